@@ -1,0 +1,26 @@
+"""The mechanism as bodies and constraints, without elements: assembly, mobility, redundancy.
+
+- ``bodies``: rigid links and interface bodies
+- ``system``: all joint constraints of a set of bodies: values, gradients, Hessians
+- ``build``: from the described mechanism to bodies and constraints
+- ``assembly``: the rigid assembly of a configuration
+- ``mobility``: free directions left and dependent constraints, by name
+"""
+
+from fenicsmech.linkage.assembly import Assembly, assemble
+from fenicsmech.linkage.bodies import Body
+from fenicsmech.linkage.build import Linkage, build_linkage
+from fenicsmech.linkage.mobility import Freedom, count_freedom
+from fenicsmech.linkage.system import Connection, JointSystem
+
+__all__ = [
+    "Assembly",
+    "Body",
+    "Connection",
+    "Freedom",
+    "JointSystem",
+    "Linkage",
+    "assemble",
+    "build_linkage",
+    "count_freedom",
+]

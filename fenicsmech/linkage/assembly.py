@@ -1,0 +1,124 @@
+"""Rigid assembly of a configuration: every link moved as a rigid body until all joints close.
+
+    C(z, φ) = 0,  motors led from φ = 0 (as drawn) to the wanted position,
+
+by Gauss–Newton steps of least norm, z ← z − A⁺ C, which stay defined where A loses rank (redundant loops,
+dead centres). The assembled state carries no elastic energy and starts every equilibrium.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenicsmech.errors import AssemblyError
+from fenicsmech.linkage.build import Linkage
+from fenicsmech.linkage.system import JointSystem
+from fenicsmech.mechanism import Configuration
+
+_CLOSED = 1e-13  # scaled constraint residual of a closed assembly
+_LARGEST_STEP = 0.1  # rad, or mechanism lengths, of motor motion at once
+_SMALLEST_STEP = 1e-4
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """Poses of all bodies in a configuration.
+
+    Attributes:
+        poses: (bodies, pose_size).
+        fraction: how much of the motor motion was possible without deforming flexible links; 1 unless the
+            motors strain the mechanism.
+    """
+
+    poses: np.ndarray
+    fraction: float
+
+
+def assemble(linkage: Linkage, configuration: Configuration) -> Assembly:
+    """The rigid assembly of ``configuration``.
+
+    If flexible links must deform for the motors to get there, the assembly stops at the last position
+    that is free of strain.
+
+    Raises:
+        AssemblyError: some loop does not close even if every flexible link could deform at will.
+    """
+    target = linkage.rigid.motor_values(configuration.position)
+    poses, fraction, _ = _follow(linkage.rigid, target)
+    if fraction < 1.0:
+        _, closing, worst = _follow(linkage.joints, linkage.joints.motor_values(configuration.position))
+        if closing < 1.0:
+            raise AssemblyError(
+                f"configuration {configuration.name!r}",
+                f"the loop through {_loop(linkage.joints, worst)} does not close: "
+                f"the motors get {closing:.1%} of the way",
+                "Check motor positions and link lengths",
+            )
+    return Assembly(poses, fraction)
+
+
+def _follow(system: JointSystem, target: np.ndarray) -> tuple[np.ndarray, float, int]:
+    """Leads the motors to ``target`` (per connection); returns poses, reached fraction, worst row."""
+    scale = np.array([system.length if c.kind.sliding else 1.0 for c in system.connections])
+    travel = float(np.max(np.abs(target / scale), initial=0.0))
+    largest = 1.0 if travel <= _LARGEST_STEP else _LARGEST_STEP / travel
+    poses, fraction, step, worst = system.drawn, 0.0, largest, 0
+    before = poses
+    poses, residual = _close(system, poses, np.zeros_like(target))
+    if np.max(np.abs(residual), initial=0.0) > _CLOSED:
+        return poses, 0.0, int(np.argmax(np.abs(residual)))
+    last_step = 0.0
+    while travel > 0.0 and fraction < 1.0:
+        step = min(step, 1.0 - fraction)
+        guess = system.unknowns(poses)
+        if last_step > 0.0:
+            guess = guess + (guess - system.unknowns(before)) * (step / last_step)
+        trial, residual = _close(system, system.with_unknowns(poses, guess), (fraction + step) * target)
+        if np.max(np.abs(residual)) <= _CLOSED:
+            before, poses, last_step = poses, trial, step
+            fraction = 1.0 if fraction + step >= 1.0 - 1e-12 else fraction + step
+            step = min(largest, 2.0 * step)
+        else:
+            worst = int(np.argmax(np.abs(residual)))
+            step *= 0.5
+            if step < _SMALLEST_STEP * largest:
+                return poses, fraction, worst
+    return poses, 1.0, worst
+
+
+def _close(system: JointSystem, poses: np.ndarray, motors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss–Newton from ``poses``; returns poses and the scaled residual, best so far."""
+    residual = system.row_scale * system.value(poses, motors)
+    for _ in range(25):
+        if np.max(np.abs(residual), initial=0.0) <= 1e-15 or not system.rows:
+            break
+        scaled = system.row_scale[:, None] * system.gradient(poses, motors) * system.pose_scale
+        step = system.pose_scale * np.linalg.lstsq(scaled, -residual, rcond=1e-10)[0]
+        trial = system.with_unknowns(poses, system.unknowns(poses) + step)
+        new = system.row_scale * system.value(trial, motors)
+        if np.linalg.norm(new) >= np.linalg.norm(residual) and np.max(np.abs(residual)) <= _CLOSED:
+            break
+        poses, residual = trial, new
+    return poses, residual
+
+
+def _loop(system: JointSystem, row: int) -> str:
+    """Names the links of the loop that the constraint ``row`` closes."""
+    name = system.row_names[row]
+    closing = next((c for c in system.connections if c.name == name), None)
+    if closing is None:
+        return name
+    paths = {closing.a: [closing.a]}
+    frontier = [closing.a]
+    while frontier and closing.b not in paths:
+        body = frontier.pop(0)
+        for c in system.connections:
+            if c is not closing and body in (c.a, c.b):
+                other = c.b if body == c.a else c.a
+                if other not in paths:
+                    paths[other] = [*paths[body], other]
+                    frontier.append(other)
+    links = dict.fromkeys(system.bodies[i].link.name for i in paths.get(closing.b, [closing.a, closing.b]))
+    return f"{name!r} ({' – '.join(links)})"

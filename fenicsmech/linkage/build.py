@@ -1,0 +1,113 @@
+"""From the described mechanism to bodies and constraints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenicsmech.joints import WELD
+from fenicsmech.linkage.bodies import Body, rigid_body
+from fenicsmech.linkage.system import Connection, JointSystem
+from fenicsmech.mechanism import FlexibleLink, Joint, Link, Mechanism
+
+
+@dataclass(frozen=True)
+class Linkage:
+    """Bodies and constraints of a mechanism.
+
+    Attributes:
+        dim: 2 or 3.
+        length: size of the mechanism, diagonal of the box around its joints and points.
+        bodies: rigid links first, then the interfaces, link by link.
+        interfaces: indices of the interface bodies of each flexible link.
+        joints: constraints of the mechanism itself: interfaces of a flexible link are independent.
+        rigid: the same with every flexible link welded into one rigid body.
+    """
+
+    dim: int
+    length: float
+    bodies: tuple[Body, ...]
+    interfaces: dict[FlexibleLink, tuple[int, ...]]
+    joints: JointSystem
+    rigid: JointSystem
+
+    def body_of(self, link: Link) -> int:
+        """Index of the body that carries ``link``: itself if rigid, its first interface if flexible."""
+        return next(i for i, body in enumerate(self.bodies) if body.link == link)
+
+
+def in_dimension(position: tuple[float, ...], dim: int) -> tuple[float, ...]:
+    """``position`` with ``dim`` coordinates; a missing z is 0."""
+    return (*position, 0.0)[:dim]
+
+
+def mechanism_length(mechanism: Mechanism) -> float:
+    """Diagonal of the box around all joints, forces and outputs."""
+    places = [in_dimension(part.at, 3) for part in (*mechanism.joints, *mechanism.forces, *mechanism.outputs)]
+    return float(np.linalg.norm(np.ptp(np.array(places), axis=0))) or 1.0
+
+
+def build_linkage(mechanism: Mechanism, dim: int) -> Linkage:
+    """The bodies and constraints of ``mechanism`` in ``dim`` dimensions."""
+    bodies = [rigid_body(link, _centre(mechanism, link, dim)) for link in mechanism.rigid_links]
+    index: dict[tuple[Link, tuple], int] = {(body.link, ()): i for i, body in enumerate(bodies)}
+    interfaces: dict[FlexibleLink, tuple[int, ...]] = {}
+    for link in mechanism.flexible_links:
+        for joint in mechanism.joints:
+            at = in_dimension(joint.at, dim)
+            if link in (joint.a, joint.b) and (link, at) not in index:
+                region = joint.regions[(joint.a, joint.b).index(link)]
+                index[link, at] = len(bodies)
+                bodies.append(Body(f"{link.name} at {joint.at}", link, at, False, region, joint.axis))
+        interfaces[link] = tuple(i for (owner, _), i in index.items() if owner == link)
+
+    def body(joint: Joint, link: Link) -> int:
+        return index[link, in_dimension(joint.at, dim) if isinstance(link, FlexibleLink) else ()]
+
+    driven = {motor.joint: motor for motor in mechanism.motors}
+    connections = [
+        Connection(
+            joint.name,
+            joint.kind,
+            body(joint, joint.a),
+            body(joint, joint.b),
+            in_dimension(joint.at, dim),
+            _triad(joint, dim),
+            driven.get(joint),
+        )
+        for joint in mechanism.joints
+    ]
+    identity = tuple(map(tuple, np.eye(dim)))
+    welds = [
+        Connection(f"link {link.name!r}", WELD, group[0], other, bodies[other].centre, identity)
+        for link, group in interfaces.items()
+        for other in group[1:]
+    ]
+    length = mechanism_length(mechanism)
+    return Linkage(
+        dim=dim,
+        length=length,
+        bodies=tuple(bodies),
+        interfaces=interfaces,
+        joints=JointSystem(bodies, connections, dim=dim, length=length),
+        rigid=JointSystem(bodies, [*connections, *welds], dim=dim, length=length),
+    )
+
+
+def _centre(mechanism: Mechanism, link: Link, dim: int) -> tuple[float, ...]:
+    places = [in_dimension(joint.at, dim) for joint in mechanism.joints if link in (joint.a, joint.b)]
+    return tuple(np.mean(places, axis=0)) if places else (0.0,) * dim
+
+
+def _triad(joint: Joint, dim: int) -> tuple[tuple[float, ...], ...]:
+    """Unit vectors of a joint as rows: in space the axis last, in the plane (axis, normal)."""
+    axis = np.array(joint.axis)
+    if dim == 2:
+        first = axis[:2] if joint.kind.sliding else np.array([1.0, 0.0])
+        return tuple(first), (-first[1], first[0])
+    # the coordinate direction least aligned with the axis; the plane's x for axes along z
+    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    e1 = helper - (helper @ axis) * axis
+    e1 /= np.linalg.norm(e1)
+    return tuple(e1), tuple(np.cross(axis, e1)), tuple(axis)

@@ -1,0 +1,79 @@
+"""What the user describes, as pure data.
+
+- ``materials``: elastic constants and strain-energy laws
+- ``shapes``: strips, outlines, STEP parts, meshes; interface regions
+- ``parts``: links, joints, motors, forces, outputs
+- ``mechanism``: the builder that collects parts
+- ``scene``: effects and configurations
+- ``validation``: checks of the whole; ``checks``: checks of single values
+"""
+
+from fenicsmech.mechanism.materials import (
+    ONYX,
+    SMOOTH_SIL_950,
+    EnergyLaw,
+    IsochoricNeoHookean,
+    IsochoricSimoNeoHookean,
+    LogarithmicNeoHookean,
+    Material,
+    NeoHookean,
+)
+from fenicsmech.mechanism.mechanism import Mechanism
+from fenicsmech.mechanism.parts import FlexibleLink, Force, Joint, Link, Motor, Output, RigidLink
+from fenicsmech.mechanism.scene import DRAWN, Configuration, Scene
+from fenicsmech.mechanism.shapes import (
+    Arc,
+    Disc,
+    Line,
+    MeshPart,
+    Outline,
+    Rectangle,
+    Region,
+    Shape,
+    StepPart,
+    Strip,
+    gmsh_mesh,
+    outline,
+    polygon,
+    step,
+    strip,
+)
+from fenicsmech.mechanism.validation import validate
+
+__all__ = [
+    "DRAWN",
+    "ONYX",
+    "SMOOTH_SIL_950",
+    "Arc",
+    "Configuration",
+    "Disc",
+    "EnergyLaw",
+    "FlexibleLink",
+    "Force",
+    "IsochoricNeoHookean",
+    "IsochoricSimoNeoHookean",
+    "Joint",
+    "Line",
+    "Link",
+    "LogarithmicNeoHookean",
+    "Material",
+    "Mechanism",
+    "MeshPart",
+    "Motor",
+    "NeoHookean",
+    "Outline",
+    "Output",
+    "Rectangle",
+    "Region",
+    "RigidLink",
+    "Scene",
+    "Shape",
+    "StepPart",
+    "Strip",
+    "gmsh_mesh",
+    "outline",
+    "polygon",
+    "step",
+    "strip",
+    "validate",
+]

@@ -1,0 +1,78 @@
+"""Checks that turn what a user typed into plain, finite data or say what is wrong with it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from fenicsmech.errors import DescriptionError
+
+
+def finite(part: str, value: float) -> float:
+    """``value`` as a float.
+
+    Raises:
+        DescriptionError: it is not a finite number.
+    """
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise DescriptionError(part, f"{value!r} is not a number", "Give a finite number") from None
+    if not math.isfinite(number):
+        raise DescriptionError(part, f"the value is {number}", "Give a finite number")
+    return number
+
+
+def positive(part: str, value: float) -> float:
+    """``value`` as a float greater than zero.
+
+    Raises:
+        DescriptionError: it is not finite or not positive.
+    """
+    number = finite(part, value)
+    if number <= 0.0:
+        raise DescriptionError(part, f"{number:g} is not positive", "Give a number greater than zero")
+    return number
+
+
+def point(part: str, values: Sequence[float], *, dimensions: tuple[int, ...] = (2, 3)) -> tuple[float, ...]:
+    """``values`` as a tuple of finite coordinates.
+
+    Raises:
+        DescriptionError: wrong number of coordinates, or one of them is not finite.
+    """
+    try:
+        coordinates = tuple(values)
+    except TypeError:
+        coordinates = ()
+    if len(coordinates) not in dimensions:
+        wanted = " or ".join(str(d) for d in dimensions)
+        raise DescriptionError(part, f"{values!r} has not {wanted} coordinates", f"Give {wanted} numbers")
+    return tuple(finite(part, c) for c in coordinates)
+
+
+def points(
+    part: str, values: Sequence[Sequence[float]], *, least: int, dimensions: tuple[int, ...]
+) -> tuple[tuple[float, ...], ...]:
+    """``values`` as a tuple of at least ``least`` points.
+
+    Raises:
+        DescriptionError: too few points, or one is not a point.
+    """
+    checked = tuple(point(part, p, dimensions=dimensions) for p in values)
+    if len(checked) < least:
+        raise DescriptionError(part, f"{len(checked)} point(s) given", f"Give at least {least} points")
+    return checked
+
+
+def direction(part: str, values: Sequence[float]) -> tuple[float, ...]:
+    """``values`` scaled to unit length.
+
+    Raises:
+        DescriptionError: it is not a vector or has no length.
+    """
+    vector = point(part, values)
+    length = math.hypot(*vector)
+    if length == 0.0:
+        raise DescriptionError(part, "the direction has zero length", "Give a vector that points somewhere")
+    return tuple(c / length for c in vector)

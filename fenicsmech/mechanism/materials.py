@@ -1,0 +1,66 @@
+"""Materials: elastic constants and the name of a strain energy; the energies themselves are in ``elasticity``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fenicsmech.errors import DescriptionError
+from fenicsmech.mechanism.checks import finite, positive
+
+
+class EnergyLaw:
+    """Which strain energy density W(F) a material has. Laws carry no numbers: E and ν are the material's."""
+
+
+@dataclass(frozen=True)
+class NeoHookean(EnergyLaw):
+    """W = μ/2 (tr FᵀF − 3 − 2 ln J) + λ/4 (J² − 1 − 2 ln J) (Simo); has a closed plane-stress form."""
+
+
+@dataclass(frozen=True)
+class LogarithmicNeoHookean(EnergyLaw):
+    """W = μ/2 (tr FᵀF − 3 − 2 ln J) + λ/2 (ln J)²."""
+
+
+@dataclass(frozen=True)
+class IsochoricNeoHookean(EnergyLaw):
+    """W = μ/2 (J^(−2/3) tr FᵀF − 3) + κ/2 (J − 1)² (CalculiX and others)."""
+
+
+@dataclass(frozen=True)
+class IsochoricSimoNeoHookean(EnergyLaw):
+    """W = μ/2 (J^(−2/3) tr FᵀF − 3) + κ/4 (J² − 1 − 2 ln J) (deal.II and others)."""
+
+
+@dataclass(frozen=True)
+class Material:
+    """An isotropic hyperelastic material.
+
+    Attributes:
+        name: for messages.
+        youngs_modulus: E at small strain, force per area.
+        poissons_ratio: ν at small strain.
+        law: the strain energy.
+
+    Raises:
+        DescriptionError: E ≤ 0, ν outside (−1, 0.5), or not numbers.
+    """
+
+    name: str
+    youngs_modulus: float
+    poissons_ratio: float
+    law: EnergyLaw = NeoHookean()
+
+    def __post_init__(self) -> None:
+        part = f"material {self.name!r}"
+        positive(f"Young's modulus of {part}", self.youngs_modulus)
+        nu = finite(f"Poisson's ratio of {part}", self.poissons_ratio)
+        if not -1.0 < nu < 0.5:
+            raise DescriptionError(part, f"Poisson's ratio is {nu:g}", "Give a value between −1 and 0.5, both excluded")
+
+
+ONYX = Material("Onyx", 1770.0, 0.42)
+"""Carbon-filled nylon, MPa; modulus fitted by the authors of the method (section VII-B)."""
+
+SMOOTH_SIL_950 = Material("Smooth-Sil 950", 1.90, 0.475)
+"""Platinum-cure silicone, MPa; constants used by the authors of the method (section VII-B)."""

@@ -1,0 +1,197 @@
+"""The mechanism as its designer describes it: links, joints, motors, forces and output points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from fenicsmech.errors import DescriptionError
+from fenicsmech.joints import (
+    CYLINDRICAL,
+    PLANAR_JOINT,
+    PRISMATIC,
+    REVOLUTE,
+    SPHERICAL,
+    UNIVERSAL,
+    WELD,
+    JointKind,
+)
+from fenicsmech.mechanism.checks import direction as unit
+from fenicsmech.mechanism.checks import point, positive
+from fenicsmech.mechanism.materials import Material
+from fenicsmech.mechanism.parts import FlexibleLink, Force, Joint, Link, Motor, Output, RigidLink
+from fenicsmech.mechanism.shapes import Disc, Rectangle, Region, Shape
+
+_Z = (0.0, 0.0, 1.0)
+
+
+class Mechanism:
+    """Collects the parts of a mechanism; every method returns the part it added, as plain data.
+
+    The drawn configuration is the unloaded, assembled one: each joint is given once, at the place where
+    both its links meet, and motor positions are counted from there.
+
+    Args:
+        name: for messages, plots and files.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.links: list[Link] = []
+        self.joints: list[Joint] = []
+        self.motors: list[Motor] = []
+        self.forces: list[Force] = []
+        self.outputs: list[Output] = []
+
+    @property
+    def flexible_links(self) -> list[FlexibleLink]:
+        """The links that bend, in the order given."""
+        return [link for link in self.links if isinstance(link, FlexibleLink)]
+
+    @property
+    def rigid_links(self) -> list[RigidLink]:
+        """The links that do not bend, in the order given."""
+        return [link for link in self.links if isinstance(link, RigidLink)]
+
+    def rigid(self, name: str, *, fixed: bool = False) -> RigidLink:
+        """Adds a rigid link; ``fixed`` makes it part of the ground."""
+        return self._add_link(RigidLink(name, fixed))
+
+    def flexible(self, name: str, shape: Shape, material: Material) -> FlexibleLink:
+        """Adds a flexible link of ``shape`` and ``material``."""
+        return self._add_link(FlexibleLink(name, shape, material))
+
+    def join(
+        self,
+        kind: JointKind,
+        a: Link,
+        b: Link,
+        *,
+        at: Sequence[float],
+        axis: Sequence[float] = _Z,
+        radius: float | None = None,
+        region: Region | None = None,
+        name: str | None = None,
+    ) -> Joint:
+        """Adds a joint of any kind between links ``a`` and ``b``.
+
+        Args:
+            kind: the joint's kind.
+            a, b: links of this mechanism.
+            at: where it is drawn, 2 or 3 coordinates (z = 0 if left out).
+            axis: its axis, 2 or 3 coordinates.
+            radius: interface radius on flexible links: everything this close to the axis moves rigidly.
+            region: interface region instead of a disc of ``radius`` (a ``Rectangle`` for clamps).
+            name: for messages; unique.
+
+        Raises:
+            DescriptionError: a link is not in the mechanism or joined with itself, a flexible link lacks an
+                interface, numbers are not finite, or the name is taken.
+        """
+        name = name or f"{kind.name} joint {a.name}–{b.name}"
+        if name in {joint.name for joint in self.joints}:
+            name = f"{name} at {tuple(at)}"
+        part = f"{name!r}"
+        self._check_name(part, name, self.joints)
+        for link in (a, b):
+            self._check_member(part, link)
+        if a is b:
+            raise DescriptionError(part, f"link {a.name!r} is joined with itself", "Name two different links")
+        if region is None and radius is not None:
+            region = Disc(radius)
+        match region:
+            case Disc(radius=value):
+                region = Disc(positive(f"radius of {part}", value))
+            case Rectangle(length=length, width=width):
+                positive(f"length of the interface of {part}", length)
+                positive(f"width of the interface of {part}", width)
+        regions = tuple(region if isinstance(link, FlexibleLink) else None for link in (a, b))
+        for link, own in zip((a, b), regions, strict=True):
+            if isinstance(link, FlexibleLink) and own is None:
+                raise DescriptionError(
+                    part, f"no interface on flexible link {link.name!r}", "Give radius=… (pin) or region=… (clamp)"
+                )
+        axis = unit(f"axis of {part}", axis)
+        joint = Joint(kind, a, b, point(f"position of {part}", at), (*axis, 0.0)[:3], regions, name)
+        self.joints.append(joint)
+        return joint
+
+    def revolute(self, a: Link, b: Link, *, at: Sequence[float], **options) -> Joint:
+        """Adds a hinge: the links share the point ``at`` and turn about ``axis`` (z); options as in ``join``."""
+        return self.join(REVOLUTE, a, b, at=at, **options)
+
+    def prismatic(self, a: Link, b: Link, *, at: Sequence[float], axis: Sequence[float], **options) -> Joint:
+        """Adds a slider along ``axis``; options as in ``join``."""
+        return self.join(PRISMATIC, a, b, at=at, axis=axis, **options)
+
+    def cylindrical(self, a: Link, b: Link, *, at: Sequence[float], axis: Sequence[float], **options) -> Joint:
+        """Adds a joint that slides along and turns about ``axis``; options as in ``join``."""
+        return self.join(CYLINDRICAL, a, b, at=at, axis=axis, **options)
+
+    def spherical(self, a: Link, b: Link, *, at: Sequence[float], **options) -> Joint:
+        """Adds a ball joint; options as in ``join``."""
+        return self.join(SPHERICAL, a, b, at=at, **options)
+
+    def universal(self, a: Link, b: Link, *, at: Sequence[float], axis: Sequence[float], **options) -> Joint:
+        """Adds a Cardan joint with shaft direction ``axis``; options as in ``join``."""
+        return self.join(UNIVERSAL, a, b, at=at, axis=axis, **options)
+
+    def planar(self, a: Link, b: Link, *, at: Sequence[float], axis: Sequence[float] = _Z, **options) -> Joint:
+        """Adds a joint whose plane, normal to ``axis``, slides and turns; options as in ``join``."""
+        return self.join(PLANAR_JOINT, a, b, at=at, axis=axis, **options)
+
+    def weld(self, a: Link, b: Link, *, at: Sequence[float], **options) -> Joint:
+        """Joins two links firmly (a clamp, if one of them is flexible); options as in ``join``."""
+        return self.join(WELD, a, b, at=at, **options)
+
+    def motor(self, joint: Joint, *, name: str | None = None) -> Motor:
+        """Adds a motor that prescribes the free coordinate of a revolute or prismatic ``joint``.
+
+        Raises:
+            DescriptionError: the joint's kind takes no motor, it has one already, or it is not in the mechanism.
+        """
+        name = name or f"motor of {joint.name}"
+        part = f"motor {name!r}"
+        self._check_name(part, name, self.motors)
+        if joint not in self.joints:
+            raise DescriptionError(part, f"{joint.name!r} is not a joint of {self.name!r}", "Add the joint first")
+        if not joint.kind.motorised:
+            raise DescriptionError(
+                part, f"a {joint.kind.name} joint takes no motor", "Use a revolute or a prismatic joint"
+            )
+        if joint in {motor.joint for motor in self.motors}:
+            raise DescriptionError(part, f"{joint.name!r} has a motor already", "Give each joint one motor")
+        motor = Motor(joint, name)
+        self.motors.append(motor)
+        return motor
+
+    def force(self, *, on: Link, at: Sequence[float], direction: Sequence[float], name: str | None = None) -> Force:
+        """Adds a dead force along ``direction`` at the material point ``at`` of link ``on``."""
+        name = name or f"force on {on.name}"
+        self._check_name(f"{name!r}", name, self.forces)
+        self._check_member(f"{name!r}", on)
+        force = Force(on, point(f"position of {name!r}", at), unit(f"direction of {name!r}", direction), name)
+        self.forces.append(force)
+        return force
+
+    def output(self, *, on: Link, at: Sequence[float], direction: Sequence[float], name: str | None = None) -> Output:
+        """Adds an output: the displacement along ``direction`` of the material point ``at`` of link ``on``."""
+        name = name or f"output on {on.name}"
+        self._check_name(f"{name!r}", name, self.outputs)
+        self._check_member(f"{name!r}", on)
+        output = Output(on, point(f"position of {name!r}", at), unit(f"direction of {name!r}", direction), name)
+        self.outputs.append(output)
+        return output
+
+    def _add_link(self, link: Link) -> Link:
+        self._check_name(f"link {link.name!r}", link.name, self.links)
+        self.links.append(link)
+        return link
+
+    def _check_member(self, part: str, link: Link) -> None:
+        if link not in self.links:
+            raise DescriptionError(part, f"{link!r} is not a link of {self.name!r}", "Add the link first")
+
+    @staticmethod
+    def _check_name(part: str, name: str, taken: Sequence[Link | Joint | Motor | Force | Output]) -> None:
+        if name in {other.name for other in taken}:
+            raise DescriptionError(part, f"the name {name!r} is taken", "Give each part a name of its own")

@@ -1,0 +1,54 @@
+"""What acts on a mechanism: the effects simulated and the configurations it is looked at in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from fenicsmech.errors import DescriptionError
+from fenicsmech.mechanism.checks import finite
+from fenicsmech.mechanism.mechanism import Mechanism
+from fenicsmech.mechanism.parts import Motor
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """Motor positions that stay as they are while loads are applied.
+
+    Attributes:
+        name: for messages, plots and tables.
+        positions: (motor, position) pairs: angle in rad or travel, counted from the drawn configuration.
+    """
+
+    name: str
+    positions: tuple[tuple[Motor, float], ...] = ()
+
+    def position(self, motor: Motor) -> float:
+        """The position of ``motor``: 0 (as drawn) unless given."""
+        return dict(self.positions).get(motor, 0.0)
+
+
+DRAWN = Configuration("as drawn")
+"""Every motor at the position in which the mechanism was drawn."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A mechanism and what is simulated of its surroundings: nothing that is not listed in ``effects``."""
+
+    mechanism: Mechanism
+    effects: Sequence = field(default_factory=tuple)
+
+    def configuration(self, name: str, positions: Mapping[Motor, float]) -> Configuration:
+        """A configuration with the given motor positions (rad or length, from the drawn configuration).
+
+        Raises:
+            DescriptionError: a motor is not in the mechanism, or its position is not finite.
+        """
+        for motor, value in positions.items():
+            if motor not in self.mechanism.motors:
+                raise DescriptionError(
+                    f"configuration {name!r}", f"{motor!r} is not a motor of {self.mechanism.name!r}", "Add it first"
+                )
+            finite(f"position of motor {motor.name!r} in configuration {name!r}", value)
+        return Configuration(name, tuple((motor, float(value)) for motor, value in positions.items()))

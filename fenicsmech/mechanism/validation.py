@@ -1,0 +1,95 @@
+"""Checks of a whole mechanism, before anything is meshed or compiled."""
+
+from __future__ import annotations
+
+from fenicsmech.errors import DescriptionError
+from fenicsmech.mechanism.mechanism import Mechanism
+from fenicsmech.mechanism.parts import FlexibleLink, Joint, Link, RigidLink
+
+
+def validate(mechanism: Mechanism, dim: int) -> None:
+    """Checks that ``mechanism`` can be simulated in ``dim`` dimensions.
+
+    Raises:
+        DescriptionError: no ground, an unconnected link, no load path to ground, a joint or direction that
+            does not exist in the plane, two interfaces of different shape at one place of a link.
+    """
+    if not mechanism.links:
+        raise DescriptionError(f"mechanism {mechanism.name!r}", "it has no links", "Add links with rigid() and flexible()")
+    _check_ground(mechanism)
+    _check_connections(mechanism)
+    _check_interfaces(mechanism)
+    if dim == 2:
+        _check_planar(mechanism)
+
+
+def _check_ground(mechanism: Mechanism) -> None:
+    if not any(isinstance(link, RigidLink) and link.fixed for link in mechanism.links):
+        raise DescriptionError(
+            f"mechanism {mechanism.name!r}",
+            "no link is fixed, so no load has a path to ground",
+            "Make one rigid link the ground: rigid(name, fixed=True)",
+        )
+
+
+def _check_connections(mechanism: Mechanism) -> None:
+    neighbours: dict[Link, set[Link]] = {link: set() for link in mechanism.links}
+    for joint in mechanism.joints:
+        neighbours[joint.a].add(joint.b)
+        neighbours[joint.b].add(joint.a)
+    for link, others in neighbours.items():
+        if not others and not (isinstance(link, RigidLink) and link.fixed):
+            raise DescriptionError(
+                f"link {link.name!r}", "it is not connected: no joint holds it", "Join it to another link or remove it"
+            )
+    grounded = {link for link in mechanism.links if isinstance(link, RigidLink) and link.fixed}
+    frontier = list(grounded)
+    while frontier:
+        new = neighbours[frontier.pop()] - grounded
+        grounded |= new
+        frontier.extend(new)
+    adrift = [link.name for link in mechanism.links if link not in grounded]
+    if adrift:
+        raise DescriptionError(
+            f"link {adrift[0]!r}",
+            f"no load path to ground: {', '.join(map(repr, adrift))} hang together but on no fixed link",
+            "Join one of them to a fixed link",
+        )
+
+
+def _check_interfaces(mechanism: Mechanism) -> None:
+    found: dict[tuple[FlexibleLink, tuple], tuple[Joint, object]] = {}
+    for joint in mechanism.joints:
+        for link, region in zip((joint.a, joint.b), joint.regions, strict=True):
+            if not isinstance(link, FlexibleLink):
+                continue
+            first, known = found.setdefault((link, joint.at), (joint, region))
+            if known != region:
+                raise DescriptionError(
+                    f"{joint.name!r}",
+                    f"its interface on {link.name!r} is {region}, but {first.name!r} has {known} at the same place",
+                    "Give joints at one place of a link the same radius or region",
+                )
+
+
+def _check_planar(mechanism: Mechanism) -> None:
+    for joint in mechanism.joints:
+        part = f"{joint.name!r}"
+        if not joint.kind.planar:
+            raise DescriptionError(
+                part, f"a {joint.kind.name} joint does not exist in a planar model", "Use space='3d' or a planar joint"
+            )
+        out_of_plane = abs(joint.axis[2])
+        if joint.kind.sliding and out_of_plane > 1e-12:
+            raise DescriptionError(
+                part, f"its axis {joint.axis} leaves the plane", "Give an axis (x, y) or use space='3d'"
+            )
+        if not joint.kind.sliding and out_of_plane < 1.0 - 1e-12:
+            raise DescriptionError(
+                part, f"its axis {joint.axis} is not normal to the plane", "Leave it at (0, 0, 1) or use space='3d'"
+            )
+    for load in (*mechanism.forces, *mechanism.outputs):
+        if len(load.direction) == 3 and abs(load.direction[2]) > 1e-12:
+            raise DescriptionError(
+                f"{load.name!r}", f"its direction {load.direction} leaves the plane", "Give (x, y) or use space='3d'"
+            )

@@ -1,0 +1,209 @@
+"""Load–displacement curves: as a table for other programs and as a plot for the eye."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from numpy.typing import ArrayLike, NDArray
+
+from fenicsmech.errors import DescriptionError
+from fenicsmech.report.arrays import real_array
+from fenicsmech.report.atomic import atomic_write
+from fenicsmech.report.canvas import INK, PALETTE, house_style, new_figure, open_frame, save_png
+
+
+@dataclass(frozen=True, eq=False)
+class CurveSeries:
+    """One curve of a plot.
+
+    Args:
+        displacement: (n,) abscissae.
+        force: (n,) ordinates.
+        label: its name in the legend.
+        stable: (n,) whether each equilibrium is stable; None: all are.
+        joined: draw the line through the samples; False for measurements.
+        colour: a matplotlib colour; None takes the next of the palette.
+
+    Raises:
+        DescriptionError: the arrays differ in length or are not finite.
+    """
+
+    displacement: NDArray[np.float64]
+    force: NDArray[np.float64]
+    label: str = ""
+    stable: NDArray[np.bool_] | None = None
+    joined: bool = True
+    colour: str | None = None
+
+    def __post_init__(self) -> None:
+        part = f"curve '{self.label}'"
+        displacement = real_array(f"displacements of {part}", self.displacement, None)
+        force = real_array(f"forces of {part}", self.force, len(displacement))
+        stable = np.ones(len(force), bool) if self.stable is None else np.array(self.stable, dtype=bool)
+        if stable.shape != force.shape:
+            raise DescriptionError(
+                f"stability of {part}", f"{stable.size} flags for {force.size} samples", "Give one flag per sample"
+            )
+        for name, value in (("displacement", displacement), ("force", force), ("stable", stable)):
+            object.__setattr__(self, name, value)
+
+
+@dataclass(frozen=True)
+class CurveTarget:
+    """A point the curve shall pass through; ``colour`` None draws it in ink."""
+
+    displacement: float
+    force: float
+    colour: str | None = None
+
+
+def plot_curve(
+    path: str | Path,
+    series: Sequence[CurveSeries],
+    *,
+    targets: Sequence[CurveTarget] = (),
+    xlabel: str = "displacement [mm]",
+    ylabel: str = "force [N]",
+    title: str = "",
+) -> None:
+    """Draw load–displacement curves: displacement across, force up, as in the field's papers.
+
+    Stable parts are solid, unstable parts dashed, computed samples are dots, targets open diamonds.
+
+    Args:
+        path: the PNG file.
+        series: the curves, drawn in this order.
+        targets: points the curves shall pass through.
+        xlabel, ylabel: quantity and unit of the axes.
+        title: a line above the plot.
+
+    Raises:
+        DescriptionError: the name does not end in .png.
+    """
+    with house_style():
+        figure = new_figure(6.4, 4.4)
+        figure.set_layout_engine("constrained")
+        axes = figure.add_subplot()
+        for index, curve in enumerate(series):
+            _draw_series(axes, curve, curve.colour or PALETTE[index % len(PALETTE)])
+        for target in targets:
+            axes.plot(
+                target.displacement, target.force, "D", ms=8, mfc="none", mec=target.colour or INK, mew=1.5, zorder=5
+            )
+        axes.margins(0.05)
+        axes.axhline(0.0, color="#bbbbbb", lw=0.8, zorder=0.5)
+        axes.axvline(0.0, color="#bbbbbb", lw=0.8, zorder=0.5)
+        axes.grid(True)
+        open_frame(axes)
+        axes.set(xlabel=xlabel, ylabel=ylabel)
+        axes.set_title(title, loc="left")
+        _draw_legend(axes, series, targets)
+        save_png(figure, path)
+
+
+def _draw_series(axes: Axes, curve: CurveSeries, colour: str) -> None:
+    x, y, stable = curve.displacement, curve.force, curve.stable
+    if curve.joined:
+        # a step is stable when both its ends are
+        solid = stable[:-1] & stable[1:]
+        for part, style in ((solid, "-"), (~solid, (0, (3.5, 2.0)))):
+            # breaking the line with NaN keeps one artist per style
+            runs = [np.array([[np.nan, np.nan]])]
+            edges = np.flatnonzero(np.diff(np.concatenate(([0], part.astype(int), [0]))))
+            for start, stop in edges.reshape(-1, 2):
+                runs += [np.column_stack((x[start : stop + 1], y[start : stop + 1])), runs[0]]
+            line = np.concatenate(runs)
+            axes.plot(line[:, 0], line[:, 1], ls=style, color=colour, lw=2.0, zorder=3)
+    size = 4.5 if len(x) <= 40 else 2.5
+    for part, face in ((stable, colour), (~stable, "white")):
+        axes.plot(x[part], y[part], "o", ms=size, mfc=face, mec=colour, mew=1.0, zorder=4)
+
+
+def _draw_legend(axes: Axes, series: Sequence[CurveSeries], targets: Sequence[CurveTarget]) -> None:
+    handles = [
+        Line2D(
+            [], [], color=curve.colour or PALETTE[i % len(PALETTE)], label=curve.label,
+            lw=2.0 if curve.joined else 0.0, marker="o", ms=4.5,
+        )
+        for i, curve in enumerate(series)
+        if curve.label
+    ]  # fmt: skip
+    if any(curve.joined and not curve.stable.all() for curve in series):
+        handles.append(
+            Line2D([], [], color="#777777", ls=(0, (3.5, 2.0)), lw=2.0, marker="o", ms=4.5, mfc="white", label="unstable")
+        )
+    if targets:
+        handles.append(Line2D([], [], lw=0, marker="D", ms=8, mfc="none", mec=INK, mew=1.5, label="target"))
+    if handles:
+        axes.legend(handles=handles, loc="best", framealpha=0.9, edgecolor="none")
+
+
+def write_curve_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> None:
+    """Write columns of numbers under their headers; floats keep every digit.
+
+    Args:
+        path: the CSV file.
+        columns: header with unit ("force [N]") to (n,) values; flags become 0 and 1.
+
+    Raises:
+        DescriptionError: no column, columns of different length, or a value that is not finite.
+    """
+    if not columns:
+        raise DescriptionError(f"table '{path}'", "there is no column", "Give at least one")
+    rows = None
+    checked = []
+    for header, values in columns.items():
+        column = real_array(f"column '{header}' of '{path}'", values, rows)
+        rows = len(column)
+        exact = np.asarray(values)
+        checked.append(exact.astype(int) if exact.dtype.kind in "bui" else column)
+    with atomic_write(path) as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(zip(*(column.tolist() for column in checked), strict=True))
+
+
+def read_curve_csv(path: str | Path) -> dict[str, NDArray[np.float64]]:
+    """Read what :func:`write_curve_csv` writes, or a spreadsheet's export of the same form.
+
+    Blank lines and lines that start with # are skipped.
+
+    Returns:
+        header to (n,) values, in the order of the file.
+
+    Raises:
+        DescriptionError: no header, a repeated header, a row of another length, or a field that is no finite number.
+        OSError: the file cannot be read.
+    """
+    with open(path, encoding="utf-8-sig", newline="") as file:  # -sig: spreadsheets put a byte-order mark first
+        reader = csv.reader(file)
+        rows = [(reader.line_num, row) for row in reader if "".join(row).strip() and not row[0].lstrip().startswith("#")]
+    if not rows:
+        raise DescriptionError(f"table '{path}'", "it is empty", "Start it with a line of headers")
+    headers = [header.strip() for header in rows[0][1]]
+    if len(set(headers)) < len(headers) or "" in headers:
+        raise DescriptionError(f"table '{path}'", f"the headers are {headers}", "Give each column its own name")
+    values = np.empty((len(rows) - 1, len(headers)))
+    for index, (line, row) in enumerate(rows[1:]):
+        if len(row) != len(headers):
+            raise DescriptionError(
+                f"table '{path}', line {line}", f"{len(row)} fields for {len(headers)} columns", "Complete the line"
+            )
+        values[index] = [_number(f"table '{path}', line {line}", field) for field in row]
+    return {header: values[:, k].copy() for k, header in enumerate(headers)}
+
+
+def _number(part: str, field: str) -> float:
+    try:
+        number = float(field)
+    except ValueError:
+        raise DescriptionError(part, f"'{field}' is not a number", "Give a number with a decimal point") from None
+    if not np.isfinite(number):
+        raise DescriptionError(part, f"the value is {number}", "Give a finite number")
+    return number

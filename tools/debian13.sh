@@ -1,0 +1,132 @@
+#!/bin/bash
+# Run a command on the current tree in a Debian 13 root built with debootstrap.
+#
+#   tools/debian13.sh COMMAND...
+#
+# The root is built when it is missing or when what it is made of has changed, and kept in
+# ${XDG_CACHE_HOME:-$HOME/.cache}/fenicsmech/debian13 (FENICSMECH_DEBIAN13 overrides this). Each run starts from a
+# fresh copy of the tree in /fenicsmech; nothing is written back. Needs root, or sudo.
+set -euo pipefail
+
+suite=trixie
+tree=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+root=${FENICSMECH_DEBIAN13:-${XDG_CACHE_HOME:-$HOME/.cache}/fenicsmech/debian13}
+environment=(HOME=/root LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive
+    PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin)
+
+fail() {
+    printf 'tools/debian13.sh: %s\n' "$@" >&2
+    exit 1
+}
+
+packages() { # the names in the package lists, without the comments
+    sed -E 's/#.*//' "$tree/tools/packages/run.txt" "$tree/tools/packages/debian13.txt" | xargs
+}
+
+# The mirror the host's own Debian packages come from.
+host_mirror() {
+    local uri
+    uri=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 'Origin: Debian' 'Label: Debian' || true)
+    uri=${uri%%$'\n'*}
+    if [[ $uri == mirror+file:* ]]; then # a file that lists mirrors, as Debian's cloud images have it
+        uri=$(grep -oEm 1 'https?://[^[:space:]]+' "${uri#mirror+file:}" || true)
+    fi
+    if [[ $uri != http?(s)://* ]]; then
+        uri=http://deb.debian.org/debian
+    fi
+    echo "${uri%/}"
+}
+
+# wget, which debootstrap downloads with, learns of a proxy from the environment only; apt may have one of its own.
+export_apt_proxy() {
+    local http='' https=''
+    eval "$(apt-config shell http Acquire::http::Proxy https Acquire::https::Proxy)"
+    if [[ $http == http* ]]; then export http_proxy=${http_proxy:-$http}; fi
+    if [[ $https == http* ]]; then export https_proxy=${https_proxy:-$https}; fi
+}
+
+# How the host's apt reaches its mirror (proxy, certificates, retries, clock tolerance), for the apt in the root.
+copy_apt_settings() {
+    local target=$1 settings=$1/etc/apt/apt.conf.d/00host file
+    apt-config dump | { grep -E '^Acquire::(http|https|Retries|Check|ForceIPv)' || true; } >"$settings"
+    for file in /etc/resolv.conf /etc/ssl/certs/ca-certificates.crt $(sed -nE 's/^.*"(\/[^"]+)";$/\1/p' "$settings"); do
+        if [ -f "$file" ]; then
+            mkdir -p "$target${file%/*}"
+            cp -L "$file" "$target$file"
+        fi
+    done
+}
+
+# Run a command inside a root. The mounts live in a namespace of their own, so that none is left behind however this
+# ends. Where mounting is forbidden (some containers) the device nodes that debootstrap made must do.
+enter() {
+    local target=$1
+    shift
+    if unshare --mount true 2>/dev/null; then
+        unshare --mount --propagation private bash -euc '
+            target=$1; shift
+            mount --rbind /dev "$target/dev"
+            mount -t tmpfs -o mode=1777 tmpfs "$target/dev/shm"
+            mount --rbind /sys "$target/sys"
+            mount -t proc proc "$target/proc"
+            exec chroot "$target" /usr/bin/env -i "$@"' enter "$target" "${environment[@]}" "$@"
+    else
+        chroot "$target" /usr/bin/env -i "${environment[@]}" "$@"
+    fi
+}
+
+fill() { # a new root
+    local target=$1 mirror=$2
+    export_apt_proxy
+    debootstrap --variant=minbase "$suite" "$target" "$mirror"
+    copy_apt_settings "$target"
+    # Documentation and translations, which nothing here reads, take as long to unpack as the programs.
+    printf 'path-exclude=/usr/share/%s/*\n' doc man locale >"$target/etc/dpkg/dpkg.cfg.d/fenicsmech"
+    echo force-unsafe-io >>"$target/etc/dpkg/dpkg.cfg.d/fenicsmech"
+    enter "$target" apt-get update
+    enter "$target" apt-get install -y --no-install-recommends $(packages)
+    enter "$target" apt-get clean
+    echo /fenicsmech >"$target/usr/lib/python3/dist-packages/fenicsmech.pth"
+}
+
+build() {
+    local log=$root.log mirror
+    mirror=$(host_mirror)
+    echo "Building a Debian 13 root in $root from $mirror: about two minutes"
+    rm -rf --one-file-system "$root.partial" "$root"
+    mkdir -p "$root.partial"
+    trap 'tail -n 5 "$log" >&2; fail "the root could not be built; the whole log is $log"' EXIT
+    (fill "$root.partial" "$mirror") >"$log" 2>&1
+    trap - EXIT
+    echo "$recipe" >"$root.partial/recipe"
+    mv "$root.partial" "$root"
+}
+
+copy_tree() {
+    rm -rf --one-file-system "$root/fenicsmech"
+    mkdir "$root/fenicsmech"
+    tar -C "$tree" --exclude-vcs --exclude=./.venv --exclude=./results --exclude=__pycache__ --exclude='.*_cache' \
+        -cf - . | tar -C "$root/fenicsmech" --no-same-owner -xf -
+}
+
+if [ "$(id -u)" != 0 ]; then
+    command -v sudo >/dev/null || fail "building and entering a root needs root or sudo, and neither is at hand"
+    pass=("FENICSMECH_DEBIAN13=$root")
+    for name in http_proxy https_proxy no_proxy; do
+        if [ -n "${!name:-}" ]; then pass+=("$name=${!name}"); fi
+    done
+    exec sudo env "${pass[@]}" bash "${BASH_SOURCE[0]}" "$@"
+fi
+
+[ $# -gt 0 ] || fail "no command given, for example: tools/debian13.sh python3 -c 'import fenicsmech'"
+command -v debootstrap >/dev/null || fail "debootstrap is missing; run: make install-test"
+
+mkdir -p "${root%/*}"
+exec 9>"$root.lock"
+flock 9 # one build or run at a time
+recipe=$({ packages; declare -f fill copy_apt_settings; } | sha256sum)
+if [ "$(cat "$root/recipe" 2>/dev/null)" != "$recipe" ]; then
+    build
+fi
+copy_tree
+enter "$root" env -C /fenicsmech "$@"
