@@ -1,0 +1,55 @@
+"""fenicsmech: flexible-link mechanisms on FEniCSx.
+
+Describe a mechanism (``Mechanism``), say what acts on it (``Scene``) and how finely it is computed
+(``Simulation``), and ask for load–displacement curves.
+"""
+
+from fenicsmech.errors import AssemblyError, DescriptionError, EquilibriumError, FenicsmechError, MeshingError
+from fenicsmech.mechanism import (
+    DRAWN,
+    ONYX,
+    SMOOTH_SIL_950,
+    Arc,
+    Configuration,
+    Disc,
+    Line,
+    Material,
+    Mechanism,
+    Rectangle,
+    Scene,
+    gmsh_mesh,
+    outline,
+    polygon,
+    step,
+    strip,
+)
+from fenicsmech.simulation import Curve, Frame, Simulation
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "DRAWN",
+    "ONYX",
+    "SMOOTH_SIL_950",
+    "Arc",
+    "AssemblyError",
+    "Configuration",
+    "Curve",
+    "DescriptionError",
+    "Disc",
+    "EquilibriumError",
+    "FenicsmechError",
+    "Frame",
+    "Line",
+    "Material",
+    "Mechanism",
+    "MeshingError",
+    "Rectangle",
+    "Scene",
+    "Simulation",
+    "gmsh_mesh",
+    "outline",
+    "polygon",
+    "step",
+    "strip",
+]

@@ -16,6 +16,10 @@ class FenicsmechError(Exception):
         self.part, self.problem, self.remedy = part, problem, remedy
         super().__init__(f"{part}: {problem}. {remedy}.")
 
+    def __reduce__(self):
+        # errors travel between MPI ranks
+        return type(self), (self.part, self.problem, self.remedy)
+
 
 class DescriptionError(FenicsmechError, ValueError):
     """The description of a mechanism, scene or request contradicts itself or is incomplete."""

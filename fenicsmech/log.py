@@ -16,9 +16,15 @@ class _RankZero(logging.Filter):
         return MPI.COMM_WORLD.rank == 0
 
 
+class _Console(logging.StreamHandler):
+    """The handler `configure` installs; a class of its own, so that configuring again replaces it."""
+
+    def __init__(self) -> None:
+        super().__init__()  # standard error as it is now
+        self.setFormatter(logging.Formatter("%(asctime)s %(levelname)-7s %(name)s: %(message)s", "%H:%M:%S"))
+
+
 _RANK_ZERO = _RankZero()
-_HANDLER = logging.StreamHandler()
-_HANDLER.setFormatter(logging.Formatter("%(asctime)s %(levelname)-7s %(name)s: %(message)s", "%H:%M:%S"))
 
 
 def logger(name: str) -> logging.Logger:
@@ -42,5 +48,7 @@ def configure(level: int = logging.INFO) -> None:
         level: the lowest level shown, `logging.DEBUG`, `logging.INFO` and so on.
     """
     package = logging.getLogger(ROOT)
+    for handler in [handler for handler in package.handlers if isinstance(handler, _Console)]:
+        package.removeHandler(handler)
+    package.addHandler(_Console())
     package.setLevel(level)
-    package.addHandler(_HANDLER)

@@ -63,7 +63,7 @@ case $purpose in
     run | test) ;;
     *) fail "usage: tools/install-debian.sh run|test" ;;
 esac
-command -v apt-get dpkg-query >/dev/null || fail "this is not Debian: install the packages in tools/packages by hand."
+command -v apt-get >/dev/null || fail "this is not Debian: install the packages listed in tools/packages by hand."
 
 mapfile -t missing < <(missing_packages)
 if [ ${#missing[@]} -gt 0 ]; then

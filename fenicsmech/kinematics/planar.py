@@ -44,6 +44,9 @@ class Planar(RigidSpace):
     def norm_hessian(self) -> np.ndarray:
         return np.zeros((0, 3, 3))
 
+    def turns(self, pose: np.ndarray) -> np.ndarray:
+        return np.ones((1, 1))
+
     def symbolic_rotation(self, parameters: list[sympy.Symbol]) -> sympy.Matrix:
         (angle,) = parameters
         return sympy.Matrix([[sympy.cos(angle), -sympy.sin(angle)], [sympy.sin(angle), sympy.cos(angle)]])

@@ -68,6 +68,10 @@ class RigidSpace(ABC):
         """Hessian of ``norm_residual``, shape (n, pose_size, pose_size)."""
 
     @abstractmethod
+    def turns(self, pose: np.ndarray) -> np.ndarray:
+        """∂r/∂ω for a small rotation vector ω in space, (rotation_size, 1 or 3)."""
+
+    @abstractmethod
     def symbolic_rotation(self, parameters: list[sympy.Symbol]) -> sympy.Matrix:
         """R(r) in sympy; must be the same formula as the numeric one."""
 

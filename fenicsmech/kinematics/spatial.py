@@ -67,6 +67,12 @@ class Spatial(RigidSpace):
     def norm_hessian(self) -> np.ndarray:
         return 2.0 * np.diag([0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0])[None]
 
+    def turns(self, pose: np.ndarray) -> np.ndarray:
+        # dq = ½ (0, ω) ∘ q
+        w, v = pose[3], pose[4:]
+        cross = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+        return 0.5 * np.vstack([-v, w * np.eye(3) - cross])
+
     def symbolic_rotation(self, parameters: list[sympy.Symbol]) -> sympy.Matrix:
         w, x, y, z = parameters
         v = sympy.Matrix([x, y, z])

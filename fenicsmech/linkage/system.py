@@ -68,7 +68,6 @@ class JointSystem:
             for c, rows in zip(self.connections, self._joint_rows, strict=True)
             if c.motor is not None
         }
-        self.joint_rows = {c.name: rows for c, rows in zip(self.connections, self._joint_rows, strict=True)}
 
         one = np.concatenate([np.full(dim, length), np.ones(self.space.rotation_size)])
         self.pose_scale = np.tile(one, len(self.free_bodies))
@@ -135,6 +134,13 @@ class JointSystem:
         for body, rows in self._norm_rows.items():
             curvature = np.einsum("k,kij->ij", multipliers[rows], self.space.norm_hessian())
             yield self.columns[body], self.columns[body], curvature
+
+    def pull(self, k: int, body: int, poses: np.ndarray, motors: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+        """Generalised force Aᵀλ of connection ``k`` on the pose of ``body``, (pose_size,)."""
+        half = self.space.pose_size
+        both = self._constraints[k].gradient(*self._arguments(k, poses, motors))
+        end = both[:, :half] if body == self.connections[k].a else both[:, half:]
+        return end.T @ multipliers[self._joint_rows[k]]
 
     def motor_rate(self, poses: np.ndarray, motors: np.ndarray, direction: np.ndarray) -> np.ndarray:
         """∂C/∂φ · ``direction`` (per connection), (rows,)."""

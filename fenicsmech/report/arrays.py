@@ -43,9 +43,8 @@ def index_array(part: str, values: ArrayLike, *shape: int | None, below: int) ->
     array = array.astype(np.int64)
     _check_shape(part, array, shape)
     if array.size and (array.min() < 0 or array.max() >= below):
-        raise DescriptionError(
-            part, f"indices run from {array.min()} to {array.max()}", f"Only 0 to {below - 1} exist; check the numbering"
-        )
+        found = f"indices run from {array.min()} to {array.max()}"
+        raise DescriptionError(part, found, f"Only 0 to {below - 1} exist; check the numbering")
     array.setflags(write=False)
     return array
 

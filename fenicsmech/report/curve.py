@@ -17,6 +17,8 @@ from fenicsmech.report.arrays import real_array
 from fenicsmech.report.atomic import atomic_write
 from fenicsmech.report.canvas import INK, PALETTE, house_style, new_figure, open_frame, save_png
 
+_DASHES = (0, (3.0, 1.6))  # of unstable parts
+
 
 @dataclass(frozen=True, eq=False)
 class CurveSeries:
@@ -61,6 +63,9 @@ class CurveTarget:
     displacement: float
     force: float
     colour: str | None = None
+
+    def __post_init__(self) -> None:
+        real_array("displacement and force of a target", (self.displacement, self.force), 2)
 
 
 def plot_curve(
@@ -112,7 +117,7 @@ def _draw_series(axes: Axes, curve: CurveSeries, colour: str) -> None:
     if curve.joined:
         # a step is stable when both its ends are
         solid = stable[:-1] & stable[1:]
-        for part, style in ((solid, "-"), (~solid, (0, (3.5, 2.0)))):
+        for part, style in ((solid, "-"), (~solid, _DASHES)):
             # breaking the line with NaN keeps one artist per style
             runs = [np.array([[np.nan, np.nan]])]
             edges = np.flatnonzero(np.diff(np.concatenate(([0], part.astype(int), [0]))))
@@ -136,12 +141,12 @@ def _draw_legend(axes: Axes, series: Sequence[CurveSeries], targets: Sequence[Cu
     ]  # fmt: skip
     if any(curve.joined and not curve.stable.all() for curve in series):
         handles.append(
-            Line2D([], [], color="#777777", ls=(0, (3.5, 2.0)), lw=2.0, marker="o", ms=4.5, mfc="white", label="unstable")
+            Line2D([], [], color="#777777", ls=_DASHES, lw=2.0, marker="o", ms=4.5, mfc="white", label="unstable")
         )
     if targets:
         handles.append(Line2D([], [], lw=0, marker="D", ms=8, mfc="none", mec=INK, mew=1.5, label="target"))
     if handles:
-        axes.legend(handles=handles, loc="best", framealpha=0.9, edgecolor="none")
+        axes.legend(handles=handles, loc="best", framealpha=0.9, edgecolor="none", handlelength=2.8)
 
 
 def write_curve_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> None:
@@ -183,7 +188,8 @@ def read_curve_csv(path: str | Path) -> dict[str, NDArray[np.float64]]:
     """
     with open(path, encoding="utf-8-sig", newline="") as file:  # -sig: spreadsheets put a byte-order mark first
         reader = csv.reader(file)
-        rows = [(reader.line_num, row) for row in reader if "".join(row).strip() and not row[0].lstrip().startswith("#")]
+        lines = [(reader.line_num, row) for row in reader]
+    rows = [(line, row) for line, row in lines if "".join(row).strip() and not row[0].lstrip().startswith("#")]
     if not rows:
         raise DescriptionError(f"table '{path}'", "it is empty", "Start it with a line of headers")
     headers = [header.strip() for header in rows[0][1]]

@@ -50,7 +50,7 @@ def _plain(key: str, value: object) -> object:
         return value
     if isinstance(value, float):
         if not math.isfinite(value):
-            raise _error(key, f"the value is {value}", "Use None for what is not known and find out where it comes from")
+            raise _error(key, f"the value is {value}", "Use None for what is not known")
         return value
     if isinstance(value, Path):
         return str(value)

@@ -1,0 +1,85 @@
+# `make demo` and `make test` are all a user types on a fresh Debian machine; `make help` lists the rest.
+SHELL := /bin/bash
+.NOTPARALLEL:
+
+PYTHON := .venv/bin/python3
+RANKS := 2
+SELECT := not slow
+DEMOS := truss claw klann
+
+# Debian's packages and nothing else: not the user's ~/.local, not a PYTHONPATH meant for another Python.
+export PYTHONNOUSERSITE := 1
+unexport PYTHONPATH PYTHONHOME
+
+# Open MPI (OMPI_ up to version 4, PRTE_ from 5): may run as root and with more ranks than cores, which containers
+# and small machines need; ranks are not bound to cores, so that two runs at once do not share one.
+export OMPI_ALLOW_RUN_AS_ROOT := 1
+export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
+export OMPI_MCA_rmaps_base_oversubscribe := 1
+export OMPI_MCA_hwloc_base_binding_policy := none
+export OMPI_MCA_btl_vader_single_copy_mechanism := none
+export PRTE_MCA_rmaps_default_mapping_policy := :oversubscribe
+export PRTE_MCA_hwloc_default_binding_policy := none
+
+MPIRUN = OPENBLAS_NUM_THREADS=1 mpirun -n $(RANKS)
+heading = @printf '\n--- %s\n' '$(1)'
+
+.PHONY: help demo test install install-test lint test-serial test-parallel test-slow test-debian13 demos-quick bench clean
+
+help: ## list the targets
+	@sed -nE 's/^([a-z0-9-]+):.*## (.*)/\1\t\2/p' Makefile | expand -t 16
+
+demo: install ## install what is missing and run the truss finger; pictures and summary.json in results/truss/
+	$(PYTHON) demos/truss.py
+
+test: lint test-serial test-parallel demos-quick test-debian13 ## everything but the slow tests
+
+# Where the packages come from elsewhere (the Debian 13 root), INSTALL= switches the installation off.
+INSTALL := yes
+
+install: ## what `make demo` needs
+	$(if $(INSTALL),@tools/install-debian.sh run)
+
+install-test: ## what `make test` needs
+	$(if $(INSTALL),@tools/install-debian.sh test)
+
+lint: install-test ## style and layering: seconds
+	$(call heading,lint)
+	$(PYTHON) -m ruff check .
+	$(PYTHON) -m ruff format --check .
+	$(PYTHON) -m pytest -q tests/test_layering.py
+
+test-serial: install-test ## the tests on one process
+	$(call heading,tests on one process)
+	$(PYTHON) -m pytest --durations=5 --durations-min=5 -m "$(SELECT)"
+
+test-parallel: install-test ## the tests marked `parallel` on $(RANKS) MPI ranks
+	$(call heading,tests on $(RANKS) ranks)
+	$(MPIRUN) $(PYTHON) -m pytest --color=no -p no:cacheprovider -m "parallel and ($(SELECT))"
+
+test-slow: install-test ## the tests marked `slow`
+	$(call heading,slow tests)
+	$(PYTHON) -m pytest -m slow
+
+test-debian13: install-test ## the tests in a Debian 13 root (built once, about two minutes)
+	$(call heading,tests in Debian 13)
+	tools/debian13.sh make --no-print-directory INSTALL= PYTHON=/usr/bin/python3 \
+	    SELECT="$(SELECT) and not calculix" test-serial test-parallel
+
+demos-quick: $(DEMOS:%=demo-quick-%) ## every demo, coarse, in results/quick/
+
+.PHONY: $(DEMOS:%=demo-quick-%)
+$(DEMOS:%=demo-quick-%): demo-quick-%: install
+	$(call heading,demo $*)
+	$(PYTHON) demos/$*.py --quick --out results/quick/$*
+
+bench: $(DEMOS:%=bench-%) ## seconds per frame (frame_median) of every demo's initial design, in results/bench/
+
+.PHONY: $(DEMOS:%=bench-%)
+$(DEMOS:%=bench-%): bench-%: install
+	$(call heading,benchmark $*)
+	$(PYTHON) demos/$*.py --simulate-only --out results/bench/$*
+
+clean: ## remove what the targets above left in this tree
+	rm -rf .venv results .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -prune -exec rm -rf {} +

@@ -1,0 +1,128 @@
+"""Material points that forces act on and displacements are read from.
+
+    on a rigid link:     u(z) = t + (R − I)(P − c)
+    on a flexible link:  u = Σ_i N_i(P) u_i, the finite-element interpolation in the cell that holds P.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from dolfinx import fem
+
+from fenicsmech.errors import DescriptionError
+from fenicsmech.kinematics import RigidSpace
+
+
+class MaterialPoint(ABC):
+    """A point that moves with the mechanism."""
+
+    @abstractmethod
+    def displacement(self, u: fem.Function, poses: np.ndarray) -> np.ndarray:
+        """Displacement from the drawn configuration, (dim,) (collective)."""
+
+
+@dataclass(frozen=True)
+class BodyPoint(MaterialPoint):
+    """A point at ``offset`` (dim,) from the centre of body ``body``."""
+
+    body: int
+    offset: np.ndarray
+    space: RigidSpace
+
+    def displacement(self, u, poses):
+        return self.space.displace(poses[self.body], self.offset[None])[0]
+
+    def gradient(self, poses: np.ndarray) -> np.ndarray:
+        """∂u/∂z, (dim, pose_size)."""
+        return self.space.displacement_gradient(poses[self.body], self.offset[None])[0]
+
+    def hessian(self, poses: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """force · ∂²u/∂z², (pose_size, pose_size)."""
+        return self.space.displacement_hessian(poses[self.body], np.outer(force, self.offset))
+
+
+@dataclass(frozen=True)
+class LinkPoint(MaterialPoint):
+    """A point in a cell of a flexible link, held by one rank.
+
+    Attributes:
+        owner: rank that holds the cell.
+        nodes: local nodes of the cell on the owner, global nodes are in ``global_nodes``; (n,).
+        global_nodes: the same nodes numbered over all ranks, on every rank, (n,).
+        weights: N_i(P), on every rank, (n,).
+    """
+
+    owner: int
+    nodes: np.ndarray
+    global_nodes: np.ndarray
+    weights: np.ndarray
+
+    def displacement(self, u, poses):
+        comm = u.function_space.mesh.comm
+        here = None
+        if comm.rank == self.owner:
+            block = u.function_space.dofmap.index_map_bs
+            here = self.weights @ u.x.array.reshape(-1, block)[self.nodes]
+        return comm.bcast(here, root=self.owner)
+
+
+def body_point(position: np.ndarray, body: int, centre: np.ndarray, space: RigidSpace) -> BodyPoint:
+    """The point drawn at ``position`` on a body."""
+    return BodyPoint(body, np.asarray(position) - np.asarray(centre), space)
+
+
+def link_point(part: str, position: np.ndarray, u: fem.Function, cells: np.ndarray, vertices: np.ndarray) -> LinkPoint:
+    """The point drawn at ``position`` on a flexible link (collective).
+
+    Args:
+        part: for messages.
+        position: (dim,).
+        u: displacement field; its order fixes the interpolation.
+        cells: owned cells of the link on this rank.
+        vertices: their corner coordinates, (cells, dim + 1, dim).
+
+    Raises:
+        DescriptionError: the point lies outside the link by more than a hundredth of a cell.
+    """
+    comm = u.function_space.mesh.comm
+    dim = len(position)
+    best = (-np.inf, comm.rank, 0, np.zeros(dim + 1))
+    if len(cells):
+        edges = vertices[:, 1:] - vertices[:, :1]
+        rest = np.linalg.solve(edges.transpose(0, 2, 1), (position - vertices[:, 0])[..., None])[..., 0]
+        barycentric = np.column_stack([1.0 - rest.sum(axis=1), rest])
+        inside = barycentric.min(axis=1)
+        winner = int(np.argmax(inside))
+        best = (float(inside[winner]), comm.rank, int(cells[winner]), barycentric[winner])
+    deepest = max(comm.allgather(best), key=lambda found: (found[0], -found[1]))
+    if deepest[0] < -0.01:
+        raise DescriptionError(part, f"the point {tuple(map(float, position))} is not on the link", "Move it onto the link")
+    _, owner, cell, barycentric = deepest
+    found = None
+    if comm.rank == owner:
+        V = u.function_space
+        nodes = V.dofmap.cell_dofs(cell)
+        weights = _lagrange(np.asarray(barycentric), V.tabulate_dof_coordinates()[nodes, :dim], vertices[cells == cell][0])
+        found = (V.dofmap.index_map.local_to_global(nodes.astype(np.int32)), weights)
+    global_nodes, weights = comm.bcast(found, root=owner)
+    local = nodes if comm.rank == owner else np.zeros(0, dtype=np.int32)
+    return LinkPoint(owner, local, global_nodes, weights)
+
+
+def _lagrange(at: np.ndarray, nodes: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Lagrange basis on a simplex at barycentric coordinates ``at``, node positions decide the order."""
+    inverse = np.linalg.inv(np.vstack([corners.T, np.ones(len(corners))]))
+    barycentric = (inverse @ np.vstack([nodes.T, np.ones(len(nodes))])).T
+    order = {len(at): 1, len(at) * (len(at) + 1) // 2: 2}.get(len(nodes), 3)
+    powers = _monomials(len(at), order)
+    vandermonde = np.array([np.prod(point**powers, axis=1) for point in barycentric])
+    return np.linalg.solve(vandermonde.T, np.prod(at**powers, axis=1))
+
+
+def _monomials(variables: int, order: int) -> np.ndarray:
+    """Exponents of all monomials of degree ``order`` in ``variables`` barycentric coordinates."""
+    grid = np.stack(np.meshgrid(*[np.arange(order + 1)] * variables, indexing="ij"), axis=-1).reshape(-1, variables)
+    return grid[grid.sum(axis=1) == order]

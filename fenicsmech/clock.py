@@ -1,0 +1,31 @@
+"""Where the time goes: seconds per named phase."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from time import perf_counter
+
+
+class Clock:
+    """Adds up wall-clock seconds per phase.
+
+    Attributes:
+        seconds: phase → seconds so far.
+    """
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def phase(self, name: str) -> Iterator[None]:
+        """Counts the time inside the block for phase ``name``."""
+        start = perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[name] = self.seconds.get(name, 0.0) + perf_counter() - start
+
+    def since(self, before: dict[str, float]) -> dict[str, float]:
+        """Seconds per phase since ``before``, an earlier copy of ``seconds``."""
+        return {name: total - before.get(name, 0.0) for name, total in self.seconds.items()}

@@ -1,0 +1,145 @@
+"""Every difference between the supported versions of dolfinx (0.5.2 and 0.9) and what goes with them."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import os
+import platform
+from collections.abc import Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import dolfinx
+import dolfinx.fem.petsc
+import numpy as np
+import ufl
+from dolfinx import fem, io
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+from petsc4py import PETSc
+
+_LEGACY = tuple(int(part) for part in dolfinx.__version__.split(".")[:2]) < (0, 6)
+
+
+
+def _processor() -> str:
+    """A short name for the instruction set of this processor: compiled kernels are only good for their own."""
+    try:
+        text = Path("/proc/cpuinfo").read_text()
+    except OSError:
+        text = platform.processor()
+    flags = next((line for line in text.splitlines() if line.startswith(("flags", "Features"))), text)
+    return hashlib.sha256(flags.encode()).hexdigest()[:12]
+
+
+# strict IEEE arithmetic (no -ffast-math): energies rely on cancellation-free forms and on NaN where J ≤ 0
+_CACHE = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "fenicsmech" / "kernels"
+_JIT = {
+    "cffi_extra_compile_args": ["-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-g0"],
+    "cache_dir": _CACHE / _processor(),
+    "timeout": 300,
+}
+
+if not _LEGACY:
+    import basix.ufl
+
+
+@contextmanager
+def _quiet_compiler():
+    """The build tools under the form compiler log every command on the root logger."""
+    logging.disable(logging.INFO)
+    try:
+        yield
+    finally:
+        logging.disable(logging.NOTSET)
+
+
+def create_mesh(comm: MPI.Comm, cells: np.ndarray, points: np.ndarray) -> dmesh.Mesh:
+    """A distributed mesh of affine triangles or tetrahedra; only one rank need pass ``cells`` and ``points``."""
+    dim = points.shape[1]
+    shape = {2: "triangle", 3: "tetrahedron"}[dim]
+    if _LEGACY:
+        domain = ufl.Mesh(ufl.VectorElement("Lagrange", ufl.Cell(shape, geometric_dimension=dim), 1))
+        partitioner = dolfinx.cpp.mesh.create_cell_partitioner()
+        return dmesh.create_mesh(comm, cells, points, domain, dmesh.GhostMode.none, partitioner)
+    domain = ufl.Mesh(basix.ufl.element("Lagrange", shape, 1, shape=(dim,)))
+    return dmesh.create_mesh(comm, cells, points, domain, dmesh.create_cell_partitioner(dmesh.GhostMode.none))
+
+
+def original_cells(mesh: dmesh.Mesh) -> np.ndarray:
+    """Position in the input of every cell on this rank, ghosts last."""
+    return np.asarray(mesh.topology.original_cell_index)
+
+
+def original_nodes(mesh: dmesh.Mesh) -> np.ndarray:
+    """Position in the input of every geometry node on this rank."""
+    return np.asarray(mesh.geometry.input_global_indices)
+
+
+def cell_nodes(mesh: dmesh.Mesh) -> np.ndarray:
+    """Local geometry nodes of every cell on this rank, (cells, vertices)."""
+    dofmap = mesh.geometry.dofmap
+    return dofmap.array.reshape(dofmap.num_nodes, -1) if _LEGACY else np.asarray(dofmap)
+
+
+def vector_space(mesh: dmesh.Mesh, degree: int) -> fem.FunctionSpace:
+    """Continuous vector fields of ``degree``."""
+    with _quiet_compiler():
+        if _LEGACY:
+            return fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
+        return fem.functionspace(mesh, ("Lagrange", degree, (mesh.geometry.dim,)))
+
+
+def cellwise_space(mesh: dmesh.Mesh) -> fem.FunctionSpace:
+    """Scalars, one per cell."""
+    with _quiet_compiler():
+        return fem.FunctionSpace(mesh, ("DG", 0)) if _LEGACY else fem.functionspace(mesh, ("DG", 0))
+
+
+def compile_form(form: ufl.Form):
+    """``form`` compiled to machine code (cached on disk)."""
+    with _quiet_compiler():
+        return fem.form(form, jit_params=dict(_JIT)) if _LEGACY else fem.form(form, jit_options=dict(_JIT))
+
+
+def compile_expression(expression, points: np.ndarray, comm: MPI.Comm) -> fem.Expression:
+    """``expression`` compiled for evaluation at ``points`` of the reference cell."""
+    with _quiet_compiler():
+        if _LEGACY:
+            return fem.Expression(expression, points, jit_params=dict(_JIT))
+        return fem.Expression(expression, points, comm=comm, jit_options=dict(_JIT))
+
+
+def evaluate_expression(expression: fem.Expression, mesh: dmesh.Mesh, cells: np.ndarray) -> np.ndarray:
+    """Values of a compiled expression in ``cells``, (cells, points × components)."""
+    if _LEGACY:
+        return expression.eval(cells)
+    return expression.eval(mesh, cells).reshape(len(cells), -1)
+
+
+def petsc_vector(function: fem.Function) -> PETSc.Vec:
+    """The ghosted PETSc vector of a function's values (shared memory)."""
+    return function.vector if _LEGACY else function.x.petsc_vec
+
+
+def write_series(
+    path, mesh: dmesh.Mesh, functions: Mapping[str, fem.Function], steps, update, comm: MPI.Comm
+) -> None:
+    """Writes an XDMF time series for ParaView.
+
+    Args:
+        path: the .xdmf file.
+        mesh: the mesh of all functions.
+        functions: name → function, P1 or cellwise.
+        steps: the time of each step.
+        update: called with the step's index before it is written, sets the functions.
+        comm: communicator of the mesh.
+    """
+    with io.XDMFFile(comm, str(path), "w") as file:
+        file.write_mesh(mesh)
+        for index, time in enumerate(steps):
+            update(index)
+            for name, function in functions.items():
+                function.name = name
+                file.write_function(function, float(time))

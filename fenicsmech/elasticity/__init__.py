@@ -1,0 +1,26 @@
+"""Strain energy of flexible links in UFL, on the fixed reference mesh with the design field in place.
+
+- ``models``: what is assumed about the third dimension (3D, plane strain, plane stress)
+- ``strain``: the invariants an energy is written in, free of cancellation
+- ``remainders``: the nonlinear remainders of logarithms and roots, free of cancellation
+- ``energies``: one strain energy density per material law
+- ``transverse``: the stretch out of the plane in plane stress, per material law
+- ``body``: energy, residual, tangent and stress of all links
+"""
+
+from fenicsmech.elasticity.body import ElasticBody, Quadrature
+from fenicsmech.elasticity.energies import density
+from fenicsmech.elasticity.models import PLANE_STRAIN, PLANE_STRESS, SPATIAL, ElasticModel
+from fenicsmech.elasticity.strain import Moduli, Strain
+
+__all__ = [
+    "PLANE_STRAIN",
+    "PLANE_STRESS",
+    "SPATIAL",
+    "ElasticBody",
+    "ElasticModel",
+    "Moduli",
+    "Quadrature",
+    "Strain",
+    "density",
+]

@@ -1,0 +1,174 @@
+"""Energy, residual, tangent and stress of all flexible links on the fixed reference mesh.
+
+With reference coordinates X₀, design d, rest shape X = X₀ + d and displacement u from the rest shape:
+
+    H = F − I = ∇u (I + ∇d)⁻¹,     E(u, d) = ∫ W(H) det(I + ∇d) b dX₀,
+
+b the depth of a planar link (1 in space). Interface cells move rigidly and store no energy: they are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+from petsc4py import PETSc
+
+from fenicsmech.compat import (
+    cellwise_space,
+    compile_expression,
+    compile_form,
+    evaluate_expression,
+    petsc_vector,
+    vector_space,
+)
+from fenicsmech.elasticity.energies import density
+from fenicsmech.elasticity.models import ElasticModel
+from fenicsmech.elasticity.strain import Moduli
+from fenicsmech.elasticity.stress import cauchy_stress, von_mises
+from fenicsmech.mechanism import EnergyLaw, Material
+
+
+@dataclass(frozen=True)
+class Quadrature:
+    """Degree of the quadrature, per order of the displacement field."""
+
+    degree: int
+
+    @staticmethod
+    def for_order(order: int, dim: int) -> Quadrature:
+        """The cheapest degree whose error lies well below the discretisation error (measured)."""
+        return Quadrature({1: 1, 2: 3 if dim == 3 else 4}.get(order, 2 * order))
+
+
+class ElasticBody:
+    """The flexible links as one hyperelastic body.
+
+    Args:
+        mesh: reference mesh.
+        link: index of the link of each local cell, (cells,).
+        free: whether each local cell can deform (False inside interfaces), (cells,).
+        materials: material of each link.
+        depths: depth of each link, used by planar models.
+        model: 3D, plane strain or plane stress.
+        order: degree of the displacement field.
+        quadrature: explicit degree; never UFL's estimate.
+
+    Attributes:
+        u: displacement field, vector P_order.
+        d: design field, vector P1.
+        youngs_modulus, poissons_ratio: per cell.
+    """
+
+    def __init__(
+        self,
+        mesh: dmesh.Mesh,
+        *,
+        link: np.ndarray,
+        free: np.ndarray,
+        materials: Sequence[Material],
+        depths: Sequence[float],
+        model: ElasticModel,
+        order: int,
+        quadrature: Quadrature,
+    ) -> None:
+        self.mesh, self.model, self.order = mesh, model, order
+        self.u = fem.Function(vector_space(mesh, order), name="displacement")
+        self.d = fem.Function(vector_space(mesh, 1), name="design")
+        self.youngs_modulus = self._cellwise([m.youngs_modulus for m in materials], link)
+        self.poissons_ratio = self._cellwise([m.poissons_ratio for m in materials], link)
+        self._depth = self._cellwise(depths, link)
+        laws = sorted({m.law for m in materials}, key=repr)
+        law_of_cell = np.array([laws.index(m.law) for m in materials])[link]
+        cells = np.flatnonzero(free).astype(np.int32)
+        tags = dmesh.meshtags(mesh, mesh.topology.dim, cells, law_of_cell[cells].astype(np.int32))
+        measure = ufl.Measure(
+            "dx", domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": quadrature.degree}
+        )
+        self._terms = [(law, measure(tag)) for tag, law in enumerate(laws)]
+        self._law_cells = [np.flatnonzero(law_of_cell == tag).astype(np.int32) for tag in range(len(laws))]
+
+    @cached_property
+    def energy_ufl(self) -> ufl.Form:
+        """E(u, d), symbolic; everything else is a derivative of it."""
+        thick = self._depth if self.model.dim == 2 else 1.0
+        volume = ufl.det(self._design_gradient) * thick
+        terms = [self._density(law) * volume * dx for law, dx in self._terms]
+        return sum(terms[1:], start=terms[0])
+
+    @cached_property
+    def residual_ufl(self) -> ufl.Form:
+        """∂E/∂u in direction of a test function."""
+        return ufl.derivative(self.energy_ufl, self.u)
+
+    @cached_property
+    def energy_form(self):
+        return compile_form(self.energy_ufl)
+
+    @cached_property
+    def residual_form(self):
+        return compile_form(self.residual_ufl)
+
+    @cached_property
+    def tangent_form(self):
+        return compile_form(ufl.derivative(self.residual_ufl, self.u))
+
+    def energy(self) -> float:
+        """E at the current fields, of the whole mesh (collective); NaN where J ≤ 0."""
+        return float(self.mesh.comm.allreduce(fem.assemble_scalar(self.energy_form)))
+
+    def residual(self, vector: PETSc.Vec) -> None:
+        """Assembles ∂E/∂u into the ghosted ``vector`` (collective)."""
+        with vector.localForm() as local:
+            local.set(0.0)
+        fem.petsc.assemble_vector(vector, self.residual_form)
+        vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+
+    def tangent(self, matrix: PETSc.Mat) -> None:
+        """Adds ∂²E/∂u² into ``matrix`` (collective; leaves it unassembled)."""
+        fem.petsc.assemble_matrix(matrix, self.tangent_form)
+
+    def update(self) -> None:
+        """Makes ghost values of u agree with their owners (collective)."""
+        petsc_vector(self.u).ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
+
+    def von_mises(self) -> np.ndarray:
+        """Von Mises stress at the midpoint of each local cell, (cells,)."""
+        values = np.zeros(sum(map(len, self._law_cells)))
+        for expression, cells in zip(self._stresses, self._law_cells, strict=True):
+            values[cells] = evaluate_expression(expression, self.mesh, cells)[:, 0]
+        return values
+
+    @cached_property
+    def _stresses(self) -> list[fem.Expression]:
+        """The compiled von Mises stress at cell midpoints, per law."""
+        midpoint = np.full((1, self.model.dim), 1.0 / (self.model.dim + 1))
+        stresses = [von_mises(cauchy_stress(self.model, law, self._strain, self._moduli)) for law, _ in self._terms]
+        return [compile_expression(stress, midpoint, self.mesh.comm) for stress in stresses]
+
+    @property
+    def _moduli(self) -> Moduli:
+        return Moduli(self.youngs_modulus, self.poissons_ratio)
+
+    @property
+    def _design_gradient(self):
+        """I + ∇d."""
+        return ufl.Identity(self.model.dim) + ufl.grad(self.d)
+
+    @property
+    def _strain(self):
+        """H = ∇u (I + ∇d)⁻¹."""
+        return ufl.dot(ufl.grad(self.u), ufl.inv(self._design_gradient))
+
+    def _density(self, law: EnergyLaw):
+        return density(law, self.model.strain(law, self._strain, self._moduli), self._moduli)
+
+    def _cellwise(self, per_link: Sequence[float], link: np.ndarray) -> fem.Function:
+        function = fem.Function(cellwise_space(self.mesh))
+        function.x.array[: len(link)] = np.asarray(per_link, dtype=float)[link]
+        return function

@@ -1,0 +1,80 @@
+"""What is assumed about the third dimension. A model turns H = F − I into the strain its energies see."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+from ufl import as_matrix, det, tr
+from ufl.core.expr import Expr
+
+from fenicsmech.elasticity.strain import Moduli, Strain, plane_strain, plane_strain_stretched, spatial_strain
+from fenicsmech.elasticity.transverse import transverse_strain
+from fenicsmech.mechanism import EnergyLaw
+
+
+class ElasticModel(ABC):
+    """Dimension and kinematic assumption of an elastic body.
+
+    Attributes:
+        name: as shown in summaries and accepted on command lines.
+        dim: dimension of the mesh.
+    """
+
+    name: str
+    dim: int
+
+    @abstractmethod
+    def strain(self, law: EnergyLaw, H: Expr, moduli: Moduli) -> Strain:
+        """The invariants of F = I + H under this model's assumption."""
+
+    @abstractmethod
+    def embed(self, law: EnergyLaw, H: Expr, moduli: Moduli) -> Expr:
+        """H as a 3 × 3 tensor under this model's assumption."""
+
+
+class Spatial(ElasticModel):
+    """Three dimensions, nothing assumed."""
+
+    name, dim = "3d", 3
+
+    def strain(self, law, H, moduli):
+        return spatial_strain(H)
+
+    def embed(self, law, H, moduli):
+        return H
+
+
+class PlaneStrain(ElasticModel):
+    """Two dimensions, F₃₃ = 1: links that cannot contract across their depth."""
+
+    name, dim = "plane-strain", 2
+
+    def strain(self, law, H, moduli):
+        return plane_strain(H)
+
+    def embed(self, law, H, moduli):
+        return _embed(H, 0.0)
+
+
+class PlaneStress(ElasticModel):
+    """Two dimensions, S₃₃ = 0: links free to contract across their depth."""
+
+    name, dim = "plane-stress", 2
+
+    def strain(self, law, H, moduli):
+        return plane_strain_stretched(H, self._transverse(law, H, moduli))
+
+    def embed(self, law, H, moduli):
+        e = self._transverse(law, H, moduli)
+        return _embed(H, e / (1 + (1 + e) ** 0.5))
+
+    @staticmethod
+    def _transverse(law: EnergyLaw, H: Expr, moduli: Moduli) -> Expr:
+        return transverse_strain(law, tr(H) + det(H), moduli)
+
+
+def _embed(H: Expr, H33: Expr | float) -> Expr:
+    return as_matrix([[H[0, 0], H[0, 1], 0], [H[1, 0], H[1, 1], 0], [0, 0, H33]])
+
+
+SPATIAL, PLANE_STRAIN, PLANE_STRESS = Spatial(), PlaneStrain(), PlaneStress()

@@ -1,0 +1,53 @@
+"""Symmetric indefinite factorisation LDLᵀ of the KKT matrix, with its inertia."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from petsc4py import PETSc
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """Numbers of negative and zero pivots: Sylvester's law makes them those of the eigenvalues."""
+
+    negative: int
+    zero: int
+
+
+class Factor:
+    """MUMPS LDLᵀ of a matrix whose pattern does not change: the symbolic analysis is done once.
+
+    Args:
+        matrix: the matrix; refactor after changing its values.
+    """
+
+    def __init__(self, matrix: PETSc.Mat) -> None:
+        self._matrix = matrix
+        self._solver = PETSc.KSP().create(matrix.comm)
+        self._solver.setType(PETSc.KSP.Type.PREONLY)
+        self._solver.setOperators(matrix)
+        pc = self._solver.getPC()
+        pc.setType(PETSc.PC.Type.CHOLESKY)
+        pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
+        pc.setFactorSetUpSolverType()
+        mumps = pc.getFactorMatrix()
+        mumps.setMumpsIcntl(7, 5)  # METIS ordering
+        mumps.setMumpsIcntl(13, 1)  # root front factored by one process: exact inertia in parallel
+        mumps.setMumpsIcntl(14, 60)  # workspace beyond the estimate, in per cent, for delayed pivots
+        mumps.setMumpsIcntl(24, 1)  # detect null pivots instead of failing on them
+        self._mumps = mumps
+
+    def refactor(self) -> Inertia | None:
+        """Factors the matrix's current values; None if the factorisation failed."""
+        self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        self._solver.setOperators(self._matrix)
+        pc = self._solver.getPC()
+        pc.setUp()
+        if self._mumps.getMumpsInfog(1) < 0:
+            return None
+        return Inertia(self._mumps.getMumpsInfog(12), self._mumps.getMumpsInfog(28))
+
+    def solve(self, right: PETSc.Vec, solution: PETSc.Vec) -> None:
+        """Solves with the last factor."""
+        self._solver.solve(right, solution)

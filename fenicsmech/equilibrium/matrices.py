@@ -1,0 +1,90 @@
+"""Creation of the two sparse matrices whose triple product is the KKT matrix; their patterns never change."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import dolfinx.fem.petsc
+import numpy as np
+from petsc4py import PETSc
+
+from fenicsmech.bodies import InterfaceMap
+from fenicsmech.elasticity import ElasticBody
+from fenicsmech.equilibrium.layout import Layout
+from fenicsmech.linkage import JointSystem
+
+
+def create_extended_matrix(
+    elastic: ElasticBody, layout: Layout, pattern: Iterable[tuple[np.ndarray, np.ndarray]]
+) -> PETSc.Mat:
+    """K̂ with the finite-element pattern and the extra ``pattern``: (global rows, global columns) of full blocks.
+
+    Holds ∂²E/∂u² of the current displacements (collective).
+    """
+    fem = dolfinx.fem.petsc.create_matrix(elastic.tangent_form)
+    elastic.tangent(fem)
+    fem.assemble()
+    starts, columns, values = fem.getValuesCSR()
+    first, size = layout.first_row, layout.local_rows
+    shift = np.repeat(np.arange(layout.owned), np.diff(starts))
+
+    rows = [shift + first]
+    cols = [columns]
+    numbers = [values]
+    for block_rows, block_columns in pattern:
+        mine = block_rows[(block_rows >= first) & (block_rows < first + size)]
+        rows.append(np.repeat(mine, len(block_columns)))
+        cols.append(np.tile(block_columns, len(mine)))
+        numbers.append(np.zeros(len(mine) * len(block_columns)))
+    row, column = np.concatenate(rows) - first, np.concatenate(cols)
+    order = np.lexsort((column, row))
+    row, column, number = row[order], column[order], np.concatenate(numbers)[order]
+    new = np.concatenate([[True], (np.diff(row) != 0) | (np.diff(column) != 0)])
+    number = np.add.reduceat(number, np.flatnonzero(new))
+    row, column = row[new], column[new]
+    starts = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=size))])
+
+    total = layout.comm.allreduce(size)
+    matrix = PETSc.Mat().createAIJ(
+        [(size, total), (size, total)],
+        csr=(starts.astype(PETSc.IntType), column.astype(PETSc.IntType), number),
+        bsize=elastic.model.dim,
+        comm=layout.comm,
+    )
+    matrix.setLGMap(*fem.getLGMap())
+    matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_LOCATION_ERR, True)
+    return matrix
+
+
+def create_map_matrix(layout: Layout, interfaces: InterfaceMap, joints: JointSystem, unit_u: float, scale: np.ndarray):
+    """G with its constant entries: the scaled identity on free DOFs and extras, zeros for ∂u/∂z (collective)."""
+    dim = joints.space.dim
+    counts = np.zeros(layout.local_rows, dtype=int)
+    counts[layout.free] = 1
+    node_columns = {body: layout.first_extra + joints.columns[body] for body in interfaces.nodes}
+    entries: dict[int, np.ndarray] = {}
+    for body, nodes in interfaces.nodes.items():
+        for node in nodes[nodes < interfaces.owned]:
+            for row in range(dim * node, dim * node + dim):
+                entries[row] = node_columns[body]
+                counts[row] = len(node_columns[body])
+    if layout.last:
+        counts[layout.owned : layout.owned + layout.extras] = 1
+    starts = np.concatenate([[0], np.cumsum(counts)])
+    columns = np.zeros(starts[-1], dtype=PETSc.IntType)
+    values = np.zeros(starts[-1])
+    columns[starts[layout.free]] = layout.first_unknown + np.arange(len(layout.free))
+    values[starts[layout.free]] = unit_u
+    for row, cols in entries.items():
+        columns[starts[row] : starts[row + 1]] = cols
+    if layout.last:
+        at = starts[layout.owned : layout.owned + layout.extras]
+        columns[at] = layout.first_extra + np.arange(layout.extras)
+        values[at] = scale
+    total_rows = layout.comm.allreduce(layout.local_rows)
+    total = layout.comm.allreduce(layout.local_unknowns)
+    return PETSc.Mat().createAIJ(
+        [(layout.local_rows, total_rows), (layout.local_unknowns, total)],
+        csr=(starts.astype(PETSc.IntType), columns, values),
+        comm=layout.comm,
+    )

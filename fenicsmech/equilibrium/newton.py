@@ -1,0 +1,230 @@
+"""Primal–dual Newton iteration with inertia control for min E(s) s.t. C(s) = 0.
+
+Each iteration solves, with the symmetric factor LDLᵀ,
+
+    [[∇²L + δ I, −Aᵀ], [−A, −1/ρ]] (ds, dλ) = −(∇L, −C),
+
+the Newton step of the augmented Lagrangian, which tends to the KKT step for large ρ and stays regular for
+redundant constraints. If the factor has more negative pivots than there are multipliers, the step need not
+descend, and δ grows until it does. Merit of a step: the augmented Lagrangian
+
+    Φ(s) = E(s) − λᵀC + ½ ρ_m |C|²  at the new multipliers λ.
+
+Slender links bend at far smaller forces than they stretch, so a good step may raise every merit for a few
+iterations: steps are taken in full while a small allowance lasts, then the iteration returns to its best
+state and searches the line. Sources: Nocedal & Wright, Numerical Optimization (doi:10.1007/978-0-387-40065-5),
+chapters 17–19; Chamberlain et al. on the watchdog (doi:10.1007/BFb0120945).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from fenicsmech.equilibrium.factor import Factor, Inertia
+from fenicsmech.equilibrium.load import Control
+from fenicsmech.equilibrium.state import State, Step
+from fenicsmech.equilibrium.system import Balance, EquilibriumSystem
+from fenicsmech.log import logger
+
+_log = logger(__name__)
+
+
+@dataclass(frozen=True)
+class NewtonOptions:
+    """Limits of the iteration.
+
+    Attributes:
+        tolerance: residual over the forces that balance in it, at convergence.
+        roundoff: residual in units of mean stiffness times length below which digits are lost.
+        iterations: most iterations.
+        allowance: iterations in a row that may fail to improve on the best residual.
+        largest_turn: largest rotation (rad), or displacement over the mechanism's length, of one step.
+    """
+
+    tolerance: float = 1e-10
+    roundoff: float = 1e-14
+    iterations: int = 25
+    allowance: int = 4
+    largest_turn: float = 0.5
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A converged equilibrium.
+
+    Attributes:
+        state: the equilibrium.
+        residuals: relative residual before each iteration and at the end.
+        iterations: KKT systems factored and solved on the way.
+        unstable_modes: number of directions in which the energy has a maximum, under dead loads.
+        unstable_under_control: the same with the control's constraint.
+        tangent: rate of the state with the control's target.
+    """
+
+    state: State
+    residuals: tuple[float, ...]
+    iterations: int
+    unstable_modes: int
+    unstable_under_control: int
+    tangent: Step
+
+
+class NotConverged(Exception):
+    """The iteration ended without an equilibrium; ``reason`` says why."""
+
+    def __init__(self, reason: str, iterations: int) -> None:
+        super().__init__(reason)
+        self.reason, self.iterations = reason, iterations
+
+
+@dataclass
+class Newton:
+    """The iteration, with the factor it keeps between solves."""
+
+    system: EquilibriumSystem
+    options: NewtonOptions = field(default_factory=NewtonOptions)
+    _factor: Factor | None = None
+
+    def solve(self, start: State, control: Control) -> Solution:
+        """The equilibrium near ``start`` under ``control`` (collective).
+
+        Raises:
+            NotConverged: too many iterations, no descent, or elements inverted all along.
+        """
+        system, options = self.system, self.options
+        if not control.constrained:
+            start = replace(start, force=control.target)
+        system.load(start)
+        if not math.isfinite(system.elastic_energy()):
+            raise NotConverged("elements are inverted in the predicted state", 0)
+        state, balance = start, system.balance(start, control)
+        best_state, best_balance, spent = state, balance, 0
+        residuals, inertia, shift, careful = [], None, 0.0, False
+        for iteration in range(options.iterations + 1):
+            residuals.append(self._relative(balance))
+            if self._converged(balance) and iteration > 0:
+                return self._accept(state, control, balance, inertia, shift, residuals, iteration)
+            if iteration == options.iterations:
+                break
+            step, inertia, shift = self._direction(state, control, balance, shift)
+            _log.debug("iteration %d: residual %.2e, shift %.1e", iteration, residuals[-1], shift)
+            if careful:
+                state, balance = self._search(state, control, step, balance, iteration)
+            else:
+                state, balance = self._full_step(state, control, step, iteration)
+            if balance.norm < best_balance.norm:
+                best_state, best_balance, spent, careful = state, balance, 0, careful
+            else:
+                spent += 1
+            if spent > options.allowance and not careful:
+                state, balance, careful = best_state, best_balance, True
+                system.load(state)
+                balance = system.balance(state, control)
+        raise NotConverged(
+            f"the residual is {residuals[-1]:.1e} of the forces after {options.iterations} iterations",
+            options.iterations,
+        )
+
+    def _relative(self, balance: Balance) -> float:
+        return balance.norm / max(balance.forces, self.options.roundoff * self.system.unit / self.options.tolerance)
+
+    def _converged(self, balance: Balance) -> bool:
+        return balance.norm <= max(self.options.tolerance * balance.forces, self.options.roundoff * self.system.unit)
+
+    def _direction(
+        self, state: State, control: Control, balance: Balance, shift: float
+    ) -> tuple[Step, Inertia, float]:
+        """The Newton step; raises δ until the factor's inertia promises descent."""
+        system = self.system
+        shift = shift / 3.0 if shift > 1e-9 else 0.0
+        for _ in range(20):
+            inertia = self._refactor(state, control, balance, shift)
+            if inertia is not None and inertia.negative <= self._expected and inertia.zero == 0:
+                break
+            shift = max(1e-8, 8.0 * shift)
+        else:
+            raise NotConverged("no shift of the tangent gives a direction of descent", 0)
+        with system.clock.phase("solve"):
+            x = balance.vector.duplicate()
+            self._factor.solve(balance.vector, x)
+            x.scale(-1.0)
+        return system.step(x), inertia, shift
+
+    def _refactor(self, state: State, control: Control, balance: Balance, shift: float) -> Inertia | None:
+        matrix = self.system.kkt(state, control, balance, shift=shift)
+        with self.system.clock.phase("factor"):
+            if self._factor is None:
+                self._factor = Factor(matrix)
+            return self._factor.refactor()
+
+    @property
+    def _expected(self) -> int:
+        """Negative pivots of a stable equilibrium: one per multiplier, one for the controlled force."""
+        return self.system.joints.rows + 1
+
+    def _full_step(self, state: State, control: Control, step: Step, iteration: int) -> tuple[State, Balance]:
+        """The whole step, shortened only where it turns too far or inverts elements."""
+        system = self.system
+        length = min(1.0, self.options.largest_turn / max(system.size(step), 1e-300))
+        for _ in range(12):
+            trial = system.moved(state, step.scaled(length))
+            if math.isfinite(system.elastic_energy()):
+                return trial, system.balance(trial, control)
+            length *= 0.5
+        raise NotConverged("every step along the Newton direction inverts elements", iteration + 1)
+
+    def _search(
+        self, state: State, control: Control, step: Step, balance: Balance, iteration: int
+    ) -> tuple[State, Balance]:
+        """Armijo backtracking on the augmented Lagrangian; near convergence a smaller residual will do."""
+        system = self.system
+        system.load(state)
+        towards = (state.multipliers + step.multipliers, state.force + step.force)
+        before = self._merit(state, control, *towards)
+        length = min(1.0, self.options.largest_turn / max(system.size(step), 1e-300))
+        for _ in range(20):
+            trial = system.moved(state, step.scaled(length))
+            after = self._merit(trial, control, *towards)
+            if math.isfinite(after):
+                new = system.balance(trial, control)
+                if after < before or new.norm < 0.9 * balance.norm:
+                    return trial, new
+            length *= 0.5
+        raise NotConverged("the line search finds no descent", iteration + 1)
+
+    def _merit(self, state: State, control: Control, multipliers: np.ndarray, force: float) -> float:
+        """Φ of the loaded state, with the multipliers the step leads to."""
+        system, stiffness = self.system, 10.0 * self.system.unit**2
+        violation = system.constraints(state)
+        value = system.potential(state, force) - multipliers @ system.joints.value(state.poses, state.motors)
+        value += 0.5 * stiffness * float(violation @ violation)
+        if control.constrained:
+            gap = (system.load_displacement(state) - control.target) / system.joints.length
+            value += force * control.target + 0.5 * stiffness * gap**2
+        return value
+
+    def _accept(self, state, control, balance, inertia, shift, residuals, iteration) -> Solution:
+        """Stability and tangent at the equilibrium, from the last factor if it was of the true matrix."""
+        system = self.system
+        if shift > 0.0:
+            inertia = self._refactor(state, control, balance, 0.0)
+        if inertia is None:
+            raise NotConverged("the tangent at the equilibrium cannot be factored", iteration)
+        with system.clock.phase("solve"):
+            right = system.load_rate(state, control)
+            x = right.duplicate()
+            self._factor.solve(right, x)
+            under_control = inertia.negative - self._expected
+            unstable = under_control
+            if control.constrained:
+                row = system.control_row()
+                response = row.duplicate()
+                self._factor.solve(row, response)
+                # Schur complement of the control row: negative exactly if removing the row leaves stability as it is
+                unstable += 1 - int(response.dot(row) < 0.0)
+        return Solution(
+            state, tuple(residuals), iteration, max(unstable, 0), max(under_control, 0), system.step(x)
+        )

@@ -1,0 +1,40 @@
+"""The state of a mechanism: displacement, poses, multipliers, controlled force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class State:
+    """A point (s, λ, f) of the equilibrium equations.
+
+    Attributes:
+        u: displacements of this rank's owned nodes, flat (owned dofs,).
+        poses: poses of all bodies, on every rank, (bodies, pose_size).
+        multipliers: λ, one per constraint row, on every rank.
+        force: magnitude f of the controlled force.
+        motors: motor value per connection.
+    """
+
+    u: np.ndarray
+    poses: np.ndarray
+    multipliers: np.ndarray
+    force: float
+    motors: np.ndarray
+
+
+@dataclass(frozen=True)
+class Step:
+    """A change of state; ``z`` are the poses of the free bodies, flat."""
+
+    u: np.ndarray
+    z: np.ndarray
+    multipliers: np.ndarray
+    force: float
+
+    def scaled(self, factor: float) -> Step:
+        """``factor`` times this step."""
+        return Step(factor * self.u, factor * self.z, factor * self.multipliers, factor * self.force)

@@ -1,0 +1,362 @@
+"""The equilibrium equations of a mechanism and their KKT matrix, distributed.
+
+    L(s, λ, f) = E(u(s)) − Σ loads − f (a · u_P) − λᵀ C(s),     s = (u_free, z)
+
+    K̂ = [[∂²E/∂u², 0    , 0  , −a_u],          unknowns x = scaled increments of (u_free, z, λ, f):
+         [0       , B    , −Aᵀ, −a_z],             x ↦ (u, z, λ, f) = G x,   G = diag(∂u/∂s, 1) · D
+         [0       , −A   , −ε , 0   ],          KKT = Gᵀ K̂ G,   right-hand side −Gᵀ ∇L
+         [−a_uᵀ   , −a_zᵀ, 0  , 0   ]]
+
+B collects the curvature of the rigid coordinates: Σ_i r_i · ∂²u_i/∂z² of interface nodes, −f a · ∂²u_P/∂z² of
+loaded points, −Σ λ_k ∂²C_k/∂z². One sparse triple product forms the whole matrix. ε = 1/ρ is the proximal term of
+the augmented Lagrangian that keeps redundant constraints regular; D makes x dimensionless.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from petsc4py import PETSc
+
+from fenicsmech.bodies import BodyPoint, InterfaceMap, LinkPoint
+from fenicsmech.clock import Clock
+from fenicsmech.compat import petsc_vector
+from fenicsmech.elasticity import ElasticBody
+from fenicsmech.equilibrium.layout import Layout
+from fenicsmech.equilibrium.load import Control, PointLoad
+from fenicsmech.equilibrium.matrices import create_extended_matrix, create_map_matrix
+from fenicsmech.equilibrium.state import State, Step
+from fenicsmech.linkage import JointSystem
+
+REGULARISATION = 1e-8
+"""ε = 1/ρ of the constraint block, in scaled units (rows of A have norm one, K̂ has mean diagonal one)."""
+
+
+@dataclass(frozen=True)
+class Balance:
+    """The gradient of the Lagrangian at a state.
+
+    Attributes:
+        vector: Gᵀ ∇L, dimensionless.
+        norm: its norm.
+        forces: norm of the loads and reactions that should cancel in it.
+        moments: Σ r_i ⊗ (X_i − c) of each interface body.
+    """
+
+    vector: PETSc.Vec
+    norm: float
+    forces: float
+    moments: dict[int, np.ndarray]
+
+
+class EquilibriumSystem:
+    """Energy, gradient and KKT matrix at a state.
+
+    Args:
+        elastic: the flexible links.
+        interfaces: interface nodes as functions of poses.
+        joints: the constraints.
+        controlled: the load whose magnitude f is controlled.
+        loads: fixed loads, with their magnitudes.
+        clock: where time is counted.
+
+    Attributes:
+        unit: a residual of this norm is a displacement of the mechanism's length against the mean stiffness.
+        unit_u, scale: what a unit of each scaled unknown stands for: displacements; (z, λ, f).
+    """
+
+    def __init__(
+        self,
+        elastic: ElasticBody,
+        interfaces: InterfaceMap,
+        joints: JointSystem,
+        *,
+        controlled: PointLoad,
+        loads: tuple[tuple[PointLoad, float], ...] = (),
+        clock: Clock,
+    ) -> None:
+        self.elastic, self.interfaces, self.joints = elastic, interfaces, joints
+        self.controlled, self.loads, self.clock = controlled, loads, clock
+        self.layout = Layout(elastic.mesh.comm, interfaces, joints)
+        self._u = petsc_vector(elastic.u)
+        self._nodal = self._u.duplicate()
+        with clock.phase("compile"):
+            self._forms = (elastic.energy_form, elastic.residual_form, elastic.tangent_form)
+        with clock.phase("setup"):
+            self._u.set(0.0)
+            self._hat = create_extended_matrix(elastic, self.layout, self._pattern())
+            # mean diagonal of the stiffness k: D = (ℓ, 1, …) / (ℓ √k) makes the KKT matrix dimensionless
+            diagonal = self._hat.getDiagonal().array_r[self.layout.free]
+            comm = self.layout.comm
+            mean = comm.allreduce(float(diagonal.sum())) / comm.allreduce(len(self.layout.free))
+            self.unit = float(np.sqrt(mean)) * joints.length
+            self.unit_u = joints.length / self.unit
+            self.scale = np.concatenate(
+                [joints.pose_scale / self.unit, joints.row_scale * self.unit, [self.unit / joints.length]]
+            )
+            self._map = create_map_matrix(self.layout, interfaces, joints, self.unit_u, self.scale)
+        self._rows = self._hat.createVecLeft()
+        self._matrix: PETSc.Mat | None = None
+
+    # -- states --------------------------------------------------------------------------------------------
+
+    def moved(self, state: State, step: Step) -> State:
+        """``state`` after ``step``: rotations back on their manifold, interface nodes on their bodies (collective)."""
+        z = self.joints.unknowns(state.poses) + step.z
+        poses = self.joints.with_unknowns(state.poses, z)
+        multipliers, force = state.multipliers + step.multipliers, state.force + step.force
+        self.load(State(state.u + step.u, poses, multipliers, force, state.motors))
+        return State(self._u.array_r.copy(), poses, multipliers, force, state.motors)
+
+    def load(self, state: State) -> None:
+        """Makes the finite-element field hold ``state`` (collective)."""
+        self._u.array_w[:] = state.u
+        self.elastic.update()
+        self.interfaces.place(state.poses)
+
+    def difference(self, later: State, earlier: State) -> Step:
+        """``later`` − ``earlier``."""
+        return Step(
+            later.u - earlier.u,
+            self.joints.unknowns(later.poses) - self.joints.unknowns(earlier.poses),
+            later.multipliers - earlier.multipliers,
+            later.force - earlier.force,
+        )
+
+    def size(self, step: Step) -> float:
+        """Largest displacement over the mechanism's length, or rotation, in ``step`` (collective)."""
+        nodes = float(np.max(np.abs(step.u), initial=0.0)) / self.joints.length
+        bodies = float(np.max(np.abs(step.z / self.joints.pose_scale), initial=0.0))
+        return max(self.layout.comm.allgather(max(nodes, bodies)))
+
+    # -- values at the loaded state ------------------------------------------------------------------------
+
+    def elastic_energy(self) -> float:
+        """E_int; NaN where an element is inverted (collective)."""
+        with self.clock.phase("energy"):
+            return self.elastic.energy()
+
+    def load_displacement(self, state: State) -> float:
+        """a · u_P, how far the controlled force's point has moved along it (collective)."""
+        return self._travel(self.controlled, state)
+
+    def potential(self, state: State, force: float) -> float:
+        """E_int − Σ loads − f a · u_P with ``force`` for f (collective)."""
+        work = force * self._travel(self.controlled, state)
+        work += sum(magnitude * self._travel(load, state) for load, magnitude in self.loads)
+        return self.elastic_energy() - work
+
+    def constraints(self, state: State) -> np.ndarray:
+        """C(s) scaled to unit gradients, (rows,)."""
+        return self.joints.row_scale * self.joints.value(state.poses, state.motors)
+
+    def balance(self, state: State, control: Control) -> Balance:
+        """Gᵀ ∇L (collective). Brings G to the poses of ``state``."""
+        with self.clock.phase("residual"):
+            self._update_map(state)
+            self.elastic.residual(self._nodal)
+            layout, dim = self.layout, self.joints.space.dim
+            r = self._nodal.array_r[: layout.owned].copy()
+            loads = np.zeros_like(r)
+            g = np.zeros(layout.extras)
+            for load, magnitude in self._acting(state):
+                self._add_load(load, magnitude, state, loads, g)
+            r -= loads
+            reactions = self.joints.gradient(state.poses, state.motors).T @ state.multipliers
+            forces = np.linalg.norm(g * self.scale) ** 2 + np.linalg.norm(reactions * self.scale[layout.z]) ** 2
+            forces += layout.comm.allreduce(float(np.linalg.norm(loads * self.unit_u) ** 2))
+            moments = layout.comm.allreduce(
+                self.interfaces.moments(r.reshape(-1, dim)), op=_add_moments
+            )
+            extras = -g
+            extras[layout.z] -= reactions
+            extras[layout.multipliers] = -self.joints.value(state.poses, state.motors)
+            if control.constrained:
+                extras[layout.force] = -(self.load_displacement(state) - control.target)
+            rows = self._rows.array_w
+            rows[: layout.owned] = r
+            if layout.last:
+                rows[layout.owned : layout.owned + layout.extras] = extras
+            vector = self._map.createVecRight()
+            self._map.multTranspose(self._rows, vector)
+            return Balance(vector, vector.norm(), float(np.sqrt(forces)), moments)
+
+    # -- derivatives at the loaded state -------------------------------------------------------------------
+
+    def kkt(self, state: State, control: Control, balance: Balance, *, shift: float) -> PETSc.Mat:
+        """The KKT matrix, with ``shift`` · I added to the block of s (collective)."""
+        layout = self.layout
+        with self.clock.phase("assemble"):
+            self._hat.zeroEntries()
+            self.elastic.tangent(self._hat)
+            self._hat.assemble()
+            if layout.last:
+                for rows, columns, block in self._entries(state, control, balance):
+                    # petsc4py reads transposed arrays in memory order
+                    self._hat.setValues(
+                        rows.astype(PETSc.IntType),
+                        columns.astype(PETSc.IntType),
+                        np.ascontiguousarray(block),
+                        addv=PETSc.InsertMode.ADD,
+                    )
+            self._hat.assemble()
+        with self.clock.phase("project"):
+            self._matrix = self._hat.ptap(self._map, result=self._matrix)
+            if shift > 0.0:
+                diagonal = self._matrix.getDiagonal()
+                free = len(layout.free)
+                diagonal.array_w[: free + (self.joints.size if layout.last else 0)] += shift
+                self._matrix.setDiagonal(diagonal)
+        return self._matrix
+
+    def load_rate(self, state: State, control: Control) -> PETSc.Vec:
+        """Right-hand side whose KKT solution is the rate of x with the control's target (collective)."""
+        layout = self.layout
+        nodal, extras = np.zeros(layout.owned), np.zeros(layout.extras)
+        if control.constrained:
+            extras[layout.force] = -1.0
+        else:
+            self._add_load(self.controlled, 1.0, state, nodal, extras)
+        return self._right_hand_side(nodal, extras)
+
+    def motor_rate(self, state: State, direction: np.ndarray) -> PETSc.Vec:
+        """Right-hand side whose KKT solution is the rate of x with motor values along ``direction`` (collective)."""
+        extras = np.zeros(self.layout.extras)
+        extras[self.layout.multipliers] = self.joints.motor_rate(state.poses, state.motors, direction)
+        return self._right_hand_side(np.zeros(self.layout.owned), extras)
+
+    def control_row(self) -> PETSc.Vec:
+        """The unit vector of the unknown f (collective)."""
+        vector = self._map.createVecRight()
+        if self.layout.last:
+            vector.array_w[-1] = 1.0
+        return vector
+
+    def step(self, x: PETSc.Vec) -> Step:
+        """The change of state that the scaled unknowns ``x`` stand for (collective)."""
+        local, layout = x.array_r, self.layout
+        free = len(layout.free)
+        u = np.zeros(layout.owned)
+        u[layout.free] = self.unit_u * local[:free]
+        extras = self.scale * local[free:] if layout.last else None
+        extras = layout.comm.bcast(extras, root=layout.comm.size - 1)
+        return Step(u, extras[layout.z], extras[layout.multipliers], float(extras[layout.force]))
+
+    # -- pieces --------------------------------------------------------------------------------------------
+
+    def _right_hand_side(self, nodal: np.ndarray, extras: np.ndarray) -> PETSc.Vec:
+        rows = self._rows.array_w
+        rows[: self.layout.owned] = nodal
+        if self.layout.last:
+            rows[self.layout.owned : self.layout.owned + self.layout.extras] = extras
+        vector = self._map.createVecRight()
+        self._map.multTranspose(self._rows, vector)
+        return vector
+
+    def _acting(self, state: State) -> list[tuple[PointLoad, float]]:
+        return [(self.controlled, state.force), *self.loads]
+
+    def _travel(self, load: PointLoad, state: State) -> float:
+        return float(load.direction @ load.point.displacement(self.elastic.u, state.poses))
+
+    def _add_load(self, load: PointLoad, magnitude: float, state: State, nodal: np.ndarray, extras: np.ndarray) -> None:
+        """Adds magnitude · a · ∂u_P/∂(u, z) to owned ``nodal`` forces and ``extras``."""
+        match load.point:
+            case BodyPoint(body=body) as point:
+                if body in self.joints.columns:
+                    extras[self.joints.columns[body]] += magnitude * load.direction @ point.gradient(state.poses)
+            case LinkPoint(global_nodes=nodes, weights=weights):
+                dim = self.joints.space.dim
+                first = self.layout.first_row // dim
+                mine = (nodes >= first) & (nodes < first + self.layout.owned // dim)
+                forces = nodal.reshape(-1, dim)
+                np.add.at(forces, nodes[mine] - first, magnitude * np.outer(weights[mine], load.direction))
+
+    def _update_map(self, state: State) -> None:
+        """Brings ∂u/∂z in G to the poses of ``state``."""
+        dim, layout = self.joints.space.dim, self.layout
+        for body in self.interfaces.nodes:
+            nodes, gradient = self.interfaces.gradient_rows(state.poses, body)
+            if not len(nodes):
+                continue
+            columns = self.joints.columns[body]
+            rows = (dim * nodes[:, None] + np.arange(dim)).ravel()
+            self._map.setValuesIJV(
+                np.arange(0, len(columns) * len(rows) + 1, len(columns), dtype=PETSc.IntType),
+                np.tile(layout.first_extra + columns, len(rows)).astype(PETSc.IntType),
+                (gradient * self.scale[columns]).ravel(),
+                rowmap=(layout.first_row + rows).astype(PETSc.IntType),
+            )
+        self._map.assemble()
+
+    def _entries(
+        self, state: State, control: Control, balance: Balance
+    ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Everything in K̂ but ∂²E/∂u², as (global rows, global columns, block)."""
+        joints, first = self.joints, self.layout.first_extra_row
+        z, rows_of = first, first + joints.size
+        for body, moment in balance.moments.items():
+            columns = z + joints.columns[body]
+            yield columns, columns, joints.space.displacement_hessian(state.poses[body], moment)
+        for load, magnitude in self._acting(state):
+            if isinstance(load.point, BodyPoint) and load.point.body in joints.columns:
+                columns = z + joints.columns[load.point.body]
+                yield columns, columns, -load.point.hessian(state.poses, magnitude * load.direction)
+        for rows, columns, block in joints.hessian_blocks(state.poses, state.motors, state.multipliers):
+            yield z + rows, z + columns, -block
+        for rows, columns, block in joints.gradient_blocks(state.poses, state.motors):
+            yield rows_of + rows, z + columns, -block
+            yield z + columns, rows_of + rows, -block.T
+        proximal = -REGULARISATION / self.scale[self.layout.multipliers] ** 2
+        for row, value in enumerate(proximal):
+            yield np.array([rows_of + row]), np.array([rows_of + row]), np.array([[value]])
+        yield from self._control_entries(state, control)
+
+    def _control_entries(self, state: State, control: Control):
+        force = np.array([self.layout.first_extra_row + self.layout.force])
+        if not control.constrained:
+            yield force, force, np.array([[-1.0 / self.scale[self.layout.force] ** 2]])
+            return
+        columns = self._control_columns()
+        match self.controlled.point:
+            case BodyPoint() as point:
+                values = -(self.controlled.direction @ point.gradient(state.poses))[None]
+            case LinkPoint(weights=weights):
+                values = -np.outer(weights, self.controlled.direction).reshape(1, -1)
+        yield force, columns, values
+        yield columns, force, values.T
+
+    def _control_columns(self) -> np.ndarray:
+        """Global rows of K̂ on which the controlled force acts."""
+        match self.controlled.point:
+            case BodyPoint(body=body):
+                return self.layout.first_extra_row + self.joints.columns[body]
+            case LinkPoint(global_nodes=nodes):
+                dim = self.joints.space.dim
+                return (dim * nodes[:, None] + np.arange(dim)).ravel()
+
+    def _pattern(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Where ``_entries`` may put something, as (global rows, global columns)."""
+        joints, first = self.joints, self.layout.first_extra_row
+        z, rows_of = first, first + joints.size
+        drawn, still = joints.drawn, np.zeros(len(joints.connections))
+        for columns in joints.columns.values():
+            yield z + columns, z + columns
+        for rows, columns, _ in joints.hessian_blocks(drawn, still, np.zeros(joints.rows)):
+            yield z + rows, z + columns
+        for rows, columns, _ in joints.gradient_blocks(drawn, still):
+            yield rows_of + rows, z + columns
+            yield z + columns, rows_of + rows
+        for row in range(joints.rows):
+            yield np.array([rows_of + row]), np.array([rows_of + row])
+        force = np.array([first + self.layout.force])
+        yield force, force
+        yield force, self._control_columns()
+        yield self._control_columns(), force
+
+
+def _add_moments(a: dict[int, np.ndarray], b: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
+    """Sum of two ranks' moments; a rank may hold no node of some body."""
+    return {body: a.get(body, 0.0) + b.get(body, 0.0) for body in sorted(a.keys() | b.keys())}

@@ -1,0 +1,26 @@
+"""Meshes of single links: conforming to the regions where joints hold the link, made by gmsh, kept as plain arrays.
+
+Ask for a mesh
+    ``mesh_link``       shape + interface sites → ``LinkMesh``
+    ``InterfaceSite``   where a joint takes hold of the link
+    ``LinkMesh``        points, cells, and which interface holds each cell (``FREE``: none)
+
+Geometry that other layers use too
+    ``Centreline``      the smooth curve of a strip
+    ``radius_ratios``   shape quality of cells
+    ``cell_measures``   signed areas and volumes of cells
+
+One file per kind of link: ``strip`` (with ``strip_outline`` and ``strip_pins``), ``outline``, ``step``, ``mesh_file``.
+What is the same all through its depth is drawn and cut in the plane (``plan_view``, ``regions``, ``fragments``,
+``sizing``) and then extruded (``extrude``). ``mesh_checks`` says what every mesh must satisfy. ``gmsh_session`` is the
+only place that starts gmsh. Nothing here knows of finite elements or of parallel ranks.
+"""
+
+from fenicsmech.meshing import mesh_file, outline, step, strip  # noqa: F401  (each registers its shape)
+from fenicsmech.meshing.centreline import Centreline
+from fenicsmech.meshing.interface_site import InterfaceSite
+from fenicsmech.meshing.link_mesh import FREE, LinkMesh, cell_measures
+from fenicsmech.meshing.mesh_link import mesh_link
+from fenicsmech.meshing.quality import radius_ratios
+
+__all__ = ["FREE", "Centreline", "InterfaceSite", "LinkMesh", "cell_measures", "mesh_link", "radius_ratios"]

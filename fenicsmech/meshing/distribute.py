@@ -1,0 +1,71 @@
+"""The meshes of all flexible links as one distributed dolfinx mesh of disconnected components."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+
+from fenicsmech.compat import cell_nodes, create_mesh, original_cells
+from fenicsmech.meshing.link_mesh import LinkMesh
+
+
+@dataclass(frozen=True)
+class MechanismMesh:
+    """The reference mesh of all flexible links.
+
+    Attributes:
+        mesh: the distributed mesh; its coordinates never change.
+        link: index of the flexible link of each cell on this rank (ghosts last), (cells,).
+        interface: index among all interfaces of the mechanism, −1 in free cells, (cells,).
+        vertices, cells: the whole mesh as one array each, on every rank: (n, dim), (m, dim + 1).
+        link_of_cell: index of the flexible link of each of ``cells``, (m,).
+    """
+
+    mesh: dmesh.Mesh
+    link: np.ndarray
+    interface: np.ndarray
+    vertices: np.ndarray
+    cells: np.ndarray
+    link_of_cell: np.ndarray
+
+    def corners(self, cells: np.ndarray) -> np.ndarray:
+        """Corner coordinates of local ``cells``, (cells, dim + 1, dim)."""
+        return self.mesh.geometry.x[cell_nodes(self.mesh)[cells]][..., : self.vertices.shape[1]]
+
+
+def distribute(comm: MPI.Comm, link_meshes: Sequence[LinkMesh] | None, *, root: int = 0) -> MechanismMesh:
+    """Joins ``link_meshes`` (given on ``root`` only) and distributes them over ``comm``.
+
+    Interfaces are numbered through, link after link.
+    """
+    whole = _join(link_meshes) if comm.rank == root else None
+    vertices, cells, link, interface = comm.bcast(whole, root=root)
+    dim = vertices.shape[1]
+    if comm.rank == root:
+        mesh = create_mesh(comm, cells, vertices)
+    else:
+        mesh = create_mesh(comm, np.zeros((0, dim + 1), np.int64), np.zeros((0, dim)))
+    here = original_cells(mesh)
+    return MechanismMesh(mesh, link[here], interface[here], vertices, cells, link)
+
+
+def _join(link_meshes: Sequence[LinkMesh]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    vertices, cells, links, interfaces = [], [], [], []
+    nodes = sites = 0
+    for index, part in enumerate(link_meshes):
+        vertices.append(part.points)
+        cells.append(part.cells + nodes)
+        links.append(np.full(len(part.cells), index))
+        interfaces.append(np.where(part.interface >= 0, part.interface + sites, -1))
+        nodes += len(part.points)
+        sites += int(part.interface.max(initial=-1)) + 1
+    return (
+        np.concatenate(vertices),
+        np.concatenate(cells).astype(np.int64),
+        np.concatenate(links),
+        np.concatenate(interfaces),
+    )

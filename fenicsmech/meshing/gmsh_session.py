@@ -1,0 +1,72 @@
+"""gmsh, started and stopped around one mesh, with every option that decides the result set explicitly."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from fenicsmech.errors import MeshingError
+
+# gmsh takes Ctrl-C away from Python, some versions already on import: keep Python's handler throughout
+_interrupt_handler = signal.getsignal(signal.SIGINT)
+import gmsh  # noqa: E402
+
+signal.signal(signal.SIGINT, _interrupt_handler)
+
+__all__ = ["gmsh", "gmsh_session"]
+
+_OPTIONS = {
+    "General.Terminal": 0,
+    "General.NumThreads": 1,
+    "General.AbortOnError": 2,  # errors become exceptions
+    "Geometry.OCCParallel": 0,
+    "Geometry.OCCUnionUnify": 1,
+    "Mesh.Algorithm": 6,  # frontal Delaunay in the plane
+    "Mesh.Algorithm3D": 1,  # Delaunay in space
+    "Mesh.ElementOrder": 1,
+    "Mesh.RandomSeed": 1,
+    "Mesh.RandomFactor": 1e-9,
+    "Mesh.RandomFactor3D": 1e-12,
+    "Mesh.Optimize": 1,
+    "Mesh.OptimizeNetgen": 0,
+    "Mesh.MinimumCircleNodes": 8,
+    "Mesh.MeshSizeFromPoints": 0,
+    "Mesh.MeshSizeFromCurvature": 0,
+    "Mesh.MeshSizeExtendFromBoundary": 1,
+}
+
+
+@contextmanager
+def gmsh_session(part: str) -> Iterator[None]:
+    """Run the block inside a fresh gmsh model; gmsh is finalised however the block ends.
+
+    gmsh keeps one global state, so sessions do not nest, and one started elsewhere must have been finalised.
+
+    Args:
+        part: what is being meshed, for messages.
+
+    Raises:
+        MeshingError: gmsh reports an error; carries the last error line of its log.
+    """
+    handler = signal.getsignal(signal.SIGINT)
+    gmsh.initialize([], False)
+    signal.signal(signal.SIGINT, handler)
+    try:
+        for option, value in _OPTIONS.items():
+            gmsh.option.setNumber(option, value)
+        gmsh.logger.start()
+        gmsh.model.add("link")
+        yield
+    except Exception as failure:
+        # gmsh raises bare Exceptions; anything more specific is not gmsh's
+        if type(failure) is not Exception:
+            raise
+        errors = [line for line in gmsh.logger.get() if line.startswith("Error")]
+        reason = errors[-1].partition(":")[2].strip() if errors else str(failure)
+        raise MeshingError(
+            part, f"gmsh reports {reason!r}", "Simplify the shape, or change the element size"
+        ) from failure
+    finally:
+        gmsh.finalize()
+        signal.signal(signal.SIGINT, handler)

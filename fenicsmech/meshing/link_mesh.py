@@ -1,0 +1,58 @@
+"""The mesh of one link: plain arrays of points, cells and interface numbers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+FREE = -1
+
+
+@dataclass(frozen=True, eq=False)
+class LinkMesh:
+    """A conforming simplex mesh of one link.
+
+    Attributes:
+        points: vertex coordinates, shape (n, dim), in the user's unit of length. Every vertex belongs to a cell.
+        cells: vertex numbers, shape (m, dim + 1): triangles or tetrahedra of positive volume.
+        interface: shape (m,): the index of the interface site that holds the cell, ``FREE`` (-1) if none does.
+    """
+
+    points: np.ndarray
+    cells: np.ndarray
+    interface: np.ndarray
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the space the link is meshed in."""
+        return self.points.shape[1]
+
+    @classmethod
+    def from_cells(cls, points: np.ndarray, cells: np.ndarray, interface: np.ndarray) -> LinkMesh:
+        """The mesh of ``cells``, turned to positive orientation, without the points that no cell uses.
+
+        Args:
+            points: (n, dim) coordinates; cells: (m, dim + 1) rows of ``points``; interface: (m,) site numbers.
+        """
+        used, renumbered = np.unique(cells, return_inverse=True)
+        points = np.array(points[used], dtype=np.float64)
+        cells = renumbered.reshape(cells.shape).astype(np.int64)
+        turned = cell_measures(points, cells) < 0.0
+        cells[turned, -2:] = cells[turned, :-3:-1]
+        mesh = cls(points, cells, np.array(interface, dtype=np.int32))
+        for array in (mesh.points, mesh.cells, mesh.interface):
+            array.setflags(write=False)
+        return mesh
+
+    def cells_of(self, site: int) -> np.ndarray:
+        """The cells (k, dim + 1) that the interface ``site`` holds; ``FREE`` gives the flexible ones."""
+        return self.cells[self.interface == site]
+
+
+def cell_measures(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Signed areas or volumes det(x₁ − x₀, …, x_d − x₀) / d! of ``cells`` ((m, d + 1)), shape (m,)."""
+    corners = points[cells]
+    edges = corners[:, 1:] - corners[:, :1]
+    return np.linalg.det(edges) / math.factorial(points.shape[1])

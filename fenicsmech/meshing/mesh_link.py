@@ -1,0 +1,48 @@
+"""From the shape of a link to its mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from fenicsmech.errors import MeshingError
+from fenicsmech.mechanism.checks import positive
+from fenicsmech.mechanism.shapes import Shape
+from fenicsmech.meshing.interface_site import InterfaceSite
+from fenicsmech.meshing.link_mesh import LinkMesh
+from fenicsmech.meshing.mesh_checks import check_link_mesh
+from fenicsmech.meshing.mesh_request import MeshRequest, mesh_shape
+
+
+def mesh_link(
+    name: str,
+    shape: Shape,
+    sites: Sequence[InterfaceSite] = (),
+    *,
+    dim: int,
+    size: float,
+    layers: int | None = None,
+) -> LinkMesh:
+    """Mesh one link so that the cells of each interface fill the region where its joint holds the link.
+
+    The same input gives the same arrays. Lengths have no preferred unit, except that STEP files are read in mm.
+
+    Args:
+        name: the link's name, for messages.
+        shape: what the link looks like.
+        sites: where joints hold it; ``LinkMesh.interface`` counts them.
+        dim: 2 (triangles) or 3 (tetrahedra).
+        size: target edge length, in the plane for links that are extruded.
+        layers: layers through the depth of an extruded link; None: one per two element sizes.
+
+    Raises:
+        MeshingError: the link cannot be meshed as described, a joint is not on the link or holds no cell, or the
+            regions of two joints touch.
+        DescriptionError: an argument makes no sense.
+    """
+    size = positive(f"element size of link {name!r}", size)
+    if dim not in (2, 3):
+        raise MeshingError(f"link {name!r}", f"dim is {dim!r}", "Give 2 or 3")
+    if layers is not None and (layers != int(layers) or layers < 1):
+        raise MeshingError(f"link {name!r}", f"the number of layers is {layers!r}", "Give a whole number from 1 up")
+    request = MeshRequest(name, tuple(sites), dim, size, layers)
+    return check_link_mesh(mesh_shape(shape, request), request)

@@ -1,0 +1,43 @@
+"""What is asked of the mesh of one link, and the function that each kind of shape implements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import singledispatch
+
+from fenicsmech.meshing.interface_site import InterfaceSite
+from fenicsmech.meshing.link_mesh import LinkMesh
+
+
+@dataclass(frozen=True)
+class MeshRequest:
+    """What the mesh of one link shall be.
+
+    Attributes:
+        link: the link's name, for messages.
+        sites: where joints hold the link; the mesh conforms to their regions.
+        dim: 2 or 3.
+        size: target edge length in the plane of the link (everywhere, for a solid).
+        layers: number of layers through the depth of an extruded link; None: chosen from depth and size.
+    """
+
+    link: str
+    sites: tuple[InterfaceSite, ...]
+    dim: int
+    size: float
+    layers: int | None = None
+
+    @property
+    def part(self) -> str:
+        """The link as messages name it."""
+        return f"link {self.link!r}"
+
+    def part_at(self, site: InterfaceSite) -> str:
+        """The joint and the link as messages name them."""
+        return f"joint {site.name!r} on link {self.link!r}"
+
+
+@singledispatch
+def mesh_shape(shape: object, request: MeshRequest) -> LinkMesh:
+    """The mesh of ``shape`` that ``request`` asks for; each kind of shape registers its own way."""
+    raise TypeError(f"{type(shape).__name__} is not a shape that can be meshed")

@@ -1,0 +1,55 @@
+"""Plots, pictures, tables and summaries: draws and writes the plain data it is given.
+
+Nothing here knows elements, joints or ranks; call it on one rank.
+
+=============  ======================================================================
+``atomic``     files that appear complete or not at all
+``curve``      load–displacement curves as CSV and PNG
+``shapes``     what a picture of a mechanism is made of
+``outline``    the outline of a rigid link from its joints
+``plan``       the top of a tetrahedral mesh
+``picture``    mechanisms, deformed and not, one or several beside each other
+``summary``    the JSON summary of a demo and its schema
+``table``      tables for the console
+``progress``   progress lines of long runs
+``canvas``     the look of all figures, and PNG files
+``frame``      size and panels of a picture
+``arrays``     checked arrays of the records
+=============  ======================================================================
+"""
+
+from fenicsmech.report.atomic import atomic_write
+from fenicsmech.report.curve import CurveSeries, CurveTarget, plot_curve, read_curve_csv, write_curve_csv
+from fenicsmech.report.outline import rigid_outline
+from fenicsmech.report.picture import draw_configurations, draw_mechanism
+from fenicsmech.report.plan import PlanView, plan_view
+from fenicsmech.report.progress import Progress, Silent
+from fenicsmech.report.shapes import Arrow, FlexibleShape, MechanismShape, Panel, Pin, RigidShape, Trace
+from fenicsmech.report.summary import check_summary, write_summary
+from fenicsmech.report.table import format_table
+
+__all__ = [
+    "Arrow",
+    "CurveSeries",
+    "CurveTarget",
+    "FlexibleShape",
+    "MechanismShape",
+    "Panel",
+    "Pin",
+    "PlanView",
+    "Progress",
+    "RigidShape",
+    "Silent",
+    "Trace",
+    "atomic_write",
+    "check_summary",
+    "draw_configurations",
+    "draw_mechanism",
+    "format_table",
+    "plan_view",
+    "plot_curve",
+    "read_curve_csv",
+    "rigid_outline",
+    "write_curve_csv",
+    "write_summary",
+]

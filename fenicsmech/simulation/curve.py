@@ -1,0 +1,69 @@
+"""A load–displacement curve: the frames of one configuration under one changing force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+
+from fenicsmech.linkage import Freedom
+from fenicsmech.mechanism import Configuration, Force
+from fenicsmech.report import CurveSeries, plot_curve, write_curve_csv
+from fenicsmech.simulation.frame import Frame
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Frames of one configuration.
+
+    Attributes:
+        force_part: the force that changes.
+        configuration: motor positions.
+        freedom: mobility and redundancy of the assembled configuration.
+        frames: one per sample, in the order asked for.
+    """
+
+    force_part: Force
+    configuration: Configuration
+    freedom: Freedom
+    frames: tuple[Frame, ...]
+
+    @property
+    def forces(self) -> np.ndarray:
+        """(frames,)."""
+        return np.array([frame.force for frame in self.frames])
+
+    @property
+    def displacements(self) -> np.ndarray:
+        """(frames,)."""
+        return np.array([frame.displacement for frame in self.frames])
+
+    @property
+    def stable(self) -> np.ndarray:
+        """(frames,)."""
+        return np.array([frame.stable for frame in self.frames])
+
+    def series(self, label: str = "") -> CurveSeries:
+        """The curve as a plot draws it."""
+        return CurveSeries(self.displacements, self.forces, label=label, stable=self.stable)
+
+    def plot(self, path: str | Path) -> None:
+        """Draws the curve as a PNG (rank 0)."""
+        if MPI.COMM_WORLD.rank == 0:
+            plot_curve(Path(path), [self.series()], title=f"{self.force_part.name}, {self.configuration.name}")
+
+    def write_csv(self, path: str | Path) -> None:
+        """Writes displacement, force, stability, energy and stress of every frame (rank 0)."""
+        if MPI.COMM_WORLD.rank == 0:
+            write_curve_csv(
+                Path(path),
+                {
+                    "displacement [mm]": self.displacements,
+                    "force [N]": self.forces,
+                    "stable": self.stable.astype(float),
+                    "strain energy [N mm]": np.array([frame.strain_energy for frame in self.frames]),
+                    "max von Mises [MPa]": np.array([frame.max_stress for frame in self.frames]),
+                },
+            )

@@ -1,0 +1,48 @@
+"""One equilibrium of a mechanism, as a record."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from fenicsmech.equilibrium import Reaction, State
+from fenicsmech.mechanism import Motor, Output
+
+
+@dataclass(frozen=True)
+class Frame:
+    """An equilibrium and what was measured in it.
+
+    Attributes:
+        force: magnitude of the controlled force.
+        displacement: of its point along it, from the assembled configuration.
+        stable: whether small disturbances die out under dead loads.
+        unstable_modes: directions in which the energy has a maximum, under dead loads.
+        stable_under_control: whether it is stable while its control is held.
+        strain_energy: elastic energy of all links.
+        max_stress: largest von Mises stress at cell midpoints.
+        outputs: displacement of each output of the mechanism, from the assembled configuration.
+        reactions: what each joint exerts on its second link, by joint name.
+        motors: torque or force of each motor.
+        iterations: Newton iterations, load steps on the way included.
+        residuals: relative residual before each iteration of the last step, and at the end.
+        seconds: wall-clock time.
+        phases: the same, by phase.
+        state: the equilibrium itself.
+    """
+
+    force: float
+    displacement: float
+    stable: bool
+    unstable_modes: int
+    stable_under_control: bool
+    strain_energy: float
+    max_stress: float
+    outputs: Mapping[Output, float]
+    reactions: Mapping[str, Reaction]
+    motors: Mapping[Motor, float]
+    iterations: int
+    residuals: tuple[float, ...]
+    seconds: float
+    phases: Mapping[str, float]
+    state: State

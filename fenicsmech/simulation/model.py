@@ -1,0 +1,154 @@
+"""The discretised mechanism: mesh, elastic links, bodies and constraints of one scene."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+
+from fenicsmech.bodies import InterfaceMap, MaterialPoint, body_point, link_point
+from fenicsmech.clock import Clock
+from fenicsmech.elasticity import ElasticBody, ElasticModel, Quadrature
+from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State
+from fenicsmech.errors import FenicsmechError
+from fenicsmech.linkage import Linkage
+from fenicsmech.linkage.build import in_dimension
+from fenicsmech.mechanism import FlexibleLink, Force, Mechanism, Output
+from fenicsmech.meshing import mesh_link
+from fenicsmech.meshing.interface_site import InterfaceSite
+from fenicsmech.meshing.link_mesh import LinkMesh
+from fenicsmech.meshing.distribute import MechanismMesh, distribute
+
+
+@dataclass(frozen=True)
+class Fidelity:
+    """How finely a scene is computed.
+
+    Attributes:
+        model: 3D, plane strain or plane stress.
+        order: degree of the displacement field.
+        sizes: element size per flexible link.
+        quadrature: quadrature degree.
+    """
+
+    model: ElasticModel
+    order: int
+    sizes: Mapping[FlexibleLink, float]
+    quadrature: Quadrature
+
+
+def mesh_links(mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> list[LinkMesh]:
+    """The mesh of every flexible link, on the calling rank."""
+    meshes = []
+    for link in mechanism.flexible_links:
+        sites = [
+            InterfaceSite(body.centre, body.region, body.axis, body.name)
+            for body in (linkage.bodies[i] for i in linkage.interfaces[link])
+        ]
+        meshes.append(mesh_link(link.name, link.shape, sites, dim=linkage.dim, size=fidelity.sizes[link]))
+    return meshes
+
+
+def mesh_mechanism(comm: MPI.Comm, mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> MechanismMesh:
+    """Meshes on rank 0 and distributes; an error there is raised on all ranks (collective)."""
+    meshes, failure = None, None
+    if comm.rank == 0:
+        try:
+            meshes = mesh_links(mechanism, linkage, fidelity)
+        except FenicsmechError as error:
+            failure = error
+    failure = comm.bcast(failure, root=0)
+    if failure is not None:
+        raise failure
+    return distribute(comm, meshes)
+
+
+class MechanismModel:
+    """A mechanism at one fidelity, ready for equilibria.
+
+    Attributes:
+        mesh: the reference mesh of all flexible links.
+        elastic: their elastic energy.
+        interfaces: interface nodes as functions of body poses.
+        clock: where time goes.
+    """
+
+    def __init__(
+        self, mechanism: Mechanism, linkage: Linkage, mesh: MechanismMesh, fidelity: Fidelity, clock: Clock
+    ) -> None:
+        self.mechanism, self.linkage, self.mesh, self.clock = mechanism, linkage, mesh, clock
+        links = mechanism.flexible_links
+        self.elastic = ElasticBody(
+            mesh.mesh,
+            link=mesh.link,
+            free=mesh.interface < 0,
+            materials=[link.material for link in links],
+            depths=[link.shape.depth for link in links],
+            model=fidelity.model,
+            order=fidelity.order,
+            quadrature=fidelity.quadrature,
+        )
+        first = len(mechanism.rigid_links)
+        cell_body = np.where(mesh.interface >= 0, mesh.interface + first, -1)
+        centres = np.array([body.centre for body in linkage.bodies])
+        self.interfaces = InterfaceMap(self.elastic.u, cell_body, centres, linkage.joints.space)
+        self._node_link = self._link_of_nodes()
+
+    @property
+    def flexible_dofs(self) -> int:
+        """Finite-element unknowns of the flexible links, interfaces excluded (collective)."""
+        own = int(np.sum(self.interfaces.body[: self.interfaces.owned] < 0)) * self.linkage.dim
+        return self.mesh.mesh.comm.allreduce(own)
+
+    @property
+    def rigid_dofs(self) -> int:
+        """Coordinates of all rigid and interface bodies, fixed ones included."""
+        return len(self.linkage.bodies) * self.linkage.joints.space.pose_size
+
+    def point(self, part: Force | Output) -> MaterialPoint:
+        """The material point of a force or output (collective)."""
+        at = np.array(in_dimension(part.at, self.linkage.dim))
+        if not isinstance(part.on, FlexibleLink):
+            body = self.linkage.body_of(part.on)
+            return body_point(at, body, self.linkage.bodies[body].centre, self.linkage.joints.space)
+        topology = self.mesh.mesh.topology
+        owned = topology.index_map(topology.dim).size_local
+        index = self.mechanism.flexible_links.index(part.on)
+        cells = np.flatnonzero(self.mesh.link[:owned] == index)
+        corners = self.mesh.corners(cells)
+        return link_point(f"{part.name!r}", at, self.elastic.u, cells, corners)
+
+    def load(self, force: Force) -> PointLoad:
+        """The point load of a force (collective)."""
+        return PointLoad(
+            force.name, self.point(force), np.array(in_dimension(force.direction, self.linkage.dim))
+        )
+
+    def system(self, controlled: PointLoad, loads: tuple[tuple[PointLoad, float], ...]) -> EquilibriumSystem:
+        """The equilibrium equations with one controlled and several fixed loads (collective)."""
+        return EquilibriumSystem(
+            self.elastic, self.interfaces, self.linkage.joints, controlled=controlled, loads=loads, clock=self.clock
+        )
+
+    def assembled_state(self, poses: np.ndarray, motors: np.ndarray) -> State:
+        """The state of a rigid assembly: every flexible link carried along by its first interface (collective)."""
+        V = self.elastic.u.function_space
+        dim, owned = self.linkage.dim, self.interfaces.owned
+        positions = V.tabulate_dof_coordinates()[:owned, :dim]
+        u = np.zeros((owned, dim))
+        for index, link in enumerate(self.mechanism.flexible_links):
+            body = self.linkage.interfaces[link][0]
+            nodes = np.flatnonzero(self._node_link[:owned] == index)
+            offsets = positions[nodes] - np.array(self.linkage.bodies[body].centre)
+            u[nodes] = self.linkage.joints.space.displace(poses[body], offsets)
+        return State(u.ravel(), poses, np.zeros(self.linkage.joints.rows), 0.0, motors)
+
+    def _link_of_nodes(self) -> np.ndarray:
+        """Index of the flexible link of every local node."""
+        V = self.elastic.u.function_space
+        owner = np.full(len(self.interfaces.body), -1)
+        for cell, link in enumerate(self.mesh.link):
+            owner[V.dofmap.cell_dofs(cell)] = link
+        return owner

@@ -1,0 +1,211 @@
+"""Simulation of a scene: how finely it is computed, and the curves it gives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from time import perf_counter
+
+from mpi4py import MPI
+
+from fenicsmech.clock import Clock
+from fenicsmech.elasticity import PLANE_STRAIN, PLANE_STRESS, SPATIAL, Quadrature
+from fenicsmech.equilibrium import (
+    Control,
+    DisplacementControl,
+    EquilibriumSystem,
+    LoadControl,
+    Newton,
+    Path,
+    PathFailed,
+    Solution,
+    State,
+    joint_reactions,
+    motor_torques,
+)
+from fenicsmech.errors import DescriptionError, EquilibriumError
+from fenicsmech.linkage import assemble, build_linkage, count_freedom
+from fenicsmech.log import logger
+from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Scene, validate
+from fenicsmech.mechanism.checks import finite, positive
+from fenicsmech.report import Progress, Silent
+from fenicsmech.simulation.curve import Curve
+from fenicsmech.simulation.frame import Frame
+from fenicsmech.simulation.model import Fidelity, MechanismModel, mesh_mechanism
+
+_log = logger(__name__)
+
+SPACES = {model.name: model for model in (SPATIAL, PLANE_STRESS, PLANE_STRAIN)}
+"""Names of the elastic models, as users type them."""
+
+
+class Simulation:
+    """Equilibria of a scene at one fidelity.
+
+    Nothing is meshed or compiled until the first curve; the description is checked at once.
+
+    Args:
+        scene: the mechanism and what acts on it.
+        space: "3d", "plane-stress" or "plane-strain".
+        order: degree of the displacement field, 1 or 2.
+        size: element size in the plane of the links, or one per flexible link.
+        quadrature: quadrature degree; the measured optimum by default.
+        comm: processes that share the work.
+
+    Raises:
+        DescriptionError: the scene cannot be simulated as described.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        *,
+        space: str = "3d",
+        order: int = 2,
+        size: float | Mapping[FlexibleLink, float],
+        quadrature: Quadrature | None = None,
+        comm: MPI.Comm = MPI.COMM_WORLD,
+    ) -> None:
+        if space not in SPACES:
+            raise DescriptionError("space", f"{space!r} is not known", f"Choose one of {', '.join(SPACES)}")
+        if order not in (1, 2, 3):
+            raise DescriptionError("order", f"{order!r} is not 1, 2 or 3", "Choose 1 for speed, 2 for accuracy")
+        model = SPACES[space]
+        mechanism = scene.mechanism
+        validate(mechanism, model.dim)
+        links = mechanism.flexible_links
+        sizes = {
+            link: positive(f"element size of {link.name!r}", size[link] if isinstance(size, Mapping) else size)
+            for link in links
+        }
+        self.scene, self.comm, self.clock = scene, comm, Clock()
+        self.fidelity = Fidelity(model, order, sizes, quadrature or Quadrature.for_order(order, model.dim))
+        self.linkage = build_linkage(mechanism, model.dim)
+        self._newtons: dict[tuple, Newton] = {}
+
+    @cached_property
+    def model(self) -> MechanismModel:
+        """The meshed mechanism (collective)."""
+        with self.clock.phase("mesh"):
+            mesh = mesh_mechanism(self.comm, self.scene.mechanism, self.linkage, self.fidelity)
+        with self.clock.phase("setup"):
+            return MechanismModel(self.scene.mechanism, self.linkage, mesh, self.fidelity, self.clock)
+
+    def load_displacement(
+        self,
+        force: Force,
+        *,
+        forces: Sequence[float] | None = None,
+        displacements: Sequence[float] | None = None,
+        configuration: Configuration = DRAWN,
+        others: Mapping[Force, float] | None = None,
+    ) -> Curve:
+        """The equilibria under a changing force (collective).
+
+        Args:
+            force: the force that changes.
+            forces: its magnitudes (load control), or
+            displacements: displacements of its point along it (displacement control).
+            configuration: motor positions.
+            others: constant magnitudes of other forces.
+
+        Raises:
+            DescriptionError: neither or both of forces and displacements, or values that are not finite.
+            AssemblyError: the configuration does not assemble.
+            EquilibriumError: a sample was not reached; carries the frames before it.
+        """
+        if (forces is None) == (displacements is None):
+            raise DescriptionError(f"{force.name!r}", "give either forces or displacements", "Pass one of the two")
+        controls: list[Control] = [
+            *(LoadControl(finite(f"sample of {force.name!r}", value)) for value in forces or ()),
+            *(DisplacementControl(finite(f"sample of {force.name!r}", value)) for value in displacements or ()),
+        ]
+        motors = self.linkage.joints.motor_values(configuration.position)
+        assembly = assemble(self.linkage, configuration)
+        freedom = count_freedom(self.linkage.rigid, assembly.poses, self.linkage.rigid.motor_values(configuration.position))
+        newton = self._newton(force, tuple((others or {}).items()))
+        state = self.model.assembled_state(assembly.poses, motors)
+        newton.system.load(state)
+        datum = newton.system.load_displacement(state)
+        datums = {
+            output: self._output(newton.system, output, state) for output in self.scene.mechanism.outputs
+        }
+        path = Path(newton, state, 0.0 if controls and not controls[0].constrained else datum)
+        frames: list[Frame] = []
+        progress = Progress(len(controls), f"{configuration.name}") if self.comm.rank == 0 else Silent()
+        with progress:
+            for control in controls:
+                shifted = control.at(control.target + datum) if control.constrained else control
+                frames.append(self._frame(path, newton.system, shifted, datum, datums, frames, force, configuration))
+                progress.update(len(frames))
+        return Curve(force, configuration, freedom, tuple(frames))
+
+    def _newton(self, force: Force, others: tuple) -> Newton:
+        """The solver for one controlled force; kept, since its symbolic factor serves every configuration."""
+        key = (force, others)
+        if key not in self._newtons:
+            model = self.model
+            loads = tuple((model.load(other), float(magnitude)) for other, magnitude in others)
+            self._newtons[key] = Newton(model.system(model.load(force), loads))
+        return self._newtons[key]
+
+    def _frame(
+        self,
+        path: Path,
+        system: EquilibriumSystem,
+        control: Control,
+        datum: float,
+        datums: dict,
+        frames: list[Frame],
+        force: Force,
+        configuration: Configuration,
+    ) -> Frame:
+        start, before, iterations = perf_counter(), dict(self.clock.seconds), path.iterations
+        try:
+            solution = path.advance(control)
+        except PathFailed as failure:
+            what = "displacement" if control.constrained else "force"
+            wanted, reached = (v - datum if control.constrained else v for v in (control.target, failure.reached))
+            last = frames[-1] if frames else None
+            raise EquilibriumError(
+                f"{force.name!r} in configuration {configuration.name!r}",
+                f"no equilibrium at {what} {wanted:g}; the last one is at {reached:g} ({failure.reason}; "
+                f"{len(failure.tried)} smaller steps were tried)",
+                "Try displacement control past a limit point, smaller samples, or a finer mesh",
+                last=last,
+                frames=frames,
+            ) from failure
+        return self._record(system, solution, path.iterations - iterations, start, before, datum, datums)
+
+    def _record(self, system, solution: Solution, iterations, start, before, datum, datums) -> Frame:
+        state = solution.state
+        system.load(state)
+        with self.clock.phase("measure"):
+            stress = self.model.elastic.von_mises()
+            peak = self.comm.allreduce(float(stress.max(initial=0.0)), op=MPI.MAX)
+            outputs = {
+                output: self._output(system, output, state) - zero for output, zero in datums.items()
+            }
+            energy = self.model.elastic.energy()
+            displacement = system.load_displacement(state) - datum
+        return Frame(
+            force=state.force,
+            displacement=displacement,
+            stable=solution.unstable_modes == 0,
+            unstable_modes=solution.unstable_modes,
+            stable_under_control=solution.unstable_under_control == 0,
+            strain_energy=energy,
+            max_stress=peak,
+            outputs=outputs,
+            reactions=joint_reactions(self.linkage.joints, state),
+            motors=motor_torques(self.linkage.joints, state),
+            iterations=iterations,
+            residuals=solution.residuals,
+            seconds=perf_counter() - start,
+            phases=self.clock.since(before),
+            state=state,
+        )
+
+    def _output(self, system: EquilibriumSystem, output, state: State) -> float:
+        load = self.model.load(output)
+        return float(load.direction @ load.point.displacement(self.model.elastic.u, state.poses))

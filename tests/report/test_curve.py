@@ -1,0 +1,121 @@
+import numpy as np
+import pytest
+
+from fenicsmech.errors import DescriptionError
+from fenicsmech.report import CurveSeries, CurveTarget, plot_curve, read_curve_csv, write_curve_csv
+
+from .png import png_size, share_of_colour
+
+X = np.linspace(0.0, 20.0, 9)
+
+
+def test_columns_survive_the_round_trip_to_the_last_digit(tmp_path):
+    columns = {
+        "displacement [mm]": np.array([0.0, 1.0 / 3.0, -1e-300, 1.7976931348623157e308]),
+        "force, measured [N]": [0, 0.1, np.pi, 2.5],
+        "stable": np.array([True, True, False, True]),
+        "iterations": [0, 3, 4, 17],
+    }
+    write_curve_csv(tmp_path / "curve.csv", columns)
+    read = read_curve_csv(tmp_path / "curve.csv")
+    assert list(read) == list(columns)
+    for header, values in columns.items():
+        assert np.array_equal(read[header], np.asarray(values, dtype=float))
+    assert (tmp_path / "curve.csv").read_text().splitlines()[3] == "-1e-300,3.141592653589793,0,4"
+
+
+def test_a_table_without_rows_is_a_table(tmp_path):
+    write_curve_csv(tmp_path / "curve.csv", {"force [N]": []})
+    assert read_curve_csv(tmp_path / "curve.csv")["force [N]"].shape == (0,)
+
+
+def test_comments_blank_lines_and_a_byte_order_mark_are_understood(tmp_path):
+    path = tmp_path / "measured.csv"
+    path.write_bytes(
+        "\ufeff# sample 1 mm, µ-test\r\n displacement [mm], force [N]\r\n\r\n0, 0\r\n1.5,2e-1\r\n".encode()
+    )
+    read = read_curve_csv(path)
+    assert read["displacement [mm]"].tolist() == [0.0, 1.5]
+    assert read["force [N]"].tolist() == [0.0, 0.2]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "it is empty"),
+        ("x,x\n1,2\n", "own name"),
+        ("x,\n1,2\n", "own name"),
+        ("x,y\n1,2\n\n3\n", "line 4: 1 fields for 2 columns"),
+        ("x,y\n1,2\n3,four\n", "line 3: 'four' is not a number"),
+        ("x,y\n1,nan\n", "line 2: the value is nan"),
+    ],
+)
+def test_a_bad_table_is_refused_with_its_line(tmp_path, text, message):
+    path = tmp_path / "bad.csv"
+    path.write_text(text)
+    with pytest.raises(DescriptionError, match=message):
+        read_curve_csv(path)
+
+
+@pytest.mark.parametrize(
+    ("columns", "message"),
+    [
+        ({}, "there is no column"),
+        ({"a": [1.0, 2.0], "b": [1.0]}, r"column 'b'.*shape \(1,\)"),
+        ({"a": [1.0, np.nan]}, r"column 'a'.*entry \[1\] is nan"),
+        ({"a": ["one"]}, "not an array of numbers"),
+    ],
+)
+def test_bad_columns_are_refused_and_nothing_is_written(tmp_path, columns, message):
+    with pytest.raises(DescriptionError, match=message):
+        write_curve_csv(tmp_path / "curve.csv", columns)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_plot_has_a_fixed_size_and_the_same_bytes_every_time(tmp_path):
+    series = [
+        CurveSeries(X, np.sin(X / 8), "initial design", stable=np.gradient(np.sin(X / 8)) > 0),
+        CurveSeries(X, X / 10, "optimised design"),
+        CurveSeries(X, X / 11, "measured", joined=False),
+    ]
+    for name in ("a.png", "b.png"):
+        plot_curve(tmp_path / name, series, targets=[CurveTarget(5.0, 0.5)], title="claw")
+    assert png_size(tmp_path / "a.png") == (960, 660)
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+def test_the_unstable_part_is_dashed(tmp_path):
+    blue = (33, 102, 172)
+    for name, stable in (("solid.png", X >= 0), ("dashed.png", X < 5)):
+        plot_curve(tmp_path / name, [CurveSeries(X, X, stable=stable)])
+    assert 0.0 < share_of_colour(tmp_path / "dashed.png", blue) < 0.9 * share_of_colour(tmp_path / "solid.png", blue)
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 500])
+def test_any_number_of_samples_is_drawn(tmp_path, count):
+    x = np.linspace(0.0, 1.0, count)
+    plot_curve(tmp_path / "curve.png", [CurveSeries(x, x, "curve", stable=x > 0.5)])
+    assert png_size(tmp_path / "curve.png") == (960, 660)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"displacement": X, "force": X[1:]}, "forces of curve 'c'.*shape"),
+        ({"displacement": X, "force": np.full(9, np.inf)}, "forces of curve 'c'.*entry"),
+        ({"displacement": X, "force": X, "stable": [True]}, "1 flags for 9 samples"),
+    ],
+)
+def test_a_contradictory_series_is_refused(arguments, message):
+    with pytest.raises(DescriptionError, match=message):
+        CurveSeries(label="c", **arguments)
+
+
+def test_a_target_that_is_not_a_number_is_refused():
+    with pytest.raises(DescriptionError, match="target"):
+        CurveTarget(np.nan, 4.0)
+
+
+def test_only_png_is_drawn(tmp_path):
+    with pytest.raises(DescriptionError, match=r"\.png"):
+        plot_curve(tmp_path / "curve.pdf", [CurveSeries(X, X)])
