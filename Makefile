@@ -12,11 +12,13 @@ export PYTHONNOUSERSITE := 1
 unexport PYTHONPATH PYTHONHOME
 
 # Open MPI (OMPI_ up to version 4, PRTE_ from 5): may run as root and with more ranks than cores, which containers
-# and small machines need; ranks are not bound to cores, so that two runs at once do not share one.
+# and small machines need; ranks are not bound to cores, so that two runs at once do not share one; they talk through
+# shared memory, being on one machine.
 export OMPI_ALLOW_RUN_AS_ROOT := 1
 export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
 export OMPI_MCA_rmaps_base_oversubscribe := 1
 export OMPI_MCA_hwloc_base_binding_policy := none
+export OMPI_MCA_btl := ^tcp
 export OMPI_MCA_btl_vader_single_copy_mechanism := none
 export PRTE_MCA_rmaps_default_mapping_policy := :oversubscribe
 export PRTE_MCA_hwloc_default_binding_policy := none

@@ -12,7 +12,9 @@ suite=trixie
 tree=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 root=${FENICSMECH_DEBIAN13:-${XDG_CACHE_HOME:-$HOME/.cache}/fenicsmech/debian13}
 environment=(HOME=/root LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive
-    PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin)
+    PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
+    OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_btl=^tcp
+    PRTE_MCA_rmaps_default_mapping_policy=:oversubscribe)
 
 fail() {
     printf 'tools/debian13.sh: %s\n' "$@" >&2
@@ -58,7 +60,8 @@ copy_apt_settings() {
 }
 
 # Run a command inside a root. The mounts live in a namespace of their own, so that none is left behind however this
-# ends. Where mounting is forbidden (some containers) the device nodes that debootstrap made must do.
+# ends. Where mounting is forbidden (some containers) the device nodes that debootstrap made must do, and UCX and hwloc,
+# which miss /proc and /sys but do without, are kept from saying so in the output of every program.
 enter() {
     local target=$1
     shift
@@ -71,7 +74,7 @@ enter() {
             mount -t proc proc "$target/proc"
             exec chroot "$target" /usr/bin/env -i "$@"' enter "$target" "${environment[@]}" "$@"
     else
-        chroot "$target" /usr/bin/env -i "${environment[@]}" "$@"
+        chroot "$target" /usr/bin/env -i "${environment[@]}" UCX_LOG_LEVEL=fatal HWLOC_HIDE_ERRORS=2 "$@"
     fi
 }
 

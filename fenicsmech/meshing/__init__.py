@@ -20,7 +20,7 @@ from fenicsmech.meshing import mesh_file, outline, step, strip  # noqa: F401  (e
 from fenicsmech.meshing.centreline import Centreline
 from fenicsmech.meshing.interface_site import InterfaceSite
 from fenicsmech.meshing.link_mesh import FREE, LinkMesh, cell_measures
-from fenicsmech.meshing.mesh_link import mesh_link
+from fenicsmech.meshing.link_mesher import mesh_link
 from fenicsmech.meshing.quality import radius_ratios
 
 __all__ = ["FREE", "Centreline", "InterfaceSite", "LinkMesh", "cell_measures", "mesh_link", "radius_ratios"]

@@ -20,7 +20,7 @@ class InterfaceSite:
     Attributes:
         at: the joint's point, 2 or 3 coordinates. Two coordinates leave the height along z open.
         region: extent of the interface across the axis.
-        axis: unit vector along which the region is swept; its sign does not matter.
+        axis: unit vector along which the region is swept in space; its sign does not matter. Not used in 2D.
         name: the joint's name, for messages.
     """
 

@@ -23,13 +23,14 @@ def check_link_mesh(mesh: LinkMesh, request: MeshRequest) -> LinkMesh:
 
     Raises:
         MeshingError: a cell has no volume; the link falls apart; a joint is off the link or holds no cell; the
-            regions of two joints touch.
+            regions of two joints touch; nothing is left to bend.
     """
     _check_volumes(mesh, request)
     _check_connected(mesh, request)
     for number, site in enumerate(request.sites):
         _check_holds(mesh, request, number, site)
     _check_apart(mesh, request)
+    _check_flexible(mesh, request)
     return mesh
 
 
@@ -139,3 +140,12 @@ def _check_apart(mesh: LinkMesh, request: MeshRequest) -> None:
     shared = np.flatnonzero(pairs[1:, 0] == pairs[:-1, 0])
     if len(shared):
         raise overlap(request, int(pairs[shared[0], 1]), int(pairs[shared[0] + 1, 1]))
+
+
+def _check_flexible(mesh: LinkMesh, request: MeshRequest) -> None:
+    if not np.any(mesh.interface == FREE):
+        raise MeshingError(
+            request.part,
+            "the interface regions of its joints cover the whole link, so nothing of it can bend",
+            "Make the regions smaller, or the link rigid",
+        )

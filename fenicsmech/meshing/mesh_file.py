@@ -12,7 +12,6 @@ from fenicsmech.meshing.interface_site import across
 from fenicsmech.meshing.link_mesh import LinkMesh
 from fenicsmech.meshing.mesh_request import MeshRequest, mesh_shape
 from fenicsmech.meshing.part_file import require_header
-from fenicsmech.meshing.plan_view import require_plane_axes
 from fenicsmech.meshing.regions import contains
 
 _HEADER = "$MeshFormat"
@@ -22,7 +21,6 @@ _SIMPLICES = {2: ("Triangle", "triangles"), 3: ("Tetrahedron", "tetrahedra")}
 
 @mesh_shape.register
 def _(shape: MeshPart, request: MeshRequest) -> LinkMesh:
-    require_plane_axes(request)
     require_header(shape.path, _HEADER, kind="gmsh mesh file", part=request.part)
     with gmsh_session(request.part):
         gmsh.merge(str(shape.path))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from fenicsmech.errors import MeshingError
 from fenicsmech.meshing.extrude import extrude, layer_count
 from fenicsmech.meshing.fragments import mesh_fragments
 from fenicsmech.meshing.gmsh_session import gmsh, gmsh_session
@@ -50,7 +49,6 @@ def mesh_plan_view(
     Raises:
         MeshingError: the mesh cannot be made.
     """
-    require_plane_axes(request)
     sites = in_units_of(request.sites, request.size)
     with gmsh_session(request.part):
         plan = draw(sites)
@@ -62,21 +60,6 @@ def mesh_plan_view(
     if request.dim > mesh.dim:
         return extrude(mesh, depth, request.layers or layer_count(depth, request.size))
     return mesh
-
-
-def require_plane_axes(request: MeshRequest) -> None:
-    """Refuse joints of a plane model whose axis lies in the plane.
-
-    Raises:
-        MeshingError: there is one.
-    """
-    for site in request.sites:
-        if request.dim == 2 and not site.is_planar:
-            raise MeshingError(
-                request.part_at(site),
-                f"the axis {site.axis} is not along z in a 2D model",
-                "Turn the axis to z, or compute in 3D",
-            )
 
 
 def _mesh_plan(request: MeshRequest, plan: PlanView) -> LinkMesh:

@@ -9,11 +9,10 @@ def first_crossing(polygon: np.ndarray) -> np.ndarray | None:
     """A point where two edges of the closed ``polygon`` ((n, 2)) that are not neighbours meet, or None."""
     edge = np.roll(polygon, -1, axis=0) - polygon
     between = polygon[None, :] - polygon[:, None]
-    # p_i + t e_i = p_j + u e_j for all pairs at once; parallel edges give no finite t, u and do not count
-    parallel = _cross(edge[:, None], edge[None, :])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        t = _cross(between, edge[None, :]) / parallel
-        u = _cross(between, edge[:, None]) / parallel
+    # p_i + t e_i = p_j + u e_j for all pairs at once; edges in line with each other do not cross
+    sine, lengths = _cross(edge[:, None], edge[None, :]), np.linalg.norm(edge, axis=1)
+    sine[np.abs(sine) <= 1e-10 * lengths[:, None] * lengths[None, :]] = np.nan
+    t, u = _cross(between, edge[None, :]) / sine, _cross(between, edge[:, None]) / sine
     number = np.arange(len(polygon))
     apart = np.abs(number[:, None] - number[None, :])
     strangers = (apart > 1) & (apart < len(polygon) - 1)

@@ -11,7 +11,6 @@ from fenicsmech.meshing.gmsh_session import gmsh, gmsh_session
 from fenicsmech.meshing.link_mesh import LinkMesh
 from fenicsmech.meshing.mesh_request import MeshRequest, mesh_shape
 from fenicsmech.meshing.part_file import require_header
-from fenicsmech.meshing.plan_view import require_plane_axes
 from fenicsmech.meshing.regions import DimTag, region_face, region_prism, solid_reach
 from fenicsmech.meshing.sizing import pin_refinements
 
@@ -20,7 +19,6 @@ _HEADER = "ISO-10303-21"
 
 @mesh_shape.register
 def _(shape: StepPart, request: MeshRequest) -> LinkMesh:
-    require_plane_axes(request)
     require_header(shape.path, _HEADER, kind="STEP file", part=request.part)
     mesh = {2: _mesh_section, 3: _mesh_solid}[request.dim]
     with gmsh_session(request.part):

@@ -50,8 +50,8 @@ def check_sides(part: str, centreline: Centreline, thickness: float) -> None:
     if bend[sharpest] * 0.5 * thickness >= 1.0:
         raise MeshingError(
             part,
-            f"the centreline bends with radius {1.0 / bend[sharpest]:g} near {_shown(centreline.evaluate(s[sharpest]))}, "
-            f"which is not more than half the thickness {thickness:g}",
+            f"the centreline bends with radius {1.0 / bend[sharpest]:g} near "
+            f"{_shown(centreline.evaluate(s[sharpest]))}, which is not more than half the thickness {thickness:g}",
             "Make the strip thinner or its centreline smoother",
         )
     right, left = (_side(centreline, s, offset * thickness) for offset in (-0.5, 0.5))

@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 from fenicsmech.bodies import InterfaceMap, MaterialPoint, body_point, link_point
 from fenicsmech.clock import Clock
+from fenicsmech.compat import petsc_vector
 from fenicsmech.elasticity import ElasticBody, ElasticModel, Quadrature
 from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State
 from fenicsmech.errors import FenicsmechError
@@ -107,6 +108,12 @@ class MechanismModel:
         """Coordinates of all rigid and interface bodies, fixed ones included."""
         return len(self.linkage.bodies) * self.linkage.joints.space.pose_size
 
+    def load(self, state: State) -> None:
+        """Makes the finite-element field hold ``state`` (collective)."""
+        petsc_vector(self.elastic.u).array_w[:] = state.u
+        self.elastic.update()
+        self.interfaces.place(state.poses)
+
     def point(self, part: Force | Output) -> MaterialPoint:
         """The material point of a force or output (collective)."""
         at = np.array(in_dimension(part.at, self.linkage.dim))
@@ -120,8 +127,8 @@ class MechanismModel:
         corners = self.mesh.corners(cells)
         return link_point(f"{part.name!r}", at, self.elastic.u, cells, corners)
 
-    def load(self, force: Force) -> PointLoad:
-        """The point load of a force (collective)."""
+    def point_load(self, force: Force | Output) -> PointLoad:
+        """The point load of a force, or of a unit force along an output (collective)."""
         return PointLoad(
             force.name, self.point(force), np.array(in_dimension(force.direction, self.linkage.dim))
         )

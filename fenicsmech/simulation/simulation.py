@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
+from pathlib import Path as FilePath
 from time import perf_counter
 
 from mpi4py import MPI
@@ -28,12 +29,16 @@ from fenicsmech.linkage import assemble, build_linkage, count_freedom
 from fenicsmech.log import logger
 from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Scene, validate
 from fenicsmech.mechanism.checks import finite, positive
-from fenicsmech.report import Progress, Silent
+from fenicsmech.report import Panel, Progress, Silent, Trace, draw_configurations
 from fenicsmech.simulation.curve import Curve
+from fenicsmech.simulation.export import write_xdmf
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.model import Fidelity, MechanismModel, mesh_mechanism
+from fenicsmech.simulation.picture import Draughtsman
+from fenicsmech.simulation.snapshot import gather
 
 _log = logger(__name__)
+_STRESS = "von Mises stress [MPa]"
 
 SPACES = {model.name: model for model in (SPATIAL, PLANE_STRESS, PLANE_STRAIN)}
 """Names of the elastic models, as users type them."""
@@ -82,6 +87,7 @@ class Simulation:
         self.fidelity = Fidelity(model, order, sizes, quadrature or Quadrature.for_order(order, model.dim))
         self.linkage = build_linkage(mechanism, model.dim)
         self._newtons: dict[tuple, Newton] = {}
+        self._last: Curve | None = None
 
     @cached_property
     def model(self) -> MechanismModel:
@@ -138,15 +144,61 @@ class Simulation:
                 shifted = control.at(control.target + datum) if control.constrained else control
                 frames.append(self._frame(path, newton.system, shifted, datum, datums, frames, force, configuration))
                 progress.update(len(frames))
-        return Curve(force, configuration, freedom, tuple(frames))
+        self._last = Curve(force, configuration, freedom, tuple(frames))
+        return self._last
+
+    def write(self, path: str | FilePath, curve: Curve | None = None) -> None:
+        """Writes the frames of ``curve`` (the last one computed) as XDMF for ParaView (collective).
+
+        Raises:
+            DescriptionError: no curve was computed yet.
+        """
+        write_xdmf(path, self.model, self._chosen(curve).frames)
+
+    def picture(self, path: str | FilePath, curve: Curve | None = None, *, stress: bool = True) -> None:
+        """Draws the undeformed mechanism and the last frame of ``curve`` as a PNG (collective).
+
+        Args:
+            path: the file.
+            curve: whose last frame; the last curve computed by default.
+            stress: colour links by von Mises stress.
+
+        Raises:
+            DescriptionError: no curve was computed yet.
+        """
+        curve = self._chosen(curve)
+        panel = self.panel(curve, stress=stress)
+        if panel is not None:
+            draw_configurations(path, [panel], title=self.scene.mechanism.name, colour_label=_STRESS if stress else "")
+
+    def panel(self, curve: Curve, *, stress: bool = True, traces: Sequence[Trace] = ()) -> Panel | None:
+        """The picture of a curve's first and last frame, on rank 0; None elsewhere (collective)."""
+        first, last = (gather(self.model, curve.frames[k].state) for k in (0, -1))
+        if first is None:
+            return None
+        pen = Draughtsman(self.scene.mechanism, self.linkage, self.model.mesh)
+        force = curve.frames[-1].force
+        return Panel(
+            pen.shape(first, stress=False),
+            (pen.shape(last, stress=stress),),
+            (pen.arrow(curve.force_part, force, last),),
+            tuple(traces),
+            f"{curve.configuration.name}: {force:.3g} N, {curve.frames[-1].displacement:.3g} mm",
+        )
+
+    def _chosen(self, curve: Curve | None) -> Curve:
+        chosen = curve or self._last
+        if chosen is None:
+            raise DescriptionError("picture", "no curve was computed yet", "Call load_displacement first")
+        return chosen
 
     def _newton(self, force: Force, others: tuple) -> Newton:
         """The solver for one controlled force; kept, since its symbolic factor serves every configuration."""
         key = (force, others)
         if key not in self._newtons:
             model = self.model
-            loads = tuple((model.load(other), float(magnitude)) for other, magnitude in others)
-            self._newtons[key] = Newton(model.system(model.load(force), loads))
+            loads = tuple((model.point_load(other), float(magnitude)) for other, magnitude in others)
+            self._newtons[key] = Newton(model.system(model.point_load(force), loads))
         return self._newtons[key]
 
     def _frame(
@@ -207,5 +259,5 @@ class Simulation:
         )
 
     def _output(self, system: EquilibriumSystem, output, state: State) -> float:
-        load = self.model.load(output)
+        load = self.model.point_load(output)
         return float(load.direction @ load.point.displacement(self.model.elastic.u, state.poses))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from fenicsmech.errors import MeshingError
 from fenicsmech.mechanism.checks import positive
@@ -44,5 +45,7 @@ def mesh_link(
         raise MeshingError(f"link {name!r}", f"dim is {dim!r}", "Give 2 or 3")
     if layers is not None and (layers != int(layers) or layers < 1):
         raise MeshingError(f"link {name!r}", f"the number of layers is {layers!r}", "Give a whole number from 1 up")
-    request = MeshRequest(name, tuple(sites), dim, size, layers)
+    # in the plane there is only one way to sweep a region, whatever the joint's own axis (of a slider, say)
+    sites = tuple(sites) if dim == 3 else tuple(replace(site, axis=(0.0, 0.0, 1.0)) for site in sites)
+    request = MeshRequest(name, sites, dim, size, layers)
     return check_link_mesh(mesh_shape(shape, request), request)

@@ -1,0 +1,58 @@
+"""States of a mechanism as an XDMF time series for ParaView."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from dolfinx import fem
+
+from fenicsmech.compat import cell_nodes, cellwise_space, vector_space, write_series
+from fenicsmech.simulation.frame import Frame
+from fenicsmech.simulation.model import MechanismModel
+from fenicsmech.simulation.snapshot import vertex_displacements
+
+
+def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame]) -> None:
+    """Writes vertex displacements and von Mises stress of ``frames``; time is the force (collective).
+
+    The files appear when they are complete.
+    """
+    path = Path(path)
+    comm = model.mesh.mesh.comm
+    displacement = fem.Function(vector_space(model.mesh.mesh, 1))
+    stress = fem.Function(cellwise_space(model.mesh.mesh))
+    dim = model.linkage.dim
+
+    def update(index: int) -> None:
+        model.load(frames[index].state)
+        nodal = vertex_displacements(model)
+        values = displacement.x.array.reshape(-1, dim)
+        for cell, nodes in enumerate(cell_nodes(model.mesh.mesh)):
+            values[displacement.function_space.dofmap.cell_dofs(cell)] = nodal[nodes]
+        von_mises = model.elastic.von_mises()
+        stress.x.array[: len(von_mises)] = von_mises
+
+    folder = None
+    if comm.rank == 0:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        folder = tempfile.mkdtemp(dir=path.parent, prefix=f".{path.stem}-")
+    folder = Path(comm.bcast(folder, root=0))
+    forces = np.array([frame.force for frame in frames])
+    write_series(
+        folder / path.name,
+        model.mesh.mesh,
+        {"displacement": displacement, "von Mises stress": stress},
+        forces,
+        update,
+        comm,
+    )
+    comm.barrier()
+    if comm.rank == 0:
+        # the heavy data first: the light file that names it must never point at nothing
+        for suffix in (".h5", ".xdmf"):
+            os.replace(folder / path.with_suffix(suffix).name, path.with_suffix(suffix))
+        folder.rmdir()

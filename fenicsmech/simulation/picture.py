@@ -1,0 +1,78 @@
+"""From the state of a mechanism to the shapes a picture is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fenicsmech.linkage import Linkage
+from fenicsmech.linkage.build import in_dimension
+from fenicsmech.mechanism import Force, Link, Mechanism
+from fenicsmech.meshing.distribute import MechanismMesh
+from fenicsmech.report import Arrow, FlexibleShape, MechanismShape, Pin, RigidShape, plan_view, rigid_outline
+from fenicsmech.simulation.snapshot import Snapshot
+
+
+class Draughtsman:
+    """Draws states of one mechanism, seen along z; the triangles are those of the undeformed mesh.
+
+    Args:
+        mechanism: what is drawn.
+        linkage: its bodies.
+        mesh: its mesh.
+    """
+
+    def __init__(self, mechanism: Mechanism, linkage: Linkage, mesh: MechanismMesh) -> None:
+        self._mechanism, self._linkage, self._mesh = mechanism, linkage, mesh
+        self._width = 0.03 * linkage.length
+        self._faces = [self._visible(index) for index in range(len(mechanism.flexible_links))]
+
+    def shape(self, snapshot: Snapshot, *, stress: bool) -> MechanismShape:
+        """The mechanism in the state of ``snapshot``, links coloured by von Mises stress if asked for."""
+        positions = (self._mesh.vertices + snapshot.displacement)[:, :2]
+        flexible = tuple(
+            FlexibleShape(positions, triangles, snapshot.von_mises[cells] if stress else None, name=link.name)
+            for (triangles, cells), link in zip(self._faces, self._mechanism.flexible_links, strict=True)
+        )
+        rigid = tuple(
+            RigidShape(rigid_outline(self._places(link, snapshot.poses), self._width), link.name, link.fixed)
+            for link in self._mechanism.rigid_links
+        )
+        return MechanismShape(flexible, rigid, self._pins(snapshot.poses))
+
+    def arrow(self, force: Force, magnitude: float, snapshot: Snapshot) -> Arrow:
+        """The arrow of a force on a rigid link in the state of ``snapshot``."""
+        at = self.position(force.on, force.at, snapshot.poses)
+        return Arrow(at, magnitude * np.array(force.direction[:2]), label=f"{magnitude:g} N")
+
+    def position(self, link: Link, at: Sequence[float], poses: np.ndarray) -> np.ndarray:
+        """Where the point drawn at ``at`` of ``link`` is, (2,); of a flexible link, carried by its first interface."""
+        body = self._linkage.body_of(link)
+        drawn = np.array(in_dimension(tuple(at), self._linkage.dim))
+        offset = drawn - np.array(self._linkage.bodies[body].centre)
+        return (drawn + self._linkage.joints.space.displace(poses[body], offset[None])[0])[:2]
+
+    def _places(self, link: Link, poses: np.ndarray) -> np.ndarray:
+        """Current positions of the joints, forces and outputs of a rigid link, (k, 2)."""
+        joints = [joint.at for joint in self._mechanism.joints if link in (joint.a, joint.b)]
+        points = [part.at for part in (*self._mechanism.forces, *self._mechanism.outputs) if part.on == link]
+        return np.array([self.position(link, at, poses) for at in (*joints, *points)])
+
+    def _pins(self, poses: np.ndarray) -> tuple[Pin, ...]:
+        pins = []
+        for connection in self._linkage.joints.connections:
+            body = self._linkage.bodies[connection.a]
+            offset = np.array(connection.at) - np.array(body.centre)
+            moved = np.array(connection.at) + self._linkage.joints.space.displace(poses[connection.a], offset[None])[0]
+            pins.append(Pin(moved[:2]))
+        return tuple(pins)
+
+    def _visible(self, index: int) -> tuple[np.ndarray, np.ndarray]:
+        """Triangles of a link seen from above, and the cell each belongs to."""
+        cells = np.flatnonzero(self._mesh.link_of_cell == index)
+        if self._linkage.dim == 2:
+            return self._mesh.cells[cells], cells
+        view = plan_view(self._mesh.vertices, self._mesh.cells[cells])
+        return view.triangles, cells[view.cells]
+
