@@ -19,6 +19,7 @@ class Centreline:
 
     Args:
         points: (n, dim) with n ≥ 2; neighbours must differ.
+        part: what the curve belongs to, for messages.
 
     Attributes:
         knots: parameters s_k of the points, shape (n,).
@@ -27,14 +28,13 @@ class Centreline:
         DescriptionError: two neighbouring points coincide.
     """
 
-    def __init__(self, points: Sequence[Sequence[float]]) -> None:
+    def __init__(self, points: Sequence[Sequence[float]], *, part: str = "centreline") -> None:
         points = np.asarray(points, dtype=float)
         chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
         if not np.all(chords > 0.0):
             k = int(np.argmin(chords))
-            raise DescriptionError(
-                "centreline", f"points {k} and {k + 1} coincide at {tuple(points[k])}", "Remove one of them"
-            )
+            where = ", ".join(f"{c:g}" for c in points[k])
+            raise DescriptionError(part, f"points {k} and {k + 1} coincide at ({where})", "Remove one of them")
         self.knots = np.concatenate([[0.0], np.cumsum(chords)])
         self._curve = CubicSpline(self.knots, points, bc_type="not-a-knot")
 

@@ -8,11 +8,18 @@ from contextlib import contextmanager
 
 from fenicsmech.errors import MeshingError
 
+
+def _restore_interrupts(handler: object) -> None:
+    """Give Ctrl-C back to ``handler``; None stands for one that Python does not know."""
+    if handler is not None:
+        signal.signal(signal.SIGINT, handler)
+
+
 # gmsh takes Ctrl-C away from Python, some versions already on import: keep Python's handler throughout
-_interrupt_handler = signal.getsignal(signal.SIGINT)
+_handler = signal.getsignal(signal.SIGINT)
 import gmsh  # noqa: E402
 
-signal.signal(signal.SIGINT, _interrupt_handler)
+_restore_interrupts(_handler)
 
 __all__ = ["gmsh", "gmsh_session"]
 
@@ -51,7 +58,7 @@ def gmsh_session(part: str) -> Iterator[None]:
     """
     handler = signal.getsignal(signal.SIGINT)
     gmsh.initialize([], False)
-    signal.signal(signal.SIGINT, handler)
+    _restore_interrupts(handler)
     try:
         for option, value in _OPTIONS.items():
             gmsh.option.setNumber(option, value)
@@ -69,4 +76,4 @@ def gmsh_session(part: str) -> Iterator[None]:
         ) from failure
     finally:
         gmsh.finalize()
-        signal.signal(signal.SIGINT, handler)
+        _restore_interrupts(handler)

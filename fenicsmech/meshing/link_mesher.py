@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from fenicsmech.errors import MeshingError
+from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism.checks import positive
 from fenicsmech.mechanism.shapes import Shape
 from fenicsmech.meshing.interface_site import InterfaceSite
@@ -40,11 +40,12 @@ def mesh_link(
             regions of two joints touch.
         DescriptionError: an argument makes no sense.
     """
-    size = positive(f"element size of link {name!r}", size)
+    part = f"mesh of link {name!r}"
+    size = positive(f"element size, {part}", size)
     if dim not in (2, 3):
-        raise MeshingError(f"link {name!r}", f"dim is {dim!r}", "Give 2 or 3")
-    if layers is not None and (layers != int(layers) or layers < 1):
-        raise MeshingError(f"link {name!r}", f"the number of layers is {layers!r}", "Give a whole number from 1 up")
+        raise DescriptionError(part, f"dim is {dim!r}", "Give 2 or 3")
+    if layers is not None and not (isinstance(layers, int) and layers > 0):
+        raise DescriptionError(part, f"the number of layers is {layers!r}", "Give a whole number from 1 up")
     # in the plane there is only one way to sweep a region, whatever the joint's own axis (of a slider, say)
     sites = tuple(sites) if dim == 3 else tuple(replace(site, axis=(0.0, 0.0, 1.0)) for site in sites)
     request = MeshRequest(name, sites, dim, size, layers)

@@ -20,30 +20,30 @@ from fenicsmech.meshing.strip_pins import ON_CENTRELINE, StripPin
 
 @mesh_shape.register
 def _(shape: Strip, request: MeshRequest) -> LinkMesh:
-    check_sides(request.part, Centreline(shape.centreline), shape.thickness)
-    _check_on_strip(shape, request)
+    centreline = Centreline(shape.centreline, part=f"centreline of {request.part}")
+    check_sides(request.part, centreline, shape.thickness)
+    _check_on_strip(centreline, shape.thickness, request)
     strip = in_units_of(shape, request.size)
     return mesh_plan_view(request, shape.depth, lambda sites: _draw(strip, sites))
 
 
-def _check_on_strip(strip: Strip, request: MeshRequest) -> None:
+def _check_on_strip(centreline: Centreline, thickness: float, request: MeshRequest) -> None:
     """Refuse joints off the strip, before their eyes hide that they are.
 
     Raises:
         MeshingError: a joint lies farther than half the thickness from the centreline, or beyond an end.
     """
-    centreline = Centreline(strip.centreline)
-    tolerance = ON_CENTRELINE * strip.thickness
+    tolerance = ON_CENTRELINE * thickness
     for site in request.sites:
         s = centreline.closest(site.at[:2])
         away = np.asarray(site.at[:2]) - centreline.evaluate(s)
         beyond = abs(away @ centreline.tangent(s))
-        if np.linalg.norm(away) > 0.5 * strip.thickness + tolerance or beyond > tolerance:
+        if np.linalg.norm(away) > 0.5 * thickness + tolerance or beyond > tolerance:
             x, y = site.at[:2]
             raise MeshingError(
                 request.part_at(site),
                 f"the point ({x:g}, {y:g}) is not on the link: it is {np.linalg.norm(away):g} away from the "
-                f"centreline of a strip of thickness {strip.thickness:g}",
+                f"centreline of a strip of thickness {thickness:g}",
                 "Move the joint onto the centreline, or lead the centreline through the joint",
             )
 

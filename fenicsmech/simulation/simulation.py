@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path as FilePath
 from time import perf_counter
 
+import numpy as np
 from mpi4py import MPI
 
 from fenicsmech.clock import Clock
@@ -26,9 +27,11 @@ from fenicsmech.equilibrium import (
 )
 from fenicsmech.errors import DescriptionError, EquilibriumError
 from fenicsmech.linkage import assemble, build_linkage, count_freedom
+from fenicsmech.linkage.build import in_dimension
 from fenicsmech.log import logger
-from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Scene, validate
+from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Output, Scene, validate
 from fenicsmech.mechanism.checks import finite, positive
+from fenicsmech.meshing.quality import radius_ratios
 from fenicsmech.report import Panel, Progress, Silent, Trace, draw_configurations
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.export import write_xdmf
@@ -122,10 +125,8 @@ class Simulation:
         """
         if (forces is None) == (displacements is None):
             raise DescriptionError(f"{force.name!r}", "give either forces or displacements", "Pass one of the two")
-        controls: list[Control] = [
-            *(LoadControl(finite(f"sample of {force.name!r}", value)) for value in forces or ()),
-            *(DisplacementControl(finite(f"sample of {force.name!r}", value)) for value in displacements or ()),
-        ]
+        kind, samples = (DisplacementControl, displacements) if forces is None else (LoadControl, forces)
+        controls: list[Control] = [kind(finite(f"sample of {force.name!r}", value)) for value in samples]
         motors = self.linkage.joints.motor_values(configuration.position)
         assembly = assemble(self.linkage, configuration)
         freedom = count_freedom(self.linkage.rigid, assembly.poses, self.linkage.rigid.motor_values(configuration.position))
@@ -155,19 +156,26 @@ class Simulation:
         """
         write_xdmf(path, self.model, self._chosen(curve).frames)
 
-    def picture(self, path: str | FilePath, curve: Curve | None = None, *, stress: bool = True) -> None:
-        """Draws the undeformed mechanism and the last frame of ``curve`` as a PNG (collective).
+    def picture(
+        self,
+        path: str | FilePath,
+        curve: Curve | None = None,
+        *,
+        stress: bool = True,
+        traces: Sequence[Trace] = (),
+    ) -> None:
+        """Draws the first and the last frame of ``curve`` as a PNG (collective).
 
         Args:
             path: the file.
-            curve: whose last frame; the last curve computed by default.
+            curve: the last curve computed by default.
             stress: colour links by von Mises stress.
+            traces: paths of points to draw along.
 
         Raises:
             DescriptionError: no curve was computed yet.
         """
-        curve = self._chosen(curve)
-        panel = self.panel(curve, stress=stress)
+        panel = self.panel(self._chosen(curve), stress=stress, traces=traces)
         if panel is not None:
             draw_configurations(path, [panel], title=self.scene.mechanism.name, colour_label=_STRESS if stress else "")
 
@@ -185,6 +193,29 @@ class Simulation:
             tuple(traces),
             f"{curve.configuration.name}: {force:.3g} N, {curve.frames[-1].displacement:.3g} mm",
         )
+
+    def path(self, part: Force | Output, configurations: Sequence[Configuration]) -> np.ndarray:
+        """Where the unloaded point of a force or output is in each configuration, (configurations, dim).
+
+        Raises:
+            AssemblyError: one of the configurations does not assemble.
+        """
+        body = self.linkage.body_of(part.on)
+        space, centre = self.linkage.joints.space, np.array(self.linkage.bodies[body].centre)
+        drawn = np.array(in_dimension(part.at, self.linkage.dim))
+        poses = [assemble(self.linkage, configuration).poses[body] for configuration in configurations]
+        return np.array([drawn + space.displace(pose, (drawn - centre)[None])[0] for pose in poses])
+
+    @property
+    def setup_seconds(self) -> float:
+        """Seconds spent before the first frame: mesh, compiled forms, matrix patterns."""
+        return sum(self.clock.seconds.get(phase, 0.0) for phase in ("mesh", "setup", "compile"))
+
+    @property
+    def mesh_ratio_max(self) -> float:
+        """Largest ratio of circumradius to inradius among the cells of the mesh."""
+        mesh = self.model.mesh
+        return self.linkage.dim / float(radius_ratios(mesh.vertices, mesh.cells).min())
 
     def _chosen(self, curve: Curve | None) -> Curve:
         chosen = curve or self._last

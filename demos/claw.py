@@ -1,0 +1,45 @@
+"""Claw gripper (half): a motor closes a rigid finger through four Onyx links that give way to the object.
+
+The finger pushes on the object at its tip; the object pushes back across the finger. The motor holds the closed
+configuration while the force grows to 10 N.
+
+    python3 demos/claw.py [--space 3d|plane-stress|plane-strain] [--order 1|2] [--size MM] [--quick] [--out DIR]
+    mpirun -n 2 python3 demos/claw.py
+"""
+
+from common import Target, finish, parse, simulation
+
+import fenicsmech as fm
+
+demo = parse("claw", __doc__.splitlines()[0], size=2.2, quick_size=4.0)
+
+THICKNESS, DEPTH, PIN = 3.0, 10.0, 3.0
+SHAFT, AXLE, ANCHOR = (15, 0), (60, 5), (22, 32)  # on the base: motor shaft and two axles
+ELBOW, KNEE, HIP, WRIST = (38, 22), (62, 42), (56, 88), (28, 92)  # moving joints
+FINGERTIP = (8, 125)
+
+
+def link(*points):
+    """A strip of Onyx along ``points``."""
+    return fm.strip(points, thickness=THICKNESS, depth=DEPTH)
+
+
+claw = fm.Mechanism("claw gripper")
+base, finger = claw.rigid("base", fixed=True), claw.rigid("finger")
+crank = claw.flexible("crank", link(SHAFT, (29, 8), ELBOW), fm.ONYX)
+coupler = claw.flexible("coupler", link(ELBOW, (50, 30), KNEE, (66, 64), HIP), fm.ONYX)
+rocker = claw.flexible("rocker", link(AXLE, (67, 23), KNEE), fm.ONYX)
+guide = claw.flexible("guide", link(ANCHOR, (15, 62), WRIST), fm.ONYX)
+shaft = claw.revolute(base, crank, at=SHAFT, radius=PIN)
+claw.revolute(crank, coupler, at=ELBOW, radius=PIN)
+claw.revolute(base, rocker, at=AXLE, radius=PIN)
+claw.revolute(rocker, coupler, at=KNEE, radius=PIN)
+claw.revolute(coupler, finger, at=HIP, radius=PIN)
+claw.revolute(base, guide, at=ANCHOR, radius=PIN)
+claw.revolute(guide, finger, at=WRIST, radius=PIN)
+claw.motor(shaft, name="servo")
+grasp = claw.force(on=finger, at=FINGERTIP, direction=(1, 0), name="object on finger")
+
+sim = simulation(demo, fm.Scene(claw))
+curve = sim.load_displacement(grasp, forces=[float(force) for force in range(11)])
+finish(demo, sim, [curve], [Target(fm.DRAWN, 4.0, 5.0), Target(fm.DRAWN, 10.0, 20.0)])

@@ -1,0 +1,66 @@
+"""Klann leg: a walking leg whose four Onyx links spring when the foot meets an obstacle.
+
+The linkage is that of US patent 6,260,862. Its foot runs along a nearly straight ground stroke while the crank turns;
+the load–displacement curve of the foot is simulated in three configurations of the stroke.
+
+    python3 demos/klann.py [--space 3d|plane-stress|plane-strain] [--order 1|2] [--size MM] [--quick] [--out DIR]
+    mpirun -n 2 python3 demos/klann.py
+"""
+
+from math import radians
+
+import numpy as np
+from common import Target, finish, parse, simulation
+
+import fenicsmech as fm
+from fenicsmech.report import Trace
+
+demo = parse("klann", __doc__.splitlines()[0], size=2.2, quick_size=4.0)
+
+SCALE = 150.0 / 19.2  # mm per unit of the patent: 150 mm from foot to hip
+THICKNESS, DEPTH, PIN = 3.0, 10.0, 3.0
+
+
+def pivot(x, y):
+    """A pivot of the patent, in mm; the foot is the origin."""
+    return (SCALE * x, SCALE * y)
+
+
+SHAFT, FIRST_AXLE, SECOND_AXLE = pivot(17.607, 11.807), pivot(17.818, 16.076), pivot(12.101, 10.186)
+CRANK_PIN, ELBOW, KNEE, HIP = pivot(14.631, 11.807), pivot(9.125, 11.807), pivot(3.024, 13.099), pivot(11.119, 19.200)
+FOOT = pivot(0.0, 0.0)
+
+
+def bowed(start, end, rise):
+    """A strip of Onyx from ``start`` to ``end`` that bows by ``rise`` to the left."""
+    start, end = np.array(start), np.array(end)
+    across = np.array([start[1] - end[1], end[0] - start[0]]) / np.hypot(*(end - start))
+    return fm.strip([start, (start + end) / 2 + rise * across, end], thickness=THICKNESS, depth=DEPTH)
+
+
+leg = fm.Mechanism("Klann leg")
+base, foot = leg.rigid("base", fixed=True), leg.rigid("leg")
+crank = leg.flexible("crank", bowed(SHAFT, CRANK_PIN, 3.0), fm.ONYX)
+rod = leg.flexible("connecting rod", fm.strip([CRANK_PIN, ELBOW, KNEE], thickness=THICKNESS, depth=DEPTH), fm.ONYX)
+first = leg.flexible("first rocker", bowed(FIRST_AXLE, HIP, 10.0), fm.ONYX)
+second = leg.flexible("second rocker", bowed(SECOND_AXLE, ELBOW, 5.0), fm.ONYX)
+shaft = leg.revolute(base, crank, at=SHAFT, radius=PIN)
+leg.revolute(crank, rod, at=CRANK_PIN, radius=PIN)
+leg.revolute(base, second, at=SECOND_AXLE, radius=PIN)
+leg.revolute(second, rod, at=ELBOW, radius=PIN)
+leg.revolute(base, first, at=FIRST_AXLE, radius=PIN)
+leg.revolute(first, foot, at=HIP, radius=PIN)
+leg.revolute(rod, foot, at=KNEE, radius=PIN)
+motor = leg.motor(shaft, name="crank motor")
+lift = leg.force(on=foot, at=FOOT, direction=(0, 1), name="obstacle under foot")
+
+scene = fm.Scene(leg)
+sim = simulation(demo, scene)
+# crank angles of the patent; the drawn one is 180°
+stroke = [scene.configuration(f"crank {angle}°", {motor: radians(angle - 180)}) for angle in (45, 95, 145)]
+curves = [sim.load_displacement(lift, forces=np.linspace(0.0, 5.0, 6), configuration=c) for c in stroke]
+finish(demo, sim, curves, [Target(configuration, 5.0, 10.0) for configuration in stroke])
+
+turn = [scene.configuration(f"{angle}°", {motor: radians(angle)}) for angle in range(0, 361, 4)]
+path = Trace(sim.path(lift, turn)[:, :2], "foot path", sim.path(lift, stroke)[:, :2])
+sim.picture(demo.folder / "foot-path.png", curves[1], stress=False, traces=[path])

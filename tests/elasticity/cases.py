@@ -1,0 +1,23 @@
+"""Every material law, and every combination of assumption and law the package supports."""
+
+import pytest
+
+from fenicsmech.elasticity import PLANE_STRAIN, PLANE_STRESS, SPATIAL
+from fenicsmech.mechanism import (
+    IsochoricNeoHookean,
+    IsochoricSimoNeoHookean,
+    LogarithmicNeoHookean,
+    NeoHookean,
+)
+
+LAWS = (NeoHookean(), LogarithmicNeoHookean(), IsochoricNeoHookean(), IsochoricSimoNeoHookean())
+CASES = (*((model, law) for model in (SPATIAL, PLANE_STRAIN) for law in LAWS), (PLANE_STRESS, NeoHookean()))
+
+
+def name(value) -> str:
+    """A name for a model or a law in the titles of tests."""
+    return getattr(value, "name", type(value).__name__)
+
+
+each_law = pytest.mark.parametrize("law", LAWS, ids=name)
+each_case = pytest.mark.parametrize(("model", "law"), CASES, ids=name)

@@ -1,0 +1,43 @@
+"""Compiled UFL expressions evaluated for many values of their arguments at once: one value per cell of a mesh."""
+
+from collections.abc import Callable
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+
+from fenicsmech.compat import cellwise_space, compile_expression, create_mesh, evaluate_expression
+from fenicsmech.elasticity import ElasticModel, Moduli, density
+from fenicsmech.mechanism import EnergyLaw
+
+from ..report.grids import rectangle
+
+
+def pointwise(build: Callable, arguments: np.ndarray) -> np.ndarray:
+    """The UFL expression ``build(*a)`` for each row a of ``arguments`` (n, k), as (n, components)."""
+    points, cells = rectangle(len(arguments), 1, 1.0, 1.0)
+    mesh = create_mesh(MPI.COMM_SELF, cells, points)
+    space = cellwise_space(mesh)
+    functions = [fem.Function(space) for _ in range(arguments.shape[1])]
+    for function, column in zip(functions, arguments.T, strict=True):
+        function.x.array[: len(column)] = column
+    expression = compile_expression(build(*functions), np.full((1, 2), 1.0 / 3.0), MPI.COMM_SELF)
+    return evaluate_expression(expression, mesh, np.arange(len(arguments), dtype=np.int32))
+
+
+def energies(model: ElasticModel, law: EnergyLaw, H: np.ndarray, young: float, poisson: float) -> np.ndarray:
+    """W of each H (n, dim, dim), (n,)."""
+
+    def build(youngs_modulus, poissons_ratio, *entries):
+        moduli = Moduli(youngs_modulus, poissons_ratio)
+        return density(law, model.strain(law, tensor(entries), moduli), moduli)
+
+    constants = np.broadcast_to([young, poisson], (len(H), 2))
+    return pointwise(build, np.hstack([constants, H.reshape(len(H), -1)]))[:, 0]
+
+
+def tensor(entries):
+    """A square tensor of 4 or 9 entries, row by row."""
+    dim = {4: 2, 9: 3}[len(entries)]
+    return ufl.as_matrix([entries[dim * i : dim * (i + 1)] for i in range(dim)])
