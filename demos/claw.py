@@ -11,9 +11,9 @@ from common import Target, finish, parse, simulation
 
 import fenicsmech as fm
 
-demo = parse("claw", __doc__.splitlines()[0], size=2.2, quick_size=4.0)
+demo = parse("claw", __doc__.splitlines()[0], size=1.73, quick_size=4.0)
 
-THICKNESS, DEPTH, PIN = 3.0, 10.0, 3.0
+THICKNESS, DEPTH, PIN = 3.0, 8.5, 3.0
 SHAFT, AXLE, ANCHOR = (15, 0), (60, 5), (22, 32)  # on the base: motor shaft and two axles
 ELBOW, KNEE, HIP, WRIST = (38, 22), (62, 42), (56, 88), (28, 92)  # moving joints
 FINGERTIP = (8, 125)

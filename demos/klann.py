@@ -15,10 +15,10 @@ from common import Target, finish, parse, simulation
 import fenicsmech as fm
 from fenicsmech.report import Trace
 
-demo = parse("klann", __doc__.splitlines()[0], size=2.2, quick_size=4.0)
+demo = parse("klann", __doc__.splitlines()[0], size=1.71, quick_size=4.0)
 
 SCALE = 150.0 / 19.2  # mm per unit of the patent: 150 mm from foot to hip
-THICKNESS, DEPTH, PIN = 3.0, 10.0, 3.0
+THICKNESS, DEPTH, PIN = 3.0, 8.5, 3.0
 
 
 def pivot(x, y):

@@ -11,7 +11,7 @@ from common import Target, finish, parse, simulation
 
 import fenicsmech as fm
 
-demo = parse("truss", __doc__.splitlines()[0], size=2.0, quick_size=3.0)
+demo = parse("truss", __doc__.splitlines()[0], size=2.1, quick_size=4.0)
 
 finger = fm.Mechanism("truss finger")
 base = finger.rigid("base", fixed=True)

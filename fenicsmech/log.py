@@ -52,3 +52,10 @@ def configure(level: int = logging.INFO) -> None:
         package.removeHandler(handler)
     package.addHandler(_Console())
     package.setLevel(level)
+    # Compiling a form gives a root logger without handlers one that shows every compiler command, and ours once more.
+    package.propagate = False
+    others = logging.getLogger()
+    if not others.handlers:
+        console = _Console()
+        console.setLevel(logging.WARNING)
+        others.addHandler(console)

@@ -34,6 +34,7 @@ def pytest_configure(config: pytest.Config) -> None:
     config.stash[STDERR] = os.dup(2)  # what pytest captures while a test runs is lost with it
     if COMM.rank > 0:
         sys.stdout = open(os.devnull, "w")  # the terminal reporter, set up next, writes to what it finds here
+        config.add_cleanup(sys.stdout.close)
 
 
 def pytest_unconfigure() -> None:

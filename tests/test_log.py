@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+import subprocess
+import sys
 from collections.abc import Iterator
 
 import pytest
@@ -15,9 +17,9 @@ from fenicsmech import log
 def package_logger() -> Iterator[logging.Logger]:
     """The package's logger, put back as it was afterwards."""
     package = logging.getLogger(log.ROOT)
-    handlers, level = list(package.handlers), package.level
+    handlers, level, propagate = list(package.handlers), package.level, package.propagate
     yield package
-    package.handlers[:] = handlers
+    package.handlers[:], package.propagate = handlers, propagate
     package.setLevel(level)
 
 
@@ -45,3 +47,19 @@ def test_configuring_twice_shows_a_message_once(capsys):
     log.configure(logging.DEBUG)
     log.logger("fenicsmech.meshing").debug("1204 cells")
     assert capsys.readouterr().err.count("1204 cells") == 1
+
+
+def test_a_script_shows_no_chatter_of_others():
+    script = """
+import logging
+from fenicsmech import log
+log.configure(logging.INFO)
+logging.getLogger().setLevel(logging.INFO)  # as setuptools does when FFCx compiles a form
+logging.info("gcc -O2 form.c")
+logging.warning("a warning of another library")
+log.logger("fenicsmech.meshing").info("1204 cells")
+"""
+    shown = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stderr
+    assert "gcc" not in shown
+    assert shown.count("a warning of another library") == 1
+    assert shown.count("1204 cells") == 1

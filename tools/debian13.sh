@@ -47,11 +47,12 @@ export_apt_proxy() {
     if [[ $https == http* ]]; then export https_proxy=${https_proxy:-$https}; fi
 }
 
-# How the host's apt reaches its mirror (proxy, certificates, retries, clock tolerance), for the apt in the root.
-copy_apt_settings() {
+# How the host reaches its mirror (names, proxy, certificates, retries, clock tolerance), for the apt in the root.
+copy_network_settings() {
     local target=$1 settings=$1/etc/apt/apt.conf.d/00host file
     apt-config dump | { grep -E '^Acquire::(http|https|Retries|Check|ForceIPv)' || true; } >"$settings"
-    for file in /etc/resolv.conf /etc/ssl/certs/ca-certificates.crt $(sed -nE 's/^.*"(\/[^"]+)";$/\1/p' "$settings"); do
+    for file in /etc/hosts /etc/resolv.conf /etc/ssl/certs/ca-certificates.crt \
+        $(sed -nE 's/^.*"(\/[^"]+)";$/\1/p' "$settings"); do
         if [ -f "$file" ]; then
             mkdir -p "$target${file%/*}"
             cp -L "$file" "$target$file"
@@ -82,7 +83,7 @@ fill() { # a new root
     local target=$1 mirror=$2
     export_apt_proxy
     debootstrap --variant=minbase "$suite" "$target" "$mirror"
-    copy_apt_settings "$target"
+    copy_network_settings "$target"
     # Documentation and translations, which nothing here reads, take as long to unpack as the programs.
     printf 'path-exclude=/usr/share/%s/*\n' doc man locale >"$target/etc/dpkg/dpkg.cfg.d/fenicsmech"
     echo force-unsafe-io >>"$target/etc/dpkg/dpkg.cfg.d/fenicsmech"
@@ -127,7 +128,7 @@ command -v debootstrap >/dev/null || fail "debootstrap is missing; run: make ins
 mkdir -p "${root%/*}"
 exec 9>"$root.lock"
 flock 9 # one build or run at a time
-recipe=$({ packages; declare -f fill copy_apt_settings; } | sha256sum)
+recipe=$({ packages; declare -f fill copy_network_settings; } | sha256sum)
 if [ "$(cat "$root/recipe" 2>/dev/null)" != "$recipe" ]; then
     build
 fi

@@ -59,13 +59,11 @@ def plane_strain(H: Expr) -> Strain:
 def plane_strain_stretched(H: Expr, e: Expr) -> Strain:
     """In the plane with F₃₃² = 1 + e.
 
-    With j₂ = tr H + det H and a = j₂ (2 + j₂) = J₂² − 1:
+    With j₂ = tr H + det H = J₂ − 1 and h = F₃₃ − 1 = e / (1 + √(1 + e)):
 
-        J² − 1 = a (1 + e) + e =: m,     J − 1 = m / (1 + √(1 + m)),
-        tr FᵀF − 3 − 2 (J − 1) = H : H − 2 det H − j₂² − a e + (J − 1)².
+        J − 1 = j₂ + J₂ h,      negative J₂ makes J negative,
+        tr FᵀF − 3 − 2 (J − 1) = H : H − 2 det H − 2 j₂ h + h².
     """
     in_plane = tr(H) + det(H)
-    a = in_plane * (2 + in_plane)
-    m = a * (1 + e) + e
-    j = m / (1 + (1 + m) ** 0.5)
-    return Strain(j, inner(H, H) - 2 * det(H) - in_plane**2 - a * e + j**2)
+    h = e / (1 + (1 + e) ** 0.5)
+    return Strain(in_plane + (1 + in_plane) * h, inner(H, H) - 2 * det(H) - 2 * in_plane * h + h**2)

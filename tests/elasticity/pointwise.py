@@ -26,15 +26,20 @@ def pointwise(build: Callable, arguments: np.ndarray) -> np.ndarray:
     return evaluate_expression(expression, mesh, np.arange(len(arguments), dtype=np.int32))
 
 
-def energies(model: ElasticModel, law: EnergyLaw, H: np.ndarray, young: float, poisson: float) -> np.ndarray:
-    """W of each H (n, dim, dim), (n,)."""
+def energies(model: ElasticModel, law: EnergyLaw, H: np.ndarray, young, poisson) -> np.ndarray:
+    """W of each H (n, dim, dim), (n,); one or n values of Young's modulus and Poisson's ratio."""
 
     def build(youngs_modulus, poissons_ratio, *entries):
         moduli = Moduli(youngs_modulus, poissons_ratio)
         return density(law, model.strain(law, tensor(entries), moduli), moduli)
 
-    constants = np.broadcast_to([young, poisson], (len(H), 2))
-    return pointwise(build, np.hstack([constants, H.reshape(len(H), -1)]))[:, 0]
+    return pointwise(build, arguments(H, young, poisson))[:, 0]
+
+
+def arguments(H: np.ndarray, young, poisson) -> np.ndarray:
+    """One row (E, ν, entries of H) per H (n, dim, dim)."""
+    constants = [np.broadcast_to(value, len(H)) for value in (young, poisson)]
+    return np.column_stack([*constants, H.reshape(len(H), -1)])
 
 
 def tensor(entries):

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import mpmath
-from mpmath import mp, mpf
+from mpmath import mpf
 
 from fenicsmech.elasticity import PLANE_STRAIN, PLANE_STRESS, SPATIAL, ElasticModel
 from fenicsmech.mechanism import (
@@ -14,7 +14,7 @@ from fenicsmech.mechanism import (
     NeoHookean,
 )
 
-mp.dps = 50
+DIGITS = 50
 
 
 def _compressible(mu, trace, J):
@@ -38,32 +38,29 @@ _ENERGIES = {
 }
 
 
-def energy(law: EnergyLaw, H: Sequence[Sequence[float]], young: float, poisson: float) -> mpf:
-    """W of F = I + H, H (3, 3), exact in the given binary numbers."""
-    F = mp.eye(3) + mp.matrix(H)
+@mpmath.workdps(DIGITS)
+def energy(model: ElasticModel, law: EnergyLaw, H: Sequence[Sequence[float]], young: float, poisson: float) -> mpf:
+    """W of H (dim, dim) under the model's assumption on the third dimension, exact in the given binary numbers."""
+    if model is SPATIAL:
+        return _spatial_energy(law, H, young, poisson)
+    if model is PLANE_STRAIN:
+        return _spatial_energy(law, _embed(H, 0), young, poisson)
+    assert model is PLANE_STRESS
+
+    def stretched(H33):
+        return _spatial_energy(law, _embed(H, H33), young, poisson)
+
+    # no stress across the plane: W is stationary in H₃₃
+    bracket = (mpf(-0.99), mpf(20))
+    return stretched(mpmath.findroot(lambda H33: mpmath.diff(stretched, H33), bracket, solver="ridder", tol=1e-40))
+
+
+def _spatial_energy(law: EnergyLaw, H, young: float, poisson: float) -> mpf:
+    F = mpmath.eye(3) + mpmath.matrix(H)
     mu = mpf(young) / (2 * (1 + mpf(poisson)))
     lam = mpf(young) * mpf(poisson) / ((1 + mpf(poisson)) * (1 - 2 * mpf(poisson)))
     trace = sum(entry**2 for entry in F)
     return _ENERGIES[law](trace, mpmath.det(F), mu, lam, lam + 2 * mu / 3)
-
-
-def transverse_stretch(law: EnergyLaw, H: Sequence[Sequence[float]], young: float, poisson: float) -> mpf:
-    """F₃₃ at which W of the in-plane H (2, 2) is stationary: no stress across the plane."""
-
-    def slope(stretch):
-        return mpmath.diff(lambda t: energy(law, _embed(H, t - 1), young, poisson), stretch)
-
-    return mpmath.findroot(slope, mpf(1), tol=mpf("1e-40"))
-
-
-def model_energy(model: ElasticModel, law: EnergyLaw, H, young: float, poisson: float) -> mpf:
-    """W of H (dim, dim) under the model's assumption on the third dimension."""
-    if model is SPATIAL:
-        return energy(law, H, young, poisson)
-    if model is PLANE_STRAIN:
-        return energy(law, _embed(H, 0), young, poisson)
-    assert model is PLANE_STRESS
-    return energy(law, _embed(H, transverse_stretch(law, H, young, poisson) - 1), young, poisson)
 
 
 def _embed(H, H33):

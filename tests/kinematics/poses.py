@@ -1,0 +1,42 @@
+"""Poses from scipy's rotations, which share nothing with the package's own."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from fenicsmech.kinematics import PLANAR, SPATIAL, RigidSpace
+
+SPACES = (PLANAR, SPATIAL)
+
+
+def turn(space: RigidSpace, omega: np.ndarray) -> Rotation:
+    """The finite rotation by the vector ``omega`` (3,), or (1,) about z in the plane."""
+    return Rotation.from_rotvec(omega if space.dim == 3 else [0.0, 0.0, omega[0]])
+
+
+def matrix(space: RigidSpace, rotation: Rotation) -> np.ndarray:
+    """The rotation matrix (dim, dim)."""
+    return rotation.as_matrix()[: space.dim, : space.dim]
+
+
+def pose(space: RigidSpace, displacement: np.ndarray, rotation: Rotation) -> np.ndarray:
+    """The pose (pose_size,) of a body moved by ``displacement`` (dim,) and turned by ``rotation``."""
+    x, y, z, w = rotation.as_quat()
+    parameters = (w, x, y, z) if space.dim == 3 else (rotation.as_rotvec()[2],)
+    return np.array([*displacement, *parameters])
+
+
+def random_rotation(space: RigidSpace, rng: np.random.Generator) -> Rotation:
+    """Any rotation in space, one by up to half a turn in the plane."""
+    return turn(space, rng.uniform(-np.pi, np.pi, 1)) if space.dim == 2 else Rotation.from_quat(rng.standard_normal(4))
+
+
+def random_pose(space: RigidSpace, rng: np.random.Generator) -> np.ndarray:
+    """A pose far from the identity."""
+    return pose(space, rng.standard_normal(space.dim), random_rotation(space, rng))
+
+
+def rotation_of(space: RigidSpace, pose: np.ndarray) -> Rotation:
+    """scipy's rotation for the rotation parameters of ``pose``."""
+    return turn(space, pose[2:]) if space.dim == 2 else Rotation.from_quat(np.roll(pose[3:], -1))
