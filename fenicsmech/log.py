@@ -52,10 +52,11 @@ def configure(level: int = logging.INFO) -> None:
         package.removeHandler(handler)
     package.addHandler(_Console())
     package.setLevel(level)
-    # Compiling a form gives a root logger without handlers one that shows every compiler command, and ours once more.
     package.propagate = False
+    # Importing FFCx gives the root logger a handler, and compiling a form makes it show every compiler command.
     others = logging.getLogger()
     if not others.handlers:
-        console = _Console()
-        console.setLevel(logging.WARNING)
-        others.addHandler(console)
+        others.addHandler(logging.StreamHandler())
+    for handler in others.handlers:
+        if type(handler) is logging.StreamHandler:  # not the handlers of an application or a test runner
+            handler.setLevel(max(handler.level, logging.WARNING))

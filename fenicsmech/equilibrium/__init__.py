@@ -1,36 +1,44 @@
 """Equilibria of a mechanism: elements and joints meet here.
 
 - ``state``: displacements, poses, multipliers
-- ``load``: point loads and what is controlled
-- ``layout``, ``matrices``, ``system``: the distributed KKT system
+- ``load``: point loads
+- ``control``: what is led along a path: a force, a displacement, motors
+- ``layout``, ``matrices``, ``extras``, ``system``: the distributed KKT system
 - ``factor``: LDLᵀ with inertia
 - ``newton``: the primal–dual iteration
-- ``path``: predictor and load steps
+- ``predictor``, ``path``: first guesses and load steps
 - ``reactions``: what joints and motors exert
 """
 
-from fenicsmech.equilibrium.load import Control, DisplacementControl, LoadControl, PointLoad
+from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadControl, MotorControl
+from fenicsmech.equilibrium.load import PointLoad
 from fenicsmech.equilibrium.newton import Newton, NewtonOptions, NotConverged, Solution
 from fenicsmech.equilibrium.path import Path, PathFailed
+from fenicsmech.equilibrium.predictor import Constant, Hermite, Predictor, Tangent
 from fenicsmech.equilibrium.reactions import Reaction, joint_reactions, motor_torques
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem
 
 __all__ = [
+    "Constant",
     "Control",
     "DisplacementControl",
     "EquilibriumSystem",
+    "Hermite",
     "LoadControl",
+    "MotorControl",
     "Newton",
     "NewtonOptions",
     "NotConverged",
     "Path",
     "PathFailed",
     "PointLoad",
+    "Predictor",
     "Reaction",
     "Solution",
     "State",
     "Step",
+    "Tangent",
     "joint_reactions",
     "motor_torques",
 ]

@@ -19,12 +19,12 @@ chapters 17–19; Chamberlain et al. on the watchdog (doi:10.1007/BFb0120945).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.factor import Factor, Inertia
-from fenicsmech.equilibrium.load import Control
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import Balance, EquilibriumSystem
 from fenicsmech.log import logger
@@ -95,8 +95,7 @@ class Newton:
             NotConverged: too many iterations, no descent, or elements inverted all along.
         """
         system, options = self.system, self.options
-        if not control.constrained:
-            start = replace(start, force=control.target)
+        start = control.prepare(start)
         system.load(start)
         if not math.isfinite(system.elastic_energy()):
             raise NotConverged("elements are inverted in the predicted state", 0)
@@ -214,7 +213,7 @@ class Newton:
         if inertia is None:
             raise NotConverged("the tangent at the equilibrium cannot be factored", iteration)
         with system.clock.phase("solve"):
-            right = system.load_rate(state, control)
+            right = control.rate(system, state)
             x = right.duplicate()
             self._factor.solve(right, x)
             under_control = inertia.negative - self._expected

@@ -38,3 +38,8 @@ class Step:
     def scaled(self, factor: float) -> Step:
         """``factor`` times this step."""
         return Step(factor * self.u, factor * self.z, factor * self.multipliers, factor * self.force)
+
+    def __add__(self, other: Step) -> Step:
+        return Step(
+            self.u + other.u, self.z + other.z, self.multipliers + other.multipliers, self.force + other.force
+        )

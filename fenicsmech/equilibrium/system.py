@@ -7,14 +7,12 @@
          [0       , −A   , −ε , 0   ],          KKT = Gᵀ K̂ G,   right-hand side −Gᵀ ∇L
          [−a_uᵀ   , −a_zᵀ, 0  , 0   ]]
 
-B collects the curvature of the rigid coordinates: Σ_i r_i · ∂²u_i/∂z² of interface nodes, −f a · ∂²u_P/∂z² of
-loaded points, −Σ λ_k ∂²C_k/∂z². One sparse triple product forms the whole matrix. ε = 1/ρ is the proximal term of
-the augmented Lagrangian that keeps redundant constraints regular; D makes x dimensionless.
+B is the curvature of the rigid coordinates. One sparse triple product forms the whole matrix; D makes x
+dimensionless.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,15 +22,13 @@ from fenicsmech.bodies import BodyPoint, InterfaceMap, LinkPoint
 from fenicsmech.clock import Clock
 from fenicsmech.compat import petsc_vector
 from fenicsmech.elasticity import ElasticBody
+from fenicsmech.equilibrium.control import Control
+from fenicsmech.equilibrium.extras import ExtraEntries
 from fenicsmech.equilibrium.layout import Layout
-from fenicsmech.equilibrium.load import Control, PointLoad
+from fenicsmech.equilibrium.load import PointLoad
 from fenicsmech.equilibrium.matrices import create_extended_matrix, create_map_matrix
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.linkage import JointSystem
-
-REGULARISATION = 1e-8
-"""ε = 1/ρ of the constraint block, in scaled units (rows of A have norm one, K̂ has mean diagonal one)."""
-
 
 @dataclass(frozen=True)
 class Balance:
@@ -80,13 +76,14 @@ class EquilibriumSystem:
         self.elastic, self.interfaces, self.joints = elastic, interfaces, joints
         self.controlled, self.loads, self.clock = controlled, loads, clock
         self.layout = Layout(elastic.mesh.comm, interfaces, joints)
+        self._extras = ExtraEntries(joints, self.layout, controlled)
         self._u = petsc_vector(elastic.u)
         self._nodal = self._u.duplicate()
         with clock.phase("compile"):
             self._forms = (elastic.energy_form, elastic.residual_form, elastic.tangent_form)
         with clock.phase("setup"):
             self._u.set(0.0)
-            self._hat = create_extended_matrix(elastic, self.layout, self._pattern())
+            self._hat = create_extended_matrix(elastic, self.layout, self._extras.pattern())
             # mean diagonal of the stiffness k: D = (ℓ, 1, …) / (ℓ √k) makes the KKT matrix dimensionless
             diagonal = self._hat.getDiagonal().array_r[self.layout.free]
             comm = self.layout.comm
@@ -96,6 +93,7 @@ class EquilibriumSystem:
             self.scale = np.concatenate(
                 [joints.pose_scale / self.unit, joints.row_scale * self.unit, [self.unit / joints.length]]
             )
+            self._extras.set_regularisation(self.scale[self.layout.multipliers], self.scale[self.layout.force])
             self._map = create_map_matrix(self.layout, interfaces, joints, self.unit_u, self.scale)
         self._rows = self._hat.createVecLeft()
         self._matrix: PETSc.Mat | None = None
@@ -193,7 +191,7 @@ class EquilibriumSystem:
             self.elastic.tangent(self._hat)
             self._hat.assemble()
             if layout.last:
-                for rows, columns, block in self._entries(state, control, balance):
+                for rows, columns, block in self._extras.entries(state, control, self._acting(state), balance.moments):
                     # petsc4py reads transposed arrays in memory order
                     self._hat.setValues(
                         rows.astype(PETSc.IntType),
@@ -211,20 +209,23 @@ class EquilibriumSystem:
                 self._matrix.setDiagonal(diagonal)
         return self._matrix
 
-    def load_rate(self, state: State, control: Control) -> PETSc.Vec:
-        """Right-hand side whose KKT solution is the rate of x with the control's target (collective)."""
-        layout = self.layout
-        nodal, extras = np.zeros(layout.owned), np.zeros(layout.extras)
-        if control.constrained:
-            extras[layout.force] = -1.0
-        else:
-            self._add_load(self.controlled, 1.0, state, nodal, extras)
+    def force_rate(self, state: State) -> PETSc.Vec:
+        """Right-hand side whose KKT solution is the rate of x with the controlled force (collective)."""
+        nodal, extras = np.zeros(self.layout.owned), np.zeros(self.layout.extras)
+        self._add_load(self.controlled, 1.0, state, nodal, extras)
         return self._right_hand_side(nodal, extras)
+
+    def target_rate(self) -> PETSc.Vec:
+        """Right-hand side whose KKT solution is the rate of x with the controlled displacement (collective)."""
+        extras = np.zeros(self.layout.extras)
+        extras[self.layout.force] = -1.0
+        return self._right_hand_side(np.zeros(self.layout.owned), extras)
 
     def motor_rate(self, state: State, direction: np.ndarray) -> PETSc.Vec:
         """Right-hand side whose KKT solution is the rate of x with motor values along ``direction`` (collective)."""
         extras = np.zeros(self.layout.extras)
-        extras[self.layout.multipliers] = self.joints.motor_rate(state.poses, state.motors, direction)
+        rate, twist = self.joints.motor_rate(state.poses, state.motors, state.multipliers, direction)
+        extras[self.layout.multipliers], extras[self.layout.z] = rate, twist
         return self._right_hand_side(np.zeros(self.layout.owned), extras)
 
     def control_row(self) -> PETSc.Vec:
@@ -290,71 +291,6 @@ class EquilibriumSystem:
                 rowmap=(layout.first_row + rows).astype(PETSc.IntType),
             )
         self._map.assemble()
-
-    def _entries(
-        self, state: State, control: Control, balance: Balance
-    ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Everything in K̂ but ∂²E/∂u², as (global rows, global columns, block)."""
-        joints, first = self.joints, self.layout.first_extra_row
-        z, rows_of = first, first + joints.size
-        for body, moment in balance.moments.items():
-            columns = z + joints.columns[body]
-            yield columns, columns, joints.space.displacement_hessian(state.poses[body], moment)
-        for load, magnitude in self._acting(state):
-            if isinstance(load.point, BodyPoint) and load.point.body in joints.columns:
-                columns = z + joints.columns[load.point.body]
-                yield columns, columns, -load.point.hessian(state.poses, magnitude * load.direction)
-        for rows, columns, block in joints.hessian_blocks(state.poses, state.motors, state.multipliers):
-            yield z + rows, z + columns, -block
-        for rows, columns, block in joints.gradient_blocks(state.poses, state.motors):
-            yield rows_of + rows, z + columns, -block
-            yield z + columns, rows_of + rows, -block.T
-        proximal = -REGULARISATION / self.scale[self.layout.multipliers] ** 2
-        for row, value in enumerate(proximal):
-            yield np.array([rows_of + row]), np.array([rows_of + row]), np.array([[value]])
-        yield from self._control_entries(state, control)
-
-    def _control_entries(self, state: State, control: Control):
-        force = np.array([self.layout.first_extra_row + self.layout.force])
-        if not control.constrained:
-            yield force, force, np.array([[-1.0 / self.scale[self.layout.force] ** 2]])
-            return
-        columns = self._control_columns()
-        match self.controlled.point:
-            case BodyPoint() as point:
-                values = -(self.controlled.direction @ point.gradient(state.poses))[None]
-            case LinkPoint(weights=weights):
-                values = -np.outer(weights, self.controlled.direction).reshape(1, -1)
-        yield force, columns, values
-        yield columns, force, values.T
-
-    def _control_columns(self) -> np.ndarray:
-        """Global rows of K̂ on which the controlled force acts."""
-        match self.controlled.point:
-            case BodyPoint(body=body):
-                return self.layout.first_extra_row + self.joints.columns[body]
-            case LinkPoint(global_nodes=nodes):
-                dim = self.joints.space.dim
-                return (dim * nodes[:, None] + np.arange(dim)).ravel()
-
-    def _pattern(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Where ``_entries`` may put something, as (global rows, global columns)."""
-        joints, first = self.joints, self.layout.first_extra_row
-        z, rows_of = first, first + joints.size
-        drawn, still = joints.drawn, np.zeros(len(joints.connections))
-        for columns in joints.columns.values():
-            yield z + columns, z + columns
-        for rows, columns, _ in joints.hessian_blocks(drawn, still, np.zeros(joints.rows)):
-            yield z + rows, z + columns
-        for rows, columns, _ in joints.gradient_blocks(drawn, still):
-            yield rows_of + rows, z + columns
-            yield z + columns, rows_of + rows
-        for row in range(joints.rows):
-            yield np.array([rows_of + row]), np.array([rows_of + row])
-        force = np.array([first + self.layout.force])
-        yield force, force
-        yield force, self._control_columns()
-        yield self._control_columns(), force
 
 
 def _add_moments(a: dict[int, np.ndarray], b: dict[int, np.ndarray]) -> dict[int, np.ndarray]:

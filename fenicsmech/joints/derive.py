@@ -2,7 +2,7 @@
 
 With the poses z = (z_a, z_b) of both bodies and the value φ of a motor,
 
-    C(z, φ),    A = ∂C/∂z,    Σ_k λ_k ∂²C_k/∂z²,    ∂C/∂φ.
+    C(z, φ),    A = ∂C/∂z,    Σ_k λ_k ∂²C_k/∂z²,    ∂C/∂φ,    Σ_k λ_k ∂²C_k/∂z∂φ.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ class Constraint:
         gradient: ∂C/∂z, shape (rows, 2 pose_size).
         hessian: takes λ (rows,) last; Σ_k λ_k ∂²C_k/∂z², shape (2 pose_size, 2 pose_size).
         rate: ∂C/∂φ, shape (rows,).
+        twist: takes λ (rows,) last; Σ_k λ_k ∂²C_k/∂z∂φ, shape (2 pose_size,).
     """
 
     rows: int
@@ -38,6 +39,7 @@ class Constraint:
     gradient: Callable[..., np.ndarray]
     hessian: Callable[..., np.ndarray]
     rate: Callable[..., np.ndarray]
+    twist: Callable[..., np.ndarray]
 
 
 def _spatial_equations(kind: JointKind, driven: bool, pose, anchor, triad, value) -> list[sympy.Expr]:
@@ -92,6 +94,7 @@ def constraint(kind: JointKind, dim: int, driven: bool) -> Constraint:
 
         return evaluate
 
+    mixed = compile_([sympy.diff(p, value) for p in pull], (2 * size,), (multipliers,))
     lower = compile_(hessian, (2 * size, 2 * size), (multipliers,))
 
     def full_hessian(poses, anchors, triad, phi, lam):
@@ -104,4 +107,5 @@ def constraint(kind: JointKind, dim: int, driven: bool) -> Constraint:
         gradient=compile_(gradient, (rows, 2 * size)),
         hessian=full_hessian,
         rate=compile_([sympy.diff(c, value) for c in equations], (rows,)),
+        twist=lambda *point: mixed(*point[:-1], point[-1].tolist()),
     )

@@ -142,13 +142,20 @@ class JointSystem:
         end = both[:, :half] if body == self.connections[k].a else both[:, half:]
         return end.T @ multipliers[self._joint_rows[k]]
 
-    def motor_rate(self, poses: np.ndarray, motors: np.ndarray, direction: np.ndarray) -> np.ndarray:
-        """∂C/∂φ · ``direction`` (per connection), (rows,)."""
-        rate = np.zeros(self.rows)
-        for k, rows in enumerate(self._joint_rows):
-            if direction[k] != 0.0:
-                rate[rows] = self._constraints[k].rate(*self._arguments(k, poses, motors)) * direction[k]
-        return rate
+    def motor_rate(
+        self, poses: np.ndarray, motors: np.ndarray, multipliers: np.ndarray, direction: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """∂C/∂φ (rows,) and ∂(Aᵀλ)/∂φ (size,), times ``direction`` (per connection)."""
+        rate, twist = np.zeros(self.rows), np.zeros(self.size)
+        half = self.space.pose_size
+        for k in np.flatnonzero(direction):
+            arguments, rows, connection = self._arguments(k, poses, motors), self._joint_rows[k], self.connections[k]
+            rate[rows] = self._constraints[k].rate(*arguments) * direction[k]
+            both = self._constraints[k].twist(*arguments, multipliers[rows]) * direction[k]
+            for body, part in ((connection.a, both[:half]), (connection.b, both[half:])):
+                if body in self.columns:
+                    twist[self.columns[body]] += part
+        return rate, twist
 
     def _arguments(self, k: int, poses: np.ndarray, motors: np.ndarray):
         connection = self.connections[k]

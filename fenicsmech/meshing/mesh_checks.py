@@ -69,13 +69,13 @@ def count_pieces(cells: np.ndarray) -> int:
 def _check_holds(mesh: LinkMesh, request: MeshRequest, number: int, site: InterfaceSite) -> None:
     held = mesh.cells_of(number)
     tolerance = _ON_LINK * request.size
-    on_link = _covers(across(site, mesh.points), mesh.cells, tolerance) or _surrounds(across(site, mesh.points), held)
+    offsets = across(site, mesh.points)
+    away = _distance(offsets, mesh.cells)
     shown = ", ".join(f"{c:g}" for c in site.at)
-    if not on_link:
-        away = np.linalg.norm(across(site, mesh.points), axis=1).min()
+    if away > tolerance and not _surrounds(offsets, held):
         raise MeshingError(
             request.part_at(site),
-            f"the point ({shown}) is not on the link, whose nearest vertex is {away:g} away",
+            f"the point ({shown}) is not on the link, but {away:g} away from it",
             "Move the joint onto the link, or change the link's shape",
         )
     if not len(held):
@@ -95,20 +95,21 @@ def _check_holds(mesh: LinkMesh, request: MeshRequest, number: int, site: Interf
             )
 
 
-def _covers(offsets: np.ndarray, cells: np.ndarray, tolerance: float) -> bool:
-    """Whether the origin of the plane lies in the projection of a cell, or within ``tolerance`` of it."""
+def _distance(offsets: np.ndarray, cells: np.ndarray) -> float:
+    """Distance of the origin of the plane from the projection of the nearest cell; 0 inside one."""
+    nearest = math.inf
     for kept in combinations(range(cells.shape[1]), 3):
         corners = offsets[cells[:, list(kept)]]
         edges = np.roll(corners, -1, axis=1) - corners
-        # distance of the origin to the left of each edge line, for triangles seen either way round
-        lengths = np.linalg.norm(edges, axis=2)
-        lengths[lengths == 0.0] = 1.0
-        left = (edges[..., 1] * corners[..., 0] - edges[..., 0] * corners[..., 1]) / lengths
-        near = np.linalg.norm(corners, axis=2).min(axis=1) <= lengths.max(axis=1)
-        inside = np.all(left >= -tolerance, axis=1) | np.all(left <= tolerance, axis=1)
-        if np.any(near & inside):
-            return True
-    return False
+        squares = np.maximum(np.einsum("mkd,mkd->mk", edges, edges), np.finfo(float).tiny)
+        # twice the area to the left of each edge, seen from the origin; their sum is twice the triangle's area
+        left = edges[..., 1] * corners[..., 0] - edges[..., 0] * corners[..., 1]
+        upright = np.abs(left.sum(axis=1)) <= 1e-9 * squares.max(axis=1)  # projected onto a line
+        if np.any(~upright & (np.all(left >= 0.0, axis=1) | np.all(left <= 0.0, axis=1))):
+            return 0.0
+        foot = np.clip(-np.einsum("mkd,mkd->mk", corners, edges) / squares, 0.0, 1.0)
+        nearest = min(nearest, float(np.linalg.norm(corners + foot[..., None] * edges, axis=2).min()))
+    return nearest
 
 
 def _surrounds(offsets: np.ndarray, cells: np.ndarray) -> bool:

@@ -82,8 +82,8 @@ def _straight_piece(centreline: Centreline, offset: float, start: float, end: fl
 
 def _curved_piece(centreline: Centreline, offset: float, start: float, end: float) -> np.ndarray:
     """Points of a side, as many as a cubic spline through them needs to follow it between them."""
-    knots = centreline.knots
-    inner = knots[(knots > start) & (knots < end)]
+    knots, margin = centreline.knots, 1e-6 * (end - start)
+    inner = knots[(knots > start + margin) & (knots < end - margin)]
     stations = np.concatenate([[start], inner, [end]])
     parts = 8
     while True:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path as FilePath
 from time import perf_counter
@@ -17,6 +18,7 @@ from fenicsmech.equilibrium import (
     DisplacementControl,
     EquilibriumSystem,
     LoadControl,
+    MotorControl,
     Newton,
     Path,
     PathFailed,
@@ -132,12 +134,14 @@ class Simulation:
         freedom = count_freedom(self.linkage.rigid, assembly.poses, self.linkage.rigid.motor_values(configuration.position))
         newton = self._newton(force, tuple((others or {}).items()))
         state = self.model.assembled_state(assembly.poses, motors)
+        if assembly.fraction < 1.0:
+            state = self._turn_motors(newton, state, assembly.fraction, motors, configuration)
         newton.system.load(state)
         datum = newton.system.load_displacement(state)
         datums = {
             output: self._output(newton.system, output, state) for output in self.scene.mechanism.outputs
         }
-        path = Path(newton, state, 0.0 if controls and not controls[0].constrained else datum)
+        path = Path(newton, state, datum if kind is DisplacementControl else 0.0)
         frames: list[Frame] = []
         progress = Progress(len(controls), f"{configuration.name}") if self.comm.rank == 0 else Silent()
         with progress:
@@ -231,6 +235,21 @@ class Simulation:
             loads = tuple((model.point_load(other), float(magnitude)) for other, magnitude in others)
             self._newtons[key] = Newton(model.system(model.point_load(force), loads))
         return self._newtons[key]
+
+    def _turn_motors(
+        self, newton: Newton, state: State, fraction: float, motors: np.ndarray, configuration: Configuration
+    ) -> State:
+        """Leads the motors the rest of their way, which strains the links."""
+        state = replace(state, motors=fraction * motors)
+        try:
+            return Path(newton, state, fraction).advance(MotorControl(1.0, motors)).state
+        except PathFailed as failure:
+            raise EquilibriumError(
+                f"configuration {configuration.name!r}",
+                f"the motors strain the links, and no equilibrium was found beyond {failure.reached:.1%} of their way "
+                f"({failure.reason})",
+                "Choose motor positions nearer to the drawn ones, or a softer link",
+            ) from failure
 
     def _frame(
         self,

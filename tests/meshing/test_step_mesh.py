@@ -5,21 +5,52 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 from fenicsmech.mechanism.shapes import Disc, step
 from fenicsmech.meshing import InterfaceSite, cell_measures, mesh_link, radius_ratios
 
 PART = Path(__file__).parents[2] / "meshes" / "curved_link.step"
 SITES = [InterfaceSite(at, Disc(3.0), name=f"pin at {at}") for at in ((0.0, 0.0), (60.0, 0.0))]
+# a band 3 wide on an arc of radius 50 that spans 60; around its ends eyes of radius 4 with holes of radius 1.5
+BAND = 3.0 * 50.0 * 2.0 * math.asin(0.6)
+EYE = math.pi * (4.0**2 - 1.5**2)
 
 
-def plan_area():
-    """Area of the part: band 3 wide on an arc of radius 50 over 60, eyes of radius 4 with holes of radius 1.5."""
-    half_angle = math.asin(0.6)
-    band = 3.0 * 50.0 * 2.0 * half_angle
-    # part of the band inside an eye: points at polar (50 + e, 50 φ) around the arc's centre, within 4 of its end
-    e = np.linspace(-1.5, 1.5, 20001)
-    radius = 50.0 + e
-    phi = np.arccos((50.0**2 + radius**2 - 16.0) / (2.0 * 50.0 * radius))
-    inside = np.trapz(radius * phi, e) if hasattr(np, "trapz") else np.trapezoid(radius * phi, e)
-    return band + 2.0 * (math.pi * (4.0**2 - 1.5**2) - inside)
+def shared_area():
+    """Area that an eye and the band share: at the radius ρ the angle φ with |ρ e^{iφ} − 50| = 4."""
+    return quad(lambda rho: rho * math.acos((50.0**2 + rho**2 - 16.0) / (100.0 * rho)), 48.5, 51.5)[0]
+
+
+PLAN_AREA = BAND + 2.0 * (EYE - shared_area())
+
+
+@pytest.mark.parametrize("section", [-5.0, 0.0, 3.3, 5.0])
+def test_a_section_has_the_area_of_the_part_even_in_its_faces(section):
+    mesh = mesh_link("part", step(PART, depth=10.0, section=section), SITES, dim=2, size=0.8)
+    measures = cell_measures(mesh.points, mesh.cells)
+    assert mesh.dim == 2 and np.all(measures > 0.0)
+    assert measures.sum() == pytest.approx(PLAN_AREA, rel=4e-3)
+    assert radius_ratios(mesh.points, mesh.cells).min() > 0.3
+
+
+def test_the_solid_has_its_volume():
+    mesh = mesh_link("part", step(PART, depth=10.0), SITES, dim=3, size=1.5)
+    volumes = cell_measures(mesh.points, mesh.cells)
+    assert mesh.dim == 3 and np.all(volumes > 0.0)
+    assert volumes.sum() == pytest.approx(10.0 * PLAN_AREA, rel=1e-2)
+    assert np.ptp(mesh.points[:, 2]) == pytest.approx(10.0)
+    assert radius_ratios(mesh.points, mesh.cells).min() > 0.1
+
+
+def test_the_element_size_is_met_in_the_solid():
+    mesh = mesh_link("part", step(PART, depth=10.0), dim=3, size=2.0)
+    edges = np.linalg.norm(mesh.points[mesh.cells] - mesh.points[np.roll(mesh.cells, 1, axis=1)], axis=2)
+    assert 1.4 < np.median(edges) < 2.4
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_same_part_gives_the_same_arrays(dim):
+    one, other = (mesh_link("part", step(PART, depth=10.0), SITES, dim=dim, size=2.0) for _ in range(2))
+    assert np.array_equal(one.points, other.points) and np.array_equal(one.cells, other.cells)
+    assert np.array_equal(one.interface, other.interface)

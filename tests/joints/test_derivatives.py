@@ -1,0 +1,78 @@
+"""Derived gradients, Hessians and motor rates of every joint pass the Taylor test far from the drawn pose."""
+
+import numpy as np
+import pytest
+
+from ..kinematics.poses import random_pose
+from ..kinematics.taylor import assert_derivative
+from .cases import CASES, DRIVEN, compiled, draw
+
+EVERY_JOINT = pytest.mark.parametrize(
+    ("case", "driven"),
+    [*((case, False) for case in CASES), *((case, True) for case in DRIVEN)],
+    ids=lambda value: {True: "driven", False: "free"}.get(value, str(value)),
+)
+SEEDS = pytest.mark.parametrize("seed", range(3))
+
+
+def anywhere(case, rng):
+    """Two unrelated poses, a drawn joint and a motor value."""
+    poses = np.concatenate([random_pose(case.space, rng), random_pose(case.space, rng)])
+    return poses, draw(case.space, rng), float(rng.uniform(-3.0, 3.0))
+
+
+@EVERY_JOINT
+@SEEDS
+def test_gradient_passes_the_taylor_test(case, driven, seed):
+    rng = np.random.default_rng(seed)
+    c, (z, drawn, value) = compiled(case, driven=driven), anywhere(case, rng)
+    slope = c.gradient(z, drawn.anchors, drawn.triad, value)
+    assert slope.shape == (c.rows, 2 * case.space.pose_size)
+    assert_derivative(lambda y: c.value(y, drawn.anchors, drawn.triad, value), z, slope, rng)
+
+
+@EVERY_JOINT
+@SEEDS
+def test_hessian_passes_the_taylor_test(case, driven, seed):
+    rng = np.random.default_rng(seed)
+    c, (z, drawn, value) = compiled(case, driven=driven), anywhere(case, rng)
+    multipliers = rng.standard_normal(c.rows)
+    curvature = c.hessian(z, drawn.anchors, drawn.triad, value, multipliers)
+    assert np.array_equal(curvature, curvature.T)
+    assert_derivative(lambda y: c.gradient(y, drawn.anchors, drawn.triad, value).T @ multipliers, z, curvature, rng)
+
+
+@EVERY_JOINT
+@SEEDS
+def test_motor_rate_passes_the_taylor_test(case, driven, seed):
+    rng = np.random.default_rng(seed)
+    c, (z, drawn, value) = compiled(case, driven=driven), anywhere(case, rng)
+    rate = c.rate(z, drawn.anchors, drawn.triad, value)
+    assert rate.shape == (c.rows,)
+    assert not np.any(rate[:-1] if driven else rate)  # a motor's equation is the last
+    assert_derivative(lambda v: c.value(z, drawn.anchors, drawn.triad, float(v[0])), np.array([value]), rate[:, None], rng)
+
+
+@EVERY_JOINT
+def test_every_joint_closes_exactly_as_drawn(case, driven):
+    rng = np.random.default_rng(0)
+    drawn = draw(case.space, rng)
+    for far in (1.0, 1e6):
+        value = compiled(case, driven=driven).value(drawn.identity, far * drawn.anchors, drawn.triad, 0.0)
+        assert np.max(np.abs(value), initial=0.0) <= 4e-16  # rounding of the triad only, wherever the joint is
+
+
+@EVERY_JOINT
+@SEEDS
+def test_equations_look_the_same_from_every_frame(case, driven, seed):
+    # scalar products do not change when both bodies move together; the difference of two points turns
+    rng = np.random.default_rng(seed)
+    c, (z, drawn, value), half = compiled(case, driven=driven), anywhere(case, rng), case.space.pose_size
+    frame = random_pose(case.space, rng)
+    lever = drawn.anchors[0] - drawn.anchors[1]
+    both = [case.space.compose(frame, z[:half], np.zeros(case.dim)), case.space.compose(frame, z[half:], lever)]
+    here = c.value(z, drawn.anchors, drawn.triad, value)
+    there = c.value(np.concatenate(both), drawn.anchors, drawn.triad, value)
+    points = case.dim if case.kind.name in {"revolute", "spherical", "universal", "weld"} else 0
+    assert there[points:] == pytest.approx(here[points:], abs=1e-13)
+    assert there[:points] == pytest.approx(case.space.rotate(frame, here[:points]) if points else [], abs=1e-13)

@@ -1,0 +1,66 @@
+"""What each kind says of itself is what it can do."""
+
+import pytest
+
+from fenicsmech.joints import (
+    CYLINDRICAL,
+    PLANAR_JOINT,
+    PRISMATIC,
+    REVOLUTE,
+    SPHERICAL,
+    UNIVERSAL,
+    WELD,
+    JointKind,
+    constraint,
+)
+
+KINDS = (REVOLUTE, PRISMATIC, CYLINDRICAL, SPHERICAL, UNIVERSAL, PLANAR_JOINT, WELD)
+
+
+def test_kinds_have_names_of_their_own():
+    assert len({kind.name for kind in KINDS}) == len(KINDS)
+
+
+@pytest.mark.parametrize(
+    ("flag", "kinds"),
+    [
+        ("planar", {REVOLUTE, PRISMATIC, PLANAR_JOINT, WELD}),
+        ("sliding", {PRISMATIC}),
+        ("motorised", {REVOLUTE, PRISMATIC}),
+    ],
+)
+def test_flags_are_those_of_the_table(flag, kinds):
+    assert {kind for kind in KINDS if getattr(kind, flag)} == kinds
+
+
+@pytest.mark.parametrize("kind", [CYLINDRICAL, SPHERICAL, UNIVERSAL], ids=lambda kind: kind.name)
+def test_joint_without_planar_form_says_so(kind):
+    with pytest.raises(NotImplementedError, match=f"a {kind.name} joint has no planar form"):
+        constraint(kind, 2, False)
+
+
+@pytest.mark.parametrize(
+    ("kind", "dim"),
+    [(kind, 3) for kind in KINDS if not kind.motorised] + [(PLANAR_JOINT, 2), (WELD, 2)],
+    ids=lambda value: getattr(value, "name", f"{value}d"),
+)
+def test_joint_without_a_free_coordinate_to_drive_takes_no_motor(kind, dim):
+    with pytest.raises(NotImplementedError, match=f"a {kind.name} joint takes no motor"):
+        constraint(kind, dim, True)
+
+
+def test_equations_are_compiled_once():
+    assert constraint(REVOLUTE, 2, True) is constraint(REVOLUTE, 2, True)
+
+
+def test_a_new_joint_is_one_class():
+    class Pin(JointKind):
+        """A point of b on an axis of a."""
+
+        name = "pin in slot"
+
+        def equations(self, a, b):
+            apart = b.origin - a.origin
+            return [apart.dot(a.e1), apart.dot(a.e2)]
+
+    assert constraint(Pin(), 3, False).rows == 2
