@@ -55,7 +55,7 @@ test-serial: install-test ## the tests on one process
 	$(call heading,tests on one process)
 	$(PYTHON) -m pytest --durations=5 --durations-min=5 -m "$(SELECT)"
 
-test-parallel: install-test ## the tests marked `parallel` on $(RANKS) MPI ranks
+test-parallel: install-test ## the tests marked `parallel`, on two MPI ranks
 	$(call heading,tests on $(RANKS) ranks)
 	$(MPIRUN) $(PYTHON) -m pytest --color=no -p no:cacheprovider -m "parallel and ($(SELECT))"
 

@@ -52,7 +52,9 @@ class Demo:
 def parse(name: str, description: str, *, size: float, quick_size: float) -> Demo:
     """The options of demo ``name``; ``size`` and ``quick_size`` are its default element sizes in mm."""
     parser = argparse.ArgumentParser(description=description)
-    parser.add_argument("--space", choices=list(SPACES), default="3d", help="3d (default), plane-stress or plane-strain")
+    parser.add_argument(
+        "--space", choices=list(SPACES), default="3d", help="3d (default), plane-stress or plane-strain"
+    )
     parser.add_argument("--order", type=int, choices=(1, 2), default=2, help="degree of the displacement field")
     parser.add_argument("--size", type=float, metavar="MM", help=f"element size (default {size} mm)")
     parser.add_argument("--simulate-only", action="store_true", help="simulate the initial design only")

@@ -22,7 +22,6 @@ from petsc4py import PETSc
 _LEGACY = tuple(int(part) for part in dolfinx.__version__.split(".")[:2]) < (0, 6)
 
 
-
 def _processor() -> str:
     """A short name for the instruction set of this processor: compiled kernels are only good for their own."""
     try:
@@ -123,9 +122,7 @@ def petsc_vector(function: fem.Function) -> PETSc.Vec:
     return function.vector if _LEGACY else function.x.petsc_vec
 
 
-def write_series(
-    path, mesh: dmesh.Mesh, functions: Mapping[str, fem.Function], steps, update, comm: MPI.Comm
-) -> None:
+def write_series(path, mesh: dmesh.Mesh, functions: Mapping[str, fem.Function], steps, update, comm: MPI.Comm) -> None:
     """Writes an XDMF time series for ParaView.
 
     Args:

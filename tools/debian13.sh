@@ -60,14 +60,19 @@ copy_network_settings() {
     done
 }
 
-# Run a command inside a root. The mounts live in a namespace of their own, so that none is left behind however this
-# ends. Where mounting is forbidden (some containers) the device nodes that debootstrap made must do, and UCX and hwloc,
-# which miss /proc and /sys but do without, are kept from saying so in the output of every program.
+# Mounts live in a namespace of their own, so that none is left behind however this ends.
+may_mount() {
+    unshare --mount true 2>/dev/null
+}
+own_mounts=(unshare --mount --propagation private)
+
+# Run a command inside a root. Where mounting is forbidden (some containers) the device nodes that debootstrap made must
+# do, and UCX and hwloc, which miss /proc and /sys but do without, are kept from saying so in the output of every program.
 enter() {
     local target=$1
     shift
-    if unshare --mount true 2>/dev/null; then
-        unshare --mount --propagation private bash -euc '
+    if may_mount; then
+        "${own_mounts[@]}" bash -euc '
             target=$1; shift
             mount --rbind /dev "$target/dev"
             mount -t tmpfs -o mode=1777 tmpfs "$target/dev/shm"
@@ -82,7 +87,8 @@ enter() {
 fill() { # a new root
     local target=$1 mirror=$2
     export_apt_proxy
-    debootstrap --variant=minbase "$suite" "$target" "$mirror"
+    if ! may_mount; then own_mounts=(); fi
+    "${own_mounts[@]}" debootstrap --variant=minbase "$suite" "$target" "$mirror"
     copy_network_settings "$target"
     # Documentation and translations, which nothing here reads, take as long to unpack as the programs.
     printf 'path-exclude=/usr/share/%s/*\n' doc man locale >"$target/etc/dpkg/dpkg.cfg.d/fenicsmech"

@@ -38,7 +38,8 @@ install_packages() {
     echo "Installing Debian packages: ${names[*]}"
     "${as_root[@]}" apt-get update -q
     "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -qy --no-install-recommends "${names[@]}" \
-        || fail "apt-get could not install the packages above. fenicsmech needs Debian 12 or 13."
+        || fail "apt-get could not install the packages above." \
+            "\`make demo\` needs Debian 12 or 13, \`make test\` Debian 12 (Debian 13 has no CalculiX)."
 }
 
 # A venv that sees Debian's packages, and this tree through a .pth file: unlike `pip install -e .` that needs no

@@ -1,7 +1,7 @@
 """Material points that forces act on and displacements are read from.
 
-    on a rigid link:     u(z) = t + (R − I)(P − c)
-    on a flexible link:  u = Σ_i N_i(P) u_i, the finite-element interpolation in the cell that holds P.
+on a rigid link:     u(z) = t + (R − I)(P − c)
+on a flexible link:  u = Σ_i N_i(P) u_i, the finite-element interpolation in the cell that holds P.
 """
 
 from __future__ import annotations
@@ -99,13 +99,17 @@ def link_point(part: str, position: np.ndarray, u: fem.Function, cells: np.ndarr
         best = (float(inside[winner]), comm.rank, int(cells[winner]), barycentric[winner])
     deepest = max(comm.allgather(best), key=lambda found: (found[0], -found[1]))
     if deepest[0] < -0.01:
-        raise DescriptionError(part, f"the point {tuple(map(float, position))} is not on the link", "Move it onto the link")
+        raise DescriptionError(
+            part, f"the point {tuple(map(float, position))} is not on the link", "Move it onto the link"
+        )
     _, owner, cell, barycentric = deepest
     found = None
     if comm.rank == owner:
         V = u.function_space
         nodes = V.dofmap.cell_dofs(cell)
-        weights = _lagrange(np.asarray(barycentric), V.tabulate_dof_coordinates()[nodes, :dim], vertices[cells == cell][0])
+        weights = _lagrange(
+            np.asarray(barycentric), V.tabulate_dof_coordinates()[nodes, :dim], vertices[cells == cell][0]
+        )
         found = (V.dofmap.index_map.local_to_global(nodes.astype(np.int32)), weights)
     global_nodes, weights = comm.bcast(found, root=owner)
     local = nodes if comm.rank == owner else np.zeros(0, dtype=np.int32)

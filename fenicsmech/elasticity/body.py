@@ -87,9 +87,7 @@ class ElasticBody:
         law_of_cell = np.array([laws.index(m.law) for m in materials])[link]
         cells = np.flatnonzero(free).astype(np.int32)
         tags = dmesh.meshtags(mesh, mesh.topology.dim, cells, law_of_cell[cells].astype(np.int32))
-        measure = ufl.Measure(
-            "dx", domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": quadrature.degree}
-        )
+        measure = ufl.Measure("dx", domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": quadrature.degree})
         self._terms = [(law, measure(tag)) for tag, law in enumerate(laws)]
         self._law_cells = [np.flatnonzero(law_of_cell == tag).astype(np.int32) for tag in range(len(laws))]
 

@@ -133,9 +133,7 @@ class Newton:
     def _converged(self, balance: Balance) -> bool:
         return balance.norm <= max(self.options.tolerance * balance.forces, self.options.roundoff * self.system.unit)
 
-    def _direction(
-        self, state: State, control: Control, balance: Balance, shift: float
-    ) -> tuple[Step, Inertia, float]:
+    def _direction(self, state: State, control: Control, balance: Balance, shift: float) -> tuple[Step, Inertia, float]:
         """The Newton step; raises δ until the factor's inertia promises descent."""
         system = self.system
         shift = shift / 3.0 if shift > 1e-9 else 0.0
@@ -224,6 +222,4 @@ class Newton:
                 self._factor.solve(row, response)
                 # Schur complement of the control row: negative exactly if removing the row leaves stability as it is
                 unstable += 1 - int(response.dot(row) < 0.0)
-        return Solution(
-            state, tuple(residuals), iteration, max(unstable, 0), max(under_control, 0), system.step(x)
-        )
+        return Solution(state, tuple(residuals), iteration, max(unstable, 0), max(under_control, 0), system.step(x))

@@ -40,6 +40,4 @@ class Step:
         return Step(factor * self.u, factor * self.z, factor * self.multipliers, factor * self.force)
 
     def __add__(self, other: Step) -> Step:
-        return Step(
-            self.u + other.u, self.z + other.z, self.multipliers + other.multipliers, self.force + other.force
-        )
+        return Step(self.u + other.u, self.z + other.z, self.multipliers + other.multipliers, self.force + other.force)

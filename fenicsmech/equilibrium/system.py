@@ -30,6 +30,7 @@ from fenicsmech.equilibrium.matrices import create_extended_matrix, create_map_m
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.linkage import JointSystem
 
+
 @dataclass(frozen=True)
 class Balance:
     """The gradient of the Lagrangian at a state.
@@ -165,9 +166,7 @@ class EquilibriumSystem:
             reactions = self.joints.gradient(state.poses, state.motors).T @ state.multipliers
             forces = np.linalg.norm(g * self.scale) ** 2 + np.linalg.norm(reactions * self.scale[layout.z]) ** 2
             forces += layout.comm.allreduce(float(np.linalg.norm(loads * self.unit_u) ** 2))
-            moments = layout.comm.allreduce(
-                self.interfaces.moments(r.reshape(-1, dim)), op=_add_moments
-            )
+            moments = layout.comm.allreduce(self.interfaces.moments(r.reshape(-1, dim)), op=_add_moments)
             extras = -g
             extras[layout.z] -= reactions
             extras[layout.multipliers] = -self.joints.value(state.poses, state.motors)

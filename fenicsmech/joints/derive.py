@@ -82,8 +82,12 @@ def constraint(kind: JointKind, dim: int, driven: bool) -> Constraint:
     arguments = (z, offsets, axes, value)
 
     gradient = [[sympy.diff(c, zi) for zi in z] for c in equations]
-    pull = [sum((m * row[i] for m, row in zip(multipliers, gradient, strict=True)), sympy.S.Zero) for i in range(2 * size)]
-    hessian = [[sympy.diff(pull[i], z[j]) if j <= i else sympy.S.Zero for j in range(2 * size)] for i in range(2 * size)]
+    pull = [
+        sum((m * row[i] for m, row in zip(multipliers, gradient, strict=True)), sympy.S.Zero) for i in range(2 * size)
+    ]
+    hessian = [
+        [sympy.diff(pull[i], z[j]) if j <= i else sympy.S.Zero for j in range(2 * size)] for i in range(2 * size)
+    ]
 
     def compile_(expressions, shape, extra=()):
         flat = sympy.lambdify((*arguments, *extra), list(sympy.flatten(expressions)), "math", cse=True)

@@ -8,6 +8,7 @@ dead centres). The assembled state carries no elastic energy and starts every eq
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,7 +54,7 @@ def assemble(linkage: Linkage, configuration: Configuration) -> Assembly:
             raise AssemblyError(
                 f"configuration {configuration.name!r}",
                 f"the loop through {_loop(linkage.joints, worst)} does not close: "
-                f"the motors get {closing:.1%} of the way",
+                f"the motors get {math.floor(1e3 * closing) / 10:.1f}% of the way",  # never 100% of what fails
                 "Check motor positions and link lengths",
             )
     return Assembly(poses, fraction)

@@ -43,9 +43,9 @@ def in_dimension(position: tuple[float, ...], dim: int) -> tuple[float, ...]:
 
 
 def mechanism_length(mechanism: Mechanism) -> float:
-    """Diagonal of the box around all joints, forces and outputs."""
+    """Diagonal of the box around all joints, forces and outputs; 1 if it has no size."""
     places = [in_dimension(part.at, 3) for part in (*mechanism.joints, *mechanism.forces, *mechanism.outputs)]
-    return float(np.linalg.norm(np.ptp(np.array(places), axis=0))) or 1.0
+    return float(np.linalg.norm(np.ptp(np.array(places or [(0.0, 0.0, 0.0)]), axis=0))) or 1.0
 
 
 def build_linkage(mechanism: Mechanism, dim: int) -> Linkage:

@@ -47,7 +47,8 @@ def count_freedom(system: JointSystem, poses: np.ndarray, motors: np.ndarray) ->
         if np.max(np.abs(free[:, system.columns[body]]), initial=0.0) > _PART
     ]
     redundant = [
-        name for name, weight in zip(system.row_names, np.max(np.abs(dependent), axis=1, initial=0.0), strict=True)
+        name
+        for name, weight in zip(system.row_names, np.max(np.abs(dependent), axis=1, initial=0.0), strict=True)
         if weight > _PART
     ]
     return Freedom(

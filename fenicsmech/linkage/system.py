@@ -57,9 +57,7 @@ class JointSystem:
         norms = len(self.space.norm_residual(self.space.identity))
         offsets = np.concatenate([[0], np.cumsum(counts)]).astype(int)
         self._joint_rows = [np.arange(first, first + n) for first, n in zip(offsets[:-1], counts, strict=True)]
-        self._norm_rows = {
-            body: np.arange(norms) + offsets[-1] + norms * k for k, body in enumerate(self.free_bodies)
-        }
+        self._norm_rows = {body: np.arange(norms) + offsets[-1] + norms * k for k, body in enumerate(self.free_bodies)}
         self.rows = int(offsets[-1]) + norms * len(self.free_bodies)
         self.row_names = [c.name for c, n in zip(self.connections, counts, strict=True) for _ in range(n)]
         self.row_names += [f"norm of {self.bodies[i].name}" for i in self.free_bodies for _ in range(norms)]

@@ -16,7 +16,7 @@ from fenicsmech.joints import (
     JointKind,
 )
 from fenicsmech.mechanism.checks import direction as unit
-from fenicsmech.mechanism.checks import point, positive
+from fenicsmech.mechanism.checks import finite, point, positive
 from fenicsmech.mechanism.materials import Material
 from fenicsmech.mechanism.parts import FlexibleLink, Force, Joint, Link, Motor, Output, RigidLink
 from fenicsmech.mechanism.shapes import Disc, Rectangle, Region, Shape
@@ -85,25 +85,19 @@ class Mechanism:
 
         Raises:
             DescriptionError: a link is not in the mechanism or joined with itself, a flexible link lacks an
-                interface, numbers are not finite, or the name is taken.
+                interface, the interface is no region or given twice, numbers are not finite, or the name is taken.
         """
-        name = name or f"{kind.name} joint {a.name}–{b.name}"
-        if name in {joint.name for joint in self.joints}:
-            name = f"{name} at {tuple(at)}"
+        for link in (a, b):
+            self._check_member(f"{name or f'{kind.name} joint'!r}", link)
+        given, name = name, name or f"{kind.name} joint {a.name}–{b.name}"
+        at = point(f"position of {name!r}", at)
+        if given is None and name in {joint.name for joint in self.joints}:
+            name = f"{name} at {at}"
         part = f"{name!r}"
         self._check_name(part, name, self.joints)
-        for link in (a, b):
-            self._check_member(part, link)
-        if a is b:
+        if a == b:
             raise DescriptionError(part, f"link {a.name!r} is joined with itself", "Name two different links")
-        if region is None and radius is not None:
-            region = Disc(radius)
-        match region:
-            case Disc(radius=value):
-                region = Disc(positive(f"radius of {part}", value))
-            case Rectangle(length=length, width=width):
-                positive(f"length of the interface of {part}", length)
-                positive(f"width of the interface of {part}", width)
+        region = _interface(part, radius, region)
         regions = tuple(region if isinstance(link, FlexibleLink) else None for link in (a, b))
         for link, own in zip((a, b), regions, strict=True):
             if isinstance(link, FlexibleLink) and own is None:
@@ -111,7 +105,7 @@ class Mechanism:
                     part, f"no interface on flexible link {link.name!r}", "Give radius=… (pin) or region=… (clamp)"
                 )
         axis = unit(f"axis of {part}", axis)
-        joint = Joint(kind, a, b, point(f"position of {part}", at), (*axis, 0.0)[:3], regions, name)
+        joint = Joint(kind, a, b, at, (*axis, 0.0)[:3], regions, name)
         self.joints.append(joint)
         return joint
 
@@ -166,18 +160,18 @@ class Mechanism:
 
     def force(self, *, on: Link, at: Sequence[float], direction: Sequence[float], name: str | None = None) -> Force:
         """Adds a dead force along ``direction`` at the material point ``at`` of link ``on``."""
+        self._check_member(f"{name or 'force'!r}", on)
         name = name or f"force on {on.name}"
         self._check_name(f"{name!r}", name, self.forces)
-        self._check_member(f"{name!r}", on)
         force = Force(on, point(f"position of {name!r}", at), unit(f"direction of {name!r}", direction), name)
         self.forces.append(force)
         return force
 
     def output(self, *, on: Link, at: Sequence[float], direction: Sequence[float], name: str | None = None) -> Output:
         """Adds an output: the displacement along ``direction`` of the material point ``at`` of link ``on``."""
+        self._check_member(f"{name or 'output'!r}", on)
         name = name or f"output on {on.name}"
         self._check_name(f"{name!r}", name, self.outputs)
-        self._check_member(f"{name!r}", on)
         output = Output(on, point(f"position of {name!r}", at), unit(f"direction of {name!r}", direction), name)
         self.outputs.append(output)
         return output
@@ -195,3 +189,21 @@ class Mechanism:
     def _check_name(part: str, name: str, taken: Sequence[Link | Joint | Motor | Force | Output]) -> None:
         if name in {other.name for other in taken}:
             raise DescriptionError(part, f"the name {name!r} is taken", "Give each part a name of its own")
+
+
+def _interface(part: str, radius: float | None, region: Region | None) -> Region | None:
+    """The interface region given as a radius or as a region, checked."""
+    if radius is not None and region is not None:
+        raise DescriptionError(part, "both a radius and a region are given", "Give one of the two")
+    match region if radius is None else Disc(radius):
+        case None:
+            return None
+        case Disc(radius=value):
+            return Disc(positive(f"radius of {part}", value))
+        case Rectangle(length=length, width=width, angle=angle):
+            return Rectangle(
+                positive(f"length of the interface of {part}", length),
+                positive(f"width of the interface of {part}", width),
+                finite(f"angle of the interface of {part}", angle),
+            )
+    raise DescriptionError(part, f"{region!r} is no interface region", "Give region=Disc(…) or region=Rectangle(…)")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism.checks import finite
@@ -18,10 +18,20 @@ class Configuration:
     Attributes:
         name: for messages, plots and tables.
         positions: (motor, position) pairs: angle in rad or travel, counted from the drawn configuration.
+
+    Raises:
+        DescriptionError: a position is not finite.
     """
 
     name: str
     positions: tuple[tuple[Motor, float], ...] = ()
+
+    def __post_init__(self) -> None:
+        checked = (
+            (motor, finite(f"position of motor {motor.name!r} in configuration {self.name!r}", value))
+            for motor, value in self.positions
+        )
+        object.__setattr__(self, "positions", tuple(checked))
 
     def position(self, motor: Motor) -> float:
         """The position of ``motor``: 0 (as drawn) unless given."""
@@ -37,7 +47,10 @@ class Scene:
     """A mechanism and what is simulated of its surroundings: nothing that is not listed in ``effects``."""
 
     mechanism: Mechanism
-    effects: Sequence = field(default_factory=tuple)
+    effects: Sequence = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "effects", tuple(self.effects))
 
     def configuration(self, name: str, positions: Mapping[Motor, float]) -> Configuration:
         """A configuration with the given motor positions (rad or length, from the drawn configuration).
@@ -45,10 +58,9 @@ class Scene:
         Raises:
             DescriptionError: a motor is not in the mechanism, or its position is not finite.
         """
-        for motor, value in positions.items():
+        for motor in positions:
             if motor not in self.mechanism.motors:
                 raise DescriptionError(
                     f"configuration {name!r}", f"{motor!r} is not a motor of {self.mechanism.name!r}", "Add it first"
                 )
-            finite(f"position of motor {motor.name!r} in configuration {name!r}", value)
-        return Configuration(name, tuple((motor, float(value)) for motor, value in positions.items()))
+        return Configuration(name, tuple(positions.items()))

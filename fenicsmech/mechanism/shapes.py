@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism.checks import finite, point, points, positive
 
 Point = tuple[float, ...]
@@ -110,12 +111,14 @@ def outline(start: Sequence[float], segments: Sequence[Line | Arc], *, depth: fl
     """The closed outline that runs from ``start`` along ``segments`` and back, extruded by ``depth``."""
     checked = []
     for segment in segments:
-        end = point("outline segment end", segment.end, dimensions=(2,))
         match segment:
-            case Line():
-                checked.append(Line(end))
-            case Arc():
-                checked.append(Arc(point("outline arc", segment.via, dimensions=(2,)), end))
+            case Line(end=end):
+                checked.append(Line(point("outline segment end", end, dimensions=(2,))))
+            case Arc(via=via, end=end):
+                via = point("outline arc", via, dimensions=(2,))
+                checked.append(Arc(via, point("outline segment end", end, dimensions=(2,))))
+            case _:
+                raise DescriptionError("outline", f"{segment!r} is no segment", "Give Line(…) or Arc(…)")
     return Outline(point("outline start", start, dimensions=(2,)), tuple(checked), positive("outline depth", depth))
 
 

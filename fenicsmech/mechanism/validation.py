@@ -11,14 +11,17 @@ def validate(mechanism: Mechanism, dim: int) -> None:
     """Checks that ``mechanism`` can be simulated in ``dim`` dimensions.
 
     Raises:
-        DescriptionError: no ground, an unconnected link, no load path to ground, a joint or direction that
-            does not exist in the plane, two interfaces of different shape at one place of a link.
+        DescriptionError: no ground, an unconnected link, no load path to ground, a force on a fixed link, a joint
+            or direction that does not exist in the plane, two interfaces of different shape at one place of a link.
     """
     if not mechanism.links:
-        raise DescriptionError(f"mechanism {mechanism.name!r}", "it has no links", "Add links with rigid() and flexible()")
+        raise DescriptionError(
+            f"mechanism {mechanism.name!r}", "it has no links", "Add links with rigid() and flexible()"
+        )
     _check_ground(mechanism)
     _check_connections(mechanism)
-    _check_interfaces(mechanism)
+    _check_forces(mechanism)
+    _check_interfaces(mechanism, dim)
     if dim == 2:
         _check_planar(mechanism)
 
@@ -57,13 +60,24 @@ def _check_connections(mechanism: Mechanism) -> None:
         )
 
 
-def _check_interfaces(mechanism: Mechanism) -> None:
+def _check_forces(mechanism: Mechanism) -> None:
+    for force in mechanism.forces:
+        if isinstance(force.on, RigidLink) and force.on.fixed:
+            raise DescriptionError(
+                f"force {force.name!r}",
+                f"it acts on the fixed link {force.on.name!r} and can do no work",
+                "Let it act on a link that moves",
+            )
+
+
+def _check_interfaces(mechanism: Mechanism, dim: int) -> None:
     found: dict[tuple[FlexibleLink, tuple], tuple[Joint, object]] = {}
     for joint in mechanism.joints:
         for link, region in zip((joint.a, joint.b), joint.regions, strict=True):
             if not isinstance(link, FlexibleLink):
                 continue
-            first, known = found.setdefault((link, joint.at), (joint, region))
+            place = (*joint.at, 0.0)[:dim]  # a z left out is 0
+            first, known = found.setdefault((link, place), (joint, region))
             if known != region:
                 raise DescriptionError(
                     f"{joint.name!r}",

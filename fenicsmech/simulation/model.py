@@ -18,9 +18,9 @@ from fenicsmech.linkage import Linkage
 from fenicsmech.linkage.build import in_dimension
 from fenicsmech.mechanism import FlexibleLink, Force, Mechanism, Output
 from fenicsmech.meshing import mesh_link
+from fenicsmech.meshing.distribute import MechanismMesh, distribute
 from fenicsmech.meshing.interface_site import InterfaceSite
 from fenicsmech.meshing.link_mesh import LinkMesh
-from fenicsmech.meshing.distribute import MechanismMesh, distribute
 
 
 @dataclass(frozen=True)
@@ -129,9 +129,7 @@ class MechanismModel:
 
     def point_load(self, force: Force | Output) -> PointLoad:
         """The point load of a force, or of a unit force along an output (collective)."""
-        return PointLoad(
-            force.name, self.point(force), np.array(in_dimension(force.direction, self.linkage.dim))
-        )
+        return PointLoad(force.name, self.point(force), np.array(in_dimension(force.direction, self.linkage.dim)))
 
     def system(self, controlled: PointLoad, loads: tuple[tuple[PointLoad, float], ...]) -> EquilibriumSystem:
         """The equilibrium equations with one controlled and several fixed loads (collective)."""

@@ -75,4 +75,3 @@ class Draughtsman:
             return self._mesh.cells[cells], cells
         view = plan_view(self._mesh.vertices, self._mesh.cells[cells])
         return view.triangles, cells[view.cells]
-

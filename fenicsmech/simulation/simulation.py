@@ -17,11 +17,14 @@ from fenicsmech.equilibrium import (
     Control,
     DisplacementControl,
     EquilibriumSystem,
+    Hermite,
     LoadControl,
     MotorControl,
     Newton,
+    NewtonOptions,
     Path,
     PathFailed,
+    Predictor,
     Solution,
     State,
     joint_reactions,
@@ -60,6 +63,8 @@ class Simulation:
         order: degree of the displacement field, 1 or 2.
         size: element size in the plane of the links, or one per flexible link.
         quadrature: quadrature degree; the measured optimum by default.
+        newton: limits of the equilibrium iteration.
+        predictor: how the next equilibrium on a curve is guessed.
         comm: processes that share the work.
 
     Raises:
@@ -74,6 +79,8 @@ class Simulation:
         order: int = 2,
         size: float | Mapping[FlexibleLink, float],
         quadrature: Quadrature | None = None,
+        newton: NewtonOptions | None = None,
+        predictor: Predictor | None = None,
         comm: MPI.Comm = MPI.COMM_WORLD,
     ) -> None:
         if space not in SPACES:
@@ -91,6 +98,7 @@ class Simulation:
         self.scene, self.comm, self.clock = scene, comm, Clock()
         self.fidelity = Fidelity(model, order, sizes, quadrature or Quadrature.for_order(order, model.dim))
         self.linkage = build_linkage(mechanism, model.dim)
+        self._options, self._predictor = newton or NewtonOptions(), predictor or Hermite()
         self._newtons: dict[tuple, Newton] = {}
         self._last: Curve | None = None
 
@@ -131,17 +139,17 @@ class Simulation:
         controls: list[Control] = [kind(finite(f"sample of {force.name!r}", value)) for value in samples]
         motors = self.linkage.joints.motor_values(configuration.position)
         assembly = assemble(self.linkage, configuration)
-        freedom = count_freedom(self.linkage.rigid, assembly.poses, self.linkage.rigid.motor_values(configuration.position))
+        freedom = count_freedom(
+            self.linkage.rigid, assembly.poses, self.linkage.rigid.motor_values(configuration.position)
+        )
         newton = self._newton(force, tuple((others or {}).items()))
         state = self.model.assembled_state(assembly.poses, motors)
         if assembly.fraction < 1.0:
             state = self._turn_motors(newton, state, assembly.fraction, motors, configuration)
         newton.system.load(state)
         datum = newton.system.load_displacement(state)
-        datums = {
-            output: self._output(newton.system, output, state) for output in self.scene.mechanism.outputs
-        }
-        path = Path(newton, state, datum if kind is DisplacementControl else 0.0)
+        datums = {output: self._output(newton.system, output, state) for output in self.scene.mechanism.outputs}
+        path = Path(newton, state, datum if kind is DisplacementControl else 0.0, predictor=self._predictor)
         frames: list[Frame] = []
         progress = Progress(len(controls), f"{configuration.name}") if self.comm.rank == 0 else Silent()
         with progress:
@@ -233,7 +241,7 @@ class Simulation:
         if key not in self._newtons:
             model = self.model
             loads = tuple((model.point_load(other), float(magnitude)) for other, magnitude in others)
-            self._newtons[key] = Newton(model.system(model.point_load(force), loads))
+            self._newtons[key] = Newton(model.system(model.point_load(force), loads), self._options)
         return self._newtons[key]
 
     def _turn_motors(
@@ -242,7 +250,7 @@ class Simulation:
         """Leads the motors the rest of their way, which strains the links."""
         state = replace(state, motors=fraction * motors)
         try:
-            return Path(newton, state, fraction).advance(MotorControl(1.0, motors)).state
+            return Path(newton, state, fraction, predictor=self._predictor).advance(MotorControl(1.0, motors)).state
         except PathFailed as failure:
             raise EquilibriumError(
                 f"configuration {configuration.name!r}",
@@ -285,9 +293,7 @@ class Simulation:
         with self.clock.phase("measure"):
             stress = self.model.elastic.von_mises()
             peak = self.comm.allreduce(float(stress.max(initial=0.0)), op=MPI.MAX)
-            outputs = {
-                output: self._output(system, output, state) - zero for output, zero in datums.items()
-            }
+            outputs = {output: self._output(system, output, state) - zero for output, zero in datums.items()}
             energy = self.model.elastic.energy()
             displacement = system.load_displacement(state) - datum
         return Frame(

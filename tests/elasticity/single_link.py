@@ -74,6 +74,16 @@ def forces(body: ElasticBody) -> np.ndarray:
     return values
 
 
+def tangent(body: ElasticBody) -> np.ndarray:
+    """∂²E/∂u², dense; on one rank."""
+    matrix = fem.petsc.create_matrix(body.tangent_form)
+    body.tangent(matrix)
+    matrix.assemble()
+    values = matrix[:, :]
+    matrix.destroy()
+    return values
+
+
 def interpolate(function: fem.Function, field: Callable[[np.ndarray], np.ndarray]) -> None:
     """Sets the nodal values of a vector field from ``field`` of positions (n, dim), (n, dim)."""
     function.x.array[:] = field(nodes(function)).ravel()

@@ -50,7 +50,9 @@ def test_motor_rate_passes_the_taylor_test(case, driven, seed):
     rate = c.rate(z, drawn.anchors, drawn.triad, value)
     assert rate.shape == (c.rows,)
     assert not np.any(rate[:-1] if driven else rate)  # a motor's equation is the last
-    assert_derivative(lambda v: c.value(z, drawn.anchors, drawn.triad, float(v[0])), np.array([value]), rate[:, None], rng)
+    assert_derivative(
+        lambda v: c.value(z, drawn.anchors, drawn.triad, float(v[0])), np.array([value]), rate[:, None], rng
+    )
 
 
 @EVERY_JOINT
