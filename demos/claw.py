@@ -11,12 +11,11 @@ from common import Target, finish, parse, simulation
 
 import fenicsmech as fm
 
-demo = parse("claw", __doc__.splitlines()[0], size=1.73, quick_size=4.0)
-
 THICKNESS, DEPTH, PIN = 3.0, 8.5, 3.0
 SHAFT, AXLE, ANCHOR = (15, 0), (60, 5), (22, 32)  # on the base: motor shaft and two axles
 ELBOW, KNEE, HIP, WRIST = (38, 22), (62, 42), (56, 88), (28, 92)  # moving joints
 FINGERTIP = (8, 125)
+FORCES = [float(force) for force in range(11)]
 
 
 def link(*points):
@@ -24,22 +23,33 @@ def link(*points):
     return fm.strip(points, thickness=THICKNESS, depth=DEPTH)
 
 
-claw = fm.Mechanism("claw gripper")
-base, finger = claw.rigid("base", fixed=True), claw.rigid("finger")
-crank = claw.flexible("crank", link(SHAFT, (29, 8), ELBOW), fm.ONYX)
-coupler = claw.flexible("coupler", link(ELBOW, (50, 30), KNEE, (66, 64), HIP), fm.ONYX)
-rocker = claw.flexible("rocker", link(AXLE, (67, 23), KNEE), fm.ONYX)
-guide = claw.flexible("guide", link(ANCHOR, (15, 62), WRIST), fm.ONYX)
-shaft = claw.revolute(base, crank, at=SHAFT, radius=PIN)
-claw.revolute(crank, coupler, at=ELBOW, radius=PIN)
-claw.revolute(base, rocker, at=AXLE, radius=PIN)
-claw.revolute(rocker, coupler, at=KNEE, radius=PIN)
-claw.revolute(coupler, finger, at=HIP, radius=PIN)
-claw.revolute(base, guide, at=ANCHOR, radius=PIN)
-claw.revolute(guide, finger, at=WRIST, radius=PIN)
-claw.motor(shaft, name="servo")
-grasp = claw.force(on=finger, at=FINGERTIP, direction=(1, 0), name="object on finger")
+def describe():
+    """The scene, and the force of the object on the finger."""
+    claw = fm.Mechanism("claw gripper")
+    base, finger = claw.rigid("base", fixed=True), claw.rigid("finger")
+    crank = claw.flexible("crank", link(SHAFT, (29, 8), ELBOW), fm.ONYX)
+    coupler = claw.flexible("coupler", link(ELBOW, (50, 30), KNEE, (66, 64), HIP), fm.ONYX)
+    rocker = claw.flexible("rocker", link(AXLE, (67, 23), KNEE), fm.ONYX)
+    guide = claw.flexible("guide", link(ANCHOR, (15, 62), WRIST), fm.ONYX)
+    shaft = claw.revolute(base, crank, at=SHAFT, radius=PIN)
+    claw.revolute(crank, coupler, at=ELBOW, radius=PIN)
+    claw.revolute(base, rocker, at=AXLE, radius=PIN)
+    claw.revolute(rocker, coupler, at=KNEE, radius=PIN)
+    claw.revolute(coupler, finger, at=HIP, radius=PIN)
+    claw.revolute(base, guide, at=ANCHOR, radius=PIN)
+    claw.revolute(guide, finger, at=WRIST, radius=PIN)
+    claw.motor(shaft, name="servo")
+    grasp = claw.force(on=finger, at=FINGERTIP, direction=(1, 0), name="object on finger")
+    return fm.Scene(claw), grasp
 
-sim = simulation(demo, fm.Scene(claw))
-curve = sim.load_displacement(grasp, forces=[float(force) for force in range(11)])
-finish(demo, sim, [curve], [Target(fm.DRAWN, 4.0, 5.0), Target(fm.DRAWN, 10.0, 20.0)])
+
+def main():
+    demo = parse("claw", __doc__.splitlines()[0], size=1.73, quick_size=4.0)
+    scene, grasp = describe()
+    sim = simulation(demo, scene)
+    curve = sim.load_displacement(grasp, forces=FORCES)
+    finish(demo, sim, [curve], [Target(fm.DRAWN, 4.0, 5.0), Target(fm.DRAWN, 10.0, 20.0)])
+
+
+if __name__ == "__main__":
+    main()

@@ -15,8 +15,7 @@ from common import Target, finish, parse, simulation
 import fenicsmech as fm
 from fenicsmech.report import Trace
 
-demo = parse("klann", __doc__.splitlines()[0], size=1.71, quick_size=4.0)
-
+FORCES = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
 SCALE = 150.0 / 19.2  # mm per unit of the patent: 150 mm from foot to hip
 THICKNESS, DEPTH, PIN = 3.0, 8.5, 3.0
 
@@ -38,29 +37,39 @@ def bowed(start, end, rise):
     return fm.strip([start, (start + end) / 2 + rise * across, end], thickness=THICKNESS, depth=DEPTH)
 
 
-leg = fm.Mechanism("Klann leg")
-base, foot = leg.rigid("base", fixed=True), leg.rigid("leg")
-crank = leg.flexible("crank", bowed(SHAFT, CRANK_PIN, 3.0), fm.ONYX)
-rod = leg.flexible("connecting rod", fm.strip([CRANK_PIN, ELBOW, KNEE], thickness=THICKNESS, depth=DEPTH), fm.ONYX)
-first = leg.flexible("first rocker", bowed(FIRST_AXLE, HIP, 10.0), fm.ONYX)
-second = leg.flexible("second rocker", bowed(SECOND_AXLE, ELBOW, 5.0), fm.ONYX)
-shaft = leg.revolute(base, crank, at=SHAFT, radius=PIN)
-leg.revolute(crank, rod, at=CRANK_PIN, radius=PIN)
-leg.revolute(base, second, at=SECOND_AXLE, radius=PIN)
-leg.revolute(second, rod, at=ELBOW, radius=PIN)
-leg.revolute(base, first, at=FIRST_AXLE, radius=PIN)
-leg.revolute(first, foot, at=HIP, radius=PIN)
-leg.revolute(rod, foot, at=KNEE, radius=PIN)
-motor = leg.motor(shaft, name="crank motor")
-lift = leg.force(on=foot, at=FOOT, direction=(0, 1), name="obstacle under foot")
+def describe():
+    """The scene, the force of an obstacle on the foot, and the motor of the crank."""
+    leg = fm.Mechanism("Klann leg")
+    base, foot = leg.rigid("base", fixed=True), leg.rigid("leg")
+    crank = leg.flexible("crank", bowed(SHAFT, CRANK_PIN, 3.0), fm.ONYX)
+    rod = leg.flexible("connecting rod", fm.strip([CRANK_PIN, ELBOW, KNEE], thickness=THICKNESS, depth=DEPTH), fm.ONYX)
+    first = leg.flexible("first rocker", bowed(FIRST_AXLE, HIP, 10.0), fm.ONYX)
+    second = leg.flexible("second rocker", bowed(SECOND_AXLE, ELBOW, 5.0), fm.ONYX)
+    shaft = leg.revolute(base, crank, at=SHAFT, radius=PIN)
+    leg.revolute(crank, rod, at=CRANK_PIN, radius=PIN)
+    leg.revolute(base, second, at=SECOND_AXLE, radius=PIN)
+    leg.revolute(second, rod, at=ELBOW, radius=PIN)
+    leg.revolute(base, first, at=FIRST_AXLE, radius=PIN)
+    leg.revolute(first, foot, at=HIP, radius=PIN)
+    leg.revolute(rod, foot, at=KNEE, radius=PIN)
+    motor = leg.motor(shaft, name="crank motor")
+    lift = leg.force(on=foot, at=FOOT, direction=(0, 1), name="obstacle under foot")
+    return fm.Scene(leg), lift, motor
 
-scene = fm.Scene(leg)
-sim = simulation(demo, scene)
-# crank angles of the patent; the drawn one is 180°
-stroke = [scene.configuration(f"crank {angle}°", {motor: radians(angle - 180)}) for angle in (45, 95, 145)]
-curves = [sim.load_displacement(lift, forces=np.linspace(0.0, 5.0, 6), configuration=c) for c in stroke]
-finish(demo, sim, curves, [Target(configuration, 5.0, 10.0) for configuration in stroke])
 
-turn = [scene.configuration(f"{angle}°", {motor: radians(angle)}) for angle in range(0, 361, 4)]
-path = Trace(sim.path(lift, turn)[:, :2], "foot path", sim.path(lift, stroke)[:, :2])
-sim.picture(demo.folder / "foot-path.png", curves[1], stress=False, traces=[path])
+def main():
+    demo = parse("klann", __doc__.splitlines()[0], size=1.71, quick_size=4.0)
+    scene, lift, motor = describe()
+    sim = simulation(demo, scene)
+    # crank angles of the patent; the drawn one is 180°
+    stroke = [scene.configuration(f"crank {angle} deg", {motor: radians(angle - 180)}) for angle in (45, 95, 145)]
+    curves = [sim.load_displacement(lift, forces=FORCES, configuration=configuration) for configuration in stroke]
+    finish(demo, sim, curves, [Target(configuration, 5.0, 10.0) for configuration in stroke])
+
+    turn = [scene.configuration(f"turned by {angle} deg", {motor: radians(angle)}) for angle in range(0, 361, 4)]
+    path = Trace(sim.path(lift, turn)[:, :2], "foot path", sim.path(lift, stroke)[:, :2])
+    sim.picture(demo.folder / "foot-path.png", curves[1], stress=False, traces=[path])
+
+
+if __name__ == "__main__":
+    main()

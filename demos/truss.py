@@ -11,23 +11,34 @@ from common import Target, finish, parse, simulation
 
 import fenicsmech as fm
 
-demo = parse("truss", __doc__.splitlines()[0], size=2.1, quick_size=4.0)
+FORCES = [0.0, 0.025, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4]
 
-finger = fm.Mechanism("truss finger")
-base = finger.rigid("base", fixed=True)
-left, right, tip = (finger.rigid(name) for name in ("left leg", "right leg", "tip"))
-diagonal = finger.flexible(
-    "diagonal", fm.strip([(0, 0), (18, 34), (40, 60)], thickness=3.0, depth=20.0), fm.SMOOTH_SIL_950
-)
-finger.revolute(base, left, at=(0, 0))
-finger.revolute(base, right, at=(40, 0))
-finger.revolute(left, tip, at=(0, 60))
-finger.revolute(right, tip, at=(40, 60))
-finger.revolute(base, diagonal, at=(0, 0), radius=3.0)
-finger.revolute(diagonal, tip, at=(40, 60), radius=3.0)
-push = finger.force(on=tip, at=(20, 70), direction=(1, 0), name="push on tip")
 
-sim = simulation(demo, fm.Scene(finger))
-forces = [0.0, 0.025, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4]
-curve = sim.load_displacement(push, forces=forces)
-finish(demo, sim, [curve], [Target(fm.DRAWN, 0.1, 6.0), Target(fm.DRAWN, 0.4, 9.0)])
+def describe():
+    """The scene, and the force that pushes the tip."""
+    finger = fm.Mechanism("truss finger")
+    base = finger.rigid("base", fixed=True)
+    left, right, tip = (finger.rigid(name) for name in ("left leg", "right leg", "tip"))
+    diagonal = finger.flexible(
+        "diagonal", fm.strip([(0, 0), (18, 34), (40, 60)], thickness=3.0, depth=20.0), fm.SMOOTH_SIL_950
+    )
+    finger.revolute(base, left, at=(0, 0))
+    finger.revolute(base, right, at=(40, 0))
+    finger.revolute(left, tip, at=(0, 60))
+    finger.revolute(right, tip, at=(40, 60))
+    finger.revolute(base, diagonal, at=(0, 0), radius=3.0)
+    finger.revolute(diagonal, tip, at=(40, 60), radius=3.0)
+    push = finger.force(on=tip, at=(20, 70), direction=(1, 0), name="push on tip")
+    return fm.Scene(finger), push
+
+
+def main():
+    demo = parse("truss", __doc__.splitlines()[0], size=2.1, quick_size=4.0)
+    scene, push = describe()
+    sim = simulation(demo, scene)
+    curve = sim.load_displacement(push, forces=FORCES)
+    finish(demo, sim, [curve], [Target(fm.DRAWN, 0.1, 6.0), Target(fm.DRAWN, 0.4, 9.0)])
+
+
+if __name__ == "__main__":
+    main()

@@ -39,18 +39,23 @@ host_mirror() {
     echo "${uri%/}"
 }
 
-# wget, which debootstrap downloads with, learns of a proxy from the environment only; apt may have one of its own.
-export_apt_proxy() {
-    local http='' https=''
+# wget, which debootstrap downloads with, learns of a proxy from the environment only, and apt may have one of its own;
+# the apt in the root, in its turn, has no other environment than ours.
+use_host_proxy() {
+    local http='' https='' name
     eval "$(apt-config shell http Acquire::http::Proxy https Acquire::https::Proxy)"
     if [[ $http == http* ]]; then export http_proxy=${http_proxy:-$http}; fi
     if [[ $https == http* ]]; then export https_proxy=${https_proxy:-$https}; fi
+    for name in http_proxy https_proxy no_proxy; do
+        if [ -n "${!name:-}" ]; then environment+=("$name=${!name}"); fi
+    done
 }
 
 # How the host reaches its mirror (names, proxy, certificates, retries, clock tolerance), for the apt in the root.
 copy_network_settings() {
     local target=$1 settings=$1/etc/apt/apt.conf.d/00host file
-    apt-config dump | { grep -E '^Acquire::(http|https|Retries|Check|ForceIPv)' || true; } >"$settings"
+    apt-config dump | { grep -E '^Acquire::(https?|Retries|Check|ForceIPv)' || true; } \
+        | sed '/Auto-\?Detect/d' >"$settings" # a program of the host's
     for file in /etc/hosts /etc/resolv.conf /etc/ssl/certs/ca-certificates.crt \
         $(sed -nE 's/^.*"(\/[^"]+)";$/\1/p' "$settings"); do
         if [ -f "$file" ]; then
@@ -86,7 +91,7 @@ enter() {
 
 fill() { # a new root
     local target=$1 mirror=$2
-    export_apt_proxy
+    use_host_proxy
     if ! may_mount; then own_mounts=(); fi
     "${own_mounts[@]}" debootstrap --variant=minbase "$suite" "$target" "$mirror"
     copy_network_settings "$target"
@@ -94,19 +99,20 @@ fill() { # a new root
     printf 'path-exclude=/usr/share/%s/*\n' doc man locale >"$target/etc/dpkg/dpkg.cfg.d/fenicsmech"
     echo force-unsafe-io >>"$target/etc/dpkg/dpkg.cfg.d/fenicsmech"
     enter "$target" apt-get update
+    # shellcheck disable=SC2046 # one word for each package
     enter "$target" apt-get install -y --no-install-recommends $(packages)
     enter "$target" apt-get clean
     echo /fenicsmech >"$target/usr/lib/python3/dist-packages/fenicsmech.pth"
 }
 
 build() {
-    local log=$root.log mirror
+    local mirror
     mirror=$(host_mirror)
     echo "Building a Debian 13 root in $root from $mirror: about two minutes"
     rm -rf --one-file-system "$root.partial" "$root"
     mkdir -p "$root.partial"
-    trap 'tail -n 5 "$log" >&2; fail "the root could not be built; the whole log is $log"' EXIT
-    (fill "$root.partial" "$mirror") >"$log" 2>&1
+    trap 'tail -n 5 "$root.log" >&2; fail "the root could not be built; the whole log is $root.log"' EXIT
+    (fill "$root.partial" "$mirror") >"$root.log" 2>&1
     trap - EXIT
     echo "$recipe" >"$root.partial/recipe"
     mv "$root.partial" "$root"

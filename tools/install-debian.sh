@@ -52,10 +52,10 @@ make_venv() {
 
 install_tools() { # the versions pinned in pyproject.toml
     local tools
-    tools=$("$python" -c 'import tomllib
+    mapfile -t tools < <("$python" -c 'import tomllib
 for tool in tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["dev"]: print(tool)')
-    echo "Installing" $tools
-    "$venv/bin/python3" -m pip install --quiet --disable-pip-version-check $tools \
+    echo "Installing ${tools[*]}"
+    "$venv/bin/python3" -m pip install --quiet --disable-pip-version-check "${tools[@]}" \
         || fail "the tools above could not be installed with pip, which needs to reach a Python package index" \
             "(behind a proxy or with a mirror of your own, set PIP_PROXY or PIP_INDEX_URL and try again)."
 }

@@ -13,7 +13,7 @@ descend, and δ grows until it does. Merit of a step: the augmented Lagrangian
 Slender links bend at far smaller forces than they stretch, so a good step may raise every merit for a few
 iterations: steps are taken in full while a small allowance lasts, then the iteration returns to its best
 state and searches the line. Sources: Nocedal & Wright, Numerical Optimization (doi:10.1007/978-0-387-40065-5),
-chapters 17–19; Chamberlain et al. on the watchdog (doi:10.1007/BFb0120945).
+chapters 17–19; Chamberlain et al. on the watchdog (Mathematical Programming Studies 16, 1982).
 """
 
 from __future__ import annotations

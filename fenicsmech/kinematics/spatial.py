@@ -31,7 +31,7 @@ _HESSIAN = _second_derivative()
 class Spatial(RigidSpace):
     """R(q) = I + 2 (w [v]× + v vᵀ − (v·v) I), quadratic in q, a rotation on |q|² = 1.
 
-    On the unit sphere this equals the homogeneous formula of Schumacher et al. (doi:10.1145/3450626.3459802);
+    On the unit sphere this equals the homogeneous formula in common use;
     it needs no cancellation at small rotations, and its second derivative is constant.
     """
 

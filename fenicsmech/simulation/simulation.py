@@ -142,7 +142,7 @@ class Simulation:
         freedom = count_freedom(
             self.linkage.rigid, assembly.poses, self.linkage.rigid.motor_values(configuration.position)
         )
-        newton = self._newton(force, tuple((others or {}).items()))
+        newton = self.newton(force, tuple((others or {}).items()))
         state = self.model.assembled_state(assembly.poses, motors)
         if assembly.fraction < 1.0:
             state = self._turn_motors(newton, state, assembly.fraction, motors, configuration)
@@ -235,8 +235,8 @@ class Simulation:
             raise DescriptionError("picture", "no curve was computed yet", "Call load_displacement first")
         return chosen
 
-    def _newton(self, force: Force, others: tuple) -> Newton:
-        """The solver for one controlled force; kept, since its symbolic factor serves every configuration."""
+    def newton(self, force: Force, others: tuple[tuple[Force, float], ...] = ()) -> Newton:
+        """The solver for one controlled and some fixed forces, kept for all configurations (collective)."""
         key = (force, others)
         if key not in self._newtons:
             model = self.model

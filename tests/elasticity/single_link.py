@@ -46,7 +46,7 @@ def single_link(
 
 def distorted(dim: int, *, seed: int = 3) -> tuple[np.ndarray, np.ndarray]:
     """A unit square or cube of few cells, no two alike; its sides stay straight."""
-    points, cells = rectangle(3, 2, 1.0, 1.0) if dim == 2 else box(2, 2, 1, (1.0, 1.0, 1.0))
+    points, cells = rectangle(3, 2, 1.0, 1.0) if dim == 2 else box(2, 2, 2, (1.0, 1.0, 1.0))
     shift = np.random.default_rng(seed).uniform(-0.1, 0.1, points.shape)
     on_side = (points < 1e-9) | (points > 1.0 - 1e-9)
     return points + np.where(on_side, 0.0, shift), cells
@@ -56,6 +56,11 @@ def nodes(function: fem.Function) -> np.ndarray:
     """Positions of the nodes of a field, (n, dim)."""
     space = function.function_space
     return space.tabulate_dof_coordinates()[:, : space.mesh.geometry.dim]
+
+
+def components(body: ElasticBody, where: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """Indices into u.x.array of all components at the nodes that ``where`` of positions (n, dim) selects."""
+    return np.flatnonzero(np.repeat(where(nodes(body.u)), body.model.dim))
 
 
 def rest_shape(body: ElasticBody) -> np.ndarray:

@@ -1,0 +1,48 @@
+"""Mechanisms with links that bend, which the assembly moves as rigid bodies where it can."""
+
+from __future__ import annotations
+
+from fenicsmech.mechanism import ONYX, SMOOTH_SIL_950, FlexibleLink, Mechanism, RigidLink, strip
+
+from .machine import Machine
+from .planar_machines import CRANK_ROCKER
+
+
+def bent_strip(start, end) -> object:
+    """A strip between two points (2,), bent to one side."""
+    middle = (0.5 * (start[0] + end[0]) + 2.0, 0.5 * (start[1] + end[1]) + 1.0)
+    return strip([tuple(start), middle, tuple(end)], thickness=2.0, depth=10.0)
+
+
+def truss_finger() -> Machine:
+    """A flexible diagonal in a rigid parallelogram, whose motor can only turn while the diagonal stretches."""
+    m = Mechanism("truss finger")
+    base = m.rigid("base", fixed=True)
+    left, right, tip = (m.rigid(name) for name in ("left", "right", "tip"))
+    diagonal = m.flexible("diagonal", bent_strip((0.0, 0.0), (40.0, 60.0)), SMOOTH_SIL_950)
+    hinge = m.revolute(base, left, at=(0.0, 0.0))
+    m.revolute(base, right, at=(40.0, 0.0))
+    m.revolute(left, tip, at=(0.0, 60.0))
+    m.revolute(right, tip, at=(40.0, 60.0))
+    m.revolute(base, diagonal, at=(0.0, 0.0), radius=3.0)
+    m.revolute(diagonal, tip, at=(40.0, 60.0), radius=3.0)
+    return Machine(m, m.motor(hinge), {})
+
+
+def flexible_four_bar(angle: float) -> Machine:
+    """The crank-rocker with a flexible coupler and a flexible rocker, drawn at the crank ``angle``."""
+    pin, joint = (tuple(point) for point in CRANK_ROCKER.positions(angle))
+    m = Mechanism("flexible four-bar")
+    ground, crank = m.rigid("ground", fixed=True), m.rigid("crank")
+    coupler = m.flexible("coupler", bent_strip(pin, joint), ONYX)
+    rocker = m.flexible("rocker", bent_strip(CRANK_ROCKER.axle, joint), ONYX)
+    shaft = m.revolute(ground, crank, at=CRANK_ROCKER.shaft)
+    m.revolute(crank, coupler, at=pin, radius=2.0)
+    m.revolute(coupler, rocker, at=joint, radius=2.0)
+    m.revolute(rocker, ground, at=CRANK_ROCKER.axle, radius=2.0)
+    return Machine(m, m.motor(shaft), {"pin": (crank, pin)})
+
+
+def links_by_name(machine: Machine) -> dict[str, RigidLink | FlexibleLink]:
+    """The links of ``machine``."""
+    return {link.name: link for link in machine.mechanism.links}

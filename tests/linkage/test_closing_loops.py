@@ -1,0 +1,81 @@
+"""A loop that cannot close is named, with how far its motor gets."""
+
+import re
+
+import numpy as np
+import pytest
+
+from fenicsmech.errors import AssemblyError
+from fenicsmech.mechanism import Mechanism
+
+from ..oracles.fourbar import FourBar
+from .machine import Machine
+from .planar_machines import four_bar, slider_crank, slider_position
+
+# The crank is too long to turn: it stops where coupler and rocker are in line.
+STOPPED = FourBar((0.0, 0.0), (30.0, 0.0), crank=25.0, coupler=12.0, rocker=20.0)
+LIMIT = np.arccos((25.0**2 + 30.0**2 - 32.0**2) / (2.0 * 25.0 * 30.0))
+START = 0.9
+EVERY_DIMENSION = pytest.mark.parametrize("dim", [2, 3])
+
+
+def share(error: AssemblyError) -> float:
+    return float(re.search(r"the motors get (\d+\.\d)% of the way", error.problem)[1]) / 100.0
+
+
+@EVERY_DIMENSION
+@pytest.mark.parametrize("turn", [2.0 * np.pi, LIMIT - START + 1e-3, -np.pi])
+def test_loop_is_named_with_the_share_of_the_way_its_motor_gets(turn, dim):
+    machine = four_bar(STOPPED, START)
+    linkage = machine.linkage(dim)
+    with pytest.raises(AssemblyError) as caught:
+        machine.drive(linkage, turn)
+    error = caught.value
+    assert error.part == "configuration 'driven'"
+    assert re.fullmatch(r"the loop through '\w+' \(.*\) does not close: the motors get .*% of the way", error.problem)
+    for link in ("ground", "crank", "coupler", "rocker"):
+        assert link in error.problem
+    assert error.remedy == "Check motor positions and link lengths"
+    # the motor's steps end at a ten thousandth of the step they started with
+    reach = LIMIT - START if turn > 0.0 else -LIMIT - START
+    assert share(error) == pytest.approx(reach / turn, abs=2e-3)
+
+
+@EVERY_DIMENSION
+def test_a_motor_that_nearly_arrives_does_not_get_the_whole_way(dim):
+    machine = slider_crank(10.0, 30.0, 1.0, driven="slider")
+    linkage = machine.linkage(dim)
+    with pytest.raises(AssemblyError, match=r"get 99\.9% of the way"):
+        machine.drive(linkage, 40.0001 - slider_position(10.0, 30.0, 1.0))
+
+
+@EVERY_DIMENSION
+def test_only_the_loop_that_fails_is_named(dim):
+    machine = four_bar(STOPPED, START)
+    m, ground = machine.mechanism, machine.mechanism.links[0]
+    arm, hand = m.rigid("arm"), m.rigid("hand")
+    m.revolute(ground, arm, at=(-10.0, 0.0))
+    m.revolute(arm, hand, at=(-20.0, 0.0))
+    linkage = machine.linkage(dim)
+    with pytest.raises(AssemblyError) as caught:
+        machine.drive(linkage, 2.0)
+    assert not re.search("arm|hand", str(caught.value))
+
+
+@EVERY_DIMENSION
+def test_motor_between_fixed_links_gets_nowhere(dim):
+    m = Mechanism("rigid")
+    joint = m.revolute(m.rigid("base", fixed=True), m.rigid("wall", fixed=True), at=(0.0, 0.0), name="pin")
+    machine = Machine(m, m.motor(joint))
+    with pytest.raises(AssemblyError, match=re.escape("'pin' (base – wall) does not close: the motors get 0.0%")):
+        machine.drive(machine.linkage(dim), 0.5)
+
+
+@EVERY_DIMENSION
+def test_two_motors_that_fight_each_other_are_refused(dim):
+    machine = four_bar(STOPPED, START)
+    axle = next(joint for joint in machine.mechanism.joints if joint.name == "axle")
+    second = machine.mechanism.motor(axle)
+    linkage = machine.linkage(dim)
+    with pytest.raises(AssemblyError, match="does not close"):
+        Machine(machine.mechanism, second).drive(linkage, 0.3)  # the first stays where it was drawn
