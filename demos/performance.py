@@ -63,7 +63,7 @@ def factors(sim, curve):
     system, frame = newton.system, curve.frames[-1]
     control = LoadControl(frame.force)
     system.load(frame.state)
-    matrix = system.kkt(frame.state, control, system.balance(frame.state, control), shift=0.0)
+    matrix = system.kkt(frame.state, control, system.balance(frame.state, control))
     kept = Factor(matrix)
     kept.refactor()
 
@@ -102,7 +102,11 @@ def main():
         command = [sys.executable, "demos/claw.py", "--space", demo.options.space, "--size", str(demo.options.size)]
         for name, environment in (("optimised", dict(os.environ)), ("reference", reference_blas)):
             done = subprocess.run(
-                [*command, "--out", str(demo.folder / name)], env=environment, capture_output=True, text=True, check=True
+                [*command, "--out", str(demo.folder / name)],
+                env=environment,
+                capture_output=True,
+                text=True,
+                check=True,
             )
             line = next(line for line in done.stdout.splitlines() if line.startswith("frame_median"))
             demo.say(f"{name} BLAS: {line.split(',')[0]}")

@@ -7,6 +7,10 @@ from dataclasses import dataclass
 from petsc4py import PETSc
 
 
+_WORKSPACE = (-8, -9)  # MUMPS: the integer or real workspace is too small
+_SPARE = 60  # per cent of workspace beyond the estimate, for delayed pivots
+
+
 @dataclass(frozen=True)
 class Inertia:
     """Numbers of negative and zero pivots: Sylvester's law makes them those of the eigenvalues."""
@@ -34,19 +38,24 @@ class Factor:
         mumps = pc.getFactorMatrix()
         mumps.setMumpsIcntl(7, 5)  # METIS ordering
         mumps.setMumpsIcntl(13, 1)  # root front factored by one process: exact inertia in parallel
-        mumps.setMumpsIcntl(14, 60)  # workspace beyond the estimate, in per cent, for delayed pivots
+        mumps.setMumpsIcntl(14, _SPARE)
         mumps.setMumpsIcntl(24, 1)  # detect null pivots instead of failing on them
         self._mumps = mumps
 
     def refactor(self) -> Inertia | None:
         """Factors the matrix's current values; None if the factorisation failed."""
         self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        self._solver.setOperators(self._matrix)
-        pc = self._solver.getPC()
-        pc.setUp()
-        if self._mumps.getMumpsInfog(1) < 0:
-            return None
-        return Inertia(self._mumps.getMumpsInfog(12), self._mumps.getMumpsInfog(28))
+        for _ in range(4):
+            self._solver.setOperators(self._matrix)
+            self._solver.getPC().setUp()
+            status = self._mumps.getMumpsInfog(1)
+            if status >= 0:
+                return Inertia(self._mumps.getMumpsInfog(12), self._mumps.getMumpsInfog(28))
+            if status not in _WORKSPACE:
+                return None
+            self._mumps.setMumpsIcntl(14, 2 * self._mumps.getMumpsIcntl(14))
+            self._matrix.scale(1.0)  # marks the values as new
+        return None
 
     def solve(self, right: PETSc.Vec, solution: PETSc.Vec) -> None:
         """Solves with the last factor."""

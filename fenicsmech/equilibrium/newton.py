@@ -6,7 +6,8 @@ Each iteration solves, with the symmetric factor LDLᵀ,
 
 the Newton step of the augmented Lagrangian, which tends to the KKT step for large ρ and stays regular for
 redundant constraints. If the factor has more negative pivots than there are multipliers, the step need not
-descend, and δ grows until it does. Merit of a step: the augmented Lagrangian
+descend, and δ grows until it does; close to an equilibrium δ stays zero, so that unstable equilibria on the path are
+found and reported as such. Merit of a step: the augmented Lagrangian
 
     Φ(s) = E(s) − λᵀC + ½ ρ_m |C|²  at the new multipliers λ.
 
@@ -22,6 +23,7 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
+from petsc4py import PETSc
 
 from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.factor import Factor, Inertia
@@ -39,6 +41,8 @@ class NewtonOptions:
     Attributes:
         tolerance: residual over the forces that balance in it, at convergence.
         roundoff: residual in units of mean stiffness times length below which digits are lost.
+        near: residual over the forces below which any equilibrium, unstable ones too, is converged to; farther
+            off, steps descend.
         iterations: most iterations.
         allowance: iterations in a row that may fail to improve on the best residual.
         largest_turn: largest rotation (rad), or displacement over the mechanism's length, of one step.
@@ -46,6 +50,7 @@ class NewtonOptions:
 
     tolerance: float = 1e-10
     roundoff: float = 1e-14
+    near: float = 1e-2
     iterations: int = 25
     allowance: int = 4
     largest_turn: float = 0.5
@@ -88,8 +93,13 @@ class Newton:
     options: NewtonOptions = field(default_factory=NewtonOptions)
     _factor: Factor | None = None
 
-    def solve(self, start: State, control: Control) -> Solution:
+    def solve(self, start: State, control: Control, *, floor: float = 0.0) -> Solution:
         """The equilibrium near ``start`` under ``control`` (collective).
+
+        Args:
+            start: first guess.
+            control: what is asked for.
+            floor: least shift δ, for mechanisms with idle freedoms.
 
         Raises:
             NotConverged: too many iterations, no descent, or elements inverted all along.
@@ -100,26 +110,29 @@ class Newton:
         if not math.isfinite(system.elastic_energy()):
             raise NotConverged("elements are inverted in the predicted state", 0)
         state, balance = start, system.balance(start, control)
-        best_state, best_balance, spent = state, balance, 0
-        residuals, inertia, shift, careful = [], None, 0.0, False
+        best, spent, careful = (state, balance.norm), 0, False
+        residuals, inertia, shift, trusted = [], None, floor, True
         for iteration in range(options.iterations + 1):
             residuals.append(self._relative(balance))
             if self._converged(balance) and iteration > 0:
-                return self._accept(state, control, balance, inertia, shift, residuals, iteration)
+                return self._accept(state, control, balance, inertia, shift, floor, residuals, iteration)
             if iteration == options.iterations:
                 break
-            step, inertia, shift = self._direction(state, control, balance, shift)
-            _log.debug("iteration %d: residual %.2e, shift %.1e", iteration, residuals[-1], shift)
-            if careful:
-                state, balance = self._search(state, control, step, balance, iteration)
-            else:
-                state, balance = self._full_step(state, control, step, iteration)
-            if balance.norm < best_balance.norm:
-                best_state, best_balance, spent, careful = state, balance, 0, careful
+            near = trusted and residuals[-1] < options.near
+            shift = floor if near else max(floor, shift / 3.0 if shift > 1e-9 else 0.0)
+            step, inertia, shift = self._direction(state, control, balance, shift, any_inertia=near)
+            _log.debug("iteration %d: residual %.2e, shift %.1e, %s", iteration, residuals[-1], shift, inertia)
+            before = balance.norm
+            advance = self._search if careful else self._full_step
+            state, balance = advance(state, control, step, balance, iteration)
+            # the contraction of Newton's method near any equilibrium, stable or not
+            trusted = trusted and not (near and balance.norm > 0.5 * before and not self._converged(balance))
+            if balance.norm < best[1]:
+                best, spent = (state, balance.norm), 0
             else:
                 spent += 1
             if spent > options.allowance and not careful:
-                state, balance, careful = best_state, best_balance, True
+                state, careful = best[0], True
                 system.load(state)
                 balance = system.balance(state, control)
         raise NotConverged(
@@ -133,13 +146,16 @@ class Newton:
     def _converged(self, balance: Balance) -> bool:
         return balance.norm <= max(self.options.tolerance * balance.forces, self.options.roundoff * self.system.unit)
 
-    def _direction(self, state: State, control: Control, balance: Balance, shift: float) -> tuple[Step, Inertia, float]:
-        """The Newton step; raises δ until the factor's inertia promises descent."""
+    def _direction(
+        self, state: State, control: Control, balance: Balance, shift: float, *, any_inertia: bool
+    ) -> tuple[Step, Inertia, float]:
+        """The Newton step; unless ``any_inertia`` will do, raises δ until the inertia promises descent."""
         system = self.system
-        shift = shift / 3.0 if shift > 1e-9 else 0.0
+        matrix = system.kkt(state, control, balance)
         for _ in range(20):
-            inertia = self._refactor(state, control, balance, shift)
-            if inertia is not None and inertia.negative <= self._expected and inertia.zero == 0:
+            inertia = self._refactor(matrix, shift)
+            descends = inertia is not None and inertia.negative <= self._expected and inertia.zero == 0
+            if descends or (any_inertia and inertia is not None):
                 break
             shift = max(1e-8, 8.0 * shift)
         else:
@@ -150,9 +166,9 @@ class Newton:
             x.scale(-1.0)
         return system.step(x), inertia, shift
 
-    def _refactor(self, state: State, control: Control, balance: Balance, shift: float) -> Inertia | None:
-        matrix = self.system.kkt(state, control, balance, shift=shift)
+    def _refactor(self, matrix: PETSc.Mat, shift: float) -> Inertia | None:
         with self.system.clock.phase("factor"):
+            self.system.shift(shift)
             if self._factor is None:
                 self._factor = Factor(matrix)
             return self._factor.refactor()
@@ -162,7 +178,9 @@ class Newton:
         """Negative pivots of a stable equilibrium: one per multiplier, one for the controlled force."""
         return self.system.joints.rows + 1
 
-    def _full_step(self, state: State, control: Control, step: Step, iteration: int) -> tuple[State, Balance]:
+    def _full_step(
+        self, state: State, control: Control, step: Step, balance: Balance, iteration: int
+    ) -> tuple[State, Balance]:
         """The whole step, shortened only where it turns too far or inverts elements."""
         system = self.system
         length = min(1.0, self.options.largest_turn / max(system.size(step), 1e-300))
@@ -203,11 +221,11 @@ class Newton:
             value += force * control.target + 0.5 * stiffness * gap**2
         return value
 
-    def _accept(self, state, control, balance, inertia, shift, residuals, iteration) -> Solution:
+    def _accept(self, state, control, balance, inertia, shift, floor, residuals, iteration) -> Solution:
         """Stability and tangent at the equilibrium, from the last factor if it was of the true matrix."""
         system = self.system
-        if shift > 0.0:
-            inertia = self._refactor(state, control, balance, 0.0)
+        if shift > floor:
+            inertia = self._refactor(system.kkt(state, control, balance), floor)
         if inertia is None:
             raise NotConverged("the tangent at the equilibrium cannot be factored", iteration)
         with system.clock.phase("solve"):

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.newton import Newton, NotConverged, Solution
-from fenicsmech.equilibrium.predictor import Anchor, Hermite, Predictor
+from fenicsmech.equilibrium.predictor import Anchor, Predictor
 from fenicsmech.equilibrium.state import State
 
 _SMALLEST = 1.0 / 1024.0  # of the distance asked for
 _EASY = 5  # iterations
+_IDLE = 1e-10  # stiffness lent to idle freedoms, in units of the mean stiffness
 
 
 class PathFailed(Exception):
@@ -37,11 +38,12 @@ class Path:
         start: a first guess at ``value``.
         value: the control value there.
         predictor: how the next equilibrium is guessed.
+        idle: whether the mechanism has freedoms without stiffness.
     """
 
-    def __init__(self, newton: Newton, start: State, value: float, *, predictor: Predictor | None = None) -> None:
-        self._newton, self._start, self._value = newton, start, value
-        self._predictor = predictor or Hermite()
+    def __init__(self, newton: Newton, start: State, value: float, *, predictor: Predictor, idle: bool) -> None:
+        self._newton, self._start, self._value, self._predictor = newton, start, value, predictor
+        self._floor = _IDLE if idle else 0.0
         self._anchors: list[Anchor] = []
         self.iterations = 0
 
@@ -58,7 +60,7 @@ class Path:
             last = abs(step) >= abs(remaining) * (1.0 - 1e-9)
             value = control.target if last else self._value + step
             try:
-                solution = self._newton.solve(self._guess(value), control.at(value))
+                solution = self._newton.solve(self._guess(value), control.at(value), floor=self._floor)
             except NotConverged as failure:
                 self.iterations += failure.iterations
                 tried.append(value)

@@ -98,6 +98,7 @@ class EquilibriumSystem:
             self._map = create_map_matrix(self.layout, interfaces, joints, self.unit_u, self.scale)
         self._rows = self._hat.createVecLeft()
         self._matrix: PETSc.Mat | None = None
+        self._diagonal: PETSc.Vec | None = None
 
     # -- states --------------------------------------------------------------------------------------------
 
@@ -182,15 +183,16 @@ class EquilibriumSystem:
 
     # -- derivatives at the loaded state -------------------------------------------------------------------
 
-    def kkt(self, state: State, control: Control, balance: Balance, *, shift: float) -> PETSc.Mat:
-        """The KKT matrix, with ``shift`` · I added to the block of s (collective)."""
+    def kkt(self, state: State, control: Control, balance: Balance) -> PETSc.Mat:
+        """The KKT matrix (collective); the same object at every call."""
         layout = self.layout
         with self.clock.phase("assemble"):
             self._hat.zeroEntries()
             self.elastic.tangent(self._hat)
             self._hat.assemble()
             if layout.last:
-                for rows, columns, block in self._extras.entries(state, control, self._acting(state), balance.moments):
+                entries = self._extras.entries(state, control, self._acting(state), balance.moments)
+                for rows, columns, block in entries:
                     # petsc4py reads transposed arrays in memory order
                     self._hat.setValues(
                         rows.astype(PETSc.IntType),
@@ -201,12 +203,14 @@ class EquilibriumSystem:
             self._hat.assemble()
         with self.clock.phase("project"):
             self._matrix = self._hat.ptap(self._map, result=self._matrix)
-            if shift > 0.0:
-                diagonal = self._matrix.getDiagonal()
-                free = len(layout.free)
-                diagonal.array_w[: free + (self.joints.size if layout.last else 0)] += shift
-                self._matrix.setDiagonal(diagonal)
+            self._diagonal = self._matrix.getDiagonal()
         return self._matrix
+
+    def shift(self, shift: float) -> None:
+        """Makes the KKT matrix hold ``shift`` · I more than it was assembled with, in the block of s (collective)."""
+        shifted = self._diagonal.copy()
+        shifted.array_w[: len(self.layout.free) + (self.joints.size if self.layout.last else 0)] += shift
+        self._matrix.setDiagonal(shifted)
 
     def force_rate(self, state: State) -> PETSc.Vec:
         """Right-hand side whose KKT solution is the rate of x with the controlled force (collective)."""

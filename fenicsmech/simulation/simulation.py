@@ -31,7 +31,7 @@ from fenicsmech.equilibrium import (
     motor_torques,
 )
 from fenicsmech.errors import DescriptionError, EquilibriumError
-from fenicsmech.linkage import assemble, build_linkage, count_freedom
+from fenicsmech.linkage import Freedom, assemble, build_linkage, count_freedom
 from fenicsmech.linkage.build import in_dimension
 from fenicsmech.log import logger
 from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Output, Scene, validate
@@ -145,11 +145,12 @@ class Simulation:
         newton = self.newton(force, tuple((others or {}).items()))
         state = self.model.assembled_state(assembly.poses, motors)
         if assembly.fraction < 1.0:
-            state = self._turn_motors(newton, state, assembly.fraction, motors, configuration)
+            state = self._turn_motors(newton, state, assembly.fraction, motors, configuration, freedom)
         newton.system.load(state)
         datum = newton.system.load_displacement(state)
         datums = {output: self._output(newton.system, output, state) for output in self.scene.mechanism.outputs}
-        path = Path(newton, state, datum if kind is DisplacementControl else 0.0, predictor=self._predictor)
+        start = datum if kind is DisplacementControl else 0.0
+        path = Path(newton, state, start, predictor=self._predictor, idle=freedom.mobility > 0)
         frames: list[Frame] = []
         progress = Progress(len(controls), f"{configuration.name}") if self.comm.rank == 0 else Silent()
         with progress:
@@ -245,12 +246,19 @@ class Simulation:
         return self._newtons[key]
 
     def _turn_motors(
-        self, newton: Newton, state: State, fraction: float, motors: np.ndarray, configuration: Configuration
+        self,
+        newton: Newton,
+        state: State,
+        fraction: float,
+        motors: np.ndarray,
+        configuration: Configuration,
+        freedom: Freedom,
     ) -> State:
         """Leads the motors the rest of their way, which strains the links."""
         state = replace(state, motors=fraction * motors)
         try:
-            return Path(newton, state, fraction, predictor=self._predictor).advance(MotorControl(1.0, motors)).state
+            path = Path(newton, state, fraction, predictor=self._predictor, idle=freedom.mobility > 0)
+            return path.advance(MotorControl(1.0, motors)).state
         except PathFailed as failure:
             raise EquilibriumError(
                 f"configuration {configuration.name!r}",

@@ -46,10 +46,9 @@ def _newton(body: ElasticBody, fixed: np.ndarray, values: np.ndarray, force: np.
     norms: list[float] = []
     try:
         for _ in range(ITERATIONS):
+            missing = values - u[fixed]
             body.residual(right)
             right.array[:] = force - right.array
-            reaction = np.linalg.norm(right.array)
-            missing = values - u[fixed]
             matrix.zeroEntries()
             body.tangent(matrix)
             matrix.assemble()
@@ -59,12 +58,13 @@ def _newton(body: ElasticBody, fixed: np.ndarray, values: np.ndarray, force: np.
             residual = right.array.copy()
             residual[fixed] = 0.0
             norms.append(float(np.linalg.norm(residual)))
-            if not np.any(missing) and norms[-1] <= 1e-11 * max(reaction, norms[0]):
-                return [norm / norms[0] for norm in norms]
             solver.setOperators(matrix)
             solver.solve(right, change)
             u += change.array
             u[fixed] = values
+            # the error left is of the order of the square of this change
+            if np.abs(change.array).max() <= 1e-8 * np.abs(u).max():
+                return [norm / norms[0] for norm in norms]
     finally:
         for thing in (matrix, right, change, solver):
             thing.destroy()

@@ -56,6 +56,21 @@ def test_motor_rate_passes_the_taylor_test(case, driven, seed):
 
 
 @EVERY_JOINT
+@SEEDS
+def test_twist_passes_the_taylor_test(case, driven, seed):
+    rng = np.random.default_rng(seed)
+    c, (z, drawn, value) = compiled(case, driven=driven), anywhere(case, rng)
+    multipliers = rng.standard_normal(c.rows)
+    twist = c.twist(z, drawn.anchors, drawn.triad, value, multipliers)
+    assert twist.shape == z.shape
+
+    def pull(v):
+        return c.gradient(z, drawn.anchors, drawn.triad, float(v[0])).T @ multipliers
+
+    assert_derivative(pull, np.array([value]), twist[:, None], rng)
+
+
+@EVERY_JOINT
 def test_every_joint_closes_exactly_as_drawn(case, driven):
     rng = np.random.default_rng(0)
     drawn = draw(case.space, rng)

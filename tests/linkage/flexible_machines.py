@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from fenicsmech.mechanism import ONYX, SMOOTH_SIL_950, FlexibleLink, Mechanism, RigidLink, strip
+from collections.abc import Sequence
+
+from fenicsmech.mechanism import ONYX, SMOOTH_SIL_950, Link, Mechanism, Strip, strip
 
 from .machine import Machine
 from .planar_machines import CRANK_ROCKER
 
 
-def bent_strip(start, end) -> object:
+def bent_strip(start: Sequence[float], end: Sequence[float]) -> Strip:
     """A strip between two points (2,), bent to one side."""
     middle = (0.5 * (start[0] + end[0]) + 2.0, 0.5 * (start[1] + end[1]) + 1.0)
     return strip([tuple(start), middle, tuple(end)], thickness=2.0, depth=10.0)
 
 
-def truss_finger() -> Machine:
+def truss_finger(*, driven: bool = True) -> Machine:
     """A flexible diagonal in a rigid parallelogram, whose motor can only turn while the diagonal stretches."""
     m = Mechanism("truss finger")
     base = m.rigid("base", fixed=True)
@@ -26,10 +28,10 @@ def truss_finger() -> Machine:
     m.revolute(right, tip, at=(40.0, 60.0))
     m.revolute(base, diagonal, at=(0.0, 0.0), radius=3.0)
     m.revolute(diagonal, tip, at=(40.0, 60.0), radius=3.0)
-    return Machine(m, m.motor(hinge), {})
+    return Machine(m, m.motor(hinge) if driven else None, {})
 
 
-def flexible_four_bar(angle: float) -> Machine:
+def flexible_four_bar(angle: float, *, driven: bool = True) -> Machine:
     """The crank-rocker with a flexible coupler and a flexible rocker, drawn at the crank ``angle``."""
     pin, joint = (tuple(point) for point in CRANK_ROCKER.positions(angle))
     m = Mechanism("flexible four-bar")
@@ -40,9 +42,9 @@ def flexible_four_bar(angle: float) -> Machine:
     m.revolute(crank, coupler, at=pin, radius=2.0)
     m.revolute(coupler, rocker, at=joint, radius=2.0)
     m.revolute(rocker, ground, at=CRANK_ROCKER.axle, radius=2.0)
-    return Machine(m, m.motor(shaft), {"pin": (crank, pin)})
+    return Machine(m, m.motor(shaft) if driven else None, {"pin": (crank, pin)})
 
 
-def links_by_name(machine: Machine) -> dict[str, RigidLink | FlexibleLink]:
+def links_by_name(machine: Machine) -> dict[str, Link]:
     """The links of ``machine``."""
     return {link.name: link for link in machine.mechanism.links}

@@ -60,7 +60,7 @@ def collinear_parallelogram(*, driven: bool = False) -> Machine:
     return Machine(m, m.motor(shaft) if driven else None)
 
 
-def klann() -> Machine:
+def klann(*, driven: bool = True) -> Machine:
     """The Klann leg of the patent, rigid, drawn with the crank at 180°."""
     pose = patent.klann(patent.DRAWN_ANGLE)
     m = Mechanism("Klann leg")
@@ -74,7 +74,8 @@ def klann() -> Machine:
     m.revolute(rod, leg, at=pose.knee)
     m.revolute(first, leg, at=pose.hip)
     on = {"crank_pin": crank, "elbow": second, "knee": rod, "hip": first, "foot": leg}
-    return Machine(m, m.motor(shaft), {name: (link, tuple(getattr(pose, name))) for name, link in on.items()})
+    pivots = {name: (link, tuple(getattr(pose, name))) for name, link in on.items()}
+    return Machine(m, m.motor(shaft) if driven else None, pivots)
 
 
 def slider_crank(crank: float, rod: float, angle: float, *, driven: str) -> Machine:
@@ -88,7 +89,9 @@ def slider_crank(crank: float, rod: float, angle: float, *, driven: str) -> Mach
     m.revolute(wheel, bar, at=pin)
     m.revolute(bar, slider, at=stroke)
     way = m.prismatic(ground, slider, at=stroke, axis=(1.0, 0.0))
-    return Machine(m, m.motor(shaft if driven == "crank" else way), {"pin": (wheel, tuple(pin)), "slider": (slider, stroke)})
+    return Machine(
+        m, m.motor(shaft if driven == "crank" else way), {"pin": (wheel, tuple(pin)), "slider": (slider, stroke)}
+    )
 
 
 def slider_position(crank: float, rod: float, angle: float) -> float:

@@ -41,7 +41,8 @@ class Bennett:
             points.append(frame[:3, 3])
             axes.append(frame[:3, 2])
             frame = frame @ _screw(turn, length, twist)
-        if np.max(np.abs(frame - np.eye(4))) > 1e-12 * self.length:
+        frame[:3, 3] /= self.length
+        if np.max(np.abs(frame - np.eye(4))) > 1e-12:
             raise ValueError("the loop does not close")
         return np.array(points), np.array(axes)
 

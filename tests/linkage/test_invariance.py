@@ -99,7 +99,8 @@ def test_plane_of_a_mechanism_may_lie_anywhere_in_space(seed):
     axis = rotation.apply([0.0, 0.0, 1.0])
     places = {joint.name: rotation.apply([*joint.at, 0.0]) for joint in flat.mechanism.joints}
     joints = {
-        j.name: m.revolute(links[j.a.name], links[j.b.name], at=places[j.name], axis=axis) for j in flat.mechanism.joints
+        j.name: m.revolute(links[j.a.name], links[j.b.name], at=places[j.name], axis=axis)
+        for j in flat.mechanism.joints
     }
     pivots = {name: (links[link.name], tuple(places[name])) for name, (link, _) in flat.pivots.items()}
     tilted = displacements(Machine(m, m.motor(joints["shaft"]), pivots), 3)

@@ -15,11 +15,6 @@ HINGES = ("shaft", "pin", "joint", "axle")
 MOVING = ("crank", "coupler", "rocker")
 
 
-def undriven(machine: Machine) -> Machine:
-    machine.mechanism.motors.clear()
-    return machine
-
-
 @pytest.mark.parametrize(("dim", "redundancy", "names"), [(2, 0, ()), (3, 3, HINGES)])
 def test_planar_loop_of_hinges_is_redundant_three_times_in_space_only(dim, redundancy, names):
     freedom = freedom_as_drawn(four_bar(CRANK_ROCKER, DRAWN_ANGLE, driven=None), dim)
@@ -36,7 +31,7 @@ def test_motor_takes_the_freedom_and_adds_no_redundancy(dim, redundancy):
 @pytest.mark.parametrize(("dim", "redundancy"), [(2, 0), (3, 6)])
 def test_klann_leg_has_one_freedom_and_two_loops(dim, redundancy):
     assert freedom_as_drawn(klann(), dim).mobility == 0
-    freedom = freedom_as_drawn(undriven(klann()), dim)
+    freedom = freedom_as_drawn(klann(driven=False), dim)
     assert (freedom.mobility, freedom.redundancy) == (1, redundancy)
     assert freedom.mobile == ("crank", "rod", "first rocker", "second rocker", "leg")
 
@@ -106,7 +101,6 @@ def test_square_braced_twice_is_overdetermined(dim, redundancy):
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_overdetermined_part_leaves_the_rest_its_freedom_and_is_named_alone(dim):
-    # a weld in a triangle of welds, carried by a pendulum
     m = Mechanism("pendulum with a doubly welded bob")
     base, rod, bob = m.rigid("base", fixed=True), m.rigid("rod"), m.rigid("bob")
     m.revolute(base, rod, at=(0.0, 0.0), name="hinge")
@@ -129,12 +123,12 @@ def test_open_chain_has_a_freedom_per_hinge(dim):
 
 @pytest.mark.parametrize(("dim", "redundancy"), [(2, 0), (3, 3)])
 def test_flexible_links_count_as_rigid(dim, redundancy):
-    freedom = freedom_as_drawn(undriven(flexible_four_bar(DRAWN_ANGLE)), dim)
+    freedom = freedom_as_drawn(flexible_four_bar(DRAWN_ANGLE, driven=False), dim)
     assert (freedom.mobility, freedom.mobile, freedom.redundancy) == (1, MOVING, redundancy)
 
 
 def test_diagonal_locks_the_truss_finger_until_it_bends():
-    machine = undriven(truss_finger())
+    machine = truss_finger(driven=False)
     assert freedom_as_drawn(machine, 2).mobility == 0
     linkage = machine.linkage(2)
     # taken apart from each other, its two ends leave the parallelogram free and turn on their pins
