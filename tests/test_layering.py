@@ -17,6 +17,7 @@ PACKAGE = Path(__file__).parents[1] / ROOT
 LAYERS = (
     "errors",
     "log",
+    "clock",
     "compat",
     "report",
     "kinematics",
@@ -26,11 +27,8 @@ LAYERS = (
     "meshing",
     "elasticity",
     "bodies",
-    "effects",
     "equilibrium",
     "simulation",
-    "design",
-    "accuracy",
 )
 
 # Libraries that belong to a few layers only: descriptions and joints know no elements, only one layer makes meshes,

@@ -9,15 +9,25 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from petsc4py import PETSc
 
 from fenicsmech.equilibrium.state import State
 
-if TYPE_CHECKING:
-    from fenicsmech.equilibrium.system import EquilibriumSystem
+
+class Rates(Protocol):
+    """Right-hand sides whose KKT solutions are rates of the scaled unknowns x (collective)."""
+
+    def force_rate(self, state: State) -> PETSc.Vec:
+        """With the controlled force."""
+
+    def target_rate(self) -> PETSc.Vec:
+        """With the displacement of its point."""
+
+    def motor_rate(self, state: State, direction: np.ndarray) -> PETSc.Vec:
+        """With motor values along ``direction`` (per connection)."""
 
 
 class Control(ABC):
@@ -40,7 +50,7 @@ class Control(ABC):
         """``state`` with the quantities the control prescribes."""
 
     @abstractmethod
-    def rate(self, system: EquilibriumSystem, state: State) -> PETSc.Vec:
+    def rate(self, system: Rates, state: State) -> PETSc.Vec:
         """Right-hand side whose KKT solution is the rate of x with the target (collective)."""
 
 

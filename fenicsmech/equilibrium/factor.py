@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from petsc4py import PETSc
 
-
 _WORKSPACE = (-8, -9)  # MUMPS: the integer or real workspace is too small
 _SPARE = 60  # per cent of workspace beyond the estimate, for delayed pivots
 

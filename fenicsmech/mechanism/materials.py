@@ -53,10 +53,12 @@ class Material:
 
     def __post_init__(self) -> None:
         part = f"material {self.name!r}"
-        positive(f"Young's modulus of {part}", self.youngs_modulus)
+        young = positive(f"Young's modulus of {part}", self.youngs_modulus)
         nu = finite(f"Poisson's ratio of {part}", self.poissons_ratio)
         if not -1.0 < nu < 0.5:
             raise DescriptionError(part, f"Poisson's ratio is {nu:g}", "Give a value between −1 and 0.5, both excluded")
+        object.__setattr__(self, "youngs_modulus", young)
+        object.__setattr__(self, "poissons_ratio", nu)
 
 
 ONYX = Material("Onyx", 1770.0, 0.42)

@@ -12,7 +12,7 @@ FREE = -1
 
 @dataclass(frozen=True, eq=False)
 class LinkMesh:
-    """A conforming simplex mesh of one link.
+    """A conforming simplex mesh of one link, in arrays that cannot be written into.
 
     Attributes:
         points: vertex coordinates, shape (n, dim), in the user's unit of length. Every vertex belongs to a cell.
@@ -23,6 +23,10 @@ class LinkMesh:
     points: np.ndarray
     cells: np.ndarray
     interface: np.ndarray
+
+    def __post_init__(self) -> None:
+        for array in (self.points, self.cells, self.interface):
+            array.setflags(write=False)
 
     @property
     def dim(self) -> int:
@@ -41,10 +45,7 @@ class LinkMesh:
         cells = renumbered.reshape(cells.shape).astype(np.int64)
         turned = cell_measures(points, cells) < 0.0
         cells[turned, -2:] = cells[turned, :-3:-1]
-        mesh = cls(points, cells, np.array(interface, dtype=np.int32))
-        for array in (mesh.points, mesh.cells, mesh.interface):
-            array.setflags(write=False)
-        return mesh
+        return cls(points, cells, np.array(interface, dtype=np.int32))
 
     def cells_of(self, site: int) -> np.ndarray:
         """The cells (k, dim + 1) that the interface ``site`` holds; ``FREE`` gives the flexible ones."""

@@ -10,7 +10,7 @@ from ..oracles import calculix
 from ..report.grids import box
 from .dirichlet_newton import solve
 from .end_load import end_load
-from .single_link import components, nodes, single_link
+from .single_link import nodes, single_link
 
 pytestmark = [
     pytest.mark.calculix,
@@ -19,7 +19,7 @@ pytestmark = [
 
 YOUNG, POISSON = 1770.0, 0.42
 SIZE = (20.0, 2.0, 3.0)
-CALCULIX = Quadrature(2)  # four points in each cell
+CALCULIX = Quadrature(2)  # the four points of C3D10
 
 
 def strip(quadrature):
@@ -42,7 +42,7 @@ def same_mesh(body):
 
 
 @pytest.mark.parametrize(
-    ("quadrature", "tolerance"), [(CALCULIX, 2e-6), (Quadrature.for_order(2, 3), 1e-3)], ids=["as CalculiX", "default"]
+    ("quadrature", "tolerance"), [(CALCULIX, 1e-6), (Quadrature.for_order(2, 3), 1e-3)], ids=["as CalculiX", "default"]
 )
 def test_bent_twisted_and_stretched_strip(quadrature, tolerance):
     body = strip(quadrature)
@@ -68,5 +68,4 @@ def test_bent_twisted_and_stretched_strip(quadrature, tolerance):
         steps=4,
     )
     error = np.linalg.norm(computed - reference.displacement) / np.linalg.norm(reference.displacement)
-    print(error, np.abs(computed - reference.displacement).max(), computed.max(0))
     assert error < tolerance

@@ -56,7 +56,7 @@ def test_uniaxial_tension(model, law, stretch):
     a, b, c = cauchy(law, stretches)
     expected = np.sqrt(0.5 * ((a - b) ** 2 + (b - c) ** 2 + (c - a) ** 2))
     if model is PLANE_STRAIN:
-        assert abs(c) > 0.3 * abs(a)  # held by the walls
+        assert abs(c) > 0.2 * abs(a)  # held by the walls
     else:
         assert expected == pytest.approx(abs(a))
 

@@ -1,0 +1,178 @@
+"""Gradient and KKT matrix against finite differences of the Lagrangian, far from equilibrium and from any symmetry.
+
+    L = E(u, z) − Σ loads − f (a · u_P − target) − λᵀ C(z)
+
+The unknowns x are moved in a straight line here: quaternions are not put back on the unit sphere, so that the second
+derivative along x is that of L and nothing else. The retraction of ``moved`` bends the line, which does not change the
+gradient; Newton's method may leave that curvature out because |q| = 1 is among the constraints.
+"""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenicsmech.equilibrium import DisplacementControl, EquilibriumSystem, LoadControl, State
+
+from ..oracles import dense
+from .crowded import SIZE, control_of, crowded, random_state, system_of
+
+CONTROLS = [LoadControl, DisplacementControl]
+
+
+def shifted(system: EquilibriumSystem, state: State, x: np.ndarray) -> State:
+    """``state`` moved in a straight line by the scaled unknowns ``x`` of this rank, and loaded (collective)."""
+    vector = system.control_row()
+    vector.array[:] = x
+    step, joints = system.step(vector), system.joints
+    poses = state.poses.copy()
+    poses[joints.free_bodies] += step.z.reshape(-1, joints.space.pose_size)
+    moved = State(
+        state.u + step.u, poses, state.multipliers + step.multipliers, state.force + step.force, state.motors
+    )
+    system.load(moved)
+    return moved
+
+
+def largest_steps(system: EquilibriumSystem) -> np.ndarray:
+    """How far each scaled unknown may go in finite differences: a small part of a cell, some degrees."""
+    layout, joints = system.layout, system.joints
+    poses = np.where(joints.pose_scale == 1.0, 0.03, 0.03 * SIZE) / system.scale[layout.z]
+    rest = np.ones(joints.rows + 1)
+    return np.concatenate([np.full(len(layout.free), 0.03 * SIZE / system.unit_u), poses, rest])
+
+
+def blocks(system: EquilibriumSystem) -> dict[str, np.ndarray]:
+    """Which unknowns are displacements, poses, multipliers, the force."""
+    ends = np.cumsum([len(system.layout.free), system.joints.size, system.joints.rows, 1])
+    return dict(zip(("u", "z", "λ", "f"), np.split(np.arange(ends[-1]), ends[:-1]), strict=True))
+
+
+@pytest.mark.parametrize("kind", CONTROLS)
+@pytest.mark.parametrize("where", ["on_rigid", "on_flexible"])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_balance_is_the_gradient_of_the_lagrangian(dim, where, kind):
+    case = crowded(dim)
+    system = system_of(case, controlled=getattr(case, where))
+    state, control = random_state(case, system), control_of(kind)
+
+    def lagrangian(x):
+        moved = shifted(system, state, x)
+        value = system.potential(moved, moved.force)
+        value -= moved.multipliers @ system.joints.value(moved.poses, moved.motors)
+        return value + (moved.force * control.target if control.constrained else 0.0)
+
+    steps = largest_steps(system)
+    expected = dense.gradient(lagrangian, np.zeros(len(steps)), step=steps)
+    system.load(state)
+    gradient = system.balance(state, control).vector.array
+    if not control.constrained:
+        expected[-1] = 0.0  # f is given, nothing is to be balanced
+    for name, unknowns in blocks(system).items():
+        scale = np.abs(expected[unknowns]).max()
+        assert gradient[unknowns] == pytest.approx(expected[unknowns], abs=1e-7 * scale), name
+
+
+@pytest.mark.parametrize("kind", CONTROLS)
+@pytest.mark.parametrize("where", ["on_rigid", "on_flexible"])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_kkt_matrix_is_the_derivative_of_the_balance(dim, where, kind):
+    case = crowded(dim)
+    system = system_of(case, controlled=getattr(case, where))
+    state, control = random_state(case, system), control_of(kind)
+    parts = blocks(system)
+    # in space, every pose and multiplier, but of the displacements a sample
+    columns = np.concatenate([parts["u"][:: {2: 1, 3: 9}[dim]], parts["z"], parts["λ"], parts["f"]])
+    if not control.constrained:
+        columns = columns[:-1]
+
+    def balance(y):
+        x = np.zeros(system.layout.local_unknowns)
+        x[columns] = y
+        return system.balance(shifted(system, state, x), control).vector.array.copy()
+
+    expected = np.zeros((system.layout.local_unknowns,) * 2)
+    expected[:, columns] = dense.jacobian(balance, np.zeros(len(columns)), step=largest_steps(system)[columns])
+    system.load(state)
+    matrix = system.kkt(state, control, system.balance(state, control))
+    matrix = matrix.getValues(range(matrix.size[0]), range(matrix.size[1]))
+    for row, rows in parts.items():
+        for column, all_columns in parts.items():
+            block = np.ix_(rows, np.intersect1d(all_columns, columns))
+            scale = max(np.abs(expected[block]).max(initial=0.0), 1e-2)
+            assert matrix[block] == pytest.approx(expected[block], abs=1e-6 * scale), (row, column)
+    if not control.constrained:
+        assert matrix[-1] == pytest.approx([*np.zeros(len(matrix) - 1), -1.0], abs=1e-12)
+
+
+@pytest.mark.parametrize("kind", CONTROLS)
+@pytest.mark.parametrize("dim", [2, 3])
+def test_kkt_matrix_is_symmetric(dim, kind):
+    case = crowded(dim)
+    system = system_of(case, controlled=case.on_flexible)
+    state, control = random_state(case, system), control_of(kind)
+    system.load(state)
+    matrix = system.kkt(state, control, system.balance(state, control))
+    matrix = matrix.getValues(range(matrix.size[0]), range(matrix.size[1]))
+    assert np.abs(matrix - matrix.T).max() <= 1e-12 * np.abs(matrix).max()
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_shift_raises_the_curvature_of_displacements_and_poses_alone(dim):
+    case = crowded(dim)
+    system = system_of(case, controlled=case.on_rigid)
+    state, control = random_state(case, system), control_of(LoadControl)
+    system.load(state)
+    matrix = system.kkt(state, control, system.balance(state, control))
+    plain = matrix.getDiagonal().array.copy()
+    parts = blocks(system)
+    for amount in (0.25, 2.0, 0.0):
+        system.shift(amount)  # from what was assembled, not on top of the last one
+        change = matrix.getDiagonal().array - plain
+        assert change[[*parts["u"], *parts["z"]]] == pytest.approx(amount, abs=1e-14)
+        assert not np.any(change[[*parts["λ"], *parts["f"]]])
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("kind", CONTROLS)
+@pytest.mark.parametrize("where", ["on_rigid", "on_flexible"])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_kkt_matrix_times_a_direction_is_the_change_of_the_balance_on_any_number_of_ranks(dim, where, kind):
+    case = crowded(dim, MPI.COMM_WORLD)
+    system = system_of(case, controlled=getattr(case, where))
+    state, control = random_state(case, system), control_of(kind)
+    random = np.random.default_rng(MPI.COMM_WORLD.rank)
+    layout = system.layout
+    steps = largest_steps(system)[: layout.local_unknowns]
+    direction = random.uniform(-1.0, 1.0, layout.local_unknowns) * steps
+    if layout.last and not control.constrained:
+        direction[-1] = 0.0
+
+    def balance(h):
+        return system.balance(shifted(system, state, h * direction), control).vector
+
+    # D(h) = D + O(h²)
+    slopes = [(balance(h) - balance(-h)) / (2.0 * h) for h in (0.1, 0.05, 0.025)]
+    finer = [(4.0 * b - a) / 3.0 for a, b in zip(slopes[:-1], slopes[1:], strict=True)]
+    expected = (16.0 * finer[1] - finer[0]) / 15.0
+    system.load(state)
+    matrix = system.kkt(state, control, system.balance(state, control))
+    vector = matrix.createVecRight()
+    vector.array[:] = direction
+    assert (matrix * vector - expected).norm() <= 1e-7 * expected.norm()
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("dim", [2, 3])
+def test_balance_is_the_same_on_any_number_of_ranks(dim):
+    values = []
+    for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
+        case = crowded(dim, comm)
+        system = system_of(case, controlled=case.on_flexible)
+        state, control = random_state(case, system), control_of(DisplacementControl)
+        system.load(state)
+        balance = system.balance(state, control)
+        extras = balance.vector.array[len(system.layout.free) :] if system.layout.last else None
+        extras = comm.bcast(extras, root=comm.size - 1)
+        values.append((system.potential(state, state.force), balance.norm, balance.forces, extras))
+    for alone, together in zip(*values, strict=True):
+        assert together == pytest.approx(alone, rel=1e-11, abs=1e-11 * np.abs(alone).max())
