@@ -7,6 +7,7 @@ class Cylindrical(JointKind):
     """(x_b − x_a) ⟂ e1_a, e2_a and e3_b ⟂ e1_a, e2_a."""
 
     name = "cylindrical"
+    bored = True
 
     def equations(self, a, b):
         apart = b.origin - a.origin

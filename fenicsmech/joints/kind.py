@@ -41,12 +41,14 @@ class JointKind(ABC):
             planar model; otherwise the axis is normal to the plane.
         planar: whether the joint exists in planar models.
         motorised: whether a motor can prescribe its free coordinate.
+        bored: whether it holds flexible links by a pin along its axis; others hold them along z.
     """
 
     name: str
     planar: bool = False
     sliding: bool = False
     motorised: bool = False
+    bored: bool = False
 
     @abstractmethod
     def equations(self, a: SpatialMarker, b: SpatialMarker) -> list[sympy.Expr]:

@@ -9,6 +9,7 @@ class Revolute(JointKind):
     """x_b = x_a, e3_b ⟂ e1_a, e2_a; a motor prescribes the angle φ: sin(angle − φ) = 0."""
 
     name = "revolute"
+    bored = True
     planar = True
     motorised = True
 

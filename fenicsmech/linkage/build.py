@@ -59,7 +59,8 @@ def build_linkage(mechanism: Mechanism, dim: int) -> Linkage:
             if link in (joint.a, joint.b) and (link, at) not in index:
                 region = joint.regions[(joint.a, joint.b).index(link)]
                 index[link, at] = len(bodies)
-                bodies.append(Body(f"{link.name} at {joint.at}", link, at, False, region, joint.axis))
+                axis = joint.axis if joint.kind.bored else (0.0, 0.0, 1.0)
+                bodies.append(Body(f"{link.name} at {joint.at}", link, at, False, region, axis))
         interfaces[link] = tuple(i for (owner, _), i in index.items() if owner == link)
 
     def body(joint: Joint, link: Link) -> int:

@@ -2,6 +2,7 @@
 
 Ask for a mesh
     ``mesh_link``       shape + interface sites → ``LinkMesh``
+    ``check_link``      what can be refused before anything is meshed
     ``InterfaceSite``   where a joint takes hold of the link
     ``LinkMesh``        points, cells, and which interface holds each cell (``FREE``: none)
 
@@ -20,7 +21,16 @@ from fenicsmech.meshing import mesh_file, outline, step, strip  # noqa: F401  (e
 from fenicsmech.meshing.centreline import Centreline
 from fenicsmech.meshing.interface_site import InterfaceSite
 from fenicsmech.meshing.link_mesh import FREE, LinkMesh, cell_measures
-from fenicsmech.meshing.link_mesher import mesh_link
+from fenicsmech.meshing.link_mesher import check_link, mesh_link
 from fenicsmech.meshing.quality import radius_ratios
 
-__all__ = ["FREE", "Centreline", "InterfaceSite", "LinkMesh", "cell_measures", "mesh_link", "radius_ratios"]
+__all__ = [
+    "FREE",
+    "Centreline",
+    "InterfaceSite",
+    "LinkMesh",
+    "cell_measures",
+    "check_link",
+    "mesh_link",
+    "radius_ratios",
+]

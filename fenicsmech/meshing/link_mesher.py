@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, MeshingError
 from fenicsmech.mechanism.checks import positive
 from fenicsmech.mechanism.shapes import Shape
 from fenicsmech.meshing.interface_site import InterfaceSite
 from fenicsmech.meshing.link_mesh import LinkMesh
 from fenicsmech.meshing.mesh_checks import check_link_mesh
-from fenicsmech.meshing.mesh_request import MeshRequest, mesh_shape
+from fenicsmech.meshing.mesh_request import MeshRequest, check_shape, holds, mesh_shape
 
 
 def mesh_link(
@@ -40,6 +40,37 @@ def mesh_link(
             regions of two joints touch.
         DescriptionError: an argument makes no sense.
     """
+    request = _request(name, sites, dim, size, layers)
+    check_shape(shape, request)
+    return check_link_mesh(mesh_shape(shape, request), request)
+
+
+def check_link(
+    name: str,
+    shape: Shape,
+    sites: Sequence[InterfaceSite],
+    points: Mapping[str, Sequence[float]],
+    *,
+    dim: int,
+    size: float,
+) -> None:
+    """Refuse what can be seen to be wrong with a link before it is meshed; arguments as in ``mesh_link``.
+
+    Args:
+        points: further points that must be on the link, by name: where forces act and displacements are read.
+
+    Raises:
+        MeshingError: as ``mesh_link``, or one of ``points`` is not on the link.
+    """
+    request = _request(name, sites, dim, size, None)
+    check_shape(shape, request)
+    for part, at in points.items():
+        if not holds(shape, request, tuple(at)):
+            shown = ", ".join(f"{c:g}" for c in at)
+            raise MeshingError(f"{part!r}", f"the point ({shown}) is not on link {name!r}", "Move it onto the link")
+
+
+def _request(name: str, sites: Sequence[InterfaceSite], dim: int, size: float, layers: int | None) -> MeshRequest:
     part = f"mesh of link {name!r}"
     size = positive(f"element size, {part}", size)
     if dim not in (2, 3):
@@ -48,5 +79,4 @@ def mesh_link(
         raise DescriptionError(part, f"the number of layers is {layers!r}", "Give a whole number from 1 up")
     # in the plane there is only one way to sweep a region, whatever the joint's own axis (of a slider, say)
     sites = tuple(sites) if dim == 3 else tuple(replace(site, axis=(0.0, 0.0, 1.0)) for site in sites)
-    request = MeshRequest(name, sites, dim, size, layers)
-    return check_link_mesh(mesh_shape(shape, request), request)
+    return MeshRequest(name, sites, dim, size, layers)

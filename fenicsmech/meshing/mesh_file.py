@@ -10,7 +10,7 @@ from fenicsmech.meshing.gmsh_session import gmsh, gmsh_session
 from fenicsmech.meshing.holders import sole_holder
 from fenicsmech.meshing.interface_site import across
 from fenicsmech.meshing.link_mesh import LinkMesh
-from fenicsmech.meshing.mesh_request import MeshRequest, mesh_shape
+from fenicsmech.meshing.mesh_request import MeshRequest, check_shape, mesh_shape
 from fenicsmech.meshing.part_file import require_header
 from fenicsmech.meshing.regions import contains
 
@@ -21,11 +21,15 @@ _SIMPLICES = {2: ("Triangle", "triangles"), 3: ("Tetrahedron", "tetrahedra")}
 
 @mesh_shape.register
 def _(shape: MeshPart, request: MeshRequest) -> LinkMesh:
-    require_header(shape.path, _HEADER, kind="gmsh mesh file", part=request.part)
     with gmsh_session(request.part):
         gmsh.merge(str(shape.path))
         points, cells = _read(shape, request)
     return LinkMesh.from_cells(points, cells, _interface(points, cells, request))
+
+
+@check_shape.register
+def _(shape: MeshPart, request: MeshRequest) -> None:
+    require_header(shape.path, _HEADER, kind="gmsh mesh file", part=request.part)
 
 
 def _read(shape: MeshPart, request: MeshRequest) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""What is asked of the mesh of one link, and the function that each kind of shape implements."""
+"""What is asked of the mesh of one link, and the functions that each kind of shape implements."""
 
 from __future__ import annotations
 
@@ -41,3 +41,19 @@ class MeshRequest:
 def mesh_shape(shape: object, request: MeshRequest) -> LinkMesh:
     """The mesh of ``shape`` that ``request`` asks for; each kind of shape registers its own way."""
     raise TypeError(f"{type(shape).__name__} is not a shape that can be meshed")
+
+
+@singledispatch
+def check_shape(shape: object, request: MeshRequest) -> None:
+    """Refuse what can be seen to be wrong with ``shape`` and its joints before anything is meshed.
+
+    Raises:
+        MeshingError: the shape is no proper outline, its file cannot be read, or a joint is not on it.
+    """
+    raise TypeError(f"{type(shape).__name__} is not a shape that can be meshed")
+
+
+@singledispatch
+def holds(shape: object, request: MeshRequest, at: tuple[float, ...]) -> bool:
+    """Whether the point ``at`` lies on ``shape``, as far as can be said without a mesh: True if in doubt."""
+    return True

@@ -13,22 +13,40 @@ from fenicsmech.mechanism.shapes import Arc, Line, Outline
 from fenicsmech.meshing.gmsh_session import gmsh
 from fenicsmech.meshing.interface_site import InterfaceSite
 from fenicsmech.meshing.link_mesh import LinkMesh
-from fenicsmech.meshing.mesh_request import MeshRequest, mesh_shape
+from fenicsmech.meshing.mesh_request import MeshRequest, check_shape, holds, mesh_shape
 from fenicsmech.meshing.plan_view import PlanView, mesh_plan_view
-from fenicsmech.meshing.planform import first_crossing
+from fenicsmech.meshing.planform import distance, first_crossing, inside
 from fenicsmech.meshing.regions import DimTag
 from fenicsmech.meshing.scaling import in_units_of
 
 _CLOSED = 1e-8  # in element sizes: ends this near are one point
 _WIDEST_ARC = 0.75 * math.pi  # arcs are drawn in pieces below a half turn, whose ends tell on which side they run
+_NEAR = 0.1  # of the element size: the outline's arcs are sampled, points this near to it may be on it
 _SAMPLES = 16  # of an arc, where crossings are looked for
 
 
 @mesh_shape.register
 def _(shape: Outline, request: MeshRequest) -> LinkMesh:
     path = _path(in_units_of(shape, request.size), request)
-    _check_simple(path, request)
     return mesh_plan_view(request, shape.depth, lambda sites: _draw(path, sites))
+
+
+@check_shape.register
+def _(shape: Outline, request: MeshRequest) -> None:
+    _check_simple(_path(in_units_of(shape, request.size), request), request)
+    for site in request.sites:
+        if not holds(shape, request, site.at):
+            x, y = site.at[:2]
+            raise MeshingError(
+                request.part_at(site), f"the point ({x:g}, {y:g}) is not on the link", "Move the joint into the outline"
+            )
+
+
+@holds.register
+def _(shape: Outline, request: MeshRequest, at: tuple[float, ...]) -> bool:
+    path = _path(in_units_of(shape, request.size), request)
+    corners = np.concatenate([_samples(segment, start)[:-1] for start, segment in path]) * request.size
+    return bool(inside(corners, np.asarray(at[:2])) or distance(corners, np.asarray(at[:2])) <= _NEAR * request.size)
 
 
 # A path is a list of (start, segment): closed, without empty segments, in units of the element size.

@@ -23,5 +23,22 @@ def first_crossing(polygon: np.ndarray) -> np.ndarray | None:
     return polygon[i] + t[i, j] * edge[i]
 
 
+def inside(polygon: np.ndarray, point: np.ndarray) -> bool:
+    """Whether ``point`` (2,) lies in the closed ``polygon`` ((n, 2)): a ray from it crosses an odd number of edges."""
+    a, b = polygon - point, np.roll(polygon, -1, axis=0) - point
+    straddles = (a[:, 1] > 0.0) != (b[:, 1] > 0.0)
+    a, b = a[straddles], b[straddles]
+    reach = a[:, 0] - a[:, 1] * (b[:, 0] - a[:, 0]) / (b[:, 1] - a[:, 1])
+    return bool(np.count_nonzero(reach > 0.0) % 2)
+
+
+def distance(polygon: np.ndarray, point: np.ndarray) -> float:
+    """Distance of ``point`` (2,) from the edges of the closed ``polygon`` ((n, 2))."""
+    edge = np.roll(polygon, -1, axis=0) - polygon
+    along = np.einsum("ij,ij->i", point - polygon, edge) / np.einsum("ij,ij->i", edge, edge)
+    nearest = polygon + np.clip(along, 0.0, 1.0)[:, None] * edge
+    return float(np.linalg.norm(point - nearest, axis=1).min())
+
+
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]

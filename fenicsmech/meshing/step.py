@@ -9,7 +9,7 @@ from fenicsmech.mechanism.shapes import StepPart
 from fenicsmech.meshing.fragments import mesh_fragments
 from fenicsmech.meshing.gmsh_session import gmsh, gmsh_session
 from fenicsmech.meshing.link_mesh import LinkMesh
-from fenicsmech.meshing.mesh_request import MeshRequest, mesh_shape
+from fenicsmech.meshing.mesh_request import MeshRequest, check_shape, mesh_shape
 from fenicsmech.meshing.part_file import require_header
 from fenicsmech.meshing.regions import DimTag, region_face, region_prism, solid_reach
 from fenicsmech.meshing.sizing import pin_refinements
@@ -19,10 +19,14 @@ _HEADER = "ISO-10303-21"
 
 @mesh_shape.register
 def _(shape: StepPart, request: MeshRequest) -> LinkMesh:
-    require_header(shape.path, _HEADER, kind="STEP file", part=request.part)
     mesh = {2: _mesh_section, 3: _mesh_solid}[request.dim]
     with gmsh_session(request.part):
         return mesh(shape, _only_solid(shape.path, request), request)
+
+
+@check_shape.register
+def _(shape: StepPart, request: MeshRequest) -> None:
+    require_header(shape.path, _HEADER, kind="STEP file", part=request.part)
 
 
 def _only_solid(path: Path, request: MeshRequest) -> DimTag:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from fenicsmech.errors import MeshingError
@@ -10,7 +12,7 @@ from fenicsmech.meshing.centreline import Centreline
 from fenicsmech.meshing.gmsh_session import gmsh
 from fenicsmech.meshing.interface_site import InterfaceSite
 from fenicsmech.meshing.link_mesh import LinkMesh
-from fenicsmech.meshing.mesh_request import MeshRequest, mesh_shape
+from fenicsmech.meshing.mesh_request import MeshRequest, check_shape, holds, mesh_shape
 from fenicsmech.meshing.plan_view import PlanView, mesh_plan_view
 from fenicsmech.meshing.regions import DimTag, region_face
 from fenicsmech.meshing.scaling import in_units_of
@@ -20,32 +22,55 @@ from fenicsmech.meshing.strip_pins import ON_CENTRELINE, StripPin
 
 @mesh_shape.register
 def _(shape: Strip, request: MeshRequest) -> LinkMesh:
-    centreline = Centreline(shape.centreline, part=f"centreline of {request.part}")
-    check_sides(request.part, centreline, shape.thickness)
-    _check_on_strip(centreline, shape.thickness, request)
     strip = in_units_of(shape, request.size)
     return mesh_plan_view(request, shape.depth, lambda sites: _draw(strip, sites))
 
 
-def _check_on_strip(centreline: Centreline, thickness: float, request: MeshRequest) -> None:
-    """Refuse joints off the strip, before their eyes hide that they are.
-
-    Raises:
-        MeshingError: a joint lies farther than half the thickness from the centreline, or beyond an end.
-    """
-    tolerance = ON_CENTRELINE * thickness
+@check_shape.register
+def _(shape: Strip, request: MeshRequest) -> None:
+    centreline = Centreline(shape.centreline, part=f"centreline of {request.part}")
+    check_sides(request.part, centreline, shape.thickness)
     for site in request.sites:
-        s = centreline.closest(site.at[:2])
-        away = np.asarray(site.at[:2]) - centreline.evaluate(s)
-        beyond = abs(away @ centreline.tangent(s))
-        if np.linalg.norm(away) > 0.5 * thickness + tolerance or beyond > tolerance:
-            x, y = site.at[:2]
+        _check_on_strip(centreline, shape.thickness, site, request)
+        if isinstance(site.region, Disc) and shape.thickness < (1.0 - ON_CENTRELINE) * site.region.radius:
             raise MeshingError(
                 request.part_at(site),
-                f"the point ({x:g}, {y:g}) is not on the link: it is {np.linalg.norm(away):g} away from the "
-                f"centreline of a strip of thickness {thickness:g}",
-                "Move the joint onto the centreline, or lead the centreline through the joint",
+                f"the strip is thinner ({shape.thickness:g}) than its pin: the interface has radius "
+                f"{site.region.radius:g}, twice that of a pin",
+                "Make the strip at least as thick as the radius, or the radius smaller",
             )
+
+
+@holds.register
+def _(shape: Strip, request: MeshRequest, at: tuple[float, ...]) -> bool:
+    centreline = Centreline(shape.centreline)
+    eyes = [
+        max(site.region.radius, 0.5 * shape.thickness) - math.dist(site.at[:2], at[:2])
+        for site in request.sites
+        if isinstance(site.region, Disc)
+    ]
+    beside = 0.5 * shape.thickness - math.dist(centreline.evaluate(centreline.closest(at[:2])), at[:2])
+    return max([beside, *eyes]) >= -ON_CENTRELINE * shape.thickness
+
+
+def _check_on_strip(centreline: Centreline, thickness: float, site: InterfaceSite, request: MeshRequest) -> None:
+    """Refuse a joint off the strip, before its eye hides that it is.
+
+    Raises:
+        MeshingError: it lies farther than half the thickness from the centreline, or beyond an end.
+    """
+    tolerance = ON_CENTRELINE * thickness
+    s = centreline.closest(site.at[:2])
+    away = np.asarray(site.at[:2]) - centreline.evaluate(s)
+    beyond = abs(away @ centreline.tangent(s))
+    if np.linalg.norm(away) > 0.5 * thickness + tolerance or beyond > tolerance:
+        x, y = site.at[:2]
+        raise MeshingError(
+            request.part_at(site),
+            f"the point ({x:g}, {y:g}) is not on the link: it is {np.linalg.norm(away):g} away from the "
+            f"centreline of a strip of thickness {thickness:g}",
+            "Move the joint onto the centreline, or lead the centreline through the joint",
+        )
 
 
 def _draw(strip: Strip, sites: tuple[InterfaceSite, ...]) -> PlanView:

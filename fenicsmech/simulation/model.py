@@ -17,10 +17,8 @@ from fenicsmech.errors import FenicsmechError
 from fenicsmech.linkage import Linkage
 from fenicsmech.linkage.build import in_dimension
 from fenicsmech.mechanism import FlexibleLink, Force, Mechanism, Output
-from fenicsmech.meshing import mesh_link
+from fenicsmech.meshing import InterfaceSite, LinkMesh, check_link, mesh_link
 from fenicsmech.meshing.distribute import MechanismMesh, distribute
-from fenicsmech.meshing.interface_site import InterfaceSite
-from fenicsmech.meshing.link_mesh import LinkMesh
 
 
 @dataclass(frozen=True)
@@ -40,16 +38,30 @@ class Fidelity:
     quadrature: Quadrature
 
 
+def check_links(mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> None:
+    """Refuses links, joints and points that cannot be right, before anything is meshed."""
+    for link in mechanism.flexible_links:
+        points = {part.name: part.at for part in (*mechanism.forces, *mechanism.outputs) if part.on == link}
+        sites = interface_sites(linkage, link)
+        check_link(link.name, link.shape, sites, points, dim=linkage.dim, size=fidelity.sizes[link])
+
+
 def mesh_links(mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> list[LinkMesh]:
     """The mesh of every flexible link, on the calling rank."""
-    meshes = []
-    for link in mechanism.flexible_links:
-        sites = [
-            InterfaceSite(body.centre, body.region, body.axis, body.name)
-            for body in (linkage.bodies[i] for i in linkage.interfaces[link])
-        ]
-        meshes.append(mesh_link(link.name, link.shape, sites, dim=linkage.dim, size=fidelity.sizes[link]))
-    return meshes
+    return [
+        mesh_link(link.name, link.shape, interface_sites(linkage, link), dim=linkage.dim, size=fidelity.sizes[link])
+        for link in mechanism.flexible_links
+    ]
+
+
+def interface_sites(linkage: Linkage, link: FlexibleLink) -> list[InterfaceSite]:
+    """Where joints hold ``link``."""
+    sites = []
+    for body in (linkage.bodies[i] for i in linkage.interfaces[link]):
+        # a pin along z holds its link at whatever height the link is
+        at = body.centre[:2] if body.axis[2] == 1.0 else body.centre
+        sites.append(InterfaceSite(at, body.region, body.axis, body.name))
+    return sites
 
 
 def mesh_mechanism(comm: MPI.Comm, mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> MechanismMesh:

@@ -41,7 +41,7 @@ from fenicsmech.report import Panel, Progress, Silent, Trace, draw_configuration
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.export import write_xdmf
 from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.model import Fidelity, MechanismModel, mesh_mechanism
+from fenicsmech.simulation.model import Fidelity, MechanismModel, check_links, mesh_mechanism
 from fenicsmech.simulation.picture import Draughtsman
 from fenicsmech.simulation.snapshot import gather
 
@@ -98,6 +98,7 @@ class Simulation:
         self.scene, self.comm, self.clock = scene, comm, Clock()
         self.fidelity = Fidelity(model, order, sizes, quadrature or Quadrature.for_order(order, model.dim))
         self.linkage = build_linkage(mechanism, model.dim)
+        check_links(mechanism, self.linkage, self.fidelity)
         self._options, self._predictor = newton or NewtonOptions(), predictor or Hermite()
         self._newtons: dict[tuple, Newton] = {}
         self._last: Curve | None = None
@@ -133,6 +134,11 @@ class Simulation:
             AssemblyError: the configuration does not assemble.
             EquilibriumError: a sample was not reached; carries the frames before it.
         """
+        for part in (force, *(others or {})):
+            if part not in self.scene.mechanism.forces:
+                raise DescriptionError(
+                    f"{part.name!r}", f"it is not a force of {self.scene.mechanism.name!r}", "Add it with force()"
+                )
         if (forces is None) == (displacements is None):
             raise DescriptionError(f"{force.name!r}", "give either forces or displacements", "Pass one of the two")
         kind, samples = (DisplacementControl, displacements) if forces is None else (LoadControl, forces)

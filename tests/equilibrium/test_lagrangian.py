@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenicsmech.equilibrium import DisplacementControl, EquilibriumSystem, LoadControl, State
+from fenicsmech.equilibrium import Control, DisplacementControl, EquilibriumSystem, LoadControl, State
+from fenicsmech.equilibrium.extras import REGULARISATION
 
 from ..oracles import dense
 from .crowded import SIZE, control_of, crowded, random_state, system_of
@@ -41,6 +42,21 @@ def largest_steps(system: EquilibriumSystem) -> np.ndarray:
     return np.concatenate([np.full(len(layout.free), 0.03 * SIZE / system.unit_u), poses, rest])
 
 
+def sample(system: EquilibriumSystem, control: Control) -> np.ndarray:
+    """The unknowns by which to differentiate: all, but in space only some of the displacements."""
+    parts = blocks(system)
+    displacements = parts["u"][:: {2: 1, 3: 9}[system.joints.space.dim]]
+    force = parts["f"] if control.constrained else []
+    return np.concatenate([displacements, parts["z"], parts["λ"], force]).astype(int)
+
+
+def scattered(system: EquilibriumSystem, columns: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Scaled unknowns that have ``values`` at ``columns`` and are zero elsewhere."""
+    x = np.zeros(system.layout.local_unknowns)
+    x[columns] = values
+    return x
+
+
 def blocks(system: EquilibriumSystem) -> dict[str, np.ndarray]:
     """Which unknowns are displacements, poses, multipliers, the force."""
     ends = np.cumsum([len(system.layout.free), system.joints.size, system.joints.rows, 1])
@@ -61,15 +77,18 @@ def test_balance_is_the_gradient_of_the_lagrangian(dim, where, kind):
         value -= moved.multipliers @ system.joints.value(moved.poses, moved.motors)
         return value + (moved.force * control.target if control.constrained else 0.0)
 
-    steps = largest_steps(system)
-    expected = dense.gradient(lagrangian, np.zeros(len(steps)), step=steps)
+    columns = sample(system, control)
+    expected = dense.gradient(
+        lambda y: lagrangian(scattered(system, columns, y)), np.zeros(len(columns)), step=largest_steps(system)[columns]
+    )
     system.load(state)
     gradient = system.balance(state, control).vector.array
-    if not control.constrained:
-        expected[-1] = 0.0  # f is given, nothing is to be balanced
     for name, unknowns in blocks(system).items():
-        scale = np.abs(expected[unknowns]).max()
-        assert gradient[unknowns] == pytest.approx(expected[unknowns], abs=1e-7 * scale), name
+        chosen = np.isin(columns, unknowns)
+        scale = np.abs(expected[chosen]).max(initial=0.0)
+        assert gradient[columns[chosen]] == pytest.approx(expected[chosen], abs=1e-7 * scale), name
+    if not control.constrained:
+        assert gradient[-1] == 0.0  # f is given, nothing is to be balanced
 
 
 @pytest.mark.parametrize("kind", CONTROLS)
@@ -79,26 +98,21 @@ def test_kkt_matrix_is_the_derivative_of_the_balance(dim, where, kind):
     case = crowded(dim)
     system = system_of(case, controlled=getattr(case, where))
     state, control = random_state(case, system), control_of(kind)
-    parts = blocks(system)
-    # in space, every pose and multiplier, but of the displacements a sample
-    columns = np.concatenate([parts["u"][:: {2: 1, 3: 9}[dim]], parts["z"], parts["λ"], parts["f"]])
-    if not control.constrained:
-        columns = columns[:-1]
+    parts, columns = blocks(system), sample(system, control)
 
     def balance(y):
-        x = np.zeros(system.layout.local_unknowns)
-        x[columns] = y
-        return system.balance(shifted(system, state, x), control).vector.array.copy()
+        return system.balance(shifted(system, state, scattered(system, columns, y)), control).vector.array.copy()
 
     expected = np.zeros((system.layout.local_unknowns,) * 2)
     expected[:, columns] = dense.jacobian(balance, np.zeros(len(columns)), step=largest_steps(system)[columns])
+    expected[parts["λ"], parts["λ"]] -= REGULARISATION
     system.load(state)
     matrix = system.kkt(state, control, system.balance(state, control))
     matrix = matrix.getValues(range(matrix.size[0]), range(matrix.size[1]))
     for row, rows in parts.items():
         for column, all_columns in parts.items():
             block = np.ix_(rows, np.intersect1d(all_columns, columns))
-            scale = max(np.abs(expected[block]).max(initial=0.0), 1e-2)
+            scale = np.abs(expected[block]).max(initial=0.0) or 1e-2 * REGULARISATION
             assert matrix[block] == pytest.approx(expected[block], abs=1e-6 * scale), (row, column)
     if not control.constrained:
         assert matrix[-1] == pytest.approx([*np.zeros(len(matrix) - 1), -1.0], abs=1e-12)

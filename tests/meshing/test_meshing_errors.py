@@ -6,7 +6,7 @@ import pytest
 
 from fenicsmech.errors import DescriptionError, MeshingError
 from fenicsmech.mechanism.shapes import Arc, Disc, Line, Rectangle, gmsh_mesh, outline, polygon, step, strip
-from fenicsmech.meshing import InterfaceSite, mesh_link
+from fenicsmech.meshing import InterfaceSite, check_link, mesh_link
 from fenicsmech.meshing.gmsh_session import gmsh, gmsh_session
 
 MESHES = Path(__file__).parents[2] / "meshes"
@@ -187,3 +187,23 @@ def test_a_mesh_file_of_the_wrong_dimension_is_refused(shape, dim, complaint):
 def test_senseless_arguments_are_refused(options):
     with pytest.raises(DescriptionError, match="link 'rod'"):
         mesh_link("rod", BAR, **{"dim": 3, "size": 2.0, **options})
+
+
+def test_a_strip_thinner_than_its_pin_is_refused_before_meshing():
+    shape = strip([(0.0, 0.0), (60.0, 0.0)], thickness=1.0, depth=5.0)
+    site = InterfaceSite((0.0, 0.0), Disc(3.0), name="hinge")
+    with pytest.raises(MeshingError, match=r"'hinge' on link 'rod': the strip is thinner \(1\) than its pin"):
+        check_link("rod", shape, [site], {}, dim=2, size=1.0)
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        strip([(0.0, 0.0), (60.0, 0.0)], thickness=4.0, depth=5.0),
+        polygon([(-2, -2), (62, -2), (62, 2), (-2, 2)], depth=5.0),
+    ],
+)
+def test_a_point_off_its_link_is_refused_before_meshing_and_one_on_it_is_not(shape):
+    check_link("rod", shape, [], {"probe": (30.0, 1.9)}, dim=2, size=1.0)
+    with pytest.raises(MeshingError, match=r"'probe': the point \(30, 3\) is not on link 'rod'"):
+        check_link("rod", shape, [], {"probe": (30.0, 3.0)}, dim=2, size=1.0)

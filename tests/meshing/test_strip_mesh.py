@@ -71,7 +71,7 @@ def test_pins_of_any_width_at_the_ends_and_along_the_way_give_well_shaped_cells(
 
 
 @pytest.mark.parametrize("points", [STRAIGHT, BENT])
-@pytest.mark.parametrize("thickness, depth, radius", [(3.0, 20.0, 3.0), (1.0, 20.0, 3.0), (6.0, 10.0, 1.5)])
+@pytest.mark.parametrize("thickness, depth, radius", [(3.0, 20.0, 3.0), (1.0, 20.0, 1.0), (6.0, 10.0, 1.5)])
 def test_tetrahedra_of_typical_strips_are_no_slivers(points, thickness, depth, radius):
     sites = pins(points[0], points[-1], radius=radius)
     mesh = mesh_link("link", strip(points, thickness=thickness, depth=depth), sites, dim=3, size=1.5)

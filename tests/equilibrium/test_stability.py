@@ -1,0 +1,51 @@
+"""The inertia of the KKT matrix tells how many modes are unstable, whatever the constraints."""
+
+import pytest
+
+from .column import EULER, THICKNESS, Column, column, critical_load
+
+
+def unstable_modes(case: Column, load: float) -> int:
+    """Under the dead ``load``, in the straight equilibrium."""
+    return case.simulation.load_displacement(case.push, forces=[load]).frames[0].unstable_modes
+
+
+@pytest.mark.parametrize("slides", [1, 3])
+def test_column_is_stable_below_the_euler_load_and_has_one_unstable_mode_above_it(slides):
+    case = column(slides=slides)
+    below, above, beyond = case.simulation.load_displacement(
+        case.push, forces=[0.98 * EULER, 1.02 * EULER, 4.2 * EULER]
+    ).frames
+    assert (below.unstable_modes, below.stable) == (0, True)
+    assert (above.unstable_modes, above.stable) == (1, False)
+    assert beyond.unstable_modes == 2  # the second mode buckles at four times the load
+    assert not above.stable_under_control
+
+
+def test_discrete_critical_load_is_that_of_the_beam():
+    case = column(slides=2)
+    low, high = 0.95 * EULER, 1.05 * EULER
+    while high - low > 1e-5 * EULER:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if unstable_modes(case, middle) else (middle, high)
+    assert low == pytest.approx(EULER, rel=1e-2)
+    assert low == pytest.approx(critical_load(0.5 * THICKNESS), rel=1e-4)
+
+
+def test_second_slide_is_reported_as_redundant_and_changes_nothing():
+    loads = [0.5 * EULER, 0.98 * EULER]
+    curves = []
+    for slides in (1, 3):
+        case = column(slides=slides)
+        curves.append(case.simulation.load_displacement(case.push, forces=loads))
+    alone, several = curves
+    assert (alone.freedom.redundancy, several.freedom.redundancy) == (0, 4)
+    assert all("prismatic" in name for name in several.freedom.redundant)
+    assert several.displacements == pytest.approx(alone.displacements, rel=1e-9)
+
+
+def test_held_displacement_does_not_keep_a_column_from_buckling_sideways():
+    case = column()
+    short, long = case.simulation.load_displacement(case.push, displacements=[0.007, 0.009]).frames
+    assert short.force < EULER < long.force
+    assert short.stable_under_control and not long.stable_under_control
