@@ -68,7 +68,7 @@ def factors(sim, curve):
     kept.refactor()
 
     def again():
-        matrix.scale(1.0)  # marks the values as new, as a Newton iteration does
+        matrix.stateIncrease()  # marks the values as new, as a Newton iteration does
         kept.refactor()
 
     def unsymmetric():

@@ -7,7 +7,14 @@ from dataclasses import dataclass
 from petsc4py import PETSc
 
 _WORKSPACE = (-8, -9)  # MUMPS: the integer or real workspace is too small
-_SPARE = 60  # per cent of workspace beyond the estimate, for delayed pivots
+_PREFIX = "fenicsmech_kkt_"
+_MUMPS = {
+    7: 2,  # ordering AMF: fewest operations on slender links (Debian's MUMPS has neither METIS nor SCOTCH)
+    12: 2,  # order the graph compressed by likely 2 × 2 pivots
+    13: 1,  # root front factored by one process: exact inertia in parallel
+    14: 60,  # per cent of workspace beyond the estimate, for delayed pivots
+    24: 1,  # detect null pivots instead of failing on them
+}
 
 
 @dataclass(frozen=True)
@@ -27,19 +34,18 @@ class Factor:
 
     def __init__(self, matrix: PETSc.Mat) -> None:
         self._matrix = matrix
+        # the only way that reaches all of MUMPS's controls, the ordering among them
+        options = PETSc.Options(_PREFIX)
+        for number, value in _MUMPS.items():
+            options[f"mat_mumps_icntl_{number}"] = value
         self._solver = PETSc.KSP().create(matrix.comm)
+        self._solver.setOptionsPrefix(_PREFIX)
         self._solver.setType(PETSc.KSP.Type.PREONLY)
         self._solver.setOperators(matrix)
         pc = self._solver.getPC()
         pc.setType(PETSc.PC.Type.CHOLESKY)
         pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
-        pc.setFactorSetUpSolverType()
-        mumps = pc.getFactorMatrix()
-        mumps.setMumpsIcntl(7, 5)  # METIS ordering
-        mumps.setMumpsIcntl(13, 1)  # root front factored by one process: exact inertia in parallel
-        mumps.setMumpsIcntl(14, _SPARE)
-        mumps.setMumpsIcntl(24, 1)  # detect null pivots instead of failing on them
-        self._mumps = mumps
+        self._solver.setFromOptions()
 
     def refactor(self) -> Inertia | None:
         """Factors the matrix's current values; None if the factorisation failed."""
@@ -47,13 +53,14 @@ class Factor:
         for _ in range(4):
             self._solver.setOperators(self._matrix)
             self._solver.getPC().setUp()
-            status = self._mumps.getMumpsInfog(1)
+            mumps = self._solver.getPC().getFactorMatrix()
+            status = mumps.getMumpsInfog(1)
             if status >= 0:
-                return Inertia(self._mumps.getMumpsInfog(12), self._mumps.getMumpsInfog(28))
+                return Inertia(mumps.getMumpsInfog(12), mumps.getMumpsInfog(28))
             if status not in _WORKSPACE:
                 return None
-            self._mumps.setMumpsIcntl(14, 2 * self._mumps.getMumpsIcntl(14))
-            self._matrix.scale(1.0)  # marks the values as new
+            mumps.setMumpsIcntl(14, 2 * mumps.getMumpsIcntl(14))
+            self._matrix.stateIncrease()  # marks the values as new
         return None
 
     def solve(self, right: PETSc.Vec, solution: PETSc.Vec) -> None:

@@ -97,14 +97,13 @@ class Drawn:
     def _apart(self) -> np.ndarray:
         return self.anchors[0] - self.anchors[1]
 
-    def rigid_motion(self, a: np.ndarray, motion: str, slot: int) -> np.ndarray:
-        """∂(both poses) (2 pose_size,) while body ``slot`` makes the unit ``motion`` along or about a's triad.
-
-        The bodies are taken to be joined as drawn, both at the pose ``a`` of the first.
-        """
+    def rigid_motion(self, both: np.ndarray, motion: str, slot: int) -> np.ndarray:
+        """∂``both`` (2 pose_size,) while body ``slot`` makes the unit ``motion`` along or about a's triad."""
         space, k = self.space, int(motion[1]) - 1
-        z = self.moved(a, {})[slot * space.pose_size :][: space.pose_size]
-        arm = space.rotate(z, -self.anchors[slot])  # from the joint to the body's centre
+        a = both[: space.pose_size]
+        z = both[slot * space.pose_size :][: space.pose_size]
+        # from the joint on a to the body's centre
+        arm = z[: space.dim] - a[: space.dim] - space.rotate(a, self.anchors[0]) + self.anchors[0] - self.anchors[slot]
         if motion[0] == "t":
             own = np.concatenate([space.rotate(a, self.triad[k]), np.zeros(space.rotation_size)])
         elif space.dim == 2:

@@ -84,8 +84,10 @@ def test_slider_axis_is_the_one_given(axis, dim):
     m.prismatic(m.rigid("base", fixed=True), m.rigid("block"), at=(0.0, 0.0), axis=axis)
     (connection,) = build_linkage(m, dim).joints.connections
     assert connection.kind is PRISMATIC
-    direction = connection.triad[0] if dim == 2 else connection.triad[2]
-    assert direction == pytest.approx([*(np.array(axis) / np.hypot(*axis)), 0.0][:dim])
+    triad = np.array(connection.triad)
+    assert triad[0 if dim == 2 else 2] == pytest.approx([*(np.array(axis) / np.hypot(*axis)), 0.0][:dim])
+    assert triad @ triad.T == pytest.approx(np.eye(dim), abs=1e-15)
+    assert np.linalg.det(triad) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("axis", [(0, 0, 1), (0, 0, -1), (1, 0, 0), (1, 1, 1), (1e-9, 0, 1), (-3, 2, 0.1)])

@@ -116,8 +116,9 @@ def test_joint_pulls_on_both_of_its_bodies_in_balance(system):
         # moments about the origin, from those about the centres
         total = np.zeros(2 * dim - 3)
         for body, pull in ((c.a, on_a), (c.b, on_b)):
-            turning = system.space.turns(system.space.identity).T @ pull[dim:]
-            total = total + turning + np.cross(system.bodies[body].centre, pull[:dim])
+            arm, force = ([*v, 0.0][:3] for v in (system.bodies[body].centre, pull[:dim]))
+            moment = np.cross(arm, force)[-total.size :]
+            total = total + system.space.turns(system.space.identity).T @ pull[dim:] + moment
         assert total == pytest.approx(np.zeros(2 * dim - 3), abs=1e-12 * system.length)
 
 

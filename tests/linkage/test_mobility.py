@@ -67,6 +67,13 @@ def test_parallelogram_gains_a_freedom_and_a_dependence_at_its_change_point(dim,
     assert (held.mobility, held.mobile, held.redundancy) == (1, ("coupler", "rocker"), redundancy + 1)
 
 
+@pytest.mark.parametrize(("dim", "redundancy"), [(2, 0), (3, 3)])
+@pytest.mark.parametrize("angle", [1e-2, 1e-4, 1e-6])
+def test_near_its_change_point_the_parallelogram_still_counts_as_regular(angle, dim, redundancy):
+    freedom = freedom_as_drawn(parallelogram(angle, driven=None), dim)
+    assert (freedom.mobility, freedom.redundancy) == (1, redundancy)
+
+
 def test_rod_between_two_balls_spins_about_itself():
     freedom = freedom_as_drawn(two_ball_rod(), 3)
     assert (freedom.mobility, freedom.mobile, freedom.redundancy) == (1, ("rod",), 0)

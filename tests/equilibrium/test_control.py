@@ -1,0 +1,70 @@
+"""Load control and displacement control are two ways along one curve; the multiplier of the second is the force."""
+
+import numpy as np
+import pytest
+
+from .arch import DISPLACEMENTS, RISE, arch, beam_forces
+from .finger import finger
+
+BEFORE = slice(0, 10)  # displacements up to the limit point and a little farther
+
+
+@pytest.mark.parametrize("space", ["plane-stress", "plane-strain", "3d"])
+def test_displacement_control_takes_the_forces_that_load_control_was_given(space):
+    simulation, push = finger(space)
+    for forces in ([1.0, 2.0, 4.0], [-0.5, -1.0, -1.5]):
+        loaded = simulation.load_displacement(push, forces=forces)
+        held = simulation.load_displacement(push, displacements=loaded.displacements)
+        assert held.displacements == pytest.approx(loaded.displacements, rel=1e-12)
+        assert held.forces == pytest.approx(forces, rel=1e-8)
+        for a, b in zip(loaded.frames, held.frames, strict=True):
+            assert b.strain_energy == pytest.approx(a.strain_energy, rel=1e-8)
+            assert b.max_stress == pytest.approx(a.max_stress, rel=1e-7)
+
+
+@pytest.mark.parametrize("space", ["plane-stress", "3d"])
+def test_force_is_the_derivative_of_the_strain_energy(space):
+    simulation, push = finger(space)
+    middle, step = 5.0, 0.1
+    curve = simulation.load_displacement(push, displacements=[middle + k * step for k in (-2, -1, 0, 1, 2)])
+    energy = [frame.strain_energy for frame in curve.frames]
+    slope = (energy[0] - 8.0 * energy[1] + 8.0 * energy[3] - energy[4]) / (12.0 * step)
+    assert curve.forces[2] == pytest.approx(slope, rel=1e-6)
+
+
+def test_snap_through_follows_the_beam_beyond_the_limit_point_and_back_to_stability():
+    simulation, push = arch()
+    curve = simulation.load_displacement(push, displacements=DISPLACEMENTS)
+    expected = beam_forces(DISPLACEMENTS)
+    assert curve.forces == pytest.approx(expected, rel=1e-2, abs=1e-12)
+    assert curve.forces[BEFORE].max() == pytest.approx(expected[BEFORE].max(), rel=3e-3)  # the limit load
+    slope = np.gradient(expected, DISPLACEMENTS)
+    clear = np.abs(slope) > 0.1 * np.abs(slope).max()  # not at the limit points
+    assert np.any(slope[clear] < 0.0)
+    assert np.array_equal(curve.stable[clear], slope[clear] > 0.0)
+    assert all(frame.unstable_modes == (0 if frame.stable else 1) for frame in curve.frames)
+    assert all(frame.stable_under_control for frame in curve.frames)
+
+
+@pytest.mark.parametrize("fractions", [[0.95], [0.5, 0.8, 0.95]])
+def test_load_below_the_limit_stays_on_its_side_and_beyond_it_snaps_to_the_other(fractions):
+    simulation, push = arch()
+    limit = simulation.load_displacement(push, displacements=DISPLACEMENTS[BEFORE]).forces.max()
+    loads = [fraction * limit for fraction in (*fractions, 1.05)]
+    *_, before, after = simulation.load_displacement(push, forces=loads).frames
+    assert before.displacement < 0.7 * RISE and before.stable
+    assert after.displacement > 1.7 * RISE and after.stable
+    held = simulation.load_displacement(push, displacements=[*DISPLACEMENTS, after.displacement]).frames[-1]
+    assert held.force == pytest.approx(after.force, rel=1e-8)
+
+
+def test_other_forces_stay_while_one_is_led():
+    simulation, push = finger("plane-stress")
+    mechanism = simulation.scene.mechanism
+    pull = mechanism.force(on=push.on, at=push.at, direction=(-1, 0), name="pull")
+    both = simulation.load_displacement(push, forces=[3.0, 5.0], others={pull: 2.0})
+    net = simulation.load_displacement(push, forces=[1.0, 3.0])
+    assert both.displacements == pytest.approx(net.displacements, rel=1e-9)
+    nothing = simulation.load_displacement(push, forces=[2.0], others={pull: 2.0}).frames[0]
+    assert nothing.displacement == pytest.approx(0.0, abs=1e-9)
+    assert nothing.strain_energy == pytest.approx(0.0, abs=1e-12)
