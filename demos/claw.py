@@ -15,6 +15,7 @@ THICKNESS, DEPTH, PIN = 3.0, 8.5, 3.0
 SHAFT, AXLE, ANCHOR = (15, 0), (60, 5), (22, 32)  # on the base: motor shaft and two axles
 ELBOW, KNEE, HIP, WRIST = (38, 22), (62, 42), (56, 88), (28, 92)  # moving joints
 FINGERTIP = (8, 125)
+SIZE = 1.73  # mm
 FORCES = [float(force) for force in range(11)]
 
 
@@ -44,7 +45,7 @@ def describe():
 
 
 def main():
-    demo = parse("claw", __doc__.splitlines()[0], size=1.73, quick_size=4.0)
+    demo = parse("claw", __doc__.splitlines()[0], size=SIZE, quick_size=4.0)
     scene, grasp = describe()
     sim = simulation(demo, scene)
     curve = sim.load_displacement(grasp, forces=FORCES)

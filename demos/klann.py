@@ -15,6 +15,7 @@ from common import Target, finish, parse, simulation
 import fenicsmech as fm
 from fenicsmech.report import Trace
 
+SIZE = 1.71  # mm
 FORCES = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
 SCALE = 150.0 / 19.2  # mm per unit of the patent: 150 mm from foot to hip
 THICKNESS, DEPTH, PIN = 3.0, 8.5, 3.0
@@ -58,7 +59,7 @@ def describe():
 
 
 def main():
-    demo = parse("klann", __doc__.splitlines()[0], size=1.71, quick_size=4.0)
+    demo = parse("klann", __doc__.splitlines()[0], size=SIZE, quick_size=4.0)
     scene, lift, motor = describe()
     sim = simulation(demo, scene)
     # crank angles of the patent; the drawn one is 180°

@@ -11,6 +11,7 @@ from common import Target, finish, parse, simulation
 
 import fenicsmech as fm
 
+SIZE = 2.1  # mm
 FORCES = [0.0, 0.025, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4]
 
 
@@ -33,7 +34,7 @@ def describe():
 
 
 def main():
-    demo = parse("truss", __doc__.splitlines()[0], size=2.1, quick_size=4.0)
+    demo = parse("truss", __doc__.splitlines()[0], size=SIZE, quick_size=4.0)
     scene, push = describe()
     sim = simulation(demo, scene)
     curve = sim.load_displacement(push, forces=FORCES)

@@ -1,6 +1,7 @@
 """The inertia of the KKT matrix tells how many modes are unstable, whatever the constraints."""
 
 import pytest
+from mpi4py import MPI
 
 from .column import EULER, THICKNESS, Column, column, critical_load
 
@@ -49,3 +50,13 @@ def test_held_displacement_does_not_keep_a_column_from_buckling_sideways():
     short, long = case.simulation.load_displacement(case.push, displacements=[0.007, 0.009]).frames
     assert short.force < EULER < long.force
     assert short.stable_under_control and not long.stable_under_control
+
+
+@pytest.mark.parallel
+def test_unstable_modes_are_counted_alike_on_any_number_of_ranks():
+    case = column(slides=2, comm=MPI.COMM_WORLD)
+    loads = [0.98 * EULER, 1.02 * EULER, 4.2 * EULER]
+    frames = case.simulation.load_displacement(case.push, forces=loads).frames
+    assert [frame.unstable_modes for frame in frames] == [0, 1, 2]
+    held = case.simulation.load_displacement(case.push, displacements=[0.007, 0.009]).frames
+    assert [frame.stable_under_control for frame in held] == [True, False]

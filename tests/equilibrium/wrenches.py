@@ -1,4 +1,6 @@
-"""What acts on each link of a mechanism in equilibrium, summed up from the reactions of its joints."""
+"""Forces and moments about the origin that act on the links of a mechanism in equilibrium."""
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -7,34 +9,44 @@ from fenicsmech.linkage.build import in_dimension
 from fenicsmech.mechanism import Link
 
 
-def cross(lever: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Moment (1,) in the plane, (3,) in space."""
-    return np.atleast_1d(np.cross(lever, force)) if len(lever) == 3 else np.array(
-        [lever[0] * force[1] - lever[1] * force[0]]
-    )
+@dataclass(frozen=True)
+class Wrench:
+    """A force (dim,) and its moment about the origin, (1,) in the plane or (3,) in space."""
+
+    force: np.ndarray
+    moment: np.ndarray
+
+    @classmethod
+    def at(cls, point: np.ndarray, force: np.ndarray, moment: np.ndarray | float = 0.0) -> "Wrench":
+        """A force at ``point`` and a moment about it."""
+        x, f = (np.append(v, 0.0)[:3] for v in (point, force))
+        return cls(np.asarray(force), moment + np.cross(x, f)[3 - (3 if len(point) == 3 else 1) :])
+
+    def __add__(self, other: "Wrench") -> "Wrench":
+        return Wrench(self.force + other.force, self.moment + other.moment)
+
+    def __neg__(self) -> "Wrench":
+        return Wrench(-self.force, -self.moment)
 
 
-def sums(simulation: fm.Simulation, curve: fm.Curve, frame: fm.Frame) -> dict[Link, tuple[np.ndarray, np.ndarray]]:
-    """Force and moment about the origin on every link: of the joints and, of the curve's force, at the moved point."""
-    mechanism, linkage, model = simulation.scene.mechanism, simulation.linkage, simulation.model
-    dim, space, poses = linkage.dim, linkage.joints.space, frame.state.poses
-    model.load(frame.state)
-    totals = {link: [np.zeros(dim), np.zeros({2: 1, 3: 3}[dim])] for link in mechanism.links}
-
-    def add(link: Link, sign: float, at: np.ndarray, force: np.ndarray, moment: np.ndarray) -> None:
-        totals[link][0] += sign * force
-        totals[link][1] += sign * (moment + cross(at, force))
-
-    connections = {connection.name: connection for connection in linkage.joints.connections}
-    for joint in mechanism.joints:
-        connection, reaction = connections[joint.name], frame.reactions[joint.name]
-        centre, pose = np.array(linkage.bodies[connection.b].centre), poses[connection.b]
+def of_joints(simulation: fm.Simulation, frame: fm.Frame) -> dict[Link, Wrench]:
+    """What the joints exert on each link, from the reported reactions."""
+    mechanism, linkage = simulation.scene.mechanism, simulation.linkage
+    dim, space = linkage.dim, linkage.joints.space
+    totals = {link: Wrench(np.zeros(dim), np.zeros({2: 1, 3: 3}[dim])) for link in mechanism.links}
+    for joint, connection in zip(mechanism.joints, linkage.joints.connections, strict=True):
+        reaction, body = frame.reactions[joint.name], linkage.bodies[connection.b]
         drawn = np.array(connection.at)
-        at = drawn + space.displace(pose, (drawn - centre)[None])[0]
-        add(joint.b, 1.0, at, reaction.force, reaction.moment)
-        add(joint.a, -1.0, at, reaction.force, reaction.moment)
-    load = curve.force_part
-    at = np.array(in_dimension(load.at, dim)) + model.point(load).displacement(model.elastic.u, poses)
-    pull = frame.force * np.array(in_dimension(load.direction, dim))
-    add(load.on, 1.0, at, pull, np.zeros({2: 1, 3: 3}[dim]))
-    return {link: (force, moment) for link, (force, moment) in totals.items()}
+        moved = drawn + space.displace(frame.state.poses[connection.b], (drawn - body.centre)[None])[0]
+        wrench = Wrench.at(moved, reaction.force, reaction.moment)
+        totals[joint.b] += wrench
+        totals[joint.a] += -wrench
+    return totals
+
+
+def of_load(simulation: fm.Simulation, curve: fm.Curve, frame: fm.Frame) -> Wrench:
+    """The curve's force, at its moved point."""
+    load, model, dim = curve.force_part, simulation.model, simulation.linkage.dim
+    model.load(frame.state)
+    moved = np.array(in_dimension(load.at, dim)) + model.point(load).displacement(model.elastic.u, frame.state.poses)
+    return Wrench.at(moved, frame.force * np.array(in_dimension(load.direction, dim)))

@@ -1,0 +1,71 @@
+"""Every demo runs as documented, leaves its files, and its numbers are the physics'."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fenicsmech as fm
+from fenicsmech.report import check_summary
+
+ROOT = Path(__file__).parents[2]
+
+# last displacement [mm] of each demo in plane stress at element size 0.8 mm, and its rigid coordinates
+DEMOS = {"truss": (1.7555, 18), "claw": (11.907, 33), "klann": (11.562, 33)}
+
+
+def run(name: str, folder: Path, *options: str) -> tuple[dict, str]:
+    """Runs a demo as a user does; returns its summary and what it printed."""
+    command = [sys.executable, str(ROOT / "demos" / f"{name}.py"), *options, "--out", str(folder)]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    return json.loads((folder / "summary.json").read_text()), done.stdout
+
+
+@pytest.mark.parametrize("name", DEMOS)
+def test_demo_leaves_a_valid_summary_pictures_and_a_stable_curve(name, tmp_path):
+    summary, printed = run(name, tmp_path, "--space", "plane-stress", "--simulate-only")
+    displacement, rigid = DEMOS[name]
+    check_summary(summary)
+    assert summary["dofs"]["rigid"] == rigid
+    assert all(frame["stable"] for frame in summary["frames"])
+    assert summary["frames"][-1]["displacement"] == pytest.approx(displacement, rel=0.005)
+    assert "frame_median" in printed
+    files = {path.name for path in tmp_path.iterdir()}
+    assert {"mechanism.png", "curve.png", "deformed.xdmf", "deformed.h5"} <= files
+
+
+def test_truss_is_soft_first_and_stiff_once_its_diagonal_is_straight(tmp_path):
+    summary, _ = run("truss", tmp_path, "--quick", "--space", "plane-stress")
+    u = np.array([frame["displacement"] for frame in summary["frames"]])
+    f = np.array([frame["force"] for frame in summary["frames"]])
+    stiffness = np.diff(f) / np.diff(u)
+    assert stiffness[-1] > 5.0 * stiffness[0]
+
+
+@pytest.mark.parametrize(("name", "published"), [("claw", 16608), ("truss", 10188), ("klann", 15915)])
+def test_default_meshes_in_space_have_the_published_numbers_of_unknowns(name, published, monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "demos")
+    demo = import_module(name)
+    scene = demo.describe()[0]
+    model = fm.Simulation(scene, size=demo.SIZE).model
+    assert model.rigid_dofs == {"claw": 77, "truss": 42, "klann": 77}[name]
+    assert model.flexible_dofs == pytest.approx(published, rel=0.1)
+
+
+def test_two_ranks_give_the_same_curve(tmp_path, mpirun):
+    options = ("--quick", "--space", "plane-stress")
+    alone, _ = run("claw", tmp_path, *options)
+    together = tmp_path / "two"
+    done = mpirun(2, ROOT / "demos" / "claw.py", *options, "--out", str(together))
+    assert done.returncode == 0, done.stderr
+    shared = json.loads((together / "summary.json").read_text())
+    assert shared["ranks"] == 2
+    for one, two in zip(alone["frames"], shared["frames"], strict=True):
+        assert two["displacement"] == pytest.approx(one["displacement"], rel=1e-9, abs=1e-12)

@@ -1,0 +1,59 @@
+"""The inertia that the factorisation reports is that of the eigenvalues, on any number of ranks."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from fenicsmech.equilibrium.factor import Factor
+
+SIZE = 60
+
+
+def with_eigenvalues(values: np.ndarray, *, seed: int = 0) -> np.ndarray:
+    """A symmetric matrix with given eigenvalues."""
+    basis, _ = np.linalg.qr(np.random.default_rng(seed).standard_normal((len(values),) * 2))
+    return basis @ np.diag(values) @ basis.T
+
+
+def distributed(dense: np.ndarray, comm: MPI.Comm) -> PETSc.Mat:
+    """``dense`` as a distributed sparse matrix."""
+    matrix = PETSc.Mat().createAIJ(dense.shape, comm=comm)
+    matrix.setUp()
+    first, last = matrix.getOwnershipRange()
+    matrix.setValues(range(first, last), range(len(dense)), dense[first:last])
+    matrix.assemble()
+    return matrix
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("negative", [0, 1, 23])
+def test_negative_pivots_are_counted(negative):
+    values = np.linspace(0.5, 2.0, SIZE)
+    values[:negative] *= -1.0
+    factor = Factor(distributed(with_eigenvalues(values), MPI.COMM_WORLD))
+    inertia = factor.refactor()
+    assert (inertia.negative, inertia.zero) == (negative, 0)
+
+
+@pytest.mark.parallel
+def test_new_values_of_the_same_matrix_are_factored_anew():
+    values = np.linspace(0.5, 2.0, SIZE)
+    matrix = distributed(with_eigenvalues(values), MPI.COMM_WORLD)
+    factor = Factor(matrix)
+    assert factor.refactor().negative == 0
+    matrix.shift(-1.0)
+    assert factor.refactor().negative == np.sum(values < 1.0)
+    right, solution = matrix.createVecs()
+    right.set(1.0)
+    factor.solve(right, solution)
+    assert (matrix * solution - right).norm() <= 1e-12 * right.norm()
+
+
+@pytest.mark.parallel
+def test_zero_pivots_are_found_instead_of_failing():
+    # two rows of zeros, as an unused multiplier or an idle freedom leaves them
+    dense = np.zeros((SIZE + 2, SIZE + 2))
+    dense[:SIZE, :SIZE] = with_eigenvalues(np.concatenate([[-1.0], np.linspace(0.5, 2.0, SIZE - 1)]))
+    inertia = Factor(distributed(dense, MPI.COMM_WORLD)).refactor()
+    assert (inertia.negative, inertia.zero) == (1, 2)
