@@ -21,6 +21,7 @@ from fenicsmech.mechanism import Configuration
 _CLOSED = 1e-13  # scaled constraint residual of a closed assembly
 _LARGEST_STEP = 0.1  # rad, or mechanism lengths, of motor motion at once
 _SMALLEST_STEP = 1e-4
+_STRAY = 0.2  # of the motion in a step: how far it may end from its extrapolation
 
 
 @dataclass(frozen=True)
@@ -73,19 +74,25 @@ def _follow(system: JointSystem, target: np.ndarray) -> tuple[np.ndarray, float,
     last_step = 0.0
     while travel > 0.0 and fraction < 1.0:
         step = min(step, 1.0 - fraction)
-        guess = system.unknowns(poses)
-        if last_step > 0.0:
-            guess = guess + (guess - system.unknowns(before)) * (step / last_step)
+        here = system.unknowns(poses)
+        guess = here + (here - system.unknowns(before)) * (step / last_step if last_step > 0.0 else 0.0)
         trial, residual = _close(system, system.with_unknowns(poses, guess), (fraction + step) * target)
-        if np.max(np.abs(residual)) <= _CLOSED:
+        there = system.unknowns(trial)
+        astray = np.linalg.norm((there - guess) / system.pose_scale)
+        onward = np.linalg.norm((there - here) / system.pose_scale)
+        shortest = step < _SMALLEST_STEP * largest
+        if np.max(np.abs(residual)) > _CLOSED:
+            worst = int(np.argmax(np.abs(residual)))
+            if shortest:
+                return poses, fraction, worst
+            step *= 0.5
+        elif last_step > 0.0 and astray > _STRAY * onward and not shortest:
+            # far from where the motion was heading: perhaps another branch, or across a gap that cannot be crossed
+            step *= 0.5
+        else:
             before, poses, last_step = poses, trial, step
             fraction = 1.0 if fraction + step >= 1.0 - 1e-12 else fraction + step
             step = min(largest, 2.0 * step)
-        else:
-            worst = int(np.argmax(np.abs(residual)))
-            step *= 0.5
-            if step < _SMALLEST_STEP * largest:
-                return poses, fraction, worst
     return poses, 1.0, worst
 
 

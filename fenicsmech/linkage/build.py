@@ -11,6 +11,8 @@ from fenicsmech.linkage.bodies import Body, rigid_body
 from fenicsmech.linkage.system import Connection, JointSystem
 from fenicsmech.mechanism import FlexibleLink, Joint, Link, Mechanism
 
+_SAME = 1e-9  # of the mechanism's length: joints this close on a link share an interface
+
 
 @dataclass(frozen=True)
 class Linkage:
@@ -51,20 +53,26 @@ def mechanism_length(mechanism: Mechanism) -> float:
 def build_linkage(mechanism: Mechanism, dim: int) -> Linkage:
     """The bodies and constraints of ``mechanism`` in ``dim`` dimensions."""
     bodies = [rigid_body(link, _centre(mechanism, link, dim)) for link in mechanism.rigid_links]
+    length = mechanism_length(mechanism)
     index: dict[tuple[Link, tuple], int] = {(body.link, ()): i for i, body in enumerate(bodies)}
+
+    def place(joint: Joint) -> tuple[int, ...]:
+        """Equal for joints at one point of a link, whatever the rounding of their coordinates."""
+        return tuple(np.rint(np.array(in_dimension(joint.at, dim)) / (_SAME * length)).astype(int).tolist())
+
     interfaces: dict[FlexibleLink, tuple[int, ...]] = {}
     for link in mechanism.flexible_links:
         for joint in mechanism.joints:
-            at = in_dimension(joint.at, dim)
-            if link in (joint.a, joint.b) and (link, at) not in index:
+            if link in (joint.a, joint.b) and (link, place(joint)) not in index:
+                at = in_dimension(joint.at, dim)
                 region = joint.regions[(joint.a, joint.b).index(link)]
-                index[link, at] = len(bodies)
+                index[link, place(joint)] = len(bodies)
                 axis = joint.axis if joint.kind.bored else (0.0, 0.0, 1.0)
                 bodies.append(Body(f"{link.name} at {joint.at}", link, at, False, region, axis))
         interfaces[link] = tuple(i for (owner, _), i in index.items() if owner == link)
 
     def body(joint: Joint, link: Link) -> int:
-        return index[link, in_dimension(joint.at, dim) if isinstance(link, FlexibleLink) else ()]
+        return index[link, place(joint) if isinstance(link, FlexibleLink) else ()]
 
     driven = {motor.joint: motor for motor in mechanism.motors}
     connections = [
@@ -85,7 +93,6 @@ def build_linkage(mechanism: Mechanism, dim: int) -> Linkage:
         for link, group in interfaces.items()
         for other in group[1:]
     ]
-    length = mechanism_length(mechanism)
     return Linkage(
         dim=dim,
         length=length,
