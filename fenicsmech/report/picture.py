@@ -14,6 +14,7 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, FancyArrowPatch, PathPatch, Polygon
 from matplotlib.path import Path as Outline
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 from matplotlib.tri import Triangulation
 
 from fenicsmech.errors import DescriptionError
@@ -229,6 +230,7 @@ def _draw_colour_bar(frame: Frame, norm: Normalize, values: np.ndarray, label: s
     over, under = values.max() > norm.vmax, values.min() < norm.vmin
     extend = "both" if over and under else "max" if over else "min" if under else "neither"
     bar = frame.figure.colorbar(ScalarMappable(norm, _STRESS), cax=frame.bar, extend=extend, extendfrac=0.04)
+    bar.locator, bar.formatter = MaxNLocator(5), FuncFormatter(lambda value, _: f"{value:.3g}")
     bar.set_label(label)
     bar.outline.set_linewidth(0.6)
 
