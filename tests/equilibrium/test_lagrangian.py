@@ -27,9 +27,7 @@ def shifted(system: EquilibriumSystem, state: State, x: np.ndarray) -> State:
     step, joints = system.step(vector), system.joints
     poses = state.poses.copy()
     poses[joints.free_bodies] += step.z.reshape(-1, joints.space.pose_size)
-    moved = State(
-        state.u + step.u, poses, state.multipliers + step.multipliers, state.force + step.force, state.motors
-    )
+    moved = State(state.u + step.u, poses, state.multipliers + step.multipliers, state.force + step.force, state.motors)
     system.load(moved)
     return moved
 
