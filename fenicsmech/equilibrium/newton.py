@@ -122,11 +122,14 @@ class Newton:
             shift = floor if near else max(floor, shift / 3.0 if shift > 1e-9 else 0.0)
             step, inertia, shift = self._direction(state, control, balance, shift, any_inertia=near)
             _log.debug("iteration %d: residual %.2e, shift %.1e, %s", iteration, residuals[-1], shift, inertia)
-            before = balance.norm
+            before, norm = state, balance.norm
             advance = self._search if careful else self._full_step
             state, balance = advance(state, control, step, balance, iteration)
-            # the contraction of Newton's method near any equilibrium, stable or not
-            trusted = trusted and not (near and balance.norm > 0.5 * before and not self._converged(balance))
+            if near and balance.norm > norm and not self._converged(balance):
+                # no contraction: near a limit or bifurcation point, where only descent leads on
+                state, trusted, careful = before, False, True
+                system.load(state)
+                balance = system.balance(state, control)
             if balance.norm < best[1]:
                 best, spent = (state, balance.norm), 0
             else:

@@ -63,8 +63,7 @@ def assemble(linkage: Linkage, configuration: Configuration) -> Assembly:
 
 def _follow(system: JointSystem, target: np.ndarray) -> tuple[np.ndarray, float, int]:
     """Leads the motors to ``target`` (per connection); returns poses, reached fraction, worst row."""
-    scale = np.array([system.length if c.kind.sliding else 1.0 for c in system.connections])
-    travel = float(np.max(np.abs(target / scale), initial=0.0))
+    travel = system.travel(target)
     largest = 1.0 if travel <= _LARGEST_STEP else _LARGEST_STEP / travel
     poses, fraction, step, worst = system.drawn, 0.0, largest, 0
     before = poses

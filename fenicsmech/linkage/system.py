@@ -92,6 +92,11 @@ class JointSystem:
         moved[self.free_bodies] = self.space.retract(z.reshape(-1, self.space.pose_size))
         return moved
 
+    def travel(self, motors: np.ndarray) -> float:
+        """The largest of ``motors`` (values per connection): rad, or travel over the mechanism's length."""
+        scale = [self.length if connection.kind.sliding else 1.0 for connection in self.connections]
+        return float(np.max(np.abs(motors / np.array(scale)), initial=0.0))
+
     def value(self, poses: np.ndarray, motors: np.ndarray) -> np.ndarray:
         """C, (rows,)."""
         residual = np.empty(self.rows)

@@ -47,6 +47,7 @@ from fenicsmech.simulation.snapshot import gather
 
 _log = logger(__name__)
 _STRESS = "von Mises stress [MPa]"
+_LARGEST_TURN = 0.25  # rad, or mechanism lengths, of a motor between equilibria
 
 SPACES = {model.name: model for model in (SPATIAL, PLANE_STRESS, PLANE_STRAIN)}
 """Names of the elastic models, as users type them."""
@@ -264,7 +265,11 @@ class Simulation:
         state = replace(state, motors=fraction * motors)
         try:
             path = Path(newton, state, fraction, predictor=self._predictor, idle=freedom.mobility > 0)
-            return path.advance(MotorControl(1.0, motors)).state
+            # in space a motor's equation is periodic: steps must stay well below a half turn
+            steps = int(np.ceil((1.0 - fraction) * self.linkage.joints.travel(motors) / _LARGEST_TURN))
+            for value in np.linspace(fraction, 1.0, steps + 1)[1:]:
+                state = path.advance(MotorControl(float(value), motors)).state
+            return state
         except PathFailed as failure:
             raise EquilibriumError(
                 f"configuration {configuration.name!r}",
