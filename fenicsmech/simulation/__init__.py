@@ -2,7 +2,9 @@
 
 - ``simulation``: the entry point
 - ``model``: the discretised mechanism behind it
+- ``request``, ``tracer``: what a curve is asked for, and how it is traced
 - ``frame``, ``curve``: what comes out
+- ``snapshot``, ``picture``, ``export``: a state gathered, drawn, written
 """
 
 from fenicsmech.simulation.curve import Curve

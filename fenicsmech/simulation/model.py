@@ -143,6 +143,11 @@ class MechanismModel:
         """The point load of a force, or of a unit force along an output (collective)."""
         return PointLoad(force.name, self.point(force), np.array(in_dimension(force.direction, self.linkage.dim)))
 
+    def travel(self, part: Force | Output, state: State) -> float:
+        """How far the point of a force or output has moved along its direction in the loaded ``state`` (collective)."""
+        load = self.point_load(part)
+        return float(load.direction @ load.point.displacement(self.elastic.u, state.poses))
+
     def system(self, controlled: PointLoad, loads: tuple[tuple[PointLoad, float], ...]) -> EquilibriumSystem:
         """The equilibrium equations with one controlled and several fixed loads (collective)."""
         return EquilibriumSystem(

@@ -3,51 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import cached_property
 from pathlib import Path as FilePath
-from time import perf_counter
 
 import numpy as np
 from mpi4py import MPI
 
 from fenicsmech.clock import Clock
 from fenicsmech.elasticity import PLANE_STRAIN, PLANE_STRESS, SPATIAL, Quadrature
-from fenicsmech.equilibrium import (
-    Control,
-    DisplacementControl,
-    EquilibriumSystem,
-    Hermite,
-    LoadControl,
-    MotorControl,
-    Newton,
-    NewtonOptions,
-    Path,
-    PathFailed,
-    Predictor,
-    Solution,
-    State,
-    joint_reactions,
-    motor_torques,
-)
-from fenicsmech.errors import DescriptionError, EquilibriumError
-from fenicsmech.linkage import Freedom, assemble, build_linkage, count_freedom
+from fenicsmech.equilibrium import Hermite, Newton, NewtonOptions, Predictor
+from fenicsmech.errors import DescriptionError
+from fenicsmech.linkage import assemble, build_linkage, count_freedom
 from fenicsmech.linkage.build import in_dimension
-from fenicsmech.log import logger
 from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Output, Scene, validate
-from fenicsmech.mechanism.checks import finite, positive
-from fenicsmech.meshing.quality import radius_ratios
+from fenicsmech.mechanism.checks import positive
+from fenicsmech.meshing import radius_ratios
 from fenicsmech.report import Panel, Progress, Silent, Trace, draw_configurations
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.export import write_xdmf
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.model import Fidelity, MechanismModel, check_links, mesh_mechanism
 from fenicsmech.simulation.picture import Draughtsman
+from fenicsmech.simulation.request import read_request
 from fenicsmech.simulation.snapshot import gather
+from fenicsmech.simulation.tracer import Tracer
 
-_log = logger(__name__)
 _STRESS = "von Mises stress [MPa]"
-_LARGEST_TURN = 0.25  # rad, or mechanism lengths, of a motor between equilibria
 
 SPACES = {model.name: model for model in (SPATIAL, PLANE_STRESS, PLANE_STRAIN)}
 """Names of the elastic models, as users type them."""
@@ -92,10 +73,8 @@ class Simulation:
         mechanism = scene.mechanism
         validate(mechanism, model.dim)
         links = mechanism.flexible_links
-        sizes = {
-            link: positive(f"element size of {link.name!r}", size[link] if isinstance(size, Mapping) else size)
-            for link in links
-        }
+        per_link = size if isinstance(size, Mapping) else dict.fromkeys(links, size)
+        sizes = {link: positive(f"element size of {link.name!r}", per_link.get(link)) for link in links}
         self.scene, self.comm, self.clock = scene, comm, Clock()
         self.fidelity = Fidelity(model, order, sizes, quadrature or Quadrature.for_order(order, model.dim))
         self.linkage = build_linkage(mechanism, model.dim)
@@ -131,42 +110,40 @@ class Simulation:
             others: constant magnitudes of other forces.
 
         Raises:
-            DescriptionError: neither or both of forces and displacements, or values that are not finite.
+            DescriptionError: the request makes no sense.
             AssemblyError: the configuration does not assemble.
             EquilibriumError: a sample was not reached; carries the frames before it.
         """
-        for part in (force, *(others or {})):
-            if part not in self.scene.mechanism.forces:
-                raise DescriptionError(
-                    f"{part.name!r}", f"it is not a force of {self.scene.mechanism.name!r}", "Add it with force()"
-                )
-        if (forces is None) == (displacements is None):
-            raise DescriptionError(f"{force.name!r}", "give either forces or displacements", "Pass one of the two")
-        kind, samples = (DisplacementControl, displacements) if forces is None else (LoadControl, forces)
-        controls: list[Control] = [kind(finite(f"sample of {force.name!r}", value)) for value in samples]
-        motors = self.linkage.joints.motor_values(configuration.position)
-        assembly = assemble(self.linkage, configuration)
-        freedom = count_freedom(
-            self.linkage.rigid, assembly.poses, self.linkage.rigid.motor_values(configuration.position)
+        request = read_request(
+            self.scene.mechanism,
+            force,
+            forces=forces,
+            displacements=displacements,
+            configuration=configuration,
+            others=others,
         )
-        newton = self.newton(force, tuple((others or {}).items()))
-        state = self.model.assembled_state(assembly.poses, motors)
-        if assembly.fraction < 1.0:
-            state = self._turn_motors(newton, state, assembly.fraction, motors, configuration, freedom)
-        newton.system.load(state)
-        datum = newton.system.load_displacement(state)
-        datums = {output: self._output(newton.system, output, state) for output in self.scene.mechanism.outputs}
-        start = datum if kind is DisplacementControl else 0.0
-        path = Path(newton, state, start, predictor=self._predictor, idle=freedom.mobility > 0)
+        assembly = assemble(self.linkage, configuration)
+        rigid = self.linkage.rigid
+        freedom = count_freedom(rigid, assembly.poses, rigid.motor_values(configuration.position))
+        newton = self.newton(force, request.others)
+        tracer = Tracer(self.model, newton, request, assembly=assembly, freedom=freedom, predictor=self._predictor)
         frames: list[Frame] = []
-        progress = Progress(len(controls), f"{configuration.name}") if self.comm.rank == 0 else Silent()
-        with progress:
-            for control in controls:
-                shifted = control.at(control.target + datum) if control.constrained else control
-                frames.append(self._frame(path, newton.system, shifted, datum, datums, frames, force, configuration))
+        label, samples = configuration.name, len(request.controls)
+        with Progress(samples, label) if self.comm.rank == 0 else Silent() as progress:
+            for control in request.controls:
+                frames.append(tracer.frame(control, frames))
                 progress.update(len(frames))
         self._last = Curve(force, configuration, freedom, tuple(frames))
         return self._last
+
+    def newton(self, force: Force, others: tuple[tuple[Force, float], ...] = ()) -> Newton:
+        """The solver for one controlled and some fixed forces, kept for all configurations (collective)."""
+        key = (force, others)
+        if key not in self._newtons:
+            model = self.model
+            loads = tuple((model.point_load(other), float(magnitude)) for other, magnitude in others)
+            self._newtons[key] = Newton(model.system(model.point_load(force), loads), self._options)
+        return self._newtons[key]
 
     def write(self, path: str | FilePath, curve: Curve | None = None) -> None:
         """Writes the frames of ``curve`` (the last one computed) as XDMF for ParaView (collective).
@@ -242,97 +219,3 @@ class Simulation:
         if chosen is None:
             raise DescriptionError("picture", "no curve was computed yet", "Call load_displacement first")
         return chosen
-
-    def newton(self, force: Force, others: tuple[tuple[Force, float], ...] = ()) -> Newton:
-        """The solver for one controlled and some fixed forces, kept for all configurations (collective)."""
-        key = (force, others)
-        if key not in self._newtons:
-            model = self.model
-            loads = tuple((model.point_load(other), float(magnitude)) for other, magnitude in others)
-            self._newtons[key] = Newton(model.system(model.point_load(force), loads), self._options)
-        return self._newtons[key]
-
-    def _turn_motors(
-        self,
-        newton: Newton,
-        state: State,
-        fraction: float,
-        motors: np.ndarray,
-        configuration: Configuration,
-        freedom: Freedom,
-    ) -> State:
-        """Leads the motors the rest of their way, which strains the links."""
-        state = replace(state, motors=fraction * motors)
-        try:
-            path = Path(newton, state, fraction, predictor=self._predictor, idle=freedom.mobility > 0)
-            # in space a motor's equation is periodic: steps must stay well below a half turn
-            steps = int(np.ceil((1.0 - fraction) * self.linkage.joints.travel(motors) / _LARGEST_TURN))
-            for value in np.linspace(fraction, 1.0, steps + 1)[1:]:
-                state = path.advance(MotorControl(float(value), motors)).state
-            return state
-        except PathFailed as failure:
-            raise EquilibriumError(
-                f"configuration {configuration.name!r}",
-                f"the motors strain the links, and no equilibrium was found beyond {failure.reached:.1%} of their way "
-                f"({failure.reason})",
-                "Choose motor positions nearer to the drawn ones, or a softer link",
-            ) from failure
-
-    def _frame(
-        self,
-        path: Path,
-        system: EquilibriumSystem,
-        control: Control,
-        datum: float,
-        datums: dict,
-        frames: list[Frame],
-        force: Force,
-        configuration: Configuration,
-    ) -> Frame:
-        start, before, iterations = perf_counter(), dict(self.clock.seconds), path.iterations
-        try:
-            solution = path.advance(control)
-        except PathFailed as failure:
-            what = "displacement" if control.constrained else "force"
-            wanted, reached = (v - datum if control.constrained else v for v in (control.target, failure.reached))
-            last = frames[-1] if frames else None
-            raise EquilibriumError(
-                f"{force.name!r} in configuration {configuration.name!r}",
-                f"no equilibrium at {what} {wanted:g}; the last one is at {reached:g} ({failure.reason}; "
-                f"{len(failure.tried)} smaller steps were tried)",
-                "Try displacement control past a limit point, smaller samples, or a finer mesh",
-                last=last,
-                frames=frames,
-            ) from failure
-        return self._record(system, solution, path.iterations - iterations, start, before, datum, datums)
-
-    def _record(self, system, solution: Solution, iterations, start, before, datum, datums) -> Frame:
-        state = solution.state
-        system.load(state)
-        with self.clock.phase("measure"):
-            stress = self.model.elastic.von_mises()
-            peak = self.comm.allreduce(float(stress.max(initial=0.0)), op=MPI.MAX)
-            outputs = {output: self._output(system, output, state) - zero for output, zero in datums.items()}
-            energy = self.model.elastic.energy()
-            displacement = system.load_displacement(state) - datum
-        return Frame(
-            force=state.force,
-            displacement=displacement,
-            stable=solution.unstable_modes == 0,
-            unstable_modes=solution.unstable_modes,
-            stable_under_control=solution.unstable_under_control == 0,
-            strain_energy=energy,
-            max_stress=peak,
-            outputs=outputs,
-            reactions=joint_reactions(self.linkage.joints, state),
-            motors=motor_torques(self.linkage.joints, state),
-            iterations=iterations,
-            residuals=solution.residuals,
-            seconds=perf_counter() - start,
-            phases=self.clock.since(before),
-            state=state,
-        )
-
-    def _output(self, system: EquilibriumSystem, output, state: State) -> float:
-        load = self.model.point_load(output)
-        return float(load.direction @ load.point.displacement(self.model.elastic.u, state.poses))

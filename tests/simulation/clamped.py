@@ -33,13 +33,14 @@ def cantilever(
     *,
     length: float = 100.0,
     thickness: float = 1.0,
+    depth: float = 1.0,
     poisson: float = 0.0,
     size: float | None = None,
     rigid_tip: bool = True,
     driven: bool = False,
     comm: MPI.Comm = MPI.COMM_SELF,
 ) -> Clamped:
-    """The elastic link from x = 0 to ``length``, square in section, between blocks that clamp it outside of that.
+    """The elastic link from x = 0 to ``length``, between blocks that clamp it outside of that.
 
     Args:
         rigid_tip: the force acts on a rigid hand clamped to the end, else on the end itself.
@@ -49,7 +50,7 @@ def cantilever(
     mechanism = fm.Mechanism("cantilever")
     base = mechanism.rigid("base", fixed=True)
     end = length + block if rigid_tip else length
-    shape = fm.strip([(-block, 0), (end, 0)], thickness=thickness, depth=thickness)
+    shape = fm.strip([(-block, 0), (end, 0)], thickness=thickness, depth=depth)
     beam = mechanism.flexible("beam", shape, fm.Material("steel", YOUNG, poisson))
     clamp = fm.Rectangle(block, 1.5 * thickness)
     mechanism.weld(base, beam, at=(-0.5 * block, 0), region=clamp)
@@ -70,4 +71,4 @@ def cantilever(
     )
     simulation = fm.Simulation(fm.Scene(mechanism), space=space, size=size or thickness, comm=comm)
     modulus = YOUNG / (1.0 - poisson**2) if space == "plane-strain" else YOUNG
-    return Clamped(simulation, force, outputs, motor, modulus * thickness**4 / 12.0)
+    return Clamped(simulation, force, outputs, motor, modulus * depth * thickness**3 / 12.0)

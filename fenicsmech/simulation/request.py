@@ -1,0 +1,66 @@
+"""What a curve is asked for, checked before anything is meshed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from fenicsmech.equilibrium import Control, DisplacementControl, LoadControl
+from fenicsmech.errors import DescriptionError
+from fenicsmech.mechanism import Configuration, Force, Mechanism
+from fenicsmech.mechanism.checks import finite
+
+
+@dataclass(frozen=True)
+class CurveRequest:
+    """A load–displacement curve to be computed.
+
+    Attributes:
+        force: the force that changes.
+        controls: its samples, as loads or as displacements counted from the unloaded configuration.
+        configuration: motor positions.
+        others: constant magnitudes of other forces.
+    """
+
+    force: Force
+    controls: tuple[Control, ...]
+    configuration: Configuration
+    others: tuple[tuple[Force, float], ...]
+
+
+def read_request(
+    mechanism: Mechanism,
+    force: Force,
+    *,
+    forces: Sequence[float] | None,
+    displacements: Sequence[float] | None,
+    configuration: Configuration,
+    others: Mapping[Force, float] | None,
+) -> CurveRequest:
+    """The request, if it makes sense for ``mechanism``.
+
+    Raises:
+        DescriptionError: a force or motor of another mechanism, a force both led and constant, neither or both of
+            forces and displacements, no samples, or numbers that are not finite.
+    """
+    others = dict(others or {})
+    for part in (force, *others):
+        if part not in mechanism.forces:
+            raise DescriptionError(f"{part.name!r}", f"it is not a force of {mechanism.name!r}", "Add it with force()")
+    if force in others:
+        raise DescriptionError(f"{force.name!r}", "it is led and held constant at once", "Leave it out of others")
+    for motor, _ in configuration.positions:
+        if motor not in mechanism.motors:
+            raise DescriptionError(
+                f"configuration {configuration.name!r}",
+                f"{motor.name!r} is not a motor of {mechanism.name!r}",
+                "Make the configuration with this mechanism's scene",
+            )
+    if (forces is None) == (displacements is None):
+        raise DescriptionError(f"{force.name!r}", "give either forces or displacements", "Pass one of the two")
+    kind, samples = (DisplacementControl, displacements) if forces is None else (LoadControl, forces)
+    controls = tuple(kind(finite(f"sample of {force.name!r}", value)) for value in samples)
+    if not controls:
+        raise DescriptionError(f"{force.name!r}", "there are no samples", "Give at least one force or displacement")
+    constant = tuple((other, finite(f"magnitude of {other.name!r}", value)) for other, value in others.items())
+    return CurveRequest(force, controls, configuration, constant)

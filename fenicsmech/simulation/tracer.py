@@ -1,0 +1,146 @@
+"""Traces the curve of a request: from the assembled configuration through all samples, recording frames."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from time import perf_counter
+
+import numpy as np
+from mpi4py import MPI
+
+from fenicsmech.equilibrium import (
+    Control,
+    MotorControl,
+    Newton,
+    Path,
+    PathFailed,
+    Predictor,
+    Solution,
+    State,
+    joint_reactions,
+    motor_torques,
+)
+from fenicsmech.errors import EquilibriumError
+from fenicsmech.linkage import Assembly, Freedom
+from fenicsmech.simulation.frame import Frame
+from fenicsmech.simulation.model import MechanismModel
+from fenicsmech.simulation.request import CurveRequest
+
+_LARGEST_TURN = 0.25  # rad, or mechanism lengths, of a motor between equilibria
+
+
+class Tracer:
+    """The unloaded equilibrium of a configuration, and the path of equilibria from there (collective).
+
+    Args:
+        model: the discretised mechanism.
+        newton: the solver for the request's forces.
+        request: what is asked for.
+        assembly: the rigid assembly of the configuration.
+        freedom: its mobility.
+        predictor: how the next equilibrium is guessed.
+
+    Raises:
+        EquilibriumError: the motors strain the links, and no equilibrium was found on the way.
+    """
+
+    def __init__(
+        self,
+        model: MechanismModel,
+        newton: Newton,
+        request: CurveRequest,
+        *,
+        assembly: Assembly,
+        freedom: Freedom,
+        predictor: Predictor,
+    ) -> None:
+        self._model, self._newton, self._request, self._predictor = model, newton, request, predictor
+        self._system, self._joints = newton.system, model.linkage.joints
+        self._idle = freedom.mobility > 0
+        state = self._unloaded(assembly)
+        self._system.load(state)
+        self._origin = self._system.load_displacement(state)
+        self._origins = {output: model.travel(output, state) for output in model.mechanism.outputs}
+        start = self._origin if request.controls[0].constrained else 0.0
+        self._path = Path(newton, state, start, predictor=predictor, idle=self._idle)
+
+    def frame(self, control: Control, before: Sequence[Frame]) -> Frame:
+        """The equilibrium under ``control``; ``before`` are the frames so far (collective).
+
+        Raises:
+            EquilibriumError: it was not reached; carries the frames before it.
+        """
+        clock, path = self._model.clock, self._path
+        start, seconds, iterations = perf_counter(), dict(clock.seconds), path.iterations
+        if control.constrained:
+            control = control.at(control.target + self._origin)
+        try:
+            solution = path.advance(control)
+        except PathFailed as failure:
+            raise self._unreached(control, failure, before) from failure
+        record = self._record(solution)
+        return replace(
+            record,
+            iterations=path.iterations - iterations,
+            seconds=perf_counter() - start,
+            phases=clock.since(seconds),
+        )
+
+    def _unloaded(self, assembly: Assembly) -> State:
+        """The configuration without force: the rigid assembly, or where motors that strain the links lead."""
+        configuration = self._request.configuration
+        motors = self._joints.motor_values(configuration.position)
+        state = self._model.assembled_state(assembly.poses, motors)
+        if assembly.fraction == 1.0:
+            return state
+        state = replace(state, motors=assembly.fraction * motors)
+        path = Path(self._newton, state, assembly.fraction, predictor=self._predictor, idle=self._idle)
+        # in space a motor's equation is periodic: steps must stay well below a half turn
+        steps = int(np.ceil((1.0 - assembly.fraction) * self._joints.travel(motors) / _LARGEST_TURN))
+        try:
+            for value in np.linspace(assembly.fraction, 1.0, steps + 1)[1:]:
+                state = path.advance(MotorControl(float(value), motors)).state
+        except PathFailed as failure:
+            raise EquilibriumError(
+                f"configuration {configuration.name!r}",
+                f"the motors strain the links, and no equilibrium was found beyond {failure.reached:.1%} of their way "
+                f"({failure.reason})",
+                "Choose motor positions nearer to the drawn ones, or a softer link",
+            ) from failure
+        return state
+
+    def _unreached(self, control: Control, failure: PathFailed, before: Sequence[Frame]) -> EquilibriumError:
+        what, origin = ("displacement", self._origin) if control.constrained else ("force", 0.0)
+        return EquilibriumError(
+            f"{self._request.force.name!r} in configuration {self._request.configuration.name!r}",
+            f"no equilibrium at {what} {control.target - origin:g}; the last one is at {failure.reached - origin:g} "
+            f"({failure.reason}; {len(failure.tried)} smaller steps were tried)",
+            "Try displacement control past a limit point, smaller samples, or a finer mesh",
+            last=before[-1] if before else None,
+            frames=before,
+        )
+
+    def _record(self, solution: Solution) -> Frame:
+        """What is measured in an equilibrium; the caller adds what it cost."""
+        model, state = self._model, solution.state
+        self._system.load(state)
+        with model.clock.phase("measure"):
+            stress = float(model.elastic.von_mises().max(initial=0.0))
+            return Frame(
+                force=state.force,
+                displacement=self._system.load_displacement(state) - self._origin,
+                stable=solution.unstable_modes == 0,
+                unstable_modes=solution.unstable_modes,
+                stable_under_control=solution.unstable_under_control == 0,
+                strain_energy=model.elastic.energy(),
+                max_stress=model.mesh.mesh.comm.allreduce(stress, op=MPI.MAX),
+                outputs={output: model.travel(output, state) - zero for output, zero in self._origins.items()},
+                reactions=joint_reactions(self._joints, state),
+                motors=motor_torques(self._joints, state),
+                iterations=solution.iterations,
+                residuals=solution.residuals,
+                seconds=0.0,
+                phases={},
+                state=state,
+            )

@@ -1,0 +1,153 @@
+"""What a simulation cannot do is refused by name, before anything is meshed."""
+
+import math
+
+import pytest
+from mpi4py import MPI
+
+import fenicsmech as fm
+
+from .demo_scenes import describe
+
+
+def simulate(scene: fm.Scene, **options) -> fm.Simulation:
+    return fm.Simulation(scene, **{"space": "plane-stress", "size": 5.0, "comm": MPI.COMM_SELF, **options})
+
+
+@pytest.fixture
+def truss():
+    """A simulation of the truss finger, the force on its tip and a second one."""
+    scene, push = describe("truss")
+    second = scene.mechanism.force(on=push.on, at=(0, 60), direction=(0, 1), name="second")
+    return simulate(scene), push, second
+
+
+def refused(part: str, action, *, simulation: fm.Simulation | None = None) -> None:
+    with pytest.raises(fm.DescriptionError) as caught:
+        action()
+    assert part in caught.value.part
+    assert caught.value.remedy
+    assert simulation is None or "model" not in vars(simulation)  # nothing was meshed
+
+
+@pytest.mark.parametrize("space", ["2d", "plane stress", "", 3, None])
+def test_unknown_space(space):
+    scene, _ = describe("truss")
+    refused("space", lambda: simulate(scene, space=space))
+
+
+@pytest.mark.parametrize("order", [0, 4, -1, 1.5, "2", None])
+def test_order_that_is_not_1_2_or_3(order):
+    scene, _ = describe("truss")
+    refused("order", lambda: simulate(scene, order=order))
+
+
+@pytest.mark.parametrize("size", [0.0, -2.0, math.nan, math.inf, "fine", None])
+def test_element_size_that_is_no_positive_number(size):
+    scene, _ = describe("truss")
+    refused("'diagonal'", lambda: simulate(scene, size=size))
+    (diagonal,) = scene.mechanism.flexible_links
+    refused("'diagonal'", lambda: simulate(scene, size={diagonal: size}))
+
+
+def test_sizes_per_link_that_leave_one_out():
+    scene, _ = describe("claw")
+    crank, *others = scene.mechanism.flexible_links
+    simulate(scene, size={crank: 3.0, **{link: 5.0 for link in others}})
+    refused("'crank'", lambda: simulate(scene, size={link: 5.0 for link in others}))
+
+
+def test_neither_or_both_of_forces_and_displacements(truss):
+    simulation, push, _ = truss
+    refused("'push on tip'", lambda: simulation.load_displacement(push), simulation=simulation)
+    refused(
+        "'push on tip'",
+        lambda: simulation.load_displacement(push, forces=[0.1], displacements=[1.0]),
+        simulation=simulation,
+    )
+
+
+@pytest.mark.parametrize("kind", ["forces", "displacements"])
+@pytest.mark.parametrize("samples", [[0.0, math.nan], [math.inf], ["much"], [None]])
+def test_samples_that_are_no_finite_numbers(truss, kind, samples):
+    simulation, push, _ = truss
+    refused("'push on tip'", lambda: simulation.load_displacement(push, **{kind: samples}), simulation=simulation)
+
+
+@pytest.mark.parametrize("kind", ["forces", "displacements"])
+def test_no_samples(truss, kind):
+    simulation, push, _ = truss
+    refused("'push on tip'", lambda: simulation.load_displacement(push, **{kind: []}), simulation=simulation)
+
+
+def test_force_of_another_mechanism(truss):
+    simulation, push, _ = truss
+    _, foreign = describe("claw")
+    refused(repr(foreign.name), lambda: simulation.load_displacement(foreign, forces=[0.1]), simulation=simulation)
+    refused(
+        repr(foreign.name),
+        lambda: simulation.load_displacement(push, forces=[0.1], others={foreign: 1.0}),
+        simulation=simulation,
+    )
+
+
+def test_other_force_without_a_finite_magnitude(truss):
+    simulation, push, second = truss
+    for magnitude in (math.nan, math.inf, "much"):
+        refused(
+            "'second'",
+            lambda magnitude=magnitude: simulation.load_displacement(push, forces=[0.1], others={second: magnitude}),
+            simulation=simulation,
+        )
+
+
+def test_force_that_is_led_and_constant_at_once(truss):
+    simulation, push, _ = truss
+    refused(
+        "'push on tip'",
+        lambda: simulation.load_displacement(push, forces=[0.1], others={push: 1.0}),
+        simulation=simulation,
+    )
+
+
+def test_configuration_of_another_mechanism(truss):
+    simulation, push, _ = truss
+    scene, _ = describe("claw")
+    turned = scene.configuration("turned", {scene.mechanism.motors[0]: 0.5})
+    refused(
+        "'turned'",
+        lambda: simulation.load_displacement(push, forces=[0.1], configuration=turned),
+        simulation=simulation,
+    )
+
+
+def test_force_and_output_beside_their_link():
+    scene, _ = describe("truss")
+    (diagonal,) = scene.mechanism.flexible_links
+    beside = scene.mechanism.force(on=diagonal, at=(30, 10), direction=(1, 0), name="beside")
+    with pytest.raises(fm.FenicsmechError, match="'beside'.*not on"):
+        simulate(scene).load_displacement(beside, forces=[0.1])
+
+
+def test_force_on_the_ground():
+    scene, push = describe("truss")
+    (ground,) = (link for link in scene.mechanism.rigid_links if link.fixed)
+    scene.mechanism.force(on=ground, at=(5, 0), direction=(1, 0), name="idle")
+    refused("'idle'", lambda: simulate(scene))
+
+
+def test_mechanism_that_cannot_be_assembled():
+    mechanism = fm.Mechanism("stuck")
+    base, crank, bar = (mechanism.rigid(name, fixed=name == "base") for name in ("base", "crank", "bar"))
+    strip = mechanism.flexible("strip", fm.strip([(40, 0), (40, 50)], thickness=3.0, depth=5.0), fm.ONYX)
+    shaft = mechanism.revolute(base, crank, at=(0, 0))
+    mechanism.revolute(crank, bar, at=(0, 10))
+    mechanism.revolute(bar, strip, at=(40, 50), radius=2.0)
+    mechanism.weld(base, strip, at=(40, 0), radius=2.0)
+    mechanism.weld(base, bar, at=(20, 30))
+    motor = mechanism.motor(shaft)
+    push = mechanism.force(on=bar, at=(20, 30), direction=(1, 0))
+    stuck = fm.Scene(mechanism)
+    half_turn = stuck.configuration("half a turn", {motor: math.pi})
+    with pytest.raises(fm.AssemblyError, match="'half a turn'.*does not close"):
+        simulate(stuck).load_displacement(push, forces=[1.0], configuration=half_turn)

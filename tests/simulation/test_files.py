@@ -1,0 +1,122 @@
+"""Pictures, tables and fields: complete files, alone and on several ranks, and nothing beside them."""
+
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+import pytest
+from dolfinx.io import XDMFFile
+from mpi4py import MPI
+
+import fenicsmech as fm
+from fenicsmech.report import Trace, read_curve_csv
+from fenicsmech.simulation.snapshot import gather
+
+from ..report.png import png_size, share_of_colour
+from .demo_scenes import describe
+
+pytestmark = pytest.mark.parallel
+
+COMM = MPI.COMM_WORLD
+FORCES = [0.0, 2.0, 5.0]
+RIGID_GREY = (86, 91, 99)
+
+
+def claw(space: str):
+    """The claw gripper, coarse, on all ranks, and its curve."""
+    scene, grasp = describe("claw")
+    order, size = (1, 6.0) if space == "3d" else (2, 4.0)
+    simulation = fm.Simulation(scene, space=space, order=order, size=size, comm=COMM)
+    return simulation, simulation.load_displacement(grasp, forces=FORCES)
+
+
+def names(folder: Path) -> set[str]:
+    """What is in ``folder``, once all ranks are done with it."""
+    COMM.Barrier()
+    found = {path.name for path in folder.iterdir()}
+    COMM.Barrier()
+    return found
+
+
+@pytest.mark.parametrize("space", ["plane-stress", "3d"])
+def test_fields_are_written_as_a_time_series_over_the_force(space, shared_tmp_path):
+    simulation, curve = claw(space)
+    path = shared_tmp_path / "new folder" / "claw.xdmf"
+    simulation.write(path)
+    assert names(path.parent) == {"claw.xdmf", "claw.h5"}
+
+    tree = ElementTree.parse(path)
+    heavy = {item.text.strip().split(":")[0] for item in tree.iter("DataItem") if item.get("Format") == "HDF"}
+    assert heavy == {"claw.h5"}
+    attributes = {attribute.get("Name") for attribute in tree.iter("Attribute")}
+    assert attributes == {"displacement", "von Mises stress"}
+    for name in attributes:
+        series = next(g for g in tree.iter("Grid") if g.get("Name") == name and g.get("GridType") == "Collection")
+        assert [float(time.get("Value")) for time in series.iter("Time")] == FORCES
+
+    with XDMFFile(COMM, str(path), "r") as file:
+        mesh = file.read_mesh(name="mesh")
+    topology = mesh.topology
+    assert topology.index_map(topology.dim).size_global == len(simulation.model.mesh.cells)
+    # HDF5 holds plain doubles: the largest displacement of the last frame stands among them
+    snapshot = gather(simulation.model, curve.frames[-1].state)
+    if snapshot is not None:
+        largest = snapshot.displacement.ravel()[np.argmax(np.abs(snapshot.displacement))]
+        heavy = path.with_suffix(".h5").read_bytes()
+        with np.errstate(invalid="ignore"):
+            distance = np.abs(np.frombuffer(heavy[: len(heavy) // 8 * 8]) - largest)
+        assert np.nanmin(distance) <= 1e-12 * abs(largest)
+
+
+def test_files_of_an_earlier_run_are_replaced(shared_tmp_path):
+    simulation, curve = claw("plane-stress")
+    other = simulation.load_displacement(curve.force_part, forces=[1.0])
+    path = shared_tmp_path / "claw.xdmf"
+    simulation.write(path, curve)
+    simulation.write(path)  # the last one computed
+    COMM.Barrier()
+    times = {float(time.get("Value")) for time in ElementTree.parse(path).iter("Time")}
+    assert times == set(other.forces)
+    assert names(shared_tmp_path) == {"claw.xdmf", "claw.h5"}
+
+
+@pytest.mark.parametrize("space", ["plane-stress", "3d"])
+def test_picture_shows_links_rigid_and_flexible(space, shared_tmp_path):
+    simulation, curve = claw(space)
+    (motor,) = simulation.scene.mechanism.motors
+    turn = [simulation.scene.configuration(f"{angle}", {motor: angle}) for angle in (-0.2, 0.0, 0.2)]
+    path = simulation.path(curve.force_part, turn)
+    assert path[1] == pytest.approx(curve.force_part.at if space != "3d" else (*curve.force_part.at, 0.0), abs=1e-9)
+    simulation.picture(shared_tmp_path / "claw.png")
+    simulation.picture(
+        shared_tmp_path / "plain.png", curve, stress=False, traces=[Trace(path[:, :2], "tip", path[1:2, :2])]
+    )
+    assert names(shared_tmp_path) == {"claw.png", "plain.png"}
+    for name in ("claw.png", "plain.png"):
+        width, height = png_size(shared_tmp_path / name)
+        assert width > 400 and height > 400
+        assert share_of_colour(shared_tmp_path / name, RIGID_GREY) > 0.002
+    assert (shared_tmp_path / "claw.png").read_bytes() != (shared_tmp_path / "plain.png").read_bytes()
+
+
+def test_curve_is_drawn_and_tabulated(shared_tmp_path):
+    _, curve = claw("plane-stress")
+    curve.plot(shared_tmp_path / "curve.png")
+    curve.write_csv(shared_tmp_path / "curve.csv")
+    assert names(shared_tmp_path) == {"curve.png", "curve.csv"}
+    assert min(png_size(shared_tmp_path / "curve.png")) > 300
+    table = read_curve_csv(shared_tmp_path / "curve.csv")
+    assert table["force [N]"] == pytest.approx(FORCES, abs=0.0)
+    assert table["displacement [mm]"] == pytest.approx(curve.displacements, abs=0.0)
+    assert table["stable"] == pytest.approx([1.0, 1.0, 1.0])
+    assert table["strain energy [N mm]"] == pytest.approx([frame.strain_energy for frame in curve.frames], abs=0.0)
+    assert table["max von Mises [MPa]"] == pytest.approx([frame.max_stress for frame in curve.frames], abs=0.0)
+
+
+def test_nothing_can_be_drawn_or_written_before_a_curve_is_computed(shared_tmp_path):
+    scene, _ = describe("truss")
+    simulation = fm.Simulation(scene, space="plane-stress", size=4.0, comm=COMM)
+    for action in (simulation.write, simulation.picture):
+        with pytest.raises(fm.DescriptionError, match="load_displacement first"):
+            action(shared_tmp_path / "nothing")
+    assert names(shared_tmp_path) == set()
