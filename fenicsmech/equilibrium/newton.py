@@ -144,7 +144,7 @@ class Newton:
         )
 
     def _relative(self, balance: Balance) -> float:
-        return balance.norm / max(balance.forces, self.options.roundoff * self.system.unit / self.options.tolerance)
+        return balance.norm / max(balance.forces, self.options.roundoff * self.system.unit)
 
     def _converged(self, balance: Balance) -> bool:
         return balance.norm <= max(self.options.tolerance * balance.forces, self.options.roundoff * self.system.unit)
