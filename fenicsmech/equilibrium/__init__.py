@@ -10,7 +10,7 @@
 - ``reactions``: what joints and motors exert
 """
 
-from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadControl, MotorControl
+from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadControl, MotorControl, ShareControl
 from fenicsmech.equilibrium.load import PointLoad
 from fenicsmech.equilibrium.newton import Newton, NewtonOptions, NotConverged, Solution
 from fenicsmech.equilibrium.path import Path, PathFailed
@@ -35,6 +35,7 @@ __all__ = [
     "PointLoad",
     "Predictor",
     "Reaction",
+    "ShareControl",
     "Solution",
     "State",
     "Step",

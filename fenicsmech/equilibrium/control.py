@@ -1,4 +1,4 @@
-"""What is led along a path of equilibria: a force, the displacement of its point, or motors.
+"""What is led along a path of equilibria: a force, the displacement of its point, motors, or constant loads.
 
 The magnitude f of the controlled force is always an unknown. Its equation is
 
@@ -25,6 +25,9 @@ class Rates(Protocol):
 
     def target_rate(self) -> PETSc.Vec:
         """With the displacement of its point."""
+
+    def share_rate(self, state: State) -> PETSc.Vec:
+        """With the share of the constant loads that acts."""
 
     def motor_rate(self, state: State, direction: np.ndarray) -> PETSc.Vec:
         """With motor values along ``direction`` (per connection)."""
@@ -104,3 +107,20 @@ class MotorControl(Control):
 
     def rate(self, system, state):
         return system.motor_rate(state, self.motors)
+
+
+@dataclass(frozen=True)
+class ShareControl(Control):
+    """The share ``target`` of the constant loads acts."""
+
+    target: float
+    constrained = False
+
+    def at(self, target):
+        return ShareControl(target)
+
+    def prepare(self, state):
+        return replace(state, share=self.target)
+
+    def rate(self, system, state):
+        return system.share_rate(state)

@@ -32,6 +32,7 @@ from fenicsmech.equilibrium.system import Balance, EquilibriumSystem
 from fenicsmech.log import logger
 
 _log = logger(__name__)
+_LEAST_SHIFT = 1e-9  # in units of the mean stiffness; slender links bend with 1e-6 of it and less
 
 
 @dataclass(frozen=True)
@@ -119,8 +120,7 @@ class Newton:
             if iteration == options.iterations:
                 break
             near = trusted and residuals[-1] < options.near
-            shift = floor if near else max(floor, shift / 3.0 if shift > 1e-9 else 0.0)
-            step, inertia, shift = self._direction(state, control, balance, shift, any_inertia=near)
+            step, inertia, shift = self._direction(state, control, balance, floor, last=shift, any_inertia=near)
             _log.debug("iteration %d: residual %.2e, shift %.1e, %s", iteration, residuals[-1], shift, inertia)
             before, norm = state, balance.norm
             advance = self._search if careful else self._full_step
@@ -150,17 +150,21 @@ class Newton:
         return balance.norm <= max(self.options.tolerance * balance.forces, self.options.roundoff * self.system.unit)
 
     def _direction(
-        self, state: State, control: Control, balance: Balance, shift: float, *, any_inertia: bool
+        self, state: State, control: Control, balance: Balance, floor: float, *, last: float, any_inertia: bool
     ) -> tuple[Step, Inertia, float]:
-        """The Newton step; unless ``any_inertia`` will do, raises δ until the inertia promises descent."""
+        """The Newton step; unless ``any_inertia`` will do, raises δ until the inertia promises descent.
+
+        δ = ``floor`` is tried first; then a third of the ``last`` one that served, and eight times that, …
+        """
         system = self.system
         matrix = system.kkt(state, control, balance)
+        shift, following = floor, max(_LEAST_SHIFT, last / 3.0)
         for _ in range(20):
             inertia = self._refactor(matrix, shift)
             descends = inertia is not None and inertia.negative <= self._expected and inertia.zero == 0
             if descends or (any_inertia and inertia is not None):
                 break
-            shift = max(1e-8, 8.0 * shift)
+            shift, following = following, 8.0 * following
         else:
             raise NotConverged("no shift of the tangent gives a direction of descent", 0)
         with system.clock.phase("solve"):

@@ -17,6 +17,7 @@ class State:
         multipliers: λ, one per constraint row, on every rank.
         force: magnitude f of the controlled force.
         motors: motor value per connection.
+        share: how much of the constant loads acts, 0 … 1.
     """
 
     u: np.ndarray
@@ -24,6 +25,7 @@ class State:
     multipliers: np.ndarray
     force: float
     motors: np.ndarray
+    share: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ dimensionless.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from petsc4py import PETSc
@@ -106,9 +106,15 @@ class EquilibriumSystem:
         """``state`` after ``step``: rotations back on their manifold, interface nodes on their bodies (collective)."""
         z = self.joints.unknowns(state.poses) + step.z
         poses = self.joints.with_unknowns(state.poses, z)
-        multipliers, force = state.multipliers + step.multipliers, state.force + step.force
-        self.load(State(state.u + step.u, poses, multipliers, force, state.motors))
-        return State(self._u.array_r.copy(), poses, multipliers, force, state.motors)
+        moved = replace(
+            state,
+            u=state.u + step.u,
+            poses=poses,
+            multipliers=state.multipliers + step.multipliers,
+            force=state.force + step.force,
+        )
+        self.load(moved)
+        return replace(moved, u=self._u.array_r.copy())
 
     def load(self, state: State) -> None:
         """Makes the finite-element field hold ``state`` (collective)."""
@@ -145,7 +151,7 @@ class EquilibriumSystem:
     def potential(self, state: State, force: float) -> float:
         """E_int − Σ loads − f a · u_P with ``force`` for f (collective)."""
         work = force * self._travel(self.controlled, state)
-        work += sum(magnitude * self._travel(load, state) for load, magnitude in self.loads)
+        work += state.share * sum(magnitude * self._travel(load, state) for load, magnitude in self.loads)
         return self.elastic_energy() - work
 
     def constraints(self, state: State) -> np.ndarray:
@@ -218,6 +224,13 @@ class EquilibriumSystem:
         self._add_load(self.controlled, 1.0, state, nodal, extras)
         return self._right_hand_side(nodal, extras)
 
+    def share_rate(self, state: State) -> PETSc.Vec:
+        """Right-hand side whose KKT solution is the rate of x with the share of the constant loads (collective)."""
+        nodal, extras = np.zeros(self.layout.owned), np.zeros(self.layout.extras)
+        for load, magnitude in self.loads:
+            self._add_load(load, magnitude, state, nodal, extras)
+        return self._right_hand_side(nodal, extras)
+
     def target_rate(self) -> PETSc.Vec:
         """Right-hand side whose KKT solution is the rate of x with the controlled displacement (collective)."""
         extras = np.zeros(self.layout.extras)
@@ -260,7 +273,7 @@ class EquilibriumSystem:
         return vector
 
     def _acting(self, state: State) -> list[tuple[PointLoad, float]]:
-        return [(self.controlled, state.force), *self.loads]
+        return [(self.controlled, state.force), *((load, state.share * size) for load, size in self.loads)]
 
     def _travel(self, load: PointLoad, state: State) -> float:
         return float(load.direction @ load.point.displacement(self.elastic.u, state.poses))

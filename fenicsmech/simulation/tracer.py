@@ -16,6 +16,7 @@ from fenicsmech.equilibrium import (
     Path,
     PathFailed,
     Predictor,
+    ShareControl,
     Solution,
     State,
     joint_reactions,
@@ -42,7 +43,7 @@ class Tracer:
         predictor: how the next equilibrium is guessed.
 
     Raises:
-        EquilibriumError: the motors strain the links, and no equilibrium was found on the way.
+        EquilibriumError: motors that strain the links, or the constant forces, lead to no equilibrium.
     """
 
     def __init__(
@@ -62,7 +63,10 @@ class Tracer:
         self._system.load(state)
         self._origin = self._system.load_displacement(state)
         self._origins = {output: model.travel(output, state) for output in model.mechanism.outputs}
-        start = self._origin if request.controls[0].constrained else 0.0
+        if request.others:
+            state = self._under_constant_loads(state)
+            self._system.load(state)
+        start = self._system.load_displacement(state) if request.controls[0].constrained else 0.0
         self._path = Path(newton, state, start, predictor=predictor, idle=self._idle)
 
     def frame(self, control: Control, before: Sequence[Frame]) -> Frame:
@@ -109,6 +113,19 @@ class Tracer:
                 "Choose motor positions nearer to the drawn ones, or a softer link",
             ) from failure
         return state
+
+    def _under_constant_loads(self, state: State) -> State:
+        """The configuration under the request's constant forces, which grow together."""
+        path = Path(self._newton, replace(state, share=0.0), 0.0, predictor=self._predictor, idle=self._idle)
+        try:
+            return path.advance(ShareControl(1.0)).state
+        except PathFailed as failure:
+            names = ", ".join(repr(force.name) for force, _ in self._request.others)
+            raise EquilibriumError(
+                f"constant forces {names} in configuration {self._request.configuration.name!r}",
+                f"no equilibrium beyond {failure.reached:.1%} of them ({failure.reason})",
+                "Choose smaller forces",
+            ) from failure
 
     def _unreached(self, control: Control, failure: PathFailed, before: Sequence[Frame]) -> EquilibriumError:
         what, origin = ("displacement", self._origin) if control.constrained else ("force", 0.0)

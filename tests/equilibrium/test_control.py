@@ -2,7 +2,11 @@
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
+import fenicsmech as fm
+
+from ..simulation.demo_scenes import describe
 from .arch import DISPLACEMENTS, RISE, arch, beam_forces
 from .finger import finger
 
@@ -68,3 +72,13 @@ def test_other_forces_stay_while_one_is_led():
     nothing = simulation.load_displacement(push, forces=[2.0], others={pull: 2.0}).frames[0]
     assert nothing.displacement == pytest.approx(0.0, abs=1e-9)
     assert nothing.strain_energy == pytest.approx(0.0, abs=1e-12)
+
+
+def test_constant_force_is_reached_as_surely_as_one_that_is_led():
+    # takes several load steps from the unloaded state, whichever way the force is given
+    scene, lift = describe("klann")
+    constant = scene.mechanism.force(on=lift.on, at=lift.at, direction=(0, 1), name="constant")
+    simulation = fm.Simulation(scene, space="plane-stress", size=4.0, comm=MPI.COMM_SELF)
+    led = simulation.load_displacement(lift, forces=[10.0])
+    both = simulation.load_displacement(lift, forces=[0.0], others={constant: 10.0})
+    assert both.displacements == pytest.approx(led.displacements, rel=1e-9)
