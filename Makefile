@@ -75,12 +75,14 @@ $(DEMOS:%=demo-quick-%): demo-quick-%: install
 	$(call heading,demo $*)
 	$(PYTHON) demos/$*.py --quick --out results/quick/$*
 
-bench: $(DEMOS:%=bench-%) ## seconds per frame (frame_median) of every demo's initial design, in results/bench/
+bench: $(DEMOS:%=bench-%) ## seconds per frame (frame_median) of every demo's initial design: 3D, on ranks, plane stress
 
 .PHONY: $(DEMOS:%=bench-%)
 $(DEMOS:%=bench-%): bench-%: install
 	$(call heading,benchmark $*)
 	$(PYTHON) demos/$*.py --simulate-only --out results/bench/$*
+	$(MPIRUN) $(PYTHON) demos/$*.py --simulate-only --out results/bench/$*-$(RANKS)-ranks
+	$(PYTHON) demos/$*.py --simulate-only --space plane-stress --out results/bench/$*-plane-stress
 
 clean: ## remove what the targets above left in this tree
 	rm -rf .venv results .pytest_cache .ruff_cache .hypothesis
