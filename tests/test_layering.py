@@ -29,6 +29,7 @@ LAYERS = (
     "bodies",
     "equilibrium",
     "simulation",
+    "design",
 )
 
 # Libraries that belong to a few layers only: descriptions and joints know no elements, only one layer makes meshes,

@@ -26,6 +26,7 @@ class InterfaceMap:
         body: body of every local node of u, −1 if free, (owned + ghost nodes,); the same on all ranks.
         owned: number of owned nodes.
         nodes: local eliminated nodes, owned and ghost, per body.
+        offsets: X_i − c of these nodes.
     """
 
     def __init__(self, u: fem.Function, cell_body: np.ndarray, centres: np.ndarray, space: RigidSpace) -> None:
@@ -37,7 +38,12 @@ class InterfaceMap:
         bodies = np.unique(self.body[self.body >= 0])
         self.nodes = {int(b): np.flatnonzero(self.body == b) for b in bodies}
         positions = V.tabulate_dof_coordinates()[:, : self.block]
-        self.offsets = {b: positions[nodes] - centres[b] for b, nodes in self.nodes.items()}
+        self._drawn = {b: positions[nodes] - centres[b] for b, nodes in self.nodes.items()}
+        self.offsets = dict(self._drawn)
+
+    def reshape(self, design: np.ndarray) -> None:
+        """Takes the design at all local nodes, (nodes, dim): offsets become X₀ + d − c."""
+        self.offsets = {b: self._drawn[b] + design[nodes] for b, nodes in self.nodes.items()}
 
     def _mark_nodes(self, cell_body: np.ndarray) -> np.ndarray:
         """Body of every local node; a node may touch an interface cell only on another rank."""

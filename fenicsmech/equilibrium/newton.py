@@ -143,6 +143,22 @@ class Newton:
             options.iterations,
         )
 
+    def factor(self, state: State, control: Control, balance: Balance, floor: float) -> None:
+        """Factors the KKT matrix of the loaded ``state``, for linear solves with it (collective).
+
+        Raises:
+            NotConverged: it cannot be factored.
+        """
+        if self._refactor(self.system.kkt(state, control, balance), floor) is None:
+            raise NotConverged("the tangent at the equilibrium cannot be factored", 0)
+
+    def solve_linear(self, right: PETSc.Vec) -> PETSc.Vec:
+        """The solution of KKT x = ``right`` with the last factor (collective)."""
+        with self.system.clock.phase("solve"):
+            x = right.duplicate()
+            self._factor.solve(right, x)
+            return x
+
     def _relative(self, balance: Balance) -> float:
         return balance.norm / max(balance.forces, self.options.roundoff * self.system.unit)
 
@@ -167,10 +183,8 @@ class Newton:
             shift, following = following, 8.0 * following
         else:
             raise NotConverged("no shift of the tangent gives a direction of descent", 0)
-        with system.clock.phase("solve"):
-            x = balance.vector.duplicate()
-            self._factor.solve(balance.vector, x)
-            x.scale(-1.0)
+        x = self.solve_linear(balance.vector)
+        x.scale(-1.0)
         return system.step(x), inertia, shift
 
     def _refactor(self, matrix: PETSc.Mat, shift: float) -> Inertia | None:
@@ -235,16 +249,11 @@ class Newton:
             inertia = self._refactor(system.kkt(state, control, balance), floor)
         if inertia is None:
             raise NotConverged("the tangent at the equilibrium cannot be factored", iteration)
-        with system.clock.phase("solve"):
-            right = control.rate(system, state)
-            x = right.duplicate()
-            self._factor.solve(right, x)
-            under_control = inertia.negative - self._expected
-            unstable = under_control
-            if control.constrained:
-                row = system.control_row()
-                response = row.duplicate()
-                self._factor.solve(row, response)
-                # Schur complement of the control row: negative exactly if removing the row leaves stability as it is
-                unstable += 1 - int(response.dot(row) < 0.0)
+        x = self.solve_linear(control.rate(system, state))
+        under_control = inertia.negative - self._expected
+        unstable = under_control
+        if control.constrained:
+            row = system.control_row()
+            # Schur complement of the control row: negative exactly if removing the row leaves stability as it is
+            unstable += 1 - int(self.solve_linear(row).dot(row) < 0.0)
         return Solution(state, tuple(residuals), iteration, max(unstable, 0), max(under_control, 0), system.step(x))

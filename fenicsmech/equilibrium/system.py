@@ -220,8 +220,12 @@ class EquilibriumSystem:
 
     def force_rate(self, state: State) -> PETSc.Vec:
         """Right-hand side whose KKT solution is the rate of x with the controlled force (collective)."""
+        return self.travel_gradient(self.controlled, state)
+
+    def travel_gradient(self, load: PointLoad, state: State) -> PETSc.Vec:
+        """Gᵀ ∂(a · u_P), of a load's travel with respect to the scaled unknowns x (collective)."""
         nodal, extras = np.zeros(self.layout.owned), np.zeros(self.layout.extras)
-        self._add_load(self.controlled, 1.0, state, nodal, extras)
+        self._add_load(load, 1.0, state, nodal, extras)
         return self._right_hand_side(nodal, extras)
 
     def share_rate(self, state: State) -> PETSc.Vec:
@@ -243,6 +247,16 @@ class EquilibriumSystem:
         rate, twist = self.joints.motor_rate(state.poses, state.motors, state.multipliers, direction)
         extras[self.layout.multipliers], extras[self.layout.z] = rate, twist
         return self._right_hand_side(np.zeros(self.layout.owned), extras)
+
+    def expand(self, x: PETSc.Vec) -> tuple[np.ndarray, np.ndarray]:
+        """∂u/∂x · x at the owned nodes, interface nodes too, (owned dofs,), and the poses' part z (collective)."""
+        rows = self._hat.createVecLeft()
+        self._map.mult(x, rows)
+        return rows.array_r[: self.layout.owned].copy(), self.step(x).z
+
+    def nodal_forces(self) -> np.ndarray:
+        """∂E/∂u minus the loads on links of the last ``balance``, (owned dofs,)."""
+        return self._rows.array_r[: self.layout.owned].copy()
 
     def control_row(self) -> PETSc.Vec:
         """The unit vector of the unknown f (collective)."""

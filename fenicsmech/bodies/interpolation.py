@@ -1,0 +1,53 @@
+"""The P1 design field at the nodes of the displacement field, d_i = Σ_k N_k(X_i) d_k, and its transpose."""
+
+from __future__ import annotations
+
+import numpy as np
+from dolfinx import fem
+from petsc4py import PETSc
+from scipy.sparse import csr_matrix
+
+from fenicsmech.compat import petsc_vector
+
+
+class DesignAtNodes:
+    """Interpolation of the vector P1 field ``d`` at the nodes of the Lagrange field ``u`` on the same mesh.
+
+    Args:
+        d: design field.
+        u: displacement field.
+    """
+
+    def __init__(self, d: fem.Function, u: fem.Function) -> None:
+        self._d, coarse, fine = d, d.function_space, u.function_space
+        dim = coarse.dofmap.index_map_bs
+        self.owned = fine.dofmap.index_map.size_local
+        cells = range(coarse.mesh.topology.index_map(dim).size_local)
+        corners = np.array([coarse.dofmap.cell_dofs(cell) for cell in cells]).reshape(len(cells), -1)
+        nodes = np.array([fine.dofmap.cell_dofs(cell) for cell in cells]).reshape(len(cells), -1)
+        corner_at = coarse.tabulate_dof_coordinates()[:, :dim][corners]
+        offset = fine.tabulate_dof_coordinates()[:, :dim][nodes] - corner_at[:, :1]
+        # barycentric coordinates of every node in its cell
+        edges = (corner_at[:, 1:] - corner_at[:, :1]).transpose(0, 2, 1)
+        inner = np.linalg.solve(edges, offset.transpose(0, 2, 1)).transpose(0, 2, 1)
+        weights = np.concatenate([1.0 - inner.sum(axis=2, keepdims=True), inner], axis=2)
+        shape = (len(u.x.array) // dim, len(d.x.array) // dim)
+        rows = np.repeat(nodes, dim + 1, axis=1).ravel()
+        columns = np.tile(corners, (1, nodes.shape[1])).ravel()
+        # cells that share a node give it the same values: keep one
+        _, first = np.unique(rows * shape[1] + columns, return_index=True)
+        self._matrix = csr_matrix((weights.ravel()[first], (rows[first], columns[first])), shape=shape)
+        self._matrix.data[np.abs(self._matrix.data) < 1e-12] = 0.0
+
+    def values(self) -> np.ndarray:
+        """d at all local nodes of u, (nodes, dim)."""
+        dim = self._d.function_space.dofmap.index_map_bs
+        return self._matrix @ self._d.x.array.reshape(-1, dim)
+
+    def add_transpose(self, nodal: np.ndarray, vector: PETSc.Vec) -> None:
+        """Adds Nᵀ ``nodal`` ((owned nodes of u, dim)) to the ghosted ``vector`` on the space of d (collective)."""
+        pulled = fem.Function(self._d.function_space)
+        pulled.x.array[:] = (self._matrix[: self.owned].T @ nodal).ravel()
+        share = petsc_vector(pulled)
+        share.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        vector.array_w[:] += share.array_r

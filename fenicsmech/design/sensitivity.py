@@ -1,0 +1,130 @@
+"""Adjoint sensitivities of an equilibrium: design field, moduli and force, one linear solve per output.
+
+At an equilibrium F(y, p) = Gᵀ ∇L = 0 with y = (s, λ). For an output O(y), with the symmetric KKT matrix ∂F/∂y,
+
+    KKT x = ∂O/∂y,     dO/dp = −xᵀ ∂F/∂p.
+
+With û = ∂u/∂y · x at all nodes and ẑ the poses' part of x,
+
+    xᵀ ∂F/∂d = ∂(r · û)/∂d  +  Σ_i over interface nodes [ (K û)_i · (R − I) + r_i · (ẑ_r ∂R/∂r) ] ∂X_i/∂d,
+
+the second part because an interface node's displacement depends on where it was drawn. Source: implicit function
+theorem, equations 8 and 9 of the paper this package follows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from fenicsmech.bodies import DesignAtNodes
+from fenicsmech.compat import compile_form, petsc_vector
+from fenicsmech.equilibrium import LoadControl, Newton, PointLoad, State
+from fenicsmech.simulation.model import MechanismModel
+
+
+@dataclass(frozen=True)
+class Gradient:
+    """Derivatives of one scalar output.
+
+    Attributes:
+        design: with respect to the design field, this rank's owned P1 values, flat.
+        youngs_moduli, poissons_ratios: with respect to each link's constants, (links,).
+        force: with respect to the controlled force.
+    """
+
+    design: np.ndarray
+    youngs_moduli: np.ndarray
+    poissons_ratios: np.ndarray
+    force: float
+
+
+class Adjoint:
+    """Sensitivities at equilibria of one model under one controlled force."""
+
+    def __init__(self, model: MechanismModel, newton: Newton) -> None:
+        self._model, self._newton, self._system = model, newton, newton.system
+        self._weight = fem.Function(model.elastic.u.function_space, name="adjoint")
+        self._nodes = DesignAtNodes(model.elastic.d, model.elastic.u)
+
+    def reshape(self, design: np.ndarray) -> None:
+        """Gives the links the rest shape X₀ + d, d this rank's P1 values with ghosts, flat."""
+        self._model.elastic.d.x.array[:] = design
+        self._model.interfaces.reshape(self._nodes.values())
+
+    def gradients(self, state: State, outputs: list[PointLoad], *, floor: float = 0.0) -> list[Gradient]:
+        """The derivatives of the travel of each of ``outputs`` at the equilibrium ``state`` (collective)."""
+        system, control = self._system, LoadControl(state.force)
+        system.load(state)
+        balance = system.balance(state, control)
+        forces = system.nodal_forces()
+        self._newton.factor(state, control, balance, floor)
+        return [self._gradient(state, output, forces) for output in outputs]
+
+    def _gradient(self, state: State, output: PointLoad, forces: np.ndarray) -> Gradient:
+        system = self._system
+        right = system.travel_gradient(output, state)
+        x = self._newton.solve_linear(right)
+        u, z = system.expand(x)
+        weight = petsc_vector(self._weight)
+        weight.array_w[:] = u
+        weight.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
+
+        design = self._assemble(self._forms["design"])
+        stiff = self._assemble(self._forms["displacement"]).array_r
+        self._nodes.add_transpose(self._interface_terms(state, z, stiff, forces), design)
+        return Gradient(
+            design=-design.array_r,
+            youngs_moduli=-self._per_link(self._forms["youngs_modulus"]),
+            poissons_ratios=-self._per_link(self._forms["poissons_ratio"]),
+            force=x.dot(system.force_rate(state)),
+        )
+
+    def _interface_terms(self, state: State, z: np.ndarray, stiff: np.ndarray, forces: np.ndarray) -> np.ndarray:
+        """(R − I)ᵀ (K û)_i + (ẑ_r ∂R/∂r)ᵀ r_i at owned interface nodes, (owned nodes, dim)."""
+        interfaces, joints = self._model.interfaces, self._model.linkage.joints
+        dim = joints.space.dim
+        stiff, forces = stiff.reshape(-1, dim), forces.reshape(-1, dim)
+        nodal = np.zeros_like(stiff)
+        for body, nodes in interfaces.nodes.items():
+            mine = nodes[nodes < interfaces.owned]
+            turn = np.einsum(
+                "a,aij->ij", z[joints.columns[body]][dim:], joints.space.rotation_gradient(state.poses[body])
+            )
+            nodal[mine] = stiff[mine] @ joints.space.rotation_increment(state.poses[body]) + forces[mine] @ turn
+        return nodal
+
+    @cached_property
+    def _forms(self) -> dict:
+        """r · û, differentiated by the design, the displacement and the moduli."""
+        elastic = self._model.elastic
+        work = ufl.derivative(elastic.energy_ufl, elastic.u, self._weight)
+        by = {
+            "design": elastic.d,
+            "displacement": elastic.u,
+            "youngs_modulus": elastic.youngs_modulus,
+            "poissons_ratio": elastic.poissons_ratio,
+        }
+        with self._model.clock.phase("compile"):
+            return {name: compile_form(ufl.derivative(work, field)) for name, field in by.items()}
+
+    def _assemble(self, form) -> PETSc.Vec:
+        with self._model.clock.phase("adjoint"):
+            vector = fem.petsc.create_vector(form)
+            with vector.localForm() as local:
+                local.set(0.0)
+            fem.petsc.assemble_vector(vector, form)
+            vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+            return vector
+
+    def _per_link(self, form) -> np.ndarray:
+        cells = self._assemble(form).array_r
+        link = self._model.mesh.link[: len(cells)]
+        sums = np.bincount(link, weights=cells, minlength=len(self._model.mechanism.flexible_links))
+        return self._model.mesh.mesh.comm.allreduce(sums, op=MPI.SUM)
