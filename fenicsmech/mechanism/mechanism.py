@@ -160,21 +160,28 @@ class Mechanism:
 
     def force(self, *, on: Link, at: Sequence[float], direction: Sequence[float], name: str | None = None) -> Force:
         """Adds a dead force along ``direction`` at the material point ``at`` of link ``on``."""
-        self._check_member(f"{name or 'force'!r}", on)
-        name = name or f"force on {on.name}"
-        self._check_name(f"{name!r}", name, self.forces)
-        force = Force(on, point(f"position of {name!r}", at), unit(f"direction of {name!r}", direction), name)
-        self.forces.append(force)
-        return force
+        return self._add_at_point(Force, self.forces, on, at, direction, name)
 
     def output(self, *, on: Link, at: Sequence[float], direction: Sequence[float], name: str | None = None) -> Output:
         """Adds an output: the displacement along ``direction`` of the material point ``at`` of link ``on``."""
-        self._check_member(f"{name or 'output'!r}", on)
-        name = name or f"output on {on.name}"
-        self._check_name(f"{name!r}", name, self.outputs)
-        output = Output(on, point(f"position of {name!r}", at), unit(f"direction of {name!r}", direction), name)
-        self.outputs.append(output)
-        return output
+        return self._add_at_point(Output, self.outputs, on, at, direction, name)
+
+    def _add_at_point(
+        self,
+        kind: type[Force] | type[Output],
+        taken: list,
+        on: Link,
+        at: Sequence[float],
+        direction: Sequence[float],
+        name: str | None,
+    ) -> Force | Output:
+        what = kind.__name__.lower()
+        self._check_member(f"{name or what!r}", on)
+        name = name or f"{what} on {on.name}"
+        self._check_name(f"{name!r}", name, taken)
+        part = kind(on, point(f"position of {name!r}", at), unit(f"direction of {name!r}", direction), name)
+        taken.append(part)
+        return part
 
     def _add_link(self, link: Link) -> Link:
         self._check_name(f"link {link.name!r}", link.name, self.links)
