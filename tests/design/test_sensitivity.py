@@ -16,7 +16,7 @@ FORCE = 8.0
 
 
 class Bench:
-    """A four-bar of two flexible links and a rigid one, loaded on the rigid one; the design field is a free function."""
+    """A four-bar of two flexible links and a rigid, loaded one; the design field is a free function."""
 
     def __init__(self, space: str) -> None:
         mechanism = fm.Mechanism("four-bar")
