@@ -145,6 +145,14 @@ class Simulation:
             self._newtons[key] = Newton(model.system(model.point_load(force), loads), self._options)
         return self._newtons[key]
 
+    def von_mises(self, frame: Frame) -> np.ndarray | None:
+        """Von Mises stress at the midpoints of all cells, on rank 0; None elsewhere (collective).
+
+        Cells are numbered as in ``model.mesh.cells``, (cells,).
+        """
+        snapshot = gather(self.model, frame.state)
+        return None if snapshot is None else snapshot.von_mises
+
     def write(self, path: str | FilePath, curve: Curve | None = None) -> None:
         """Writes the frames of ``curve`` (the last one computed) as XDMF for ParaView (collective).
 

@@ -120,3 +120,17 @@ def test_nothing_can_be_drawn_or_written_before_a_curve_is_computed(shared_tmp_p
         with pytest.raises(fm.DescriptionError, match="load_displacement first"):
             action(shared_tmp_path / "nothing")
     assert names(shared_tmp_path) == set()
+
+
+@pytest.mark.parametrize("space", ["plane-stress", "3d"])
+def test_stress_field_peaks_at_the_largest_stress_of_the_frame_and_vanishes_in_interfaces(space):
+    simulation, curve = claw(space)
+    stress = simulation.von_mises(curve.frames[-1])
+    assert (stress is None) == (COMM.rank > 0)
+    if stress is not None:
+        mesh = simulation.model.mesh
+        assert stress.shape == (len(mesh.cells),)
+        assert stress.max() == pytest.approx(curve.frames[-1].max_stress, rel=1e-12)
+        pin = np.linalg.norm(mesh.vertices[mesh.cells][..., :2] - (15.0, 0.0), axis=-1).max(axis=1) < 3.0 + 1e-9
+        assert pin.any()
+        assert stress[pin].max() < 1e-9 * stress.max()
