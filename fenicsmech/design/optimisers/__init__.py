@@ -1,0 +1,21 @@
+"""Minimisers of a regularised least-squares objective O(p) = ½ |r(p)|² + R(p).
+
+- ``problem``: what is minimised, and the history of a minimisation
+- ``levenberg_marquardt``: uses the structure; the default
+- ``bfgs``: quasi-Newton with backtracking, as in the paper this package follows
+"""
+
+from fenicsmech.design.optimisers.bfgs import Bfgs
+from fenicsmech.design.optimisers.levenberg_marquardt import LevenbergMarquardt
+from fenicsmech.design.optimisers.problem import Evaluation, Infeasible, Iterate, LeastSquaresProblem, Minimiser, Reason
+
+__all__ = [
+    "Bfgs",
+    "Evaluation",
+    "Infeasible",
+    "Iterate",
+    "LeastSquaresProblem",
+    "LevenbergMarquardt",
+    "Minimiser",
+    "Reason",
+]
