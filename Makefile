@@ -58,6 +58,7 @@ test-serial: install-test ## the tests on one process
 test-parallel: install-test ## the tests marked `parallel`, on two MPI ranks
 	$(call heading,tests on $(RANKS) ranks)
 	$(MPIRUN) $(PYTHON) -m pytest --color=no -p no:cacheprovider -m "parallel and ($(SELECT))"
+	OPENBLAS_NUM_THREADS=1 mpirun -n 4 $(PYTHON) -m pytest --color=no -p no:cacheprovider tests/simulation/test_ranks.py
 
 test-slow: install-test ## the tests marked `slow`
 	$(call heading,slow tests)

@@ -72,11 +72,11 @@ def simulation(demo: Demo, scene: fm.Scene) -> fm.Simulation:
 
 
 def finish(demo: Demo, sim: fm.Simulation, curves: Sequence[fm.Curve], targets: Sequence[Target]) -> None:
-    """Leaves pictures, curve and summary in the demo's folder and prints what was found (collective)."""
+    """Leaves pictures, curves, fields and summary in the demo's folder and prints what was found (collective)."""
     panels = [sim.panel(curve) for curve in curves]
-    sim.write(demo.folder / "deformed.xdmf", curves[-1])
-    dofs = {"rigid": sim.model.rigid_dofs, "flexible": sim.model.flexible_dofs}
-    memory = sim.comm.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, op=MPI.MAX) / 1024.0
+    for curve in curves:
+        sim.write(demo.folder / f"deformed{_suffix(curve, curves)}.xdmf", curve)
+    summary = summarise(demo, sim, curves, targets)
     if not demo.leads:
         return
     draw_configurations(
@@ -88,26 +88,26 @@ def finish(demo: Demo, sim: fm.Simulation, curves: Sequence[fm.Curve], targets: 
         title=f"{sim.scene.mechanism.name}: initial design",
     )
     for curve in curves:
-        suffix = f"-{curve.configuration.name.replace(' ', '-')}" if len(curves) > 1 else ""
-        curve.write_csv(demo.folder / f"curve{suffix}.csv")
-    # the first frame of a curve carries no load; it is not what a frame costs
-    frames = [frame for curve in curves for frame in curve.frames if frame.force != 0.0]
-    seconds = median(frame.seconds for frame in frames)
-    summary = {
+        curve.write_csv(demo.folder / f"curve{_suffix(curve, curves)}.csv")
+    check_summary(summary)
+    write_summary(demo.folder / "summary.json", summary)
+    tell(demo, sim, curves, summary)
+
+
+def summarise(demo: Demo, sim: fm.Simulation, curves: Sequence[fm.Curve], targets: Sequence[Target]) -> dict:
+    """The summary of a simulated initial design (collective)."""
+    peak = sim.comm.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, op=MPI.MAX) / 1024.0
+    frames = _loaded(curves)
+    return {
         "demo": demo.name,
         "space": demo.options.space,
         "order": demo.options.order,
         "ranks": sim.comm.size,
-        "dofs": dofs,
+        "dofs": {"rigid": sim.model.rigid_dofs, "flexible": sim.model.flexible_dofs},
         "parameters": None,
         "targets": [
-            {
-                "configuration": target.configuration.name,
-                "force": target.force,
-                "wanted": target.displacement,
-                "reached": None,
-            }
-            for target in targets
+            {"configuration": t.configuration.name, "force": t.force, "wanted": t.displacement, "reached": None}
+            for t in targets
         ],
         "frames": [
             {
@@ -125,16 +125,23 @@ def finish(demo: Demo, sim: fm.Simulation, curves: Sequence[fm.Curve], targets: 
             for curve in curves
             for frame in curve.frames
         ],
-        "seconds": {"setup": sim.setup_seconds, "frame_median": seconds, "optimize": None, "phases": sim.clock.seconds},
+        "seconds": {
+            "setup": sim.setup_seconds,
+            "frame_median": median(frame.seconds for frame in frames),
+            "optimize": None,
+            "phases": sim.clock.seconds,
+        },
         "iterations": sum(frame.iterations for frame in frames),
         "evaluations": None,
         "objective": {"initial": None, "final": None},
         "thickness": None,
         "mesh_ratio_max": sim.mesh_ratio_max,
-        "peak_memory_mb": memory,
+        "peak_memory_mb": peak,
     }
-    check_summary(summary)
-    write_summary(demo.folder / "summary.json", summary)
+
+
+def tell(demo: Demo, sim: fm.Simulation, curves: Sequence[fm.Curve], summary: dict) -> None:
+    """Prints the frames, the size of the problem, and where the time went."""
     rows = [
         (curve.configuration.name, f.force, f.displacement, "yes" if f.stable else "no", f.iterations, f.seconds)
         for curve in curves
@@ -142,8 +149,19 @@ def finish(demo: Demo, sim: fm.Simulation, curves: Sequence[fm.Curve], targets: 
     ]
     headers = ("configuration", "force [N]", "displacement [mm]", "stable", "iterations", "seconds")
     demo.say(format_table(headers, rows))
+    dofs = summary["dofs"]
     demo.say(f"DOFs: {dofs['rigid']} rigid + {dofs['flexible']} flexible, {sim.comm.size} process(es)")
     phases = ", ".join(f"{name} {value:.2f}" for name, value in sim.clock.seconds.items())
     demo.say(f"seconds: {phases}; in all {perf_counter() - demo.started:.1f}")
-    demo.say(f"frame_median: {seconds:.3f} s, peak memory {memory:.0f} MB")
+    seconds, peak = summary["seconds"]["frame_median"], summary["peak_memory_mb"]
+    demo.say(f"frame_median: {seconds:.3f} s, peak memory {peak:.0f} MB")
     demo.say(f"files in {demo.folder}")
+
+
+def _suffix(curve: fm.Curve, curves: Sequence[fm.Curve]) -> str:
+    return f"-{curve.configuration.name.replace(' ', '-')}" if len(curves) > 1 else ""
+
+
+def _loaded(curves: Sequence[fm.Curve]) -> list[fm.Frame]:
+    """Frames under load: those without cost less than a frame does."""
+    return [frame for curve in curves for frame in curve.frames if frame.force != 0.0]

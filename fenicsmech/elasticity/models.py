@@ -9,7 +9,8 @@ from ufl.core.expr import Expr
 
 from fenicsmech.elasticity.strain import Moduli, Strain, plane_strain, plane_strain_stretched, spatial_strain
 from fenicsmech.elasticity.transverse import transverse_strain
-from fenicsmech.mechanism import EnergyLaw
+from fenicsmech.errors import DescriptionError
+from fenicsmech.mechanism import EnergyLaw, Material
 
 
 class ElasticModel(ABC):
@@ -22,6 +23,14 @@ class ElasticModel(ABC):
 
     name: str
     dim: int
+
+    @abstractmethod
+    def check(self, link: str, material: Material) -> None:
+        """Refuses a material whose law has no form under this model's assumption.
+
+        Raises:
+            DescriptionError: it has none.
+        """
 
     @abstractmethod
     def strain(self, law: EnergyLaw, H: Expr, moduli: Moduli) -> Strain:
@@ -37,6 +46,9 @@ class Spatial(ElasticModel):
 
     name, dim = "3d", 3
 
+    def check(self, link, material):
+        pass
+
     def strain(self, law, H, moduli):
         return spatial_strain(H)
 
@@ -49,6 +61,9 @@ class PlaneStrain(ElasticModel):
 
     name, dim = "plane-strain", 2
 
+    def check(self, link, material):
+        pass
+
     def strain(self, law, H, moduli):
         return plane_strain(H)
 
@@ -60,6 +75,14 @@ class PlaneStress(ElasticModel):
     """Two dimensions, S₃₃ = 0: links free to contract across their depth."""
 
     name, dim = "plane-stress", 2
+
+    def check(self, link, material):
+        if transverse_strain.dispatch(type(material.law)) is transverse_strain.dispatch(EnergyLaw):
+            raise DescriptionError(
+                f"link {link!r}",
+                f"the law {type(material.law).__name__} of {material.name!r} has no closed form in plane stress",
+                "Use the law NeoHookean(), or plane strain or 3D",
+            )
 
     def strain(self, law, H, moduli):
         return plane_strain_stretched(H, self._transverse(law, H, moduli))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fenicsmech.mechanism import FlexibleLink, Link, Region, RigidLink
+from fenicsmech.mechanism import Link, Region, RigidLink
 
 
 @dataclass(frozen=True)
@@ -26,11 +26,6 @@ class Body:
     fixed: bool
     region: Region | None = None
     axis: tuple[float, ...] = (0.0, 0.0, 1.0)
-
-    @property
-    def is_interface(self) -> bool:
-        """Whether it is part of a flexible link."""
-        return isinstance(self.link, FlexibleLink)
 
 
 def rigid_body(link: RigidLink, centre: tuple[float, ...]) -> Body:

@@ -10,8 +10,7 @@ from fenicsmech.joints import WELD
 from fenicsmech.linkage.bodies import Body, rigid_body
 from fenicsmech.linkage.system import Connection, JointSystem
 from fenicsmech.mechanism import FlexibleLink, Joint, Link, Mechanism
-
-_SAME = 1e-9  # of the mechanism's length: joints this close on a link share an interface
+from fenicsmech.mechanism.places import in_dimension, mechanism_length, same_place
 
 
 @dataclass(frozen=True)
@@ -39,40 +38,28 @@ class Linkage:
         return next(i for i, body in enumerate(self.bodies) if body.link == link)
 
 
-def in_dimension(position: tuple[float, ...], dim: int) -> tuple[float, ...]:
-    """``position`` with ``dim`` coordinates; a missing z is 0."""
-    return (*position, 0.0)[:dim]
-
-
-def mechanism_length(mechanism: Mechanism) -> float:
-    """Diagonal of the box around all joints, forces and outputs; 1 if it has no size."""
-    places = [in_dimension(part.at, 3) for part in (*mechanism.joints, *mechanism.forces, *mechanism.outputs)]
-    return float(np.linalg.norm(np.ptp(np.array(places or [(0.0, 0.0, 0.0)]), axis=0))) or 1.0
-
-
 def build_linkage(mechanism: Mechanism, dim: int) -> Linkage:
     """The bodies and constraints of ``mechanism`` in ``dim`` dimensions."""
     bodies = [rigid_body(link, _centre(mechanism, link, dim)) for link in mechanism.rigid_links]
     length = mechanism_length(mechanism)
-    index: dict[tuple[Link, tuple], int] = {(body.link, ()): i for i, body in enumerate(bodies)}
-
-    def place(joint: Joint) -> tuple[int, ...]:
-        """Equal for joints at one point of a link, whatever the rounding of their coordinates."""
-        return tuple(np.rint(np.array(in_dimension(joint.at, dim)) / (_SAME * length)).astype(int).tolist())
-
     interfaces: dict[FlexibleLink, tuple[int, ...]] = {}
     for link in mechanism.flexible_links:
+        first = len(bodies)
         for joint in mechanism.joints:
-            if link in (joint.a, joint.b) and (link, place(joint)) not in index:
-                at = in_dimension(joint.at, dim)
+            known = any(same_place(body.centre, joint.at, dim=dim, length=length) for body in bodies[first:])
+            if link in (joint.a, joint.b) and not known:
                 region = joint.regions[(joint.a, joint.b).index(link)]
-                index[link, place(joint)] = len(bodies)
                 axis = joint.axis if joint.kind.bored else (0.0, 0.0, 1.0)
+                at = in_dimension(joint.at, dim)
                 bodies.append(Body(f"{link.name} at {joint.at}", link, at, False, region, axis))
-        interfaces[link] = tuple(i for (owner, _), i in index.items() if owner == link)
+        interfaces[link] = tuple(range(first, len(bodies)))
 
     def body(joint: Joint, link: Link) -> int:
-        return index[link, place(joint) if isinstance(link, FlexibleLink) else ()]
+        return next(
+            i
+            for i, body in enumerate(bodies)
+            if body.link == link and (body.region is None or same_place(body.centre, joint.at, dim=dim, length=length))
+        )
 
     driven = {motor.joint: motor for motor in mechanism.motors}
     connections = [

@@ -59,6 +59,10 @@ def points(
     Raises:
         DescriptionError: too few points, or one is not a point.
     """
+    try:
+        values = tuple(values)
+    except TypeError:
+        raise DescriptionError(part, f"{values!r} is not a list of points", "Give a list of points") from None
     checked = tuple(point(part, p, dimensions=dimensions) for p in values)
     if len(checked) < least:
         raise DescriptionError(part, f"{len(checked)} point(s) given", f"Give at least {least} points")

@@ -54,6 +54,8 @@ class Material:
     def __post_init__(self) -> None:
         part = f"material {self.name!r}"
         young = positive(f"Young's modulus of {part}", self.youngs_modulus)
+        if not isinstance(self.law, EnergyLaw):
+            raise DescriptionError(part, f"its law is {self.law!r}", "Give a law, as NeoHookean()")
         nu = finite(f"Poisson's ratio of {part}", self.poissons_ratio)
         if not -1.0 < nu < 0.5:
             raise DescriptionError(part, f"Poisson's ratio is {nu:g}", "Give a value between −1 and 0.5, both excluded")

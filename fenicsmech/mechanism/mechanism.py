@@ -57,7 +57,23 @@ class Mechanism:
         return self._add_link(RigidLink(name, fixed))
 
     def flexible(self, name: str, shape: Shape, material: Material) -> FlexibleLink:
-        """Adds a flexible link of ``shape`` and ``material``."""
+        """Adds a flexible link of ``shape`` and ``material``.
+
+        Raises:
+            DescriptionError: they are none, or the name is taken.
+        """
+        if not isinstance(shape, Shape):
+            raise DescriptionError(
+                f"link {name!r}",
+                f"its shape is {shape!r}",
+                "Make one with strip(), polygon(), outline(), step() or gmsh_mesh()",
+            )
+        if not isinstance(material, Material):
+            raise DescriptionError(
+                f"link {name!r}",
+                f"its material is {material!r}",
+                "Give a Material(name, E, ν) or one that exists, as ONYX",
+            )
         return self._add_link(FlexibleLink(name, shape, material))
 
     def join(

@@ -44,13 +44,25 @@ DRAWN = Configuration("as drawn")
 
 @dataclass(frozen=True)
 class Scene:
-    """A mechanism and what is simulated of its surroundings: nothing that is not listed in ``effects``."""
+    """A mechanism and what is simulated of its surroundings: nothing that is not listed in ``effects``.
+
+    Raises:
+        DescriptionError: ``mechanism`` is none, or an effect is not known. There is none yet.
+    """
 
     mechanism: Mechanism
     effects: Sequence = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "effects", tuple(self.effects))
+        if not isinstance(self.mechanism, Mechanism):
+            raise DescriptionError("scene", f"{self.mechanism!r} is not a mechanism", "Pass a Mechanism")
+        if self.effects:
+            raise DescriptionError(
+                "scene",
+                f"the effect {self.effects[0]!r} is not known",
+                "Leave effects empty: links, joints and forces act",
+            )
 
     def configuration(self, name: str, positions: Mapping[Motor, float]) -> Configuration:
         """A configuration with the given motor positions (rad or length, from the drawn configuration).
@@ -61,6 +73,8 @@ class Scene:
         for motor in positions:
             if motor not in self.mechanism.motors:
                 raise DescriptionError(
-                    f"configuration {name!r}", f"{motor!r} is not a motor of {self.mechanism.name!r}", "Add it first"
+                    f"configuration {name!r}",
+                    f"{motor.name!r} is not a motor of {self.mechanism.name!r}",
+                    "Add it with motor(), and name motors, not joints",
                 )
         return Configuration(name, tuple(positions.items()))

@@ -5,6 +5,8 @@ from __future__ import annotations
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism.mechanism import Mechanism
 from fenicsmech.mechanism.parts import FlexibleLink, Joint, Link, RigidLink
+from fenicsmech.mechanism.places import mechanism_length, same_place
+from fenicsmech.mechanism.shapes import Region
 
 
 def validate(mechanism: Mechanism, dim: int) -> None:
@@ -71,19 +73,21 @@ def _check_forces(mechanism: Mechanism) -> None:
 
 
 def _check_interfaces(mechanism: Mechanism, dim: int) -> None:
-    found: dict[tuple[FlexibleLink, tuple], tuple[Joint, object]] = {}
+    length = mechanism_length(mechanism)
+    found: list[tuple[FlexibleLink, Joint, Region]] = []
     for joint in mechanism.joints:
         for link, region in zip((joint.a, joint.b), joint.regions, strict=True):
             if not isinstance(link, FlexibleLink):
                 continue
-            place = (*joint.at, 0.0)[:dim]  # a z left out is 0
-            first, known = found.setdefault((link, place), (joint, region))
-            if known != region:
-                raise DescriptionError(
-                    f"{joint.name!r}",
-                    f"its interface on {link.name!r} is {region}, but {first.name!r} has {known} at the same place",
-                    "Give joints at one place of a link the same radius or region",
-                )
+            for owner, first, known in found:
+                same = owner == link and same_place(first.at, joint.at, dim=dim, length=length)
+                if same and known != region:
+                    raise DescriptionError(
+                        f"{joint.name!r}",
+                        f"its interface on {link.name!r} is {region}, but {first.name!r} has {known} at the same place",
+                        "Give joints at one place of a link the same radius or region",
+                    )
+            found.append((link, joint, region))
 
 
 def _check_planar(mechanism: Mechanism) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from dolfinx import fem
 
 from fenicsmech.compat import cell_nodes, cellwise_space, vector_space, write_series
+from fenicsmech.errors import DescriptionError
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.snapshot import vertex_displacements
@@ -20,8 +21,13 @@ def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame])
     """Writes vertex displacements and von Mises stress of ``frames``; time is the force (collective).
 
     The files appear when they are complete.
+
+    Raises:
+        DescriptionError: the path does not end in .xdmf.
     """
     path = Path(path)
+    if path.suffix != ".xdmf":
+        raise DescriptionError(f"file {str(path)!r}", "only XDMF is written", "Give a name that ends in .xdmf")
     comm = model.mesh.mesh.comm
     displacement = fem.Function(vector_space(model.mesh.mesh, 1))
     stress = fem.Function(cellwise_space(model.mesh.mesh))

@@ -15,8 +15,8 @@ from fenicsmech.elasticity import ElasticBody, ElasticModel, Quadrature
 from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State
 from fenicsmech.errors import FenicsmechError
 from fenicsmech.linkage import Linkage
-from fenicsmech.linkage.build import in_dimension
 from fenicsmech.mechanism import FlexibleLink, Force, Mechanism, Output
+from fenicsmech.mechanism.places import in_dimension
 from fenicsmech.meshing import InterfaceSite, LinkMesh, check_link, mesh_link
 from fenicsmech.meshing.distribute import MechanismMesh, distribute
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from fenicsmech.linkage import Linkage
-from fenicsmech.linkage.build import in_dimension
 from fenicsmech.mechanism import Force, Link, Mechanism
+from fenicsmech.mechanism.places import in_dimension
 from fenicsmech.meshing.distribute import MechanismMesh
 from fenicsmech.report import Arrow, FlexibleShape, MechanismShape, Pin, RigidShape, plan_view, rigid_outline
 from fenicsmech.simulation.snapshot import Snapshot

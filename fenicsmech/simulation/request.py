@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from fenicsmech.equilibrium import Control, DisplacementControl, LoadControl
@@ -46,7 +46,12 @@ def read_request(
     others = dict(others or {})
     for part in (force, *others):
         if part not in mechanism.forces:
-            raise DescriptionError(f"{part.name!r}", f"it is not a force of {mechanism.name!r}", "Add it with force()")
+            name = part.name if isinstance(part, Force) else part
+            raise DescriptionError(f"{name!r}", f"it is not a force of {mechanism.name!r}", "Add it with force()")
+    if not isinstance(configuration, Configuration):
+        raise DescriptionError(
+            f"configuration {configuration!r}", "it is not a configuration", "Make one with scene.configuration()"
+        )
     if force in others:
         raise DescriptionError(f"{force.name!r}", "it is led and held constant at once", "Leave it out of others")
     for motor, _ in configuration.positions:
@@ -59,6 +64,8 @@ def read_request(
     if (forces is None) == (displacements is None):
         raise DescriptionError(f"{force.name!r}", "give either forces or displacements", "Pass one of the two")
     kind, samples = (DisplacementControl, displacements) if forces is None else (LoadControl, forces)
+    if isinstance(samples, str) or not isinstance(samples, Iterable):
+        raise DescriptionError(f"{force.name!r}", f"its samples are {samples!r}", "Give a list of numbers")
     controls = tuple(kind(finite(f"sample of {force.name!r}", value)) for value in samples)
     if not controls:
         raise DescriptionError(f"{force.name!r}", "there are no samples", "Give at least one force or displacement")

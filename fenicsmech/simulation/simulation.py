@@ -12,11 +12,11 @@ from mpi4py import MPI
 from fenicsmech.clock import Clock
 from fenicsmech.elasticity import PLANE_STRAIN, PLANE_STRESS, SPATIAL, Quadrature
 from fenicsmech.equilibrium import Hermite, Newton, NewtonOptions, Predictor
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import AssemblyError, DescriptionError
 from fenicsmech.linkage import assemble, build_linkage, count_freedom
-from fenicsmech.linkage.build import in_dimension
-from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Output, Scene, validate
+from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Mechanism, Output, Scene, validate
 from fenicsmech.mechanism.checks import positive
+from fenicsmech.mechanism.places import in_dimension
 from fenicsmech.meshing import radius_ratios
 from fenicsmech.report import Panel, Progress, Silent, Trace, draw_configurations
 from fenicsmech.simulation.curve import Curve
@@ -42,7 +42,7 @@ class Simulation:
     Args:
         scene: the mechanism and what acts on it.
         space: "3d", "plane-stress" or "plane-strain".
-        order: degree of the displacement field, 1 or 2.
+        order: degree of the displacement field, 1, 2 or 3.
         size: element size in the plane of the links, or one per flexible link.
         quadrature: quadrature degree; the measured optimum by default.
         newton: limits of the equilibrium iteration.
@@ -73,9 +73,16 @@ class Simulation:
         mechanism = scene.mechanism
         validate(mechanism, model.dim)
         links = mechanism.flexible_links
+        if not links:
+            raise DescriptionError(
+                f"mechanism {mechanism.name!r}", "no link is flexible: nothing would bend", "Add one with flexible()"
+            )
         per_link = size if isinstance(size, Mapping) else dict.fromkeys(links, size)
         sizes = {link: positive(f"element size of {link.name!r}", per_link.get(link)) for link in links}
+        for link in links:
+            model.check(link.name, link.material)
         self.scene, self.comm, self.clock = scene, comm, Clock()
+        self._described = _description(mechanism)
         self.fidelity = Fidelity(model, order, sizes, quadrature or Quadrature.for_order(order, model.dim))
         self.linkage = build_linkage(mechanism, model.dim)
         check_links(mechanism, self.linkage, self.fidelity)
@@ -114,6 +121,12 @@ class Simulation:
             AssemblyError: the configuration does not assemble.
             EquilibriumError: a sample was not reached; carries the frames before it.
         """
+        if _description(self.scene.mechanism) != self._described:
+            raise DescriptionError(
+                f"mechanism {self.scene.mechanism.name!r}",
+                "links, joints or motors were added after the simulation was made",
+                "Make a new Simulation",
+            )
         request = read_request(
             self.scene.mechanism,
             force,
@@ -157,7 +170,7 @@ class Simulation:
         """Writes the frames of ``curve`` (the last one computed) as XDMF for ParaView (collective).
 
         Raises:
-            DescriptionError: no curve was computed yet.
+            DescriptionError: no curve was computed yet, or the path does not end in .xdmf.
         """
         write_xdmf(path, self.model, self._chosen(curve).frames)
 
@@ -203,13 +216,22 @@ class Simulation:
         """Where the unloaded point of a force or output is in each configuration, (configurations, dim).
 
         Raises:
-            AssemblyError: one of the configurations does not assemble.
+            AssemblyError: one of the configurations does not assemble, or its motors strain the links.
         """
         body = self.linkage.body_of(part.on)
         space, centre = self.linkage.joints.space, np.array(self.linkage.bodies[body].centre)
         drawn = np.array(in_dimension(part.at, self.linkage.dim))
-        poses = [assemble(self.linkage, configuration).poses[body] for configuration in configurations]
-        return np.array([drawn + space.displace(pose, (drawn - centre)[None])[0] for pose in poses])
+        positions = []
+        for configuration in configurations:
+            assembly = assemble(self.linkage, configuration)
+            if assembly.fraction < 1.0:
+                raise AssemblyError(
+                    f"configuration {configuration.name!r}",
+                    f"its motors strain the links beyond {assembly.fraction:.1%} of their way",
+                    "Use load_displacement with an output at the point",
+                )
+            positions.append(drawn + space.displace(assembly.poses[body], (drawn - centre)[None])[0])
+        return np.array(positions)
 
     @property
     def setup_seconds(self) -> float:
@@ -225,5 +247,10 @@ class Simulation:
     def _chosen(self, curve: Curve | None) -> Curve:
         chosen = curve or self._last
         if chosen is None:
-            raise DescriptionError("picture", "no curve was computed yet", "Call load_displacement first")
+            raise DescriptionError("simulation", "no curve was computed yet", "Call load_displacement first")
         return chosen
+
+
+def _description(mechanism: Mechanism) -> tuple[tuple, ...]:
+    """What a simulation is built from; forces and outputs may be added later."""
+    return tuple(mechanism.links), tuple(mechanism.joints), tuple(mechanism.motors)

@@ -58,7 +58,8 @@ class Tracer:
     ) -> None:
         self._model, self._newton, self._request, self._predictor = model, newton, request, predictor
         self._system, self._joints = newton.system, model.linkage.joints
-        self._idle = freedom.mobility > 0
+        self._freedom, self._idle = freedom, freedom.mobility > 0
+        self._origin, self._origins = 0.0, dict.fromkeys(model.mechanism.outputs, 0.0)
         state = self._unloaded(assembly)
         self._system.load(state)
         self._origin = self._system.load_displacement(state)
@@ -111,6 +112,7 @@ class Tracer:
                 f"the motors strain the links, and no equilibrium was found beyond {failure.reached:.1%} of their way "
                 f"({failure.reason})",
                 "Choose motor positions nearer to the drawn ones, or a softer link",
+                last=self._last(failure, ()),
             ) from failure
         return state
 
@@ -125,6 +127,7 @@ class Tracer:
                 f"constant forces {names} in configuration {self._request.configuration.name!r}",
                 f"no equilibrium beyond {failure.reached:.1%} of them ({failure.reason})",
                 "Choose smaller forces",
+                last=self._last(failure, ()),
             ) from failure
 
     def _unreached(self, control: Control, failure: PathFailed, before: Sequence[Frame]) -> EquilibriumError:
@@ -133,10 +136,22 @@ class Tracer:
             f"{self._request.force.name!r} in configuration {self._request.configuration.name!r}",
             f"no equilibrium at {what} {control.target - origin:g}; the last one is at {failure.reached - origin:g} "
             f"({failure.reason}; {len(failure.tried)} smaller steps were tried)",
-            "Try displacement control past a limit point, smaller samples, or a finer mesh",
-            last=before[-1] if before else None,
+            self._remedy(),
+            last=self._last(failure, before),
             frames=before,
         )
+
+    def _remedy(self) -> str:
+        if self._freedom.mobility:
+            names = ", ".join(map(repr, self._freedom.mobile))
+            return f"Nothing but the force holds {names}: add a joint or a motor, or check the force's direction"
+        return "Try displacement control past a limit point, other samples, or a finer mesh"
+
+    def _last(self, failure: PathFailed, before: Sequence[Frame]) -> Frame | None:
+        """The last equilibrium reached, on the way to a sample too."""
+        if failure.last is not None:
+            return self._record(failure.last)
+        return before[-1] if before else None
 
     def _record(self, solution: Solution) -> Frame:
         """What is measured in an equilibrium; the caller adds what it cost."""

@@ -57,7 +57,8 @@ def test_failure_carries_the_frames_before_it_and_names_force_configuration_valu
         simulation.load_displacement(push, displacements=[3.0, 5.0, OUT_OF_REACH], configuration=motionless)
     error = caught.value
     assert [frame.displacement for frame in error.frames] == pytest.approx([3.0, 5.0], rel=1e-9)
-    assert error.last is error.frames[-1]
+    assert 5.0 <= error.last.displacement < OUT_OF_REACH
+    assert error.problem.split("the last one is at ")[1].startswith(f"{error.last.displacement:g} ")
     assert "'push'" in error.part and "'standing still'" in error.part
     assert f"no equilibrium at displacement {OUT_OF_REACH:g}" in error.problem
     assert 5.0 <= float(error.problem.split("the last one is at ")[1].split(" ")[0]) < OUT_OF_REACH
@@ -66,11 +67,12 @@ def test_failure_carries_the_frames_before_it_and_names_force_configuration_valu
     assert again.forces == pytest.approx([frame.force for frame in error.frames], rel=1e-9)
 
 
-def test_failure_at_the_first_sample_carries_no_frame():
+def test_failure_at_the_first_sample_carries_the_last_equilibrium_on_the_way():
     simulation, push = finger("plane-stress")
     with pytest.raises(fm.EquilibriumError) as caught:
         simulation.load_displacement(push, displacements=[OUT_OF_REACH])
-    assert caught.value.last is None and caught.value.frames == ()
+    assert caught.value.frames == ()
+    assert 0.0 < caught.value.last.displacement < OUT_OF_REACH
 
 
 def test_force_that_nothing_resists_is_refused():

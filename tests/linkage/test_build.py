@@ -18,7 +18,7 @@ def test_truss_finger_has_four_rigid_bodies_and_two_interfaces(dim):
     machine = truss_finger()
     linkage = machine.linkage(dim)
     assert [body.name for body in linkage.bodies[:4]] == ["base", "left", "right", "tip"]
-    assert [body.is_interface for body in linkage.bodies] == [False] * 4 + [True] * 2
+    assert [body.region is not None for body in linkage.bodies] == [False] * 4 + [True] * 2
     assert [body.fixed for body in linkage.bodies] == [True] + [False] * 5
     diagonal = links_by_name(machine)["diagonal"]
     assert linkage.interfaces == {diagonal: (4, 5)}
@@ -106,5 +106,5 @@ def test_interface_takes_region_and_axis_of_its_joint():
     m = Mechanism("clamp")
     link = m.flexible("link", bent_strip((0.0, 0.0), (30.0, 0.0)), ONYX)
     m.weld(m.rigid("base", fixed=True), link, at=(0.0, 0.0), region=Rectangle(4.0, 2.0, 0.1))
-    (body,) = (body for body in build_linkage(m, 3).bodies if body.is_interface)
+    (body,) = (body for body in build_linkage(m, 3).bodies if body.region is not None)
     assert (body.region, body.axis) == (Rectangle(4.0, 2.0, 0.1), (0.0, 0.0, 1.0))

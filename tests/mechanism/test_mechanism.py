@@ -176,8 +176,8 @@ def test_position_of_a_motor_of_another_mechanism_is_refused():
     assert_refused(
         lambda: Scene(p.mechanism).configuration("up", {foreign: 1.0}),
         "configuration 'up'",
-        f"{foreign!r} is not a motor of 'press'",
-        "Add it first",
+        f"{foreign.name!r} is not a motor of 'press'",
+        "Add it with motor(), and name motors, not joints",
     )
 
 
