@@ -22,7 +22,7 @@ _REFUSALS = 20
 
 @dataclass(frozen=True)
 class LevenbergMarquardt(Minimiser):
-    """Stops when the reduction promised without damping is below ``tolerance`` times the objective, or after ``iterations``."""
+    """Stops when the reduction promised without damping is below ``tolerance`` of O, or after ``iterations``."""
 
     iterations: int = 60
     tolerance: float = 1e-6
