@@ -4,7 +4,8 @@
 - ``shapes``: strips, outlines, STEP parts, meshes; interface regions
 - ``parts``: links, joints, motors, forces, outputs
 - ``mechanism``: the builder that collects parts
-- ``scene``: effects and configurations
+- ``scene``: effects and configurations; ``units``: labels
+- ``places``: positions in a dimension, and which are one place
 - ``validation``: checks of the whole; ``checks``: checks of single values
 """
 
@@ -38,6 +39,7 @@ from fenicsmech.mechanism.shapes import (
     step,
     strip,
 )
+from fenicsmech.mechanism.units import Units
 from fenicsmech.mechanism.validation import validate
 
 __all__ = [
@@ -70,6 +72,7 @@ __all__ = [
     "Shape",
     "StepPart",
     "Strip",
+    "Units",
     "gmsh_mesh",
     "outline",
     "polygon",

@@ -9,6 +9,7 @@ from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism.checks import finite
 from fenicsmech.mechanism.mechanism import Mechanism
 from fenicsmech.mechanism.parts import Motor
+from fenicsmech.mechanism.units import Units
 
 
 @dataclass(frozen=True)
@@ -46,12 +47,15 @@ DRAWN = Configuration("as drawn")
 class Scene:
     """A mechanism and what is simulated of its surroundings: nothing that is not listed in ``effects``.
 
+    ``units`` name the units of the description in plots and tables.
+
     Raises:
         DescriptionError: ``mechanism`` is none, or an effect is not known. There is none yet.
     """
 
     mechanism: Mechanism
     effects: Sequence = ()
+    units: Units = Units()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "effects", tuple(self.effects))

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from mpi4py import MPI
 
 from fenicsmech.linkage import Freedom
-from fenicsmech.mechanism import Configuration, Force
+from fenicsmech.mechanism import Configuration, Force, Units
 from fenicsmech.report import CurveSeries, plot_curve, write_curve_csv
 from fenicsmech.simulation.frame import Frame
 
@@ -23,12 +22,16 @@ class Curve:
         configuration: motor positions.
         freedom: mobility and redundancy of the assembled configuration.
         frames: one per sample, in the order asked for.
+        units: of the scene, for labels.
+        leads: whether this process writes files.
     """
 
     force_part: Force
     configuration: Configuration
     freedom: Freedom
     frames: tuple[Frame, ...]
+    units: Units
+    leads: bool
 
     @property
     def forces(self) -> np.ndarray:
@@ -51,19 +54,26 @@ class Curve:
 
     def plot(self, path: str | Path) -> None:
         """Draws the curve as a PNG (rank 0)."""
-        if MPI.COMM_WORLD.rank == 0:
-            plot_curve(Path(path), [self.series()], title=f"{self.force_part.name}, {self.configuration.name}")
+        if self.leads:
+            plot_curve(
+                Path(path),
+                [self.series()],
+                xlabel=f"displacement [{self.units.length}]",
+                ylabel=f"force [{self.units.force}]",
+                title=f"{self.force_part.name}, {self.configuration.name}",
+            )
 
     def write_csv(self, path: str | Path) -> None:
         """Writes displacement, force, stability, energy and stress of every frame (rank 0)."""
-        if MPI.COMM_WORLD.rank == 0:
+        length, force, stress = self.units.length, self.units.force, self.units.stress
+        if self.leads:
             write_curve_csv(
                 Path(path),
                 {
-                    "displacement [mm]": self.displacements,
-                    "force [N]": self.forces,
+                    f"displacement [{length}]": self.displacements,
+                    f"force [{force}]": self.forces,
                     "stable": self.stable.astype(float),
-                    "strain energy [N mm]": np.array([frame.strain_energy for frame in self.frames]),
-                    "max von Mises [MPa]": np.array([frame.max_stress for frame in self.frames]),
+                    f"strain energy [{force} {length}]": np.array([frame.strain_energy for frame in self.frames]),
+                    f"max von Mises [{stress}]": np.array([frame.max_stress for frame in self.frames]),
                 },
             )

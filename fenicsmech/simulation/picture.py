@@ -41,10 +41,10 @@ class Draughtsman:
         )
         return MechanismShape(flexible, rigid, self._pins(snapshot.poses))
 
-    def arrow(self, force: Force, magnitude: float, snapshot: Snapshot) -> Arrow:
+    def arrow(self, force: Force, magnitude: float, snapshot: Snapshot, *, label: str) -> Arrow:
         """The arrow of a force on a rigid link in the state of ``snapshot``."""
         at = self.position(force.on, force.at, snapshot.poses)
-        return Arrow(at, magnitude * np.array(force.direction[:2]), label=f"{magnitude:g} N")
+        return Arrow(at, magnitude * np.array(force.direction[:2]), label=label)
 
     def position(self, link: Link, at: Sequence[float], poses: np.ndarray) -> np.ndarray:
         """Where the point drawn at ``at`` of ``link`` is, (2,); of a flexible link, carried by its first interface."""

@@ -28,8 +28,6 @@ from fenicsmech.simulation.request import read_request
 from fenicsmech.simulation.snapshot import gather
 from fenicsmech.simulation.tracer import Tracer
 
-_STRESS = "von Mises stress [MPa]"
-
 SPACES = {model.name: model for model in (SPATIAL, PLANE_STRESS, PLANE_STRAIN)}
 """Names of the elastic models, as users type them."""
 
@@ -146,7 +144,9 @@ class Simulation:
             for control in request.controls:
                 frames.append(tracer.frame(control, frames))
                 progress.update(len(frames))
-        self._last = Curve(force, configuration, freedom, tuple(frames))
+        self._last = Curve(
+            force, configuration, freedom, tuple(frames), units=self.scene.units, leads=self.comm.rank == 0
+        )
         return self._last
 
     def newton(self, force: Force, others: tuple[tuple[Force, float], ...] = ()) -> Newton:
@@ -195,7 +195,14 @@ class Simulation:
         """
         panel = self.panel(self._chosen(curve), stress=stress, traces=traces)
         if panel is not None:
-            draw_configurations(path, [panel], title=self.scene.mechanism.name, colour_label=_STRESS if stress else "")
+            units = self.scene.units
+            draw_configurations(
+                path,
+                [panel],
+                title=self.scene.mechanism.name,
+                colour_label=f"von Mises stress [{units.stress}]" if stress else "",
+                unit=units.length,
+            )
 
     def panel(self, curve: Curve, *, stress: bool = True, traces: Sequence[Trace] = ()) -> Panel | None:
         """The picture of a curve's first and last frame, on rank 0; None elsewhere (collective)."""
@@ -203,13 +210,14 @@ class Simulation:
         if first is None:
             return None
         pen = Draughtsman(self.scene.mechanism, self.linkage, self.model.mesh)
-        force = curve.frames[-1].force
+        force, units = curve.frames[-1].force, self.scene.units
         return Panel(
             pen.shape(first, stress=False),
             (pen.shape(last, stress=stress),),
-            (pen.arrow(curve.force_part, force, last),),
+            (pen.arrow(curve.force_part, force, last, label=f"{force:g} {units.force}"),),
             tuple(traces),
-            f"{curve.configuration.name}: {force:.3g} N, {curve.frames[-1].displacement:.3g} mm",
+            f"{curve.configuration.name}: {force:.3g} {units.force}, "
+            f"{curve.frames[-1].displacement:.3g} {units.length}",
         )
 
     def path(self, part: Force | Output, configurations: Sequence[Configuration]) -> np.ndarray:

@@ -2,12 +2,15 @@
 
 import pytest
 
+from fenicsmech.errors import DescriptionError
 from fenicsmech.joints import SPHERICAL
 from fenicsmech.mechanism import (
     ONYX,
     Configuration,
     Disc,
+    Material,
     Mechanism,
+    NeoHookean,
     Rectangle,
     RigidLink,
     Scene,
@@ -199,3 +202,15 @@ def test_directions_have_unit_length():
     assert p.mechanism.force(on=p.crank, at=(0.0, 0.0), direction=(3.0, 4.0)).direction == (0.6, 0.8)
     slider = p.mechanism.prismatic(p.base, p.crank, at=(0.0, 0.0), axis=(0.0, -5.0))
     assert slider.axis == (0.0, -1.0, 0.0)
+
+
+def test_shape_and_material_of_the_wrong_kind_are_refused():
+    other = Mechanism("m")
+    with pytest.raises(DescriptionError, match="link 'bar': its shape is"):
+        other.flexible("bar", [(0, 0), (1, 1)], ONYX)
+    with pytest.raises(DescriptionError, match="link 'bar': its material is 'PLA'"):
+        other.flexible("bar", bar(), "PLA")
+    with pytest.raises(DescriptionError, match="material 'PLA': its law is"):
+        Material("PLA", 2000.0, 0.3, NeoHookean)
+    with pytest.raises(DescriptionError, match="not a list of points"):
+        strip(None, thickness=1.0, depth=1.0)

@@ -151,3 +151,56 @@ def test_mechanism_that_cannot_be_assembled():
     half_turn = stuck.configuration("half a turn", {motor: math.pi})
     with pytest.raises(fm.AssemblyError, match="'half a turn'.*does not close"):
         simulate(stuck).load_displacement(push, forces=[1.0], configuration=half_turn)
+
+
+def test_effect_that_does_not_exist():
+    scene, _ = describe("truss")
+    refused("scene", lambda: fm.Scene(scene.mechanism, effects=["gravity"]))
+    refused("scene", lambda: fm.Scene("truss"))
+
+
+def test_mechanism_of_rigid_links_only():
+    mechanism = fm.Mechanism("stiff")
+    mechanism.revolute(mechanism.rigid("ground", fixed=True), mechanism.rigid("bar"), at=(0, 0))
+    refused("'stiff'", lambda: simulate(fm.Scene(mechanism)))
+
+
+def test_law_without_a_plane_stress_form_is_refused_with_its_link_and_material():
+    scene, _ = describe("truss")
+    ground = scene.mechanism.links[0]
+    rubber = fm.Material("rubber", 1.0, 0.4, fm.IsochoricNeoHookean())
+    bar = scene.mechanism.flexible("bar", fm.strip([(0, 0), (-40, 0)], thickness=3, depth=5), rubber)
+    scene.mechanism.revolute(ground, bar, at=(0, 0), radius=1.5)
+    with pytest.raises(fm.DescriptionError, match="'bar'.*IsochoricNeoHookean of 'rubber'"):
+        simulate(scene)
+    simulate(scene, space="plane-strain")
+
+
+def test_mechanism_that_changed_after_the_simulation_was_made(truss):
+    simulation, push, _ = truss
+    simulation.scene.mechanism.rigid("late")
+    refused("'truss finger'", lambda: simulation.load_displacement(push, forces=[0.1]), simulation=simulation)
+
+
+def test_force_configuration_and_samples_of_the_wrong_kind(truss):
+    simulation, push, _ = truss
+    refused("'push on tip'", lambda: simulation.load_displacement("push on tip", forces=[0.1]), simulation=simulation)
+    refused("'open'", lambda: simulation.load_displacement(push, forces=[0.1], configuration="open"))
+    for samples in (2.0, "12"):
+        refused("'push on tip'", lambda samples=samples: simulation.load_displacement(push, forces=samples))
+
+
+def test_field_file_of_another_kind_is_refused_and_leaves_nothing(truss, tmp_path):
+    simulation, push, _ = truss
+    simulation.load_displacement(push, forces=[0.1])
+    refused("x.vtu", lambda: simulation.write(tmp_path / "x.vtu"))
+    assert not list(tmp_path.iterdir())
+
+
+def test_path_of_a_point_stops_where_motors_strain_the_links():
+    scene, push = describe("truss")
+    shaft = next(joint for joint in scene.mechanism.joints if joint.at == (0.0, 0.0))
+    motor = scene.mechanism.motor(shaft)
+    turned = scene.configuration("turned", {motor: -0.05})
+    with pytest.raises(fm.AssemblyError, match="'turned'.*strain"):
+        simulate(scene).path(push, [turned])

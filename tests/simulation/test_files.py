@@ -134,3 +134,13 @@ def test_stress_field_peaks_at_the_largest_stress_of_the_frame_and_vanishes_in_i
         pin = np.linalg.norm(mesh.vertices[mesh.cells][..., :2] - (15.0, 0.0), axis=-1).max(axis=1) < 3.0 + 1e-9
         assert pin.any()
         assert stress[pin].max() < 1e-9 * stress.max()
+
+
+def test_labels_name_the_units_of_the_scene(shared_tmp_path):
+    scene, grasp = describe("claw")
+    scene = fm.Scene(scene.mechanism, units=fm.Units(length="in", force="lbf", stress="psi"))
+    simulation = fm.Simulation(scene, space="plane-stress", order=1, size=6.0, comm=COMM)
+    simulation.load_displacement(grasp, forces=[1.0]).write_csv(shared_tmp_path / "curve.csv")
+    COMM.Barrier()
+    header = (shared_tmp_path / "curve.csv").read_text().splitlines()[0]
+    assert all(label in header for label in ("displacement [in]", "force [lbf]", "[lbf in]", "[psi]"))
