@@ -1,0 +1,165 @@
+"""Best handle positions: better meshes, an exact implicit derivative, kinks of the spline, ranks."""
+
+import numpy as np
+import pytest
+
+from fenicsmech.design.handle_optimum import HandleOptimum, ShapeError
+from fenicsmech.design.handle_step import LinkDerivatives, choose_sides, follow_spline
+from fenicsmech.design.handles import LinkHandles
+
+from .shapes import bench
+
+each_dim = pytest.mark.parametrize("dim", [2, 3])
+
+
+def naive(both, p: np.ndarray) -> np.ndarray:
+    """Joints turned like the spline's tangent, all other handles where they were."""
+    shape = both.shape
+    links = zip(shape.shapes, shape.parameters(p), strict=True)
+    return np.concatenate([follow_spline(link.handles, q) for link, q in links])
+
+
+def slopes(both, p: np.ndarray, theta: np.ndarray) -> np.ndarray:
+    """∂S/∂θ."""
+    both.shape.apply(p, theta)
+    return both.shape.pull(p, theta, both.quality.gradient())[1]
+
+
+@each_dim
+def test_strongly_changed_designs_get_better_meshes(dim):
+    both = bench(dim)
+    p = both.design(0.25, seed=6)
+    both.shape.apply(p, naive(both, p))
+    before, worst_before = both.quality.value(), both.quality.cell_values().max()
+    placed = both.optimum.solve(p)
+    after, worst_after = both.quality.value(), both.quality.cell_values().max()
+    assert placed.quality == pytest.approx(after)
+    assert after < before
+    assert worst_after < worst_before
+
+
+@each_dim
+def test_the_sum_is_stationary_at_the_optimum_and_handles_stay_in_order(dim):
+    both = bench(dim)
+    p = both.design(0.2, seed=6)
+    placed = both.optimum.solve(p)
+    start = slopes(both, p, both.shape.initial_theta)
+    assert np.abs(slopes(both, p, placed.theta)).max() < 1e-6 * np.abs(start).max()
+    for link, theta in zip(both.shape.shapes, both.shape.positions(placed.theta), strict=True):
+        along = np.where(link.handles.slides, theta, link.handles.t)
+        assert np.all(np.diff(along) > 0.0)
+        assert (along[0], along[-1]) == (0.0, link.handles.spline.segments)
+
+
+def test_designs_that_invert_cells_at_first_are_reached_in_steps():
+    both = bench(2)
+    p = both.design(0.45, seed=8)
+    both.shape.apply(p, naive(both, p))
+    assert both.quality.value() == np.inf
+    assert np.isfinite(both.optimum.solve(p).quality)
+
+
+def test_designs_without_a_proper_mesh_are_refused():
+    both = bench(2)
+    p = both.shape.initial.copy()
+    p[np.concatenate([link.handles.spline.is_thickness for link in both.shape.shapes])] = -3.0
+    with pytest.raises(ShapeError, match="inverted"):
+        both.optimum.solve(p)
+
+
+def test_joints_that_may_not_turn_do_not():
+    both = bench(2, turns=False)
+    placed = both.optimum.solve(both.design(0.2, seed=6))
+    for link, theta in zip(both.shape.shapes, both.shape.positions(placed.theta), strict=True):
+        assert not np.any(theta[~link.handles.slides])
+
+
+def test_optimum_does_not_depend_on_the_unit_of_length():
+    millimetres, metres = bench(2), bench(2, unit=1000.0)
+    p = millimetres.design(0.2, seed=6)
+    lengths = ~np.concatenate([link.handles.spline.is_thickness for link in millimetres.shape.shapes])
+    one, other = millimetres.optimum.solve(p), metres.optimum.solve(np.where(lengths, p / 1000.0, p))
+    assert other.theta == pytest.approx(one.theta, abs=1e-6)
+    assert other.quality == pytest.approx(one.quality, rel=1e-9)
+
+
+@each_dim
+@pytest.mark.parametrize("seed", [1, 2])
+def test_total_gradient_agrees_with_differences_of_best_positions(dim, seed):
+    both = bench(dim)
+    placed = both.optimum.solve(both.design(0.2, seed))
+    g = np.random.default_rng(seed).standard_normal((both.shape.owned, dim))
+    gradient = both.optimum.total_gradient(placed, *both.shape.pull(placed.p, placed.theta, g))
+    direction = both.direction(seed + 20)
+
+    def value(h: float) -> float:
+        near = both.optimum.solve(placed.p + h * direction, placed)
+        return np.sum(g * both.shape.field(near.p, near.theta)[: both.shape.owned])
+
+    h = 1e-4
+    difference = (value(h) - value(-h)) / (2 * h)
+    assert gradient @ direction == pytest.approx(difference, rel=1e-5)
+    partial = both.shape.pull(placed.p, placed.theta, g)[0] @ direction
+    assert abs(partial - difference) > 1e-3 * abs(difference)  # the handles' share is not small
+
+
+def test_gradients_of_several_outputs_at_once():
+    both = bench(2)
+    placed = both.optimum.solve(both.design())
+    random = np.random.default_rng(0)
+    by_p, by_theta = random.standard_normal((3, len(placed.p))), random.standard_normal((3, len(placed.theta)))
+    together = both.optimum.total_gradient(placed, by_p, by_theta)
+    for row, one_p, one_theta in zip(together, by_p, by_theta, strict=True):
+        assert row == pytest.approx(both.optimum.total_gradient(placed, one_p, one_theta))
+
+
+def test_handles_near_by_are_found_in_few_iterations():
+    both = bench(2)
+    placed = both.optimum.solve(both.design(0.2))
+    nothing = np.zeros(len(placed.theta))
+    both.optimum.total_gradient(placed, np.zeros(len(placed.p)), nothing)  # lets the next solve start on the tangent
+    near = both.optimum.solve(both.design(0.201), placed)
+    assert near.iterations <= 2
+    fresh = HandleOptimum(both.shape, both.quality).solve(both.design(0.201), placed)
+    assert near.theta == pytest.approx(fresh.theta, abs=1e-7)
+
+
+def one_handle_at_a_control_point() -> tuple[LinkHandles, np.ndarray, np.ndarray]:
+    """Handles of the arch with an intermediary one at t = 1, and a design that bends differently on both sides."""
+    handles = bench(2).shape.shapes[0].handles
+    t = np.array([0.0, 1.0, handles.spline.segments])
+    few = LinkHandles(handles.spline, t, np.array([0, -1, 1]), np.array([True, False, True]))
+    p = handles.spline.initial.copy()
+    p[1] += 15.0  # the tangent at the first joint
+    return few, p, few.initial
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_a_handle_at_a_kink_is_held_or_goes_to_the_side_where_the_sum_falls(held):
+    handles, p, theta = one_handle_at_a_control_point()
+    after, before = (handles.gradients(p, theta, segments=np.full(3, segment))[1][1] for segment in (1, 0))
+    assert np.abs(after - before).max() > 1e-3
+    # the sum rises both ways, or falls on the later side
+    wanted = np.array([1.0, -1.0]) if held else np.array([-1.0, -1.0])
+    slope = np.linalg.lstsq(np.array([after.ravel(), before.ravel()]), wanted, rcond=None)[0]
+    gradient = np.zeros((3, 2, 3))
+    gradient[1] = slope.reshape(2, 3)
+    sides = choose_sides(handles, p, theta, LinkDerivatives(gradient, np.zeros((3, 2, 3, 3, 2, 3))))
+    assert sides.free.tolist() == [True, not held, True]
+    assert held or sides.segments[1] == 1
+
+
+@pytest.mark.parallel
+@each_dim
+def test_optimum_and_its_derivative_do_not_depend_on_the_number_of_ranks(dim):
+    seen = []
+    for shared in (False, True):
+        both = bench(dim, shared=shared)
+        placed = both.optimum.solve(both.design(0.2))
+        whole = np.random.default_rng(3).standard_normal(both.mesh.vertices.shape)
+        pulled = both.shape.pull(placed.p, placed.theta, whole[both.shape.original])
+        gradient = both.optimum.total_gradient(placed, *pulled)
+        seen.append((placed.quality, placed.theta, gradient))
+    assert seen[1][0] == pytest.approx(seen[0][0], rel=1e-12)
+    assert seen[1][1] == pytest.approx(seen[0][1], abs=1e-7)
+    assert seen[1][2] == pytest.approx(seen[0][2], rel=1e-5, abs=1e-6 * np.abs(seen[0][2]).max())
