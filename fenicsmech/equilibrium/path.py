@@ -45,6 +45,7 @@ class Path:
         self._newton, self._start, self._value, self._predictor = newton, start, value, predictor
         self._floor = _IDLE if idle else 0.0
         self._anchors: list[Anchor] = []
+        self._last: Solution | None = None
         self.iterations = 0
 
     def advance(self, control: Control) -> Solution:
@@ -54,7 +55,7 @@ class Path:
             PathFailed: the smallest step failed.
         """
         distance = control.target - self._value
-        step, solution, tried = distance, None, []
+        step, tried = distance, []
         while True:
             remaining = control.target - self._value
             last = abs(step) >= abs(remaining) * (1.0 - 1e-9)
@@ -66,9 +67,10 @@ class Path:
                 tried.append(value)
                 step = 0.5 * (value - self._value)
                 if abs(step) <= _SMALLEST * abs(distance):
-                    raise PathFailed(solution, self._value, failure.reason, tuple(tried)) from failure
+                    raise PathFailed(self._last, self._value, failure.reason, tuple(tried)) from failure
                 continue
             self.iterations += solution.iterations
+            self._last = solution
             self._remember(Anchor(value, solution.state, solution.tangent))
             if last:
                 return solution

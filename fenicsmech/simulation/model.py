@@ -108,6 +108,7 @@ class MechanismModel:
         centres = np.array([body.centre for body in linkage.bodies])
         self.interfaces = InterfaceMap(self.elastic.u, cell_body, centres, linkage.joints.space)
         self._node_link = self._link_of_nodes()
+        self._point_loads: dict[Force | Output, PointLoad] = {}
 
     @property
     def flexible_dofs(self) -> int:
@@ -141,7 +142,10 @@ class MechanismModel:
 
     def point_load(self, force: Force | Output) -> PointLoad:
         """The point load of a force, or of a unit force along an output (collective)."""
-        return PointLoad(force.name, self.point(force), np.array(in_dimension(force.direction, self.linkage.dim)))
+        if force not in self._point_loads:
+            direction = np.array(in_dimension(force.direction, self.linkage.dim))
+            self._point_loads[force] = PointLoad(force.name, self.point(force), direction)
+        return self._point_loads[force]
 
     def travel(self, part: Force | Output, state: State) -> float:
         """How far the point of a force or output has moved along its direction in the loaded ``state`` (collective)."""

@@ -112,7 +112,7 @@ class Tracer:
                 f"the motors strain the links, and no equilibrium was found beyond {failure.reached:.1%} of their way "
                 f"({failure.reason})",
                 "Choose motor positions nearer to the drawn ones, or a softer link",
-                last=self._last(failure, ()),
+                last=self._last(failure),
             ) from failure
         return state
 
@@ -127,7 +127,7 @@ class Tracer:
                 f"constant forces {names} in configuration {self._request.configuration.name!r}",
                 f"no equilibrium beyond {failure.reached:.1%} of them ({failure.reason})",
                 "Choose smaller forces",
-                last=self._last(failure, ()),
+                last=self._last(failure),
             ) from failure
 
     def _unreached(self, control: Control, failure: PathFailed, before: Sequence[Frame]) -> EquilibriumError:
@@ -137,7 +137,7 @@ class Tracer:
             f"no equilibrium at {what} {control.target - origin:g}; the last one is at {failure.reached - origin:g} "
             f"({failure.reason}; {len(failure.tried)} smaller steps were tried)",
             self._remedy(),
-            last=self._last(failure, before),
+            last=self._last(failure),
             frames=before,
         )
 
@@ -147,11 +147,9 @@ class Tracer:
             return f"Nothing but the force holds {names}: add a joint or a motor, or check the force's direction"
         return "Try displacement control past a limit point, other samples, or a finer mesh"
 
-    def _last(self, failure: PathFailed, before: Sequence[Frame]) -> Frame | None:
+    def _last(self, failure: PathFailed) -> Frame | None:
         """The last equilibrium reached, on the way to a sample too."""
-        if failure.last is not None:
-            return self._record(failure.last)
-        return before[-1] if before else None
+        return None if failure.last is None else self._record(failure.last)
 
     def _record(self, solution: Solution) -> Frame:
         """What is measured in an equilibrium; the caller adds what it cost."""

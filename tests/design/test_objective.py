@@ -16,23 +16,15 @@ from fenicsmech.design.shape_map import ShapeMap
 from fenicsmech.design.spline_design import SplineDesign, Target, shape_request
 from fenicsmech.design.spline_samples import SplineSamples
 
+from ..simulation.demo_scenes import describe
+
 
 def truss_objective(space: str, size: float) -> tuple[Objective, np.ndarray, np.ndarray]:
     """Objective of the truss finger, its initial design, and which parameters are thicknesses."""
-    finger = fm.Mechanism("truss finger")
-    base = finger.rigid("base", fixed=True)
-    left, right, tip = (finger.rigid(name) for name in ("left", "right", "tip"))
-    diagonal = finger.flexible(
-        "diagonal", fm.strip([(0, 0), (18, 34), (40, 60)], thickness=3.0, depth=20.0), fm.SMOOTH_SIL_950
-    )
-    finger.revolute(base, left, at=(0, 0))
-    finger.revolute(base, right, at=(40, 0))
-    finger.revolute(left, tip, at=(0, 60))
-    finger.revolute(right, tip, at=(40, 60))
-    finger.revolute(base, diagonal, at=(0, 0), radius=3.0)
-    finger.revolute(diagonal, tip, at=(40, 60), radius=3.0)
-    push = finger.force(on=tip, at=(20, 70), direction=(1, 0))
-    simulation = fm.Simulation(fm.Scene(finger), space=space, size=size)
+    scene, push = describe("truss")
+    finger = scene.mechanism
+    (diagonal,) = finger.flexible_links
+    simulation = fm.Simulation(scene, space=space, size=size)
     model = simulation.model
     design = SplineDesign(diagonal, segments=3, thickness=(1.5, 6.0))
     shapes = shape_links(model.mesh, [shape_request(design, finger, simulation.linkage)])
