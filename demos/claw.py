@@ -1,13 +1,15 @@
-"""Claw gripper (half): a motor closes a rigid finger through four Onyx links that give way to the object.
+"""Claw gripper (half): a motor closes a rigid finger through four Onyx links, shaped to give way to the object.
 
 The finger pushes on the object at its tip; the object pushes back across the finger. The motor holds the closed
-configuration while the force grows to 10 N.
+configuration while the force grows to 10 N. The links are shaped until the finger gives way by 5 mm at 4 N and by
+20 mm at 10 N.
 
     python3 demos/claw.py [--space 3d|plane-stress|plane-strain] [--order 1|2] [--size MM] [--quick] [--out DIR]
     mpirun -n 2 python3 demos/claw.py
 """
 
-from common import Target, finish, parse, simulation
+from common import parse
+from task import Task, run
 
 import fenicsmech as fm
 
@@ -44,12 +46,22 @@ def describe():
     return fm.Scene(claw), grasp
 
 
+def task(scene, grasp):
+    """What is simulated and wanted."""
+    return Task(
+        grasp,
+        loads=FORCES,
+        configurations=[fm.DRAWN],
+        designs=[fm.SplineDesign(link, segments=3, thickness=(1.0, 9.0)) for link in scene.mechanism.flexible_links],
+        targets=[fm.Target(grasp, force=4.0, displacement=5.0), fm.Target(grasp, force=10.0, displacement=20.0)],
+        pin=PIN,
+    )
+
+
 def main():
-    demo = parse("claw", __doc__.splitlines()[0], size=SIZE, quick_size=4.0)
+    demo = parse("claw", __doc__.splitlines()[0], size=SIZE, quick_size=3.0)
     scene, grasp = describe()
-    sim = simulation(demo, scene)
-    curve = sim.load_displacement(grasp, forces=FORCES)
-    finish(demo, sim, [curve], [Target(fm.DRAWN, 4.0, 5.0), Target(fm.DRAWN, 10.0, 20.0)])
+    run(demo, scene, task(scene, grasp))
 
 
 if __name__ == "__main__":

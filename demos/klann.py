@@ -1,7 +1,7 @@
-"""Klann leg: a walking leg whose four Onyx links spring when the foot meets an obstacle.
+"""Klann leg: a walking leg whose four Onyx links are shaped to spring when the foot meets an obstacle.
 
 The linkage is that of US patent 6,260,862. Its foot runs along a nearly straight ground stroke while the crank turns;
-the load–displacement curve of the foot is simulated in three configurations of the stroke.
+the links are shaped until 5 N lift the foot by 10 mm in three configurations of the stroke.
 
     python3 demos/klann.py [--space 3d|plane-stress|plane-strain] [--order 1|2] [--size MM] [--quick] [--out DIR]
     mpirun -n 2 python3 demos/klann.py
@@ -10,7 +10,8 @@ the load–displacement curve of the foot is simulated in three configurations o
 from math import radians
 
 import numpy as np
-from common import Target, finish, parse, simulation
+from common import parse
+from task import Task, run
 
 import fenicsmech as fm
 from fenicsmech.report import Trace
@@ -19,6 +20,7 @@ SIZE = 1.71  # mm
 FORCES = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
 SCALE = 150.0 / 19.2  # mm per unit of the patent: 150 mm from foot to hip
 THICKNESS, DEPTH, PIN = 3.0, 8.5, 3.0
+SEGMENTS = {"crank": 2, "connecting rod": 2, "first rocker": 3, "second rocker": 3}
 
 
 def pivot(x, y):
@@ -58,18 +60,33 @@ def describe():
     return fm.Scene(leg), lift, motor
 
 
-def main():
-    demo = parse("klann", __doc__.splitlines()[0], size=SIZE, quick_size=4.0)
-    scene, lift, motor = describe()
-    sim = simulation(demo, scene)
+def task(scene, lift, motor):
+    """What is simulated and wanted."""
     # crank angles of the patent; the drawn one is 180°
     stroke = [scene.configuration(f"crank {angle} deg", {motor: radians(angle - 180)}) for angle in (45, 95, 145)]
-    curves = [sim.load_displacement(lift, forces=FORCES, configuration=configuration) for configuration in stroke]
-    finish(demo, sim, curves, [Target(configuration, 5.0, 10.0) for configuration in stroke])
+    return Task(
+        lift,
+        loads=FORCES,
+        configurations=stroke,
+        designs=[
+            fm.SplineDesign(link, segments=SEGMENTS[link.name], thickness=(1.0, 9.0))
+            for link in scene.mechanism.flexible_links
+        ],
+        targets=[fm.Target(lift, force=5.0, displacement=10.0, configuration=place) for place in stroke],
+        pin=PIN,
+    )
+
+
+def main():
+    demo = parse("klann", __doc__.splitlines()[0], size=SIZE, quick_size=2.2)
+    scene, lift, motor = describe()
+    wanted = task(scene, lift, motor)
+    outcome = run(demo, scene, wanted)
 
     turn = [scene.configuration(f"turned by {angle} deg", {motor: radians(angle)}) for angle in range(0, 361, 4)]
-    path = Trace(sim.path(lift, turn)[:, :2], "foot path", sim.path(lift, stroke)[:, :2])
-    sim.picture(demo.folder / "foot-path.png", curves[1], stress=False, traces=[path])
+    sim = outcome.sim
+    path = Trace(sim.path(lift, turn)[:, :2], "foot path", sim.path(lift, wanted.configurations)[:, :2])
+    sim.picture(demo.folder / "foot-path.png", outcome.curves[1], stress=False, traces=[path])
 
 
 if __name__ == "__main__":

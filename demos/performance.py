@@ -86,7 +86,7 @@ def factors(sim, curve):
 
 
 def main():
-    demo = parse("performance", __doc__.splitlines()[0], size=1.73, quick_size=4.0)
+    demo = parse("performance", __doc__.splitlines()[0], size=1.73, quick_size=3.0)
     sim, default = curve_of(demo)
     reference = default.frames[-1].displacement
     rows = [row("default", default, reference)]

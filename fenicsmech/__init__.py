@@ -1,9 +1,21 @@
 """fenicsmech: flexible-link mechanisms on FEniCSx.
 
 Describe a mechanism (``Mechanism``), say what acts on it (``Scene``) and how finely it is computed
-(``Simulation``), and ask for load–displacement curves.
+(``Simulation``), and ask for load–displacement curves; or say which links may change and what is wanted
+(``DesignProblem``), and ask for their shapes.
 """
 
+from fenicsmech.design import (
+    Bfgs,
+    DesignProblem,
+    DesignResult,
+    LevenbergMarquardt,
+    MeshQuality,
+    ShapeBounds,
+    SplineDesign,
+    StayClose,
+    Target,
+)
 from fenicsmech.errors import AssemblyError, DescriptionError, EquilibriumError, FenicsmechError, MeshingError
 from fenicsmech.mechanism import (
     DRAWN,
@@ -38,24 +50,33 @@ __all__ = [
     "SMOOTH_SIL_950",
     "Arc",
     "AssemblyError",
+    "Bfgs",
     "Configuration",
     "Curve",
     "DescriptionError",
+    "DesignProblem",
+    "DesignResult",
     "Disc",
     "EquilibriumError",
     "FenicsmechError",
     "Frame",
     "IsochoricNeoHookean",
     "IsochoricSimoNeoHookean",
+    "LevenbergMarquardt",
     "Line",
     "LogarithmicNeoHookean",
     "Material",
     "Mechanism",
+    "MeshQuality",
     "MeshingError",
     "NeoHookean",
     "Rectangle",
     "Scene",
+    "ShapeBounds",
     "Simulation",
+    "SplineDesign",
+    "StayClose",
+    "Target",
     "Units",
     "gmsh_mesh",
     "outline",

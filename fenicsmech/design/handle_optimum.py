@@ -32,7 +32,7 @@ from fenicsmech.log import logger
 _log = logger(__name__)
 
 _ITERATIONS = 60
-_SETTLED = 1e-13  # predicted decrease of S, relative
+_SETTLED = 1e-10  # predicted decrease of S, relative; one more step follows, after which it is rounding
 _ARMIJO = 1e-4
 _SHORTEST = 1e-8  # fraction of a step
 _HALVINGS = 4  # of a change of p that inverts cells

@@ -10,12 +10,12 @@ import numpy as np
 from fenicsmech.compat import original_cells
 from fenicsmech.design.handle_placement import place_handles
 from fenicsmech.design.handles import LinkHandles
-from fenicsmech.design.plan import plan_of
 from fenicsmech.design.spline_fit import fit_spline
 from fenicsmech.design.weights import handle_weights
 from fenicsmech.errors import FenicsmechError
 from fenicsmech.meshing import FREE, Centreline, LinkMesh, cell_measures
 from fenicsmech.meshing.distribute import MechanismMesh
+from fenicsmech.meshing.plan import plan_of
 
 _SPACING = 1.0  # of handles, in mean widths of the link
 
@@ -31,6 +31,7 @@ class ShapeRequest:
         joints: positions of its interfaces, in the order of the mesh, (sites, 2).
         turns: whether each interface may turn about its joint; a clamp may not, (sites,).
         interior: control points between each joint and the next along the centreline, (sites − 1,).
+        thickness: in the plane, where δ = 1; None: the mean width of the link.
         spacing: arc length between handles; None: the mean width of the link.
     """
 
@@ -40,6 +41,7 @@ class ShapeRequest:
     joints: tuple[tuple[float, float], ...]
     turns: tuple[bool, ...]
     interior: tuple[int, ...]
+    thickness: float | None = None
     spacing: float | None = None
 
 
@@ -52,14 +54,14 @@ class LinkShape:
         handles: its handles.
         weights: of each handle at each vertex of the link, (n, handles).
         deviation: largest distance from the spline to the centreline it follows.
-        width: mean width of the link in the plane, where δ = 1.
+        thickness: in the plane, where δ = 1.
     """
 
     link: int
     handles: LinkHandles
     weights: np.ndarray
     deviation: float
-    width: float
+    thickness: float
 
 
 def shape_link(mesh: LinkMesh, request: ShapeRequest) -> LinkShape:
@@ -72,7 +74,8 @@ def shape_link(mesh: LinkMesh, request: ShapeRequest) -> LinkShape:
     fit = fit_spline(request.centreline, request.joints, request.interior, part=f"spline of {part}")
     width = _mean_width(mesh, request.centreline.length)
     handles = place_handles(mesh, fit, spacing=request.spacing or _SPACING * width, turns=request.turns, part=part)
-    return LinkShape(request.link, handles, handle_weights(mesh, handles, part=part), fit.deviation, width)
+    weights = handle_weights(mesh, handles, part=part)
+    return LinkShape(request.link, handles, weights, fit.deviation, request.thickness or width)
 
 
 def shape_links(mesh: MechanismMesh, requests: Sequence[ShapeRequest], *, root: int = 0) -> list[LinkShape]:
@@ -91,8 +94,14 @@ def shape_links(mesh: MechanismMesh, requests: Sequence[ShapeRequest], *, root: 
     return comm.bcast(shapes, root=root)
 
 
-def gather_links(mesh: MechanismMesh) -> list[LinkMesh]:
-    """The mesh of every flexible link with its own numbering of interfaces, on every rank (collective)."""
+def gather_links(mesh: MechanismMesh, vertices: np.ndarray | None = None) -> list[LinkMesh]:
+    """The mesh of every flexible link with its own numbering of interfaces, on every rank (collective).
+
+    Args:
+        mesh: the mechanism's mesh.
+        vertices: where its vertices are, (vertices, dim); as drawn by default.
+    """
+    points = mesh.vertices if vertices is None else vertices
     interface = np.full(len(mesh.cells), FREE)
     topology = mesh.mesh.topology
     owned = topology.index_map(topology.dim).size_local
@@ -103,7 +112,7 @@ def gather_links(mesh: MechanismMesh) -> list[LinkMesh]:
         mine = mesh.link_of_cell == link
         numbers = interface[mine]
         numbers[numbers != FREE] -= numbers[numbers != FREE].min(initial=np.iinfo(int).max)
-        links.append(LinkMesh.from_cells(mesh.vertices, mesh.cells[mine].copy(), numbers))
+        links.append(LinkMesh.from_cells(points, mesh.cells[mine].copy(), numbers))
     return links
 
 

@@ -1,138 +1,177 @@
 """The design objective: how far simulated displacements are from their targets, with derivatives.
 
-    O(p) = Σ ½ (u_k(p) − ū_k)² + R(p),    k over targets (the paper's equation 5 and section V-A).
+    O(p) = Σ ½ w_k r_k² + R(p),     r_k = (u_k(p) − ū_k) / |ū_k|,      k over targets
 
-Each evaluation places the handles, reshapes the links, finds the equilibria of all targets from those of the last
-accepted design, and pulls their adjoint sensitivities back to p.
+(the paper's equation 5 and section V-A, relative to the targets and so free of units). Each evaluation places the
+handles, reshapes the links, follows the equilibria of all targets from those of the best design so far, and pulls
+their adjoint sensitivities back to p. Groups of processes share the targets.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from fenicsmech.design.handle_optimum import HandleOptimum, Placement, ShapeError
-from fenicsmech.design.optimisers import Evaluation, Infeasible
-from fenicsmech.design.penalties import Penalty
-from fenicsmech.design.sensitivity import Adjoint
-from fenicsmech.design.shape_map import ShapeMap
+from fenicsmech.clock import Clock
+from fenicsmech.design.equilibria import Known, TargetEquilibria
+from fenicsmech.design.groups import Group
+from fenicsmech.design.handle_optimum import Placement, ShapeError
+from fenicsmech.design.optimisers import Evaluation, Infeasible, TooHigh
+from fenicsmech.design.regularisers import Model, Regulariser
+from fenicsmech.design.rest_shape import RestShape
 from fenicsmech.design.spline_design import Target
-from fenicsmech.equilibrium import LoadControl, NotConverged, Solution, State
-from fenicsmech.errors import EquilibriumError
-from fenicsmech.linkage import assemble
-from fenicsmech.simulation import Simulation
+
+_SMALL = 0.1  # targets below this share of the largest one are measured by it
+
+
+def target_scales(targets: Sequence[Target]) -> np.ndarray:
+    """|ū_k|, or a share of the largest where ū_k is next to nothing, (targets,)."""
+    wanted = np.abs([target.displacement for target in targets])
+    return np.maximum(wanted, _SMALL * wanted.max()) if wanted.any() else np.ones(len(wanted))
+
+
+@dataclass(frozen=True, eq=False)
+class _Base:
+    """The best design so far, from which others are reached."""
+
+    value: float
+    placement: Placement
+    known: Known
 
 
 class Objective:
-    """O(p) of one simulation.
+    """O(p) of one simulation; collective on all groups.
 
     Args:
-        simulation: how displacements are computed.
-        shape: from p to the design field.
-        optimum: best handle positions.
-        targets: what is wanted.
-        penalty: R.
+        rest: from p to the rest shape of this group's simulation.
+        equilibria: of this group's targets.
+        targets: all of them.
+        regulariser: R.
+        group: this process's group.
+        clock: where time is counted: handles, regularisers, equilibria, gradients.
 
     Attributes:
-        reached: displacement of each target at the last evaluation.
+        lengths: changes of the parameters that count alike, (parameters,).
+        reached: displacement of each target at the last evaluation, (targets,).
     """
 
     def __init__(
         self,
-        simulation: Simulation,
-        shape: ShapeMap,
-        optimum: HandleOptimum,
+        rest: RestShape,
+        equilibria: TargetEquilibria,
+        *,
         targets: Sequence[Target],
-        penalty: Penalty,
+        regulariser: Regulariser,
+        group: Group,
+        clock: Clock,
     ) -> None:
-        self._simulation, self._shape, self._optimum = simulation, shape, optimum
-        self._targets, self._penalty = tuple(targets), penalty
-        self._adjoints = {
-            part: Adjoint(simulation.model, simulation.newton(part)) for part in {t.force_part for t in targets}
-        }
-        self._placement: Placement | None = None
-        self._states: dict[Target, State] = {}
-        self._origins: dict[tuple, float] = {}
-        self.reached = np.full(len(self._targets), np.nan)
+        self._rest, self._equilibria, self._regulariser, self._group = rest, equilibria, regulariser, group
+        self._wanted = np.array([target.displacement for target in targets])
+        self._scale = target_scales(targets) / np.sqrt([target.weight for target in targets])
+        self._base: _Base | None = None
+        self._near: Placement | None = None
+        self.lengths, self._clock = rest.lengths, clock
+        self.reached = np.full(len(targets), np.nan)
 
-    def evaluate(self, parameters: np.ndarray) -> Evaluation:
-        """O and its derivatives (collective).
+    @property
+    def placement(self) -> Placement | None:
+        """Handle positions of the best design so far."""
+        return self._base and self._base.placement
+
+    def begin(self, near: Placement | None) -> None:
+        """Starts afresh: the next evaluation finds its equilibria from zero load, its handles near ``near``."""
+        self._base, self._near = None, near
+
+    def evaluate(self, parameters: np.ndarray, below: float = np.inf) -> Evaluation:
+        """O and its derivatives.
+
+        Args:
+            parameters: p, (parameters,).
+            below: the largest value of use to the caller.
+
+        Raises:
+            Infeasible: cells invert, or a target's equilibrium is not found or is unstable.
+            TooHigh: the value is above ``below``; derivatives were not computed.
+        """
+        placement, model, known = self._together(lambda: self._solve(parameters, self._base))
+        reached = self._displacements(known)
+        value = self._value(parameters, model, reached)
+        if value > below:
+            raise TooHigh(f"the objective is {value:.3g}")
+        with self._clock.phase("gradients"):
+            nodal = self._equilibria.gradients(known)
+            jacobian = self._gathered(self._rest.gradient(placement, nodal)) / self._scale[:, None]
+        if self._base is None or value < self._base.value:
+            self._base = _Base(value, placement, known)
+        self.reached = reached
+        return Evaluation(
+            parameters=np.array(parameters),
+            residuals=self._residuals(reached),
+            jacobian=jacobian,
+            regulariser=model,
+        )
+
+    def traced(self, parameters: np.ndarray) -> float:
+        """O, its handles placed near the drawn ones and its equilibria found from zero load.
 
         Raises:
             Infeasible: cells invert, or a target's equilibrium is not found or is unstable.
         """
-        clock = self._simulation.clock
-        try:
-            with clock.phase("handles"):
-                placement = self._optimum.solve(parameters, self._placement)
-        except ShapeError as error:
-            raise Infeasible(str(error)) from error
-        self.reshape()
-        states, reached, fields = {}, [], []
-        for target in self._targets:
-            adjoint = self._adjoints[target.force_part]
-            state, displacement = self._equilibrium(target)
-            states[target] = state
-            reached.append(displacement)
-            system = self._simulation.newton(target.force_part).system
-            fields.append(adjoint.gradients(state, [system.controlled])[0].design)
-        with clock.phase("handles"):
-            nodal = np.array(fields).reshape(len(fields), self._shape.owned, -1)
-            by_p, by_theta = self._shape.pull(parameters, placement.theta, nodal)
-            jacobian = self._optimum.total_gradient(placement, by_p, by_theta)
-        self._placement, self._states = placement, states
-        self.reached = np.array(reached)
-        penalty = self._penalty.at(parameters)
-        return Evaluation(
-            parameters=np.array(parameters),
-            residuals=self.reached - np.array([target.displacement for target in self._targets]),
-            jacobian=jacobian,
-            penalty=penalty.value,
-            penalty_gradient=penalty.gradient,
-            penalty_curvature=penalty.curvature,
-        )
+        _, model, known = self._together(lambda: self._solve(parameters, None))
+        return self._value(parameters, model, self._displacements(known))
 
-    def reshape(self) -> None:
-        """Gives the links the shape that the design field holds (collective)."""
-        adjoint = next(iter(self._adjoints.values()))
-        adjoint.reshape(self._simulation.model.elastic.d.x.array)
+    def active(self, parameters: np.ndarray) -> tuple[str, ...]:
+        """The bounds that hold the design ``parameters`` back, in words."""
+        placement = self._rest.place(parameters, self.placement)
+        return self._group.everyone.bcast(self._regulariser.active(self._rest, placement), root=0)
 
-    def _equilibrium(self, target: Target) -> tuple[State, float]:
-        """The equilibrium of a target, from that of the last design if there is one, and its displacement."""
-        if target in self._states:
-            newton = self._simulation.newton(target.force_part)
+    def _residuals(self, reached: np.ndarray) -> np.ndarray:
+        return (reached - self._wanted) / self._scale
+
+    def _value(self, parameters: np.ndarray, model: Model, reached: np.ndarray) -> float:
+        residuals = self._residuals(reached)
+        value = 0.5 * float(residuals @ residuals) + model(parameters).value
+        return self._group.everyone.bcast(value, root=0)  # what hangs on its last bit must not differ
+
+    def _displacements(self, known: Known) -> np.ndarray:
+        return self._gathered(np.array([[sample.displacement] for sample in known.samples]))[:, 0]
+
+    def _solve(self, parameters: np.ndarray, base: _Base | None) -> tuple[Placement, Model, Known]:
+        """Placement, model of R and this group's equilibria, followed from those of ``base`` if there is one."""
+        with self._clock.phase("handles"):
             try:
-                solution = newton.solve(self._states[target], LoadControl(target.force))
-                return self._checked(target, solution)
-            except NotConverged:
-                pass
+                placement = self._rest.place(parameters, base.placement if base else self._near)
+            except ShapeError as error:
+                raise Infeasible(str(error)) from error
+        with self._clock.phase("regularisers"):
+            model = self._regulariser.around(self._rest, placement)
+        with self._clock.phase("equilibria"):
+            known = self._equilibria.follow(base.known) if base else self._equilibria.trace()
+        return placement, model, known
+
+    def _together(self, work):
+        """The result of ``work``, if no group failed.
+
+        Raises:
+            Infeasible: on all groups, if it is raised in one.
+        """
+        everyone, failure, result = self._group.everyone, None, None
         try:
-            curve = self._simulation.load_displacement(
-                target.force_part, forces=[target.force], configuration=target.configuration
-            )
-        except EquilibriumError as error:
-            raise Infeasible(str(error)) from error
-        frame = curve.frames[-1]
-        if not frame.stable:
-            raise Infeasible(f"the equilibrium at {target.force:g} is unstable")
-        return frame.state, frame.displacement
+            result = work()
+        except Infeasible as error:
+            failure = str(error)
+        failures = [reason for reason in everyone.allgather(failure) if reason is not None]
+        if failures:
+            raise Infeasible(failures[0])
+        return result
 
-    def _checked(self, target: Target, solution: Solution) -> tuple[State, float]:
-        system = self._simulation.newton(target.force_part).system
-        if solution.unstable_modes:
-            raise Infeasible(f"the equilibrium at {target.force:g} is unstable")
-        origin = self._origin(target)
-        system.load(solution.state)
-        return solution.state, system.load_displacement(solution.state) - origin
-
-    def _origin(self, target: Target) -> float:
-        """Where displacements of a target count from: the rigid assembly, the same for all designs (collective)."""
-        key = (target.force_part, target.configuration)
-        if key not in self._origins:
-            linkage, model = self._simulation.linkage, self._simulation.model
-            poses = assemble(linkage, target.configuration).poses
-            state = model.assembled_state(poses, linkage.joints.motor_values(target.configuration.position))
-            model.load(state)
-            self._origins[key] = model.travel(target.force_part, state)
-        return self._origins[key]
+    def _gathered(self, rows: np.ndarray) -> np.ndarray:
+        """One row per target from the rows of each group's targets, (targets, n)."""
+        everyone = self._group.everyone
+        parts = everyone.allgather((self._group.mine, rows) if self._group.leads else ((), rows[:0]))
+        gathered = np.empty((len(self._wanted), rows.shape[1]))
+        for mine, part in parts:
+            gathered[list(mine)] = part
+        return gathered

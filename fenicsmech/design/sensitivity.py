@@ -23,7 +23,6 @@ from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fenicsmech.bodies import DesignAtNodes
 from fenicsmech.compat import compile_form, petsc_vector
 from fenicsmech.equilibrium import LoadControl, Newton, PointLoad, State
 from fenicsmech.simulation.model import MechanismModel
@@ -51,12 +50,6 @@ class Adjoint:
     def __init__(self, model: MechanismModel, newton: Newton) -> None:
         self._model, self._newton, self._system = model, newton, newton.system
         self._weight = fem.Function(model.elastic.u.function_space, name="adjoint")
-        self._nodes = DesignAtNodes(model.elastic.d, model.elastic.u)
-
-    def reshape(self, design: np.ndarray) -> None:
-        """Gives the links the rest shape X₀ + d, d this rank's P1 values with ghosts, flat."""
-        self._model.elastic.d.x.array[:] = design
-        self._model.interfaces.reshape(self._nodes.values())
 
     def gradients(self, state: State, outputs: list[PointLoad], *, floor: float = 0.0) -> list[Gradient]:
         """The derivatives of the travel of each of ``outputs`` at the equilibrium ``state`` (collective)."""
@@ -78,7 +71,7 @@ class Adjoint:
 
         design = self._assemble(self._forms["design"])
         stiff = self._assemble(self._forms["displacement"]).array_r
-        self._nodes.add_transpose(self._interface_terms(state, z, stiff, forces), design)
+        self._model.design_nodes.add_transpose(self._interface_terms(state, z, stiff, forces), design)
         return Gradient(
             design=-design.array_r,
             youngs_moduli=-self._per_link(self._forms["youngs_modulus"]),

@@ -14,10 +14,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.polynomial.polynomial import polyder, polyval
+from numpy.polynomial.polynomial import polyder
 
 # rows: powers of τ in h₀₀ (P_k), h₁₀ (M_k), h₀₁ (P_{k+1}), h₁₁ (M_{k+1})
-HERMITE = np.array([[1, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]])
+_HERMITE = np.array([[1.0, 0.0, -3.0, 2.0], [0.0, 1.0, -2.0, 1.0], [0.0, 0.0, 3.0, -2.0], [0.0, 0.0, -1.0, 1.0]])
+_DERIVATIVES = [polyder(_HERMITE, order, axis=1) for order in range(5)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +92,8 @@ class LinkSpline:
         """
         segments = self.segments_of(t) if segments is None else segments
         weights = np.zeros((len(t), 2 * len(self.controls)))
-        for k, powers in enumerate(HERMITE):
-            weights[np.arange(len(t)), 2 * segments + k] = polyval(t - segments, polyder(powers, order))
+        columns = 2 * segments[:, None] + np.arange(4)
+        coefficients = _DERIVATIVES[order]
+        powers = (t - segments)[:, None] ** np.arange(coefficients.shape[1])
+        weights[np.arange(len(t))[:, None], columns] = powers @ coefficients.T
         return weights

@@ -12,8 +12,10 @@ from fenicsmech.errors import DescriptionError
 from fenicsmech.joints import WELD
 from fenicsmech.linkage import Linkage
 from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Mechanism, Strip
-from fenicsmech.mechanism.checks import finite
+from fenicsmech.mechanism.checks import finite, positive
 from fenicsmech.meshing import Centreline
+
+_RANGE = (1.0 / 3.0, 3.0)  # of thicknesses, in units of the drawn one: 1 … 9 mm for a link of 3 mm
 
 
 @dataclass(frozen=True)
@@ -23,16 +25,63 @@ class SplineDesign:
     Attributes:
         link: the link.
         segments: number of cubic segments; control points beyond the joints go where joints are farthest apart.
-        thickness: least and largest thickness in the plane that can be made.
-        bend: largest curvature ratio.
+        thickness: least and largest thickness in the plane that can be made; a third to three times the drawn one
+            by default.
+        bend: largest curvature ratio r, the spacing of 500 samples over the radius of curvature.
         centreline: points the centreline runs through; that of a strip by default.
+
+    Raises:
+        DescriptionError: a number makes no sense.
     """
 
     link: FlexibleLink
     segments: int
-    thickness: tuple[float, float] = (1.0, 9.0)
+    thickness: tuple[float, float] | None = None
     bend: float = 0.08
     centreline: Sequence[Sequence[float]] | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.link, FlexibleLink):
+            raise DescriptionError("spline design", f"{self.link!r} is no flexible link", "Name one of the mechanism's")
+        part = f"design of link {self.link.name!r}"
+        if not isinstance(self.segments, int) or self.segments < 1:
+            raise DescriptionError(part, f"{self.segments!r} segments", "Give a whole number of at least 1")
+        positive(f"curvature bound of the {part}", self.bend)
+        if self.thickness is not None:
+            least, most = self.thickness
+            positive(f"least thickness of the {part}", least)
+            finite(f"largest thickness of the {part}", most)
+            if not least < most:
+                raise DescriptionError(part, f"thickness from {least:g} to {most:g}", "Give the smaller one first")
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Fabrication bounds of a link.
+
+    Attributes:
+        thickness: least and largest thickness in the plane.
+        bend: largest curvature ratio r.
+    """
+
+    thickness: tuple[float, float]
+    bend: float
+
+
+def bounds_of(design: SplineDesign, thickness: float) -> Bounds:
+    """The bounds of ``design`` for a link drawn with ``thickness``.
+
+    Raises:
+        DescriptionError: the drawn thickness is not within them.
+    """
+    least, most = design.thickness or (_RANGE[0] * thickness, _RANGE[1] * thickness)
+    if not least < thickness < most:
+        raise DescriptionError(
+            f"design of link {design.link.name!r}",
+            f"its drawn thickness {thickness:.3g} is not between {least:g} and {most:g}",
+            "Draw it within the bounds, or widen them",
+        )
+    return Bounds((least, most), design.bend)
 
 
 @dataclass(frozen=True)
@@ -44,16 +93,22 @@ class Target:
         force: its magnitude.
         displacement: how far its point should move along it.
         configuration: motor positions.
+        weight: how much its relative error counts beside those of other targets.
+
+    Raises:
+        DescriptionError: a number makes no sense.
     """
 
     force_part: Force
     force: float
     displacement: float
     configuration: Configuration = DRAWN
+    weight: float = 1.0
 
     def __post_init__(self) -> None:
         finite(f"force of a target for {self.force_part.name!r}", self.force)
         finite(f"displacement of a target for {self.force_part.name!r}", self.displacement)
+        positive(f"weight of a target for {self.force_part.name!r}", self.weight)
 
 
 def shape_request(design: SplineDesign, mechanism: Mechanism, linkage: Linkage) -> ShapeRequest:
@@ -86,6 +141,7 @@ def shape_request(design: SplineDesign, mechanism: Mechanism, linkage: Linkage) 
         link=mechanism.flexible_links.index(link),
         name=link.name,
         centreline=centreline,
+        thickness=link.shape.thickness if isinstance(link.shape, Strip) else None,
         joints=joints,
         turns=tuple(at not in welded for at in joints),
         interior=tuple(int(n) for n in interior),

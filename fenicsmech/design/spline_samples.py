@@ -21,8 +21,9 @@ class SplineSamples:
     """Uniform samples in t of one spline; both δ and the points are linear in p."""
 
     def __init__(self, spline: LinkSpline, *, count: int = COUNT) -> None:
-        self._spline, self.t = spline, np.linspace(0.0, spline.segments, count)
+        self.t = np.linspace(0.0, spline.segments, count)
         self._gradient = spline.gradient(self.t)
+        self._fixed = spline.evaluate(np.zeros(spline.size), self.t)
 
     @property
     def thickness_gradient(self) -> np.ndarray:
@@ -31,15 +32,21 @@ class SplineSamples:
 
     def thickness(self, p: np.ndarray) -> np.ndarray:
         """δ, (count,)."""
-        return self._spline.evaluate(p, self.t)[:, 2]
+        return self._fixed[:, 2] + self._gradient[:, 2] @ p
 
-    def curvature(self, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """r, signed, at the inner samples, (count − 2,), and ∂r/∂p, (count − 2, size)."""
-        points = self._spline.evaluate(p, self.t)[:, :2]
-        triples = np.stack([points[:-2], points[1:-1], points[2:]], axis=1)
-        values, partial = _ratio(triples)
-        moves = np.stack([self._gradient[:-2, :2], self._gradient[1:-1, :2], self._gradient[2:, :2]], axis=1)
-        return values, np.einsum("nkc,nkcp->np", partial, moves)
+    def curvature(self, p: np.ndarray) -> np.ndarray:
+        """r, signed, at the inner samples, (count − 2,)."""
+        return _ratio(self._triples(p, slice(None)))[0]
+
+    def curvature_gradient(self, p: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+        """∂r/∂p at some of the inner samples, a mask (count − 2,), (chosen, size)."""
+        moves = np.stack([self._gradient[k : len(self.t) - 2 + k, :2][chosen] for k in range(3)], axis=1)
+        return np.einsum("nkc,nkcp->np", _ratio(self._triples(p, chosen))[1], moves)
+
+    def _triples(self, p: np.ndarray, chosen: np.ndarray | slice) -> np.ndarray:
+        """Three consecutive points around the chosen inner samples, (chosen, 3, 2)."""
+        points = self._fixed[:, :2] + self._gradient[:, :2] @ p
+        return np.stack([points[k : len(points) - 2 + k][chosen] for k in range(3)], axis=1)
 
 
 def _ratio(triples: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

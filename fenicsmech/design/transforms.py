@@ -70,8 +70,10 @@ def _derive(transform: sympy.Matrix, variables: Sequence[sympy.Symbol], constant
 
         def evaluate(q, c, *weight):
             numbers = flat(q.T, c.T, *(w.reshape(-1, 6).T for w in weight))
-            rows = np.stack([np.broadcast_to(number, len(q)) for number in numbers], axis=1)
-            return rows.reshape(len(q), *shape)
+            rows = np.empty((len(numbers), len(q)))
+            for row, number in zip(rows, numbers, strict=True):
+                row[:] = number
+            return rows.T.reshape(len(q), *shape)
 
         return evaluate
 

@@ -131,6 +131,23 @@ class ElasticBody:
         """Adds ∂²E/∂u² into ``matrix`` (collective; leaves it unassembled)."""
         fem.petsc.assemble_matrix(matrix, self.tangent_form)
 
+    def carried(self, change: np.ndarray) -> np.ndarray:
+        """Displacements after the rest shape changes by δ, every node's change carried along by the deformation:
+
+            x(X + δ) ≈ x(X) + F δ,     u ← u + H δ,
+
+        a first guess of the displacement from the new rest shape. Where links only move rigidly it is exact.
+
+        Args:
+            change: δ, this rank's P1 values with ghosts, flat.
+
+        Returns:
+            This rank's values of u, ghosts last, flat.
+        """
+        self._change.x.array[:] = change
+        self._carried.interpolate(self._carrying)
+        return self.u.x.array + self._carried.x.array
+
     def update(self) -> None:
         """Makes ghost values of u agree with their owners (collective)."""
         petsc_vector(self.u).ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
@@ -148,6 +165,20 @@ class ElasticBody:
         midpoint = np.full((1, self.model.dim), 1.0 / (self.model.dim + 1))
         stresses = [von_mises(cauchy_stress(self.model, law, self._strain, self._moduli)) for law, _ in self._terms]
         return [compile_expression(stress, midpoint, self.mesh.comm) for stress in stresses]
+
+    @cached_property
+    def _change(self) -> fem.Function:
+        return fem.Function(self.d.function_space, name="change_of_design")
+
+    @cached_property
+    def _carried(self) -> fem.Function:
+        return fem.Function(self.u.function_space, name="carried_change")
+
+    @cached_property
+    def _carrying(self) -> fem.Expression:
+        """H δ at the nodes of u."""
+        V = self.u.function_space
+        return compile_expression(ufl.dot(self._strain, self._change), V.element.interpolation_points(), self.mesh.comm)
 
     @property
     def _moduli(self) -> Moduli:

@@ -13,13 +13,14 @@
 from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadControl, MotorControl, ShareControl
 from fenicsmech.equilibrium.load import PointLoad
 from fenicsmech.equilibrium.newton import Newton, NewtonOptions, NotConverged, Solution
-from fenicsmech.equilibrium.path import Path, PathFailed
+from fenicsmech.equilibrium.path import IDLE_STIFFNESS, Path, PathFailed
 from fenicsmech.equilibrium.predictor import Constant, Hermite, Predictor, Tangent
 from fenicsmech.equilibrium.reactions import Reaction, joint_reactions, motor_torques
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem
 
 __all__ = [
+    "IDLE_STIFFNESS",
     "Constant",
     "Control",
     "DisplacementControl",

@@ -1,6 +1,7 @@
 """Load steps: from a known equilibrium to the wanted control value, by predictor and Newton.
 
-Steps halve when Newton fails and double when it was easy; equilibria that were reached are never lost.
+Steps halve when Newton fails and double when it was easy, and never go farther than a stride of the tangent;
+equilibria that were reached are never lost.
 """
 
 from __future__ import annotations
@@ -12,7 +13,9 @@ from fenicsmech.equilibrium.state import State
 
 _SMALLEST = 1.0 / 1024.0  # of the distance asked for
 _EASY = 5  # iterations
-_IDLE = 1e-10  # stiffness lent to idle freedoms, in units of the mean stiffness
+_STRIDE = 0.1  # of the mechanism's length, or rad: how far a step may move anything, by the tangent (measured)
+IDLE_STIFFNESS = 1e-10
+"""What is lent to idle freedoms, in units of the mean stiffness."""
 
 
 class PathFailed(Exception):
@@ -43,7 +46,7 @@ class Path:
 
     def __init__(self, newton: Newton, start: State, value: float, *, predictor: Predictor, idle: bool) -> None:
         self._newton, self._start, self._value, self._predictor = newton, start, value, predictor
-        self._floor = _IDLE if idle else 0.0
+        self._floor = IDLE_STIFFNESS if idle else 0.0
         self._anchors: list[Anchor] = []
         self._last: Solution | None = None
         self.iterations = 0
@@ -54,10 +57,13 @@ class Path:
         Raises:
             PathFailed: the smallest step failed.
         """
+        if not self._anchors:
+            self._settle(control.at(self._value))
         distance = control.target - self._value
         step, tried = distance, []
         while True:
             remaining = control.target - self._value
+            step = self._strided(step)
             last = abs(step) >= abs(remaining) * (1.0 - 1e-9)
             value = control.target if last else self._value + step
             try:
@@ -76,6 +82,24 @@ class Path:
                 return solution
             if solution.iterations <= _EASY:
                 step *= 2.0
+
+    def _settle(self, control: Control) -> None:
+        """The equilibrium at the start, whose tangent tells how far to go at first."""
+        try:
+            solution = self._newton.solve(self._start, control, floor=self._floor)
+        except NotConverged as failure:
+            self.iterations += failure.iterations
+            return
+        self.iterations += solution.iterations
+        self._last = solution
+        self._remember(Anchor(self._value, solution.state, solution.tangent))
+
+    def _strided(self, step: float) -> float:
+        """``step``, shortened if it moves anything farther than Newton's method takes in its stride."""
+        if not self._anchors:
+            return step
+        motion = self._newton.system.size(self._anchors[-1].tangent) * abs(step)
+        return step * min(1.0, _STRIDE / max(motion, _STRIDE))
 
     def _guess(self, value: float) -> State:
         if not self._anchors:

@@ -2,24 +2,31 @@
 
 Nothing here knows elements, joints or ranks; call it on one rank.
 
-=============  ======================================================================
-``atomic``     files that appear complete or not at all
-``curve``      load–displacement curves as CSV and PNG
-``shapes``     what a picture of a mechanism is made of
-``outline``    the outline of a rigid link from its joints
-``plan``       the top of a tetrahedral mesh
-``picture``    mechanisms, deformed and not, one or several beside each other
-``summary``    the JSON summary of a demo and its schema
-``table``      tables for the console
-``progress``   progress lines of long runs
-``canvas``     the look of all figures, and PNG files
-``frame``      size and panels of a picture
-``arrays``     checked arrays of the records
-=============  ======================================================================
+=================  ==================================================================
+``atomic``         files that appear complete or not at all
+``curve``          load–displacement curves as CSV and PNG
+``shapes``         what a picture of a mechanism is made of
+``outline``        the outline of a rigid link from its joints
+``plan``           the top of a tetrahedral mesh
+``picture``        mechanisms, deformed and not, one or several beside each other
+``design_shapes``  what a picture of a design is made of
+``designs``        links before and after an optimisation
+``summary``        the JSON summary of a demo and its schema
+``table``          tables for the console
+``progress``       progress lines of long runs
+``canvas``         the look of all figures, and PNG files
+``frame``          size and panels of a picture
+``design_frame``   size of a picture of a design, and where each link stands in it
+``labels``         labels beside what they name
+``arrays``         checked arrays of the records
+=================  ==================================================================
 """
 
 from fenicsmech.report.atomic import atomic_write
+from fenicsmech.report.canvas import PALETTE
 from fenicsmech.report.curve import CurveSeries, CurveTarget, plot_curve, read_curve_csv, write_curve_csv
+from fenicsmech.report.design_shapes import DesignShape, LinkOutline
+from fenicsmech.report.designs import draw_designs
 from fenicsmech.report.outline import rigid_outline
 from fenicsmech.report.picture import draw_configurations, draw_mechanism
 from fenicsmech.report.plan import PlanView, plan_view
@@ -29,10 +36,13 @@ from fenicsmech.report.summary import check_summary, write_summary
 from fenicsmech.report.table import format_table
 
 __all__ = [
+    "PALETTE",
     "Arrow",
     "CurveSeries",
     "CurveTarget",
+    "DesignShape",
     "FlexibleShape",
+    "LinkOutline",
     "MechanismShape",
     "Panel",
     "Pin",
@@ -44,6 +54,7 @@ __all__ = [
     "atomic_write",
     "check_summary",
     "draw_configurations",
+    "draw_designs",
     "draw_mechanism",
     "format_table",
     "plan_view",

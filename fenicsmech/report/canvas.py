@@ -9,12 +9,15 @@ import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+from numpy.typing import ArrayLike
 
 from fenicsmech.errors import DescriptionError
 from fenicsmech.report.atomic import atomic_write
 
 DPI = 150
 INK = "#333333"
+FLEXIBLE, FLEXIBLE_RIM = "#f39c3d", "#a85b0b"
 PALETTE = ("#2166ac", "#d95f02", "#1b9e77", "#b2182b", "#7570b3", "#8c6d31")
 
 _STYLE = {
@@ -58,6 +61,12 @@ def new_figure(width: float, height: float) -> Figure:
 def open_frame(axes: Axes) -> None:
     """Keep only the left and the bottom line of the frame."""
     axes.spines[["top", "right"]].set_visible(False)
+
+
+def draw_pin(axes: Axes, at: ArrayLike, radius: float) -> None:
+    """Draw a revolute joint at ``at`` (2,): a ring with a dot, over everything but arrows and labels."""
+    axes.add_patch(Circle(at, radius, fc="white", ec=INK, lw=1.0, zorder=6))
+    axes.add_patch(Circle(at, 0.35 * radius, fc=INK, ec="none", zorder=6))
 
 
 def save_png(figure: Figure, path: str | Path) -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import csv
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike, NDArray
 
@@ -18,6 +20,8 @@ from fenicsmech.report.atomic import atomic_write
 from fenicsmech.report.canvas import INK, PALETTE, house_style, new_figure, open_frame, save_png
 
 _DASHES = (0, (3.0, 1.6))  # of unstable parts
+_FAINT = 0.45  # of the colour remains
+_MIXED = "#777777"  # what curves of several colours share
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +35,7 @@ class CurveSeries:
         stable: (n,) whether each equilibrium is stable; None: all are.
         joined: draw the line through the samples; False for measurements.
         colour: a matplotlib colour; None takes the next of the palette.
+        faint: draw it thin and light behind the others, as what was before.
 
     Raises:
         DescriptionError: the arrays differ in length or are not finite.
@@ -42,6 +47,7 @@ class CurveSeries:
     stable: NDArray[np.bool_] | None = None
     joined: bool = True
     colour: str | None = None
+    faint: bool = False
 
     def __post_init__(self) -> None:
         part = f"curve '{self.label}'"
@@ -79,12 +85,14 @@ def plot_curve(
 ) -> None:
     """Draw load–displacement curves: displacement across, force up, as in the field's papers.
 
-    Stable parts are solid, unstable parts dashed, computed samples are dots, targets open diamonds.
+    Stable parts are solid, unstable parts dashed, computed samples are dots, targets open diamonds. For curves before
+    and after a change, give both the same colour and make the first faint; curves that share a label appear once in
+    the legend, in grey if their colours differ.
 
     Args:
         path: the PNG file.
-        series: the curves, drawn in this order.
-        targets: points the curves shall pass through.
+        series: the curves, drawn in this order, faint ones behind.
+        targets: points the curves shall pass through; equal ones are drawn around each other.
         xlabel, ylabel: quantity and unit of the axes.
         title: a line above the plot.
 
@@ -96,11 +104,8 @@ def plot_curve(
         figure.set_layout_engine("constrained")
         axes = figure.add_subplot()
         for index, curve in enumerate(series):
-            _draw_series(axes, curve, curve.colour or PALETTE[index % len(PALETTE)])
-        for target in targets:
-            axes.plot(
-                target.displacement, target.force, "D", ms=8, mfc="none", mec=target.colour or INK, mew=1.5, zorder=5
-            )
+            _draw_series(axes, curve, _colour(curve, index))
+        _draw_targets(axes, targets)
         axes.margins(0.05)
         axes.axhline(0.0, color="#bbbbbb", lw=0.8, zorder=0.5)
         axes.axvline(0.0, color="#bbbbbb", lw=0.8, zorder=0.5)
@@ -112,8 +117,21 @@ def plot_curve(
         save_png(figure, path)
 
 
+def _colour(curve: CurveSeries, index: int) -> str:
+    return curve.colour or PALETTE[index % len(PALETTE)]
+
+
+def _pen(colour: str, *, faint: bool) -> tuple[str, float, float]:
+    """Colour and width of the line, and size of the dots on it."""
+    if not faint:
+        return colour, 2.0, 4.5
+    return to_hex(1.0 - _FAINT * (1.0 - np.array(to_rgb(colour)))), 1.4, 3.2
+
+
 def _draw_series(axes: Axes, curve: CurveSeries, colour: str) -> None:
     x, y, stable = curve.displacement, curve.force, curve.stable
+    colour, width, size = _pen(colour, faint=curve.faint)
+    behind = 1.0 if curve.faint else 0.0
     if curve.joined:
         # a step is stable when both its ends are
         solid = stable[:-1] & stable[1:]
@@ -124,29 +142,47 @@ def _draw_series(axes: Axes, curve: CurveSeries, colour: str) -> None:
             for start, stop in edges.reshape(-1, 2):
                 runs += [np.column_stack((x[start : stop + 1], y[start : stop + 1])), runs[0]]
             line = np.concatenate(runs)
-            axes.plot(line[:, 0], line[:, 1], ls=style, color=colour, lw=2.0, zorder=3)
-    size = 4.5 if len(x) <= 40 else 2.5
+            axes.plot(line[:, 0], line[:, 1], ls=style, color=colour, lw=width, zorder=3 - behind)
+    size = size if len(x) <= 40 else 0.55 * size
     for part, face in ((stable, colour), (~stable, "white")):
-        axes.plot(x[part], y[part], "o", ms=size, mfc=face, mec=colour, mew=1.0, zorder=4)
+        axes.plot(x[part], y[part], "o", ms=size, mfc=face, mec=colour, mew=1.0, zorder=4 - 1.5 * behind)
+
+
+def _draw_targets(axes: Axes, targets: Sequence[CurveTarget]) -> None:
+    seen: Counter[tuple[float, float]] = Counter()
+    for target in targets:
+        place = target.displacement, target.force
+        size = 8.0 + 5.0 * seen[place]
+        seen[place] += 1
+        axes.plot(*place, "D", ms=size, mfc="none", mec=target.colour or INK, mew=1.5, clip_on=False, zorder=5)
 
 
 def _draw_legend(axes: Axes, series: Sequence[CurveSeries], targets: Sequence[CurveTarget]) -> None:
-    handles = [
-        Line2D(
-            [], [], color=curve.colour or PALETTE[i % len(PALETTE)], label=curve.label,
-            lw=2.0 if curve.joined else 0.0, marker="o", ms=4.5,
+    same: dict[str, list[tuple[CurveSeries, str]]] = {}  # curves and colours of each label
+    for index, curve in enumerate(series):
+        if curve.label:
+            same.setdefault(curve.label, []).append((curve, _colour(curve, index)))
+    handles = []
+    for label, group in same.items():
+        curve = group[0][0]
+        colour, width, size = _pen(_common([colour for _, colour in group]), faint=curve.faint)
+        handles.append(
+            Line2D([], [], color=colour, label=label, lw=width if curve.joined else 0.0, marker="o", ms=size)
         )
-        for i, curve in enumerate(series)
-        if curve.label
-    ]  # fmt: skip
     if any(curve.joined and not curve.stable.all() for curve in series):
         handles.append(
-            Line2D([], [], color="#777777", ls=_DASHES, lw=2.0, marker="o", ms=4.5, mfc="white", label="unstable")
+            Line2D([], [], color=_MIXED, ls=_DASHES, lw=2.0, marker="o", ms=4.5, mfc="white", label="unstable")
         )
     if targets:
-        handles.append(Line2D([], [], lw=0, marker="D", ms=8, mfc="none", mec=INK, mew=1.5, label="target"))
+        colour = _common([target.colour or INK for target in targets])
+        handles.append(Line2D([], [], lw=0, marker="D", ms=8, mfc="none", mec=colour, mew=1.5, label="target"))
     if handles:
         axes.legend(handles=handles, loc="best", framealpha=0.9, edgecolor="none", handlelength=2.8)
+
+
+def _common(colours: Sequence[str]) -> str:
+    """The colour they share, or grey."""
+    return colours[0] if len(set(colours)) == 1 else _MIXED
 
 
 def write_curve_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> None:

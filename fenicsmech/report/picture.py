@@ -12,13 +12,13 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle, FancyArrowPatch, PathPatch, Polygon
+from matplotlib.patches import FancyArrowPatch, PathPatch, Polygon
 from matplotlib.path import Path as Outline
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 from matplotlib.tri import Triangulation
 
 from fenicsmech.errors import DescriptionError
-from fenicsmech.report.canvas import INK, PALETTE, house_style, save_png
+from fenicsmech.report.canvas import FLEXIBLE, FLEXIBLE_RIM, PALETTE, draw_pin, house_style, save_png
 from fenicsmech.report.frame import Frame, arrow_ends, lay_out
 from fenicsmech.report.plan import rim
 from fenicsmech.report.shapes import (
@@ -30,7 +30,6 @@ from fenicsmech.report.shapes import (
     Trace,
 )
 
-_FLEXIBLE, _FLEXIBLE_RIM = "#f39c3d", "#a85b0b"
 _RIGID, _RIGID_RIM = "#c9ccd1", "#6b7078"
 _FIXED, _FIXED_RIM, _FIXED_HATCH = "#565b63", "#2e3238", "#7d838d"
 _PALE = "#c4c4c4"
@@ -143,16 +142,14 @@ def _draw_panel(axes: Axes, panel: Panel, frame: Frame, norm: Normalize | None) 
         for rigid in state.rigid:
             axes.add_patch(PathPatch(_polygon(rigid), fc=_RIGID, ec="none", alpha=0.35, zorder=2.5))
         for flexible in state.flexible:
-            axes.add_patch(PathPatch(_outline(flexible), fc=_FLEXIBLE, ec="none", alpha=0.25, zorder=2.6))
+            axes.add_patch(PathPatch(_outline(flexible), fc=FLEXIBLE, ec="none", alpha=0.25, zorder=2.6))
     state = _filled(panel)
     for rigid in sorted(state.rigid, key=lambda shape: not shape.fixed):
         _draw_rigid(axes, rigid)
     for flexible in state.flexible:
         _draw_flexible(axes, flexible, norm)
     for pin in state.pins:
-        radius = pin.radius or 0.014 * frame.size
-        axes.add_patch(Circle(pin.at, radius, fc="white", ec=INK, lw=1.0, zorder=6))
-        axes.add_patch(Circle(pin.at, 0.35 * radius, fc=INK, ec="none", zorder=6))
+        draw_pin(axes, pin.at, pin.radius or 0.014 * frame.size)
     for index, trace in enumerate(panel.traces):
         colour = _trace_colour(index)
         axes.plot(*trace.points.T, color=colour, lw=1.4, zorder=5)
@@ -191,7 +188,7 @@ def _draw_rigid(axes: Axes, shape: RigidShape) -> None:
 
 
 def _draw_flexible(axes: Axes, shape: FlexibleShape, norm: Normalize | None) -> None:
-    face = _FLEXIBLE
+    face = FLEXIBLE
     if shape.values is not None:
         cells = PolyCollection(
             shape.points[shape.triangles], array=shape.values, cmap=_STRESS, norm=norm, ec="face", lw=0.3, zorder=4
@@ -202,7 +199,7 @@ def _draw_flexible(axes: Axes, shape: FlexibleShape, norm: Normalize | None) -> 
         mesh = Triangulation(*shape.points.T, shape.triangles)
         axes.tripcolor(mesh, shape.point_values, shading="gouraud", cmap=_STRESS, norm=norm, zorder=4)
         face = "none"
-    axes.add_patch(PathPatch(_outline(shape), fc=face, ec=_FLEXIBLE_RIM, lw=0.9, joinstyle="round", zorder=4))
+    axes.add_patch(PathPatch(_outline(shape), fc=face, ec=FLEXIBLE_RIM, lw=0.9, joinstyle="round", zorder=4))
 
 
 def _draw_arrow(axes: Axes, arrow: Arrow, scale: float) -> None:

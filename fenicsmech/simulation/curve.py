@@ -48,9 +48,9 @@ class Curve:
         """(frames,)."""
         return np.array([frame.stable for frame in self.frames])
 
-    def series(self, label: str = "") -> CurveSeries:
-        """The curve as a plot draws it."""
-        return CurveSeries(self.displacements, self.forces, label=label, stable=self.stable)
+    def series(self, label: str = "", *, colour: str | None = None, faint: bool = False) -> CurveSeries:
+        """The curve as a plot draws it, arguments as those of ``CurveSeries``."""
+        return CurveSeries(self.displacements, self.forces, label=label, stable=self.stable, colour=colour, faint=faint)
 
     def plot(self, path: str | Path) -> None:
         """Draws the curve as a PNG (rank 0)."""

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 from dolfinx import fem
+from dolfinx import mesh as dmesh
 
 from fenicsmech.compat import cell_nodes, cellwise_space, vector_space, write_series
 from fenicsmech.errors import DescriptionError
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.model import MechanismModel
-from fenicsmech.simulation.snapshot import vertex_displacements
+from fenicsmech.simulation.snapshot import at_vertices
 
 
 def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame]) -> None:
-    """Writes vertex displacements and von Mises stress of ``frames``; time is the force (collective).
+    """Writes vertex displacements and von Mises stress of ``frames`` of one design; time is the force (collective).
 
     The files appear when they are complete.
 
@@ -34,13 +36,14 @@ def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame])
     dim = model.linkage.dim
 
     def update(index: int) -> None:
-        model.load(frames[index].state)
-        nodal = vertex_displacements(model)
-        values = displacement.x.array.reshape(-1, dim)
-        for cell, nodes in enumerate(cell_nodes(model.mesh.mesh)):
-            values[displacement.function_space.dofmap.cell_dofs(cell)] = nodal[nodes]
-        von_mises = model.elastic.von_mises()
-        stress.x.array[: len(von_mises)] = von_mises
+        with model.shaped(frames[index].design):
+            model.load(frames[index].state)
+            nodal = at_vertices(model, model.elastic.u)
+            values = displacement.x.array.reshape(-1, dim)
+            for cell, nodes in enumerate(cell_nodes(model.mesh.mesh)):
+                values[displacement.function_space.dofmap.cell_dofs(cell)] = nodal[nodes]
+            von_mises = model.elastic.von_mises()
+            stress.x.array[: len(von_mises)] = von_mises
 
     folder = None
     if comm.rank == 0:
@@ -48,17 +51,25 @@ def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame])
         folder = tempfile.mkdtemp(dir=path.parent, prefix=f".{path.stem}-")
     folder = Path(comm.bcast(folder, root=0))
     forces = np.array([frame.force for frame in frames])
-    write_series(
-        folder / path.name,
-        model.mesh.mesh,
-        {"displacement": displacement, "von Mises stress": stress},
-        forces,
-        update,
-        comm,
-    )
+    with _mesh_of(model, frames[0].design) as mesh:
+        write_series(
+            folder / path.name, mesh, {"displacement": displacement, "von Mises stress": stress}, forces, update, comm
+        )
     comm.barrier()
     if comm.rank == 0:
         # the heavy data first: the light file that names it must never point at nothing
         for suffix in (".h5", ".xdmf"):
             os.replace(folder / path.with_suffix(suffix).name, path.with_suffix(suffix))
         folder.rmdir()
+
+
+@contextmanager
+def _mesh_of(model: MechanismModel, design: np.ndarray) -> Iterator[dmesh.Mesh]:
+    """The mesh with its nodes where ``design`` puts them: files show the links at rest."""
+    mesh, drawn = model.mesh.mesh, model.mesh.mesh.geometry.x.copy()
+    with model.shaped(design):
+        mesh.geometry.x[:, : model.linkage.dim] += at_vertices(model, model.elastic.d)
+    try:
+        yield mesh
+    finally:
+        mesh.geometry.x[:] = drawn

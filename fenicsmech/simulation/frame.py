@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from fenicsmech.equilibrium import Reaction, State
 from fenicsmech.mechanism import Motor, Output
 
@@ -29,6 +31,7 @@ class Frame:
         seconds: wall-clock time.
         phases: the same, by phase.
         state: the equilibrium itself.
+        design: the rest shape it belongs to, this rank's values of the design field, flat.
     """
 
     force: float
@@ -46,3 +49,4 @@ class Frame:
     seconds: float
     phases: Mapping[str, float]
     state: State
+    design: np.ndarray

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 
 import numpy as np
 from mpi4py import MPI
 
-from fenicsmech.bodies import InterfaceMap, MaterialPoint, body_point, link_point
+from fenicsmech.bodies import DesignAtNodes, InterfaceMap, MaterialPoint, body_point, link_point
 from fenicsmech.clock import Clock
 from fenicsmech.compat import petsc_vector
 from fenicsmech.elasticity import ElasticBody, ElasticModel, Quadrature
@@ -85,6 +86,7 @@ class MechanismModel:
         mesh: the reference mesh of all flexible links.
         elastic: their elastic energy.
         interfaces: interface nodes as functions of body poses.
+        design_nodes: the design field at the nodes of the displacement.
         clock: where time goes.
     """
 
@@ -107,6 +109,7 @@ class MechanismModel:
         cell_body = np.where(mesh.interface >= 0, mesh.interface + first, -1)
         centres = np.array([body.centre for body in linkage.bodies])
         self.interfaces = InterfaceMap(self.elastic.u, cell_body, centres, linkage.joints.space)
+        self.design_nodes = DesignAtNodes(self.elastic.d, self.elastic.u)
         self._node_link = self._link_of_nodes()
         self._point_loads: dict[Force | Output, PointLoad] = {}
 
@@ -120,6 +123,28 @@ class MechanismModel:
     def rigid_dofs(self) -> int:
         """Coordinates of all rigid and interface bodies, fixed ones included."""
         return len(self.linkage.bodies) * self.linkage.joints.space.pose_size
+
+    def reshape(self, design: np.ndarray) -> None:
+        """Gives the links the rest shape X₀ + d, d this rank's P1 values with ghosts, flat."""
+        self.elastic.d.x.array[:] = design
+        self.interfaces.reshape(self.design_nodes.values())
+
+    @contextmanager
+    def shaped(self, design: np.ndarray) -> Iterator[None]:
+        """Gives the links another rest shape for a while."""
+        before = self.elastic.d.x.array.copy()
+        self.reshape(design)
+        try:
+            yield
+        finally:
+            self.reshape(before)
+
+    def carry(self, state: State, design: np.ndarray) -> State:
+        """Reshapes the links and guesses the equilibrium there from the one at the present shape (collective)."""
+        self.load(state)
+        u = self.elastic.carried(design - self.elastic.d.x.array)
+        self.reshape(design)
+        return replace(state, u=u[: len(state.u)])
 
     def load(self, state: State) -> None:
         """Makes the finite-element field hold ``state`` (collective)."""
@@ -162,7 +187,7 @@ class MechanismModel:
         """The state of a rigid assembly: every flexible link carried along by its first interface (collective)."""
         V = self.elastic.u.function_space
         dim, owned = self.linkage.dim, self.interfaces.owned
-        positions = V.tabulate_dof_coordinates()[:owned, :dim]
+        positions = V.tabulate_dof_coordinates()[:owned, :dim] + self.design_nodes.values()[:owned]
         u = np.zeros((owned, dim))
         for index, link in enumerate(self.mechanism.flexible_links):
             body = self.linkage.interfaces[link][0]

@@ -30,16 +30,19 @@ class Draughtsman:
 
     def shape(self, snapshot: Snapshot, *, stress: bool) -> MechanismShape:
         """The mechanism in the state of ``snapshot``, links coloured by von Mises stress if asked for."""
-        positions = (self._mesh.vertices + snapshot.displacement)[:, :2]
+        positions = (snapshot.rest + snapshot.displacement)[:, :2]
         flexible = tuple(
             FlexibleShape(positions, triangles, snapshot.von_mises[cells] if stress else None, name=link.name)
             for (triangles, cells), link in zip(self._faces, self._mechanism.flexible_links, strict=True)
         )
-        rigid = tuple(
-            RigidShape(rigid_outline(self._places(link, snapshot.poses), self._width), link.name, link.fixed)
+        return MechanismShape(flexible, self.rigid(snapshot.poses), self._pins(snapshot.poses))
+
+    def rigid(self, poses: np.ndarray) -> tuple[RigidShape, ...]:
+        """The rigid links at ``poses`` (bodies, pose_size)."""
+        return tuple(
+            RigidShape(rigid_outline(self._places(link, poses), self._width), link.name, link.fixed)
             for link in self._mechanism.rigid_links
         )
-        return MechanismShape(flexible, rigid, self._pins(snapshot.poses))
 
     def arrow(self, force: Force, magnitude: float, snapshot: Snapshot, *, label: str) -> Arrow:
         """The arrow of a force on a rigid link in the state of ``snapshot``."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path as FilePath
 
@@ -24,8 +24,8 @@ from fenicsmech.simulation.export import write_xdmf
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.model import Fidelity, MechanismModel, check_links, mesh_mechanism
 from fenicsmech.simulation.picture import Draughtsman
-from fenicsmech.simulation.request import read_request
-from fenicsmech.simulation.snapshot import gather
+from fenicsmech.simulation.request import CurveRequest, read_request
+from fenicsmech.simulation.snapshot import gather, rest_vertices
 from fenicsmech.simulation.tracer import Tracer
 
 SPACES = {model.name: model for model in (SPATIAL, PLANE_STRESS, PLANE_STRAIN)}
@@ -133,21 +133,47 @@ class Simulation:
             configuration=configuration,
             others=others,
         )
-        assembly = assemble(self.linkage, configuration)
+        with Progress(len(request.controls), configuration.name) if self.comm.rank == 0 else Silent() as progress:
+            self._last = self.trace(request, watch=progress.update)
+        return self._last
+
+    def trace(self, request: CurveRequest, *, watch: Callable[[int], None] = lambda done: None) -> Curve:
+        """The curve of a checked request, as ``load_displacement`` without showing progress (collective).
+
+        Args:
+            request: what is asked for.
+            watch: called with the number of frames so far.
+        """
+        assembly = assemble(self.linkage, request.configuration)
         rigid = self.linkage.rigid
-        freedom = count_freedom(rigid, assembly.poses, rigid.motor_values(configuration.position))
-        newton = self.newton(force, request.others)
+        freedom = count_freedom(rigid, assembly.poses, rigid.motor_values(request.configuration.position))
+        newton = self.newton(request.force, request.others)
         tracer = Tracer(self.model, newton, request, assembly=assembly, freedom=freedom, predictor=self._predictor)
         frames: list[Frame] = []
-        label, samples = configuration.name, len(request.controls)
-        with Progress(samples, label) if self.comm.rank == 0 else Silent() as progress:
-            for control in request.controls:
-                frames.append(tracer.frame(control, frames))
-                progress.update(len(frames))
-        self._last = Curve(
-            force, configuration, freedom, tuple(frames), units=self.scene.units, leads=self.comm.rank == 0
+        for control in request.controls:
+            frames.append(tracer.frame(control, frames))
+            watch(len(frames))
+        return Curve(
+            request.force,
+            request.configuration,
+            freedom,
+            tuple(frames),
+            units=self.scene.units,
+            leads=self.comm.rank == 0,
         )
-        return self._last
+
+    def on(self, comm: MPI.Comm) -> Simulation:
+        """The same scene at the same fidelity for other processes, as drawn."""
+        return Simulation(
+            self.scene,
+            space=self.fidelity.model.name,
+            order=self.fidelity.order,
+            size=self.fidelity.sizes,
+            quadrature=self.fidelity.quadrature,
+            newton=self._options,
+            predictor=self._predictor,
+            comm=comm,
+        )
 
     def newton(self, force: Force, others: tuple[tuple[Force, float], ...] = ()) -> Newton:
         """The solver for one controlled and some fixed forces, kept for all configurations (collective)."""
@@ -163,7 +189,7 @@ class Simulation:
 
         Cells are numbered as in ``model.mesh.cells``, (cells,).
         """
-        snapshot = gather(self.model, frame.state)
+        snapshot = gather(self.model, frame)
         return None if snapshot is None else snapshot.von_mises
 
     def write(self, path: str | FilePath, curve: Curve | None = None) -> None:
@@ -206,7 +232,7 @@ class Simulation:
 
     def panel(self, curve: Curve, *, stress: bool = True, traces: Sequence[Trace] = ()) -> Panel | None:
         """The picture of a curve's first and last frame, on rank 0; None elsewhere (collective)."""
-        first, last = (gather(self.model, curve.frames[k].state) for k in (0, -1))
+        first, last = (gather(self.model, curve.frames[k]) for k in (0, -1))
         if first is None:
             return None
         pen = Draughtsman(self.scene.mechanism, self.linkage, self.model.mesh)
@@ -248,9 +274,11 @@ class Simulation:
 
     @property
     def mesh_ratio_max(self) -> float:
-        """Largest ratio of circumradius to inradius among the cells of the mesh."""
-        mesh = self.model.mesh
-        return self.linkage.dim / float(radius_ratios(mesh.vertices, mesh.cells).min())
+        """Largest ratio of circumradius to inradius among the cells of the rest shape (collective)."""
+        rest, ratio = rest_vertices(self.model), None
+        if rest is not None:
+            ratio = self.linkage.dim / float(radius_ratios(rest, self.model.mesh.cells).min())
+        return self.comm.bcast(ratio, root=0)
 
     def _chosen(self, curve: Curve | None) -> Curve:
         chosen = curve or self._last

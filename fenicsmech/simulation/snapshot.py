@@ -1,61 +1,77 @@
-"""A state on one process: vertex displacements and cell stresses of the whole mesh, gathered for pictures."""
+"""A frame on one process: vertices and cell stresses of the whole mesh, gathered for pictures."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from dolfinx import fem
 
 from fenicsmech.compat import cell_nodes, original_cells, original_nodes
-from fenicsmech.equilibrium import State
+from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.model import MechanismModel
 
 
 @dataclass(frozen=True)
 class Snapshot:
-    """Fields of one state on the whole mesh, and the poses of all bodies.
+    """Fields of one frame on the whole mesh, and the poses of all bodies.
 
     Attributes:
-        displacement: of the mesh's vertices, (vertices, dim).
+        rest: vertices of the unloaded links, (vertices, dim).
+        displacement: from there, (vertices, dim).
         von_mises: at the midpoints of the mesh's cells, (cells,).
         poses: (bodies, pose_size).
     """
 
+    rest: np.ndarray
     displacement: np.ndarray
     von_mises: np.ndarray
     poses: np.ndarray
 
 
-def vertex_displacements(model: MechanismModel) -> np.ndarray:
-    """Displacement of this rank's geometry nodes in the loaded state, (nodes, dim)."""
-    mesh, u = model.mesh.mesh, model.elastic.u
-    dim = model.linkage.dim
-    values = u.x.array.reshape(-1, dim)
-    displacement = np.zeros((len(mesh.geometry.x), dim))
+def at_vertices(model: MechanismModel, field: fem.Function) -> np.ndarray:
+    """Values of a Lagrange field (d or u) at this rank's geometry nodes, (nodes, dim)."""
+    mesh, dim = model.mesh.mesh, model.linkage.dim
+    values = field.x.array.reshape(-1, dim)
+    vertices = np.zeros((len(mesh.geometry.x), dim))
     for nodes, cell in zip(cell_nodes(mesh), range(len(model.mesh.link)), strict=False):
         # the first DOFs of a Lagrange cell are its vertices, in the order of the geometry
-        displacement[nodes] = values[u.function_space.dofmap.cell_dofs(cell)[: dim + 1]]
-    return displacement
+        vertices[nodes] = values[field.function_space.dofmap.cell_dofs(cell)[: dim + 1]]
+    return vertices
 
 
-def gather(model: MechanismModel, state: State) -> Snapshot | None:
-    """The snapshot of ``state``, on rank 0; None elsewhere (collective)."""
+def rest_vertices(model: MechanismModel) -> np.ndarray | None:
+    """Vertices of the present rest shape on rank 0, (vertices, dim); None elsewhere (collective)."""
     mesh = model.mesh
-    model.load(state)
+    parts = mesh.mesh.comm.gather((original_nodes(mesh.mesh), at_vertices(model, model.elastic.d)), root=0)
+    if parts is None:
+        return None
+    rest = mesh.vertices.copy()
+    for nodes, design in parts:
+        rest[nodes] = mesh.vertices[nodes] + design
+    return rest
+
+
+def gather(model: MechanismModel, frame: Frame) -> Snapshot | None:
+    """The snapshot of ``frame``, on rank 0; None elsewhere (collective)."""
+    mesh = model.mesh
     own = mesh.mesh.topology.index_map(mesh.mesh.topology.dim).size_local
-    parts = mesh.mesh.comm.gather(
-        (
-            original_nodes(mesh.mesh),
-            vertex_displacements(model),
-            original_cells(mesh.mesh)[:own],
-            model.elastic.von_mises()[:own],
-        ),
-        root=0,
-    )
+    with model.shaped(frame.design):
+        model.load(frame.state)
+        rest = rest_vertices(model)
+        parts = mesh.mesh.comm.gather(
+            (
+                original_nodes(mesh.mesh),
+                at_vertices(model, model.elastic.u),
+                original_cells(mesh.mesh)[:own],
+                model.elastic.von_mises()[:own],
+            ),
+            root=0,
+        )
     if parts is None:
         return None
     displacement, stress = np.zeros_like(mesh.vertices), np.zeros(len(mesh.cells))
     for nodes, u, cells, values in parts:
         displacement[nodes] = u
         stress[cells] = values
-    return Snapshot(displacement, stress, state.poses)
+    return Snapshot(rest, displacement, stress, frame.state.poses)

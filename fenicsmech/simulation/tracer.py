@@ -173,4 +173,5 @@ class Tracer:
                 seconds=0.0,
                 phases={},
                 state=state,
+                design=model.elastic.d.x.array.copy(),
             )

@@ -44,14 +44,55 @@ def test_demo_leaves_a_valid_summary_pictures_and_a_stable_curve(name, tmp_path)
 
 
 def test_truss_is_soft_first_and_stiff_once_its_diagonal_is_straight(tmp_path):
-    summary, _ = run("truss", tmp_path, "--quick", "--space", "plane-stress")
+    summary, _ = run("truss", tmp_path, "--quick", "--space", "plane-stress", "--simulate-only")
     u = np.array([frame["displacement"] for frame in summary["frames"]])
     f = np.array([frame["force"] for frame in summary["frames"]])
     stiffness = np.diff(f) / np.diff(u)
     assert stiffness[-1] > 5.0 * stiffness[0]
 
 
-def test_two_ranks_give_the_same_curve(tmp_path, mpirun):
+def check_design(summary: dict, folder: Path, thickness: tuple[float, float]) -> None:
+    """Every target within 1 %, inside the bounds of fabrication, every equilibrium stable, all files there."""
+    check_summary(summary)
+    for target in summary["targets"]:
+        assert target["reached"] == pytest.approx(target["wanted"], rel=0.01)
+    least, most = summary["thickness"]
+    assert thickness[0] <= least <= most <= thickness[1]
+    assert summary["curvature_ratio_max"] <= 0.08
+    assert summary["mesh_ratio_max"] <= 30.0
+    assert all(frame["stable"] for frame in summary["frames"])
+    assert summary["objective"]["final"] < 0.05 * summary["objective"]["initial"]
+    # the curve of the optimised mechanism runs through the targets
+    frames = {(frame["configuration"], frame["force"]): frame["displacement"] for frame in summary["frames"]}
+    for target in summary["targets"]:
+        there = frames[target["configuration"], target["force"]]
+        assert there == pytest.approx(target["reached"], rel=1e-6)
+    assert {"links.png", "design.json", "curve.png", "mechanism.png"} <= {path.name for path in folder.iterdir()}
+    solids = {path.suffix for path in (folder / "links").iterdir()}
+    assert solids == {".step", ".stl"}
+
+
+THICKNESS = {"truss": (1.5, 6.0), "claw": (1.0, 9.0), "klann": (1.0, 9.0)}
+PARAMETERS = {"truss": 18, "claw": 69, "klann": 57}
+
+
+@pytest.mark.parametrize("name", DEMOS)
+def test_quick_demo_reaches_its_targets_in_plane_stress(name, tmp_path):
+    summary, printed = run(name, tmp_path, "--quick", "--space", "plane-stress")
+    check_design(summary, tmp_path, THICKNESS[name])
+    assert summary["parameters"] == PARAMETERS[name]
+    assert "optimize:" in printed
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", DEMOS)
+def test_quick_demo_reaches_its_targets_in_space(name, tmp_path):
+    summary, _ = run(name, tmp_path, "--quick")
+    check_design(summary, tmp_path, THICKNESS[name])
+    assert len(summary["plane_stress"]["reached_in_3d"]) == len(summary["targets"])
+
+
+def test_two_ranks_give_the_same_curve_and_the_same_optimum(tmp_path, mpirun):
     options = ("--quick", "--space", "plane-stress")
     alone, _ = run("claw", tmp_path, *options)
     together = tmp_path / "two"
@@ -59,5 +100,8 @@ def test_two_ranks_give_the_same_curve(tmp_path, mpirun):
     assert done.returncode == 0, done.stderr
     shared = json.loads((together / "summary.json").read_text())
     assert shared["ranks"] == 2
-    for one, two in zip(alone["frames"], shared["frames"], strict=True):
+    for one, two in zip(alone["initial_frames"], shared["initial_frames"], strict=True):
         assert two["displacement"] == pytest.approx(one["displacement"], rel=1e-9, abs=1e-12)
+    designs = [json.loads((folder / "design.json").read_text())["links"] for folder in (tmp_path, together)]
+    for one, two in zip(*designs, strict=True):
+        assert two["parameters"] == pytest.approx(one["parameters"], rel=1e-6, abs=1e-6)

@@ -5,8 +5,8 @@ import pytest
 
 from fenicsmech.design.insertion import insert, pierced
 from fenicsmech.design.laplacian import lumped_mass, stiffness
-from fenicsmech.design.plan import plan_of
 from fenicsmech.meshing import FREE, cell_measures
+from fenicsmech.meshing.plan import plan_of
 
 from .shapes import DEPTH, strip_mesh
 

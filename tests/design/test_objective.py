@@ -1,62 +1,185 @@
-"""The design objective: its gradient away from the initial design, and a target that is reached by changing a shape."""
+"""The design objective: its value, its gradient away from the initial design, what it refuses, groups of processes."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.design.handle_optimum import HandleOptimum
-from fenicsmech.design.link_shape import shape_links
-from fenicsmech.design.objective import Objective
-from fenicsmech.design.optimisers import LevenbergMarquardt
-from fenicsmech.design.penalties import Bounds, ShapeBounds, StayClose
-from fenicsmech.design.quality import QualitySum
-from fenicsmech.design.shape_map import ShapeMap
-from fenicsmech.design.spline_design import SplineDesign, Target, shape_request
-from fenicsmech.design.spline_samples import SplineSamples
+from fenicsmech.design.objective import target_scales
+from fenicsmech.design.optimisers import Infeasible, LevenbergMarquardt, Quadratic, Start, TooHigh
+from fenicsmech.design.regularisers import MeshQuality, Regulariser, ShapeBounds, StayClose
 
-from ..simulation.demo_scenes import describe
+from .mechanisms import Case, objective, strained, truss
+
+TARGETS = ((0.1, 2.0), (0.4, 3.2))
+REGULARISER = MeshQuality(limit=2.5, width=2.5) + ShapeBounds() + 1e-3 * StayClose()
 
 
-def truss_objective(space: str, size: float) -> tuple[Objective, np.ndarray, np.ndarray]:
-    """Objective of the truss finger, its initial design, and which parameters are thicknesses."""
-    scene, push = describe("truss")
-    finger = scene.mechanism
-    (diagonal,) = finger.flexible_links
-    simulation = fm.Simulation(scene, space=space, size=size)
-    model = simulation.model
-    design = SplineDesign(diagonal, segments=3, thickness=(1.5, 6.0))
-    shapes = shape_links(model.mesh, [shape_request(design, finger, simulation.linkage)])
-    shape = ShapeMap(model.mesh, model.elastic.d, shapes)
-    optimum = HandleOptimum(shape, QualitySum(model.elastic.d))
-    spline = shapes[0].handles.spline
-    bounds = ShapeBounds(
-        [SplineSamples(spline)], [shapes[0].width], [Bounds(design.thickness, design.bend)], [slice(0, spline.size)]
+def away(bench, change: float = 0.05) -> tuple[np.ndarray, np.ndarray]:
+    """A design away from the initial one, and a direction from there."""
+    return bench.design(change, seed=5), bench.direction(6)
+
+
+def test_value_is_half_the_weighted_sum_of_squared_relative_errors():
+    case = truss(*TARGETS)
+    light, heavy = (
+        fm.Target(t.force_part, t.force, t.displacement, weight=w)
+        for t, w in zip(case.targets, (0.5, 3.0), strict=True)
     )
-    targets = [Target(push, 0.1, 2.0), Target(push, 0.4, 3.2)]
-    objective = Objective(simulation, shape, optimum, targets, bounds + 1e-3 * StayClose(shape.initial))
-    return objective, shape.initial, spline.is_thickness
+    whole, bench = objective(Case(case.scene, case.designs, [light, heavy]), StayClose())
+    here = whole.evaluate(bench.rest.initial)
+    errors = (whole.reached - [2.0, 3.2]) / [2.0, 3.2]
+    assert here.value == pytest.approx(0.5 * (0.5 * errors[0] ** 2 + 3.0 * errors[1] ** 2), rel=1e-10)
+    curve = bench.simulation.load_displacement(light.force_part, forces=[0.1, 0.4])
+    assert whole.reached == pytest.approx(curve.displacements, rel=1e-8)
+    assert whole.traced(bench.rest.initial) == pytest.approx(here.value, rel=1e-8)
 
 
-@pytest.mark.parametrize(("space", "size"), [("plane-stress", 3.0), ("3d", 4.0)])
-def test_gradient_agrees_with_central_differences_away_from_the_initial_design(space, size):
-    objective, start, thickness = truss_objective(space, size)
-    assert len(start) == 18
-    random = np.random.default_rng(5)
-    scale = np.where(thickness, 0.1, 1.0)
-    p = start + 0.5 * scale * random.standard_normal(len(start))
-    direction = scale * random.standard_normal(len(start))
-    here = objective.evaluate(p)
-    step = 2e-3
-    slope = (objective.evaluate(p + step * direction).value - objective.evaluate(p - step * direction).value) / (
-        2 * step
-    )
-    assert here.gradient @ direction == pytest.approx(slope, rel=1e-5)
+def test_targets_that_are_next_to_nothing_are_measured_by_the_largest_one():
+    (push,) = truss().scene.mechanism.forces
+    wanted = [fm.Target(push, 1.0, displacement) for displacement in (0.0, 5.0, -0.1, -2.0)]
+    assert target_scales(wanted) == pytest.approx([0.5, 5.0, 0.5, 2.0])
+    assert target_scales(wanted[:1]) == pytest.approx([1.0])
+
+
+@pytest.mark.parametrize(("space", "size", "order"), [("plane-stress", 3.0, 2), ("3d", 4.0, 1)])
+def test_gradient_agrees_with_central_differences_away_from_the_initial_design(space, size, order):
+    whole, bench = objective(truss(*TARGETS), REGULARISER, space=space, size=size, order=order)
+    p, direction = away(bench)
+    assert len(p) == 18
+    here = whole.evaluate(p)
+    assert here.penalty.value > 1e-5
+    step = 1e-3
+    ahead, back = (whole.evaluate(p + h * direction) for h in (step, -step))
+    assert here.gradient @ direction == pytest.approx((ahead.value - back.value) / (2 * step), rel=1e-5)
+    slope = (ahead.residuals - back.residuals) / (2 * step)
+    assert here.jacobian @ direction == pytest.approx(slope, rel=1e-5, abs=1e-5 * np.abs(slope).max())
+
+
+def test_gradient_does_not_depend_on_the_way_to_a_design():
+    seen = []
+    for through in (0, 1, 2):
+        whole, bench = objective(truss(*TARGETS), REGULARISER)
+        p, direction = away(bench)
+        for share in np.linspace(0.0, 1.0, through + 1)[:-1]:
+            whole.evaluate(bench.rest.initial + share * (p - bench.rest.initial) + 0.01 * share * direction)
+        here = whole.evaluate(p)
+        seen.append([here.value, *here.gradient])
+    for other in seen[1:]:
+        assert other == pytest.approx(seen[0], rel=1e-6, abs=1e-6 * np.abs(seen[0]).max())
+
+
+def test_values_that_are_of_no_use_are_refused_without_derivatives(monkeypatch):
+    whole, bench = objective(truss(*TARGETS), StayClose())
+    p, _ = away(bench)
+    value = whole.evaluate(p).value
+    assert whole.evaluate(p, below=1.001 * value).value == pytest.approx(value, rel=1e-8)
+
+    def never(known):
+        raise AssertionError("derivatives were computed")
+
+    monkeypatch.setattr(bench.equilibria, "gradients", never)
+    with pytest.raises(TooHigh, match="objective is"):
+        whole.evaluate(p, below=0.999 * value)
+
+
+def test_what_was_reached_is_that_of_the_last_evaluation_of_use():
+    whole, bench = objective(truss(*TARGETS), StayClose())
+    assert np.all(np.isnan(whole.reached))
+    value = whole.evaluate(bench.rest.initial).value
+    reached = whole.reached.copy()
+    with pytest.raises(TooHigh):
+        whole.evaluate(bench.design(0.3), below=1e-6 * value)
+    assert np.array_equal(whole.reached, reached)
+
+
+def test_designs_that_turn_cells_inside_out_are_infeasible():
+    whole, bench = objective(truss(*TARGETS), StayClose())
+    p = np.where(bench.rest.lengths == 1.0, -3.0, bench.rest.initial)
+    with pytest.raises(Infeasible, match="inverted"):
+        whole.evaluate(p)
+    with pytest.raises(Infeasible, match="inverted"):
+        whole.traced(p)
+    assert np.isfinite(whole.evaluate(bench.rest.initial).value)  # it recovers
+
+
+def test_loads_that_no_equilibrium_carries_are_infeasible():
+    whole, bench = objective(truss((1e4, 5.0)), StayClose())
+    with pytest.raises(Infeasible, match="push on tip"):
+        whole.evaluate(bench.rest.initial)
+
+
+def test_bounds_that_hold_a_design_back_are_named():
+    whole, bench = objective(truss(*TARGETS, thickness=(2.9, 3.1)), REGULARISER)
+    whole.evaluate(bench.rest.initial)
+    link = bench.rest.links[0]
+    p = bench.rest.initial.copy()
+    p[np.flatnonzero(link.spline.is_thickness)[1:-1]] += 0.1
+    assert "largest thickness 3.1 of 'diagonal'" in whole.active(p)
 
 
 def test_targets_are_reached_by_changing_the_shape():
-    objective, start, _ = truss_objective("plane-stress", 3.0)
-    last = LevenbergMarquardt(iterations=40).minimise(objective, start, watch=lambda iterate: None)
-    objective.evaluate(last.evaluation.parameters)
-    assert objective.reached == pytest.approx([2.0, 3.2], rel=0.01)
+    whole, bench = objective(truss(*TARGETS), ShapeBounds() + 1e-4 * StayClose())
+    last = LevenbergMarquardt().minimise(whole, Start(bench.rest.initial), watch=lambda iterate: None)
+    whole.evaluate(last.evaluation.parameters)
+    assert whole.reached == pytest.approx([2.0, 3.2], rel=0.01)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize(
+    ("case", "fidelity"),
+    [
+        (lambda: truss(*TARGETS), {}),
+        (lambda: truss(*TARGETS), {"space": "3d", "size": 4.0, "order": 1}),
+        (lambda: strained(1.0, 3.0, 2.0), {}),
+    ],
+    ids=["truss", "truss in space", "braced four-bar"],
+)
+def test_groups_of_processes_find_the_same_value_and_derivatives(case, fidelity):
+    seen = []
+    for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
+        whole, bench = objective(case(), REGULARISER, comm=comm, **fidelity)
+        assert bench.simulation.comm.size == 1  # each group is one process
+        whole.evaluate(bench.rest.initial)
+        here = whole.evaluate(away(bench)[0])
+        seen.append((here.value, here.residuals, here.gradient, here.jacobian))
+    for alone, together in zip(*seen, strict=True):
+        assert together == pytest.approx(alone, rel=1e-10, abs=1e-10 * np.abs(alone).max())
+
+
+@pytest.mark.parallel
+def test_one_group_of_all_processes_finds_the_same_value_and_derivatives():
+    seen = []
+    for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
+        whole, bench = objective(truss((0.4, 3.2)), REGULARISER, comm=comm)
+        assert bench.simulation.comm.size == comm.size
+        here = whole.evaluate(away(bench)[0])
+        seen.append((here.value, here.residuals, here.gradient))
+    for alone, together in zip(*seen, strict=True):
+        assert together == pytest.approx(alone, rel=1e-7, abs=1e-7 * np.abs(alone).max())
+
+
+@pytest.mark.parallel
+def test_what_is_infeasible_in_one_group_is_so_in_all():
+    whole, bench = objective(truss((0.1, 2.0), (1e4, 5.0)), StayClose(), comm=MPI.COMM_WORLD)
+    with pytest.raises(Infeasible, match="push on tip"):
+        whole.evaluate(bench.rest.initial)
+
+
+class Rounded(Regulariser):
+    """1, which some processes round differently, as sums over meshes that are distributed differently are."""
+
+    def around(self, rest, placement):
+        value = 1.0 + 1e-12 * MPI.COMM_WORLD.rank
+        return lambda p: Quadratic(value, np.zeros(len(p)), np.zeros((len(p), len(p))))
+
+
+@pytest.mark.parallel
+def test_processes_agree_on_what_is_too_high_however_they_round():
+    whole, bench = objective(truss(*TARGETS), Rounded(), comm=MPI.COMM_WORLD)
+    value = MPI.COMM_WORLD.bcast(whole.evaluate(bench.rest.initial).value)
+    whole.evaluate(bench.rest.initial, below=value + 0.5e-12)
+    with pytest.raises(TooHigh):
+        whole.evaluate(bench.rest.initial, below=value - 0.5e-12)

@@ -47,7 +47,7 @@ class Bench:
 
     def state(self, design: np.ndarray, force: float = FORCE):
         """The last frame of the curve to ``force`` of the given design."""
-        self.adjoint.reshape(design)
+        self.model.reshape(design)
         samples = [force / 2, force]
         return self.simulation.load_displacement(self.force, forces=samples, configuration=self.turned).frames[-1]
 

@@ -59,7 +59,7 @@ def test_fields_are_written_as_a_time_series_over_the_force(space, shared_tmp_pa
     topology = mesh.topology
     assert topology.index_map(topology.dim).size_global == len(simulation.model.mesh.cells)
     # HDF5 holds plain doubles: the largest displacement of the last frame stands among them
-    snapshot = gather(simulation.model, curve.frames[-1].state)
+    snapshot = gather(simulation.model, curve.frames[-1])
     if snapshot is not None:
         largest = snapshot.displacement.ravel()[np.argmax(np.abs(snapshot.displacement))]
         heavy = path.with_suffix(".h5").read_bytes()

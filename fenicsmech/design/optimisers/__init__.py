@@ -7,7 +7,17 @@
 
 from fenicsmech.design.optimisers.bfgs import Bfgs
 from fenicsmech.design.optimisers.levenberg_marquardt import LevenbergMarquardt
-from fenicsmech.design.optimisers.problem import Evaluation, Infeasible, Iterate, LeastSquaresProblem, Minimiser, Reason
+from fenicsmech.design.optimisers.problem import (
+    Evaluation,
+    Infeasible,
+    Iterate,
+    LeastSquaresProblem,
+    Minimiser,
+    Quadratic,
+    Reason,
+    Start,
+    TooHigh,
+)
 
 __all__ = [
     "Bfgs",
@@ -17,5 +27,8 @@ __all__ = [
     "LeastSquaresProblem",
     "LevenbergMarquardt",
     "Minimiser",
+    "Quadratic",
     "Reason",
+    "Start",
+    "TooHigh",
 ]

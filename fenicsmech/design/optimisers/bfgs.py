@@ -19,6 +19,7 @@ from fenicsmech.design.optimisers.problem import (
     LeastSquaresProblem,
     Minimiser,
     Reason,
+    Start,
 )
 
 _ARMIJO = 1e-4
@@ -27,32 +28,35 @@ _HALVINGS = 30
 
 @dataclass(frozen=True)
 class Bfgs(Minimiser):
-    """Stops when the expected reduction is below ``tolerance`` times the objective, or after ``iterations``."""
+    """Stops when the expected reduction is below ``tolerance`` times the objective, or after ``iterations``.
+
+    What it expects hangs on an approximate Hessian: a tolerance that is not small ends it far from a minimum.
+    """
 
     iterations: int = 300
     tolerance: float = 1e-6
 
-    def minimise(self, problem: LeastSquaresProblem, start: np.ndarray, *, watch: Callable[[Iterate], None]) -> Iterate:
-        here = problem.evaluate(start)
-        inverse = np.eye(len(start))
-        last = Iterate(0, 1, here, 0.0, None)
+    def minimise(self, problem: LeastSquaresProblem, start: Start, *, watch: Callable[[Iterate], None]) -> Iterate:
+        here, size = problem.evaluate(start.parameters), len(start.parameters)
+        inverse = np.eye(size) if start.memory is None else start.memory.reshape(size, size)
+        last = _iterate(start.number, start.evaluations + 1, here, inverse)
         watch(last)
         while last.reason is None:
-            here = last.evaluation
-            step = -inverse @ here.gradient
-            if -float(here.gradient @ step) <= self.tolerance * max(here.value, 1e-30):
-                last = Iterate(last.number, last.evaluations, here, 0.0, Reason.CONVERGED)
-            else:
-                there, tried = self._search(problem, here, step)
-                evaluations, number = last.evaluations + tried, last.number + 1
-                if there is None:
-                    last = Iterate(last.number, evaluations, here, 0.0, Reason.NO_DESCENT)
-                else:
-                    inverse = _updated(inverse, here, there, first=last.number == 0)
-                    reason = Reason.ITERATIONS if number >= self.iterations else None
-                    last = Iterate(number, evaluations, there, 0.0, reason)
+            last = self._advance(problem, last)
             watch(last)
         return last
+
+    def _advance(self, problem: LeastSquaresProblem, last: Iterate) -> Iterate:
+        here, number, evaluations = last.evaluation, last.number, last.evaluations
+        inverse = last.memory.reshape(len(here.parameters), -1)
+        if last.promise <= self.tolerance:
+            return _iterate(number, evaluations, here, inverse, Reason.CONVERGED)
+        there, tried = self._search(problem, here, -inverse @ here.gradient)
+        if there is None:
+            return _iterate(number, evaluations + tried, here, inverse, Reason.NO_DESCENT)
+        inverse = _updated(inverse, here, there, first=number == 0)
+        reason = Reason.ITERATIONS if number + 1 >= self.iterations else None
+        return _iterate(number + 1, evaluations + tried, there, inverse, reason)
 
     def _search(
         self, problem: LeastSquaresProblem, here: Evaluation, step: np.ndarray
@@ -60,13 +64,19 @@ class Bfgs(Minimiser):
         slope, length = float(here.gradient @ step), 1.0
         for tried in range(1, _HALVINGS + 1):
             try:
-                there = problem.evaluate(here.parameters + length * step)
-                if there.value <= here.value + _ARMIJO * length * slope:
-                    return there, tried
+                return problem.evaluate(here.parameters + length * step, here.value + _ARMIJO * length * slope), tried
             except Infeasible:
-                pass
-            length *= 0.5
+                length *= 0.5
         return None, _HALVINGS
+
+
+def _iterate(
+    number: int, evaluations: int, evaluation: Evaluation, inverse: np.ndarray, reason: Reason | None = None
+) -> Iterate:
+    """With the reduction that the quasi-Newton step promises."""
+    gradient = evaluation.gradient
+    promise = 0.5 * float(gradient @ inverse @ gradient) / max(evaluation.value, 1e-30)
+    return Iterate(number, evaluations, evaluation, inverse.ravel(), promise, reason)
 
 
 def _updated(inverse: np.ndarray, here: Evaluation, there: Evaluation, *, first: bool) -> np.ndarray:

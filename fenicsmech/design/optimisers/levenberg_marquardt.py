@@ -1,63 +1,132 @@
-"""Levenberg–Marquardt: Gauss–Newton steps with exact curvature of the penalties, damped until they descend.
+"""Levenberg–Marquardt for least squares with a regulariser that costs next to nothing to evaluate.
 
-    (Jᵀ J + ∂²R/∂p² + μ D) s = −∂O/∂p,     D the diagonal of Jᵀ J + ∂²R/∂p².
+Only the residuals r are made linear; the regulariser R, barriers included, enters each step as it is:
 
-A step is accepted if it lowers O by a share of what the quadratic model promises; μ falls after good steps and
-grows after bad or infeasible ones. Source: Nocedal & Wright, Numerical Optimization
-(doi:10.1007/978-0-387-40065-5), chapter 10.
+    s = argmin ½ |r + J s|² + R(p + s) + ½ μ |s / ℓ|²,     ℓ the lengths of the parameters.
+
+A step is accepted if it lowers O by a share of what this model promises; μ falls after good steps and grows after bad
+or infeasible ones. Sources: Nocedal & Wright, Numerical Optimization (doi:10.1007/978-0-387-40065-5), chapter 10; for
+the composite model: Fletcher, Practical Methods of Optimization (doi:10.1002/9781118723203), chapter 14.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenicsmech.design.optimisers.problem import Infeasible, Iterate, LeastSquaresProblem, Minimiser, Reason
+from fenicsmech.design.optimisers.problem import (
+    Evaluation,
+    Infeasible,
+    Iterate,
+    LeastSquaresProblem,
+    Minimiser,
+    Reason,
+    Start,
+    TooHigh,
+)
 
 _POOR, _GOOD = 0.1, 0.75  # actual over promised reduction: below, the step is refused; above, damping falls
 _REFUSALS = 20
+_STALLS = 3
+_LEAST = 1e-9  # μ, so that parameters without influence stay where they are
+_INNER = 50
 
 
 @dataclass(frozen=True)
 class LevenbergMarquardt(Minimiser):
-    """Stops when the reduction promised without damping is below ``tolerance`` of O, or after ``iterations``."""
+    """Ends when the undamped step promises less than ``tolerance`` of O, or three steps in a row gained less."""
 
     iterations: int = 60
-    tolerance: float = 1e-6
-    damping: float = 1e-3
+    tolerance: float = 5e-3
+    damping: float = 1e-2
 
-    def minimise(self, problem: LeastSquaresProblem, start: np.ndarray, *, watch: Callable[[Iterate], None]) -> Iterate:
-        best = Iterate(0, 1, problem.evaluate(start), self.damping, None)
-        watch(best)
-        while best.reason is None:
-            best = self._advance(problem, best)
-            watch(best)
-        return best
+    def minimise(self, problem: LeastSquaresProblem, start: Start, *, watch: Callable[[Iterate], None]) -> Iterate:
+        here, metric = problem.evaluate(start.parameters), 1.0 / problem.lengths**2
+        memory = _Memory(self.damping, 0) if start.memory is None else _Memory.of(start.memory)
+        last = _iterate(start.number, start.evaluations + 1, here, memory, metric)
+        watch(last)
+        while last.reason is None:
+            last = self._advance(problem, last, metric)
+            watch(last)
+        return last
 
-    def _advance(self, problem: LeastSquaresProblem, last: Iterate) -> Iterate:
-        here, damping, evaluations = last.evaluation, last.damping, last.evaluations
-        gradient, curvature = here.gradient, here.curvature
-        scale = np.maximum(np.diag(curvature), 1e-12 * np.max(np.diag(curvature)))
-        undamped = np.linalg.solve(curvature + 1e-12 * np.diag(scale), -gradient)
-        if -0.5 * float(gradient @ undamped) <= self.tolerance * max(here.value, 1e-30):
-            return Iterate(last.number, evaluations, here, damping, Reason.CONVERGED)
+    def _advance(self, problem: LeastSquaresProblem, last: Iterate, metric: np.ndarray) -> Iterate:
+        here, memory, evaluations = last.evaluation, _Memory.of(last.memory), last.evaluations
+        damping = memory.damping
+        if last.promise <= self.tolerance or memory.stalls >= _STALLS:
+            return replace(last, reason=Reason.CONVERGED)
         for _ in range(_REFUSALS):
-            step = np.linalg.solve(curvature + damping * np.diag(scale), -gradient)
-            promised = -float(gradient @ step) - 0.5 * float(step @ curvature @ step)
+            there, promised = _step(here, damping, metric)
+            if promised <= 0.0:
+                break  # damped to a standstill
             evaluations += 1
             try:
-                there = problem.evaluate(here.parameters + step)
+                new = problem.evaluate(there, here.value - _POOR * promised)
+            except TooHigh:
+                damping *= 4.0
+                continue
             except Infeasible:
                 damping *= 10.0
                 continue
-            ratio = (here.value - there.value) / promised
-            if ratio < _POOR:
-                damping *= 4.0
-                continue
-            damping = max(damping / 5.0, 1e-12) if ratio > _GOOD else damping
-            number = last.number + 1
+            gain, number = here.value - new.value, last.number + 1
+            if gain > _GOOD * promised:
+                damping = max(damping / 5.0, _LEAST)
+            stalls = memory.stalls + 1 if gain < self.tolerance * here.value else 0
             reason = Reason.ITERATIONS if number >= self.iterations else None
-            return Iterate(number, evaluations, there, damping, reason)
-        return Iterate(last.number, evaluations, here, damping, Reason.NO_DESCENT)
+            return _iterate(number, evaluations, new, _Memory(damping, stalls), metric, reason)
+        return replace(last, evaluations=evaluations, reason=Reason.NO_DESCENT)
+
+
+@dataclass(frozen=True)
+class _Memory:
+    """μ, and how many steps in a row gained next to nothing."""
+
+    damping: float
+    stalls: int
+
+    @staticmethod
+    def of(numbers: np.ndarray) -> _Memory:
+        return _Memory(float(numbers[0]), int(numbers[1]))
+
+    @property
+    def numbers(self) -> np.ndarray:
+        return np.array([self.damping, self.stalls])
+
+
+def _step(here: Evaluation, damping: float, metric: np.ndarray) -> tuple[np.ndarray, float]:
+    """The minimum p + s of the damped model by Newton's method, and the reduction that the model promises there."""
+    p, value = here.parameters, here.value
+    for _ in range(_INNER):
+        model, away = here.model(p), p - here.parameters
+        gradient = model.gradient + damping * metric * away
+        newton = np.linalg.solve(model.curvature + np.diag(damping * metric), -gradient)
+        slope = float(gradient @ newton)
+        if -slope <= 1e-10 * here.value:
+            break
+        length = 1.0
+        while length > 1e-8:
+            trial = p + length * newton
+            away = trial - here.parameters
+            damped = here.model(trial).value + 0.5 * damping * float(away @ (metric * away))
+            if damped <= value + 0.1 * length * slope:
+                p, value = trial, damped
+                break
+            length *= 0.5
+        else:
+            break
+    return p, here.value - here.model(p).value
+
+
+def _iterate(
+    number: int,
+    evaluations: int,
+    evaluation: Evaluation,
+    memory: _Memory,
+    metric: np.ndarray,
+    reason: Reason | None = None,
+) -> Iterate:
+    """With the reduction that the undamped step promises."""
+    promise = _step(evaluation, _LEAST, metric)[1] / max(evaluation.value, 1e-30)
+    return Iterate(number, evaluations, evaluation, memory.numbers, promise, reason)

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -15,7 +16,31 @@ class Infeasible(Exception):
     """The objective has no value at these parameters; the step that led there is taken back."""
 
 
-@dataclass(frozen=True)
+class TooHigh(Infeasible):
+    """The objective has a value, but one that is of no use to the minimiser."""
+
+
+@dataclass(frozen=True, eq=False)
+class Quadratic:
+    """A function near one point.
+
+    Attributes:
+        value: R.
+        gradient: ∂R/∂p, (n,).
+        curvature: ∂²R/∂p², or a positive semidefinite approximation, (n, n).
+    """
+
+    value: float
+    gradient: np.ndarray
+    curvature: np.ndarray
+
+    @staticmethod
+    def zero(size: int) -> Quadratic:
+        """R = 0 of ``size`` parameters."""
+        return Quadratic(0.0, np.zeros(size), np.zeros((size, size)))
+
+
+@dataclass(frozen=True, eq=False)
 class Evaluation:
     """O(p) = ½ |r|² + R and its derivatives at one point.
 
@@ -23,42 +48,55 @@ class Evaluation:
         parameters: p, (n,).
         residuals: r, (m,).
         jacobian: ∂r/∂p, (m, n).
-        penalty: R.
-        penalty_gradient: ∂R/∂p, (n,).
-        penalty_curvature: ∂²R/∂p², or a positive semidefinite approximation, (n, n).
+        regulariser: R near p, which costs little to evaluate.
     """
 
     parameters: np.ndarray
     residuals: np.ndarray
     jacobian: np.ndarray
-    penalty: float
-    penalty_gradient: np.ndarray
-    penalty_curvature: np.ndarray
+    regulariser: Callable[[np.ndarray], Quadratic]
+
+    @cached_property
+    def penalty(self) -> Quadratic:
+        """R at p."""
+        return self.regulariser(self.parameters)
 
     @property
     def value(self) -> float:
         """O."""
-        return 0.5 * float(self.residuals @ self.residuals) + self.penalty
+        return 0.5 * float(self.residuals @ self.residuals) + self.penalty.value
 
     @property
     def gradient(self) -> np.ndarray:
         """∂O/∂p = Jᵀ r + ∂R/∂p, (n,)."""
-        return self.jacobian.T @ self.residuals + self.penalty_gradient
+        return self.jacobian.T @ self.residuals + self.penalty.gradient
 
-    @property
-    def curvature(self) -> np.ndarray:
-        """Jᵀ J + ∂²R/∂p², (n, n)."""
-        return self.jacobian.T @ self.jacobian + self.penalty_curvature
+    def model(self, parameters: np.ndarray) -> Quadratic:
+        """½ |r + J s|² + R(p + s), the objective with displacements made linear, at ``parameters`` p + s."""
+        r = self.residuals + self.jacobian @ (parameters - self.parameters)
+        penalty = self.regulariser(parameters)
+        return Quadratic(
+            0.5 * float(r @ r) + penalty.value,
+            self.jacobian.T @ r + penalty.gradient,
+            self.jacobian.T @ self.jacobian + penalty.curvature,
+        )
 
 
 class LeastSquaresProblem(Protocol):
-    """An objective that can be evaluated with its derivatives."""
+    """An objective that can be evaluated with its derivatives.
 
-    def evaluate(self, parameters: np.ndarray) -> Evaluation:
+    Attributes:
+        lengths: changes of the parameters that count alike, (n,).
+    """
+
+    lengths: np.ndarray
+
+    def evaluate(self, parameters: np.ndarray, below: float = np.inf) -> Evaluation:
         """O and its derivatives.
 
         Raises:
             Infeasible: O has no value there.
+            TooHigh: it is larger than ``below``; its derivatives were not computed.
         """
 
 
@@ -70,7 +108,23 @@ class Reason(Enum):
     NO_DESCENT = "no step lowers the objective although the gradient does not vanish: check bounds and mesh quality"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Where a minimisation starts, or goes on after it was interrupted.
+
+    Attributes:
+        parameters: p, (n,).
+        number, evaluations: iterations and objective evaluations so far.
+        memory: what the minimiser had learnt, from ``Iterate.memory``; None at the very start.
+    """
+
+    parameters: np.ndarray
+    number: int = 0
+    evaluations: int = 0
+    memory: np.ndarray | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class Iterate:
     """State of a minimisation after an iteration.
 
@@ -78,23 +132,33 @@ class Iterate:
         number: iterations so far.
         evaluations: objective evaluations so far, infeasible ones included.
         evaluation: the best point.
-        damping: the minimiser's step control, to resume with.
+        memory: what the minimiser has learnt, to go on with.
+        promise: the reduction that is still expected, over the objective; inf if that is not known.
         reason: None while it goes on.
     """
 
     number: int
     evaluations: int
     evaluation: Evaluation
-    damping: float
+    memory: np.ndarray
+    promise: float
     reason: Reason | None
 
 
 class Minimiser(ABC):
-    """A method that minimises a least-squares problem from a start."""
+    """A method that minimises a least-squares problem from a start.
+
+    Attributes:
+        iterations: most iterations.
+        tolerance: promised reduction over the objective at which it ends.
+    """
+
+    iterations: int
+    tolerance: float
 
     @abstractmethod
-    def minimise(self, problem: LeastSquaresProblem, start: np.ndarray, *, watch: Callable[[Iterate], None]) -> Iterate:
-        """The last iterate; ``watch`` sees every one, the start as number 0.
+    def minimise(self, problem: LeastSquaresProblem, start: Start, *, watch: Callable[[Iterate], None]) -> Iterate:
+        """The last iterate; ``watch`` sees every one, the start as well.
 
         Raises:
             Infeasible: at the start.

@@ -1,84 +1,244 @@
-"""Both minimisers find known minima, take back infeasible steps, and say why they stop."""
+"""Both minimisers find known minima, respect what they are told, can go on later, and say why they stop."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
-from fenicsmech.design.optimisers import Bfgs, Evaluation, Infeasible, LevenbergMarquardt, Reason
+from fenicsmech.design.barrier import Barrier
+from fenicsmech.design.optimisers import (
+    Bfgs,
+    Evaluation,
+    Infeasible,
+    Iterate,
+    LevenbergMarquardt,
+    Minimiser,
+    Quadratic,
+    Reason,
+    Start,
+    TooHigh,
+)
 
 MINIMISERS = [LevenbergMarquardt(iterations=200, tolerance=1e-14), Bfgs(iterations=2000, tolerance=1e-14)]
+each_minimiser = pytest.mark.parametrize("minimiser", MINIMISERS, ids=lambda minimiser: type(minimiser).__name__)
 
 
-class Rosenbrock:
+@dataclass
+class Problem:
+    """Residuals and a regulariser; keeps a list of where it was evaluated, and refuses what is not asked for."""
+
+    start: np.ndarray
+    lengths: np.ndarray
+    asked: list[np.ndarray] = field(default_factory=list, init=False)
+    refused: int = field(default=0, init=False)
+
+    def evaluate(self, parameters: np.ndarray, below: float = np.inf) -> Evaluation:
+        self.asked.append(parameters)
+        self.check(parameters)
+        evaluation = Evaluation(parameters, *self.residuals(parameters), self.regulariser)
+        if evaluation.value > below:
+            self.refused += 1
+            raise TooHigh(f"{evaluation.value} is above {below}")
+        return evaluation
+
+    def check(self, parameters: np.ndarray) -> None:
+        """Raises Infeasible where there is no value."""
+
+    def residuals(self, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        raise NotImplementedError
+
+    def regulariser(self, parameters: np.ndarray) -> Quadratic:
+        return Quadratic.zero(len(parameters))
+
+
+class Rosenbrock(Problem):
     """r = (10 (y − x²), 1 − x), infeasible beyond x = 1.2; a weak pull towards the start."""
 
-    def __init__(self, pull: float = 0.0) -> None:
-        self.pull, self.start = pull, np.array([-1.2, 1.0])
+    def __init__(self, pull: float = 0.0, *, unit: Sequence[float] = (1.0, 1.0)) -> None:
+        self.pull, self.unit = pull, np.array(unit)
+        super().__init__(np.array([-1.2, 1.0]) * self.unit, self.unit)
 
-    def evaluate(self, parameters: np.ndarray) -> Evaluation:
-        x, y = parameters
-        if x > 1.2:
+    def check(self, parameters):
+        if parameters[0] > 1.2 * self.unit[0]:
             raise Infeasible("x is too large")
-        away = parameters - self.start
-        return Evaluation(
-            parameters=parameters,
-            residuals=np.array([10.0 * (y - x * x), 1.0 - x]),
-            jacobian=np.array([[-20.0 * x, 10.0], [-1.0, 0.0]]),
-            penalty=0.5 * self.pull * float(away @ away),
-            penalty_gradient=self.pull * away,
-            penalty_curvature=self.pull * np.eye(2),
+
+    def residuals(self, parameters):
+        x, y = parameters / self.unit
+        jacobian = np.array([[-20.0 * x, 10.0], [-1.0, 0.0]]) / self.unit
+        return np.array([10.0 * (y - x * x), 1.0 - x]), jacobian
+
+    def regulariser(self, parameters):
+        away = (parameters - self.start) / self.unit
+        return Quadratic(
+            0.5 * self.pull * float(away @ away), self.pull * away / self.unit, self.pull * np.diag(self.unit**-2)
         )
 
 
-def watched(minimiser, problem, start):
+class Wall(Problem):
+    """r = x − 10, and a steep barrier from x = 1 on, which costs 1e5 times the residual where the residual vanishes.
+
+    Args:
+        quadratic: show a parabola around the point of evaluation in place of the barrier.
+    """
+
+    BARRIER = Barrier(1.0, 0.02)
+
+    def __init__(self, *, quadratic: bool = False) -> None:
+        super().__init__(np.zeros(1), np.ones(1))
+        self.quadratic = quadratic
+
+    def evaluate(self, parameters, below=np.inf):
+        evaluation = super().evaluate(parameters, below)
+        if not self.quadratic:
+            return evaluation
+        here = evaluation.penalty
+
+        def parabola(p: np.ndarray) -> Quadratic:
+            step = p - parameters
+            bend = here.curvature @ step
+            return Quadratic(here.value + (here.gradient + 0.5 * bend) @ step, here.gradient + bend, here.curvature)
+
+        return Evaluation(parameters, evaluation.residuals, evaluation.jacobian, parabola)
+
+    def residuals(self, parameters):
+        return parameters - 10.0, np.eye(1)
+
+    def regulariser(self, parameters):
+        b, x = self.BARRIER, parameters
+        return Quadratic(float(b.value(x).sum()), b.slope(x), np.diag(b.curvature(x)))
+
+
+class Cliff(Problem):
+    """Falls towards a cliff that cannot be approached: everything but the start is infeasible."""
+
+    def __init__(self) -> None:
+        super().__init__(np.zeros(2), np.ones(2))
+
+    def check(self, parameters):
+        if np.any(parameters != 0.0):
+            raise Infeasible("over the cliff")
+
+    def residuals(self, parameters):
+        return np.ones(1), np.ones((1, 2))
+
+
+def watched(minimiser: Minimiser, problem: Problem, start: Start | None = None) -> tuple[Iterate, list[Iterate]]:
     history = []
-    return minimiser.minimise(problem, start, watch=history.append), history
+    return minimiser.minimise(problem, start or Start(problem.start), watch=history.append), history
 
 
-@pytest.mark.parametrize("minimiser", MINIMISERS)
+@each_minimiser
 def test_banana_valley_is_followed_to_its_end(minimiser):
-    problem = Rosenbrock()
-    last, history = watched(minimiser, problem, problem.start)
+    last, history = watched(minimiser, Rosenbrock())
     assert last.reason is Reason.CONVERGED
     assert last.evaluation.parameters == pytest.approx([1.0, 1.0], abs=1e-5)
     values = [iterate.evaluation.value for iterate in history]
     assert values == sorted(values, reverse=True)
+    assert [iterate.reason for iterate in history[:-1]] == [None] * (len(history) - 1)
 
 
-@pytest.mark.parametrize("minimiser", MINIMISERS)
-def test_penalty_moves_the_minimum_to_where_the_whole_gradient_vanishes(minimiser):
-    problem = Rosenbrock(pull=0.1)
-    last, _ = watched(minimiser, problem, problem.start)
+@each_minimiser
+def test_every_evaluation_is_counted(minimiser):
+    problem = Rosenbrock()
+    last, _ = watched(minimiser, problem)
+    assert last.evaluations == len(problem.asked)
+    assert problem.refused > 0
+
+
+@each_minimiser
+def test_regulariser_moves_the_minimum_to_where_the_whole_gradient_vanishes(minimiser):
+    last, _ = watched(minimiser, Rosenbrock(pull=0.1))
     assert np.linalg.norm(last.evaluation.gradient) < 1e-5
     assert last.evaluation.parameters[0] < 0.9
 
 
+def test_levenberg_marquardt_takes_the_same_way_in_any_unit_of_length():
+    ways = []
+    for unit in ((1.0, 1.0), (1e-3, 1e-3), (1e3, 1e-3)):
+        problem = Rosenbrock(pull=0.01, unit=unit)
+        _, history = watched(LevenbergMarquardt(tolerance=1e-8), problem)
+        ways.append(np.array([iterate.evaluation.parameters / unit for iterate in history]))
+    for way in ways[1:]:
+        assert way == pytest.approx(ways[0], rel=1e-6, abs=1e-8)
+
+
 @pytest.mark.parametrize("minimiser", [LevenbergMarquardt(iterations=2, tolerance=1e-14), Bfgs(iterations=2)])
 def test_running_out_of_iterations_is_said(minimiser):
-    problem = Rosenbrock()
-    last, history = watched(minimiser, problem, problem.start)
+    last, history = watched(minimiser, Rosenbrock())
     assert last.reason is Reason.ITERATIONS
     assert [iterate.number for iterate in history] == [0, 1, 2]
 
 
-class Cliff:
-    """Falls towards a cliff that cannot be approached: everything but the start is infeasible."""
-
-    def evaluate(self, parameters: np.ndarray) -> Evaluation:
-        if np.any(parameters != 0.0):
-            raise Infeasible("over the cliff")
-        return Evaluation(parameters, np.ones(1), np.ones((1, 2)), 0.0, np.zeros(2), np.zeros((2, 2)))
-
-
-@pytest.mark.parametrize("minimiser", MINIMISERS)
+@each_minimiser
 def test_nothing_feasible_ahead_is_said_and_the_start_kept(minimiser):
-    last, _ = watched(minimiser, Cliff(), np.zeros(2))
+    last, _ = watched(minimiser, Cliff())
     assert last.reason is Reason.NO_DESCENT
     assert np.array_equal(last.evaluation.parameters, np.zeros(2))
 
 
-def test_least_squares_structure_pays():
+@each_minimiser
+def test_a_start_without_a_value_is_refused(minimiser):
+    with pytest.raises(Infeasible, match="too large"):
+        watched(minimiser, Rosenbrock(), Start(np.array([2.0, 0.0])))
+
+
+@each_minimiser
+def test_a_minimum_is_recognised_at_once(minimiser):
     problem = Rosenbrock()
-    fast, slow = (watched(m, problem, problem.start)[0].evaluations for m in MINIMISERS)
+    last, history = watched(minimiser, problem, Start(np.ones(2)))
+    assert last.reason is Reason.CONVERGED
+    assert (last.number, last.evaluations) == (0, 1)
+    assert len(history) == 2
+
+
+def test_least_squares_structure_pays():
+    fast, slow = (watched(m, Rosenbrock())[0].evaluations for m in MINIMISERS)
     assert fast < slow
+
+
+def test_barriers_are_not_run_through_where_the_residual_would():
+    exact, parabola = Wall(), Wall(quadratic=True)
+    minimiser = LevenbergMarquardt(tolerance=1e-6)
+    (last, _), (other, _) = (watched(minimiser, problem) for problem in (exact, parabola))
+    optimum = brentq(lambda x: exact.BARRIER.slope(x) + x - 10.0, 1.0, 2.0)
+    assert last.evaluation.parameters == pytest.approx([optimum], rel=1e-5)
+    assert other.evaluation.parameters == pytest.approx([optimum], rel=1e-2)
+    # the first step ends where the barrier balances the residual, not where the residual vanishes
+    assert max(p[0] for p in exact.asked) < optimum + 1e-3
+    assert max(p[0] for p in parabola.asked) > 9.0
+    assert len(exact.asked) <= 4
+    assert len(parabola.asked) >= 2 * len(exact.asked)
+
+
+@each_minimiser
+def test_going_on_from_any_iterate_repeats_what_would_have_come(minimiser):
+    _, history = watched(minimiser, Rosenbrock(pull=0.01))
+    assert len(history) > 8
+    for index, iterate in enumerate(history[:-1]):
+        # as it comes back from a file
+        numbers = json.loads(json.dumps([iterate.evaluation.parameters.tolist(), iterate.memory.tolist()]))
+        start = Start(np.array(numbers[0]), iterate.number, iterate.evaluations, np.array(numbers[1]))
+        _, again = watched(minimiser, Rosenbrock(pull=0.01), start)
+        rest = history[index:]
+        assert len(again) == len(rest)
+        for ours, theirs in zip(again, rest, strict=True):
+            assert ours.number == theirs.number
+            assert ours.evaluations == theirs.evaluations + 1  # the start was evaluated once more
+            assert np.array_equal(ours.evaluation.parameters, theirs.evaluation.parameters)
+            assert np.array_equal(ours.memory, theirs.memory)
+            assert (ours.promise, ours.reason) == (theirs.promise, theirs.reason)
+
+
+def test_three_steps_that_gain_next_to_nothing_are_enough():
+    # damping so strong that a step gains little although much is promised
+    crawling = LevenbergMarquardt(tolerance=1e-3, damping=1e9)
+    last, history = watched(crawling, Rosenbrock())
+    assert last.reason is Reason.CONVERGED
+    assert last.promise > crawling.tolerance
+    assert last.number == 3
+    assert len(history) == 5

@@ -13,7 +13,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from fenicsmech.meshing import LinkMesh
+from fenicsmech.meshing.link_mesh import LinkMesh
 
 _SAME = 1e-8  # of the link's extent: vertices this close in the plan stand on one column
 

@@ -1,0 +1,376 @@
+"""A design problem: which links of a simulation may change, and what is wanted of the mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from fenicsmech.clock import Clock
+from fenicsmech.design.checkpoint import Checkpoint, Saved
+from fenicsmech.design.equilibria import TargetEquilibria
+from fenicsmech.design.groups import Group, split
+from fenicsmech.design.handle_optimum import Placement
+from fenicsmech.design.link_files import draw_links, outline, rest_meshes, write_solids
+from fenicsmech.design.link_shape import LinkShape, shape_links
+from fenicsmech.design.objective import Objective, target_scales
+from fenicsmech.design.optimisers import Infeasible, Iterate, LevenbergMarquardt, Minimiser, Reason, Start
+from fenicsmech.design.progress import DesignProgress
+from fenicsmech.design.regularisers import MeshQuality, Regulariser, ShapeBounds, StayClose
+from fenicsmech.design.rest_shape import RestShape
+from fenicsmech.design.result import DesignResult, LinkDesign, TargetResult
+from fenicsmech.design.spline_design import SplineDesign, Target, bounds_of, shape_request
+from fenicsmech.design.team import Outcome, minimise_together
+from fenicsmech.errors import DescriptionError, EquilibriumError, FenicsmechError
+from fenicsmech.linkage import assemble
+from fenicsmech.log import logger
+from fenicsmech.simulation import Simulation
+from fenicsmech.simulation.request import read_request
+
+_log = logger(__name__)
+
+DEFAULT_REGULARISER = MeshQuality() + ShapeBounds() + 1e-4 * StayClose()
+_SAME = 1e-6  # relative difference between displacements of one equilibrium
+
+
+class DesignProblem:
+    """Shapes of some links that make points move as far as wanted.
+
+        min over p   Σ_k ½ w_k ((u_k(p) − ū_k) / ū_k)² + R(p)
+
+    Nothing is meshed or compiled before it is needed; the description is checked at once.
+
+    Args:
+        simulation: how displacements are computed. It has the drawn shape until ``apply`` or ``optimize`` change it.
+        designs: the links that may change.
+        targets: what is wanted.
+        regulariser: R; mesh quality, bounds of fabrication and a little closeness to the drawing by default.
+
+    Raises:
+        DescriptionError: the problem contradicts itself or the simulation's scene.
+        AssemblyError: a target's configuration does not assemble.
+    """
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        designs: Sequence[SplineDesign],
+        *,
+        targets: Sequence[Target],
+        regulariser: Regulariser = DEFAULT_REGULARISER,
+    ) -> None:
+        self.simulation, self.designs, self.targets = simulation, tuple(designs), tuple(targets)
+        self._regulariser, self._clock = regulariser, Clock()
+        _check_designs(self.designs)
+        _check_targets(simulation, self.targets)
+        mechanism, linkage = simulation.scene.mechanism, simulation.linkage
+        self._requests = [shape_request(design, mechanism, linkage) for design in self.designs]
+
+    @property
+    def initial(self) -> np.ndarray:
+        """Parameters of the drawn shapes, (parameters,) (collective)."""
+        return self._rest.initial
+
+    def apply(self, design: DesignResult | np.ndarray) -> None:
+        """Gives the simulation the shapes of a result or of parameters (parameters,) (collective).
+
+        Raises:
+            DescriptionError: the design is one of other links.
+            ShapeError: cells of the mesh are inverted in this shape.
+        """
+        if isinstance(design, DesignResult):
+            self._rest.place(self._parameters(design), self._placement(design))
+            return
+        parameters = np.array(design, dtype=float)
+        if parameters.shape != self.initial.shape or not np.all(np.isfinite(parameters)):
+            raise DescriptionError(
+                "design", f"parameters of shape {parameters.shape}", f"Give {len(self.initial)} finite numbers"
+            )
+        self._rest.place(parameters, None)
+
+    def optimize(
+        self,
+        *,
+        minimiser: Minimiser | None = None,
+        start: DesignResult | None = None,
+        checkpoint: str | Path | None = None,
+        resume: bool = False,
+    ) -> DesignResult:
+        """The best design; the simulation has its shapes afterwards (collective).
+
+        Targets that cannot be reached lead to the best design found, with the error of each and the bounds that hold
+        it back.
+
+        Args:
+            minimiser: Levenberg–Marquardt by default.
+            start: where to start, as the result of a cheaper simulation; the drawn shapes by default.
+            checkpoint: file that is brought up to date after each iteration.
+            resume: go on from ``checkpoint`` if it exists.
+
+        Raises:
+            DescriptionError: the checkpoint or the start is one of another problem.
+            EquilibriumError: the initial design does not carry its loads.
+        """
+        began = perf_counter()
+        minimiser = minimiser or LevenbergMarquardt()
+        clock = dict(self._clock.seconds)
+        group, objective = self._team
+        begin, near = Start(self.initial), None
+        if start is not None:
+            begin, near = Start(self._parameters(start)), self._placement(start)
+        saved = None if checkpoint is None else Checkpoint(Path(checkpoint), self._fingerprint(minimiser))
+        if resume and saved is not None and (found := self._resumed(saved)) is not None:
+            begin, near = found.start, self._rest.known(found.start.parameters, found.handles)
+        with DesignProgress(minimiser, leads=self.simulation.comm.rank == 0) as progress:
+
+            def watch(iterate: Iterate) -> None:
+                if saved is not None:
+                    saved.save(iterate, objective.placement.theta)
+                progress.update(iterate, self._errors(objective.reached))
+
+            try:
+                objective.begin(None)
+                initial = objective.traced(self.initial)
+                objective.begin(near)
+                outcome = minimise_together(self.simulation.comm, objective, minimiser, begin, watch=watch)
+                final = objective.evaluate(outcome.parameters).value
+            except Infeasible as failure:
+                raise EquilibriumError(
+                    f"design of {self.simulation.scene.mechanism.name!r}",
+                    f"the design to start from has no value: {failure}",
+                    "Draw links that carry the targets' loads, or start with smaller loads",
+                ) from failure
+        with self._clock.phase("verification"):
+            reached = self._verified(outcome, objective.reached)
+        return self._result(
+            outcome,
+            reached=reached,
+            objective=(initial, final),
+            active=objective.active(outcome.parameters),
+            seconds=perf_counter() - began,
+            phases=self._clock.since(clock),
+            groups=self.simulation.comm.size // group.comm.size,
+        )
+
+    def picture(self, path: str | Path, design: DesignResult) -> None:
+        """Draws the links as drawn and as in ``design``, as a PNG (collective).
+
+        Raises:
+            DescriptionError: the design is one of other links.
+        """
+        links, model = [design.link for design in self.designs], self.simulation.model
+        outlines = []
+        with model.shaped(model.elastic.d.x.array.copy()):
+            for parameters, near in ((self.initial, None), (self._parameters(design), self._placement(design))):
+                self._rest.place(parameters, near)
+                meshes = rest_meshes(self.simulation, links) or []
+                outlines.append(
+                    [
+                        outline(link, mesh, parameters[link.place])
+                        for link, mesh in zip(self._rest.links, meshes, strict=False)
+                    ]
+                )
+        if self.simulation.comm.rank == 0:
+            draw_links(path, self.simulation, links, *outlines)
+
+    def export(self, folder: str | Path, *, pin: float | None = None) -> None:
+        """Writes ``NAME.step`` and ``NAME.stl`` of every link that may change, in its present shape (collective).
+
+        Args:
+            folder: where to; it is created.
+            pin: diameter of the holes left for pins; none by default.
+
+        Raises:
+            MeshingError: no solid can be made of a link.
+        """
+        links, failure = [design.link for design in self.designs], None
+        meshes = rest_meshes(self.simulation, links)
+        if meshes is not None:
+            try:
+                write_solids(folder, self.simulation.linkage, links, meshes, pin)
+            except FenicsmechError as error:
+                failure = error
+        failure = self.simulation.comm.bcast(failure, root=0)
+        if failure is not None:
+            raise failure
+
+    # -- parts ---------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _shapes(self) -> list[LinkShape]:
+        """Handles and weights of the links that change, the same on all processes."""
+        with self._clock.phase("setup"):
+            mesh = self.simulation.model.mesh
+        with self._clock.phase("weights"):
+            return shape_links(mesh, self._requests)
+
+    @cached_property
+    def _rest(self) -> RestShape:
+        return self._rest_of(self.simulation)
+
+    @cached_property
+    def _team(self) -> tuple[Group, Objective]:
+        """This process's group, and the objective as its simulation sees it."""
+        rest = self._rest
+        with self._clock.phase("setup"):
+            group, simulation = split(self.simulation.comm, len(self.targets)), self.simulation
+            if group.comm is not simulation.comm:
+                simulation = simulation.on(group.comm)
+                rest = self._rest_of(simulation)
+            equilibria = TargetEquilibria(simulation, [self.targets[k] for k in group.mine])
+            objective = Objective(
+                rest, equilibria, targets=self.targets, regulariser=self._regulariser, group=group, clock=self._clock
+            )
+        return group, objective
+
+    def _rest_of(self, simulation: Simulation) -> RestShape:
+        bounds = [bounds_of(design, shape.thickness) for design, shape in zip(self.designs, self._shapes, strict=True)]
+        return RestShape(simulation.model, self._shapes, [design.link.name for design in self.designs], bounds)
+
+    def _parameters(self, result: DesignResult) -> np.ndarray:
+        """Parameters of a result of the same links."""
+        wanted = [(link.name, link.place.stop - link.place.start) for link in self._rest.links]
+        given = {link.name: link.parameters for link in result.links}
+        for name, size in wanted:
+            if len(given.get(name, ())) != size:
+                raise DescriptionError(
+                    f"design of {result.mechanism!r}",
+                    f"it has {len(given.get(name, ()))} parameters of link {name!r} instead of {size}",
+                    "Use a result of the same links and numbers of segments",
+                )
+        return np.concatenate([given[name] for name, _ in wanted])
+
+    def _placement(self, result: DesignResult) -> Placement | None:
+        """Handle positions of a result of the same links."""
+        given = {link.name: link.handles for link in result.links}
+        return self._rest.known(
+            self._parameters(result), np.concatenate([given[link.name] for link in self._rest.links])
+        )
+
+    def _fingerprint(self, minimiser: Minimiser) -> dict[str, object]:
+        """What a checkpoint must agree with."""
+        fidelity = self.simulation.fidelity
+        return {
+            "mechanism": self.simulation.scene.mechanism.name,
+            "space": fidelity.model.name,
+            "order": fidelity.order,
+            "sizes": list(fidelity.sizes.values()),
+            "links": [[link.name, link.spline.initial.tolist()] for link in self._rest.links],
+            "targets": [
+                [t.force_part.name, t.configuration.name, t.force, t.displacement, t.weight] for t in self.targets
+            ],
+            "regulariser": repr(self._regulariser),
+            "minimiser": type(minimiser).__name__,
+        }
+
+    def _resumed(self, checkpoint: Checkpoint) -> Saved | None:
+        """Where the checkpoint says to go on, None if there is none yet; errors are raised on all processes."""
+        comm, saved, failure = self.simulation.comm, None, None
+        if comm.rank == 0 and checkpoint.path.exists():
+            try:
+                saved = checkpoint.load()
+            except FenicsmechError as error:
+                failure = error
+        saved, failure = comm.bcast((saved, failure), root=0)
+        if failure is not None:
+            raise failure
+        return saved
+
+    def _errors(self, reached: np.ndarray) -> np.ndarray:
+        return (reached - [t.displacement for t in self.targets]) / target_scales(self.targets)
+
+    def _verified(self, outcome: Outcome, reached: np.ndarray) -> np.ndarray:
+        """Displacements on the paths from zero load, which is where a user will find them.
+
+        They were followed from design to design; should a path from zero load end elsewhere, it is said.
+        """
+        self._rest.place(outcome.parameters, self._team[1].placement)
+        equilibria = TargetEquilibria(self.simulation, self.targets)
+        try:
+            verified = np.array([sample.displacement for sample in equilibria.trace().samples])
+        except Infeasible as failure:
+            _log.warning("loaded from zero, the optimum does not reach all its targets: %s", failure)
+            return reached
+        for index in np.flatnonzero(np.abs(verified - reached) > _SAME * target_scales(self.targets)):
+            _log.warning(
+                "target %d of the optimum: %.6g when loaded from zero, %.6g when followed from the drawn design",
+                index + 1,
+                verified[index],
+                reached[index],
+            )
+        return verified
+
+    def _result(self, outcome: Outcome, *, reached: np.ndarray, **found) -> DesignResult:
+        targets = tuple(
+            TargetResult(
+                target.force_part.name,
+                target.configuration.name,
+                target.force,
+                target.displacement,
+                float(start),
+                float(there),
+                float(error),
+            )
+            for target, start, there, error in zip(
+                self.targets, outcome.started, reached, self._errors(reached), strict=True
+            )
+        )
+        links = []
+        for link, handles in zip(self._rest.links, self._rest.handles(self._team[1].placement), strict=True):
+            own = outcome.parameters[link.place]
+            thickness, bend = link.thickness * link.samples.thickness(own), link.samples.curvature(own)
+            links.append(
+                LinkDesign(
+                    link.name,
+                    tuple(own.tolist()),
+                    tuple(handles.tolist()),
+                    tuple(tuple(map(tuple, point)) for point in link.spline.controls_at(own).tolist()),
+                    (float(thickness.min()), float(thickness.max())),
+                    float(np.abs(bend).max(initial=0.0)),
+                )
+            )
+        comm = self.simulation.comm
+        return DesignResult(
+            mechanism=self.simulation.scene.mechanism.name,
+            links=tuple(links),
+            targets=targets,
+            reason=outcome.reason.value,
+            converged=outcome.reason is Reason.CONVERGED,
+            iterations=outcome.number,
+            evaluations=outcome.evaluations,
+            mesh_ratio_max=self.simulation.mesh_ratio_max,
+            processes=comm.size,
+            **found,
+        )
+
+
+def _check_designs(designs: Sequence[SplineDesign]) -> None:
+    if not designs:
+        raise DescriptionError("design problem", "no link may change", "Name links with SplineDesign(…)")
+    for design in designs:
+        if not isinstance(design, SplineDesign):
+            raise DescriptionError("design problem", f"{design!r} is no design of a link", "Give SplineDesign(…)")
+    names = [design.link.name for design in designs]
+    for name in names:
+        if names.count(name) > 1:
+            raise DescriptionError(f"design of link {name!r}", "it is given twice", "Give each link once")
+
+
+def _check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
+    if not targets:
+        raise DescriptionError("design problem", "nothing is wanted", "Give targets=[Target(…), …]")
+    for target in targets:
+        if not isinstance(target, Target):
+            raise DescriptionError("design problem", f"{target!r} is no target", "Give Target(…)")
+        read_request(
+            simulation.scene.mechanism,
+            target.force_part,
+            forces=[target.force],
+            displacements=None,
+            configuration=target.configuration,
+            others=None,
+        )
+        assemble(simulation.linkage, target.configuration)

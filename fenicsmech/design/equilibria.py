@@ -1,0 +1,172 @@
+"""Equilibria of targets, found once from zero load and then followed as the design changes.
+
+A displacement counts from the unloaded configuration. Where that moves with the design (the force acts on a flexible
+link, or motors strain the links), it is an equilibrium that is followed too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenicsmech.design.optimisers import Infeasible
+from fenicsmech.design.sensitivity import Adjoint
+from fenicsmech.design.spline_design import Target
+from fenicsmech.equilibrium import IDLE_STIFFNESS, LoadControl, Newton, NotConverged, State
+from fenicsmech.errors import EquilibriumError
+from fenicsmech.linkage import assemble
+from fenicsmech.mechanism import FlexibleLink
+from fenicsmech.simulation import Simulation
+from fenicsmech.simulation.request import CurveRequest
+
+_HALVINGS = 2  # of a change of design whose equilibrium is not found
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """The equilibrium of a target at one design.
+
+    Attributes:
+        state: under the target's force.
+        origin: unloaded; None if it does not depend on the design.
+        displacement: of the target's point, from the unloaded configuration.
+    """
+
+    state: State
+    origin: State | None
+    displacement: float
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """Equilibria of some targets at one design.
+
+    Attributes:
+        design: this rank's values of the design field, flat.
+        samples: one per target.
+    """
+
+    design: np.ndarray
+    samples: tuple[Sample, ...]
+
+
+class TargetEquilibria:
+    """The equilibria of ``targets`` in one simulation; all methods are collective on its communicator."""
+
+    def __init__(self, simulation: Simulation, targets: Sequence[Target]) -> None:
+        self._simulation, self._model = simulation, simulation.model
+        self.targets = tuple(targets)
+        forces = dict.fromkeys(target.force_part for target in targets)
+        self._newtons = {part: simulation.newton(part) for part in forces}
+        self._adjoints = {part: Adjoint(self._model, newton) for part, newton in self._newtons.items()}
+        self._floor: dict[Target, float] = {}
+        self._fixed_origin: dict[Target, float] = {}
+
+    def trace(self) -> Known:
+        """From zero load to every target, at the present design.
+
+        Raises:
+            Infeasible: an equilibrium is not found or is unstable.
+        """
+        samples: dict[Target, Sample] = {}
+        paths: dict[tuple, list[Target]] = {}
+        for target in self.targets:
+            key = target.force_part, target.configuration, target.force < 0.0
+            paths.setdefault(key, []).append(target)
+        for targets in paths.values():
+            samples.update(self._traced(targets))
+        return Known(self._model.elastic.d.x.array.copy(), tuple(samples[target] for target in self.targets))
+
+    def follow(self, known: Known) -> Known:
+        """At the present design, from those of another one.
+
+        Raises:
+            Infeasible: an equilibrium is not found or is unstable.
+        """
+        design = self._model.elastic.d.x.array.copy()
+        try:
+            samples = [
+                self._followed(target, sample, known.design, design)
+                for target, sample in zip(self.targets, known.samples, strict=True)
+            ]
+        finally:
+            self._model.reshape(design)
+        return Known(design, tuple(samples))
+
+    def gradients(self, known: Known) -> np.ndarray:
+        """Derivatives of the displacements by the design field that the model holds, (targets, owned values)."""
+        fields = [self._gradient(*pair) for pair in zip(self.targets, known.samples, strict=True)]
+        return np.array(fields).reshape(len(fields), -1)
+
+    def _gradient(self, target: Target, sample: Sample) -> np.ndarray:
+        adjoint, floor = self._adjoints[target.force_part], self._floor[target]
+        outputs = [self._newtons[target.force_part].system.controlled]
+        (loaded,) = adjoint.gradients(sample.state, outputs, floor=floor)
+        if sample.origin is None:
+            return loaded.design
+        (unloaded,) = adjoint.gradients(sample.origin, outputs, floor=floor)
+        return loaded.design - unloaded.design
+
+    def _traced(self, targets: Sequence[Target]) -> dict[Target, Sample]:
+        """The samples of targets on one path, which differ in the size of their force alone."""
+        part, configuration = targets[0].force_part, targets[0].configuration
+        moving = self._origin_moves(targets[0])
+        loads = {0.0} if moving else set()
+        loads |= {target.force for target in targets}
+        controls = tuple(LoadControl(load) for load in sorted(loads, key=abs))
+        request = CurveRequest(part, controls, configuration, others=())
+        try:
+            curve = self._simulation.trace(request)
+        except EquilibriumError as error:
+            raise Infeasible(str(error)) from error
+        frames = {frame.force: frame for frame in curve.frames}
+        samples = {}
+        for target in targets:
+            frame = frames[target.force]
+            if not frame.stable:
+                raise Infeasible(_unstable(target))
+            self._floor[target] = IDLE_STIFFNESS if curve.freedom.mobility else 0.0
+            self._fixed_origin[target] = self._travel(target, frame.state) - frame.displacement
+            samples[target] = Sample(frame.state, curve.frames[0].state if moving else None, frame.displacement)
+        return samples
+
+    def _followed(self, target: Target, sample: Sample, before: np.ndarray, after: np.ndarray) -> Sample:
+        state = self._moved(target, sample.state, LoadControl(target.force), before, after, _HALVINGS)
+        if sample.origin is None:
+            return Sample(state, None, self._travel(target, state) - self._fixed_origin[target])
+        origin = self._moved(target, sample.origin, LoadControl(0.0), before, after, _HALVINGS)
+        return Sample(state, origin, self._travel(target, state) - self._travel(target, origin))
+
+    def _moved(
+        self, target: Target, state: State, control: LoadControl, before: np.ndarray, after: np.ndarray, halvings: int
+    ) -> State:
+        """The equilibrium at design ``after``, from the one at ``before``, halfway first if need be."""
+        self._model.reshape(before)
+        guess = self._model.carry(state, after)
+        newton: Newton = self._newtons[target.force_part]
+        try:
+            solution = newton.solve(guess, control, floor=self._floor[target])
+        except NotConverged as failure:
+            if halvings == 0:
+                raise Infeasible(f"no equilibrium at {target.force:g} ({failure.reason})") from failure
+            halfway = 0.5 * (before + after)
+            state = self._moved(target, state, control, before, halfway, halvings - 1)
+            return self._moved(target, state, control, halfway, after, halvings - 1)
+        if solution.unstable_modes:
+            raise Infeasible(_unstable(target))
+        return solution.state
+
+    def _origin_moves(self, target: Target) -> bool:
+        """Whether the unloaded position of the target's point depends on the design."""
+        on_link = isinstance(target.force_part.on, FlexibleLink)
+        return on_link or assemble(self._simulation.linkage, target.configuration).fraction < 1.0
+
+    def _travel(self, target: Target, state: State) -> float:
+        self._model.load(state)
+        return self._model.travel(target.force_part, state)
+
+
+def _unstable(target: Target) -> str:
+    return f"the equilibrium at {target.force:g} in configuration {target.configuration.name!r} is unstable"

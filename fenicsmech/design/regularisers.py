@@ -1,0 +1,196 @@
+"""What keeps designs near the start, their meshes good, and their links printable: terms R(p) of the objective.
+
+Regularisers combine with + and *: ``MeshQuality() + ShapeBounds() + 1e-3 * StayClose()``. All are free of units.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenicsmech.design.barrier import Barrier
+from fenicsmech.design.handle_optimum import Placement
+from fenicsmech.design.optimisers import Quadratic
+from fenicsmech.design.rest_shape import DesignedLink, RestShape
+
+Model = Callable[[np.ndarray], Quadratic]
+
+
+class Regulariser(ABC):
+    """A term R(p) of the objective."""
+
+    @abstractmethod
+    def around(self, rest: RestShape, placement: Placement) -> Model:
+        """R near the design that ``rest`` holds, placed as in ``placement`` (collective).
+
+        The model needs no mesh: it is R itself where R is a function of the splines alone, and else agrees with R and
+        its gradient at the design.
+        """
+
+    def active(self, rest: RestShape, placement: Placement) -> tuple[str, ...]:
+        """The bounds that hold the design back, in words (collective)."""
+        return ()
+
+    def __add__(self, other: Regulariser) -> Regulariser:
+        return Weighted((self, other), (1.0, 1.0))
+
+    def __mul__(self, factor: float) -> Regulariser:
+        return Weighted((self,), (float(factor),))
+
+    __rmul__ = __mul__
+
+
+@dataclass(frozen=True)
+class Weighted(Regulariser):
+    """Σ weight · term."""
+
+    terms: tuple[Regulariser, ...]
+    weights: tuple[float, ...]
+
+    def around(self, rest, placement):
+        models = [(weight, term.around(rest, placement)) for weight, term in zip(self.weights, self.terms, strict=True)]
+
+        def model(p: np.ndarray) -> Quadratic:
+            parts = [(weight, part(p)) for weight, part in models]
+            return Quadratic(
+                sum(weight * part.value for weight, part in parts),
+                sum(weight * part.gradient for weight, part in parts),
+                sum(weight * part.curvature for weight, part in parts),
+            )
+
+        return model
+
+    def active(self, rest, placement):
+        return tuple(bound for term in self.terms for bound in term.active(rest, placement))
+
+
+@dataclass(frozen=True)
+class StayClose(Regulariser):
+    """R_init = ½ Σ ((p − p₀) / h)², h the thickness of each link (the paper's equation 7, made free of units).
+
+    Thickness parameters δ are relative to h already.
+    """
+
+    def around(self, rest, placement):
+        scale = 1.0 / rest.lengths**2
+
+        def model(p: np.ndarray) -> Quadratic:
+            away = p - rest.initial
+            return Quadratic(0.5 * float(away @ (scale * away)), scale * away, np.diag(scale))
+
+        return model
+
+
+@dataclass(frozen=True)
+class ShapeBounds(Regulariser):
+    """R_shape: barriers on thickness and curvature ratio at the samples of each spline (section V-A of the paper).
+
+    Widths and strengths of the barriers are the paper's; they begin a width before the bounds, so that designs end
+    within them.
+    """
+
+    def around(self, rest, placement):
+        def model(p: np.ndarray) -> Quadratic:
+            value, gradient, curvature = 0.0, np.zeros(len(p)), np.zeros((len(p), len(p)))
+            for link in rest.links:
+                for bound in _bounds(link, p[link.place]):
+                    barrier, beyond = bound.barrier, bound.values > bound.barrier.limit
+                    if not beyond.any():
+                        continue
+                    x, by_p = bound.values[beyond], bound.gradient(beyond)
+                    value += float(barrier.value(x).sum())
+                    gradient[link.place] += barrier.slope(x) @ by_p
+                    # the curvature of x itself is left out: it may be negative, and is multiplied by a small slope
+                    curvature[link.place, link.place] += by_p.T @ (barrier.curvature(x)[:, None] * by_p)
+            return Quadratic(value, gradient, curvature)
+
+        return model
+
+    def active(self, rest, placement):
+        found = []
+        for link in rest.links:
+            for bound in _bounds(link, placement.p[link.place]):
+                if np.any(bound.values > bound.barrier.limit):
+                    found.append(f"{bound.name} of {link.name!r}")
+        return tuple(dict.fromkeys(found))
+
+
+@dataclass(frozen=True, eq=False)
+class _Bound:
+    """What is bounded from above along a link.
+
+    Attributes:
+        name: of the bound.
+        values: at the samples, (n,).
+        gradient: derivatives by the link's parameters at chosen samples, a mask (n,).
+        barrier: on the values.
+    """
+
+    name: str
+    values: np.ndarray
+    gradient: Callable[[np.ndarray], np.ndarray]
+    barrier: Barrier
+
+
+def _bounds(link: DesignedLink, p: np.ndarray) -> list[_Bound]:
+    """The bounds of a link, p its own parameters."""
+    samples, h = link.samples, link.thickness
+    thickness, bend = h * samples.thickness(p), samples.curvature(p)
+    least, most = link.bounds.thickness
+    sharpest, name = Barrier(link.bounds.bend - 0.01, 0.01), f"curvature {link.bounds.bend:g}"
+    return [
+        _Bound(
+            f"least thickness {least:g}",
+            -thickness,
+            lambda chosen: -h * samples.thickness_gradient[chosen],
+            Barrier(-1.02 * least, 0.02 * least),
+        ),
+        _Bound(
+            f"largest thickness {most:g}",
+            thickness,
+            lambda chosen: h * samples.thickness_gradient[chosen],
+            Barrier(0.98 * most, 0.02 * most),
+        ),
+        _Bound(name, bend, lambda chosen: samples.curvature_gradient(p, chosen), sharpest),
+        _Bound(name, -bend, lambda chosen: -samples.curvature_gradient(p, chosen), sharpest),
+    ]
+
+
+@dataclass(frozen=True)
+class MeshQuality(Regulariser):
+    """R_mesh = Σ_e β(ρ_e), ρ a cell's circumradius over its inradius; infinite where cells are inverted.
+
+    The constants are the paper's (appendix). A design with inverted cells has no placement at all and is refused
+    before R_mesh is asked for.
+
+    Attributes:
+        limit: aspect ratio up to which nothing is penalised.
+        width, strength: ε and m of the barrier.
+    """
+
+    limit: float = 30.0
+    width: float = 30.0
+    strength: float = 5.0
+
+    def around(self, rest, placement):
+        size, here = len(placement.p), Quadratic.zero(len(placement.p))
+        if rest.worst_ratio() > self.limit:
+            barrier = Barrier(self.limit, self.width, self.strength)
+            value, gradient = rest.quality_penalty(barrier, placement)
+            # exact for one cell beyond the limit: β″ = ⅔ β′² / β
+            here = Quadratic(value, gradient, np.outer(gradient, gradient) * (2.0 / 3.0) / value)
+
+        def model(p: np.ndarray) -> Quadratic:
+            step = p - placement.p
+            bend = here.curvature @ step
+            return Quadratic(
+                here.value + float((here.gradient + 0.5 * bend) @ step), here.gradient + bend, here.curvature
+            )
+
+        return model if here.value else lambda p: Quadratic.zero(size)
+
+    def active(self, rest, placement):
+        return (f"aspect ratio {self.limit:g} of the mesh",) if rest.worst_ratio() > self.limit else ()

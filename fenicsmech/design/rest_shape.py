@@ -1,0 +1,131 @@
+"""The rest shape of a simulation's links as a function of the design p, handles placed at their best.
+
+p → θ*(p) → d(p, θ*(p)) → X = X₀ + d
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import ufl
+from mpi4py import MPI
+
+from fenicsmech.design.barrier import Barrier
+from fenicsmech.design.handle_optimum import HandleOptimum, Placement
+from fenicsmech.design.link_shape import LinkShape
+from fenicsmech.design.quality import QualitySum
+from fenicsmech.design.shape_map import ShapeMap
+from fenicsmech.design.spline import LinkSpline
+from fenicsmech.design.spline_design import Bounds
+from fenicsmech.design.spline_samples import SplineSamples
+from fenicsmech.simulation.model import MechanismModel
+
+
+@dataclass(frozen=True, eq=False)
+class DesignedLink:
+    """A link that changes.
+
+    Attributes:
+        name: of the link.
+        place: its entries of p.
+        spline: its centreline and thickness.
+        samples: where bounds are put on them.
+        thickness: in the plane, where δ = 1.
+        bounds: of fabrication.
+    """
+
+    name: str
+    place: slice
+    spline: LinkSpline
+    samples: SplineSamples
+    thickness: float
+    bounds: Bounds
+
+
+class RestShape:
+    """The rest shape of one model; methods marked collective are so on the model's communicator.
+
+    Args:
+        model: whose links change.
+        shapes: handles and weights of these links.
+        names: of these links.
+        bounds: of these links.
+
+    Attributes:
+        links: the links that change.
+        initial: p of the drawn design, (parameters,).
+        lengths: what a unit of (p − p₀) / lengths stands for, (parameters,): a link's thickness; 1 for δ.
+    """
+
+    def __init__(
+        self, model: MechanismModel, shapes: Sequence[LinkShape], names: Sequence[str], bounds: Sequence[Bounds]
+    ) -> None:
+        self._model, design = model, model.elastic.d
+        self._map = ShapeMap(model.mesh, design, shapes)
+        self._ratio = QualitySum(design)
+        self._optimum = HandleOptimum(self._map, self._ratio)
+        self._penalties: dict[Barrier, QualitySum] = {}
+        self.initial = self._map.initial
+        splines = [shape.handles.spline for shape in shapes]
+        ends = np.cumsum([0, *(spline.size for spline in splines)])
+        self.links = tuple(
+            DesignedLink(name, slice(a, b), spline, SplineSamples(spline), shape.thickness, bound)
+            for name, a, b, spline, shape, bound in zip(
+                names, ends[:-1], ends[1:], splines, shapes, bounds, strict=True
+            )
+        )
+        self.lengths = np.concatenate([np.where(s.spline.is_thickness, 1.0, s.thickness) for s in self.links])
+
+    def known(self, p: np.ndarray, theta: np.ndarray) -> Placement | None:
+        """A placement to start from, for handle positions found before; None if there are as many handles no more."""
+        if theta.shape != self._map.initial_theta.shape:
+            return None
+        return Placement(p, theta, np.inf, 0)
+
+    def handles(self, placement: Placement) -> list[np.ndarray]:
+        """Positions of the handles of each link."""
+        return self._map.positions(placement.theta)
+
+    def place(self, p: np.ndarray, near: Placement | None) -> Placement:
+        """Gives the links the shape of design ``p``, handles placed at their best (collective).
+
+        Args:
+            p: the design, (parameters,).
+            near: placement of a design near by.
+
+        Raises:
+            ShapeError: cells stay inverted however the handles are placed.
+        """
+        placement = self._optimum.solve(p, near)
+        self._model.reshape(self._model.elastic.d.x.array)
+        return placement
+
+    def design(self) -> np.ndarray:
+        """This rank's values of the design field, ghosts last, flat."""
+        return self._model.elastic.d.x.array.copy()
+
+    def gradient(self, placement: Placement, nodal: np.ndarray) -> np.ndarray:
+        """dO/dp (…, parameters) from ∂O/∂d (…, owned values) of the design placed as in ``placement`` (collective)."""
+        fields = nodal.reshape(*nodal.shape[:-1], self._map.owned, -1)
+        by_p, by_theta = self._map.pull(placement.p, placement.theta, fields)
+        return self._optimum.total_gradient(placement, by_p, by_theta)
+
+    def worst_ratio(self) -> float:
+        """Largest ρ among the cells of the present rest shape (collective)."""
+        worst = float(self._ratio.cell_values().max(initial=0.0))
+        return self._model.mesh.mesh.comm.allreduce(worst, op=MPI.MAX)
+
+    def quality_penalty(self, barrier: Barrier, placement: Placement) -> tuple[float, np.ndarray]:
+        """Σ_e β(ρ_e) of the present rest shape, and its derivative by p (collective)."""
+        if barrier not in self._penalties:
+            self._penalties[barrier] = QualitySum(self._model.elastic.d, lambda rho: _symbolic(barrier, rho))
+        total = self._penalties[barrier]
+        return total.value(), self.gradient(placement, total.gradient().ravel())
+
+
+def _symbolic(barrier: Barrier, rho):
+    """β(ρ) in UFL."""
+    excess = ufl.max_value((rho - barrier.limit) / barrier.width, 0.0)
+    return barrier.strength * excess**3

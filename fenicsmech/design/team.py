@@ -1,0 +1,81 @@
+"""One process decides, all compute: a minimiser runs on the first process, the others evaluate with it.
+
+Decisions that hang on the last bit of a number can then not differ between processes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+
+from fenicsmech.design.objective import Objective
+from fenicsmech.design.optimisers import Evaluation, Infeasible, Iterate, Minimiser, Reason, Start
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """How a minimisation ended.
+
+    Attributes:
+        number, evaluations, parameters, reason: as in ``Iterate`` and its evaluation.
+        started: displacement of each target at the start, (targets,).
+    """
+
+    number: int
+    evaluations: int
+    parameters: np.ndarray
+    reason: Reason
+    started: np.ndarray
+
+
+class _Leader:
+    """The objective as the first process sees it: the others are told what to evaluate."""
+
+    def __init__(self, comm: MPI.Comm, objective: Objective) -> None:
+        self._comm, self._objective, self.lengths = comm, objective, objective.lengths
+
+    def evaluate(self, parameters: np.ndarray, below: float = np.inf) -> Evaluation:
+        self._comm.bcast((parameters, below), root=0)
+        return self._objective.evaluate(parameters, below)
+
+
+def minimise_together(
+    comm: MPI.Comm, objective: Objective, minimiser: Minimiser, start: Start, *, watch: Callable[[Iterate], None]
+) -> Outcome:
+    """The outcome of ``minimiser`` on all processes (collective); ``watch`` is called on the first.
+
+    Raises:
+        Infeasible: at the start.
+        Exception: whatever ``watch`` raises, on all processes.
+    """
+    outcome, failure = None, None
+    if comm.rank == 0:
+        started = []
+
+        def watch_first(iterate: Iterate) -> None:
+            started.append(objective.reached)
+            watch(iterate)
+
+        try:
+            last = minimiser.minimise(_Leader(comm, objective), start, watch=watch_first)
+            outcome = Outcome(last.number, last.evaluations, last.evaluation.parameters, last.reason, started[0])
+        except Exception as error:
+            failure = error
+        comm.bcast(None, root=0)
+    else:
+        _follow(comm, objective)
+    outcome, failure = comm.bcast((outcome, failure), root=0)
+    if failure is not None:
+        raise failure
+    return outcome
+
+
+def _follow(comm: MPI.Comm, objective: Objective) -> None:
+    while (request := comm.bcast(None, root=0)) is not None:
+        try:
+            objective.evaluate(*request)
+        except Infeasible:
+            pass  # the first process has seen it too, and decides

@@ -1,0 +1,217 @@
+"""Equilibria of targets, followed from design to design: the same as from zero load, with exact derivatives."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import fenicsmech as fm
+from fenicsmech.design.equilibria import Known, TargetEquilibria
+from fenicsmech.design.optimisers import Infeasible
+from fenicsmech.equilibrium import Newton, NewtonOptions, NotConverged
+
+from .mechanisms import Bench, Case, bench, bow, strained, strains, truss, turned_beam
+
+CASES = {
+    "truss": lambda: truss((0.1, 1.0), (0.4, 2.0)),
+    "force on a link": lambda: bow(20.0, 60.0),
+    "strained by motors": lambda: strained(1.0, 3.0),
+    "turned by 135°": lambda: turned_beam(1.0, 3.0, -2.0),
+}
+each_case = pytest.mark.parametrize("name", CASES)
+MOVING = ("force on a link", "strained by motors")  # cases whose unloaded point moves with the design
+
+
+def made(name: str, **fidelity) -> Bench:
+    case = CASES[name]()
+    return bench(case, case.simulate(**fidelity))
+
+
+def displacements(known: Known) -> np.ndarray:
+    return np.array([sample.displacement for sample in known.samples])
+
+
+def assert_alike(followed: Known, traced: Known, *, digits: float = 1e-8) -> None:
+    """The same states and displacements."""
+    assert displacements(followed) == pytest.approx(displacements(traced), rel=digits)
+    for a, b in zip(followed.samples, traced.samples, strict=True):
+        assert (a.origin is None) == (b.origin is None)
+        pairs = [(a.state, b.state)] + ([] if a.origin is None else [(a.origin, b.origin)])
+        for one, other in pairs:
+            assert one.u == pytest.approx(other.u, abs=digits * np.abs(other.u).max())
+            assert one.poses == pytest.approx(other.poses, abs=digits * np.abs(other.poses).max())
+            assert one.force == other.force
+
+
+@each_case
+def test_following_a_design_ends_where_its_loading_from_zero_ends(name):
+    both = made(name)
+    first = both.rest.place(both.design(0.03, seed=1), None)
+    known = both.equilibria.trace()
+    both.rest.place(both.design(0.08, seed=2), first)
+    followed = both.equilibria.follow(known)
+    assert_alike(followed, both.equilibria.trace())
+    assert np.abs(displacements(followed) - displacements(known)).max() > 1e-3 * np.abs(displacements(known)).max()
+    assert np.array_equal(followed.design, both.rest.design())
+
+
+@pytest.mark.parallel
+def test_following_in_space_on_any_number_of_ranks():
+    both = made("truss", space="3d", size=4.0, order=1, comm=MPI.COMM_WORLD)
+    first = both.rest.place(both.rest.initial, None)
+    known = both.equilibria.trace()
+    both.rest.place(both.design(0.08), first)
+    assert_alike(both.equilibria.follow(known), both.equilibria.trace())
+
+
+def test_displacements_are_those_of_the_curve_that_a_user_computes():
+    for name in CASES:
+        both = made(name)
+        both.rest.place(both.design(0.05), None)
+        known = both.equilibria.trace()
+        for target, reached in zip(both.equilibria.targets, displacements(known), strict=True):
+            curve = both.simulation.load_displacement(
+                target.force_part, forces=[target.force / 2, target.force], configuration=target.configuration
+            )
+            assert curve.displacements[-1] == pytest.approx(reached, rel=1e-8), name
+
+
+def test_cases_are_what_they_claim_to_be():
+    for name, describe in CASES.items():
+        case = describe()
+        simulation = case.simulate()
+        assert strains(simulation, case.targets[0]) == (name == "strained by motors")
+        both = bench(case, simulation)
+        both.rest.place(both.rest.initial, None)
+        for sample in both.equilibria.trace().samples:
+            assert (sample.origin is not None) == (name in MOVING)
+
+
+def bulged(both: Bench) -> np.ndarray:
+    """A truss whose diagonal bulges strongly."""
+    (link,) = both.rest.links
+    sideways = np.zeros((4, 2, 3))
+    sideways[1:3, 0, 0] = 8.0
+    return both.rest.initial + sideways.ravel()[link.spline.entries]
+
+
+def test_a_large_change_of_design_is_halved_on_the_way(monkeypatch):
+    both = made("truss")
+    start = both.rest.place(both.rest.initial, None)
+    known = both.equilibria.trace()
+    both.rest.place(bulged(both), start)
+    newton = both.simulation.newton(both.equilibria.targets[0].force_part)
+    solve, failures = Newton.solve, []
+
+    def counted(self, *arguments, **options):
+        try:
+            return solve(self, *arguments, **options)
+        except NotConverged as failure:
+            failures.append(failure)
+            raise
+
+    monkeypatch.setattr(Newton, "solve", counted)
+    newton.options = NewtonOptions(iterations=6)
+    followed = both.equilibria.follow(known)
+    assert len(failures) >= 1
+    newton.options = NewtonOptions()
+    assert_alike(followed, both.equilibria.trace())
+
+
+def test_a_change_that_is_too_large_is_infeasible_and_leaves_the_design_in_place():
+    both = made("truss")
+    start = both.rest.place(both.rest.initial, None)
+    known = both.equilibria.trace()
+    both.rest.place(bulged(both), start)
+    design = both.rest.design()
+    both.simulation.newton(both.equilibria.targets[0].force_part).options = NewtonOptions(iterations=2)
+    with pytest.raises(Infeasible, match="no equilibrium at 0.1"):
+        both.equilibria.follow(known)
+    assert np.array_equal(both.rest.design(), design)
+
+
+def column(force: float) -> Case:
+    """A slightly bent column under a load along it."""
+    mechanism = fm.Mechanism("column")
+    base, cap = mechanism.rigid("base", fixed=True), mechanism.rigid("cap")
+    shape = fm.strip([(0, 0), (0.0, 20), (0, 40)], thickness=2.0, depth=6.0)
+    bar = mechanism.flexible("bar", shape, fm.Material("plastic", 2000.0, 0.35))
+    mechanism.revolute(base, bar, at=(0, 0), radius=1.5)
+    mechanism.revolute(bar, cap, at=(0, 40), radius=1.5)
+    mechanism.prismatic(base, cap, at=(0, 40), axis=(0, 1))
+    push = mechanism.force(on=cap, at=(0, 40), direction=(0, -1))
+    return Case(fm.Scene(mechanism), [fm.SplineDesign(bar, 2)], [fm.Target(push, force, 0.1)])
+
+
+def test_unstable_equilibria_are_infeasible():
+    euler = np.pi**2 * 2000.0 * 6.0 * 2.0**3 / 12.0 / 40.0**2
+    case = column(0.5 * euler)
+    stable = bench(case, case.simulate(size=2.0))
+    stable.rest.place(stable.rest.initial, None)
+    stable.equilibria.trace()
+    case = column(1.5 * euler)
+    with pytest.raises(Infeasible, match="unstable"):
+        TargetEquilibria(case.simulate(size=2.0), case.targets).trace()
+
+
+def test_load_that_no_equilibrium_carries_is_infeasible():
+    case = truss((1e4, 5.0))
+    both = bench(case, case.simulate())
+    both.rest.place(both.rest.initial, None)
+    with pytest.raises(Infeasible, match="push on tip"):
+        both.equilibria.trace()
+
+
+@each_case
+def test_gradients_agree_with_central_differences_of_followed_equilibria(name):
+    both = made(name)
+    placed = both.rest.place(both.design(0.05), None)
+    known = both.equilibria.trace()
+    gradient = both.rest.gradient(placed, both.equilibria.gradients(known))
+    direction, step = both.direction(7), 1e-3
+
+    def moved(h: float) -> np.ndarray:
+        both.rest.place(placed.p + h * direction, placed)
+        return displacements(both.equilibria.follow(known))
+
+    slope = (moved(step) - moved(-step)) / (2.0 * step)
+    assert gradient @ direction == pytest.approx(slope, rel=1e-5)
+
+
+@each_case
+def test_gradients_do_not_disturb_the_design(name):
+    both = made(name)
+    both.rest.place(both.design(0.05), None)
+    known = both.equilibria.trace()
+    before = both.rest.design()
+    first = both.equilibria.gradients(known)
+    assert np.array_equal(both.rest.design(), before)
+    assert both.equilibria.gradients(known) == pytest.approx(first, rel=1e-12)
+
+
+def test_targets_of_several_forces_directions_and_sizes_are_told_apart():
+    scene = truss().scene
+    mechanism = scene.mechanism
+    (pushing,) = mechanism.forces
+    tip = pushing.on
+    lift = mechanism.force(on=tip, at=(20, 70), direction=(0.6, -0.8), name="lift")
+    (diagonal,) = mechanism.flexible_links
+    targets = [
+        fm.Target(pushing, 0.4, 1.0),
+        fm.Target(lift, 0.2, 1.0),
+        fm.Target(pushing, 0.1, 1.0),
+        fm.Target(pushing, -0.02, 1.0),
+        fm.Target(pushing, 0.1, 2.0),
+        fm.Target(pushing, 0.0, 1.0),
+    ]
+    case = Case(scene, [fm.SplineDesign(diagonal, 3)], targets)
+    both = bench(case, case.simulate())
+    both.rest.place(both.rest.initial, None)
+    together = displacements(both.equilibria.trace())
+    for target, reached in zip(targets, together, strict=True):
+        alone = displacements(TargetEquilibria(both.simulation, [target]).trace())
+        assert alone == pytest.approx([reached], rel=1e-8, abs=1e-12)
+    assert together[2] == together[4]
+    assert together[3] < 0.0 < together[2] < together[0]
+    assert together[5] == pytest.approx(0.0, abs=1e-10)

@@ -1,0 +1,94 @@
+"""Groups of processes: how many, and that every target has exactly one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import pytest
+from mpi4py import MPI
+
+from fenicsmech.design.groups import group_count, split
+
+
+@dataclass(frozen=True)
+class World:
+    """One process of a communicator of ``size``; ``Split`` tells which of its parts this one is in."""
+
+    rank: int
+    size: int
+
+    def Split(self, *, color: int, key: int) -> Part:
+        return Part(color, key)
+
+
+@dataclass(frozen=True)
+class Part:
+    color: int
+    key: int
+
+
+def groups_of(processes: int, targets: int):
+    return [split(World(rank, processes), targets) for rank in range(processes)]
+
+
+@pytest.mark.parametrize(
+    ("processes", "targets", "groups"),
+    [
+        (1, 5, 1),  # alone
+        (2, 1, 1),  # nothing to share out
+        (2, 2, 2),
+        (2, 3, 2),  # two rounds of one beat three rounds at 1.4 times the speed
+        (4, 2, 2),
+        (4, 3, 3),  # one target each in one round; the fourth process helps one group
+        (4, 4, 4),
+        (3, 2, 2),
+        (8, 3, 3),
+        (8, 6, 6),
+    ],
+)
+def test_number_of_groups(processes, targets, groups):
+    assert group_count(processes, targets) == groups
+
+
+@pytest.mark.parametrize("processes", range(1, 9))
+@pytest.mark.parametrize("targets", range(1, 7))
+def test_number_of_groups_promises_the_shortest_time(processes, targets):
+    def seconds(groups: int) -> float:
+        return math.ceil(targets / groups) / math.sqrt(processes // groups)
+
+    best = min(seconds(groups) for groups in range(1, min(processes, targets) + 1))
+    assert seconds(group_count(processes, targets)) == pytest.approx(best)
+
+
+@pytest.mark.parametrize("processes", range(1, 9))
+@pytest.mark.parametrize("targets", range(1, 7))
+def test_every_target_is_in_exactly_one_group_and_every_group_has_targets_and_neighbouring_processes(
+    processes, targets
+):
+    groups = groups_of(processes, targets)
+    count = group_count(processes, targets)
+    if count == 1:
+        assert all(group.comm == group.everyone and group.mine == tuple(range(targets)) for group in groups)
+        return
+    colours = [group.comm.color for group in groups]
+    assert colours == sorted(colours)
+    assert set(colours) == set(range(count))
+    assert [group.comm.key for group in groups] == list(range(processes))
+    targets_of = {group.comm.color: group.mine for group in groups}
+    assert all(targets_of[group.comm.color] == group.mine for group in groups)
+    assert sorted(k for mine in targets_of.values() for k in mine) == list(range(targets))
+    sizes = [len(mine) for mine in targets_of.values()]
+    assert max(sizes) - min(sizes) <= 1
+    shares = [colours.count(colour) for colour in set(colours)]
+    assert max(shares) - min(shares) <= 1
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("targets", range(1, 5))
+def test_communicators_are_those_of_the_groups(targets):
+    world = MPI.COMM_WORLD
+    group = split(world, targets)
+    assert group.everyone is world
+    assert group.comm.allgather(group.mine) == [group.mine] * group.comm.size
+    assert world.allreduce(len(group.mine) if group.leads else 0) == targets

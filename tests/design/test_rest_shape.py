@@ -1,0 +1,76 @@
+"""The rest shape as a function of the parameters alone: lengths, quality, and derivatives of displacements by them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenicsmech.design.barrier import Barrier
+from fenicsmech.meshing import radius_ratios
+from fenicsmech.simulation.snapshot import rest_vertices
+
+from ..oracles.dense import taylor_rates
+from .mechanisms import bench, bow, pinned_links, strained, truss, turned_beam
+
+CASES = {
+    "truss": lambda: truss((0.1, 1.0), (0.4, 2.0)),
+    "force on a link": lambda: bow(60.0),
+    "strained by motors": lambda: strained(3.0),
+    "turned by 135°": lambda: turned_beam(3.0),
+}
+
+
+def test_links_own_consecutive_parameters_that_count_in_thicknesses():
+    case = pinned_links()
+    both = bench(case, case.simulate())
+    assert [link.name for link in both.rest.links] == ["arch", "rod"]
+    assert [link.thickness for link in both.rest.links] == [3.0, 3.0]
+    for link in both.rest.links:
+        assert both.rest.initial[link.place] == pytest.approx(link.spline.initial)
+        assert both.rest.lengths[link.place] == pytest.approx(np.where(link.spline.is_thickness, 1.0, 3.0))
+    assert both.rest.links[0].place.stop == both.rest.links[1].place.start
+    assert both.rest.links[1].place.stop == len(both.rest.initial)
+
+
+def test_worst_ratio_is_that_of_the_simulation():
+    case = pinned_links()
+    both = bench(case, case.simulate())
+    for change in (0.0, 0.3):
+        both.rest.place(both.design(change), None)
+        assert both.rest.worst_ratio() == pytest.approx(both.simulation.mesh_ratio_max, rel=1e-10)
+
+
+def test_penalty_sums_its_barrier_over_the_cells():
+    case = pinned_links()
+    both = bench(case, case.simulate())
+    placed, barrier = both.rest.place(both.design(0.3), None), Barrier(2.2, 1.5, 4.0)
+    model = both.simulation.model
+    ratios = 2.0 / radius_ratios(rest_vertices(model), model.mesh.cells)
+    value, _ = both.rest.quality_penalty(barrier, placed)
+    assert np.sum(ratios > barrier.limit) > 3
+    assert value == pytest.approx(barrier.value(ratios).sum(), rel=1e-8)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("comm", [MPI.COMM_SELF, MPI.COMM_WORLD], ids=["alone", "together"])
+@pytest.mark.parametrize(
+    ("name", "space", "size"),
+    [(name, "plane-stress", 3.0) for name in CASES] + [("truss", "3d", 4.0), ("force on a link", "plane-strain", 3.0)],
+)
+def test_displacements_pass_the_taylor_test_by_the_parameters(name, space, size, comm):
+    case = CASES[name]()
+    order = 1 if space == "3d" else 2
+    both = bench(case, case.simulate(space, size=size, order=order, comm=comm))
+    placed = both.rest.place(both.design(0.06), None)
+    known = both.equilibria.trace()
+    gradient = both.rest.gradient(placed, both.equilibria.gradients(known))
+    direction = both.direction(7)
+
+    def reached(h: np.ndarray) -> np.ndarray:
+        both.rest.place(placed.p + h[0] * direction, placed)
+        return np.array([sample.displacement for sample in both.equilibria.follow(known).samples])
+
+    rates = taylor_rates(reached, [0.0], [1.0], (gradient @ direction)[:, None], [0.02, 0.01, 0.005])
+    assert rates.with_gradient.min() >= 1.95
+    assert rates.without.min() >= 0.95

@@ -1,0 +1,160 @@
+"""Simulations whose links have another rest shape than drawn: pins, curves, frames and files follow it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import fenicsmech as fm
+from fenicsmech.linkage import assemble
+from fenicsmech.simulation.snapshot import gather, rest_vertices
+
+PLASTIC = fm.Material("plastic", 2000.0, 0.35)
+
+
+def crane(space: str, *, order: int = 1, comm: MPI.Comm = MPI.COMM_WORLD):
+    """A driven hub with a beam clamped to it and a loaded hand at the beam's end."""
+    mechanism = fm.Mechanism("crane")
+    base, hub, hand = mechanism.rigid("base", fixed=True), mechanism.rigid("hub"), mechanism.rigid("hand")
+    shape = fm.strip([(0, 0), (40, 0)], thickness=4.0, depth=6.0)
+    beam = mechanism.flexible("beam", shape, PLASTIC)
+    motor = mechanism.motor(mechanism.revolute(base, hub, at=(0, 0)))
+    for link, x in ((hub, 0.0), (hand, 40.0)):
+        mechanism.weld(link, beam, at=(x, 0), region=fm.Rectangle(4.0, 5.0))
+    push = mechanism.force(on=hand, at=(40, 0), direction=(0, 1))
+    scene = fm.Scene(mechanism)
+    simulation = fm.Simulation(scene, space=space, order=order, size=4.0, comm=comm)
+    return simulation, push, scene.configuration("turned", {motor: 2.4})
+
+
+def wave(simulation: fm.Simulation, amplitude: float) -> np.ndarray:
+    """A change of the rest shape that leaves what is clamped rigid, on this rank."""
+    field = simulation.model.elastic.d
+    x = field.function_space.tabulate_dof_coordinates()[:, : simulation.linkage.dim]
+    along = np.clip((x[:, 0] - 2.0) / 36.0, 0.0, 1.0)
+    change = np.zeros_like(x)
+    change[:, 1] = amplitude * (along + np.sin(np.pi * along) ** 2)
+    return change.ravel()
+
+
+def thicker(simulation: fm.Simulation, factor: float) -> np.ndarray:
+    """The change of the rest shape that makes the beam ``factor`` times as thick, on this rank."""
+    x = simulation.model.elastic.d.function_space.tabulate_dof_coordinates()[:, : simulation.linkage.dim]
+    return (x * np.array([0.0, factor - 1.0, 0.0])[: simulation.linkage.dim]).ravel()
+
+
+each_space = pytest.mark.parametrize("space", ["plane-stress", "3d"])
+
+
+@pytest.mark.parallel
+@each_space
+def test_a_reshaped_mechanism_assembles_without_energy(space):
+    simulation, _, turned = crane(space)
+    model, assembly = simulation.model, assemble(simulation.linkage, turned)
+    motors = simulation.linkage.joints.motor_values(turned.position)
+    model.reshape(wave(simulation, 5.0))
+    model.load(model.assembled_state(assembly.poses, motors))
+    stored = model.elastic.energy()
+    assert abs(stored) < 1e-18 * PLASTIC.youngs_modulus * 40.0**3
+
+
+@pytest.mark.parallel
+@each_space
+def test_carrying_an_assembled_mechanism_to_another_shape_assembles_it_there(space):
+    simulation, _, turned = crane(space)
+    model, assembly = simulation.model, assemble(simulation.linkage, turned)
+    motors = simulation.linkage.joints.motor_values(turned.position)
+    model.reshape(wave(simulation, 2.0))
+    carried = model.carry(model.assembled_state(assembly.poses, motors), wave(simulation, -5.0))
+    assert np.array_equal(model.elastic.d.x.array, wave(simulation, -5.0))
+    expected = model.assembled_state(assembly.poses, motors)
+    assert carried.u == pytest.approx(expected.u, abs=1e-11)
+
+
+@pytest.mark.parallel
+@each_space
+def test_stiffness_grows_with_the_third_power_of_the_designed_thickness(space):
+    simulation, push, _ = crane(space, order=2)
+    (drawn,) = simulation.load_displacement(push, forces=[0.1]).displacements
+    simulation.model.reshape(thicker(simulation, 1.1))
+    (reshaped,) = simulation.load_displacement(push, forces=[0.1]).displacements
+    assert drawn / reshaped == pytest.approx(1.1**3, rel=0.01)
+    simulation.model.reshape(thicker(simulation, 1.0))
+    assert simulation.load_displacement(push, forces=[0.1]).displacements == pytest.approx([drawn], rel=1e-10)
+
+
+def test_another_shape_for_a_while_is_taken_back_even_after_an_error():
+    simulation, _, _ = crane("plane-stress", comm=MPI.COMM_SELF)
+    model = simulation.model
+    first, second = wave(simulation, 2.0), wave(simulation, -1.0)
+    model.reshape(first)
+    nodes = model.design_nodes.values().copy()
+    with pytest.raises(RuntimeError), model.shaped(second):
+        assert np.array_equal(model.elastic.d.x.array, second)
+        assert not np.allclose(model.design_nodes.values(), nodes)
+        raise RuntimeError
+    assert np.array_equal(model.elastic.d.x.array, first)
+    assert np.array_equal(model.design_nodes.values(), nodes)
+
+
+@pytest.mark.parallel
+@each_space
+def test_frames_keep_the_shape_they_were_computed_with(space):
+    simulation, push, turned = crane(space)
+    simulation.model.reshape(wave(simulation, 2.0))
+    curve = simulation.load_displacement(push, forces=[2.0], configuration=turned)
+    before = simulation.von_mises(curve.frames[0]), gather(simulation.model, curve.frames[0])
+    simulation.model.reshape(wave(simulation, -3.0))
+    after = simulation.von_mises(curve.frames[0]), gather(simulation.model, curve.frames[0])
+    assert np.array_equal(simulation.model.elastic.d.x.array, wave(simulation, -3.0))
+    if simulation.comm.rank == 0:
+        assert after[0] == pytest.approx(before[0], rel=1e-12)
+        assert after[1].rest == pytest.approx(before[1].rest, abs=1e-14)
+        assert after[1].displacement == pytest.approx(before[1].displacement, abs=1e-14)
+    else:
+        assert before == after == (None, None)
+
+
+@pytest.mark.parallel
+def test_files_show_a_frame_in_its_own_shape_and_leave_the_mesh_alone(shared_tmp_path):
+    simulation, push, _ = crane("plane-stress")
+    simulation.model.reshape(wave(simulation, 2.0))
+    curve = simulation.load_displacement(push, forces=[2.0])
+    simulation.model.reshape(wave(simulation, -3.0))
+    geometry = simulation.model.mesh.mesh.geometry.x
+    drawn = geometry.copy()
+    simulation.write(shared_tmp_path / "crane.xdmf", curve)
+    assert np.array_equal(geometry, drawn)
+    simulation.comm.barrier()
+    with simulation.model.shaped(curve.frames[0].design):
+        rest = rest_vertices(simulation.model)
+    if rest is not None:
+        # HDF5 holds plain doubles: the highest vertex of the frame's shape stands among them, and no vertex of others
+        heavy = (shared_tmp_path / "crane.h5").read_bytes()
+        assert rest[:, 1].max().tobytes() in heavy
+    shown = rest_vertices(simulation.model)
+    if shown is not None:
+        assert shown[:, 1].min().tobytes() not in heavy
+
+
+@pytest.mark.parallel
+def test_mesh_ratio_is_that_of_the_present_shape():
+    simulation, _, _ = crane("plane-stress")
+    drawn = simulation.mesh_ratio_max
+    simulation.model.reshape(thicker(simulation, 0.6))
+    assert abs(simulation.mesh_ratio_max - drawn) > 0.1 * drawn
+    simulation.model.reshape(thicker(simulation, 1.0))
+    assert simulation.mesh_ratio_max == pytest.approx(drawn, rel=1e-12)
+
+
+@pytest.mark.parallel
+def test_the_same_scene_on_other_processes_has_its_drawn_shape_and_the_same_fidelity():
+    simulation, push, turned = crane("plane-stress")
+    curve = simulation.load_displacement(push, forces=[2.0], configuration=turned)
+    simulation.model.reshape(wave(simulation, 2.0))
+    alone = simulation.on(MPI.COMM_SELF)
+    assert (alone.scene, alone.fidelity) == (simulation.scene, simulation.fidelity)
+    assert alone.comm.size == 1
+    again = alone.load_displacement(push, forces=[2.0], configuration=turned)
+    assert again.displacements == pytest.approx(curve.displacements, rel=1e-9)
