@@ -36,17 +36,23 @@ class Demo:
             print(text, flush=True)
 
 
-def parse(name: str, description: str, *, size: float, quick_size: float) -> Demo:
-    """The options of demo ``name``; ``size`` and ``quick_size`` are its default element sizes in mm."""
+def parse(name: str, description: str, *, size: float, quick_size: float, data: Path | None = None) -> Demo:
+    """The options of demo ``name``: of one that optimises links, or of one that reads measurements from ``data``.
+
+    ``size`` and ``quick_size`` are its default element sizes in mm.
+    """
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument(
         "--space", choices=list(SPACES), default="3d", help="3d (default), plane-stress or plane-strain"
     )
     parser.add_argument("--order", type=int, choices=(1, 2), default=2, help="degree of the displacement field")
     parser.add_argument("--size", type=float, metavar="MM", help=f"element size (default {size} mm)")
-    parser.add_argument("--simulate-only", action="store_true", help="simulate the initial design only")
-    parser.add_argument("--resume", action="store_true", help="go on with an optimisation that was interrupted")
-    parser.add_argument("--bfgs", action="store_true", help="optimise by BFGS instead of Levenberg–Marquardt")
+    if data is None:
+        parser.add_argument("--simulate-only", action="store_true", help="simulate the initial design only")
+        parser.add_argument("--resume", action="store_true", help="go on with an optimisation that was interrupted")
+        parser.add_argument("--bfgs", action="store_true", help="optimise by BFGS instead of Levenberg–Marquardt")
+    else:
+        parser.add_argument("--data", type=Path, default=data, metavar="DIR", help="folder of the measurements")
     parser.add_argument("--quick", action="store_true", help=f"coarse: element size {quick_size} mm")
     parser.add_argument("--out", type=Path, default=Path("results") / name, metavar="DIR", help="folder for files")
     options = parser.parse_args()

@@ -26,11 +26,14 @@ What is minimised
     ``groups``, ``team``  targets spread over groups of processes; one process decides
     ``optimisers``        Levenberg–Marquardt, BFGS
 
+    ``characterisation``  Young's modulus from measurements
+
 What a user sees
     ``design_problem``    the entry point; ``progress`` and ``checkpoint`` while it runs
     ``result``            designs as plain data; ``link_files`` pictures and solids of them
 """
 
+from fenicsmech.design.characterisation import Experiment, ModulusFit, fit_modulus
 from fenicsmech.design.design_problem import DesignProblem
 from fenicsmech.design.optimisers import Bfgs, LevenbergMarquardt
 from fenicsmech.design.regularisers import MeshQuality, ShapeBounds, StayClose
@@ -41,12 +44,15 @@ __all__ = [
     "Bfgs",
     "DesignProblem",
     "DesignResult",
+    "Experiment",
     "LevenbergMarquardt",
     "LinkDesign",
     "MeshQuality",
+    "ModulusFit",
     "ShapeBounds",
     "SplineDesign",
     "StayClose",
     "Target",
     "TargetResult",
+    "fit_modulus",
 ]

@@ -12,7 +12,7 @@ import numpy as np
 from fenicsmech.clock import Clock
 from fenicsmech.design.checkpoint import Checkpoint, Saved
 from fenicsmech.design.equilibria import TargetEquilibria
-from fenicsmech.design.groups import Group, split
+from fenicsmech.design.groups import Group, group_count, split
 from fenicsmech.design.handle_optimum import Placement
 from fenicsmech.design.link_files import draw_links, outline, rest_meshes, write_solids
 from fenicsmech.design.link_shape import LinkShape, shape_links
@@ -117,7 +117,7 @@ class DesignProblem:
         began = perf_counter()
         minimiser = minimiser or LevenbergMarquardt()
         clock = dict(self._clock.seconds)
-        group, objective = self._team
+        _, objective = self._team
         begin, near = Start(self.initial), None
         if start is not None:
             begin, near = Start(self._parameters(start)), self._placement(start)
@@ -152,7 +152,7 @@ class DesignProblem:
             active=objective.active(outcome.parameters),
             seconds=perf_counter() - began,
             phases=self._clock.since(clock),
-            groups=self.simulation.comm.size // group.comm.size,
+            groups=group_count(self.simulation.comm.size, len(self.targets)),
         )
 
     def picture(self, path: str | Path, design: DesignResult) -> None:
@@ -258,10 +258,14 @@ class DesignProblem:
             "space": fidelity.model.name,
             "order": fidelity.order,
             "sizes": list(fidelity.sizes.values()),
+            "drawing": [repr(link) for link in self.simulation.scene.mechanism.flexible_links],
             "links": [[link.name, link.spline.initial.tolist()] for link in self._rest.links],
-            "targets": [
-                [t.force_part.name, t.configuration.name, t.force, t.displacement, t.weight] for t in self.targets
+            "bounds": [repr(link.bounds) for link in self._rest.links],
+            "forces": [[t.force_part.name, *t.force_part.at, *t.force_part.direction] for t in self.targets],
+            "configurations": [
+                [t.configuration.name, *(at for _, at in t.configuration.positions)] for t in self.targets
             ],
+            "targets": [[t.force, t.displacement, t.weight] for t in self.targets],
             "regulariser": repr(self._regulariser),
             "minimiser": type(minimiser).__name__,
         }
@@ -287,7 +291,7 @@ class DesignProblem:
 
         They were followed from design to design; should a path from zero load end elsewhere, it is said.
         """
-        self._rest.place(outcome.parameters, self._team[1].placement)
+        self._rest.place(outcome.parameters, self.simulation.comm.bcast(self._team[1].placement, root=0))
         equilibria = TargetEquilibria(self.simulation, self.targets)
         try:
             verified = np.array([sample.displacement for sample in equilibria.trace().samples])
@@ -333,7 +337,7 @@ class DesignProblem:
                 )
             )
         comm = self.simulation.comm
-        return DesignResult(
+        mine = DesignResult(
             mechanism=self.simulation.scene.mechanism.name,
             links=tuple(links),
             targets=targets,
@@ -345,6 +349,7 @@ class DesignProblem:
             processes=comm.size,
             **found,
         )
+        return comm.bcast(mine, root=0)  # groups differ in the last bits
 
 
 def _check_designs(designs: Sequence[SplineDesign]) -> None:

@@ -48,6 +48,8 @@ class SplineDesign:
             raise DescriptionError(part, f"{self.segments!r} segments", "Give a whole number of at least 1")
         positive(f"curvature bound of the {part}", self.bend)
         if self.thickness is not None:
+            if not isinstance(self.thickness, Sequence) or len(self.thickness) != 2:
+                raise DescriptionError(part, f"thickness {self.thickness!r}", "Give the least and the largest one")
             least, most = self.thickness
             positive(f"least thickness of the {part}", least)
             finite(f"largest thickness of the {part}", most)
@@ -106,6 +108,8 @@ class Target:
     weight: float = 1.0
 
     def __post_init__(self) -> None:
+        if not isinstance(self.force_part, Force):
+            raise DescriptionError("target", f"{self.force_part!r} is no force", "Give one of the mechanism's")
         finite(f"force of a target for {self.force_part.name!r}", self.force)
         finite(f"displacement of a target for {self.force_part.name!r}", self.displacement)
         positive(f"weight of a target for {self.force_part.name!r}", self.weight)

@@ -129,6 +129,10 @@ class MechanismModel:
         self.elastic.d.x.array[:] = design
         self.interfaces.reshape(self.design_nodes.values())
 
+    def set_youngs_modulus(self, links: np.ndarray, modulus: float) -> None:
+        """Gives the links in a mask (links,) another Young's modulus."""
+        self.elastic.youngs_modulus.x.array[np.flatnonzero(links[self.mesh.link])] = modulus
+
     @contextmanager
     def shaped(self, design: np.ndarray) -> Iterator[None]:
         """Gives the links another rest shape for a while."""

@@ -105,3 +105,14 @@ def test_two_ranks_give_the_same_curve_and_the_same_optimum(tmp_path, mpirun):
     designs = [json.loads((folder / "design.json").read_text())["links"] for folder in (tmp_path, together)]
     for one, two in zip(*designs, strict=True):
         assert two["parameters"] == pytest.approx(one["parameters"], rel=1e-6, abs=1e-6)
+
+
+@pytest.mark.slow
+def test_characterisation_finds_the_modulus_of_the_synthetic_data(tmp_path):
+    summary, printed = run("characterize", tmp_path, "--quick")
+    check_summary(summary)
+    modulus = summary["youngs_modulus"]
+    assert modulus["fitted"] == pytest.approx(modulus["true"], rel=0.01)
+    assert modulus["interval"][0] < modulus["true"] < modulus["interval"][1]
+    assert "95 % interval" in printed
+    assert (tmp_path / "curve.png").exists()

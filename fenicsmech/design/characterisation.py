@@ -1,0 +1,179 @@
+"""Young's modulus of a material from measured forces and displacements.
+
+Displacements u_k(E) of samples under the measured forces are fitted to the measured ū_k by Gauss–Newton on ln E:
+
+    min Σ_k ((u_k(E) − ū_k) / s_k)²,     s_k the largest |ū| of the sample's measurements,
+
+which is maximum likelihood if forces are exact and displacements are read with independent normal errors of one size
+relative to each sample's range. With the residuals' standard deviation σ and J = ∂(u/s)/∂ln E from the adjoint,
+
+    standard error of ln E = σ / |J|,     interval  E exp(± t σ / |J|),     t Student's quantile for n − 1.
+
+Source: Seber & Wild, Nonlinear Regression (doi:10.1002/0471725315), chapters 2 and 5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from fenicsmech.design.sensitivity import Adjoint
+from fenicsmech.equilibrium import IDLE_STIFFNESS, LoadControl
+from fenicsmech.errors import DescriptionError
+from fenicsmech.mechanism import DRAWN, Configuration, Force, Material
+from fenicsmech.mechanism.checks import finite
+from fenicsmech.simulation import Curve, Simulation
+from fenicsmech.simulation.request import CurveRequest, read_request
+
+_SETTLED = 1e-6  # change of ln E
+_ITERATIONS = 30
+_LARGEST_STEP = 1.0  # of ln E
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """Measurements on one sample.
+
+    Attributes:
+        simulation: of the sample in its test rig.
+        force_part: the force that was applied.
+        forces: its magnitudes, (n,).
+        displacements: how far its point moved along it, (n,).
+        configuration: motor positions.
+
+    Raises:
+        DescriptionError: the numbers do not pair, are not finite, or tell nothing.
+    """
+
+    simulation: Simulation
+    force_part: Force
+    forces: Sequence[float]
+    displacements: Sequence[float]
+    configuration: Configuration = DRAWN
+
+    def __post_init__(self) -> None:
+        part = f"measurements of {self.simulation.scene.mechanism.name!r}"
+        forces = np.array([finite(f"force among the {part}", value) for value in self.forces])
+        displacements = np.array([finite(f"displacement among the {part}", value) for value in self.displacements])
+        if len(forces) != len(displacements):
+            raise DescriptionError(
+                part, f"{len(forces)} forces for {len(displacements)} displacements", "Give one of each per reading"
+            )
+        if not np.any(forces * displacements):
+            raise DescriptionError(part, "no force moves anything", "Give readings under load")
+        object.__setattr__(self, "forces", forces)
+        object.__setattr__(self, "displacements", displacements)
+
+    @property
+    def request(self) -> CurveRequest:
+        """The curve through all measured forces, from the smallest to the largest."""
+        request = read_request(
+            self.simulation.scene.mechanism,
+            self.force_part,
+            forces=self.forces,
+            displacements=None,
+            configuration=self.configuration,
+            others=None,
+        )
+        loads = sorted({control.target for control in request.controls}, key=abs)
+        return CurveRequest(request.force, tuple(map(LoadControl, loads)), request.configuration, request.others)
+
+
+@dataclass(frozen=True)
+class ModulusFit:
+    """Young's modulus fitted to experiments.
+
+    Attributes:
+        youngs_modulus: E.
+        standard_error: of E.
+        interval: the 95 % confidence interval of E.
+        spread: standard deviation of the residuals, relative to each sample's largest displacement.
+        curves: simulated at the fitted modulus, one per experiment.
+        residuals: simulated minus measured displacement, per experiment.
+        iterations: of Gauss–Newton.
+    """
+
+    youngs_modulus: float
+    standard_error: float
+    interval: tuple[float, float]
+    spread: float
+    curves: tuple[Curve, ...]
+    residuals: tuple[tuple[float, ...], ...]
+    iterations: int
+
+
+def fit_modulus(experiments: Sequence[Experiment], material: Material) -> ModulusFit:
+    """Young's modulus of ``material`` (collective); the simulations keep it.
+
+    Args:
+        experiments: measurements, at least two readings in all.
+        material: that of some links; its modulus is where the fit starts.
+
+    Raises:
+        DescriptionError: no link of an experiment is of this material, or there are fewer than two readings.
+        EquilibriumError: a measured force is not reached in simulation.
+    """
+    rigs = [_Rig(experiment, material) for experiment in experiments]
+    readings = sum(len(experiment.forces) for experiment in experiments)
+    if readings < 2:
+        raise DescriptionError(
+            f"modulus of {material.name!r}", f"{readings} reading(s)", "Give two or more: an interval needs them"
+        )
+    log_modulus, iterations, step = float(np.log(material.youngs_modulus)), 0, np.inf
+    while True:
+        curves, residuals, slopes = zip(*(rig.compare(np.exp(log_modulus)) for rig in rigs), strict=True)
+        scaled = np.concatenate([r / rig.range for r, rig in zip(residuals, rigs, strict=True)])
+        J = np.concatenate([slope / rig.range for slope, rig in zip(slopes, rigs, strict=True)])
+        if abs(step) <= _SETTLED or iterations == _ITERATIONS:
+            break
+        step = float(np.clip(-(J @ scaled) / (J @ J), -_LARGEST_STEP, _LARGEST_STEP))
+        log_modulus += step
+        iterations += 1
+    spread = float(np.sqrt(scaled @ scaled / (readings - 1)))
+    error, modulus = spread / float(np.linalg.norm(J)), float(np.exp(log_modulus))
+    reach = float(student.ppf(0.975, readings - 1)) * error
+    return ModulusFit(
+        youngs_modulus=modulus,
+        standard_error=modulus * error,
+        interval=(modulus * float(np.exp(-reach)), modulus * float(np.exp(reach))),
+        spread=spread,
+        curves=tuple(curves),
+        residuals=tuple(tuple(r.tolist()) for r in residuals),
+        iterations=iterations,
+    )
+
+
+class _Rig:
+    """One experiment in simulation."""
+
+    def __init__(self, experiment: Experiment, material: Material) -> None:
+        self._experiment, self._request = experiment, experiment.request
+        self._simulation = experiment.simulation
+        mechanism = self._simulation.scene.mechanism
+        self._links = np.array([link.material == material for link in mechanism.flexible_links])
+        if not self._links.any():
+            raise DescriptionError(
+                f"modulus of {material.name!r}",
+                f"no link of {mechanism.name!r} is made of it",
+                "Give the material of the samples",
+            )
+        self.range = float(np.abs(experiment.displacements).max())
+
+    def compare(self, modulus: float) -> tuple[Curve, np.ndarray, np.ndarray]:
+        """The curve at ``modulus`` E, u − ū (n,) and ∂u/∂ln E (n,)."""
+        simulation, part = self._simulation, self._request.force
+        model, newton = simulation.model, simulation.newton(part)
+        model.set_youngs_modulus(self._links, modulus)
+        curve = simulation.trace(self._request)
+        adjoint, floor = Adjoint(model, newton), IDLE_STIFFNESS if curve.freedom.mobility else 0.0
+        slopes, travels = {}, {}
+        for frame in curve.frames:
+            (gradient,) = adjoint.gradients(frame.state, [newton.system.controlled], floor=floor)
+            travels[frame.force] = frame.displacement
+            slopes[frame.force] = modulus * float(gradient.youngs_moduli[self._links].sum())
+        forces = self._experiment.forces.tolist()
+        reached = np.array([travels[force] for force in forces])
+        return curve, reached - self._experiment.displacements, np.array([slopes[force] for force in forces])

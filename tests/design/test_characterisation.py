@@ -1,0 +1,91 @@
+"""Young's modulus from measurements: exact for exact data, its interval covers the truth as often as it says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fenicsmech as fm
+from fenicsmech.design.characterisation import Experiment, fit_modulus
+from fenicsmech.errors import DescriptionError
+
+TRUE = fm.Material("nylon", 1500.0, 0.4)
+GUESS = replace(TRUE, youngs_modulus=600.0)
+FORCES = (0.1, 0.3, 0.5, 0.7)
+
+
+def bench(material: fm.Material, thickness: float = 1.0, samples: int = 1):
+    """A cantilever, or two in parallel under one grip, and the force across."""
+    rig = fm.Mechanism("bench")
+    ground, grip = rig.rigid("ground", fixed=True), rig.rigid("grip")
+    for k in range(samples):
+        y = 10.0 * k
+        sample = rig.flexible(f"sample {k}", fm.strip([(-2, y), (32, y)], thickness=thickness, depth=4.0), material)
+        rig.weld(ground, sample, at=(-1, y), region=fm.Rectangle(2, 2 * thickness))
+        rig.weld(sample, grip, at=(31, y), region=fm.Rectangle(2, 2 * thickness))
+    push = rig.force(on=grip, at=(30, 0), direction=(0, 1))
+    return fm.Simulation(fm.Scene(rig), space="plane-stress", size=2.0), push
+
+
+def exact(thickness: float = 1.0, samples: int = 1) -> np.ndarray:
+    simulation, push = bench(TRUE, thickness, samples)
+    return simulation.load_displacement(push, forces=FORCES).displacements
+
+
+def experiment(displacements, thickness: float = 1.0, samples: int = 1) -> Experiment:
+    simulation, push = bench(GUESS, thickness, samples)
+    return Experiment(simulation, push, FORCES, displacements)
+
+
+@pytest.mark.parallel
+def test_modulus_of_exact_data_is_found_again():
+    fit = fit_modulus([experiment(exact()), experiment(exact(2.0), 2.0)], GUESS)
+    assert fit.youngs_modulus == pytest.approx(1500.0, rel=1e-6)
+    assert fit.spread < 1e-6
+    assert fit.curves[0].displacements == pytest.approx(exact(), rel=1e-6)
+
+
+def test_all_links_of_the_material_change_together():
+    fit = fit_modulus([experiment(exact(samples=2), samples=2)], GUESS)
+    assert fit.youngs_modulus == pytest.approx(1500.0, rel=1e-6)
+
+
+def test_interval_covers_the_truth_as_often_as_it_says():
+    random, covered, rounds = np.random.default_rng(3), 0, 20
+    true = exact()
+    simulation, push = bench(GUESS)
+    for _ in range(rounds):
+        noisy = true + 0.01 * true.max() * random.standard_normal(len(true))
+        low, high = fit_modulus([Experiment(simulation, push, FORCES, noisy)], GUESS).interval
+        covered += low <= 1500.0 <= high
+    assert 16 <= covered  # P(fewer of 20 at 95 %) = 0.3 %
+
+
+def test_interval_shrinks_with_the_noise():
+    pattern = np.array([1.0, -1.0, 1.0, -1.0])
+    widths = []
+    for noise in (0.02, 0.01):
+        low, high = fit_modulus([experiment(exact() + noise * pattern)], GUESS).interval
+        widths.append(high - low)
+    assert widths[0] == pytest.approx(2.0 * widths[1], rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("forces", "displacements", "message"),
+    [
+        ((1.0, 2.0), (1.0,), "2 forces for 1 displacements"),
+        ((1.0, float("nan")), (1.0, 2.0), "nan"),
+        ((0.0, 0.0), (0.0, 1.0), "no force moves anything"),
+    ],
+)
+def test_data_that_tell_nothing_are_refused(forces, displacements, message):
+    simulation, push = bench(GUESS)
+    with pytest.raises(DescriptionError, match=message):
+        Experiment(simulation, push, forces, displacements)
+
+
+def test_a_material_that_no_sample_is_made_of_is_refused():
+    with pytest.raises(DescriptionError, match="no link of 'bench' is made of it"):
+        fit_modulus([experiment(exact())], fm.ONYX)
