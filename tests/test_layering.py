@@ -27,6 +27,7 @@ LAYERS = (
     "meshing",
     "elasticity",
     "bodies",
+    "effects",
     "equilibrium",
     "simulation",
     "design",

@@ -7,7 +7,7 @@ link, or motors strain the links), it is an equilibrium that is followed too.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -129,8 +129,14 @@ class TargetEquilibria:
                 raise Infeasible(_unstable(target))
             self._floor[target] = IDLE_STIFFNESS if curve.freedom.mobility else 0.0
             self._fixed_origin[target] = self._travel(target, frame.state) - frame.displacement
-            samples[target] = Sample(frame.state, curve.frames[0].state if moving else None, frame.displacement)
+            origin = self._unloaded(target, curve.frames[0].state) if moving else None
+            samples[target] = Sample(frame.state, origin, frame.displacement)
         return samples
+
+    def _unloaded(self, target: Target, state: State) -> State:
+        """The equilibrium without force and without effects, from one without force."""
+        newton = self._newtons[target.force_part]
+        return newton.solve(replace(state, share=0.0), LoadControl(0.0), floor=self._floor[target]).state
 
     def _followed(self, target: Target, sample: Sample, before: np.ndarray, after: np.ndarray) -> Sample:
         state = self._moved(target, sample.state, LoadControl(target.force), before, after, _HALVINGS)

@@ -9,7 +9,7 @@ b the depth of a planar link (1 in space). Interface cells move rigidly and stor
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -58,11 +58,14 @@ class ElasticBody:
         model: 3D, plane strain or plane stress.
         order: degree of the displacement field.
         quadrature: explicit degree; never UFL's estimate.
+        effects: energies beside the elastic one, as functions of this body; none costs nothing.
 
     Attributes:
         u: displacement field, vector P_order.
         d: design field, vector P1.
         youngs_modulus, poissons_ratio: per cell.
+        dx: measure of all cells, interfaces included.
+        share: how much of the effects acts.
     """
 
     def __init__(
@@ -76,24 +79,40 @@ class ElasticBody:
         model: ElasticModel,
         order: int,
         quadrature: Quadrature,
+        effects: Sequence[Callable[[ElasticBody], ufl.Form | None]] = (),
     ) -> None:
         self.mesh, self.model, self.order = mesh, model, order
         self.u = fem.Function(vector_space(mesh, order), name="displacement")
         self.d = fem.Function(vector_space(mesh, 1), name="design")
-        self.youngs_modulus = self._cellwise([m.youngs_modulus for m in materials], link)
-        self.poissons_ratio = self._cellwise([m.poissons_ratio for m in materials], link)
-        self._depth = self._cellwise(depths, link)
+        self._link, self._effects = link, tuple(effects)
+        self.youngs_modulus = self.cellwise([m.youngs_modulus for m in materials])
+        self.poissons_ratio = self.cellwise([m.poissons_ratio for m in materials])
+        self._depth = self.cellwise(depths)
         laws = sorted({m.law for m in materials}, key=repr)
         law_of_cell = np.array([laws.index(m.law) for m in materials])[link]
         cells = np.flatnonzero(free).astype(np.int32)
         tags = dmesh.meshtags(mesh, mesh.topology.dim, cells, law_of_cell[cells].astype(np.int32))
         measure = ufl.Measure("dx", domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": quadrature.degree})
+        self.dx = measure
+        self.share = fem.Constant(mesh, PETSc.ScalarType(1.0))
         self._terms = [(law, measure(tag)) for tag, law in enumerate(laws)]
         self._law_cells = [np.flatnonzero(law_of_cell == tag).astype(np.int32) for tag in range(len(laws))]
 
     @cached_property
     def energy_ufl(self) -> ufl.Form:
-        """E(u, d), symbolic; everything else is a derivative of it."""
+        """E(u, d), the energy of effects included, symbolic; everything else is a derivative of it."""
+        if self.effects_ufl is None:
+            return self._strain_ufl
+        return self._strain_ufl + self.share * self.effects_ufl
+
+    @cached_property
+    def effects_ufl(self) -> ufl.Form | None:
+        """The energy of all effects, None if there are none."""
+        terms = [term for effect in self._effects if (term := effect(self)) is not None]
+        return sum(terms[1:], start=terms[0]) if terms else None
+
+    @cached_property
+    def _strain_ufl(self) -> ufl.Form:
         thick = self._depth if self.model.dim == 2 else 1.0
         volume = ufl.det(self._design_gradient) * thick
         terms = [self._density(law) * volume * dx for law, dx in self._terms]
@@ -120,12 +139,18 @@ class ElasticBody:
         """E at the current fields, of the whole mesh (collective); NaN where J ≤ 0."""
         return float(self.mesh.comm.allreduce(fem.assemble_scalar(self.energy_form)))
 
+    def strain_energy(self) -> float:
+        """The elastic part of E (collective)."""
+        form = self.energy_form if self.effects_ufl is None else self._strain_form
+        return float(self.mesh.comm.allreduce(fem.assemble_scalar(form)))
+
+    def effects_residual(self, vector: PETSc.Vec) -> None:
+        """Assembles the derivative of the effects' energy by u into the ghosted ``vector`` (collective)."""
+        self._assemble(self._effects_form, vector)
+
     def residual(self, vector: PETSc.Vec) -> None:
         """Assembles ∂E/∂u into the ghosted ``vector`` (collective)."""
-        with vector.localForm() as local:
-            local.set(0.0)
-        fem.petsc.assemble_vector(vector, self.residual_form)
-        vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        self._assemble(self.residual_form, vector)
 
     def tangent(self, matrix: PETSc.Mat) -> None:
         """Adds ∂²E/∂u² into ``matrix`` (collective; leaves it unassembled)."""
@@ -197,7 +222,22 @@ class ElasticBody:
     def _density(self, law: EnergyLaw):
         return density(law, self.model.strain(law, self._strain, self._moduli), self._moduli)
 
-    def _cellwise(self, per_link: Sequence[float], link: np.ndarray) -> fem.Function:
+    @cached_property
+    def _strain_form(self):
+        return compile_form(self._strain_ufl)
+
+    @cached_property
+    def _effects_form(self):
+        return compile_form(ufl.derivative(self.effects_ufl, self.u))
+
+    def _assemble(self, form, vector: PETSc.Vec) -> None:
+        with vector.localForm() as local:
+            local.set(0.0)
+        fem.petsc.assemble_vector(vector, form)
+        vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+
+    def cellwise(self, per_link: Sequence[float]) -> fem.Function:
+        """A field with one value per cell from one value per link, (links,)."""
         function = fem.Function(cellwise_space(self.mesh))
-        function.x.array[: len(link)] = np.asarray(per_link, dtype=float)[link]
+        function.x.array[: len(self._link)] = np.asarray(per_link, dtype=float)[self._link]
         return function

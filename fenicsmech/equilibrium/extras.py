@@ -1,6 +1,7 @@
 """The entries of K̂ that belong to poses, multipliers and the controlled force.
 
-B = Σ_i r_i · ∂²u_i/∂z² of interface nodes − f a · ∂²u_P/∂z² of loaded points − Σ λ_k ∂²C_k/∂z², the constraint
+B = Σ_i r_i · ∂²u_i/∂z² of interface nodes − f a · ∂²u_P/∂z² of loaded points + ∂²V/∂z² of potentials
+− Σ λ_k ∂²C_k/∂z², the constraint
 gradients −A, the control's row −a, and −ε on the multipliers: ε = 1/ρ is the proximal term of the augmented
 Lagrangian that keeps redundant constraints regular.
 """
@@ -15,6 +16,7 @@ from fenicsmech.bodies import BodyPoint, LinkPoint
 from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.layout import Layout
 from fenicsmech.equilibrium.load import PointLoad
+from fenicsmech.equilibrium.potentials import BodyPotentials
 from fenicsmech.equilibrium.state import State
 from fenicsmech.linkage import JointSystem
 
@@ -29,10 +31,11 @@ class ExtraEntries:
         joints: the constraints.
         layout: numbering of rows.
         controlled: the controlled force.
+        potentials: of body poses.
     """
 
-    def __init__(self, joints: JointSystem, layout: Layout, controlled: PointLoad) -> None:
-        self._joints, self._controlled = joints, controlled
+    def __init__(self, joints: JointSystem, layout: Layout, controlled: PointLoad, potentials: BodyPotentials) -> None:
+        self._joints, self._controlled, self._potentials = joints, controlled, potentials
         self._z = layout.first_extra_row
         self._multipliers = layout.first_extra_row + joints.size
         self._force = np.array([layout.first_extra_row + layout.force])
@@ -60,6 +63,8 @@ class ExtraEntries:
             if isinstance(load.point, BodyPoint) and load.point.body in joints.columns:
                 columns = z + joints.columns[load.point.body]
                 yield columns, columns, -load.point.hessian(state.poses, magnitude * load.direction)
+        for rows, columns, block in self._potentials.hessian_blocks(state):
+            yield z + rows, z + columns, block
         for rows, columns, block in joints.hessian_blocks(state.poses, state.motors, state.multipliers):
             yield z + rows, z + columns, -block
         for rows, columns, block in joints.gradient_blocks(state.poses, state.motors):
@@ -76,6 +81,8 @@ class ExtraEntries:
         for columns in joints.columns.values():
             yield z + columns, z + columns
         for rows, columns, _ in joints.hessian_blocks(drawn, still, np.zeros(joints.rows)):
+            yield z + rows, z + columns
+        for rows, columns in self._potentials.pattern():
             yield z + rows, z + columns
         for rows, columns, _ in joints.gradient_blocks(drawn, still):
             yield multipliers + rows, z + columns

@@ -1,6 +1,6 @@
 """The equilibrium equations of a mechanism and their KKT matrix, distributed.
 
-    L(s, λ, f) = E(u(s)) − Σ loads − f (a · u_P) − λᵀ C(s),     s = (u_free, z)
+    L(s, λ, f) = E(u(s)) + V(z) − Σ loads − f (a · u_P) − λᵀ C(s),     s = (u_free, z)
 
     K̂ = [[∂²E/∂u², 0    , 0  , −a_u],          unknowns x = scaled increments of (u_free, z, λ, f):
          [0       , B    , −Aᵀ, −a_z],             x ↦ (u, z, λ, f) = G x,   G = diag(∂u/∂s, 1) · D
@@ -13,6 +13,7 @@ dimensionless.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,12 +22,14 @@ from petsc4py import PETSc
 from fenicsmech.bodies import BodyPoint, InterfaceMap, LinkPoint
 from fenicsmech.clock import Clock
 from fenicsmech.compat import petsc_vector
+from fenicsmech.effects import PosePotential
 from fenicsmech.elasticity import ElasticBody
 from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.extras import ExtraEntries
 from fenicsmech.equilibrium.layout import Layout
 from fenicsmech.equilibrium.load import PointLoad
 from fenicsmech.equilibrium.matrices import create_extended_matrix, create_map_matrix
+from fenicsmech.equilibrium.potentials import BodyPotentials
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.linkage import JointSystem
 
@@ -57,6 +60,7 @@ class EquilibriumSystem:
         joints: the constraints.
         controlled: the load whose magnitude f is controlled.
         loads: fixed loads, with their magnitudes.
+        potentials: of body poses.
         clock: where time is counted.
 
     Attributes:
@@ -72,12 +76,14 @@ class EquilibriumSystem:
         *,
         controlled: PointLoad,
         loads: tuple[tuple[PointLoad, float], ...] = (),
+        potentials: Sequence[PosePotential] = (),
         clock: Clock,
     ) -> None:
         self.elastic, self.interfaces, self.joints = elastic, interfaces, joints
         self.controlled, self.loads, self.clock = controlled, loads, clock
         self.layout = Layout(elastic.mesh.comm, interfaces, joints)
-        self._extras = ExtraEntries(joints, self.layout, controlled)
+        self._potentials = BodyPotentials(potentials, joints)
+        self._extras = ExtraEntries(joints, self.layout, controlled, self._potentials)
         self._u = petsc_vector(elastic.u)
         self._nodal = self._u.duplicate()
         with clock.phase("compile"):
@@ -119,6 +125,7 @@ class EquilibriumSystem:
     def load(self, state: State) -> None:
         """Makes the finite-element field hold ``state`` (collective)."""
         self._u.array_w[:] = state.u
+        self.elastic.share.value = state.share
         self.elastic.update()
         self.interfaces.place(state.poses)
 
@@ -152,7 +159,7 @@ class EquilibriumSystem:
         """E_int − Σ loads − f a · u_P with ``force`` for f (collective)."""
         work = force * self._travel(self.controlled, state)
         work += state.share * sum(magnitude * self._travel(load, state) for load, magnitude in self.loads)
-        return self.elastic_energy() - work
+        return self.elastic_energy() + self._potentials.value(state) - work
 
     def constraints(self, state: State) -> np.ndarray:
         """C(s) scaled to unit gradients, (rows,)."""
@@ -175,7 +182,7 @@ class EquilibriumSystem:
             forces += layout.comm.allreduce(float(np.linalg.norm(loads * self.unit_u) ** 2))
             moments = layout.comm.allreduce(self.interfaces.moments(r.reshape(-1, dim)), op=_add_moments)
             extras = -g
-            extras[layout.z] -= reactions
+            extras[layout.z] += self._potentials.gradient(state) - reactions
             extras[layout.multipliers] = -self.joints.value(state.poses, state.motors)
             if control.constrained:
                 extras[layout.force] = -(self.load_displacement(state) - control.target)
@@ -233,6 +240,10 @@ class EquilibriumSystem:
         nodal, extras = np.zeros(self.layout.owned), np.zeros(self.layout.extras)
         for load, magnitude in self.loads:
             self._add_load(load, magnitude, state, nodal, extras)
+        extras[self.layout.z] -= self._potentials.rate(state)
+        if self.elastic.effects_ufl is not None:
+            self.elastic.effects_residual(self._nodal)
+            nodal -= self._nodal.array_r[: self.layout.owned]
         return self._right_hand_side(nodal, extras)
 
     def target_rate(self) -> PETSc.Vec:

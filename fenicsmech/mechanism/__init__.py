@@ -4,11 +4,12 @@
 - ``shapes``: strips, outlines, STEP parts, meshes; interface regions
 - ``parts``: links, joints, motors, forces, outputs
 - ``mechanism``: the builder that collects parts
-- ``scene``: effects and configurations; ``units``: labels
+- ``scene``: effects and configurations; ``effect``: what effects have in common; ``units``: labels
 - ``places``: positions in a dimension, and which are one place
 - ``validation``: checks of the whole; ``checks``: checks of single values
 """
 
+from fenicsmech.mechanism.effect import Effect
 from fenicsmech.mechanism.materials import (
     ONYX,
     SMOOTH_SIL_950,
@@ -49,6 +50,7 @@ __all__ = [
     "Arc",
     "Configuration",
     "Disc",
+    "Effect",
     "EnergyLaw",
     "FlexibleLink",
     "Force",

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism.checks import finite
+from fenicsmech.mechanism.effect import Effect
 from fenicsmech.mechanism.mechanism import Mechanism
 from fenicsmech.mechanism.parts import Motor
 from fenicsmech.mechanism.units import Units
@@ -50,23 +51,22 @@ class Scene:
     ``units`` name the units of the description in plots and tables.
 
     Raises:
-        DescriptionError: ``mechanism`` is none, or an effect is not known. There is none yet.
+        DescriptionError: ``mechanism`` is none, or something listed under ``effects`` is no effect.
     """
 
     mechanism: Mechanism
-    effects: Sequence = ()
+    effects: Sequence[Effect] = ()
     units: Units = Units()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "effects", tuple(self.effects))
         if not isinstance(self.mechanism, Mechanism):
             raise DescriptionError("scene", f"{self.mechanism!r} is not a mechanism", "Pass a Mechanism")
-        if self.effects:
-            raise DescriptionError(
-                "scene",
-                f"the effect {self.effects[0]!r} is not known",
-                "Leave effects empty: links, joints and forces act",
-            )
+        for effect in self.effects:
+            if not isinstance(effect, Effect):
+                raise DescriptionError(
+                    "scene", f"{effect!r} is not an effect", "List effects, as Gravity(…); links, joints and forces act"
+                )
 
     def configuration(self, name: str, positions: Mapping[Motor, float]) -> Configuration:
         """A configuration with the given motor positions (rad or length, from the drawn configuration).

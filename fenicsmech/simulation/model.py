@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
+import ufl
 from mpi4py import MPI
 
 from fenicsmech.bodies import DesignAtNodes, InterfaceMap, MaterialPoint, body_point, link_point
 from fenicsmech.clock import Clock
 from fenicsmech.compat import petsc_vector
+from fenicsmech.effects import BodyEffect, LinkEffect, LinkFields
 from fenicsmech.elasticity import ElasticBody, ElasticModel, Quadrature
 from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State
 from fenicsmech.errors import FenicsmechError
 from fenicsmech.linkage import Linkage
-from fenicsmech.mechanism import FlexibleLink, Force, Mechanism, Output
+from fenicsmech.mechanism import Effect, FlexibleLink, Force, Mechanism, Output
 from fenicsmech.mechanism.places import in_dimension
 from fenicsmech.meshing import InterfaceSite, LinkMesh, check_link, mesh_link
 from fenicsmech.meshing.distribute import MechanismMesh, distribute
@@ -88,12 +91,20 @@ class MechanismModel:
         interfaces: interface nodes as functions of body poses.
         design_nodes: the design field at the nodes of the displacement.
         clock: where time goes.
+        effects: what acts beside links, joints and forces.
     """
 
     def __init__(
-        self, mechanism: Mechanism, linkage: Linkage, mesh: MechanismMesh, fidelity: Fidelity, clock: Clock
+        self,
+        mechanism: Mechanism,
+        linkage: Linkage,
+        mesh: MechanismMesh,
+        fidelity: Fidelity,
+        clock: Clock,
+        effects: Sequence[Effect] = (),
     ) -> None:
         self.mechanism, self.linkage, self.mesh, self.clock = mechanism, linkage, mesh, clock
+        self.effects = tuple(effects)
         links = mechanism.flexible_links
         self.elastic = ElasticBody(
             mesh.mesh,
@@ -104,7 +115,14 @@ class MechanismModel:
             model=fidelity.model,
             order=fidelity.order,
             quadrature=fidelity.quadrature,
+            effects=[partial(_link_energy, effect, links) for effect in effects if isinstance(effect, LinkEffect)],
         )
+        self._potentials = [
+            potential
+            for effect in effects
+            if isinstance(effect, BodyEffect)
+            for potential in effect.potentials(linkage)
+        ]
         first = len(mechanism.rigid_links)
         cell_body = np.where(mesh.interface >= 0, mesh.interface + first, -1)
         centres = np.array([body.centre for body in linkage.bodies])
@@ -153,6 +171,7 @@ class MechanismModel:
     def load(self, state: State) -> None:
         """Makes the finite-element field hold ``state`` (collective)."""
         petsc_vector(self.elastic.u).array_w[:] = state.u
+        self.elastic.share.value = state.share
         self.elastic.update()
         self.interfaces.place(state.poses)
 
@@ -184,7 +203,13 @@ class MechanismModel:
     def system(self, controlled: PointLoad, loads: tuple[tuple[PointLoad, float], ...]) -> EquilibriumSystem:
         """The equilibrium equations with one controlled and several fixed loads (collective)."""
         return EquilibriumSystem(
-            self.elastic, self.interfaces, self.linkage.joints, controlled=controlled, loads=loads, clock=self.clock
+            self.elastic,
+            self.interfaces,
+            self.linkage.joints,
+            controlled=controlled,
+            loads=loads,
+            potentials=self._potentials,
+            clock=self.clock,
         )
 
     def assembled_state(self, poses: np.ndarray, motors: np.ndarray) -> State:
@@ -207,3 +232,8 @@ class MechanismModel:
         for cell, link in enumerate(self.mesh.link):
             owner[V.dofmap.cell_dofs(cell)] = link
         return owner
+
+
+def _link_energy(effect: LinkEffect, links: Sequence[FlexibleLink], body: ElasticBody) -> ufl.Form | None:
+    """The energy of an effect in the fields of ``body``."""
+    return effect.energy(LinkFields(tuple(links), body.u, body.d, body.dx, body.order, body.cellwise))

@@ -79,6 +79,8 @@ class Simulation:
         sizes = {link: positive(f"element size of {link.name!r}", per_link.get(link)) for link in links}
         for link in links:
             model.check(link.name, link.material)
+        for effect in scene.effects:
+            effect.check(mechanism, model.dim)
         self.scene, self.comm, self.clock = scene, comm, Clock()
         self._described = _description(mechanism)
         self.fidelity = Fidelity(model, order, sizes, quadrature or Quadrature.for_order(order, model.dim))
@@ -94,7 +96,9 @@ class Simulation:
         with self.clock.phase("mesh"):
             mesh = mesh_mechanism(self.comm, self.scene.mechanism, self.linkage, self.fidelity)
         with self.clock.phase("setup"):
-            return MechanismModel(self.scene.mechanism, self.linkage, mesh, self.fidelity, self.clock)
+            return MechanismModel(
+                self.scene.mechanism, self.linkage, mesh, self.fidelity, self.clock, self.scene.effects
+            )
 
     def load_displacement(
         self,

@@ -64,7 +64,7 @@ class Tracer:
         self._system.load(state)
         self._origin = self._system.load_displacement(state)
         self._origins = {output: model.travel(output, state) for output in model.mechanism.outputs}
-        if request.others:
+        if request.others or model.effects:
             state = self._under_constant_loads(state)
             self._system.load(state)
         start = self._system.load_displacement(state) if request.controls[0].constrained else 0.0
@@ -93,10 +93,11 @@ class Tracer:
         )
 
     def _unloaded(self, assembly: Assembly) -> State:
-        """The configuration without force: the rigid assembly, or where motors that strain the links lead."""
+        """The configuration without force or effect: the rigid assembly, or where motors that strain links lead."""
         configuration = self._request.configuration
         motors = self._joints.motor_values(configuration.position)
-        state = self._model.assembled_state(assembly.poses, motors)
+        constant = bool(self._request.others or self._model.effects)
+        state = replace(self._model.assembled_state(assembly.poses, motors), share=0.0 if constant else 1.0)
         if assembly.fraction == 1.0:
             return state
         state = replace(state, motors=assembly.fraction * motors)
@@ -117,16 +118,19 @@ class Tracer:
         return state
 
     def _under_constant_loads(self, state: State) -> State:
-        """The configuration under the request's constant forces, which grow together."""
+        """The configuration under the request's constant forces and the scene's effects, which grow together."""
         path = Path(self._newton, replace(state, share=0.0), 0.0, predictor=self._predictor, idle=self._idle)
         try:
             return path.advance(ShareControl(1.0)).state
         except PathFailed as failure:
-            names = ", ".join(repr(force.name) for force, _ in self._request.others)
+            names = ", ".join(
+                [repr(force.name) for force, _ in self._request.others]
+                + [effect.explain() for effect in self._model.effects]
+            )
             raise EquilibriumError(
-                f"constant forces {names} in configuration {self._request.configuration.name!r}",
+                f"constant loads ({names}) in configuration {self._request.configuration.name!r}",
                 f"no equilibrium beyond {failure.reached:.1%} of them ({failure.reason})",
-                "Choose smaller forces",
+                "Choose smaller ones",
                 last=self._last(failure),
             ) from failure
 
@@ -163,7 +167,7 @@ class Tracer:
                 stable=solution.unstable_modes == 0,
                 unstable_modes=solution.unstable_modes,
                 stable_under_control=solution.unstable_under_control == 0,
-                strain_energy=model.elastic.energy(),
+                strain_energy=model.elastic.strain_energy(),
                 max_stress=model.mesh.mesh.comm.allreduce(stress, op=MPI.MAX),
                 outputs={output: model.travel(output, state) - zero for output, zero in self._origins.items()},
                 reactions=joint_reactions(self._joints, state),

@@ -94,9 +94,9 @@ def test_quick_demo_reaches_its_targets_in_space(name, tmp_path):
 
 def test_two_ranks_give_the_same_curve_and_the_same_optimum(tmp_path, mpirun):
     options = ("--quick", "--space", "plane-stress")
-    alone, _ = run("claw", tmp_path, *options)
+    alone, _ = run("truss", tmp_path, *options)
     together = tmp_path / "two"
-    done = mpirun(2, ROOT / "demos" / "claw.py", *options, "--out", str(together))
+    done = mpirun(2, ROOT / "demos" / "truss.py", *options, "--out", str(together))
     assert done.returncode == 0, done.stderr
     shared = json.loads((together / "summary.json").read_text())
     assert shared["ranks"] == 2

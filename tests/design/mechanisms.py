@@ -38,6 +38,11 @@ class Case:
         """The mechanism at a fidelity."""
         return fm.Simulation(self.scene, space=space, size=size, order=order, comm=comm)
 
+    def problem(self, *, regulariser: Regulariser | None = None, **fidelity) -> fm.DesignProblem:
+        """The design problem at a fidelity."""
+        options = {} if regulariser is None else {"regulariser": regulariser}
+        return fm.DesignProblem(self.simulate(**fidelity), self.designs, targets=self.targets, **options)
+
 
 @dataclass(frozen=True, eq=False)
 class Bench:

@@ -7,6 +7,7 @@ from fenicsmech.design.handle_optimum import HandleOptimum, ShapeError
 from fenicsmech.design.handle_step import LinkDerivatives, choose_sides, follow_spline
 from fenicsmech.design.handles import LinkHandles
 
+from ..oracles.dense import taylor_rates
 from .shapes import bench
 
 each_dim = pytest.mark.parametrize("dim", [2, 3])
@@ -101,6 +102,25 @@ def test_total_gradient_agrees_with_differences_of_best_positions(dim, seed):
     assert gradient @ direction == pytest.approx(difference, rel=1e-5)
     partial = both.shape.pull(placed.p, placed.theta, g)[0] @ direction
     assert abs(partial - difference) > 1e-3 * abs(difference)  # the handles' share is not small
+
+
+@pytest.mark.parallel
+@each_dim
+@pytest.mark.parametrize("shared", [False, True], ids=["alone", "together"])
+def test_total_gradient_passes_the_taylor_test_with_handles_that_follow(dim, shared):
+    both = bench(dim, shared=shared)
+    comm, owned = both.mesh.mesh.comm, both.shape.owned
+    placed = both.optimum.solve(both.design(0.2))
+    g = np.random.default_rng(4).standard_normal(both.mesh.vertices.shape)[both.shape.original][:owned]
+    gradient = both.optimum.total_gradient(placed, *both.shape.pull(placed.p, placed.theta, g))
+
+    def value(p: np.ndarray) -> float:
+        near = both.optimum.solve(p, placed)
+        return comm.allreduce(np.sum(g * both.shape.field(near.p, near.theta)[:owned]))
+
+    rates = taylor_rates(value, placed.p, both.direction(24), gradient, [0.002, 0.001, 0.0005])
+    assert rates.with_gradient.min() >= 1.95
+    assert rates.without.min() >= 0.95
 
 
 def test_gradients_of_several_outputs_at_once():

@@ -6,7 +6,7 @@ import pytest
 from fenicsmech.design.handles import BETWEEN
 from fenicsmech.design.link_shape import shape_link
 
-from ..oracles.dense import jacobian
+from ..oracles.dense import jacobian, taylor_rates
 from .shapes import bench, request, strip_mesh
 
 LINKS = [0, 1]
@@ -63,6 +63,25 @@ def test_gradients_of_the_maps(link):
     for j, rows in enumerate(full):
         assert rows[..., j] == pytest.approx(by_theta[j], abs=1e-7)
         assert np.delete(rows, j, axis=-1) == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("link", LINKS)
+def test_maps_pass_the_taylor_test_by_parameters_and_positions_together(link):
+    handles, p, theta = away(link)
+    by_p, by_theta = handles.gradients(p, theta)
+    random = np.random.default_rng(9)
+    dp = random.standard_normal(len(p)) * np.where(handles.spline.is_thickness, 0.2, 3.0)
+    dtheta = random.uniform(-0.1, 0.1, len(theta))
+    slope = by_p @ dp + by_theta * dtheta[:, None, None]
+    rates = taylor_rates(
+        lambda h: handles.transforms(p + h[0] * dp, theta + h[0] * dtheta).ravel(),
+        [0.0],
+        [1.0],
+        slope.reshape(-1, 1),
+        [0.04, 0.02, 0.01, 0.005],
+    )
+    assert rates.with_gradient.min() >= 1.95
+    assert rates.without.min() >= 0.95
 
 
 @pytest.mark.parametrize("link", LINKS)

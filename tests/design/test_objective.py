@@ -129,36 +129,28 @@ def test_targets_are_reached_by_changing_the_shape():
 
 @pytest.mark.parallel
 @pytest.mark.parametrize(
-    ("case", "fidelity"),
+    ("case", "fidelity", "digits"),
     [
-        (lambda: truss(*TARGETS), {}),
-        (lambda: truss(*TARGETS), {"space": "3d", "size": 4.0, "order": 1}),
-        (lambda: strained(1.0, 3.0, 2.0), {}),
+        (lambda: truss(*TARGETS), {}, 1e-10),
+        (lambda: truss(*TARGETS), {"space": "3d", "size": 4.0, "order": 1}, 1e-10),
+        # each group takes its own steps to its targets, and so leaves other residuals
+        (lambda: strained(1.0, 3.0, 2.0), {}, 1e-8),
+        (lambda: truss(TARGETS[1]), {}, 1e-7),
     ],
-    ids=["truss", "truss in space", "braced four-bar"],
+    ids=["truss", "truss in space", "braced four-bar", "one target"],
 )
-def test_groups_of_processes_find_the_same_value_and_derivatives(case, fidelity):
+def test_any_number_of_processes_finds_the_same_value_and_derivatives(case, fidelity, digits):
     seen = []
     for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
         whole, bench = objective(case(), REGULARISER, comm=comm, **fidelity)
-        assert bench.simulation.comm.size == 1  # each group is one process
         whole.evaluate(bench.rest.initial)
         here = whole.evaluate(away(bench)[0])
         seen.append((here.value, here.residuals, here.gradient, here.jacobian))
-    for alone, together in zip(*seen, strict=True):
-        assert together == pytest.approx(alone, rel=1e-10, abs=1e-10 * np.abs(alone).max())
-
-
-@pytest.mark.parallel
-def test_one_group_of_all_processes_finds_the_same_value_and_derivatives():
-    seen = []
-    for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
-        whole, bench = objective(truss((0.4, 3.2)), REGULARISER, comm=comm)
-        assert bench.simulation.comm.size == comm.size
-        here = whole.evaluate(away(bench)[0])
-        seen.append((here.value, here.residuals, here.gradient))
-    for alone, together in zip(*seen, strict=True):
-        assert together == pytest.approx(alone, rel=1e-7, abs=1e-7 * np.abs(alone).max())
+    # processes that share a mesh add up in another order, those that share targets only do not
+    if comm.allreduce(bench.simulation.comm.size, op=MPI.MAX) > 1:
+        digits = 1e-7
+    for one, together in zip(*seen, strict=True):
+        assert together == pytest.approx(one, rel=digits, abs=digits * np.abs(one).max())
 
 
 @pytest.mark.parallel
@@ -172,7 +164,7 @@ class Rounded(Regulariser):
     """1, which some processes round differently, as sums over meshes that are distributed differently are."""
 
     def around(self, rest, placement):
-        value = 1.0 + 1e-12 * MPI.COMM_WORLD.rank
+        value = 1.0 + 1e-8 * MPI.COMM_WORLD.rank
         return lambda p: Quadratic(value, np.zeros(len(p)), np.zeros((len(p), len(p))))
 
 
@@ -180,6 +172,6 @@ class Rounded(Regulariser):
 def test_processes_agree_on_what_is_too_high_however_they_round():
     whole, bench = objective(truss(*TARGETS), Rounded(), comm=MPI.COMM_WORLD)
     value = MPI.COMM_WORLD.bcast(whole.evaluate(bench.rest.initial).value)
-    whole.evaluate(bench.rest.initial, below=value + 0.5e-12)
+    whole.evaluate(bench.rest.initial, below=value + 0.5e-8)
     with pytest.raises(TooHigh):
-        whole.evaluate(bench.rest.initial, below=value - 0.5e-12)
+        whole.evaluate(bench.rest.initial, below=value - 0.5e-8)

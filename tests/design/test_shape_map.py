@@ -64,21 +64,32 @@ def test_plane_and_space_have_the_same_shape():
         assert change == pytest.approx(fields[0][below], abs=1e-9)
 
 
+@pytest.mark.parallel
 @each_dim
-def test_tangent_passes_the_taylor_test_away_from_the_initial_design(dim):
-    both = bench(dim)
-    p, theta, count = both.design(0.2), both.positions(), len(both.shape.initial)
-    direction = np.concatenate([both.direction(7), np.random.default_rng(8).uniform(-0.2, 0.2, len(theta))])
-    slope = both.shape.push(p, theta, direction[:count], direction[count:]).ravel()
-    rates = taylor_rates(
-        lambda h: both.shape.field(p + h[0] * direction[:count], theta + h[0] * direction[count:]).ravel(),
+@pytest.mark.parametrize("shared", [False, True], ids=["alone", "together"])
+def test_tangent_and_its_transpose_pass_the_taylor_test_away_from_the_initial_design(dim, shared):
+    both = bench(dim, shared=shared)
+    shape, comm = both.shape, both.mesh.mesh.comm
+    p, theta = both.design(0.2), both.positions()
+    dp, dtheta = both.direction(7), np.random.default_rng(8).uniform(-0.2, 0.2, len(both.positions()))
+    g, steps = field_like(both, 3)[: shape.owned], [0.02, 0.01, 0.005, 0.0025]
+
+    def moved(h):
+        return shape.field(p + h[0] * dp, theta + h[0] * dtheta)
+
+    pushed = shape.push(p, theta, dp, dtheta).ravel()
+    rates = taylor_rates(lambda h: moved(h).ravel(), [0.0], [1.0], pushed[:, None], steps)
+    by_p, by_theta = shape.pull(p, theta, g)
+    pulled = taylor_rates(
+        lambda h: comm.allreduce(np.sum(moved(h)[: shape.owned] * g)),
         [0.0],
         [1.0],
-        slope[:, None],
-        [0.02, 0.01, 0.005, 0.0025],
+        [by_p @ dp + by_theta @ dtheta],
+        steps,
     )
-    assert rates.with_gradient.min() >= 1.95
-    assert rates.without.min() >= 0.95
+    for each in (rates, pulled):
+        assert each.with_gradient.min() >= 1.95
+        assert each.without.min() >= 0.95
 
 
 @pytest.mark.parallel

@@ -30,7 +30,7 @@ def test_other_errors_pass_through_and_end_the_session():
     assert_gmsh_works()
 
 
-def test_ctrl_c_reaches_python_inside_and_after_a_session():
+def test_ctrl_c_reaches_python_inside_and_after_a_session(python_interrupts):
     handler = signal.getsignal(signal.SIGINT)
     with pytest.raises(KeyboardInterrupt), gmsh_session("link 'rod'"):
         assert signal.getsignal(signal.SIGINT) is handler
@@ -38,6 +38,14 @@ def test_ctrl_c_reaches_python_inside_and_after_a_session():
         signal.sigtimedwait([], 1.0)
     assert signal.getsignal(signal.SIGINT) is handler
     assert_gmsh_works()
+
+
+@pytest.fixture
+def python_interrupts():
+    """Python's own handler of Ctrl+C: shells start background jobs with the signal ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 def test_importing_and_meshing_print_nothing_and_keep_the_interrupt_handler():

@@ -2,7 +2,8 @@
 
     H_{k+1} = (I − ρ s yᵀ) H_k (I − ρ y sᵀ) + ρ s sᵀ,     ρ = 1 / yᵀ s,
 
-steps along −H ∂O/∂p, halved until O falls enough (Armijo); infeasible points count as too far.
+H_0 = diag(ℓ²) with the lengths ℓ of the parameters; steps along −H ∂O/∂p, halved until O falls enough (Armijo);
+infeasible points count as too far.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ class Bfgs(Minimiser):
 
     def minimise(self, problem: LeastSquaresProblem, start: Start, *, watch: Callable[[Iterate], None]) -> Iterate:
         here, size = problem.evaluate(start.parameters), len(start.parameters)
-        inverse = np.eye(size) if start.memory is None else start.memory.reshape(size, size)
+        inverse = np.diag(problem.lengths**2) if start.memory is None else start.memory.reshape(size, size)
         last = _iterate(start.number, start.evaluations + 1, here, inverse)
         watch(last)
         while last.reason is None:
@@ -86,7 +87,7 @@ def _updated(inverse: np.ndarray, here: Evaluation, there: Evaluation, *, first:
     if curvature <= 1e-10 * np.linalg.norm(y) * np.linalg.norm(s):
         return inverse
     if first:
-        inverse = np.eye(len(s)) * curvature / float(y @ y)
+        inverse = inverse * curvature / float(y @ inverse @ y)
     rho = 1.0 / curvature
     left = np.eye(len(s)) - rho * np.outer(s, y)
     return left @ inverse @ left.T + rho * np.outer(s, s)

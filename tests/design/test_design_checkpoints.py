@@ -1,0 +1,97 @@
+"""Optimisations that go on from a checkpoint: only from one of the same problem, and only if asked to."""
+
+from __future__ import annotations
+
+import pytest
+
+import fenicsmech as fm
+
+from .mechanisms import Case, strained, truss
+
+REACHABLE = ((0.1, 2.0), (0.4, 3.2))
+
+
+def test_resuming_without_a_checkpoint_starts_from_the_beginning(tmp_path):
+    file = tmp_path / "checkpoint.json"
+    direct = truss((0.4, 1.8)).problem().optimize()
+    resumed = truss((0.4, 1.8)).problem().optimize(checkpoint=file, resume=True)
+    assert resumed.links == direct.links
+    assert file.exists()
+
+
+def test_going_on_from_a_checkpoint_ends_where_one_run_does(tmp_path):
+    file = tmp_path / "checkpoint.json"
+    direct = truss(*REACHABLE).problem().optimize()
+    first = truss(*REACHABLE).problem().optimize(minimiser=fm.LevenbergMarquardt(iterations=3), checkpoint=file)
+    assert not first.converged
+    resumed = truss(*REACHABLE).problem().optimize(checkpoint=file, resume=True)
+    assert resumed.iterations == direct.iterations
+    assert resumed.evaluations == direct.evaluations + 1
+    assert resumed.objective == pytest.approx(direct.objective, rel=1e-6)
+    assert resumed.links[0].parameters == pytest.approx(direct.links[0].parameters, abs=1e-5)
+
+
+def test_a_checkpoint_is_not_used_unless_asked_for(tmp_path):
+    file = tmp_path / "checkpoint.json"
+    first = truss((0.4, 1.8)).problem().optimize(checkpoint=file)
+    again = truss((0.4, 1.8)).problem().optimize(checkpoint=file)
+    assert again.evaluations == first.evaluations
+
+
+def soft_truss() -> Case:
+    """The truss finger with a diagonal of another material."""
+    case = truss((0.4, 1.8))
+    mechanism = fm.Mechanism("truss finger")
+    base = mechanism.rigid("base", fixed=True)
+    left, right, tip = (mechanism.rigid(name) for name in ("left leg", "right leg", "tip"))
+    soft = fm.Material("soft", 1.5, 0.45)
+    diagonal = mechanism.flexible("diagonal", case.designs[0].link.shape, soft)
+    for a, b, at in ((base, left, (0, 0)), (base, right, (40, 0)), (left, tip, (0, 60)), (right, tip, (40, 60))):
+        mechanism.revolute(a, b, at=at)
+    mechanism.revolute(base, diagonal, at=(0, 0), radius=3.0)
+    mechanism.revolute(diagonal, tip, at=(40, 60), radius=3.0)
+    push = mechanism.force(on=tip, at=(20, 70), direction=(1, 0), name="push on tip")
+    return Case(fm.Scene(mechanism), [fm.SplineDesign(diagonal, 3, thickness=(1.5, 6.0))], [fm.Target(push, 0.4, 1.8)])
+
+
+@pytest.mark.parametrize(
+    ("differs", "case", "options"),
+    [
+        ("targets", lambda: truss((0.4, 1.9)), {}),
+        ("targets", lambda: truss((0.4, 1.8), (0.1, 1.0)), {}),
+        ("sizes", lambda: truss((0.4, 1.8)), {"size": 2.9}),
+        ("order", lambda: truss((0.4, 1.8)), {"order": 1}),
+        ("space", lambda: truss((0.4, 1.8)), {"space": "plane-strain"}),
+        ("regulariser", lambda: truss((0.4, 1.8)), {"regulariser": fm.StayClose()}),
+        ("bounds", lambda: truss((0.4, 1.8), thickness=(1.5, 3.1)), {}),
+        ("bounds", lambda: truss((0.4, 1.8), bend=0.05), {}),
+        ("drawing", soft_truss, {}),
+    ],
+)
+def test_checkpoints_of_another_problem_are_refused(differs, case, options, tmp_path):
+    file = tmp_path / "checkpoint.json"
+    truss((0.4, 1.8)).problem().optimize(minimiser=fm.LevenbergMarquardt(iterations=1), checkpoint=file)
+    before = file.read_bytes()
+    with pytest.raises(fm.DescriptionError, match=f"another problem.*{differs}"):
+        case().problem(**options).optimize(checkpoint=file, resume=True)
+    assert file.read_bytes() == before
+
+
+def test_checkpoints_of_other_motor_positions_are_refused(tmp_path):
+    file = tmp_path / "checkpoint.json"
+    strained(1.0).problem().optimize(minimiser=fm.LevenbergMarquardt(iterations=1), checkpoint=file)
+    with pytest.raises(fm.DescriptionError, match="another problem: configurations differ"):
+        strained(1.0, angle=0.09).problem().optimize(checkpoint=file, resume=True)
+
+
+def test_checkpoints_of_another_minimiser_are_refused_but_not_those_of_other_limits(tmp_path):
+    file = tmp_path / "checkpoint.json"
+    truss((0.4, 1.8)).problem().optimize(minimiser=fm.LevenbergMarquardt(iterations=1), checkpoint=file)
+    with pytest.raises(fm.DescriptionError, match="minimiser"):
+        truss((0.4, 1.8)).problem().optimize(minimiser=fm.Bfgs(), checkpoint=file, resume=True)
+    resumed = (
+        truss((0.4, 1.8))
+        .problem()
+        .optimize(minimiser=fm.LevenbergMarquardt(iterations=5, tolerance=1e-2), checkpoint=file, resume=True)
+    )
+    assert resumed.iterations >= 1

@@ -1,0 +1,202 @@
+"""Design problems that contradict themselves or their scene: refused at once, naming part and remedy."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+import fenicsmech as fm
+from fenicsmech.simulation import model as simulation_model
+
+from .mechanisms import Case, bow, pinned_links, strained, truss
+from .refusal import refused
+
+pytestmark = pytest.mark.usefixtures("nothing_is_meshed")
+
+REACHABLE = ((0.1, 2.0), (0.4, 3.2))
+
+
+@pytest.fixture
+def nothing_is_meshed(monkeypatch):
+    """Fails the test if something is meshed."""
+
+    def meshed(*arguments, **options):
+        raise AssertionError("a link was meshed")
+
+    monkeypatch.setattr(simulation_model, "mesh_link", meshed)
+
+
+def test_no_link_may_change():
+    case = truss(*REACHABLE)
+    refused(
+        lambda: Case(case.scene, [], case.targets).problem(),
+        part="design problem",
+        problem="no link may change",
+        remedy="SplineDesign",
+    )
+
+
+def test_a_link_is_given_twice():
+    case = truss(*REACHABLE)
+    refused(
+        lambda: Case(case.scene, [*case.designs, *case.designs], case.targets).problem(),
+        part="'diagonal'",
+        problem="twice",
+        remedy="once",
+    )
+
+
+def test_a_link_of_another_mechanism():
+    case, other = truss(*REACHABLE), bow()
+    refused(
+        lambda: Case(case.scene, other.designs, case.targets).problem(),
+        part="'arch'",
+        problem="not a flexible link of 'truss finger'",
+        remedy="one of its links",
+    )
+
+
+def test_a_link_that_looks_the_same_but_is_another():
+    case = truss(*REACHABLE)
+    thinner = fm.strip([(0, 0), (18, 34), (40, 60)], thickness=2.0, depth=20.0)
+    twin = fm.Mechanism("twin").flexible("diagonal", thinner, fm.SMOOTH_SIL_950)
+    refused(
+        lambda: Case(case.scene, [fm.SplineDesign(twin, 3)], case.targets).problem(),
+        part="'diagonal'",
+        problem="not a flexible link",
+        remedy="one of its links",
+    )
+
+
+def test_a_rigid_link():
+    tip = truss().scene.mechanism.rigid_links[-1]
+    refused(lambda: fm.SplineDesign(tip, 3), part="spline design", problem="no flexible link", remedy="Name one")
+
+
+def test_nothing_is_wanted():
+    case = truss()
+    refused(lambda: case.problem(), part="design problem", problem="nothing is wanted", remedy="targets=")
+
+
+def test_what_is_no_target_or_no_design():
+    case = truss(*REACHABLE)
+    refused(
+        lambda: Case(case.scene, case.designs, [(0.1, 2.0)]).problem(),
+        part="design problem",
+        problem="no target",
+        remedy="Target",
+    )
+    refused(
+        lambda: Case(case.scene, [case.designs[0].link], case.targets).problem(),
+        part="design problem",
+        problem="no design",
+        remedy="SplineDesign",
+    )
+
+
+def test_a_force_of_another_mechanism():
+    case, other = truss(*REACHABLE), bow(10.0)
+    refused(
+        lambda: Case(case.scene, case.designs, other.targets).problem(),
+        part=other.targets[0].force_part.name,
+        problem="not a force of 'truss finger'",
+        remedy="force",
+    )
+
+
+def test_motors_of_another_mechanism():
+    case, other = truss(*REACHABLE), strained(1.0)
+    target = fm.Target(case.targets[0].force_part, 0.1, 2.0, other.targets[0].configuration)
+    refused(
+        lambda: Case(case.scene, case.designs, [target]).problem(),
+        part="'turned'",
+        problem="not a motor of 'truss finger'",
+        remedy="configuration",
+    )
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, "two", None])
+@pytest.mark.parametrize("name", ["force", "displacement", "weight"])
+def test_targets_that_are_no_numbers(name, number):
+    push = truss(*REACHABLE).targets[0].force_part
+    numbers = {"force": 0.1, "displacement": 2.0, "weight": 1.0, name: number}
+    refused(
+        lambda: fm.Target(push, **numbers),
+        part=f"{name} of a target for 'push on tip'",
+        problem="",
+        remedy="finite",
+    )
+
+
+@pytest.mark.parametrize("weight", [0.0, -1.0])
+def test_targets_that_count_for_nothing(weight):
+    push = truss(*REACHABLE).targets[0].force_part
+    refused(lambda: fm.Target(push, 0.1, 2.0, weight=weight), part="weight", problem="not positive", remedy="greater")
+
+
+def test_a_target_without_a_force():
+    refused(lambda: fm.Target("push", 0.1, 2.0), part="target", problem="no force", remedy="mechanism")
+
+
+def test_fewer_segments_than_gaps_between_joints():
+    case = pinned_links()
+    push = case.scene.mechanism.force(on=case.designs[0].link, at=(20, 9), direction=(0, -1))
+    few = fm.SplineDesign(case.designs[1].link, 1)
+    refused(
+        lambda: Case(case.scene, [few], [fm.Target(push, 1.0, 0.1)]).problem(),
+        part="'rod'",
+        problem="1 segment.* for 2 gaps",
+        remedy="at least 2",
+    )
+
+
+@pytest.mark.parametrize("segments", [0, -1, 2.5, None])
+def test_numbers_of_segments_that_make_no_sense(segments):
+    link = truss().designs[0].link
+    refused(lambda: fm.SplineDesign(link, segments), part="'diagonal'", problem="segments", remedy="whole number")
+
+
+@pytest.mark.parametrize(
+    ("bounds", "problem"),
+    [
+        ({"thickness": (3.0, 2.0)}, "from 3 to 2"),
+        ({"thickness": (-1.0, 2.0)}, "not positive"),
+        ({"thickness": (1.0, math.nan)}, "nan"),
+        ({"thickness": 3.0}, "3.0"),
+        ({"thickness": (1.0, 2.0, 3.0)}, "1.0, 2.0, 3.0"),
+        ({"bend": 0.0}, "not positive"),
+        ({"bend": math.inf}, "inf"),
+    ],
+)
+def test_bounds_that_make_no_sense(bounds, problem):
+    link = truss().designs[0].link
+    with pytest.raises(fm.DescriptionError, match=problem) as caught:
+        fm.SplineDesign(link, 3, **bounds)
+    assert "'diagonal'" in caught.value.part
+
+
+def test_a_configuration_that_does_not_assemble():
+    case = strained(1.0)
+    mechanism = case.scene.mechanism
+    (motor,) = mechanism.motors
+    stop = mechanism.rigid("stop")
+    base, crank = mechanism.rigid_links[:2]
+    mechanism.revolute(crank, stop, at=(0, 30))
+    mechanism.revolute(stop, base, at=(5, 30))
+    far = case.scene.configuration("far", {motor: 2.0})
+    target = fm.Target(case.targets[0].force_part, 1.0, 0.1, far)
+    with pytest.raises(fm.AssemblyError, match="does not close") as caught:
+        Case(case.scene, case.designs, [target]).problem()
+    assert "'far'" in caught.value.part
+
+
+def test_a_link_without_a_centreline():
+    mechanism = fm.Mechanism("plate")
+    base = mechanism.rigid("base", fixed=True)
+    plate = mechanism.flexible("plate", fm.polygon([(-5, -5), (45, -5), (45, 5), (-5, 5)], depth=5.0), fm.ONYX)
+    for x in (0, 40):
+        mechanism.revolute(base, plate, at=(x, 0), radius=2.0)
+    push = mechanism.force(on=plate, at=(20, 0), direction=(0, 1))
+    case = Case(fm.Scene(mechanism), [fm.SplineDesign(plate, 2)], [fm.Target(push, 1.0, 0.1)])
+    refused(lambda: case.problem(), part="'plate'", problem="no centreline", remedy="centreline=")

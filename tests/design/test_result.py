@@ -1,0 +1,122 @@
+"""Results as files: nothing is lost, and nothing else is taken for one."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fenicsmech as fm
+from fenicsmech.design.result import DesignResult, LinkDesign, TargetResult
+
+
+def link(name: str, thickness: tuple[float, float]) -> LinkDesign:
+    """With numbers that decimal fractions do not hold."""
+    random = np.random.default_rng(len(name))
+    return LinkDesign(
+        name,
+        parameters=tuple((random.standard_normal(4) / 3.0).tolist()),
+        handles=(0.0, 1.0 / 3.0, 1.0),
+        controls=tuple(tuple(map(tuple, point)) for point in random.standard_normal((3, 2, 3)).tolist()),
+        thickness=thickness,
+        bend=0.01 / 3.0,
+    )
+
+
+RESULT = DesignResult(
+    mechanism="Zange “ß”",
+    links=(link("coupler", (1.0 / 3.0, 2.0)), link("rocker", (0.7, 4.1))),
+    targets=(
+        TargetResult("push", "as drawn", 0.1, wanted=2.0, started=0.3, reached=1.99, error=-0.005),
+        TargetResult("push", "geöffnet", 0.4, wanted=0.0, started=0.3, reached=0.02, error=0.1),
+    ),
+    reason="a minimum was found",
+    converged=True,
+    active=("least thickness 0.7 of 'rocker'",),
+    objective=(0.4 / 7.0, 1e-17 / 3.0),
+    iterations=7,
+    evaluations=9,
+    mesh_ratio_max=4.0 / 3.0,
+    seconds=0.1,
+    phases={"setup": 0.1 / 3.0},
+    processes=2,
+    groups=2,
+)
+
+
+def test_what_was_saved_comes_back_equal(tmp_path):
+    path = tmp_path / "new folder" / "design.json"
+    RESULT.save(path)
+    assert DesignResult.load(path) == RESULT
+    assert DesignResult.load(str(path)) == RESULT
+
+
+def test_the_file_is_plain_data_that_people_can_read(tmp_path):
+    path = tmp_path / "design.json"
+    RESULT.save(path)
+    text = path.read_text(encoding="utf-8")
+    assert "Zange “ß”" in text
+    data = json.loads(text)
+    assert data["links"][0]["controls"][0][0] == list(RESULT.links[0].controls[0][0])
+    assert data["targets"][1]["wanted"] == 0.0
+
+
+def test_an_interrupted_save_leaves_the_result_before_it(tmp_path, monkeypatch):
+    path = tmp_path / "design.json"
+    RESULT.save(path)
+
+    def full(*arguments):
+        raise OSError("no space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(OSError, match="no space"):
+        replace(RESULT, iterations=8).save(path)
+    assert DesignResult.load(path) == RESULT
+    assert [file.name for file in tmp_path.iterdir()] == ["design.json"]
+
+
+def test_summaries_look_at_all_links_and_targets():
+    assert RESULT.worst_error == 0.1
+    assert RESULT.thickness == (1.0 / 3.0, 4.1)
+    assert RESULT.parameters == 8
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"junk", b"[]", b"{}", b'{"format": "fenicsmech checkpoint 1"}', b"\xff\xfebinary", b'{"format"']
+)
+def test_what_is_no_design_is_refused(tmp_path, content):
+    path = tmp_path / "junk.json"
+    path.write_bytes(content)
+    with pytest.raises(fm.DescriptionError, match="does not hold a design") as caught:
+        DesignResult.load(path)
+    assert "junk.json" in caught.value.part
+
+
+def test_missing_files_are_refused(tmp_path):
+    with pytest.raises(fm.DescriptionError, match="no such file"):
+        DesignResult.load(tmp_path / "nothing.json")
+
+
+@pytest.mark.parametrize("missing", ["links", "targets", "objective", "iterations"])
+def test_files_that_lack_something_are_refused(tmp_path, missing):
+    path = tmp_path / "design.json"
+    RESULT.save(path)
+    data = json.loads(path.read_text(encoding="utf-8"))
+    del data[missing]
+    path.write_text(json.dumps(data))
+    with pytest.raises(fm.DescriptionError, match="incomplete") as caught:
+        DesignResult.load(path)
+    assert missing in str(caught.value)
+
+
+@pytest.mark.parametrize("part", ["links", "targets"])
+def test_files_whose_parts_lack_something_are_refused(tmp_path, part):
+    path = tmp_path / "design.json"
+    RESULT.save(path)
+    data = json.loads(path.read_text(encoding="utf-8"))
+    data[part][0] = {"name": "coupler"}
+    path.write_text(json.dumps(data))
+    with pytest.raises(fm.DescriptionError, match="incomplete"):
+        DesignResult.load(path)

@@ -1,0 +1,63 @@
+"""One process decides, all compute: the same outcome on all, errors too."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenicsmech.design.optimisers import Evaluation, Infeasible, LevenbergMarquardt, Quadratic, Reason, Start, TooHigh
+from fenicsmech.design.team import minimise_together
+
+pytestmark = pytest.mark.parallel
+
+COMM = MPI.COMM_WORLD
+
+
+class Valley:
+    """r = (10 (y − x²), 1 − x), to which every process contributes its share; infeasible beyond x = 1.2."""
+
+    def __init__(self) -> None:
+        self.lengths, self.reached, self.asked = np.ones(2), np.zeros(2), 0
+
+    def evaluate(self, parameters: np.ndarray, below: float = np.inf) -> Evaluation:
+        self.asked += 1
+        x, y = COMM.allreduce(parameters / COMM.size)  # hangs unless all take part
+        if x > 1.2:
+            raise Infeasible("x is too large")
+        self.reached = np.array([x, y])
+        residuals = np.array([10.0 * (y - x * x), 1.0 - x])
+        evaluation = Evaluation(
+            parameters, residuals, np.array([[-20.0 * x, 10.0], [-1.0, 0.0]]), lambda p: Quadratic.zero(2)
+        )
+        if evaluation.value > below:
+            raise TooHigh("no use")
+        return evaluation
+
+
+def test_all_processes_have_the_outcome_and_evaluate_alike():
+    valley, seen = Valley(), []
+    outcome = minimise_together(
+        COMM, valley, LevenbergMarquardt(tolerance=1e-10), Start(np.array([-1.2, 1.0])), watch=seen.append
+    )
+    assert outcome.parameters == pytest.approx([1.0, 1.0], abs=1e-4)
+    assert outcome.reason is Reason.CONVERGED
+    assert outcome.started == pytest.approx([-1.2, 1.0])
+    assert valley.asked == outcome.evaluations
+    assert COMM.allgather(outcome.parameters.tolist()) == [outcome.parameters.tolist()] * COMM.size
+    assert COMM.allgather((outcome.number, outcome.evaluations)) == [(outcome.number, outcome.evaluations)] * COMM.size
+    assert bool(seen) == (COMM.rank == 0)
+
+
+def test_a_start_without_a_value_is_refused_on_all_processes():
+    with pytest.raises(Infeasible, match="too large"):
+        minimise_together(COMM, Valley(), LevenbergMarquardt(), Start(np.array([2.0, 0.0])), watch=lambda i: None)
+
+
+def test_what_the_watcher_raises_ends_all_processes():
+    def full(iterate):
+        if iterate.number == 2:
+            raise OSError("no space left on device")
+
+    with pytest.raises(OSError, match="no space"):
+        minimise_together(COMM, Valley(), LevenbergMarquardt(), Start(np.array([-1.2, 1.0])), watch=full)
