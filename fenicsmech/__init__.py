@@ -19,6 +19,7 @@ from fenicsmech.design import (
     Target,
     fit_modulus,
 )
+from fenicsmech.effects import Gravity, Mass
 from fenicsmech.errors import AssemblyError, DescriptionError, EquilibriumError, FenicsmechError, MeshingError
 from fenicsmech.mechanism import (
     DRAWN,
@@ -64,11 +65,13 @@ __all__ = [
     "Experiment",
     "FenicsmechError",
     "Frame",
+    "Gravity",
     "IsochoricNeoHookean",
     "IsochoricSimoNeoHookean",
     "LevenbergMarquardt",
     "Line",
     "LogarithmicNeoHookean",
+    "Mass",
     "Material",
     "Mechanism",
     "MeshQuality",
