@@ -106,6 +106,7 @@ def summarise(outcome: Outcome) -> dict:
     if result is not None:
         summary |= {
             "worst_error": result.worst_error,
+            "verified": result.verified,
             "curvature_ratio_max": max(link.bend for link in result.links),
             "active_bounds": result.active,
             "ended": result.reason,

@@ -29,7 +29,8 @@ What is minimised
     ``characterisation``  Young's modulus from measurements
 
 What a user sees
-    ``design_problem``    the entry point; ``progress`` and ``checkpoint`` while it runs
+    ``design_problem``    the entry point, with its ``problem_checks``; ``progress`` and ``checkpoint`` while it runs,
+                          ``conclusion`` at its end
     ``result``            designs as plain data; ``link_files`` pictures and solids of them
 """
 

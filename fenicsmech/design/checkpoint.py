@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from mpi4py import MPI
 
-from fenicsmech.design.optimisers import Iterate, Start
+from fenicsmech.design.optimisers import Iterate, Minimiser, Start
+from fenicsmech.design.regularisers import Regulariser
+from fenicsmech.design.rest_shape import RestShape
+from fenicsmech.design.spline_design import Target
 from fenicsmech.errors import DescriptionError
 from fenicsmech.report import atomic_write
+from fenicsmech.simulation import Simulation
 
 _FORMAT = "fenicsmech checkpoint 1"
 
@@ -78,3 +83,42 @@ class Checkpoint:
             np.array(data["parameters"]), data["number"], data["evaluations"], np.array(data["memory"], dtype=float)
         )
         return Saved(start, np.array(data["handles"]))
+
+    def load_together(self, comm: MPI.Comm) -> Saved | None:
+        """The same on all processes, errors too; None if there is no file yet (collective)."""
+        saved, failure = None, None
+        if comm.rank == 0 and self.path.exists():
+            try:
+                saved = self.load()
+            except DescriptionError as error:
+                failure = error
+        saved, failure = comm.bcast((saved, failure), root=0)
+        if failure is not None:
+            raise failure
+        return saved
+
+
+def fingerprint(
+    simulation: Simulation,
+    rest: RestShape,
+    targets: Sequence[Target],
+    regulariser: Regulariser,
+    minimiser: Minimiser,
+) -> dict[str, object]:
+    """What is minimised and how, as plain data that a checkpoint must agree with."""
+    fidelity, mechanism = simulation.fidelity, simulation.scene.mechanism
+    return {
+        "mechanism": mechanism.name,
+        "space": fidelity.model.name,
+        "order": fidelity.order,
+        "sizes": list(fidelity.sizes.values()),
+        "effects": [repr(effect) for effect in simulation.scene.effects],
+        "drawing": [repr(link) for link in mechanism.flexible_links],
+        "links": [[link.name, link.spline.initial.tolist()] for link in rest.links],
+        "bounds": [repr(link.bounds) for link in rest.links],
+        "forces": [[t.force_part.name, *t.force_part.at, *t.force_part.direction] for t in targets],
+        "configurations": [[t.configuration.name, *(at for _, at in t.configuration.positions)] for t in targets],
+        "targets": [[t.force, t.displacement, t.weight] for t in targets],
+        "regulariser": repr(regulariser),
+        "minimiser": type(minimiser).__name__,
+    }

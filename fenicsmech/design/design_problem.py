@@ -10,30 +10,26 @@ from time import perf_counter
 import numpy as np
 
 from fenicsmech.clock import Clock
-from fenicsmech.design.checkpoint import Checkpoint, Saved
+from fenicsmech.design.checkpoint import Checkpoint, fingerprint
+from fenicsmech.design.conclusion import link_designs, target_results, verify
 from fenicsmech.design.equilibria import TargetEquilibria
 from fenicsmech.design.groups import Group, group_count, split
 from fenicsmech.design.handle_optimum import Placement
 from fenicsmech.design.link_files import draw_links, outline, rest_meshes, write_solids
 from fenicsmech.design.link_shape import LinkShape, shape_links
-from fenicsmech.design.objective import Objective, target_scales
+from fenicsmech.design.objective import Objective, target_errors
 from fenicsmech.design.optimisers import Infeasible, Iterate, LevenbergMarquardt, Minimiser, Reason, Start
+from fenicsmech.design.problem_checks import check_designs, check_targets
 from fenicsmech.design.progress import DesignProgress
 from fenicsmech.design.regularisers import MeshQuality, Regulariser, ShapeBounds, StayClose
 from fenicsmech.design.rest_shape import RestShape
-from fenicsmech.design.result import DesignResult, LinkDesign, TargetResult
+from fenicsmech.design.result import DesignResult
 from fenicsmech.design.spline_design import SplineDesign, Target, bounds_of, shape_request
-from fenicsmech.design.team import Outcome, minimise_together
+from fenicsmech.design.team import minimise_together
 from fenicsmech.errors import DescriptionError, EquilibriumError, FenicsmechError
-from fenicsmech.linkage import assemble
-from fenicsmech.log import logger
 from fenicsmech.simulation import Simulation
-from fenicsmech.simulation.request import read_request
-
-_log = logger(__name__)
 
 DEFAULT_REGULARISER = MeshQuality() + ShapeBounds() + 1e-4 * StayClose()
-_SAME = 1e-6  # relative difference between displacements of one equilibrium
 
 
 class DesignProblem:
@@ -64,8 +60,8 @@ class DesignProblem:
     ) -> None:
         self.simulation, self.designs, self.targets = simulation, tuple(designs), tuple(targets)
         self._regulariser, self._clock = regulariser, Clock()
-        _check_designs(self.designs)
-        _check_targets(simulation, self.targets)
+        check_designs(self.designs)
+        check_targets(simulation, self.targets)
         mechanism, linkage = simulation.scene.mechanism, simulation.linkage
         self._requests = [shape_request(design, mechanism, linkage) for design in self.designs]
 
@@ -121,15 +117,18 @@ class DesignProblem:
         begin, near = Start(self.initial), None
         if start is not None:
             begin, near = Start(self._parameters(start)), self._placement(start)
-        saved = None if checkpoint is None else Checkpoint(Path(checkpoint), self._fingerprint(minimiser))
-        if resume and saved is not None and (found := self._resumed(saved)) is not None:
+        saved = None
+        if checkpoint is not None:
+            problem = fingerprint(self.simulation, self._rest, self.targets, self._regulariser, minimiser)
+            saved = Checkpoint(Path(checkpoint), problem)
+        if resume and saved is not None and (found := saved.load_together(self.simulation.comm)) is not None:
             begin, near = found.start, self._rest.known(found.start.parameters, found.handles)
         with DesignProgress(minimiser, leads=self.simulation.comm.rank == 0) as progress:
 
             def watch(iterate: Iterate) -> None:
                 if saved is not None:
                     saved.save(iterate, objective.placement.theta)
-                progress.update(iterate, self._errors(objective.reached))
+                progress.update(iterate, target_errors(self.targets, objective.reached))
 
             try:
                 objective.begin(None)
@@ -143,17 +142,28 @@ class DesignProblem:
                     f"the design to start from has no value: {failure}",
                     "Draw links that carry the targets' loads, or start with smaller loads",
                 ) from failure
+        comm, placement = self.simulation.comm, self.simulation.comm.bcast(objective.placement, root=0)
         with self._clock.phase("verification"):
-            reached = self._verified(outcome, objective.reached)
-        return self._result(
-            outcome,
-            reached=reached,
-            objective=(initial, final),
+            self._rest.place(outcome.parameters, placement)
+            reached, verified = verify(self.simulation, self.targets, objective.reached)
+        result = DesignResult(
+            mechanism=self.simulation.scene.mechanism.name,
+            links=link_designs(self._rest, placement),
+            targets=target_results(self.targets, outcome.started, reached),
+            reason=outcome.reason.value,
+            converged=outcome.reason is Reason.CONVERGED,
+            verified=verified,
             active=objective.active(outcome.parameters),
+            objective=(initial, final),
+            iterations=outcome.number,
+            evaluations=outcome.evaluations,
+            mesh_ratio_max=self.simulation.mesh_ratio_max,
             seconds=perf_counter() - began,
             phases=self._clock.since(clock),
-            groups=group_count(self.simulation.comm.size, len(self.targets)),
+            processes=comm.size,
+            groups=group_count(comm.size, len(self.targets)),
         )
+        return comm.bcast(result, root=0)  # processes differ in times and in the last bits
 
     def picture(self, path: str | Path, design: DesignResult) -> None:
         """Draws the links as drawn and as in ``design``, as a PNG (collective).
@@ -249,133 +259,3 @@ class DesignProblem:
         return self._rest.known(
             self._parameters(result), np.concatenate([given[link.name] for link in self._rest.links])
         )
-
-    def _fingerprint(self, minimiser: Minimiser) -> dict[str, object]:
-        """What a checkpoint must agree with."""
-        fidelity = self.simulation.fidelity
-        return {
-            "mechanism": self.simulation.scene.mechanism.name,
-            "space": fidelity.model.name,
-            "order": fidelity.order,
-            "sizes": list(fidelity.sizes.values()),
-            "drawing": [repr(link) for link in self.simulation.scene.mechanism.flexible_links],
-            "links": [[link.name, link.spline.initial.tolist()] for link in self._rest.links],
-            "bounds": [repr(link.bounds) for link in self._rest.links],
-            "forces": [[t.force_part.name, *t.force_part.at, *t.force_part.direction] for t in self.targets],
-            "configurations": [
-                [t.configuration.name, *(at for _, at in t.configuration.positions)] for t in self.targets
-            ],
-            "targets": [[t.force, t.displacement, t.weight] for t in self.targets],
-            "regulariser": repr(self._regulariser),
-            "minimiser": type(minimiser).__name__,
-        }
-
-    def _resumed(self, checkpoint: Checkpoint) -> Saved | None:
-        """Where the checkpoint says to go on, None if there is none yet; errors are raised on all processes."""
-        comm, saved, failure = self.simulation.comm, None, None
-        if comm.rank == 0 and checkpoint.path.exists():
-            try:
-                saved = checkpoint.load()
-            except FenicsmechError as error:
-                failure = error
-        saved, failure = comm.bcast((saved, failure), root=0)
-        if failure is not None:
-            raise failure
-        return saved
-
-    def _errors(self, reached: np.ndarray) -> np.ndarray:
-        return (reached - [t.displacement for t in self.targets]) / target_scales(self.targets)
-
-    def _verified(self, outcome: Outcome, reached: np.ndarray) -> np.ndarray:
-        """Displacements on the paths from zero load, which is where a user will find them.
-
-        They were followed from design to design; should a path from zero load end elsewhere, it is said.
-        """
-        self._rest.place(outcome.parameters, self.simulation.comm.bcast(self._team[1].placement, root=0))
-        equilibria = TargetEquilibria(self.simulation, self.targets)
-        try:
-            verified = np.array([sample.displacement for sample in equilibria.trace().samples])
-        except Infeasible as failure:
-            _log.warning("loaded from zero, the optimum does not reach all its targets: %s", failure)
-            return reached
-        for index in np.flatnonzero(np.abs(verified - reached) > _SAME * target_scales(self.targets)):
-            _log.warning(
-                "target %d of the optimum: %.6g when loaded from zero, %.6g when followed from the drawn design",
-                index + 1,
-                verified[index],
-                reached[index],
-            )
-        return verified
-
-    def _result(self, outcome: Outcome, *, reached: np.ndarray, **found) -> DesignResult:
-        targets = tuple(
-            TargetResult(
-                target.force_part.name,
-                target.configuration.name,
-                target.force,
-                target.displacement,
-                float(start),
-                float(there),
-                float(error),
-            )
-            for target, start, there, error in zip(
-                self.targets, outcome.started, reached, self._errors(reached), strict=True
-            )
-        )
-        links = []
-        for link, handles in zip(self._rest.links, self._rest.handles(self._team[1].placement), strict=True):
-            own = outcome.parameters[link.place]
-            thickness, bend = link.thickness * link.samples.thickness(own), link.samples.curvature(own)
-            links.append(
-                LinkDesign(
-                    link.name,
-                    tuple(own.tolist()),
-                    tuple(handles.tolist()),
-                    tuple(tuple(map(tuple, point)) for point in link.spline.controls_at(own).tolist()),
-                    (float(thickness.min()), float(thickness.max())),
-                    float(np.abs(bend).max(initial=0.0)),
-                )
-            )
-        comm = self.simulation.comm
-        mine = DesignResult(
-            mechanism=self.simulation.scene.mechanism.name,
-            links=tuple(links),
-            targets=targets,
-            reason=outcome.reason.value,
-            converged=outcome.reason is Reason.CONVERGED,
-            iterations=outcome.number,
-            evaluations=outcome.evaluations,
-            mesh_ratio_max=self.simulation.mesh_ratio_max,
-            processes=comm.size,
-            **found,
-        )
-        return comm.bcast(mine, root=0)  # groups differ in the last bits
-
-
-def _check_designs(designs: Sequence[SplineDesign]) -> None:
-    if not designs:
-        raise DescriptionError("design problem", "no link may change", "Name links with SplineDesign(…)")
-    for design in designs:
-        if not isinstance(design, SplineDesign):
-            raise DescriptionError("design problem", f"{design!r} is no design of a link", "Give SplineDesign(…)")
-    names = [design.link.name for design in designs]
-    for name in names:
-        if names.count(name) > 1:
-            raise DescriptionError(f"design of link {name!r}", "it is given twice", "Give each link once")
-
-
-def _check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
-    if not targets:
-        raise DescriptionError("design problem", "nothing is wanted", "Give targets=[Target(…), …]")
-    for target in targets:
-        if not isinstance(target, Target):
-            raise DescriptionError("design problem", f"{target!r} is no target", "Give Target(…)")
-        read_request(
-            simulation.scene.mechanism,
-            target.force_part,
-            forces=[target.force],
-            displacements=None,
-            configuration=target.configuration,
-            others=None,
-        )
-        assemble(simulation.linkage, target.configuration)

@@ -32,6 +32,11 @@ def target_scales(targets: Sequence[Target]) -> np.ndarray:
     return np.maximum(wanted, _SMALL * wanted.max()) if wanted.any() else np.ones(len(wanted))
 
 
+def target_errors(targets: Sequence[Target], reached: np.ndarray) -> np.ndarray:
+    """Errors of displacements ``reached`` (targets,) relative to these scales, (targets,)."""
+    return (reached - [target.displacement for target in targets]) / target_scales(targets)
+
+
 @dataclass(frozen=True, eq=False)
 class _Base:
     """The best design so far, from which others are reached."""

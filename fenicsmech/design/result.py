@@ -66,6 +66,8 @@ class DesignResult:
         targets: how far each target was reached, in the order they were given.
         reason: why the optimisation ended, in words.
         converged: whether it ended at a minimum.
+        verified: whether loading the mechanism from zero leads to the equilibria that were followed from design to
+            design; the log says where not.
         active: the bounds that hold the design back, in words.
         objective: of the initial and of the final design.
         iterations, evaluations: of the objective.
@@ -81,6 +83,7 @@ class DesignResult:
     targets: tuple[TargetResult, ...]
     reason: str
     converged: bool
+    verified: bool
     active: tuple[str, ...]
     objective: tuple[float, float]
     iterations: int

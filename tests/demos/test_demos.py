@@ -60,6 +60,7 @@ def check_design(summary: dict, folder: Path, thickness: tuple[float, float]) ->
     assert thickness[0] <= least <= most <= thickness[1]
     assert summary["curvature_ratio_max"] <= 0.08
     assert summary["mesh_ratio_max"] <= 30.0
+    assert summary["verified"]
     assert all(frame["stable"] for frame in summary["frames"])
     assert summary["objective"]["final"] < 0.05 * summary["objective"]["initial"]
     # the curve of the optimised mechanism runs through the targets

@@ -34,6 +34,7 @@ RESULT = DesignResult(
     ),
     reason="a minimum was found",
     converged=True,
+    verified=True,
     active=("least thickness 0.7 of 'rocker'",),
     objective=(0.4 / 7.0, 1e-17 / 3.0),
     iterations=7,
