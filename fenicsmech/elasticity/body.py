@@ -152,6 +152,12 @@ class ElasticBody:
         """Assembles ∂E/∂u into the ghosted ``vector`` (collective)."""
         self._assemble(self.residual_form, vector)
 
+    def assembled(self, form) -> np.ndarray:
+        """A compiled linear form on the space of u, this rank's owned values, flat (collective)."""
+        vector = petsc_vector(self.u).duplicate()
+        self._assemble(form, vector)
+        return vector.array_r.copy()
+
     def tangent(self, matrix: PETSc.Mat) -> None:
         """Adds ∂²E/∂u² into ``matrix`` (collective; leaves it unassembled)."""
         fem.petsc.assemble_matrix(matrix, self.tangent_form)

@@ -20,6 +20,7 @@ from fenicsmech.mechanism.places import in_dimension
 from fenicsmech.meshing import radius_ratios
 from fenicsmech.report import Panel, Progress, Silent, Trace, draw_configurations
 from fenicsmech.simulation.curve import Curve
+from fenicsmech.simulation.explanation import Explanation, hints, simulated
 from fenicsmech.simulation.export import write_xdmf
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.model import Fidelity, MechanismModel, check_links, mesh_mechanism
@@ -178,6 +179,27 @@ class Simulation:
             predictor=self._predictor,
             comm=comm,
         )
+
+    def explain(self, curve: Curve | None = None, *, tolerance: float = 0.01) -> Explanation:
+        """What is simulated and what is left out, with figures where that may matter (collective).
+
+        Args:
+            curve: whose last frame the figures are of; the last curve computed by default.
+            tolerance: relative change of the displacement from which something matters.
+
+        Raises:
+            DescriptionError: no curve was computed yet.
+        """
+        chosen, fidelity = self._chosen(curve), self.fidelity
+        left_out = hints(
+            self.model,
+            self.newton(chosen.force_part),
+            chosen,
+            order=fidelity.order,
+            tolerance=tolerance,
+            units=self.scene.units,
+        )
+        return Explanation(simulated(self.model, fidelity.model.name, fidelity.order), tuple(left_out))
 
     def newton(self, force: Force, others: tuple[tuple[Force, float], ...] = ()) -> Newton:
         """The solver for one controlled and some fixed forces, kept for all configurations (collective)."""

@@ -1,0 +1,96 @@
+"""What a simulation leaves out is said, and its figures agree with simulations that include it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import fenicsmech as fm
+from fenicsmech.simulation.explanation import PLASTIC_WEIGHT, weight_influence
+
+from .demo_scenes import describe
+
+
+def hint(explanation, what: str):
+    """The hint of that name, None if there is none."""
+    return next((hint for hint in explanation.left_out if hint.what == what), None)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("space", ["plane-stress", "3d"])
+def test_hint_on_weight_is_what_gravity_does(space):
+    scene, push = describe("claw")
+    simulation = fm.Simulation(scene, space=space, size=4.0)
+    curve = simulation.load_displacement(push, forces=[2.0])
+    influence = weight_influence(simulation.model, simulation.newton(push), curve, curve.frames[-1])
+    direction = influence / np.linalg.norm(influence)
+    density = 1e-2 * PLASTIC_WEIGHT  # light enough to be linear
+    weighed = fm.Scene(scene.mechanism, effects=[fm.Gravity(tuple(direction), {fm.ONYX: density})])
+    heavy = fm.Simulation(weighed, space=space, size=4.0).load_displacement(push, forces=[2.0])
+    change = heavy.displacements[0] - curve.displacements[0]
+    assert change == pytest.approx(density * np.linalg.norm(influence), rel=1e-3)
+
+
+def test_weight_matters_to_the_soft_finger_and_not_to_the_stiff_claw():
+    for name, force, matters in (("truss", 0.4, True), ("claw", 10.0, False)):
+        scene, push = describe(name)
+        simulation = fm.Simulation(scene, space="plane-stress", size=4.0)
+        simulation.load_displacement(push, forces=[force])
+        assert hint(simulation.explain(), "weight").matters is matters
+
+
+def test_effects_that_are_listed_are_named_and_not_hinted_at():
+    scene, push = describe("truss")
+    gravity = fm.Gravity((0, -9810), {fm.SMOOTH_SIL_950: 1.2e-9})
+    simulation = fm.Simulation(fm.Scene(scene.mechanism, effects=[gravity]), space="plane-stress", size=4.0)
+    simulation.load_displacement(push, forces=[0.1])
+    explanation = simulation.explain()
+    assert "weight of Smooth-Sil 950" in explanation.simulated
+    assert hint(explanation, "weight") is None
+    assert "Simulated:" in str(explanation)
+    assert "Left out:" in str(explanation)
+
+
+def pinned(material: fm.Material, *, depth: float = 4.0, space: str = "plane-stress", order: int = 2):
+    """A straight link on a slider, compressed along its axis."""
+    rig = fm.Mechanism("strut")
+    ground, slide = rig.rigid("ground", fixed=True), rig.rigid("slide")
+    strut = rig.flexible("strut", fm.strip([(0, 0), (60, 0)], thickness=6.0, depth=depth), material)
+    rig.revolute(ground, strut, at=(0, 0), radius=2.0)
+    rig.revolute(strut, slide, at=(60, 0), radius=2.0)
+    rig.prismatic(ground, slide, at=(60, 0), axis=(1, 0, 0))
+    push = rig.force(on=slide, at=(60, 0), direction=(-1, 0))
+    return fm.Simulation(fm.Scene(rig), space=space, size=4.0, order=order), push
+
+
+def test_compression_is_compared_with_the_load_that_buckles_a_link_out_of_the_plane():
+    stiff = fm.Material("stiff", 2000.0, 0.3)
+    critical = np.pi**2 * 2000.0 * 6.0 * 4.0**3 / 12.0 / 60.0**2
+    for share in (0.05, 0.5):
+        simulation, push = pinned(stiff)
+        simulation.load_displacement(push, forces=[share * critical])
+        found = hint(simulation.explain(), "bending out of the plane")
+        assert f"about {share:.2g} " in found.text
+        assert found.matters is (share > 0.2)
+
+
+def test_nearly_incompressible_links_are_pointed_out():
+    for poisson, expected in ((0.3, None), (0.495, True)):
+        simulation, push = pinned(fm.Material("rubber", 2.0, poisson))
+        simulation.load_displacement(push, forces=[0.01])
+        found = hint(simulation.explain(), "pressure as an unknown of its own")
+        assert (found and found.matters) == expected
+
+
+def test_links_that_cross_are_pointed_out():
+    rig = fm.Mechanism("scissors")
+    ground, end = rig.rigid("ground", fixed=True), rig.rigid("end")
+    one = rig.flexible("one", fm.strip([(0, 0), (40, 30)], thickness=3.0, depth=4.0), fm.ONYX)
+    other = rig.flexible("other", fm.strip([(0, 30), (40, 0)], thickness=3.0, depth=4.0), fm.ONYX)
+    for link, start, stop in ((one, (0, 0), (40, 30)), (other, (0, 30), (40, 0))):
+        rig.revolute(ground, link, at=start, radius=2.0)
+        rig.revolute(link, end, at=stop, radius=2.0)
+    push = rig.force(on=end, at=(40, 15), direction=(1, 0))
+    simulation = fm.Simulation(fm.Scene(rig), space="plane-stress", size=3.0)
+    simulation.load_displacement(push, forces=[1.0])
+    assert "one and other" in hint(simulation.explain(), "contact between links").text
