@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from statistics import median
 from time import perf_counter
 
+import numpy as np
 from common import Demo
 from mpi4py import MPI
 
@@ -78,6 +79,7 @@ def summarise(outcome: Outcome) -> dict:
     demo, sim, curves, result = outcome.demo, outcome.sim, outcome.curves, outcome.result
     peak = sim.comm.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, op=MPI.MAX) / 1024.0
     reached = [None] * len(outcome.targets) if result is None else [target.reached for target in result.targets]
+    errors = [sim.error_estimates(curve) for curve in curves]
     summary = {
         "demo": demo.name,
         "space": demo.options.space,
@@ -89,7 +91,10 @@ def summarise(outcome: Outcome) -> dict:
             {"configuration": t.configuration.name, "force": t.force, "wanted": t.displacement, "reached": there}
             for t, there in zip(outcome.targets, reached, strict=True)
         ],
-        "frames": _frames(curves),
+        "frames": [
+            frame | {"displacement_error": float(error)}
+            for frame, error in zip(_frames(curves), np.concatenate(errors), strict=True)
+        ],
         "seconds": {
             "setup": sim.setup_seconds,
             "frame_median": median(frame.seconds for frame in _loaded(curves)),
@@ -127,13 +132,10 @@ def summarise(outcome: Outcome) -> dict:
 def tell(outcome: Outcome, summary: dict) -> None:
     """Prints the frames, the targets, the size of the problem, and where the time went."""
     demo, sim, result = outcome.demo, outcome.sim, outcome.result
-    rows = [
-        (curve.configuration.name, f.force, f.displacement, "yes" if f.stable else "no", f.iterations, f.seconds)
-        for curve in outcome.curves
-        for f in curve.frames
-    ]
-    headers = ("configuration", "force [N]", "displacement [mm]", "stable", "iterations", "seconds")
-    demo.say(format_table(headers, rows))
+    keys = ("configuration", "force", "displacement", "displacement_error", "stable", "iterations", "seconds")
+    rows = [tuple(frame[key] for key in keys) for frame in summary["frames"]]
+    headers = ("configuration", "force [N]", "displacement [mm]", "finer elements add [mm]", "stable", "iterations")
+    demo.say(format_table((*headers, "seconds"), rows))
     if result is not None:
         _tell_design(outcome, summary)
     dofs = summary["dofs"]

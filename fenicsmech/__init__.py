@@ -19,7 +19,16 @@ from fenicsmech.design import (
     Target,
     fit_modulus,
 )
-from fenicsmech.effects import Gravity, Mass
+from fenicsmech.effects import (
+    Contact,
+    Cylinder,
+    Gravity,
+    HalfPlane,
+    JointCompliance,
+    JointSpring,
+    Mass,
+    Pressure,
+)
 from fenicsmech.errors import AssemblyError, DescriptionError, EquilibriumError, FenicsmechError, MeshingError
 from fenicsmech.mechanism import (
     DRAWN,
@@ -44,7 +53,7 @@ from fenicsmech.mechanism import (
     step,
     strip,
 )
-from fenicsmech.simulation import Curve, Frame, Simulation
+from fenicsmech.simulation import Curve, Frame, PinFriction, Simulation, friction_band
 
 __version__ = "0.1.0"
 
@@ -92,4 +101,12 @@ __all__ = [
     "polygon",
     "step",
     "strip",
+    "Contact",
+    "Cylinder",
+    "HalfPlane",
+    "JointCompliance",
+    "JointSpring",
+    "Pressure",
+    "PinFriction",
+    "friction_band",
 ]

@@ -92,6 +92,23 @@ def vector_space(mesh: dmesh.Mesh, degree: int) -> fem.FunctionSpace:
         return fem.functionspace(mesh, ("Lagrange", degree, (mesh.geometry.dim,)))
 
 
+def scalar_space(mesh: dmesh.Mesh, degree: int) -> fem.FunctionSpace:
+    """Continuous scalar fields of ``degree``."""
+    with _quiet_compiler():
+        return (
+            fem.FunctionSpace(mesh, ("Lagrange", degree)) if _LEGACY else fem.functionspace(mesh, ("Lagrange", degree))
+        )
+
+
+def tensor_space(mesh: dmesh.Mesh, degree: int) -> fem.FunctionSpace:
+    """Continuous fields of square tensors, of ``degree``."""
+    dim = mesh.geometry.dim
+    with _quiet_compiler():
+        if _LEGACY:
+            return fem.TensorFunctionSpace(mesh, ("Lagrange", degree))
+        return fem.functionspace(mesh, ("Lagrange", degree, (dim, dim)))
+
+
 def cellwise_space(mesh: dmesh.Mesh) -> fem.FunctionSpace:
     """Scalars, one per cell."""
     with _quiet_compiler():

@@ -1,20 +1,22 @@
 """What an effect adds to the potential energy of a mechanism: on its flexible links, and between its bodies.
 
-    Π = E_int + share · (Σ link energies + Σ body potentials) − loads
+    Π = E_int + share · (Σ link energies + Σ body potentials) + Σ potentials that hold − loads
 
-``share`` grows from 0 to 1 before the controlled force does, as that of the constant loads.
+``share`` grows from 0 to 1 before the controlled force does, as that of the constant loads. What holds the mechanism,
+as the stiffness of a spring does, acts from the start: without it equilibria on the way need not exist.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import ufl
 from dolfinx import fem
 
+from fenicsmech.effects.faces import Boundary, Faces, cofactor
 from fenicsmech.linkage import Linkage
 from fenicsmech.mechanism import FlexibleLink
 from fenicsmech.mechanism.effect import Effect
@@ -30,6 +32,7 @@ class LinkFields:
         dx: ufl measure of all cells, interfaces included, on the reference mesh.
         order: degree of u.
         cellwise: makes a field with one value per cell from one value per link, (links,).
+        boundaries: where the parts of links' boundaries are that effects ask for.
     """
 
     links: tuple[FlexibleLink, ...]
@@ -38,11 +41,22 @@ class LinkFields:
     dx: ufl.Measure
     order: int
     cellwise: Callable[[Sequence[float]], fem.Function]
+    boundaries: Mapping[Faces, Boundary]
 
     @property
     def dim(self) -> int:
         """Dimension of the space."""
-        return self.u.function_space.mesh.geometry.dim
+        return self.mesh.geometry.dim
+
+    @property
+    def mesh(self):
+        """The reference mesh."""
+        return self.u.function_space.mesh
+
+    @property
+    def position(self):
+        """x = X₀ + d + u, where material points are."""
+        return ufl.SpatialCoordinate(self.mesh) + self.d + self.u
 
     @property
     def stretch(self):
@@ -53,9 +67,37 @@ class LinkFields:
         """∫ density dV over all links at rest, dV without the depth of planar links; ``degree`` of the quadrature."""
         return density * self.stretch * self.dx(metadata={"quadrature_degree": degree})
 
+    def boundary_integral(self, density, faces: Faces, *, degree: int) -> ufl.Form:
+        """∫ density dA over ``faces`` at rest, per depth of planar links; ``degree`` of the quadrature.
+
+        By Nanson's formula dA = |det(I + ∇d) (I + ∇d)⁻ᵀ N| dA₀.
+        """
+        shape = ufl.Identity(self.dim) + ufl.grad(self.d)
+        area = ufl.dot(cofactor(shape), ufl.FacetNormal(self.mesh))
+        return self.reference_integral(density * ufl.sqrt(ufl.dot(area, area)), faces, degree=degree)
+
+    def flux(self, vector, faces: Faces, *, degree: int) -> ufl.Form:
+        """∫ vector · n da over ``faces`` as deformed, n out of the link, per depth of planar links.
+
+        By Nanson's formula n da = cof(I + ∇d + ∇u) N dA₀.
+        """
+        motion = ufl.Identity(self.dim) + ufl.grad(self.d) + ufl.grad(self.u)
+        area = ufl.dot(cofactor(motion), ufl.FacetNormal(self.mesh))
+        return self.reference_integral(ufl.dot(vector, area), faces, degree=degree)
+
+    def reference_integral(self, density, faces: Faces, *, degree: int) -> ufl.Form:
+        """∫ density dA₀ over ``faces`` of the reference mesh."""
+        terms = [density * ds(metadata={"quadrature_degree": degree}) for ds in self.boundaries[faces].measures]
+        return sum(terms[1:], start=terms[0])
+
 
 class LinkEffect(Effect):
     """An effect with an energy on flexible links."""
+
+    @property
+    def faces(self) -> Sequence[Faces]:
+        """The parts of links' boundaries that the energy is integrated over."""
+        return ()
 
     @abstractmethod
     def energy(self, fields: LinkFields) -> ufl.Form | None:
@@ -67,9 +109,11 @@ class PosePotential(ABC):
 
     Attributes:
         bodies: indices of the bodies.
+        holds: whether it acts in full from the start, instead of growing with the share.
     """
 
     bodies: tuple[int, ...]
+    holds: bool = False
 
     @abstractmethod
     def value(self, poses: np.ndarray) -> float:
@@ -90,3 +134,11 @@ class BodyEffect(Effect):
     @abstractmethod
     def potentials(self, linkage: Linkage) -> Sequence[PosePotential]:
         """The potentials."""
+
+
+class JointSoftening(Effect):
+    """An effect that lets equations of joints give way to their multipliers: C + c λ = 0."""
+
+    @abstractmethod
+    def compliances(self, linkage: Linkage) -> Mapping[int, float]:
+        """c ≥ 0 of the rows of ``linkage.joints`` concerned; those of several effects add up."""

@@ -135,6 +135,28 @@ class ElasticBody:
     def tangent_form(self):
         return compile_form(ufl.derivative(self.residual_ufl, self.u))
 
+    def gradient(self, field: fem.Function):
+        """H = ∇field (I + ∇d)⁻¹, the gradient of a field on the rest shape, symbolic."""
+        return ufl.dot(ufl.grad(field), ufl.inv(self._design_gradient))
+
+    def free(self, degree: int) -> ufl.Measure:
+        """The measure of all cells that can deform, with quadrature of ``degree``."""
+        metadata = {"quadrature_degree": degree}
+        return sum((dx(metadata=metadata) for _, dx in self._terms[1:]), start=self._terms[0][1](metadata=metadata))
+
+    def curvature(self, A, B, *, degree: int) -> ufl.Form:
+        """∫ A : ∂²W/∂F∂F : B dV at the present displacement, for gradients A, B on the rest shape."""
+        i, j, k, m = ufl.indices(4)
+        H = ufl.variable(self._strain)
+        thick = self._depth if self.model.dim == 2 else 1.0
+        terms = []
+        for law, dx in self._terms:
+            density_ = density(law, self.model.strain(law, H, self._moduli), self._moduli)
+            C = ufl.diff(ufl.diff(density_, H), H)
+            product = A[i, j] * C[i, j, k, m] * B[k, m] * ufl.det(self._design_gradient) * thick
+            terms.append(product * dx(metadata={"quadrature_degree": degree}))
+        return sum(terms[1:], start=terms[0])
+
     def energy(self) -> float:
         """E at the current fields, of the whole mesh (collective); NaN where J ≤ 0."""
         return float(self.mesh.comm.allreduce(fem.assemble_scalar(self.energy_form)))
@@ -222,8 +244,8 @@ class ElasticBody:
 
     @property
     def _strain(self):
-        """H = ∇u (I + ∇d)⁻¹."""
-        return ufl.dot(ufl.grad(self.u), ufl.inv(self._design_gradient))
+        """H of the displacement."""
+        return self.gradient(self.u)
 
     def _density(self, law: EnergyLaw):
         return density(law, self.model.strain(law, self._strain, self._moduli), self._moduli)

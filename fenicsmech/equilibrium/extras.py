@@ -2,8 +2,8 @@
 
 B = Σ_i r_i · ∂²u_i/∂z² of interface nodes − f a · ∂²u_P/∂z² of loaded points + ∂²V/∂z² of potentials
 − Σ λ_k ∂²C_k/∂z², the constraint
-gradients −A, the control's row −a, and −ε on the multipliers: ε = 1/ρ is the proximal term of the augmented
-Lagrangian that keeps redundant constraints regular.
+gradients −A, the control's row −a, and −ε − c on the multipliers: ε = 1/ρ is the proximal term of the augmented
+Lagrangian that keeps redundant constraints regular, c the compliance of joints.
 """
 
 from __future__ import annotations
@@ -32,19 +32,27 @@ class ExtraEntries:
         layout: numbering of rows.
         controlled: the controlled force.
         potentials: of body poses.
+        compliances: c per constraint, (rows,).
     """
 
-    def __init__(self, joints: JointSystem, layout: Layout, controlled: PointLoad, potentials: BodyPotentials) -> None:
+    def __init__(
+        self,
+        joints: JointSystem,
+        layout: Layout,
+        controlled: PointLoad,
+        potentials: BodyPotentials,
+        compliances: np.ndarray,
+    ) -> None:
         self._joints, self._controlled, self._potentials = joints, controlled, potentials
         self._z = layout.first_extra_row
         self._multipliers = layout.first_extra_row + joints.size
         self._force = np.array([layout.first_extra_row + layout.force])
-        self._proximal = np.zeros(joints.rows)
+        self._compliances, self._proximal = compliances, np.zeros(joints.rows)
         self._idle = 0.0
 
     def set_regularisation(self, multipliers: np.ndarray, force: float) -> None:
         """Takes the scales of the multipliers (rows,) and of the controlled force."""
-        self._proximal = -REGULARISATION / multipliers**2
+        self._proximal = -REGULARISATION / multipliers**2 - self._compliances
         self._idle = -1.0 / force**2
 
     def entries(

@@ -9,7 +9,7 @@ redundant constraints. If the factor has more negative pivots than there are mul
 descend, and δ grows until it does; close to an equilibrium δ stays zero, so that unstable equilibria on the path are
 found and reported as such. Merit of a step: the augmented Lagrangian
 
-    Φ(s) = E(s) − λᵀC + ½ ρ_m |C|²  at the new multipliers λ.
+    Φ(s) = E(s) − λᵀC + ½ ρ_m |C + cλ|²  at the new multipliers λ, with the compliance c of joints.
 
 Slender links bend at far smaller forces than they stretch, so a good step may raise every merit for a few
 iterations: steps are taken in full while a small allowance lasts, then the iteration returns to its best
@@ -234,7 +234,7 @@ class Newton:
     def _merit(self, state: State, control: Control, multipliers: np.ndarray, force: float) -> float:
         """Φ of the loaded state, with the multipliers the step leads to."""
         system, stiffness = self.system, 10.0 * self.system.unit**2
-        violation = system.constraints(state)
+        violation = system.joints.row_scale * system.constraints(state, multipliers)
         value = system.potential(state, force) - multipliers @ system.joints.value(state.poses, state.motors)
         value += 0.5 * stiffness * float(violation @ violation)
         if control.constrained:

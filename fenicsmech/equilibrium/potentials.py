@@ -1,8 +1,11 @@
-"""Potentials of body poses that effects add: value, gradient, blocks of the Hessian, times the share that acts."""
+"""Potentials of body poses that effects add: value, gradient, blocks of the Hessian, times the share σ that acts.
+
+σ is 1 for what holds the mechanism, and the share of the constant loads for all else.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -19,26 +22,21 @@ class BodyPotentials:
         self._parts = [(potential, self._places(potential)) for potential in potentials]
 
     def value(self, state: State) -> float:
-        """share · Σ V."""
-        return state.share * sum(potential.value(state.poses) for potential, _ in self._parts)
+        """Σ σ V."""
+        return sum(_acting(potential, state) * potential.value(state.poses) for potential, _ in self._parts)
 
     def gradient(self, state: State) -> np.ndarray:
-        """share · Σ ∂V/∂z, (size,)."""
-        return state.share * self.rate(state)
+        """Σ σ ∂V/∂z, (size,)."""
+        return self._slope(state, lambda potential: _acting(potential, state))
 
     def rate(self, state: State) -> np.ndarray:
         """The derivative of the gradient by the share, (size,)."""
-        total = np.zeros(self._joints.size)
-        for potential, places in self._parts:
-            slope = potential.gradient(state.poses)
-            for local, columns in places:
-                total[columns] += slope[local]
-        return total
+        return self._slope(state, lambda potential: 0.0 if potential.holds else 1.0)
 
     def hessian_blocks(self, state: State) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """share · ∂²V/∂z² as (columns, columns, block) triples."""
+        """σ ∂²V/∂z² as (columns, columns, block) triples."""
         for potential, places in self._parts:
-            curvature = state.share * potential.hessian(state.poses)
+            curvature = _acting(potential, state) * potential.hessian(state.poses)
             for rows, row_columns in places:
                 for columns, column_columns in places:
                     yield row_columns, column_columns, curvature[rows, columns]
@@ -50,6 +48,15 @@ class BodyPotentials:
                 for _, columns in places:
                     yield rows, columns
 
+    def _slope(self, state: State, factor: Callable[[PosePotential], float]) -> np.ndarray:
+        """Σ factor · ∂V/∂z, (size,)."""
+        total = np.zeros(self._joints.size)
+        for potential, places in self._parts:
+            slope = factor(potential) * potential.gradient(state.poses)
+            for local, columns in places:
+                total[columns] += slope[local]
+        return total
+
     def _places(self, potential: PosePotential) -> list[tuple[slice, np.ndarray]]:
         """Which part of a potential's derivatives belongs to which columns; fixed bodies have none."""
         size = self._joints.space.pose_size
@@ -58,3 +65,8 @@ class BodyPotentials:
             for k, body in enumerate(potential.bodies)
             if body in self._joints.columns
         ]
+
+
+def _acting(potential: PosePotential, state: State) -> float:
+    """σ."""
+    return 1.0 if potential.holds else state.share

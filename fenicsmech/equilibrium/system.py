@@ -1,20 +1,21 @@
 """The equilibrium equations of a mechanism and their KKT matrix, distributed.
 
-    L(s, λ, f) = E(u(s)) + V(z) − Σ loads − f (a · u_P) − λᵀ C(s),     s = (u_free, z)
+    L(s, λ, f) = E(u(s)) + V(z) − Σ loads − f (a · u_P) − λᵀ C(s) − ½ λᵀ c λ,     s = (u_free, z)
 
     K̂ = [[∂²E/∂u², 0    , 0  , −a_u],          unknowns x = scaled increments of (u_free, z, λ, f):
          [0       , B    , −Aᵀ, −a_z],             x ↦ (u, z, λ, f) = G x,   G = diag(∂u/∂s, 1) · D
-         [0       , −A   , −ε , 0   ],          KKT = Gᵀ K̂ G,   right-hand side −Gᵀ ∇L
+         [0       , −A   , −ε−c, 0 ],           KKT = Gᵀ K̂ G,   right-hand side −Gᵀ ∇L
          [−a_uᵀ   , −a_zᵀ, 0  , 0   ]]
 
-B is the curvature of the rigid coordinates. One sparse triple product forms the whole matrix; D makes x
-dimensionless.
+B is the curvature of the rigid coordinates, c the compliance of joints, 0 unless an effect softens them. One sparse
+triple product forms the whole matrix; D makes x dimensionless.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from petsc4py import PETSc
@@ -61,6 +62,7 @@ class EquilibriumSystem:
         controlled: the load whose magnitude f is controlled.
         loads: fixed loads, with their magnitudes.
         potentials: of body poses.
+        compliances: c by constraint row; 0 where none is given.
         clock: where time is counted.
 
     Attributes:
@@ -77,13 +79,15 @@ class EquilibriumSystem:
         controlled: PointLoad,
         loads: tuple[tuple[PointLoad, float], ...] = (),
         potentials: Sequence[PosePotential] = (),
+        compliances: Mapping[int, float] = MappingProxyType({}),
         clock: Clock,
     ) -> None:
         self.elastic, self.interfaces, self.joints = elastic, interfaces, joints
         self.controlled, self.loads, self.clock = controlled, loads, clock
         self.layout = Layout(elastic.mesh.comm, interfaces, joints)
         self._potentials = BodyPotentials(potentials, joints)
-        self._extras = ExtraEntries(joints, self.layout, controlled, self._potentials)
+        self._compliances = np.array([compliances.get(row, 0.0) for row in range(joints.rows)])
+        self._extras = ExtraEntries(joints, self.layout, controlled, self._potentials, self._compliances)
         self._u = petsc_vector(elastic.u)
         self._nodal = self._u.duplicate()
         with clock.phase("compile"):
@@ -161,9 +165,9 @@ class EquilibriumSystem:
         work += state.share * sum(magnitude * self._travel(load, state) for load, magnitude in self.loads)
         return self.elastic_energy() + self._potentials.value(state) - work
 
-    def constraints(self, state: State) -> np.ndarray:
-        """C(s) scaled to unit gradients, (rows,)."""
-        return self.joints.row_scale * self.joints.value(state.poses, state.motors)
+    def constraints(self, state: State, multipliers: np.ndarray) -> np.ndarray:
+        """C(s) + c λ at ``multipliers`` λ, (rows,)."""
+        return self.joints.value(state.poses, state.motors) + self._compliances * multipliers
 
     def balance(self, state: State, control: Control) -> Balance:
         """Gᵀ ∇L (collective). Brings G to the poses of ``state``."""
@@ -183,7 +187,7 @@ class EquilibriumSystem:
             moments = layout.comm.allreduce(self.interfaces.moments(r.reshape(-1, dim)), op=_add_moments)
             extras = -g
             extras[layout.z] += self._potentials.gradient(state) - reactions
-            extras[layout.multipliers] = -self.joints.value(state.poses, state.motors)
+            extras[layout.multipliers] = -self.constraints(state, state.multipliers)
             if control.constrained:
                 extras[layout.force] = -(self.load_displacement(state) - control.target)
             rows = self._rows.array_w

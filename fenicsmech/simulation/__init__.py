@@ -4,11 +4,13 @@
 - ``model``: the discretised mechanism behind it
 - ``request``, ``tracer``: what a curve is asked for, and how it is traced
 - ``frame``, ``curve``: what comes out
+- ``friction``: how far friction in hinges holds a curve's load
 - ``snapshot``, ``picture``, ``export``: a state gathered, drawn, written
 """
 
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.frame import Frame
+from fenicsmech.simulation.friction import PinFriction, friction_band
 from fenicsmech.simulation.simulation import SPACES, Simulation
 
-__all__ = ["SPACES", "Curve", "Frame", "Simulation"]
+__all__ = ["SPACES", "Curve", "Frame", "PinFriction", "Simulation", "friction_band"]

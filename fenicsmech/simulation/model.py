@@ -14,7 +14,7 @@ from mpi4py import MPI
 from fenicsmech.bodies import DesignAtNodes, InterfaceMap, MaterialPoint, body_point, link_point
 from fenicsmech.clock import Clock
 from fenicsmech.compat import petsc_vector
-from fenicsmech.effects import BodyEffect, LinkEffect, LinkFields
+from fenicsmech.effects import BodyEffect, JointSoftening, LinkEffect, LinkFields, find_boundaries
 from fenicsmech.elasticity import ElasticBody, ElasticModel, Quadrature
 from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State
 from fenicsmech.errors import FenicsmechError
@@ -106,6 +106,9 @@ class MechanismModel:
         self.mechanism, self.linkage, self.mesh, self.clock = mechanism, linkage, mesh, clock
         self.effects = tuple(effects)
         links = mechanism.flexible_links
+        link_effects = [effect for effect in effects if isinstance(effect, LinkEffect)]
+        faces = [part for effect in link_effects for part in effect.faces]
+        self._boundaries = find_boundaries(mesh.mesh, links, mesh.link, faces)
         self.elastic = ElasticBody(
             mesh.mesh,
             link=mesh.link,
@@ -115,7 +118,7 @@ class MechanismModel:
             model=fidelity.model,
             order=fidelity.order,
             quadrature=fidelity.quadrature,
-            effects=[partial(_link_energy, effect, links) for effect in effects if isinstance(effect, LinkEffect)],
+            effects=[partial(self._link_energy, effect) for effect in link_effects],
         )
         self._potentials = [
             potential
@@ -123,6 +126,11 @@ class MechanismModel:
             if isinstance(effect, BodyEffect)
             for potential in effect.potentials(linkage)
         ]
+        self._compliances: dict[int, float] = {}
+        for effect in effects:
+            if isinstance(effect, JointSoftening):
+                for row, compliance in effect.compliances(linkage).items():
+                    self._compliances[row] = self._compliances.get(row, 0.0) + compliance
         first = len(mechanism.rigid_links)
         cell_body = np.where(mesh.interface >= 0, mesh.interface + first, -1)
         centres = np.array([body.centre for body in linkage.bodies])
@@ -209,6 +217,7 @@ class MechanismModel:
             controlled=controlled,
             loads=loads,
             potentials=self._potentials,
+            compliances=self._compliances,
             clock=self.clock,
         )
 
@@ -225,6 +234,19 @@ class MechanismModel:
             u[nodes] = self.linkage.joints.space.displace(poses[body], offsets)
         return State(u.ravel(), poses, np.zeros(self.linkage.joints.rows), 0.0, motors)
 
+    @property
+    def fields(self) -> LinkFields:
+        """What link energies are written in."""
+        return self._fields(self.elastic)
+
+    def _fields(self, body: ElasticBody) -> LinkFields:
+        links = tuple(self.mechanism.flexible_links)
+        return LinkFields(links, body.u, body.d, body.dx, body.order, body.cellwise, self._boundaries)
+
+    def _link_energy(self, effect: LinkEffect, body: ElasticBody) -> ufl.Form | None:
+        """The energy of an effect in the fields of ``body``."""
+        return effect.energy(self._fields(body))
+
     def _link_of_nodes(self) -> np.ndarray:
         """Index of the flexible link of every local node."""
         V = self.elastic.u.function_space
@@ -232,8 +254,3 @@ class MechanismModel:
         for cell, link in enumerate(self.mesh.link):
             owner[V.dofmap.cell_dofs(cell)] = link
         return owner
-
-
-def _link_energy(effect: LinkEffect, links: Sequence[FlexibleLink], body: ElasticBody) -> ufl.Form | None:
-    """The energy of an effect in the fields of ``body``."""
-    return effect.energy(LinkFields(tuple(links), body.u, body.d, body.dx, body.order, body.cellwise))

@@ -23,6 +23,7 @@ from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.explanation import Explanation, hints, simulated
 from fenicsmech.simulation.export import write_xdmf
 from fenicsmech.simulation.frame import Frame
+from fenicsmech.simulation.goal_error import GoalError
 from fenicsmech.simulation.model import Fidelity, MechanismModel, check_links, mesh_mechanism
 from fenicsmech.simulation.picture import Draughtsman
 from fenicsmech.simulation.request import CurveRequest, read_request
@@ -89,6 +90,7 @@ class Simulation:
         check_links(mechanism, self.linkage, self.fidelity)
         self._options, self._predictor = newton or NewtonOptions(), predictor or Hermite()
         self._newtons: dict[tuple, Newton] = {}
+        self._errors: dict[Force, GoalError] = {}
         self._last: Curve | None = None
 
     @cached_property
@@ -179,6 +181,21 @@ class Simulation:
             predictor=self._predictor,
             comm=comm,
         )
+
+    def error_estimates(self, curve: Curve | None = None) -> np.ndarray:
+        """What finer elements would add to the displacement of each frame, (frames,) (collective).
+
+        Args:
+            curve: the last curve computed by default.
+
+        Raises:
+            DescriptionError: no curve was computed yet.
+        """
+        chosen = self._chosen(curve)
+        part = chosen.force_part
+        if part not in self._errors:
+            self._errors[part] = GoalError(self.model, self.newton(part))
+        return np.array([self._errors[part].estimate(frame, chosen.freedom) for frame in chosen.frames])
 
     def explain(self, curve: Curve | None = None, *, tolerance: float = 0.01) -> Explanation:
         """What is simulated and what is left out, with figures where that may matter (collective).

@@ -1,0 +1,142 @@
+"""Frictionless contact with rigid obstacles, by a penalty on penetration.
+
+    V = Σ_links ∫ ½ κ ⟨−g(x)⟩² dA + Σ_points ½ k ⟨−g(x)⟩²,     x = X₀ + d + u,
+
+g the signed gap and ⟨·⟩ the positive part. The pressure κ ⟨−g⟩ pushes a link out along ∇g. V is once continuously
+differentiable, its second derivative jumps where points come into contact: Newton's method is semismooth there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from fenicsmech.effects.faces import Faces
+from fenicsmech.effects.obstacles import Obstacle
+from fenicsmech.effects.protocol import BodyEffect, LinkEffect, LinkFields, PosePotential
+from fenicsmech.errors import DescriptionError
+from fenicsmech.kinematics import RigidSpace
+from fenicsmech.mechanism import FlexibleLink, Link, RigidLink
+from fenicsmech.mechanism.checks import points, positive
+from fenicsmech.mechanism.places import in_dimension
+
+_STIFFNESS = 1.0  # of the outermost layer of elements
+
+
+@dataclass(frozen=True)
+class Contact(LinkEffect, BodyEffect):
+    """A link and an obstacle that cannot pass through each other.
+
+    Attributes:
+        link: a flexible link, touched anywhere on its boundary, or a rigid link, touched at ``points``.
+        obstacle: a ``Cylinder`` or a ``HalfPlane``.
+        stiffness: for flexible links pressure per penetration κ, by default 10 times that of the outermost layer of
+            elements, 10 E / h: where the pressure is p, the obstacle gives way by 0.1 (p / E) h. For rigid links
+            force per penetration k of each point; must be given.
+        points: of a rigid link as drawn.
+
+    Penetration falls as 1 / stiffness. In space a pressed edge also feels its flat faces inside of the obstacle, by a
+    share of the order of penetration over depth.
+
+    Raises:
+        DescriptionError: a number makes no sense, or what a link of this kind needs is missing.
+    """
+
+    link: Link
+    obstacle: Obstacle
+    stiffness: float | None = None
+    points: Sequence[Sequence[float]] = ()
+
+    def __post_init__(self) -> None:
+        part = f"contact of {getattr(self.link, 'name', self.link)!r}"
+        if self.stiffness is not None:
+            object.__setattr__(self, "stiffness", positive(f"stiffness of {part}", self.stiffness))
+        object.__setattr__(self, "points", points(f"points of {part}", self.points, least=0, dimensions=(2, 3)))
+        if not isinstance(self.obstacle, Obstacle):
+            raise DescriptionError(part, f"{self.obstacle!r} is no obstacle", "Give a Cylinder(…) or HalfPlane(…)")
+        match self.link:
+            case RigidLink() if not self.points or self.stiffness is None:
+                raise DescriptionError(
+                    part, "a rigid link touches at points only", "Give points=… and their stiffness=…"
+                )
+            case FlexibleLink() if self.points:
+                raise DescriptionError(part, "a flexible link touches anywhere", "Leave points out")
+
+    def check(self, mechanism, dim):
+        if self.link not in mechanism.links:
+            raise DescriptionError("contact", f"{self.link!r} is no link of {mechanism.name!r}", "Leave it out")
+        self.obstacle.check(dim)
+
+    def explain(self):
+        return f"frictionless contact of {self.link.name} with {self.obstacle}"
+
+    @property
+    def faces(self):
+        return (Faces(self.link),) if isinstance(self.link, FlexibleLink) else ()
+
+    def energy(self, fields):
+        if not isinstance(self.link, FlexibleLink):
+            return None
+        depth = self.link.shape.depth if fields.dim == 2 else 1.0
+        gap = self.obstacle.gap_form(fields.position, fields.mesh)
+        inside = -gap
+        if self.obstacle.core is not None:
+            # like an inverted element, what no solution may be found beyond
+            lost = ufl.lt(gap, fem.Constant(fields.mesh, -self.obstacle.core))
+            inside = ufl.conditional(lost, fem.Constant(fields.mesh, np.nan), inside)
+        inside = ufl.conditional(ufl.lt(gap, 0.0), inside, 0.0)
+        density = 0.5 * depth * self._stiffness(fields) * inside**2
+        return fields.boundary_integral(density, Faces(self.link), degree=2 * fields.order)
+
+    def _stiffness(self, fields: LinkFields):
+        """κ in UFL."""
+        if self.stiffness is not None:
+            return fem.Constant(fields.mesh, self.stiffness)
+        height = fields.dim * ufl.CellVolume(fields.mesh) / ufl.FacetArea(fields.mesh)
+        return fem.Constant(fields.mesh, _STIFFNESS * self.link.material.youngs_modulus) / height
+
+    def potentials(self, linkage):
+        if not isinstance(self.link, RigidLink):
+            return []
+        body = linkage.body_of(self.link)
+        drawn = np.array([in_dimension(p, linkage.dim) for p in self.points])
+        return [_Points(self, body, drawn, np.array(linkage.bodies[body].centre), linkage.joints.space)]
+
+
+class _Points(PosePotential):
+    """½ k Σ ⟨−g⟩² at points of one body."""
+
+    def __init__(self, contact: Contact, body: int, drawn: np.ndarray, centre: np.ndarray, space: RigidSpace) -> None:
+        self.bodies, self._drawn, self._offsets, self._space = (body,), drawn, drawn - centre, space
+        self._obstacle, self._stiffness = contact.obstacle, contact.stiffness
+
+    def value(self, poses):
+        _, inside, _ = self._touching(poses)
+        return 0.5 * self._stiffness * float(inside @ inside)
+
+    def gradient(self, poses):
+        where, inside, offsets = self._touching(poses)
+        slope = np.einsum("ni,nia->na", self._obstacle.gap_gradient(where), self._motion(poses, offsets))
+        return -self._stiffness * inside @ slope
+
+    def hessian(self, poses):
+        where, inside, offsets = self._touching(poses)
+        normal, motion = self._obstacle.gap_gradient(where), self._motion(poses, offsets)
+        slope = np.einsum("ni,nia->na", normal, motion)
+        bend = np.einsum("n,nij,nia,njb->ab", inside, self._obstacle.gap_hessian(where), motion, motion)
+        turn = self._space.displacement_hessian(poses[self.bodies[0]], (inside[:, None] * normal).T @ offsets)
+        return self._stiffness * (slope.T @ slope - bend - turn)
+
+    def _touching(self, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Positions of the points inside the obstacle, −g, and their offsets from the body's centre."""
+        where = self._drawn + self._space.displace(poses[self.bodies[0]], self._offsets)
+        gap = self._obstacle.gap(where)
+        inside = gap < 0.0
+        return where[inside], -gap[inside], self._offsets[inside]
+
+    def _motion(self, poses: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+        return self._space.displacement_gradient(poses[self.bodies[0]], offsets)

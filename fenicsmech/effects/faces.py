@@ -1,0 +1,134 @@
+"""Parts of the boundaries of flexible links: their facets, and measures to integrate over them.
+
+Facets are tagged by the set of requested parts they belong to, so that parts may overlap; facets of no part are not
+tagged and cost nothing.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+import ufl
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+
+from fenicsmech.compat import cell_nodes, original_nodes
+from fenicsmech.errors import DescriptionError
+from fenicsmech.mechanism import FlexibleLink
+
+
+@dataclass(frozen=True)
+class Faces:
+    """The boundary of a flexible link, or part of it.
+
+    Attributes:
+        link: the link.
+        where: tells positions of the drawn link, (n, dim), that lie on the part from others, (n,); a facet belongs to
+            the part if all its corners do. None for the whole boundary.
+    """
+
+    link: FlexibleLink
+    where: Callable[[np.ndarray], np.ndarray] | None = None
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """Where ``Faces`` are on the reference mesh.
+
+    Attributes:
+        facets: this rank's facets.
+        corners: numbers of their corners in the whole mesh, the same on all ranks, (facets, dim).
+        measures: ufl measures whose sum covers them.
+    """
+
+    facets: np.ndarray
+    corners: np.ndarray
+    measures: tuple[ufl.Measure, ...]
+
+    def is_closed(self, comm: MPI.Comm) -> bool:
+        """Whether the facets of all ranks together have no rim (collective)."""
+        rims = Counter()
+        for found in comm.allgather(self.corners):
+            for facet in np.sort(found, axis=1).tolist():
+                rims.update(combinations(facet, len(facet) - 1))
+        return all(count % 2 == 0 for count in rims.values())
+
+
+def find_boundaries(
+    mesh: dmesh.Mesh, links: Sequence[FlexibleLink], link_of_cell: np.ndarray, faces: Sequence[Faces]
+) -> dict[Faces, Boundary]:
+    """Where each of ``faces`` is (collective).
+
+    Args:
+        mesh: the mesh of all links.
+        links: all flexible links.
+        link_of_cell: index of the link of each local cell, (cells,).
+        faces: the parts asked for; without any nothing is made.
+
+    Raises:
+        DescriptionError: a part has no facet.
+    """
+    faces = tuple(dict.fromkeys(faces))
+    if not faces:
+        return {}
+    facets, cells, opposite = _exterior_facets(mesh)
+    owner, dim = link_of_cell[cells], mesh.geometry.dim
+    corners = _corners(mesh, cells, opposite)
+    places = mesh.geometry.x[corners.ravel(), :dim]
+    numbers = original_nodes(mesh)[corners]
+    within = np.zeros((len(facets), len(faces)), dtype=bool)
+    for k, part in enumerate(faces):
+        within[:, k] = owner == links.index(part.link)
+        if part.where is not None:
+            inside = np.asarray(part.where(places), dtype=bool)
+            within[:, k] &= inside.reshape(len(facets), dim).all(axis=1)
+    kinds = sorted(set().union(*mesh.comm.allgather({tuple(row) for row in within.tolist() if any(row)})))
+    tag = {kind: number for number, kind in enumerate(kinds, start=1)}
+    tags = np.array([tag.get(tuple(row), 0) for row in within.tolist()], dtype=np.int32)
+    known = np.flatnonzero(tags)
+    facet_tags = dmesh.meshtags(mesh, mesh.topology.dim - 1, facets[known], tags[known])
+    ds = ufl.Measure("ds", domain=mesh, subdomain_data=facet_tags)
+    boundaries = {}
+    for k, part in enumerate(faces):
+        measures = tuple(ds(tag[kind]) for kind in kinds if kind[k])
+        if not measures:
+            raise DescriptionError(
+                f"boundary of link {part.link.name!r}",
+                "no facet has all its corners where the predicate says",
+                "Widen it; it is asked about the drawn link, (n, dim)",
+            )
+        boundaries[part] = Boundary(facets[within[:, k]], numbers[within[:, k]], measures)
+    return boundaries
+
+
+def cofactor(A):
+    """det(A) A⁻ᵀ in UFL, by which facet normals times areas change under the gradient A of a map."""
+    if A.ufl_shape == (2, 2):
+        return ufl.as_matrix([[A[1, 1], -A[1, 0]], [-A[0, 1], A[0, 0]]])
+    after = [(1, 2), (2, 0), (0, 1)]
+    return ufl.as_matrix([[A[a, k] * A[b, m] - A[a, m] * A[b, k] for k, m in after] for a, b in after])
+
+
+def _exterior_facets(mesh: dmesh.Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """This rank's facets on the boundary, ascending, the cell of each, and the cell's corner opposite to it."""
+    topology, dim = mesh.topology, mesh.topology.dim
+    topology.create_connectivity(dim - 1, dim)
+    topology.create_connectivity(dim, dim - 1)
+    facets = np.sort(dmesh.exterior_facet_indices(topology)).astype(np.int32)
+    cells_of, facets_of = topology.connectivity(dim - 1, dim), topology.connectivity(dim, dim - 1)
+    cells = np.array([cells_of.links(facet)[0] for facet in facets], dtype=np.int32)
+    # simplices number their facets by the corner opposite
+    pairs = zip(facets, cells, strict=True)
+    opposite = np.array([np.flatnonzero(facets_of.links(cell) == facet)[0] for facet, cell in pairs], dtype=int)
+    return facets, cells, opposite
+
+
+def _corners(mesh: dmesh.Mesh, cells: np.ndarray, opposite: np.ndarray) -> np.ndarray:
+    """Geometry nodes at the corners of the facets of ``cells`` opposite to their corner ``opposite``, (facets, dim)."""
+    nodes = cell_nodes(mesh)[cells]
+    others = nodes[np.arange(nodes.shape[1]) != opposite[:, None]]
+    return others.reshape(len(cells), nodes.shape[1] - 1)

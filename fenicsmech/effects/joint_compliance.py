@@ -1,0 +1,61 @@
+"""Joint compliance: pins that give way under the force they carry.
+
+A force λ across the pin moves its two ends apart by c λ. With the constraint C = x_b − x_a of a rigid pin,
+
+    C + c λ = 0,    V = ½ |C|² / c,
+
+so that c enters the KKT matrix as −c on the diagonal of the multipliers, and c → 0 is the rigid pin.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fenicsmech.effects.protocol import JointSoftening
+from fenicsmech.errors import DescriptionError
+from fenicsmech.joints import REVOLUTE, SPHERICAL, UNIVERSAL, WELD
+from fenicsmech.mechanism import Joint
+from fenicsmech.mechanism.checks import positive
+
+_PINNED = (REVOLUTE, SPHERICAL, UNIVERSAL, WELD)  # their first equations are x_b − x_a = 0
+
+
+@dataclass(frozen=True)
+class JointCompliance(JointSoftening):
+    """A joint whose links share a point gives way there, alike in all directions; its axis stays aligned.
+
+    Two compliances of one joint act in series. What is stored in the joint is not part of a frame's strain energy.
+
+    Attributes:
+        joint: a revolute, spherical, universal or weld joint.
+        compliance: c; with N and mm in mm/N.
+
+    Raises:
+        DescriptionError: the compliance is not positive.
+    """
+
+    joint: Joint
+    compliance: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "compliance", positive(f"compliance of {self.joint.name!r}", self.compliance))
+
+    def check(self, mechanism, dim):
+        name = f"compliance of {self.joint.name!r}"
+        if self.joint not in mechanism.joints:
+            raise DescriptionError(
+                name, f"{self.joint.name!r} is no joint of {mechanism.name!r}", "Name a joint of the mechanism"
+            )
+        if self.joint.kind not in _PINNED:
+            raise DescriptionError(
+                name,
+                f"the links of a {self.joint.kind.name} joint share no point",
+                "Soften revolute, spherical, universal or weld joints",
+            )
+
+    def explain(self):
+        return f"compliance {self.compliance:g} of {self.joint.name!r}"
+
+    def compliances(self, linkage):
+        rows = [row for row, name in enumerate(linkage.joints.row_names) if name == self.joint.name]
+        return dict.fromkeys(rows[: linkage.dim], self.compliance)

@@ -1,0 +1,111 @@
+"""Joint springs: what turns about a hinge or slides along a slider against a linear spring.
+
+V = ½ k (φ − φ₀)² = ½ k φ² − k φ₀ φ + const.
+
+The first term holds the mechanism from the start, the second winds the spring up as constant loads grow: on the way
+its rest position goes from 0 to φ₀.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+
+from fenicsmech.effects.protocol import BodyEffect, PosePotential
+from fenicsmech.errors import DescriptionError
+from fenicsmech.linkage.coordinate import JointCoordinate
+from fenicsmech.mechanism import Joint
+from fenicsmech.mechanism.checks import finite, positive
+
+
+@dataclass(frozen=True)
+class JointSpring(BodyEffect):
+    """A torsion spring on a revolute joint, or a spring along a prismatic one.
+
+    The coordinate φ is that of a motor: the angle (rad) or travel of the joint's second link, zero as drawn. In the
+    plane angles count full turns; in space they hold for |φ| < 2π.
+
+    Attributes:
+        joint: a revolute or prismatic joint.
+        stiffness: k; with N and mm in N mm/rad, or N/mm.
+        rest: φ₀, where the spring is relaxed; rad or length.
+
+    Raises:
+        DescriptionError: a number makes no sense.
+    """
+
+    joint: Joint
+    stiffness: float
+    rest: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "stiffness", positive(f"stiffness of {self._name}", self.stiffness))
+        object.__setattr__(self, "rest", finite(f"rest position of {self._name}", self.rest))
+
+    def check(self, mechanism, dim):
+        if self.joint not in mechanism.joints:
+            raise DescriptionError(
+                self._name, f"{self.joint.name!r} is no joint of {mechanism.name!r}", "Name a joint of the mechanism"
+            )
+        if not self.joint.kind.motorised:
+            raise DescriptionError(
+                self._name,
+                f"a {self.joint.kind.name} joint has no single free coordinate",
+                "Put springs on revolute or prismatic joints",
+            )
+        if dim == 3 and not self.joint.kind.sliding and abs(self.rest) >= 2.0 * pi:
+            raise DescriptionError(
+                self._name,
+                f"in space angles stay within a full turn, the rest angle is {self.rest:g} rad",
+                "Wind the spring up by less than 2π, or simulate in the plane",
+            )
+
+    def explain(self):
+        relaxed = f", relaxed at {self.rest:g}" if self.rest else ""
+        return f"spring of stiffness {self.stiffness:g} in {self.joint.name!r}{relaxed}"
+
+    def potentials(self, linkage):
+        coordinate = JointCoordinate(linkage, self.joint)
+        preload = [_Preload(coordinate, self.stiffness * self.rest)] if self.rest else []
+        return [_Stiffness(coordinate, self.stiffness), *preload]
+
+    @property
+    def _name(self) -> str:
+        return f"spring in {self.joint.name!r}"
+
+
+class _Stiffness(PosePotential):
+    """½ k φ² of one joint's coordinate."""
+
+    holds = True
+
+    def __init__(self, coordinate: JointCoordinate, stiffness: float) -> None:
+        self.bodies, self._coordinate, self._stiffness = coordinate.bodies, coordinate, stiffness
+
+    def value(self, poses):
+        return 0.5 * self._stiffness * self._coordinate.value(poses) ** 2
+
+    def gradient(self, poses):
+        return self._stiffness * self._coordinate.value(poses) * self._coordinate.gradient(poses)
+
+    def hessian(self, poses):
+        slope, bend = self._coordinate.gradient(poses), self._coordinate.hessian(poses)
+        return self._stiffness * (np.outer(slope, slope) + self._coordinate.value(poses) * bend)
+
+
+class _Preload(PosePotential):
+    """−M φ with the constant torque or force M = k φ₀ of a spring in the drawn position."""
+
+    def __init__(self, coordinate: JointCoordinate, size: float) -> None:
+        self.bodies, self._coordinate, self._size = coordinate.bodies, coordinate, size
+
+    def value(self, poses):
+        return -self._size * self._coordinate.value(poses)
+
+    def gradient(self, poses):
+        return -self._size * self._coordinate.gradient(poses)
+
+    def hessian(self, poses):
+        return -self._size * self._coordinate.hessian(poses)

@@ -1,0 +1,90 @@
+"""Pressure on the boundary of a flexible link: it stays normal to the boundary and grows with its area.
+
+    V = (p / n) ∫ P (x − x₀) · n da,     δV = p ∫ δx · n da + a term at the rim,
+
+p times the volume that the boundary encloses with x₀: P = I and n = dim for a point x₀, in space also P = I − e_z ⊗ e_z
+and n = 2 for an axis along z. Closed boundaries have no rim, and x₀ plays no part. The term at the rim of an open one
+vanishes
+
+- where the rim is held,
+- in the plane, where its ends move along lines through x₀, as on an axis of symmetry,
+- in space, where it moves within planes through x₀ that it lies in, as on a plane of symmetry; with an axis x₀, within
+  planes z = const. that it lies in: to motions along z the load is that on a hole that plugs close.
+
+With other rims the load has no energy: how much work it does depends on the way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import ufl
+from dolfinx import fem
+
+from fenicsmech.effects.faces import Faces
+from fenicsmech.effects.protocol import LinkEffect
+from fenicsmech.errors import DescriptionError
+from fenicsmech.mechanism import FlexibleLink
+from fenicsmech.mechanism.checks import finite, point
+
+
+@dataclass(frozen=True)
+class Pressure(LinkEffect):
+    """A fluid that presses on a flexible link.
+
+    Attributes:
+        link: the link.
+        pressure: into the link; negative for suction.
+        where: tells positions of the drawn link, (n, dim), that are pressed on from others, (n,): facets whose corners
+            all are. None: the whole boundary.
+        about: x₀; to be given for an open part, and a promise that its rim is held or moves as said above. In space
+            two coordinates are an axis along z, which suits holes through extruded links, and their sides.
+
+    Raises:
+        DescriptionError: a number makes no sense, or this is no flexible link. Later, when the link is meshed: the part
+            is open without a point to go ``about``, or empty.
+    """
+
+    link: FlexibleLink
+    pressure: float
+    where: Callable[[np.ndarray], np.ndarray] | None = None
+    about: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.link, FlexibleLink):
+            raise DescriptionError("pressure", f"{self.link!r} is no flexible link", "Give one")
+        object.__setattr__(self, "pressure", finite(f"pressure on {self.link.name!r}", self.pressure))
+        if self.about is not None:
+            object.__setattr__(self, "about", point(f"centre of the pressure on {self.link.name!r}", self.about))
+
+    def check(self, mechanism, dim):
+        if self.link not in mechanism.flexible_links:
+            raise DescriptionError("pressure", f"{self.link!r} is no link of {mechanism.name!r}", "Leave it out")
+
+    def explain(self):
+        part = "the whole boundary" if self.where is None else "part of the boundary"
+        return f"pressure of {self.pressure:g} on {part} of {self.link.name}"
+
+    @property
+    def faces(self):
+        return (Faces(self.link, self.where),)
+
+    def energy(self, fields):
+        (faces,) = self.faces
+        if self.about is None and not fields.boundaries[faces].is_closed(fields.mesh.comm):
+            raise DescriptionError(
+                f"pressure on {self.link.name!r}",
+                "the part it acts on is open: its load has an energy only if the rim is held",
+                "Hold the rim and give about=…, or press on a closed part",
+            )
+        dim, order = fields.dim, fields.order
+        centre = (0.0,) * dim if self.about is None else self.about[:dim]
+        along = len(centre)
+        depth = self.link.shape.depth if dim == 2 else 1.0
+        pressure = fem.Constant(fields.mesh, self.pressure * depth / along)
+        start = fem.Constant(fields.mesh, np.array(centre))
+        arm = [fields.position[k] - start[k] for k in range(along)] + [0.0] * (dim - along)
+        # x has the degree of u, n da its (dim − 1)th power one degree lower
+        return fields.flux(pressure * ufl.as_vector(arm), faces, degree=order + (dim - 1) * (order - 1))

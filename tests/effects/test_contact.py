@@ -1,0 +1,153 @@
+"""Links come to rest against rigid obstacles as closed forms say, and those out of reach change nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import fenicsmech as fm
+from fenicsmech.design.sensitivity import Adjoint
+from fenicsmech.effects import Contact, Cylinder, HalfPlane
+
+from ..design.refusal import refused
+from .touching import block, cantilever, finger
+
+PULLS = [0.05, 0.1, 0.2, 0.4]
+
+
+@pytest.mark.parametrize("space", ["plane-stress", "3d"])
+def test_a_cantilever_rests_on_a_plane_first_at_its_tip_and_then_farther_in(space):
+    # P at a = L / 2; R on the tip, or where the link touches with horizontal tangent, c = a + 6 EI gap / (P a²)
+    length, gap = 100.0, 1.0
+    case = cantilever(space, gap=gap, length=length)
+    bending, a = 2000.0 * 3.0 * 2.0**3 / 12.0, 0.5 * length
+    deflection = 6.0 * bending * gap / a**2
+    for frame in case.simulation.load_displacement(case.force, forces=[0.05, 0.12, 0.18, 0.3]).frames:
+        load = frame.force
+        c = min(a + deflection / load, length)
+        reaction = load * a**2 / c**2 if c < length else 5.0 / 16.0 * load - 3.0 * bending * gap / length**3
+        force, least = case.measure(frame)
+        assert force[1] == pytest.approx(max(reaction, 0.0), rel=0.01, abs=1e-12)
+        assert np.abs(np.delete(force, 1)).max() < 1e-12
+        at_load = (load * a**3 / 3.0 - max(reaction, 0.0) * a**2 * (3.0 * c - a) / 6.0) / bending
+        assert frame.displacement == pytest.approx(at_load, rel=0.005)
+        assert least > -0.01 * gap
+        assert frame.stable
+
+
+@pytest.mark.parametrize("space", ["plane-stress", "3d"])
+def test_a_block_sinks_in_by_force_over_area_and_stiffness(space):
+    force = 20.0
+    for stiffness in (30.0, 60.0):
+        case = block(space, stiffness)
+        (frame,) = case.simulation.load_displacement(case.force, forces=[force]).frames
+        found, gap = case.measure(frame)
+        assert found == pytest.approx(np.eye(len(found))[1] * force, abs=1e-8 * force)
+        assert gap == pytest.approx(-force / (50.0 * stiffness), rel=1e-3 if space == "plane-stress" else 0.01)
+
+
+@pytest.mark.parametrize("space", ["plane-stress", "3d"])
+def test_a_finger_closes_on_a_cylinder_and_penetrates_the_less_the_stiffer_it_is(space):
+    depths = []
+    for stiffness in (0.5, 2.0, None):
+        case = finger(space, stiffness=stiffness)
+        frame = case.simulation.load_displacement(case.force, forces=PULLS).frames[-1]
+        force, gap = case.measure(frame)
+        # the finger leans on the cylinder's right, which pushes it away from its axis
+        assert 0.5 < force[0] < 0.7 and 0.0 < force[1] < 0.2
+        depths.append(-gap)
+        assert frame.stable
+    # on a round obstacle the area of contact grows too: somewhat slower than 1 / κ
+    assert 2.0 < depths[0] / depths[1] < 4.0
+    assert depths[-1] < 0.02
+
+
+@pytest.mark.parametrize("space", ["plane-stress", "3d"])
+def test_an_obstacle_out_of_reach_changes_nothing(space):
+    far, without = finger(space, centre=(-100.0, 38.0)), finger(space, active=False)
+    curves = [case.simulation.load_displacement(case.force, forces=PULLS) for case in (far, without)]
+    for a, b in zip(*(curve.frames for curve in curves), strict=True):
+        assert np.abs(a.state.u - b.state.u).max() < 1e-9
+    force, gap = far.measure(curves[0].frames[-1])
+    assert not force.any()
+    assert gap > 0.0
+
+
+def test_without_contact_no_boundary_is_looked_for():
+    case = finger("plane-stress", active=False)
+    assert case.simulation.model.fields.boundaries == {}
+    kinds = {integral.integral_type() for integral in case.simulation.model.elastic.energy_ufl.integrals()}
+    assert kinds == {"cell"}
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("comm", [MPI.COMM_SELF, MPI.COMM_WORLD], ids=["alone", "together"])
+@pytest.mark.parametrize("space", ["plane-stress", "3d"])
+def test_displacements_in_contact_are_differentiated_by_the_design_field(space, comm):
+    case = finger(space, comm=comm)
+    model = case.simulation.model
+    V = model.elastic.d.function_space
+    wave = np.sin(V.tabulate_dof_coordinates()[:, : model.linkage.dim] @ np.diag([0.2, 0.1, 0.3][: model.linkage.dim]))
+    base, direction = 0.2 * wave.ravel(), 0.3 * np.roll(wave, 1, axis=1).ravel()
+
+    def solve(step: float):
+        model.reshape(base + step * direction)
+        return case.simulation.load_displacement(case.force, forces=PULLS).frames[-1]
+
+    h = 1e-3
+    slope = (_travel(case, solve(h)) - _travel(case, solve(-h))) / (2.0 * h)
+    frame = solve(0.0)
+    assert abs(case.measure(frame)[0][0]) > 0.3
+    adjoint = Adjoint(model, case.simulation.newton(case.force))
+    (gradient,) = adjoint.gradients(frame.state, [model.point_load(case.force)])
+    found = comm.allreduce(gradient.design @ direction[: len(gradient.design)])
+    assert found == pytest.approx(slope, rel=1e-4)
+
+
+def _travel(case, frame) -> float:
+    case.simulation.model.load(frame.state)
+    return case.simulation.model.travel(case.force, frame.state)
+
+
+@pytest.mark.parametrize("space", ["plane-stress", "3d"])
+def test_a_rigid_link_rests_on_its_points(space):
+    # a leaf that carries next to nothing holds a table, drawn with its feet a little below the plane
+    mechanism = fm.Mechanism("table")
+    base, table = mechanism.rigid("base", fixed=True), mechanism.rigid("table")
+    leaf = mechanism.flexible(
+        "leaf", fm.strip([(-40, 0), (0, 0)], thickness=1.0, depth=2.0), fm.Material("foam", 200.0, 0.3)
+    )
+    mechanism.weld(base, leaf, at=(-40, 0), radius=1.0)
+    mechanism.weld(leaf, table, at=(0, 0), radius=1.0)
+    push = mechanism.force(on=table, at=(15, -8), direction=(0, -1))  # below the feet, where it steadies
+    contact = Contact(table, HalfPlane((0, -3), (0, 1)), stiffness=50.0, points=[(10, -3.01), (30, -3.01)])
+    simulation = fm.Simulation(fm.Scene(mechanism, effects=[contact]), space=space, size=2.0)
+    (frame,) = simulation.load_displacement(push, forces=[4.0]).frames
+    # the feet carry 3 and 1: they stand 0.06 and 0.02 below the plane, and the force is a quarter of their way apart
+    assert frame.displacement == pytest.approx(0.05 - 0.25 * 0.04, rel=2e-3)
+    assert frame.stable
+
+
+def test_descriptions_without_sense_are_refused():
+    mechanism = fm.Mechanism("finger")
+    base = mechanism.rigid("base", fixed=True)
+    link = mechanism.flexible("link", fm.strip([(0, 0), (20, 0)], thickness=2.0, depth=2.0), fm.ONYX)
+    stranger = fm.Mechanism("other").rigid("stranger")
+    mechanism.weld(base, link, at=(0, 0), radius=1.0)
+    floor = HalfPlane((0, -5), (0, 1))
+    refused(lambda: Contact(base, floor), part="'base'", problem="points only", remedy="points=")
+    refused(lambda: Contact(base, floor, points=[(0, 0)]), part="'base'", problem="points only", remedy="stiffness=")
+    refused(lambda: Contact(link, floor, points=[(0, 0)]), part="'link'", problem="anywhere", remedy="out")
+    refused(lambda: Contact(link, floor, -1.0), part="stiffness", problem="not positive", remedy="greater")
+    refused(lambda: Contact(link, "floor"), part="'link'", problem="no obstacle", remedy="HalfPlane")
+    refused(lambda: HalfPlane((0, 0), (0, 0)), part="normal", problem="zero length", remedy="somewhere")
+    refused(lambda: Cylinder((0, 0, 0), 1.0), part="centre", problem="has not 2 coordinates", remedy="2 numbers")
+    refused(lambda: Cylinder((0, 0), 0.0), part="radius", problem="not positive", remedy="greater")
+    for contact, space, problem in (
+        (Contact(stranger, floor, 1.0, [(0, 0)]), "3d", "no link"),
+        (Contact(link, HalfPlane((0, 0), (0, 0, 1))), "plane-stress", "leaves the plane"),
+    ):
+        scene = fm.Scene(mechanism, effects=[contact])
+        with pytest.raises(fm.DescriptionError, match=problem):
+            fm.Simulation(scene, space=space, size=2.0)

@@ -1,0 +1,99 @@
+"""Derivatives of contact energies by state and design, by Taylor tests with part of the boundary in contact."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import ufl
+from dolfinx import fem
+
+import fenicsmech as fm
+from fenicsmech.compat import compile_form
+from fenicsmech.effects import Contact, Cylinder, HalfPlane
+from fenicsmech.linkage import build_linkage
+
+from ..elasticity.single_link import interpolate, wave
+from ..oracles.dense import gradient, jacobian, taylor_rates
+
+STEPS = 10.0 ** -np.arange(1.5, 3.6, 0.5)
+OBSTACLES = {"cylinder": Cylinder((9.0, -3.0), 2.5), "half-plane": HalfPlane((9.0, -0.9), (0.1, 1.0))}
+
+
+def strip(space: str, obstacle, order: int) -> tuple[Contact, object]:
+    """A deformed and redesigned strip, pressed into ``obstacle``, and the fields its energy is written in."""
+    mechanism = fm.Mechanism("strip")
+    base = mechanism.rigid("base", fixed=True)
+    link = mechanism.flexible("link", fm.strip([(0, 0), (20, 0)], thickness=2.0, depth=1.5), fm.ONYX)
+    mechanism.weld(base, link, at=(0, 0), radius=1.0)
+    contact = Contact(link, obstacle)
+    model = fm.Simulation(fm.Scene(mechanism, effects=[contact]), space=space, size=2.0, order=order).model
+    fields = model.fields
+    interpolate(fields.d, wave(fields.dim, 0.2, seed=1))
+    interpolate(fields.u, wave(fields.dim, 0.2, seed=2))
+    return contact, fields
+
+
+@pytest.mark.parametrize("obstacle", OBSTACLES)
+@pytest.mark.parametrize("space, order", [("plane-stress", 1), ("plane-stress", 2), ("3d", 2)])
+def test_energy_and_its_gradient_are_differentiated_by_state_and_design(space, order, obstacle):
+    contact, fields = strip(space, OBSTACLES[obstacle], order)
+    energy = contact.energy(fields)
+    work = fem.Function(fields.u.function_space)
+    interpolate(work, wave(fields.dim, 1.0, seed=5))
+    assert fem.assemble_scalar(compile_form(energy)) > 0.0
+    for form in (energy, ufl.derivative(energy, fields.u, work)):
+        compiled = compile_form(form)
+        for field in (fields.u, fields.d):
+            slope = fem.assemble_vector(compile_form(ufl.derivative(form, field))).array
+            start, size = field.x.array.copy(), 0.02
+            direction = np.random.default_rng(4).uniform(-size, size, len(start))
+
+            def value(values, field=field, compiled=compiled):
+                field.x.array[:] = values
+                return fem.assemble_scalar(compiled)
+
+            rates = taylor_rates(value, start, direction, slope, STEPS)
+            field.x.array[:] = start
+            assert rates.without[-1] > 0.95
+            # the gradient has kinks where points come into contact, none of them on the last step; on a half-plane it
+            # is linear in u between them
+            assert rates.with_gradient[-1] > 1.95 or rates.remainder[-1] < 1e-12 * abs(slope @ direction)
+
+
+@pytest.mark.parametrize("obstacle", OBSTACLES)
+@pytest.mark.parametrize("dim", [2, 3])
+def test_points_of_rigid_links_have_exact_gradients_and_hessians(dim, obstacle):
+    mechanism = fm.Mechanism("pair")
+    base, arm = mechanism.rigid("base", fixed=True), mechanism.rigid("arm")
+    link = mechanism.flexible("link", fm.strip([(0, 0), (20, 0)], thickness=2.0, depth=2.0), fm.ONYX)
+    mechanism.weld(base, link, at=(0, 0), radius=1.0)
+    mechanism.weld(link, arm, at=(20, 0), radius=1.0)
+    linkage = build_linkage(mechanism, dim)
+    # the last point stays clear of the obstacle
+    contact = Contact(arm, OBSTACLES[obstacle], 7.0, points=[(8.5, -1.2), (9.8, -1.3), (9.0, 3.0)])
+    (potential,) = contact.potentials(linkage)
+    (body,) = potential.bodies
+    poses = np.tile(linkage.joints.space.identity, (len(linkage.bodies), 1))
+    poses[body] += np.random.default_rng(1).uniform(-0.03, 0.03, poses.shape[1])
+
+    def at(pose):
+        changed = poses.copy()
+        changed[body] = pose
+        return changed
+
+    assert potential.value(poses) > 0.0
+    slope = gradient(lambda pose: potential.value(at(pose)), poses[body], step=1e-3)
+    assert potential.gradient(poses) == pytest.approx(slope, rel=1e-7, abs=1e-7)
+    curvature = jacobian(lambda pose: potential.gradient(at(pose)), poses[body], step=1e-3)
+    assert potential.hessian(poses) == pytest.approx(curvature, rel=1e-7, abs=1e-6)
+
+
+@pytest.mark.parametrize("obstacle", OBSTACLES)
+@pytest.mark.parametrize("dim", [2, 3])
+def test_gaps_have_exact_gradients_and_hessians(dim, obstacle):
+    shape, point = OBSTACLES[obstacle], np.array([7.3, -1.2, 0.4])[:dim]
+    slope = gradient(lambda x: shape.gap(x[None])[0], point)
+    assert shape.gap_gradient(point[None])[0] == pytest.approx(slope, abs=1e-9)
+    assert np.linalg.norm(slope) == pytest.approx(1.0, abs=1e-9)
+    curvature = jacobian(lambda x: shape.gap_gradient(x[None])[0], point)
+    assert shape.gap_hessian(point[None])[0] == pytest.approx(curvature, abs=1e-9)

@@ -1,0 +1,82 @@
+"""Links that come into contact with obstacles (mm, N, MPa)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+
+import fenicsmech as fm
+from fenicsmech.effects import Contact, ContactGauge, Cylinder, HalfPlane
+from fenicsmech.mechanism import Force
+
+
+@dataclass(frozen=True, eq=False)
+class Touching:
+    """A simulation, its force and its contact."""
+
+    simulation: fm.Simulation
+    force: Force
+    contact: Contact
+
+    def measure(self, frame: fm.Frame) -> tuple[np.ndarray, float]:
+        """Force on the link and smallest gap."""
+        gauge = ContactGauge(self.contact, self.simulation.model.fields)
+        self.simulation.model.load(frame.state)
+        return gauge.force(), gauge.gap()
+
+
+def cantilever(
+    space: str, *, gap: float, length: float = 100.0, thickness: float = 2.0, depth: float = 3.0
+) -> Touching:
+    """A straight link clamped at x = 0, pushed down at mid-length, above a plane ``gap`` below its underside."""
+    mechanism = fm.Mechanism("cantilever")
+    base = mechanism.rigid("base", fixed=True)
+    shape = fm.strip([(-thickness, 0), (length, 0)], thickness=thickness, depth=depth)
+    beam = mechanism.flexible("beam", shape, fm.Material("nylon", 2000.0, 0.0))
+    clamp = fm.Rectangle(thickness, 1.5 * thickness)
+    mechanism.weld(base, beam, at=(-0.5 * thickness, 0), region=clamp)
+    push = mechanism.force(on=beam, at=(0.5 * length, 0), direction=(0, -1))
+    contact = Contact(beam, HalfPlane((0, -0.5 * thickness - gap), (0, 1)))
+    return Touching(_simulation(mechanism, [contact], space, 2.0 * thickness), push, contact)
+
+
+def finger(
+    space: str,
+    *,
+    stiffness: float | None = None,
+    size: float = 3.0,
+    centre: tuple[float, float] = (-10.0, 38.0),
+    active: bool = True,
+    comm: MPI.Comm = MPI.COMM_SELF,
+) -> Touching:
+    """A soft upright finger, clamped at its root, whose tip is pulled to the left over a cylinder at ``centre``.
+
+    active: whether the scene lists the contact.
+    """
+    mechanism = fm.Mechanism("finger")
+    base = mechanism.rigid("base", fixed=True)
+    strip = fm.strip([(0, 0), (0, 60)], thickness=3.0, depth=6.0)
+    link = mechanism.flexible("finger", strip, fm.Material("rubber", 50.0, 0.4))
+    mechanism.weld(base, link, at=(0, 0), radius=3.0)
+    pull = mechanism.force(on=link, at=(0, 60), direction=(-1, 0))
+    contact = Contact(link, Cylinder(centre, 6.0), stiffness)
+    return Touching(_simulation(mechanism, [contact] if active else [], space, size, comm), pull, contact)
+
+
+def block(space: str, stiffness: float) -> Touching:
+    """A block of 10 × 8 × 5 on a plane, pressed by a rigid plate on a slider."""
+    mechanism = fm.Mechanism("block")
+    base, plate = mechanism.rigid("base", fixed=True), mechanism.rigid("plate")
+    square = fm.polygon([(-5, 0), (5, 0), (5, 8), (-5, 8)], depth=5.0)
+    link = mechanism.flexible("block", square, fm.Material("cork", 200.0, 0.0))
+    mechanism.prismatic(base, plate, at=(0, 7), axis=(0, 1))
+    mechanism.weld(plate, link, at=(0, 7), region=fm.Rectangle(11.0, 2.0))
+    push = mechanism.force(on=plate, at=(0, 8), direction=(0, -1))
+    contact = Contact(link, HalfPlane((0, 0), (0, 1)), stiffness)
+    return Touching(_simulation(mechanism, [contact], space, 4.0), push, contact)
+
+
+def _simulation(mechanism, effects, space: str, size: float, comm: MPI.Comm = MPI.COMM_SELF) -> fm.Simulation:
+    return fm.Simulation(fm.Scene(mechanism, effects=effects), space=space, size=size, comm=comm)

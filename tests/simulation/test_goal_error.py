@@ -1,0 +1,87 @@
+"""Error estimates of displacements lie within a factor of two of the true errors, and cost less than half a frame."""
+
+from __future__ import annotations
+
+from time import perf_counter
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import fenicsmech as fm
+
+from .demo_scenes import describe
+from .refined import arch, cantilever, refine
+
+LOADS = {"truss": 0.4, "claw": 10.0, "klann": 5.0}
+
+
+def case(name: str):
+    """Scene, force and load of a problem."""
+    made = {"cantilever": cantilever, "arch": arch}
+    if name in made:
+        return made[name]()
+    scene, push = describe(name)[:2]
+    return scene, push, LOADS[name]
+
+
+def estimated(
+    name: str, space: str, order: int, size: float, *, comm: MPI.Comm = MPI.COMM_WORLD
+) -> tuple[float, float]:
+    """Displacement at the load, and its estimated error."""
+    scene, push, load = case(name)
+    simulation = fm.Simulation(scene, space=space, order=order, size=size, comm=comm)
+    curve = simulation.load_displacement(push, forces=[0.5 * load, load])
+    return curve.displacements[-1], simulation.error_estimates(curve)[-1]
+
+
+def reference(name: str, space: str, size: float) -> float:
+    scene, push, load = case(name)
+    simulation = fm.Simulation(scene, space=space, order=3, size=size)
+    return simulation.load_displacement(push, forces=[0.5 * load, load]).displacements[-1]
+
+
+@pytest.mark.parametrize(("order", "size"), [(1, 1.0), (2, 4.0), (2, 2.0), (2, 1.5)])
+@pytest.mark.parametrize("name", ["cantilever", "arch", "truss", "claw", "klann"])
+def test_effectivity_in_the_plane_is_between_a_half_and_two(name, order, size, monkeypatch):
+    value, estimate = estimated(name, "plane-stress", order, size)
+    refine(monkeypatch, 2 if size > 2.0 else 1)
+    error = reference(name, "plane-stress", size) - value
+    assert 0.5 < estimate / error < 2.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [3.0, 2.0])
+@pytest.mark.parametrize("name", ["cantilever", "arch", "truss", "claw", "klann"])
+def test_effectivity_in_space_is_between_a_half_and_two(name, size):
+    value, estimate = estimated(name, "3d", 2, size)
+    assert 0.5 < estimate / (reference(name, "3d", size) - value) < 2.0
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("space", ["plane-stress", "3d"])
+def test_estimate_is_the_same_on_any_number_of_processes(space):
+    shared = estimated("claw", space, 2, 4.0)[1]
+    alone = estimated("claw", space, 2, 4.0, comm=MPI.COMM_SELF)[1]
+    assert shared == pytest.approx(alone, rel=1e-5)
+
+
+def test_estimate_falls_with_the_mesh_and_vanishes_without_load():
+    scene, push, load = cantilever()
+    estimates = []
+    for size in (3.0, 1.5, 0.75):
+        simulation = fm.Simulation(scene, space="plane-stress", size=size)
+        curve = simulation.load_displacement(push, forces=[0.0, load])
+        estimates.append(simulation.error_estimates(curve))
+    assert np.all(np.abs(np.array(estimates)[:, 0]) < 1e-12)
+    assert estimates[0][1] > 2.0 * estimates[1][1] > 4.0 * estimates[2][1] > 0.0
+
+
+def test_estimate_costs_at_most_half_of_its_frame():
+    scene, push = describe("claw")
+    simulation = fm.Simulation(scene, space="3d", size=3.0)
+    curve = simulation.load_displacement(push, forces=list(np.linspace(1.0, 10.0, 10)))
+    simulation.error_estimates(curve)
+    start = perf_counter()
+    simulation.error_estimates(curve)
+    assert perf_counter() - start < 0.5 * sum(frame.seconds for frame in curve.frames)
