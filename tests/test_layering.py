@@ -31,6 +31,7 @@ LAYERS = (
     "equilibrium",
     "simulation",
     "design",
+    "accuracy",
 )
 
 # Libraries that belong to a few layers only: descriptions and joints know no elements, only one layer makes meshes,

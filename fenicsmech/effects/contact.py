@@ -24,7 +24,7 @@ from fenicsmech.mechanism import FlexibleLink, Link, RigidLink
 from fenicsmech.mechanism.checks import points, positive
 from fenicsmech.mechanism.places import in_dimension
 
-_STIFFNESS = 1.0  # of the outermost layer of elements
+_STIFFNESS = 0.1  # of the outermost layer of elements; ten times more costs slender links several times the iterations
 
 
 @dataclass(frozen=True)
@@ -34,13 +34,16 @@ class Contact(LinkEffect, BodyEffect):
     Attributes:
         link: a flexible link, touched anywhere on its boundary, or a rigid link, touched at ``points``.
         obstacle: a ``Cylinder`` or a ``HalfPlane``.
-        stiffness: for flexible links pressure per penetration κ, by default 10 times that of the outermost layer of
-            elements, 10 E / h: where the pressure is p, the obstacle gives way by 0.1 (p / E) h. For rigid links
-            force per penetration k of each point; must be given.
+        stiffness: for flexible links pressure per penetration κ, by default a tenth of that of the outermost layer of
+            elements, 0.1 E / h with its height h: under the pressure p the obstacle gives way by 10 (p / E) h. For
+            rigid links force per penetration k of each point; must be given.
         points: of a rigid link as drawn.
 
-    Penetration falls as 1 / stiffness. In space a pressed edge also feels its flat faces inside of the obstacle, by a
-    share of the order of penetration over depth.
+    Penetration falls as 1 / stiffness, while Newton's method takes the more iterations where contact changes. Obstacles
+    act once the motors have moved: a configuration whose rigid assembly is on the far side of an obstacle stays there.
+    From there on flexible links cannot slip through a cylinder: no state in which they reach a quarter of its radius
+    deep is taken. In space a pressed edge also feels its flat faces inside of the obstacle, by a share of the order of
+    penetration over depth.
 
     Raises:
         DescriptionError: a number makes no sense, or what a link of this kind needs is missing.
@@ -52,7 +55,9 @@ class Contact(LinkEffect, BodyEffect):
     points: Sequence[Sequence[float]] = ()
 
     def __post_init__(self) -> None:
-        part = f"contact of {getattr(self.link, 'name', self.link)!r}"
+        if not isinstance(self.link, Link):
+            raise DescriptionError("contact", f"{self.link!r} is no link", "Give a rigid or a flexible link")
+        part = f"contact of {self.link.name!r}"
         if self.stiffness is not None:
             object.__setattr__(self, "stiffness", positive(f"stiffness of {part}", self.stiffness))
         object.__setattr__(self, "points", points(f"points of {part}", self.points, least=0, dimensions=(2, 3)))

@@ -2,24 +2,25 @@
 
 Nothing here knows elements, joints or ranks; call it on one rank.
 
-=================  ==================================================================
-``atomic``         files that appear complete or not at all
-``curve``          load–displacement curves as CSV and PNG
-``shapes``         what a picture of a mechanism is made of
-``outline``        the outline of a rigid link from its joints
-``plan``           the top of a tetrahedral mesh
-``picture``        mechanisms, deformed and not, one or several beside each other
-``design_shapes``  what a picture of a design is made of
-``designs``        links before and after an optimisation
-``summary``        the JSON summary of a demo and its schema
-``table``          tables for the console
-``progress``       progress lines of long runs
-``canvas``         the look of all figures, and PNG files
-``frame``          size and panels of a picture
-``design_frame``   size of a picture of a design, and where each link stands in it
-``labels``         labels beside what they name
-``arrays``         checked arrays of the records
-=================  ==================================================================
+==================  ==================================================================
+``atomic``          files that appear complete or not at all
+``curve``           load–displacement curves as CSV and PNG
+``work_precision``  error against time, with the Pareto front
+``shapes``          what a picture of a mechanism is made of
+``outline``         the outline of a rigid link from its joints
+``plan``            the top of a tetrahedral mesh
+``picture``         mechanisms, deformed and not, one or several beside each other
+``design_shapes``   what a picture of a design is made of
+``designs``         links before and after an optimisation
+``summary``         the JSON summary of a demo and its schema
+``table``           tables for the console
+``progress``        progress lines of long runs
+``canvas``          the look of all figures, and PNG files
+``frame``           size and panels of a picture
+``design_frame``    size of a picture of a design, and where each link stands in it
+``labels``          labels beside what they name
+``arrays``          checked arrays of the records
+==================  ==================================================================
 """
 
 from fenicsmech.report.atomic import atomic_write
@@ -34,6 +35,7 @@ from fenicsmech.report.progress import Progress, Silent
 from fenicsmech.report.shapes import Arrow, FlexibleShape, MechanismShape, Panel, Pin, RigidShape, Trace
 from fenicsmech.report.summary import check_summary, write_summary
 from fenicsmech.report.table import format_table
+from fenicsmech.report.work_precision import ErrorLevel, WorkSeries, pareto_front, plot_work_precision
 
 __all__ = [
     "PALETTE",
@@ -41,6 +43,7 @@ __all__ = [
     "CurveSeries",
     "CurveTarget",
     "DesignShape",
+    "ErrorLevel",
     "FlexibleShape",
     "LinkOutline",
     "MechanismShape",
@@ -51,14 +54,17 @@ __all__ = [
     "RigidShape",
     "Silent",
     "Trace",
+    "WorkSeries",
     "atomic_write",
     "check_summary",
     "draw_configurations",
     "draw_designs",
     "draw_mechanism",
     "format_table",
+    "pareto_front",
     "plan_view",
     "plot_curve",
+    "plot_work_precision",
     "read_curve_csv",
     "rigid_outline",
     "write_curve_csv",

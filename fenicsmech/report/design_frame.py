@@ -87,7 +87,8 @@ def lay_out_designs(
     if len(designs) > 1:
         rows = _Rows(designs, captions, scale)
         beside = rows.width + _GAP
-        scale = _scale(high - low, (_LARGEST[0], max(_LARGEST[1], rows.height)))
+        # as tall as the rows if that is wide enough, but not larger than them
+        scale = max(scale, min(_scale(high - low, (_LARGEST[0], max(_LARGEST[1], rows.height))), rows.scale))
     wide, tall = scale * (high - low) + 2.0 * _PADDING
     wide = max(wide, _SMALLEST, subtitle, max(heading, legend) - beside)
     tall = max(tall, _SMALLEST, rows.height if rows else 0.0)
@@ -126,7 +127,7 @@ class _Rows:
         self.scale = min((_DETAILS[0] - 2.0 * _SIDE) / self._sizes[:, 0].max(), _ZOOM * place_scale)
         self._fill()
         while self.height > _DETAILS[1] and self.scale > place_scale:
-            self.scale *= 0.95
+            self.scale = max(0.95 * self.scale, place_scale)
             self._fill()
 
     def _fill(self) -> None:

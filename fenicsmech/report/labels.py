@@ -62,7 +62,7 @@ class Labels:
         best = np.inf, np.zeros(2), spots[0], 0.0
         for order, spot in enumerate(spots):
             anchor = self._axes.transData.transform(spot.anchor)
-            reach = float(np.abs(spot.direction) @ half)  # the whole box lies beyond the anchor
+            reach = float(np.min(half / np.maximum(np.abs(spot.direction), 1e-9)))  # from its centre to its edge
             for gap in _GAPS:
                 centre = anchor + (reach + gap * self._point) * spot.direction
                 cost = self._cost(centre, half) + gap + _ORDER * order

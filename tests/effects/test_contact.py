@@ -60,7 +60,7 @@ def test_a_finger_closes_on_a_cylinder_and_penetrates_the_less_the_stiffer_it_is
         assert frame.stable
     # on a round obstacle the area of contact grows too: somewhat slower than 1 / κ
     assert 2.0 < depths[0] / depths[1] < 4.0
-    assert depths[-1] < 0.02
+    assert depths[-1] < 0.05
 
 
 @pytest.mark.parametrize("space", ["plane-stress", "3d"])
@@ -140,6 +140,7 @@ def test_descriptions_without_sense_are_refused():
     refused(lambda: Contact(base, floor, points=[(0, 0)]), part="'base'", problem="points only", remedy="stiffness=")
     refused(lambda: Contact(link, floor, points=[(0, 0)]), part="'link'", problem="anywhere", remedy="out")
     refused(lambda: Contact(link, floor, -1.0), part="stiffness", problem="not positive", remedy="greater")
+    refused(lambda: Contact("link", floor), part="contact", problem="is no link", remedy="rigid")
     refused(lambda: Contact(link, "floor"), part="'link'", problem="no obstacle", remedy="HalfPlane")
     refused(lambda: HalfPlane((0, 0), (0, 0)), part="normal", problem="zero length", remedy="somewhere")
     refused(lambda: Cylinder((0, 0, 0), 1.0), part="centre", problem="has not 2 coordinates", remedy="2 numbers")

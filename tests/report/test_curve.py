@@ -1,12 +1,29 @@
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 
 from fenicsmech.errors import DescriptionError
-from fenicsmech.report import CurveSeries, CurveTarget, plot_curve, read_curve_csv, write_curve_csv
+from fenicsmech.report import PALETTE, CurveSeries, CurveTarget, curve, plot_curve, read_curve_csv, write_curve_csv
 
 from .png import png_size, share_of_colour
 
 X = np.linspace(0.0, 20.0, 9)
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """The figures that are drawn from now on."""
+    figures = []
+    monkeypatch.setattr(curve, "save_png", lambda figure, path: figures.append(figure))
+    return figures
+
+
+def legend(figure):
+    """Colour of each entry by its label."""
+    shown = figure.axes[0].get_legend()
+    labels = [text.get_text() for text in shown.get_texts()]
+    assert len(set(labels)) == len(labels)
+    return {label: line.get_markeredgecolor() for label, line in zip(labels, shown.get_lines(), strict=True)}
 
 
 def test_columns_survive_the_round_trip_to_the_last_digit(tmp_path):
@@ -89,6 +106,44 @@ def test_the_unstable_part_is_dashed(tmp_path):
     for name, stable in (("solid.png", X >= 0), ("dashed.png", X < 5)):
         plot_curve(tmp_path / name, [CurveSeries(X, X, stable=stable)])
     assert 0.0 < share_of_colour(tmp_path / "dashed.png", blue) < 0.9 * share_of_colour(tmp_path / "solid.png", blue)
+
+
+def test_a_faint_curve_is_thinner_lighter_and_behind_the_others(tmp_path):
+    blue, faint = (33, 102, 172), (155, 186, 218)
+    orders = {"strong": ["strong"], "faint": ["faint"], "both": ["faint", "strong"], "turned": ["strong", "faint"]}
+    for name, order in orders.items():
+        series = [CurveSeries(X, X, colour="#2166ac", faint=kind == "faint") for kind in order]
+        plot_curve(tmp_path / f"{name}.png", series)
+    share = {name: share_of_colour(tmp_path / f"{name}.png", blue) for name in orders}
+    assert share["faint"] == 0.0
+    assert share["both"] == share["turned"] == pytest.approx(share["strong"], rel=0.02)
+    assert 0.0 < share_of_colour(tmp_path / "faint.png", faint) < 0.9 * share["strong"]
+
+
+def test_the_legend_names_what_several_curves_share_once_and_in_grey(tmp_path, drawn):
+    blue, orange, grey = PALETTE[0], PALETTE[1], "#777777"
+    series = [
+        CurveSeries(X, X, "initial design", colour=blue, faint=True),
+        CurveSeries(X, 2 * X, "initial design", colour=orange, faint=True),
+        CurveSeries(X, X / 2, "crank 45 deg", colour=blue),
+        CurveSeries(X, X / 3, "crank 95 deg", colour=orange),
+    ]
+    plot_curve(tmp_path / "a.png", series, targets=[CurveTarget(5, 2, blue), CurveTarget(5, 3, orange)])
+    plot_curve(tmp_path / "b.png", series[::2], targets=[CurveTarget(5, 2, blue), CurveTarget(9, 3, blue)])
+    several, one = (legend(figure) for figure in drawn)
+    assert list(several) == ["initial design", "crank 45 deg", "crank 95 deg", "target"]
+    assert several["crank 45 deg"] == blue and several["crank 95 deg"] == orange and several["target"] == grey
+    red, green, light = to_rgb(several["initial design"])
+    assert red == green == light > to_rgb(grey)[0]
+    assert one["target"] == blue and list(one) == ["initial design", "crank 45 deg", "target"]
+
+
+def test_targets_at_the_same_place_are_all_seen(tmp_path):
+    colours = PALETTE[:3]
+    plot_curve(tmp_path / "targets.png", [CurveSeries(X, X)], targets=[CurveTarget(5, 2, c) for c in colours[::-1]])
+    for colour in colours[1:]:
+        wanted = tuple(round(255 * c) for c in to_rgb(colour))
+        assert share_of_colour(tmp_path / "targets.png", wanted) > 1e-4
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 500])

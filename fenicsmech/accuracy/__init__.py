@@ -1,0 +1,33 @@
+"""What accuracy costs in time.
+
+- ``rung``: a fidelity, and the ladder of them for a scene
+- ``quantity``: what is looked at: a number read from one equilibrium
+- ``measurement``: value and seconds of a rung
+- ``extrapolation``: the limit of a sequence of meshes, and how well it is known
+- ``error_split``: modelling, discretisation and algebraic error
+- ``study``: the ladder run, the reference found, every rung beside it
+- ``files``: table and plot of a study
+"""
+
+from fenicsmech.accuracy.error_split import ErrorSplit
+from fenicsmech.accuracy.extrapolation import Limit, extrapolate
+from fenicsmech.accuracy.files import save_study
+from fenicsmech.accuracy.measurement import Measurement
+from fenicsmech.accuracy.quantity import Displacement, Quantity
+from fenicsmech.accuracy.rung import RIGID, Rung, ladder
+from fenicsmech.accuracy.study import Study, run_study
+
+__all__ = [
+    "RIGID",
+    "Displacement",
+    "ErrorSplit",
+    "Limit",
+    "Measurement",
+    "Quantity",
+    "Rung",
+    "Study",
+    "extrapolate",
+    "ladder",
+    "run_study",
+    "save_study",
+]

@@ -1,0 +1,125 @@
+"""A rung: one fidelity at which a scene can be computed; and the ladder of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from fenicsmech.elasticity import PLANE_STRAIN, PLANE_STRESS, SPATIAL, ElasticModel, Quadrature
+from fenicsmech.equilibrium import NewtonOptions
+from fenicsmech.errors import DescriptionError
+from fenicsmech.mechanism import Scene, validate
+
+TOLERANCE = NewtonOptions().tolerance
+"""Newton's tolerance unless a rung says otherwise."""
+
+_PLANAR_SIZES = MappingProxyType({order: (4.0, 2.0, 1.0, 0.5, 0.25) for order in (1, 2)})
+_SPATIAL_SIZES = MappingProxyType({order: (4.0, 2.0, 1.0, 0.5) for order in (1, 2, 3)})
+_QUADRATURES = (2, 3, 4, 5, 6)
+_TOLERANCES = (1e-4, 1e-6, 1e-8)
+_VARIED_ORDER = 2  # whose quadrature and tolerance are varied, at the base size
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One fidelity.
+
+    Attributes:
+        model: 3D, plane strain or plane stress; None: every link is rigid.
+        order: degree of the displacement field.
+        factor: element size over the base size of the study.
+        quadrature: degree; None: the default of model and order.
+        tolerance: of Newton's residual over the forces that balance in it.
+    """
+
+    model: ElasticModel | None
+    order: int = 2
+    factor: float = 1.0
+    quadrature: int | None = None
+    tolerance: float = TOLERANCE
+
+    @property
+    def model_name(self) -> str:
+        """The model as tables name it."""
+        return "rigid" if self.model is None else self.model.name.replace("-", " ").replace("3d", "3D")
+
+    @property
+    def name(self) -> str:
+        """What sets the rung apart, as "3D P2 h×0.5, degree 5"."""
+        if self.model is None:
+            return "rigid"
+        words = [f"{self.model_name} P{self.order} h×{self.factor:g}"]
+        if self.quadrature is not None:
+            words.append(f"degree {self.quadrature}")
+        if self.tolerance != TOLERANCE:
+            words.append(f"tol {self.tolerance:.0e}".replace("e-0", "e-"))
+        return ", ".join(words)
+
+    @property
+    def is_variant(self) -> bool:
+        """Whether quadrature or tolerance differ from the defaults."""
+        return self.quadrature is not None or self.tolerance != TOLERANCE
+
+
+RIGID = Rung(None)
+"""Rigid kinematics: nothing bends."""
+
+
+def ladder(
+    scene: Scene,
+    *,
+    planar: Mapping[int, Sequence[float]] = _PLANAR_SIZES,
+    spatial: Mapping[int, Sequence[float]] = _SPATIAL_SIZES,
+    quadratures: Sequence[int] = _QUADRATURES,
+    tolerances: Sequence[float] = _TOLERANCES,
+) -> list[Rung]:
+    """The rungs for ``scene``, each family from coarse to fine: rigid, plane strain and stress, 3D.
+
+    Planar models are left out where the scene has no form in the plane. Quadrature and tolerance are varied for
+    order 2 at the base size, in plane stress and in 3D.
+
+    Args:
+        scene: what is to be computed.
+        planar: size factors of every order in the plane.
+        spatial: the same in space.
+        quadratures: degrees beside the default one.
+        tolerances: of Newton's method beside the default one.
+
+    Raises:
+        DescriptionError: the scene cannot be simulated in space.
+    """
+    rungs = [RIGID]
+    _check(scene, SPATIAL)
+    for model, sizes in ((PLANE_STRAIN, planar), (PLANE_STRESS, planar), (SPATIAL, spatial)):
+        if model is not SPATIAL and not _fits(scene, model):
+            continue
+        for order, factors in sizes.items():
+            rungs += [Rung(model, order, factor) for factor in sorted(factors, reverse=True)]
+        if model is not PLANE_STRAIN and 1.0 in sizes.get(_VARIED_ORDER, ()):
+            default = Quadrature.for_order(_VARIED_ORDER, model.dim).degree
+            rungs += [Rung(model, _VARIED_ORDER, quadrature=degree) for degree in quadratures if degree != default]
+            rungs += [Rung(model, _VARIED_ORDER, tolerance=value) for value in tolerances if value != TOLERANCE]
+    return rungs
+
+
+def _fits(scene: Scene, model: ElasticModel) -> bool:
+    """Whether ``scene`` can be simulated in ``model``."""
+    try:
+        _check(scene, model)
+    except DescriptionError:
+        return False
+    return True
+
+
+def _check(scene: Scene, model: ElasticModel) -> None:
+    """Refuses a scene that has no form in ``model``.
+
+    Raises:
+        DescriptionError: it has none.
+    """
+    validate(scene.mechanism, model.dim)
+    for link in scene.mechanism.flexible_links:
+        model.check(link.name, link.material)
+    for effect in scene.effects:
+        effect.check(scene.mechanism, model.dim)
