@@ -28,6 +28,7 @@ from fenicsmech.effects import (
     JointSpring,
     Mass,
     Pressure,
+    Prestrain,
 )
 from fenicsmech.errors import AssemblyError, DescriptionError, EquilibriumError, FenicsmechError, MeshingError
 from fenicsmech.mechanism import (
@@ -107,6 +108,7 @@ __all__ = [
     "JointCompliance",
     "JointSpring",
     "Pressure",
+    "Prestrain",
     "PinFriction",
     "friction_band",
 ]

@@ -6,6 +6,7 @@
 - ``joint_spring``: springs in revolute and prismatic joints
 - ``joint_compliance``: pins that give way
 - ``pressure``: of a fluid on the boundary of a link
+- ``prestrain``: links that would be longer or shorter than drawn
 - ``contact``: frictionless contact with ``obstacles``; ``contact_gauge`` measures it
 
 An effect that a scene does not list costs nothing: no form, no unknown, no entry of a matrix.
@@ -19,7 +20,8 @@ from fenicsmech.effects.joint_compliance import JointCompliance
 from fenicsmech.effects.joint_spring import JointSpring
 from fenicsmech.effects.obstacles import Cylinder, HalfPlane, Obstacle
 from fenicsmech.effects.pressure import Pressure
-from fenicsmech.effects.protocol import BodyEffect, JointSoftening, LinkEffect, LinkFields, PosePotential
+from fenicsmech.effects.prestrain import Prestrain
+from fenicsmech.effects.protocol import BodyEffect, JointSoftening, LinkEffect, LinkFields, PosePotential, RestStretch
 
 __all__ = [
     "BodyEffect",
@@ -38,5 +40,7 @@ __all__ = [
     "Obstacle",
     "PosePotential",
     "Pressure",
+    "Prestrain",
+    "RestStretch",
     "find_boundaries",
 ]

@@ -17,6 +17,7 @@ import ufl
 from dolfinx import fem
 
 from fenicsmech.effects.faces import Boundary, Faces, cofactor
+from fenicsmech.elasticity import ElasticModel, Stretch
 from fenicsmech.linkage import Linkage
 from fenicsmech.mechanism import FlexibleLink
 from fenicsmech.mechanism.effect import Effect
@@ -142,3 +143,15 @@ class JointSoftening(Effect):
     @abstractmethod
     def compliances(self, linkage: Linkage) -> Mapping[int, float]:
         """c ≥ 0 of the rows of ``linkage.joints`` concerned; those of several effects add up."""
+
+
+class RestStretch(Effect):
+    """An effect by which links without strain are longer or shorter than drawn."""
+
+    @abstractmethod
+    def stretches(self, model: ElasticModel) -> Mapping[FlexibleLink, Stretch]:
+        """The stretch of each link concerned.
+
+        Raises:
+            DescriptionError: it makes no sense in ``model``.
+        """

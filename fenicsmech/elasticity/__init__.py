@@ -5,11 +5,13 @@
 - ``remainders``: the nonlinear remainders of logarithms and roots, free of cancellation
 - ``energies``: one strain energy density per material law
 - ``transverse``: the stretch out of the plane in plane stress, per material law
+- ``growth``: links whose strain-free state is not the drawn one
 - ``body``: energy, residual, tangent and stress of all links
 """
 
 from fenicsmech.elasticity.body import ElasticBody, Quadrature
 from fenicsmech.elasticity.energies import density
+from fenicsmech.elasticity.growth import Stretch
 from fenicsmech.elasticity.models import PLANE_STRAIN, PLANE_STRESS, SPATIAL, ElasticModel
 from fenicsmech.elasticity.strain import Moduli, Strain
 
@@ -22,5 +24,6 @@ __all__ = [
     "Moduli",
     "Quadrature",
     "Strain",
+    "Stretch",
     "density",
 ]

@@ -28,6 +28,7 @@ from fenicsmech.compat import (
     vector_space,
 )
 from fenicsmech.elasticity.energies import density
+from fenicsmech.elasticity.growth import UNSTRETCHED, Growth, Stretch
 from fenicsmech.elasticity.models import ElasticModel
 from fenicsmech.elasticity.strain import Moduli
 from fenicsmech.elasticity.stress import cauchy_stress, von_mises
@@ -59,6 +60,7 @@ class ElasticBody:
         order: degree of the displacement field.
         quadrature: explicit degree; never UFL's estimate.
         effects: energies beside the elastic one, as functions of this body; none costs nothing.
+        stretches: of the strain-free state of each link, None where it is as drawn; none costs nothing.
 
     Attributes:
         u: displacement field, vector P_order.
@@ -80,6 +82,7 @@ class ElasticBody:
         order: int,
         quadrature: Quadrature,
         effects: Sequence[Callable[[ElasticBody], ufl.Form | None]] = (),
+        stretches: Sequence[Stretch | None] = (),
     ) -> None:
         self.mesh, self.model, self.order = mesh, model, order
         self.u = fem.Function(vector_space(mesh, order), name="displacement")
@@ -95,6 +98,10 @@ class ElasticBody:
         measure = ufl.Measure("dx", domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": quadrature.degree})
         self.dx = measure
         self.share = fem.Constant(mesh, PETSc.ScalarType(1.0))
+        self._growth = None
+        if any(stretches):
+            known = [stretch or UNSTRETCHED for stretch in stretches]
+            self._growth = Growth(known, self.cellwise, free=free, dim=model.dim, share=self.share)
         self._terms = [(law, measure(tag)) for tag, law in enumerate(laws)]
         self._law_cells = [np.flatnonzero(law_of_cell == tag).astype(np.int32) for tag in range(len(laws))]
 
@@ -115,6 +122,8 @@ class ElasticBody:
     def _strain_ufl(self) -> ufl.Form:
         thick = self._depth if self.model.dim == 2 else 1.0
         volume = ufl.det(self._design_gradient) * thick
+        if self._growth is not None:
+            volume *= self._growth.volume
         terms = [self._density(law) * volume * dx for law, dx in self._terms]
         return sum(terms[1:], start=terms[0])
 
@@ -147,13 +156,16 @@ class ElasticBody:
     def curvature(self, A, B, *, degree: int) -> ufl.Form:
         """∫ A : ∂²W/∂F∂F : B dV at the present displacement, for gradients A, B on the rest shape."""
         i, j, k, m = ufl.indices(4)
-        H = ufl.variable(self._strain)
-        thick = self._depth if self.model.dim == 2 else 1.0
+        H = ufl.variable(self.gradient(self.u))
+        elastic = H if self._growth is None else self._growth.elastic(H)
+        scale = self._depth if self.model.dim == 2 else 1.0
+        if self._growth is not None:
+            scale *= self._growth.volume
         terms = []
         for law, dx in self._terms:
-            density_ = density(law, self.model.strain(law, H, self._moduli), self._moduli)
+            density_ = density(law, self.model.strain(law, elastic, self._moduli), self._moduli)
             C = ufl.diff(ufl.diff(density_, H), H)
-            product = A[i, j] * C[i, j, k, m] * B[k, m] * ufl.det(self._design_gradient) * thick
+            product = A[i, j] * C[i, j, k, m] * B[k, m] * ufl.det(self._design_gradient) * scale
             terms.append(product * dx(metadata={"quadrature_degree": degree}))
         return sum(terms[1:], start=terms[0])
 
@@ -166,9 +178,14 @@ class ElasticBody:
         form = self.energy_form if self.effects_ufl is None else self._strain_form
         return float(self.mesh.comm.allreduce(fem.assemble_scalar(form)))
 
-    def effects_residual(self, vector: PETSc.Vec) -> None:
-        """Assembles the derivative of the effects' energy by u into the ghosted ``vector`` (collective)."""
-        self._assemble(self._effects_form, vector)
+    @property
+    def shares(self) -> bool:
+        """Whether the energy depends on the share."""
+        return self.effects_ufl is not None or self._growth is not None
+
+    def share_residual(self, vector: PETSc.Vec) -> None:
+        """Assembles the derivative of the residual by the share into the ghosted ``vector`` (collective)."""
+        self._assemble(self._share_form, vector)
 
     def residual(self, vector: PETSc.Vec) -> None:
         """Assembles ∂E/∂u into the ghosted ``vector`` (collective)."""
@@ -231,7 +248,9 @@ class ElasticBody:
     def _carrying(self) -> fem.Expression:
         """H δ at the nodes of u."""
         V = self.u.function_space
-        return compile_expression(ufl.dot(self._strain, self._change), V.element.interpolation_points(), self.mesh.comm)
+        return compile_expression(
+            ufl.dot(self.gradient(self.u), self._change), V.element.interpolation_points(), self.mesh.comm
+        )
 
     @property
     def _moduli(self) -> Moduli:
@@ -244,8 +263,9 @@ class ElasticBody:
 
     @property
     def _strain(self):
-        """H of the displacement."""
-        return self.gradient(self.u)
+        """H of the displacement; its elastic part where links have grown."""
+        H = self.gradient(self.u)
+        return H if self._growth is None else self._growth.elastic(H)
 
     def _density(self, law: EnergyLaw):
         return density(law, self.model.strain(law, self._strain, self._moduli), self._moduli)
@@ -255,8 +275,11 @@ class ElasticBody:
         return compile_form(self._strain_ufl)
 
     @cached_property
-    def _effects_form(self):
-        return compile_form(ufl.derivative(self.effects_ufl, self.u))
+    def _share_form(self):
+        terms = [self.effects_ufl] if self.effects_ufl is not None else []
+        if self._growth is not None:
+            terms.append(ufl.diff(self._strain_ufl, self._growth.share))
+        return compile_form(ufl.derivative(sum(terms[1:], start=terms[0]), self.u))
 
     def _assemble(self, form, vector: PETSc.Vec) -> None:
         with vector.localForm() as local:

@@ -245,8 +245,8 @@ class EquilibriumSystem:
         for load, magnitude in self.loads:
             self._add_load(load, magnitude, state, nodal, extras)
         extras[self.layout.z] -= self._potentials.rate(state)
-        if self.elastic.effects_ufl is not None:
-            self.elastic.effects_residual(self._nodal)
+        if self.elastic.shares:
+            self.elastic.share_residual(self._nodal)
             nodal -= self._nodal.array_r[: self.layout.owned]
         return self._right_hand_side(nodal, extras)
 

@@ -14,10 +14,10 @@ from mpi4py import MPI
 from fenicsmech.bodies import DesignAtNodes, InterfaceMap, MaterialPoint, body_point, link_point
 from fenicsmech.clock import Clock
 from fenicsmech.compat import petsc_vector
-from fenicsmech.effects import BodyEffect, JointSoftening, LinkEffect, LinkFields, find_boundaries
-from fenicsmech.elasticity import ElasticBody, ElasticModel, Quadrature
+from fenicsmech.effects import BodyEffect, JointSoftening, LinkEffect, LinkFields, RestStretch, find_boundaries
+from fenicsmech.elasticity import ElasticBody, ElasticModel, Quadrature, Stretch
 from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State
-from fenicsmech.errors import FenicsmechError
+from fenicsmech.errors import DescriptionError, FenicsmechError
 from fenicsmech.linkage import Linkage
 from fenicsmech.mechanism import Effect, FlexibleLink, Force, Mechanism, Output
 from fenicsmech.mechanism.places import in_dimension
@@ -119,6 +119,7 @@ class MechanismModel:
             order=fidelity.order,
             quadrature=fidelity.quadrature,
             effects=[partial(self._link_energy, effect) for effect in link_effects],
+            stretches=_stretches(links, fidelity.model, effects),
         )
         self._potentials = [
             potential
@@ -254,3 +255,19 @@ class MechanismModel:
         for cell, link in enumerate(self.mesh.link):
             owner[V.dofmap.cell_dofs(cell)] = link
         return owner
+
+
+def _stretches(links: Sequence[FlexibleLink], model: ElasticModel, effects: Sequence[Effect]) -> list[Stretch | None]:
+    """The stretch of the strain-free state of each link.
+
+    Raises:
+        DescriptionError: a link has two.
+    """
+    found: dict[FlexibleLink, Stretch] = {}
+    for effect in effects:
+        if isinstance(effect, RestStretch):
+            for link, stretch in effect.stretches(model).items():
+                if link in found:
+                    raise DescriptionError(f"link {link.name!r}", "it is prestrained twice", "Leave one out")
+                found[link] = stretch
+    return [found.get(link) for link in links]
