@@ -26,7 +26,8 @@ from fenicsmech.errors import DescriptionError
 FORMAL_ORDER = 2.0
 """Highest order that is trusted: cells have straight sides, so pins and curved links are resolved as h²."""
 
-_LEAST_ORDER, _LARGEST_ORDER = 0.5, 12.0
+_LEAST_ORDER, _LARGEST_ORDER = 0.5, 6.0  # of sequences taken for even: displacements of P3 converge with 2·3 at best
+_SEARCHED = 12.0  # highest order that is looked for
 _SAFETY, _DOUBT = 1.25, 3.0  # on the correction of an even sequence; on anything else
 _APART = 1.2  # least ratio of sizes between meshes that are compared
 
@@ -51,10 +52,11 @@ class Limit:
 def extrapolate(sizes: Sequence[float], values: Sequence[float], *, formal: float = FORMAL_ORDER) -> Limit | None:
     """The limit of ``values`` as the element size goes to zero.
 
-    The three finest meshes count whose sizes are at least a fifth apart. An even sequence, whose order is at least a
-    half, is extrapolated with that order, ``formal`` at most, and the uncertainty is 1.25 times the correction. Two
-    meshes are extrapolated with ``formal``, and three times the correction. Values that oscillate or do not settle
-    are not extrapolated: the limit is the finest one, and the uncertainty three times the largest change.
+    The three finest meshes count whose sizes are at least a fifth apart. An even sequence, whose order is between a
+    half and 6, is extrapolated with that order, ``formal`` at most, and the uncertainty is 1.25 times the correction.
+    Two meshes are extrapolated with ``formal``, and three times the correction. Other values are not extrapolated:
+    the limit is the finest one, and the uncertainty three times the last change if they seem to settle faster than
+    any element does, three times the largest change if they oscillate or do not settle.
 
     Args:
         sizes: element sizes in any unit and order, (n,).
@@ -85,6 +87,8 @@ def extrapolate(sizes: Sequence[float], values: Sequence[float], *, formal: floa
     order = _observed_order(h, f)
     if order is None or order < _LEAST_ORDER:
         return Limit(float(f[0]), _DOUBT * float(np.abs(np.diff(f)).max()), order, 3)
+    if order > _LARGEST_ORDER:
+        return Limit(float(f[0]), _DOUBT * float(abs(f[1] - f[0])), order, 3)
     correction = _correction(h, f, min(order, formal))
     return Limit(float(f[0] + correction), _SAFETY * abs(correction), order, 3)
 
@@ -106,4 +110,4 @@ def _observed_order(h: np.ndarray, f: np.ndarray) -> float | None:
     lowest = 1e-3
     if excess(lowest) >= 0.0:
         return None
-    return _LARGEST_ORDER if excess(_LARGEST_ORDER) <= 0.0 else float(brentq(excess, lowest, _LARGEST_ORDER))
+    return _SEARCHED if excess(_SEARCHED) <= 0.0 else float(brentq(excess, lowest, _SEARCHED))

@@ -11,14 +11,14 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from fenicsmech.accuracy.quantity import Quantity
-from fenicsmech.accuracy.rung import Rung
+from fenicsmech.accuracy.rung import RIGID, Rung
 from fenicsmech.elasticity import Quadrature
 from fenicsmech.equilibrium import NewtonOptions
 from fenicsmech.errors import FenicsmechError
 from fenicsmech.linkage import assemble, build_linkage
 from fenicsmech.mechanism import FlexibleLink, Scene
 from fenicsmech.simulation import Simulation
-from fenicsmech.simulation.request import read_request
+from fenicsmech.simulation.request import CurveRequest, read_request
 
 _SAMPLES = (0.2, 0.4, 0.6, 0.8, 1.0)  # of the load: evenly, as predictors like it
 _ENOUGH = 5.0  # s: a curve that takes as long is not noise
@@ -81,16 +81,28 @@ def measure(
 
 
 def _measure_rigid(scene: Scene, quantity: Quantity, repeats: int) -> Measurement:
-    """Rigid kinematics in space: the configuration assembled."""
+    """Rigid kinematics in space: the curve is the way to the configuration; a frame finds that nothing has moved."""
     linkage = build_linkage(scene.mechanism, 3)
-    seconds = []
+    joints = linkage.rigid
+    motors = joints.motor_values(quantity.configuration.position)
+    ways, frames = [], []
     for _ in range(repeats):
         start = perf_counter()
-        assemble(linkage, quantity.configuration)
-        seconds.append(perf_counter() - start)
-    typical = median(seconds)
-    unknowns = len(linkage.bodies) * linkage.joints.space.pose_size
-    return Measurement(Rung(None), quantity.rigid_value, typical, typical, 0.0, unknowns, iterations=0, repeats=repeats)
+        poses = assemble(linkage, quantity.configuration).poses
+        there = perf_counter()
+        joints.value(poses, motors)
+        frames.append(perf_counter() - there)
+        ways.append(perf_counter() - start)
+    return Measurement(
+        RIGID,
+        value=quantity.rigid_value,
+        frame_seconds=median(frames),
+        curve_seconds=median(ways),
+        setup_seconds=0.0,
+        unknowns=len(linkage.bodies) * joints.space.pose_size,
+        iterations=0,
+        repeats=repeats,
+    )
 
 
 def _measure_elastic(
@@ -132,7 +144,7 @@ def _measure_elastic(
     )
 
 
-def _request(scene: Scene, quantity: Quantity, shares: tuple[float, ...]):
+def _request(scene: Scene, quantity: Quantity, shares: tuple[float, ...]) -> CurveRequest:
     """The curve through shares of the quantity's load."""
     return read_request(
         scene.mechanism,

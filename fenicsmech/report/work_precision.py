@@ -136,10 +136,10 @@ def plot_work_precision(
         figure.set_layout_engine("none")
         labels = Labels(axes, _obstacles(axes, series, floor, front))
         if floor > 0.0:
-            _label_line(axes, labels, f"reference known to ±{100.0 * floor:.2g} %", floor, -1.0, _MUTED)
+            _label_line(axes, labels, f"reference known to ±{100.0 * floor:.2g} %", floor, (-1.0,), _MUTED)
         for level in levels:
             text = f"modelling error of {level.model}: {100.0 * level.error:.2g} %"
-            _label_line(axes, labels, text, level.error, 1.0, colours.get(level.model, INK))
+            _label_line(axes, labels, text, level.error, (1.0, -1.0), colours.get(level.model, INK))
         for x, y, name, model in front:
             spots = [Spot(np.array([x, y]), np.array(d) / np.hypot(*d)) for d in _DIRECTIONS]
             labels.add(name, spots, leader=True, color=colours[model], fontsize=8.5, fontweight="bold")
@@ -213,13 +213,13 @@ def _obstacles(
     return squares + [np.vstack([line, line[::-1]]) for line in (*joined, stairs)]  # there and back: no area
 
 
-def _label_line(axes: Axes, labels: Labels, text: str, error: float, side: float, colour: str) -> None:
+def _label_line(axes: Axes, labels: Labels, text: str, error: float, sides: Sequence[float], colour: str) -> None:
     """Writes ``text`` along a level, above (1) or below (−1) it, at the left end if there is room."""
     low, high = axes.get_xlim()
     width, _ = text_size(text, fontsize=_SMALL)
     half = 0.5 * width / (axes.get_position().width * axes.figure.get_figwidth()) + 0.01
-    shares = (half, 1.0 - half, 0.5)
-    spots = [Spot(np.array([low * (high / low) ** share, error]), np.array([0.0, side])) for share in shares]
+    places = [np.array([low * (high / low) ** share, error]) for share in (half, 1.0 - half, 0.5)]
+    spots = [Spot(place, np.array([0.0, side])) for place in places for side in sides]
     labels.add(text, spots, color=colour, fontsize=_SMALL)
 
 

@@ -37,6 +37,13 @@ def test_a_sequence_that_does_not_settle_is_not_extrapolated(values):
     assert limit.uncertainty >= 3.0 * 0.2 - 1e-12
 
 
+def test_values_that_settle_faster_than_any_element_does_are_taken_as_they_are():
+    limit = extrapolate([1.0, 2.0, 4.0], [11.91, 11.905, 11.794 - 1.0])
+    assert limit.value == 11.91
+    assert limit.order > 6.0
+    assert limit.uncertainty == pytest.approx(3.0 * 0.005)
+
+
 def test_two_meshes_give_a_doubtful_limit_and_one_gives_none():
     limit = extrapolate([1.0, 2.0], [2.0 + 0.1, 2.0 + 0.4])
     assert limit.value == pytest.approx(2.0)
