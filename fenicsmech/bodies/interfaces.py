@@ -1,4 +1,4 @@
-"""Interface nodes as functions of body poses: u_i = t + (R − I)(X_i − c), X_i = X₀_i + d_i.
+"""Interface nodes as functions of body poses: u_i = t + (R − I)(X_i − c), X_i the node at rest.
 
 All nodes of the cells in an interface are eliminated from the unknowns; each follows the pose of its body.
 """
@@ -18,6 +18,7 @@ class InterfaceMap:
 
     Args:
         u: displacement field.
+        drawn: positions of its local nodes, (nodes, dim).
         cell_body: index of the body each local cell belongs to, −1 if it is free, (cells,).
         centres: reference centre of every body, (bodies, dim).
         space: rigid-body coordinates.
@@ -29,7 +30,9 @@ class InterfaceMap:
         offsets: X_i − c of these nodes.
     """
 
-    def __init__(self, u: fem.Function, cell_body: np.ndarray, centres: np.ndarray, space: RigidSpace) -> None:
+    def __init__(
+        self, u: fem.Function, drawn: np.ndarray, cell_body: np.ndarray, centres: np.ndarray, space: RigidSpace
+    ) -> None:
         self.space, self._u = space, u
         V = u.function_space
         self.block = V.dofmap.index_map_bs
@@ -37,12 +40,11 @@ class InterfaceMap:
         self.body = self._mark_nodes(cell_body)
         bodies = np.unique(self.body[self.body >= 0])
         self.nodes = {int(b): np.flatnonzero(self.body == b) for b in bodies}
-        positions = V.tabulate_dof_coordinates()[:, : self.block]
-        self._drawn = {b: positions[nodes] - centres[b] for b, nodes in self.nodes.items()}
+        self._drawn = {b: drawn[nodes] - centres[b] for b, nodes in self.nodes.items()}
         self.offsets = dict(self._drawn)
 
     def reshape(self, design: np.ndarray) -> None:
-        """Takes the design at all local nodes, (nodes, dim): offsets become X₀ + d − c."""
+        """Takes the design at all local nodes, (nodes, dim): added to the drawn positions."""
         self.offsets = {b: self._drawn[b] + design[nodes] for b, nodes in self.nodes.items()}
 
     def _mark_nodes(self, cell_body: np.ndarray) -> np.ndarray:

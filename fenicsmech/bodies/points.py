@@ -8,12 +8,15 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from dolfinx import fem
 
 from fenicsmech.errors import DescriptionError
 from fenicsmech.kinematics import RigidSpace
+
+_CORRECTIONS = 20  # of a point's place in curved cells; each gains a digit
 
 
 class MaterialPoint(ABC):
@@ -74,7 +77,9 @@ def body_point(position: np.ndarray, body: int, centre: np.ndarray, space: Rigid
     return BodyPoint(body, np.asarray(position) - np.asarray(centre), space)
 
 
-def link_point(part: str, position: np.ndarray, u: fem.Function, cells: np.ndarray, vertices: np.ndarray) -> LinkPoint:
+def link_point(
+    part: str, position: np.ndarray, u: fem.Function, cells: np.ndarray, vertices: np.ndarray, bulges: np.ndarray
+) -> LinkPoint:
     """The point drawn at ``position`` on a flexible link (collective).
 
     Args:
@@ -83,6 +88,7 @@ def link_point(part: str, position: np.ndarray, u: fem.Function, cells: np.ndarr
         u: displacement field; its order fixes the interpolation.
         cells: owned cells of the link on this rank.
         vertices: their corner coordinates, (cells, dim + 1, dim).
+        bulges: of their edges, pairs of corners in lexical order, (cells, pairs, dim).
 
     Raises:
         DescriptionError: the point lies outside the link by more than a hundredth of a cell.
@@ -91,9 +97,7 @@ def link_point(part: str, position: np.ndarray, u: fem.Function, cells: np.ndarr
     dim = len(position)
     best = (-np.inf, comm.rank, 0, np.zeros(dim + 1))
     if len(cells):
-        edges = vertices[:, 1:] - vertices[:, :1]
-        rest = np.linalg.solve(edges.transpose(0, 2, 1), (position - vertices[:, 0])[..., None])[..., 0]
-        barycentric = np.column_stack([1.0 - rest.sum(axis=1), rest])
+        barycentric = _barycentric(position, vertices, bulges)
         inside = barycentric.min(axis=1)
         winner = int(np.argmax(inside))
         best = (float(inside[winner]), comm.rank, int(cells[winner]), barycentric[winner])
@@ -114,6 +118,20 @@ def link_point(part: str, position: np.ndarray, u: fem.Function, cells: np.ndarr
     global_nodes, weights = comm.bcast(found, root=owner)
     local = nodes if comm.rank == owner else np.zeros(0, dtype=np.int32)
     return LinkPoint(owner, local, global_nodes, weights)
+
+
+def _barycentric(position: np.ndarray, vertices: np.ndarray, bulges: np.ndarray) -> np.ndarray:
+    """Barycentric coordinates λ of ``position`` in each cell, X₀(λ) + c(λ) = position, (cells, dim + 1)."""
+    inverse = np.linalg.inv((vertices[:, 1:] - vertices[:, :1]).transpose(0, 2, 1))
+    i, j = np.transpose(list(combinations(range(vertices.shape[1]), 2)))
+    straight, target = None, np.broadcast_to(position, (len(vertices), len(position)))
+    for _ in range(_CORRECTIONS if bulges.any() else 1):
+        rest = np.einsum("kij,kj->ki", inverse, target - vertices[:, 0])
+        straight = np.column_stack([1.0 - rest.sum(axis=1), rest])
+        # far outside a cell its bulge means nothing
+        within = np.clip(straight, 0.0, 1.0)
+        target = position - np.einsum("ke,ked->kd", 4.0 * within[:, i] * within[:, j], bulges)
+    return straight
 
 
 def _lagrange(at: np.ndarray, nodes: np.ndarray, corners: np.ndarray) -> np.ndarray:

@@ -29,8 +29,6 @@ class ContactGauge:
         facets = fields.boundaries[Faces(contact.link)].facets
         V = fields.u.function_space
         self._nodes = fem.locate_dofs_topological(V, fields.dim - 1, facets)
-        self._drawn = V.tabulate_dof_coordinates()[self._nodes, : fields.dim]
-        self._design = fem.Function(V)
 
     def force(self) -> np.ndarray:
         """What the obstacle exerts on the link, (dim,) (collective)."""
@@ -45,7 +43,6 @@ class ContactGauge:
     def gap(self) -> float:
         """The smallest gap at nodes of the link's boundary; where negative, the largest penetration (collective)."""
         fields = self._fields
-        self._design.interpolate(fields.d)
-        moved = (fields.u.x.array + self._design.x.array).reshape(-1, fields.dim)[self._nodes]
-        gaps = self._obstacle.gap(self._drawn + moved)
+        moved = fields.rest_nodes() + fields.u.x.array.reshape(-1, fields.dim)
+        gaps = self._obstacle.gap(moved[self._nodes])
         return fields.mesh.comm.allreduce(float(gaps.min(initial=np.inf)), op=MPI.MIN)

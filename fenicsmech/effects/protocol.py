@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import ufl
 from dolfinx import fem
+from ufl.core.expr import Expr
 
 from fenicsmech.effects.faces import Boundary, Faces, cofactor
 from fenicsmech.elasticity import ElasticModel, Stretch
@@ -29,7 +30,10 @@ class LinkFields:
 
     Attributes:
         links: all flexible links.
-        u, d: displacement and design field.
+        u: displacement field.
+        rest: X, where material points are at rest, symbolic.
+        rest_gradient: ∇X on the reference mesh, symbolic.
+        rest_nodes: X at this rank's nodes of u now, ghosts last, (nodes, dim).
         dx: ufl measure of all cells, interfaces included, on the reference mesh.
         order: degree of u.
         cellwise: makes a field with one value per cell from one value per link, (links,).
@@ -38,7 +42,9 @@ class LinkFields:
 
     links: tuple[FlexibleLink, ...]
     u: fem.Function
-    d: fem.Function
+    rest: Expr
+    rest_gradient: Expr
+    rest_nodes: Callable[[], np.ndarray]
     dx: ufl.Measure
     order: int
     cellwise: Callable[[Sequence[float]], fem.Function]
@@ -56,13 +62,13 @@ class LinkFields:
 
     @property
     def position(self):
-        """x = X₀ + d + u, where material points are."""
-        return ufl.SpatialCoordinate(self.mesh) + self.d + self.u
+        """x = X + u, where material points are."""
+        return self.rest + self.u
 
     @property
     def stretch(self):
-        """det(I + ∇d): volume at rest over that of the reference mesh."""
-        return ufl.det(ufl.Identity(self.dim) + ufl.grad(self.d))
+        """det(∇X): volume at rest over that of the reference mesh."""
+        return ufl.det(self.rest_gradient)
 
     def integral(self, density, *, degree: int) -> ufl.Form:
         """∫ density dV over all links at rest, dV without the depth of planar links; ``degree`` of the quadrature."""
@@ -71,18 +77,17 @@ class LinkFields:
     def boundary_integral(self, density, faces: Faces, *, degree: int) -> ufl.Form:
         """∫ density dA over ``faces`` at rest, per depth of planar links; ``degree`` of the quadrature.
 
-        By Nanson's formula dA = |det(I + ∇d) (I + ∇d)⁻ᵀ N| dA₀.
+        By Nanson's formula dA = |det(∇X) (∇X)⁻ᵀ N| dA₀.
         """
-        shape = ufl.Identity(self.dim) + ufl.grad(self.d)
-        area = ufl.dot(cofactor(shape), ufl.FacetNormal(self.mesh))
+        area = ufl.dot(cofactor(self.rest_gradient), ufl.FacetNormal(self.mesh))
         return self.reference_integral(density * ufl.sqrt(ufl.dot(area, area)), faces, degree=degree)
 
     def flux(self, vector, faces: Faces, *, degree: int) -> ufl.Form:
         """∫ vector · n da over ``faces`` as deformed, n out of the link, per depth of planar links.
 
-        By Nanson's formula n da = cof(I + ∇d + ∇u) N dA₀.
+        By Nanson's formula n da = cof(∇X + ∇u) N dA₀.
         """
-        motion = ufl.Identity(self.dim) + ufl.grad(self.d) + ufl.grad(self.u)
+        motion = self.rest_gradient + ufl.grad(self.u)
         area = ufl.dot(cofactor(motion), ufl.FacetNormal(self.mesh))
         return self.reference_integral(ufl.dot(vector, area), faces, degree=degree)
 

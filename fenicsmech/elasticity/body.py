@@ -1,8 +1,9 @@
 """Energy, residual, tangent and stress of all flexible links on the fixed reference mesh.
 
-With reference coordinates X₀, design d, rest shape X = X₀ + d and displacement u from the rest shape:
+With reference coordinates X₀ of straight cells, the bulge c that curves them along the drawn outline, design d, rest
+shape X = X₀ + c + d and displacement u from the rest shape:
 
-    H = F − I = ∇u (I + ∇d)⁻¹,     E(u, d) = ∫ W(H) det(I + ∇d) b dX₀,
+    H = F − I = ∇u (∇X)⁻¹,     E(u, d) = ∫ W(H) det(∇X) b dX₀,     ∇X = I + ∇c + ∇d,
 
 b the depth of a planar link (1 in space). Interface cells move rigidly and store no energy: they are left out.
 """
@@ -61,10 +62,12 @@ class ElasticBody:
         quadrature: explicit degree; never UFL's estimate.
         effects: energies beside the elastic one, as functions of this body; none costs nothing.
         stretches: of the strain-free state of each link, None where it is as drawn; none costs nothing.
+        bulge: c, by which curved cells differ from straight ones; None if all are straight.
 
     Attributes:
         u: displacement field, vector P_order.
         d: design field, vector P1.
+        bulge: c, vector P2, or None.
         youngs_modulus, poissons_ratio: per cell.
         dx: measure of all cells, interfaces included.
         share: how much of the effects acts.
@@ -83,10 +86,12 @@ class ElasticBody:
         quadrature: Quadrature,
         effects: Sequence[Callable[[ElasticBody], ufl.Form | None]] = (),
         stretches: Sequence[Stretch | None] = (),
+        bulge: fem.Function | None = None,
     ) -> None:
         self.mesh, self.model, self.order = mesh, model, order
         self.u = fem.Function(vector_space(mesh, order), name="displacement")
         self.d = fem.Function(vector_space(mesh, 1), name="design")
+        self.bulge = bulge
         self._link, self._effects = link, tuple(effects)
         self.youngs_modulus = self.cellwise([m.youngs_modulus for m in materials])
         self.poissons_ratio = self.cellwise([m.poissons_ratio for m in materials])
@@ -121,7 +126,7 @@ class ElasticBody:
     @cached_property
     def _strain_ufl(self) -> ufl.Form:
         thick = self._depth if self.model.dim == 2 else 1.0
-        volume = ufl.det(self._design_gradient) * thick
+        volume = ufl.det(self.rest_gradient) * thick
         if self._growth is not None:
             volume *= self._growth.volume
         terms = [self._density(law) * volume * dx for law, dx in self._terms]
@@ -145,8 +150,31 @@ class ElasticBody:
         return compile_form(ufl.derivative(self.residual_ufl, self.u))
 
     def gradient(self, field: fem.Function):
-        """H = ∇field (I + ∇d)⁻¹, the gradient of a field on the rest shape, symbolic."""
-        return ufl.dot(ufl.grad(field), ufl.inv(self._design_gradient))
+        """H = ∇field (∇X)⁻¹, the gradient of a field on the rest shape, symbolic."""
+        return ufl.dot(ufl.grad(field), ufl.inv(self.rest_gradient))
+
+    @property
+    def rest_gradient(self):
+        """∇X = I + ∇c + ∇d, symbolic."""
+        gradient = ufl.Identity(self.model.dim) + ufl.grad(self.d)
+        return gradient if self.bulge is None else gradient + ufl.grad(self.bulge)
+
+    @property
+    def rest(self):
+        """X = X₀ + c + d, symbolic."""
+        rest = ufl.SpatialCoordinate(self.mesh) + self.d
+        return rest if self.bulge is None else rest + self.bulge
+
+    @cached_property
+    def drawn_nodes(self) -> np.ndarray:
+        """X₀ + c at this rank's nodes of u, ghosts last, (nodes, dim)."""
+        V, dim = self.u.function_space, self.model.dim
+        nodes = V.tabulate_dof_coordinates()[:, :dim]
+        if self.bulge is None:
+            return nodes
+        bulge = fem.Function(V)
+        bulge.interpolate(self.bulge)
+        return nodes + bulge.x.array.reshape(-1, dim)
 
     def free(self, degree: int) -> ufl.Measure:
         """The measure of all cells that can deform, with quadrature of ``degree``."""
@@ -165,7 +193,7 @@ class ElasticBody:
         for law, dx in self._terms:
             density_ = density(law, self.model.strain(law, elastic, self._moduli), self._moduli)
             C = ufl.diff(ufl.diff(density_, H), H)
-            product = A[i, j] * C[i, j, k, m] * B[k, m] * ufl.det(self._design_gradient) * scale
+            product = A[i, j] * C[i, j, k, m] * B[k, m] * ufl.det(self.rest_gradient) * scale
             terms.append(product * dx(metadata={"quadrature_degree": degree}))
         return sum(terms[1:], start=terms[0])
 
@@ -255,11 +283,6 @@ class ElasticBody:
     @property
     def _moduli(self) -> Moduli:
         return Moduli(self.youngs_modulus, self.poissons_ratio)
-
-    @property
-    def _design_gradient(self):
-        """I + ∇d."""
-        return ufl.Identity(self.model.dim) + ufl.grad(self.d)
 
     @property
     def _strain(self):

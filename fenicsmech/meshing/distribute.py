@@ -10,6 +10,7 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from fenicsmech.compat import cell_nodes, create_mesh, original_cells
+from fenicsmech.meshing.curved_edges import CurvedEdges
 from fenicsmech.meshing.link_mesh import LinkMesh
 
 
@@ -23,6 +24,7 @@ class MechanismMesh:
         interface: index among all interfaces of the mechanism, −1 in free cells, (cells,).
         vertices, cells: the whole mesh as one array each, on every rank: (n, dim), (m, dim + 1).
         link_of_cell: index of the flexible link of each of ``cells``, (m,).
+        curved: edges of the whole mesh that follow curves, on every rank.
     """
 
     mesh: dmesh.Mesh
@@ -31,6 +33,7 @@ class MechanismMesh:
     vertices: np.ndarray
     cells: np.ndarray
     link_of_cell: np.ndarray
+    curved: CurvedEdges
 
     def corners(self, cells: np.ndarray) -> np.ndarray:
         """Corner coordinates of local ``cells``, (cells, dim + 1, dim)."""
@@ -43,24 +46,26 @@ def distribute(comm: MPI.Comm, link_meshes: Sequence[LinkMesh] | None, *, root: 
     Interfaces are numbered through, link after link.
     """
     whole = _join(link_meshes) if comm.rank == root else None
-    vertices, cells, link, interface = comm.bcast(whole, root=root)
+    vertices, cells, link, interface, curved = comm.bcast(whole, root=root)
     dim = vertices.shape[1]
     if comm.rank == root:
         mesh = create_mesh(comm, cells, vertices)
     else:
         mesh = create_mesh(comm, np.zeros((0, dim + 1), np.int64), np.zeros((0, dim)))
     here = original_cells(mesh)
-    return MechanismMesh(mesh, link[here], interface[here], vertices, cells, link)
+    return MechanismMesh(mesh, link[here], interface[here], vertices, cells, link, curved)
 
 
-def _join(link_meshes: Sequence[LinkMesh]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    vertices, cells, links, interfaces = [], [], [], []
+def _join(link_meshes: Sequence[LinkMesh]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, CurvedEdges]:
+    vertices, cells, links, interfaces, ends, bulges = [], [], [], [], [], []
     nodes = sites = 0
     for index, part in enumerate(link_meshes):
         vertices.append(part.points)
         cells.append(part.cells + nodes)
         links.append(np.full(len(part.cells), index))
         interfaces.append(np.where(part.interface >= 0, part.interface + sites, -1))
+        ends.append(part.curved.ends + nodes)
+        bulges.append(part.curved.bulges)
         nodes += len(part.points)
         sites += int(part.interface.max(initial=-1)) + 1
     return (
@@ -68,4 +73,5 @@ def _join(link_meshes: Sequence[LinkMesh]) -> tuple[np.ndarray, np.ndarray, np.n
         np.concatenate(cells).astype(np.int64),
         np.concatenate(links),
         np.concatenate(interfaces),
+        CurvedEdges(np.concatenate(ends), np.concatenate(bulges)),
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fenicsmech.meshing.curved_edges import CurvedEdges
 from fenicsmech.meshing.link_mesh import LinkMesh
 
 
@@ -38,4 +39,17 @@ def extrude(plan: LinkMesh, depth: float, layers: int) -> LinkMesh:
             np.column_stack([a + below, b + below, b + above, c + above]),
             np.column_stack([a + below, a + above, b + above, c + above]),
         ]
-    return LinkMesh.from_cells(points, np.concatenate(cells), np.tile(plan.interface, 3 * layers))
+    return LinkMesh.from_cells(
+        points, np.concatenate(cells), np.tile(plan.interface, 3 * layers), _walls(plan.curved, layers, count)
+    )
+
+
+def _walls(plan: CurvedEdges, layers: int, count: int) -> CurvedEdges:
+    """Curved edges of an extruded mesh: copies at every height, and the diagonals of the walls between them."""
+    lower, upper = plan.ends.T
+    ends = [plan.ends + layer * count for layer in range(layers + 1)]
+    for layer in range(layers):
+        near, far = (layer, layer + 1) if 2 * layer < layers else (layer + 1, layer)
+        ends.append(np.column_stack([lower + near * count, upper + far * count]))
+    bulges = np.column_stack([plan.bulges, np.zeros(len(plan.ends))])
+    return CurvedEdges(np.sort(np.concatenate(ends), axis=1), np.tile(bulges, (2 * layers + 1, 1)))

@@ -56,7 +56,7 @@ def mesh_plan_view(
             mesh = _mesh_plan(request, plan)
         else:
             mesh = _mesh_solid(request, plan, in_units_of(depth, request.size))
-    mesh = replace(mesh, points=mesh.points * request.size)
+    mesh = replace(mesh, points=mesh.points * request.size, curved=mesh.curved.times(request.size))
     if request.dim > mesh.dim:
         return extrude(mesh, depth, request.layers or layer_count(depth, request.size))
     return mesh

@@ -120,7 +120,7 @@ def weight_influence(model: MechanismModel, newton, curve: Curve, frame: Frame) 
         influence, _ = system.expand(x)
         depths = [link.shape.depth if model.linkage.dim == 2 else 1.0 for link in model.mechanism.flexible_links]
         v = ufl.TestFunction(elastic.u.function_space)
-        depth = elastic.cellwise(depths) * ufl.det(ufl.Identity(model.linkage.dim) + ufl.grad(elastic.d))
+        depth = elastic.cellwise(depths) * ufl.det(elastic.rest_gradient)
         direction = fem.Constant(elastic.mesh, np.zeros(model.linkage.dim))
         form = compile_form(ufl.dot(direction, v) * depth * elastic.dx(metadata={"quadrature_degree": elastic.order}))
         slopes = []

@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 from fenicsmech.bodies import DesignAtNodes, InterfaceMap, MaterialPoint, body_point, link_point
 from fenicsmech.clock import Clock
-from fenicsmech.compat import petsc_vector
+from fenicsmech.compat import cell_nodes, original_nodes, petsc_vector
 from fenicsmech.effects import BodyEffect, JointSoftening, LinkEffect, LinkFields, RestStretch, find_boundaries
 from fenicsmech.elasticity import ElasticBody, ElasticModel, Quadrature, Stretch
 from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State
@@ -22,6 +22,7 @@ from fenicsmech.linkage import Linkage
 from fenicsmech.mechanism import Effect, FlexibleLink, Force, Mechanism, Output
 from fenicsmech.mechanism.places import in_dimension
 from fenicsmech.meshing import InterfaceSite, LinkMesh, check_link, mesh_link
+from fenicsmech.meshing.bulge import bulge_field
 from fenicsmech.meshing.distribute import MechanismMesh, distribute
 
 
@@ -120,6 +121,8 @@ class MechanismModel:
             quadrature=fidelity.quadrature,
             effects=[partial(self._link_energy, effect) for effect in link_effects],
             stretches=_stretches(links, fidelity.model, effects),
+            # only fields of the bulge's degree can move curved cells rigidly
+            bulge=bulge_field(mesh) if fidelity.order > 1 else None,
         )
         self._potentials = [
             potential
@@ -135,7 +138,9 @@ class MechanismModel:
         first = len(mechanism.rigid_links)
         cell_body = np.where(mesh.interface >= 0, mesh.interface + first, -1)
         centres = np.array([body.centre for body in linkage.bodies])
-        self.interfaces = InterfaceMap(self.elastic.u, cell_body, centres, linkage.joints.space)
+        self.interfaces = InterfaceMap(
+            self.elastic.u, self.elastic.drawn_nodes, cell_body, centres, linkage.joints.space
+        )
         self.design_nodes = DesignAtNodes(self.elastic.d, self.elastic.u)
         self._node_link = self._link_of_nodes()
         self._point_loads: dict[Force | Output, PointLoad] = {}
@@ -177,6 +182,10 @@ class MechanismModel:
         self.reshape(design)
         return replace(state, u=u[: len(state.u)])
 
+    def rest_nodes(self) -> np.ndarray:
+        """Where this rank's nodes of u are at rest, ghosts last, (nodes, dim)."""
+        return self.elastic.drawn_nodes + self.design_nodes.values()
+
     def load(self, state: State) -> None:
         """Makes the finite-element field hold ``state`` (collective)."""
         petsc_vector(self.elastic.u).array_w[:] = state.u
@@ -195,7 +204,7 @@ class MechanismModel:
         index = self.mechanism.flexible_links.index(part.on)
         cells = np.flatnonzero(self.mesh.link[:owned] == index)
         corners = self.mesh.corners(cells)
-        return link_point(f"{part.name!r}", at, self.elastic.u, cells, corners)
+        return link_point(f"{part.name!r}", at, self.elastic.u, cells, corners, self._bulges(cells))
 
     def point_load(self, force: Force | Output) -> PointLoad:
         """The point load of a force, or of a unit force along an output (collective)."""
@@ -224,9 +233,8 @@ class MechanismModel:
 
     def assembled_state(self, poses: np.ndarray, motors: np.ndarray) -> State:
         """The state of a rigid assembly: every flexible link carried along by its first interface (collective)."""
-        V = self.elastic.u.function_space
         dim, owned = self.linkage.dim, self.interfaces.owned
-        positions = V.tabulate_dof_coordinates()[:owned, :dim] + self.design_nodes.values()[:owned]
+        positions = self.rest_nodes()[:owned]
         u = np.zeros((owned, dim))
         for index, link in enumerate(self.mechanism.flexible_links):
             body = self.linkage.interfaces[link][0]
@@ -242,11 +250,27 @@ class MechanismModel:
 
     def _fields(self, body: ElasticBody) -> LinkFields:
         links = tuple(self.mechanism.flexible_links)
-        return LinkFields(links, body.u, body.d, body.dx, body.order, body.cellwise, self._boundaries)
+        return LinkFields(
+            links,
+            body.u,
+            body.rest,
+            body.rest_gradient,
+            self.rest_nodes,
+            body.dx,
+            body.order,
+            body.cellwise,
+            self._boundaries,
+        )
 
     def _link_energy(self, effect: LinkEffect, body: ElasticBody) -> ufl.Form | None:
         """The energy of an effect in the fields of ``body``."""
         return effect.energy(self._fields(body))
+
+    def _bulges(self, cells: np.ndarray) -> np.ndarray:
+        """Bulges of the edges of local ``cells``, as the displacement field sees them, (cells, pairs, dim)."""
+        mesh = self.mesh.mesh
+        bulges = self.mesh.curved.of_cells(original_nodes(mesh)[cell_nodes(mesh)[cells]])
+        return bulges if self.elastic.bulge is not None else np.zeros_like(bulges)
 
     def _link_of_nodes(self) -> np.ndarray:
         """Index of the flexible link of every local node."""
