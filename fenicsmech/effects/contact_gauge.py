@@ -28,6 +28,7 @@ class ContactGauge:
         self._form = compile_form(-ufl.derivative(contact.energy(fields), fields.u))
         facets = fields.boundaries[Faces(contact.link)].facets
         V = fields.u.function_space
+        self._design = fem.Function(V)
         self._nodes = fem.locate_dofs_topological(V, fields.dim - 1, facets)
 
     def force(self) -> np.ndarray:
@@ -43,6 +44,7 @@ class ContactGauge:
     def gap(self) -> float:
         """The smallest gap at nodes of the link's boundary; where negative, the largest penetration (collective)."""
         fields = self._fields
-        moved = fields.rest_nodes() + fields.u.x.array.reshape(-1, fields.dim)
+        self._design.interpolate(fields.body.d)
+        moved = fields.body.drawn_nodes + (self._design.x.array + fields.u.x.array).reshape(-1, fields.dim)
         gaps = self._obstacle.gap(moved[self._nodes])
         return fields.mesh.comm.allreduce(float(gaps.min(initial=np.inf)), op=MPI.MIN)

@@ -9,16 +9,15 @@ as the stiffness of a spring does, acts from the start: without it equilibria on
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import ufl
 from dolfinx import fem
-from ufl.core.expr import Expr
 
 from fenicsmech.effects.faces import Boundary, Faces, cofactor
-from fenicsmech.elasticity import ElasticModel, Stretch
+from fenicsmech.elasticity import ElasticBody, ElasticModel, Stretch
 from fenicsmech.linkage import Linkage
 from fenicsmech.mechanism import FlexibleLink
 from fenicsmech.mechanism.effect import Effect
@@ -30,25 +29,32 @@ class LinkFields:
 
     Attributes:
         links: all flexible links.
-        u: displacement field.
-        rest: X, where material points are at rest, symbolic.
-        rest_gradient: ∇X on the reference mesh, symbolic.
-        rest_nodes: X at this rank's nodes of u now, ghosts last, (nodes, dim).
-        dx: ufl measure of all cells, interfaces included, on the reference mesh.
-        order: degree of u.
-        cellwise: makes a field with one value per cell from one value per link, (links,).
+        body: the links as one body.
         boundaries: where the parts of links' boundaries are that effects ask for.
     """
 
     links: tuple[FlexibleLink, ...]
-    u: fem.Function
-    rest: Expr
-    rest_gradient: Expr
-    rest_nodes: Callable[[], np.ndarray]
-    dx: ufl.Measure
-    order: int
-    cellwise: Callable[[Sequence[float]], fem.Function]
+    body: ElasticBody
     boundaries: Mapping[Faces, Boundary]
+
+    @property
+    def u(self) -> fem.Function:
+        """Displacement field."""
+        return self.body.u
+
+    @property
+    def order(self) -> int:
+        """Degree of u."""
+        return self.body.order
+
+    @property
+    def dx(self) -> ufl.Measure:
+        """Measure of all cells, interfaces included, on the reference mesh."""
+        return self.body.dx
+
+    def cellwise(self, per_link: Sequence[float]) -> fem.Function:
+        """A field with one value per cell from one value per link, (links,)."""
+        return self.body.cellwise(per_link)
 
     @property
     def dim(self) -> int:
@@ -58,17 +64,17 @@ class LinkFields:
     @property
     def mesh(self):
         """The reference mesh."""
-        return self.u.function_space.mesh
+        return self.body.mesh
 
     @property
     def position(self):
         """x = X + u, where material points are."""
-        return self.rest + self.u
+        return self.body.rest + self.u
 
     @property
     def stretch(self):
         """det(∇X): volume at rest over that of the reference mesh."""
-        return ufl.det(self.rest_gradient)
+        return ufl.det(self.body.rest_gradient)
 
     def integral(self, density, *, degree: int) -> ufl.Form:
         """∫ density dV over all links at rest, dV without the depth of planar links; ``degree`` of the quadrature."""
@@ -79,7 +85,7 @@ class LinkFields:
 
         By Nanson's formula dA = |det(∇X) (∇X)⁻ᵀ N| dA₀.
         """
-        area = ufl.dot(cofactor(self.rest_gradient), ufl.FacetNormal(self.mesh))
+        area = ufl.dot(cofactor(self.body.rest_gradient), ufl.FacetNormal(self.mesh))
         return self.reference_integral(density * ufl.sqrt(ufl.dot(area, area)), faces, degree=degree)
 
     def flux(self, vector, faces: Faces, *, degree: int) -> ufl.Form:
@@ -87,7 +93,7 @@ class LinkFields:
 
         By Nanson's formula n da = cof(∇X + ∇u) N dA₀.
         """
-        motion = self.rest_gradient + ufl.grad(self.u)
+        motion = self.body.rest_gradient + ufl.grad(self.u)
         area = ufl.dot(cofactor(motion), ufl.FacetNormal(self.mesh))
         return self.reference_integral(ufl.dot(vector, area), faces, degree=degree)
 

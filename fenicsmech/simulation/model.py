@@ -182,10 +182,6 @@ class MechanismModel:
         self.reshape(design)
         return replace(state, u=u[: len(state.u)])
 
-    def rest_nodes(self) -> np.ndarray:
-        """Where this rank's nodes of u are at rest, ghosts last, (nodes, dim)."""
-        return self.elastic.drawn_nodes + self.design_nodes.values()
-
     def load(self, state: State) -> None:
         """Makes the finite-element field hold ``state`` (collective)."""
         petsc_vector(self.elastic.u).array_w[:] = state.u
@@ -234,7 +230,7 @@ class MechanismModel:
     def assembled_state(self, poses: np.ndarray, motors: np.ndarray) -> State:
         """The state of a rigid assembly: every flexible link carried along by its first interface (collective)."""
         dim, owned = self.linkage.dim, self.interfaces.owned
-        positions = self.rest_nodes()[:owned]
+        positions = self.elastic.drawn_nodes[:owned] + self.design_nodes.values()[:owned]
         u = np.zeros((owned, dim))
         for index, link in enumerate(self.mechanism.flexible_links):
             body = self.linkage.interfaces[link][0]
@@ -249,18 +245,7 @@ class MechanismModel:
         return self._fields(self.elastic)
 
     def _fields(self, body: ElasticBody) -> LinkFields:
-        links = tuple(self.mechanism.flexible_links)
-        return LinkFields(
-            links,
-            body.u,
-            body.rest,
-            body.rest_gradient,
-            self.rest_nodes,
-            body.dx,
-            body.order,
-            body.cellwise,
-            self._boundaries,
-        )
+        return LinkFields(tuple(self.mechanism.flexible_links), body, self._boundaries)
 
     def _link_energy(self, effect: LinkEffect, body: ElasticBody) -> ufl.Form | None:
         """The energy of an effect in the fields of ``body``."""

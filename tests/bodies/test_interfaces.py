@@ -41,7 +41,13 @@ class Setting:
         random = np.random.default_rng(6)
         self.centres = random.uniform(-1.0, 3.0, (4, dim))
         self.poses = self.space.retract(random.uniform(-2.0, 2.0, (4, self.space.pose_size)))
-        self.map = InterfaceMap(self.mesh.u, cell_body[self.mesh.here], self.centres, self.space)
+        self.map = InterfaceMap(
+            self.mesh.u,
+            self.mesh.u.function_space.tabulate_dof_coordinates()[:, :dim],
+            cell_body[self.mesh.here],
+            self.centres,
+            self.space,
+        )
 
     def expected(self, nodes):
         """Displacements of marked ``nodes`` by a formula of their own."""

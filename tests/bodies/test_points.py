@@ -21,7 +21,8 @@ def owned_cells(mesh):
 
 def find(mesh, position, cells=None):
     cells = owned_cells(mesh) if cells is None else cells
-    return link_point("link 'strip'", np.asarray(position), mesh.u, cells, mesh.corners[mesh.here[cells]])
+    straight = np.zeros((len(cells), mesh.dim * (mesh.dim + 1) // 2, mesh.dim))
+    return link_point("link 'strip'", np.asarray(position), mesh.u, cells, mesh.corners[mesh.here[cells]], straight)
 
 
 def polynomial(order, dim):

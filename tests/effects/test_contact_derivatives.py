@@ -28,7 +28,7 @@ def strip(space: str, obstacle, order: int) -> tuple[Contact, object]:
     contact = Contact(link, obstacle)
     model = fm.Simulation(fm.Scene(mechanism, effects=[contact]), space=space, size=2.0, order=order).model
     fields = model.fields
-    interpolate(fields.d, wave(fields.dim, 0.2, seed=1))
+    interpolate(fields.body.d, wave(fields.dim, 0.2, seed=1))
     interpolate(fields.u, wave(fields.dim, 0.2, seed=2))
     return contact, fields
 
@@ -43,7 +43,7 @@ def test_energy_and_its_gradient_are_differentiated_by_state_and_design(space, o
     assert fem.assemble_scalar(compile_form(energy)) > 0.0
     for form in (energy, ufl.derivative(energy, fields.u, work)):
         compiled = compile_form(form)
-        for field in (fields.u, fields.d):
+        for field in (fields.u, fields.body.d):
             slope = fem.assemble_vector(compile_form(ufl.derivative(form, field))).array
             start, size = field.x.array.copy(), 0.02
             direction = np.random.default_rng(4).uniform(-size, size, len(start))

@@ -52,7 +52,7 @@ def test_displacements_of_flexible_links_and_reactions_of_joints(quadrature, tol
 
     cells = np.array([space.dofmap.cell_dofs(cell) for cell in range(len(model.mesh.link))])
     cells = cells[:, list(calculix.VTK_FROM_BASIX)]
-    mesh = calculix.Mesh(space.tabulate_dof_coordinates(), cells, model.mesh.link)
+    mesh = calculix.Mesh(model.elastic.drawn_nodes, cells, model.mesh.link)
     links = simulation.scene.mechanism.flexible_links
     materials = {k: calculix.NeoHooke(YOUNG[link.name], POISSON) for k, link in enumerate(links)}
     moved = [calculix.Fixed(nodes, computed[nodes]) for nodes in model.interfaces.nodes.values()]
