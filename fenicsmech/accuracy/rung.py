@@ -118,8 +118,8 @@ def _check(scene: Scene, model: ElasticModel) -> None:
     Raises:
         DescriptionError: it has none.
     """
-    validate(scene.mechanism, model.dim)
+    validate(scene.mechanism, model.mechanism_dim)
     for link in scene.mechanism.flexible_links:
         model.check(link.name, link.material)
     for effect in scene.effects:
-        effect.check(scene.mechanism, model.dim)
+        effect.check(scene.mechanism, model.mechanism_dim)

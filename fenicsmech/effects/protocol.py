@@ -34,6 +34,7 @@ class LinkFields:
         order: degree of u.
         cellwise: makes a field with one value per cell from one value per link, (links,).
         boundaries: where the parts of links' boundaries are that effects ask for.
+        model: what is assumed about the third dimension.
     """
 
     links: tuple[FlexibleLink, ...]
@@ -43,11 +44,12 @@ class LinkFields:
     order: int
     cellwise: Callable[[Sequence[float]], fem.Function]
     boundaries: Mapping[Faces, Boundary]
+    model: ElasticModel
 
     @property
     def dim(self) -> int:
-        """Dimension of the space."""
-        return self.mesh.geometry.dim
+        """Dimension of the mesh."""
+        return self.model.dim
 
     @property
     def mesh(self):
@@ -65,11 +67,11 @@ class LinkFields:
         return ufl.det(ufl.Identity(self.dim) + ufl.grad(self.d))
 
     def integral(self, density, *, degree: int) -> ufl.Form:
-        """∫ density dV over all links at rest, dV without the depth of planar links; ``degree`` of the quadrature."""
+        """∫ density dV over the mesh at rest, to be multiplied as ``model`` says; ``degree`` of the quadrature."""
         return density * self.stretch * self.dx(metadata={"quadrature_degree": degree})
 
     def boundary_integral(self, density, faces: Faces, *, degree: int) -> ufl.Form:
-        """∫ density dA over ``faces`` at rest, per depth of planar links; ``degree`` of the quadrature.
+        """∫ density dA over ``faces`` of the mesh at rest, to be multiplied as ``model`` says.
 
         By Nanson's formula dA = |det(I + ∇d) (I + ∇d)⁻ᵀ N| dA₀.
         """
@@ -78,9 +80,9 @@ class LinkFields:
         return self.reference_integral(density * ufl.sqrt(ufl.dot(area, area)), faces, degree=degree)
 
     def flux(self, vector, faces: Faces, *, degree: int) -> ufl.Form:
-        """∫ vector · n da over ``faces`` as deformed, n out of the link, per depth of planar links.
+        """∫ vector · n da over ``faces`` of the mesh as deformed, to be multiplied as ``model`` says.
 
-        By Nanson's formula n da = cof(I + ∇d + ∇u) N dA₀.
+        n points out of the link. By Nanson's formula n da = cof(I + ∇d + ∇u) N dA₀.
         """
         motion = ufl.Identity(self.dim) + ufl.grad(self.d) + ufl.grad(self.u)
         area = ufl.dot(cofactor(motion), ufl.FacetNormal(self.mesh))

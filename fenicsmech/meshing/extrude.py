@@ -25,13 +25,22 @@ def extrude(plan: LinkMesh, depth: float, layers: int) -> LinkMesh:
         depth: extent along z.
         layers: number of layers, at least 1.
     """
-    count = len(plan.points)
-    heights = np.linspace(-0.5 * depth, 0.5 * depth, layers + 1)
+    return _stack(plan, np.linspace(-0.5 * depth, 0.5 * depth, layers + 1), mirrored_from=(layers + 1) // 2)
+
+
+def extrude_half(plan: LinkMesh, depth: float, layers: int) -> LinkMesh:
+    """The upper half, z ≥ 0, of what ``extrude`` makes of twice as many ``layers``."""
+    return _stack(plan, np.linspace(0.0, 0.5 * depth, layers + 1), mirrored_from=0)
+
+
+def _stack(plan: LinkMesh, heights: np.ndarray, *, mirrored_from: int) -> LinkMesh:
+    """Layers of tetrahedra between ``heights``; those from number ``mirrored_from`` on are cut upside down."""
+    count, layers = len(plan.points), len(heights) - 1
     points = np.column_stack([np.tile(plan.points, (layers + 1, 1)), np.repeat(heights, count)])
     a, b, c = np.sort(plan.cells, axis=1).T
     cells = []
     for layer in range(layers):
-        near, far = (layer, layer + 1) if 2 * layer < layers else (layer + 1, layer)
+        near, far = (layer, layer + 1) if layer < mirrored_from else (layer + 1, layer)
         below, above = near * count, far * count
         cells += [
             np.column_stack([a + below, b + below, c + below, c + above]),

@@ -56,7 +56,7 @@ class PressedBody:
         self._found, self._link = found, link
 
     def fields_of(self, body: ElasticBody) -> LinkFields:
-        return LinkFields((self._link,), body.u, body.d, body.dx, body.order, body.cellwise, self._found)
+        return LinkFields((self._link,), body.u, body.d, body.dx, body.order, body.cellwise, self._found, body.model)
 
     @property
     def fields(self) -> LinkFields:

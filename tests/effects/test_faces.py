@@ -44,7 +44,7 @@ class Bars:
         mesh = self.model.mesh
         found = find_boundaries(mesh.mesh, self.bars, mesh.link, faces)
         body = self.model.elastic
-        return LinkFields(tuple(self.bars), body.u, body.d, body.dx, body.order, body.cellwise, found)
+        return LinkFields(tuple(self.bars), body.u, body.d, body.dx, body.order, body.cellwise, found, body.model)
 
     def area(self, fields: LinkFields, part: Faces) -> float:
         form = compile_form(fields.boundary_integral(1.0, part, degree=1))
