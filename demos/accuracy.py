@@ -2,9 +2,9 @@
 
     OPENBLAS_NUM_THREADS=1 python3 demos/accuracy.py [truss|claw|klann] [--quick] [--out DIR]
 
-Rigid links, plane strain and plane stress P1/P2, 3D P1/P2/P3, element sizes, quadrature degrees and solver
-tolerances; the reference is the extrapolated limit in space. Leaves table.csv, table.md, work-precision.png and
-summary.json.
+Rigid links, plane strain and plane stress P1/P2, 3D P1/P2/P3 of half the depth and of all of it, element sizes,
+quadrature degrees and solver tolerances; the reference is the extrapolated limit in space. Leaves table.csv, table.md,
+work-precision.png and summary.json.
 """
 
 import argparse

@@ -3,7 +3,7 @@
 Reads forces and displacements of each sample from a CSV file and fits one modulus to both, with its 95 % confidence
 interval. The data that come with the demo are synthetic (see demos/data/README.md).
 
-    python3 demos/characterize.py [--data DIR] [--space 3d|plane-stress|plane-strain] [--order 1|2] [--size MM]
+    python3 demos/characterize.py [--data DIR] [--space SPACE] [--order 1|2] [--size MM]
 """
 
 from pathlib import Path

@@ -4,7 +4,7 @@ The finger pushes on the object at its tip; the object pushes back across the fi
 configuration while the force grows to 10 N. The links are shaped until the finger gives way by 5 mm at 4 N and by
 20 mm at 10 N.
 
-    python3 demos/claw.py [--space 3d|plane-stress|plane-strain] [--order 1|2] [--size MM] [--quick] [--out DIR]
+    python3 demos/claw.py [--space SPACE] [--order 1|2] [--size MM] [--quick] [--out DIR]
     mpirun -n 2 python3 demos/claw.py
 """
 

@@ -42,9 +42,7 @@ def parse(name: str, description: str, *, size: float, quick_size: float, data: 
     ``size`` and ``quick_size`` are its default element sizes in mm.
     """
     parser = argparse.ArgumentParser(description=description)
-    parser.add_argument(
-        "--space", choices=list(SPACES), default="3d", help="3d (default), plane-stress or plane-strain"
-    )
+    parser.add_argument("--space", choices=list(SPACES), default="3d", help=f"one of {', '.join(SPACES)}")
     parser.add_argument("--order", type=int, choices=(1, 2), default=2, help="degree of the displacement field")
     parser.add_argument("--size", type=float, metavar="MM", help=f"element size (default {size} mm)")
     if data is None:

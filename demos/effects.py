@@ -1,6 +1,6 @@
 """What each effect costs: the claw's curve with effects added one by one.
 
-    OPENBLAS_NUM_THREADS=1 python3 demos/effects.py [--space 3d|plane-stress] [--size MM]
+    OPENBLAS_NUM_THREADS=1 python3 demos/effects.py [--space SPACE] [--size MM]
 
 One table: terms of the energy, unknowns, seconds per Newton iteration relative to the bare scene (median over a curve,
 the bare scene measured again at the end), and how far the effect moves the finger.
@@ -48,7 +48,7 @@ EFFECTS = {
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--space", choices=("3d", "plane-stress"), default="3d")
+    parser.add_argument("--space", choices=("3d", "3d-symmetric", "plane-stress"), default="3d")
     parser.add_argument("--size", type=float, default=claw.SIZE, metavar="MM", help="element size")
     options = parser.parse_args()
     rows, bare = [], None

@@ -3,7 +3,7 @@
 The linkage is that of US patent 6,260,862. Its foot runs along a nearly straight ground stroke while the crank turns;
 the links are shaped until 5 N lift the foot by 10 mm in three configurations of the stroke.
 
-    python3 demos/klann.py [--space 3d|plane-stress|plane-strain] [--order 1|2] [--size MM] [--quick] [--out DIR]
+    python3 demos/klann.py [--space SPACE] [--order 1|2] [--size MM] [--quick] [--out DIR]
     mpirun -n 2 python3 demos/klann.py
 """
 

@@ -1,6 +1,6 @@
 """What each choice in the solver is worth, measured on the claw: quadrature, predictor, factor, BLAS, ranks.
 
-    OPENBLAS_NUM_THREADS=1 python3 demos/performance.py [--space 3d|plane-stress|plane-strain] [--size MM] [--out DIR]
+    OPENBLAS_NUM_THREADS=1 python3 demos/performance.py [--space SPACE] [--size MM] [--out DIR]
 
 Prints a table of variants, each beside the default: seconds per frame, Newton iterations, and how far the last
 displacement moves. Medians over the frames of one curve.

@@ -40,7 +40,7 @@ def run(demo: Demo, scene: fm.Scene, task: Task) -> Outcome:
         outcome = Outcome(demo, sim, before, targets=task.targets)
     else:
         coarse = None
-        if demo.options.space == "3d":
+        if demo.options.space in ("3d", "3d-symmetric"):
             # a planar mechanism's plane-stress optimum is found in seconds and is close to the one in space
             coarse = optimise(demo, fm.DesignProblem(simulation(demo, scene, "plane-stress"), **wanted(task)), None)
         problem = fm.DesignProblem(sim, **wanted(task))

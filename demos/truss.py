@@ -4,7 +4,7 @@ The rigid links form a parallelogram, so the tip only translates and the height 
 matter. The diagonal resists: soft while it unbends, stiff once it is straight. Its shape is optimised until the tip
 moves by 6 mm under 0.1 N, and by no more than 9 mm under four times as much.
 
-    python3 demos/truss.py [--space 3d|plane-stress|plane-strain] [--order 1|2] [--size MM] [--quick] [--out DIR]
+    python3 demos/truss.py [--space SPACE] [--order 1|2] [--size MM] [--quick] [--out DIR]
     mpirun -n 2 python3 demos/truss.py --resume
 """
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from fenicsmech.elasticity import PLANE_STRAIN, PLANE_STRESS, SPATIAL, ElasticModel, Quadrature
+from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRAIN, PLANE_STRESS, SPATIAL, ElasticModel, Quadrature
 from fenicsmech.equilibrium import NewtonOptions
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import Scene, validate
@@ -26,7 +26,7 @@ class Rung:
     """One fidelity.
 
     Attributes:
-        model: 3D, plane strain or plane stress; None: every link is rigid.
+        model: 3D, whole or half, plane strain or plane stress; None: every link is rigid.
         order: degree of the displacement field.
         factor: element size over the base size of the study.
         quadrature: degree; None: the default of model and order.
@@ -74,10 +74,10 @@ def ladder(
     quadratures: Sequence[int] = _QUADRATURES,
     tolerances: Sequence[float] = _TOLERANCES,
 ) -> list[Rung]:
-    """The rungs for ``scene``, each family from coarse to fine: rigid, plane strain and stress, 3D.
+    """The rungs for ``scene``, each family from coarse to fine: rigid, plane strain and stress, 3D half and whole.
 
-    Planar models are left out where the scene has no form in the plane. Quadrature and tolerance are varied for
-    order 2 at the base size, in plane stress and in 3D.
+    Models of motion in the plane are left out where the scene has no such form. Quadrature and tolerance are varied for
+    order 2 at the base size, in plane stress and in whole 3D.
 
     Args:
         scene: what is to be computed.
@@ -91,12 +91,13 @@ def ladder(
     """
     rungs = [RIGID]
     _check(scene, SPATIAL)
-    for model, sizes in ((PLANE_STRAIN, planar), (PLANE_STRESS, planar), (SPATIAL, spatial)):
+    families = {PLANE_STRAIN: planar, PLANE_STRESS: planar, MID_PLANE_SYMMETRIC: spatial, SPATIAL: spatial}
+    for model, sizes in families.items():
         if model is not SPATIAL and not _fits(scene, model):
             continue
         for order, factors in sizes.items():
             rungs += [Rung(model, order, factor) for factor in sorted(factors, reverse=True)]
-        if model is not PLANE_STRAIN and 1.0 in sizes.get(_VARIED_ORDER, ()):
+        if model in (PLANE_STRESS, SPATIAL) and 1.0 in sizes.get(_VARIED_ORDER, ()):
             default = Quadrature.for_order(_VARIED_ORDER, model.dim).degree
             rungs += [Rung(model, _VARIED_ORDER, quadrature=degree) for degree in quadratures if degree != default]
             rungs += [Rung(model, _VARIED_ORDER, tolerance=value) for value in tolerances if value != TOLERANCE]
@@ -118,8 +119,8 @@ def _check(scene: Scene, model: ElasticModel) -> None:
     Raises:
         DescriptionError: it has none.
     """
-    validate(scene.mechanism, model.dim)
+    validate(scene.mechanism, model.mechanism_dim)
     for link in scene.mechanism.flexible_links:
         model.check(link.name, link.material)
     for effect in scene.effects:
-        effect.check(scene.mechanism, model.dim)
+        effect.check(scene.mechanism, model.mechanism_dim)

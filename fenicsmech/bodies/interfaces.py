@@ -1,6 +1,7 @@
 """Interface nodes as functions of body poses: u_i = t + (R − I)(X_i − c), X_i the node at rest.
 
-All nodes of the cells in an interface are eliminated from the unknowns; each follows the pose of its body.
+All nodes of the cells in an interface are eliminated from the unknowns; each follows the pose of its body. Where bodies
+move in the plane while the mesh is one half of the links in space, that is u_z = 0, as it is on the mid-plane z = 0.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from petsc4py import PETSc
 
 from fenicsmech.compat import petsc_vector
 from fenicsmech.kinematics import RigidSpace
+from fenicsmech.meshing.mid_plane import on_mid_plane
 
 
 class InterfaceMap:
@@ -26,6 +28,8 @@ class InterfaceMap:
     Attributes:
         body: body of every local node of u, −1 if free, (owned + ghost nodes,); the same on all ranks.
         owned: number of owned nodes.
+        block: displacements per node.
+        unknown: whether each owned displacement is an unknown, (owned nodes, block).
         nodes: local eliminated nodes, owned and ghost, per body.
         offsets: X_i − c of these nodes.
     """
@@ -40,12 +44,18 @@ class InterfaceMap:
         self.body = self._mark_nodes(cell_body)
         bodies = np.unique(self.body[self.body >= 0])
         self.nodes = {int(b): np.flatnonzero(self.body == b) for b in bodies}
-        self._drawn = {b: drawn[nodes] - centres[b] for b, nodes in self.nodes.items()}
+        positions = V.tabulate_dof_coordinates()
+        self._drawn = {b: drawn[nodes, : space.dim] - centres[b] for b, nodes in self.nodes.items()}
         self.offsets = dict(self._drawn)
+        self._mid_plane = np.zeros(len(positions), dtype=bool)
+        if space.dim < self.block:
+            self._mid_plane = on_mid_plane(positions, V.mesh.comm)
+        self.unknown = np.tile(self.body[: self.owned, None] < 0, self.block)
+        self.unknown[self._mid_plane[: self.owned], space.dim :] = False
 
     def reshape(self, design: np.ndarray) -> None:
         """Takes the design at all local nodes, (nodes, dim): added to the drawn positions."""
-        self.offsets = {b: self._drawn[b] + design[nodes] for b, nodes in self.nodes.items()}
+        self.offsets = {b: self._drawn[b] + design[nodes, : self.space.dim] for b, nodes in self.nodes.items()}
 
     def _mark_nodes(self, cell_body: np.ndarray) -> np.ndarray:
         """Body of every local node; a node may touch an interface cell only on another rank."""
@@ -65,20 +75,22 @@ class InterfaceMap:
         return body
 
     def place(self, poses: np.ndarray) -> None:
-        """Sets u at all eliminated nodes from ``poses`` (bodies, pose_size)."""
-        values = self._u.x.array.reshape(-1, self.block)
+        """Sets all displacements that are no unknowns from ``poses`` (bodies, pose_size)."""
+        values, dim = self._u.x.array.reshape(-1, self.block), self.space.dim
         for body, nodes in self.nodes.items():
-            values[nodes] = self.space.displace(poses[body], self.offsets[body])
+            values[nodes, :dim] = self.space.displace(poses[body], self.offsets[body])
+            values[nodes, dim:] = 0.0
+        values[self._mid_plane, dim:] = 0.0
 
     def gradient_rows(self, poses: np.ndarray, body: int) -> tuple[np.ndarray, np.ndarray]:
-        """∂u/∂z for the owned nodes of ``body``: local nodes (n,) and (n, dim, pose_size)."""
+        """∂u/∂z for the owned nodes of ``body``: local nodes (n,) and (n, dim, pose_size), dim that of the space."""
         mine = self.nodes[body] < self.owned
         return self.nodes[body][mine], self.space.displacement_gradient(poses[body], self.offsets[body][mine])
 
     def moments(self, forces: np.ndarray) -> dict[int, np.ndarray]:
-        """Σ f_i ⊗ (X_i − c) over the owned nodes of each body, from nodal ``forces`` (owned nodes, dim)."""
+        """Σ f_i ⊗ (X_i − c) over the owned nodes of each body, from nodal ``forces`` (owned nodes, block)."""
         moments = {}
         for body, nodes in self.nodes.items():
             mine = nodes < self.owned
-            moments[body] = forces[nodes[mine]].T @ self.offsets[body][mine]
+            moments[body] = forces[nodes[mine], : self.space.dim].T @ self.offsets[body][mine]
         return moments

@@ -20,11 +20,17 @@ from fenicsmech.simulation.snapshot import rest_vertices
 
 
 def rest_meshes(simulation: Simulation, links: Sequence[FlexibleLink]) -> list[LinkMesh] | None:
-    """Meshes of some links in their present shape on the first process, None elsewhere (collective)."""
+    """Meshes of some links in their present shape on the first process, None elsewhere (collective).
+
+    Links of which one half is meshed are given by their plan.
+    """
     rest = rest_vertices(simulation.model)
     meshes = gather_links(simulation.model.mesh, rest)
     everyone = simulation.scene.mechanism.flexible_links
-    return None if rest is None else [meshes[everyone.index(link)] for link in links]
+    if rest is None:
+        return None
+    chosen = [meshes[everyone.index(link)] for link in links]
+    return [plan_of(mesh).mesh for mesh in chosen] if simulation.fidelity.model.symmetric else chosen
 
 
 def outline(link: DesignedLink, mesh: LinkMesh, p: np.ndarray) -> LinkOutline:

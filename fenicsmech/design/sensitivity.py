@@ -83,14 +83,15 @@ class Adjoint:
         """(R − I)ᵀ (K û)_i + (ẑ_r ∂R/∂r)ᵀ r_i at owned interface nodes, (owned nodes, dim)."""
         interfaces, joints = self._model.interfaces, self._model.linkage.joints
         dim = joints.space.dim
-        stiff, forces = stiff.reshape(-1, dim), forces.reshape(-1, dim)
+        stiff, forces = stiff.reshape(-1, interfaces.block), forces.reshape(-1, interfaces.block)
         nodal = np.zeros_like(stiff)
         for body, nodes in interfaces.nodes.items():
             mine = nodes[nodes < interfaces.owned]
             turn = np.einsum(
                 "a,aij->ij", z[joints.columns[body]][dim:], joints.space.rotation_gradient(state.poses[body])
             )
-            nodal[mine] = stiff[mine] @ joints.space.rotation_increment(state.poses[body]) + forces[mine] @ turn
+            back = joints.space.rotation_increment(state.poses[body])
+            nodal[mine, :dim] = stiff[mine, :dim] @ back + forces[mine, :dim] @ turn
         return nodal
 
     @cached_property

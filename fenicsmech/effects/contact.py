@@ -86,7 +86,7 @@ class Contact(LinkEffect, BodyEffect):
     def energy(self, fields):
         if not isinstance(self.link, FlexibleLink):
             return None
-        depth = self.link.shape.depth if fields.dim == 2 else 1.0
+        depth = fields.model.multiplier(self.link.shape.depth)
         gap = self.obstacle.gap_form(fields.position, fields.mesh)
         inside = -gap
         if self.obstacle.core is not None:

@@ -1,7 +1,7 @@
 """Parts of the boundaries of flexible links: their facets, and measures to integrate over them.
 
 Facets are tagged by the set of requested parts they belong to, so that parts may overlap; facets of no part are not
-tagged and cost nothing.
+tagged and cost nothing. Where only half of the links is meshed, its facets on the mid-plane are no boundary of theirs.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from mpi4py import MPI
 from fenicsmech.compat import cell_nodes, original_nodes
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import FlexibleLink
+from fenicsmech.meshing.mid_plane import on_mid_plane
 
 
 @dataclass(frozen=True)
@@ -42,24 +43,32 @@ class Boundary:
     Attributes:
         facets: this rank's facets.
         corners: numbers of their corners in the whole mesh, the same on all ranks, (facets, dim).
+        joined: whether these lie on a mid-plane, where the boundary goes on in its mirror image, (facets, dim).
         measures: ufl measures whose sum covers them.
     """
 
     facets: np.ndarray
     corners: np.ndarray
+    joined: np.ndarray
     measures: tuple[ufl.Measure, ...]
 
     def is_closed(self, comm: MPI.Comm) -> bool:
-        """Whether the facets of all ranks together have no rim (collective)."""
-        rims = Counter()
-        for found in comm.allgather(self.corners):
+        """Whether the facets of all ranks together, with their mirror images, have no rim (collective)."""
+        rims, joined = Counter(), set()
+        for found, mirrored in comm.allgather((self.corners, self.joined)):
+            joined.update(found[mirrored].tolist())
             for facet in np.sort(found, axis=1).tolist():
                 rims.update(combinations(facet, len(facet) - 1))
-        return all(count % 2 == 0 for count in rims.values())
+        return all(count % 2 == 0 or joined.issuperset(rim) for rim, count in rims.items())
 
 
 def find_boundaries(
-    mesh: dmesh.Mesh, links: Sequence[FlexibleLink], link_of_cell: np.ndarray, faces: Sequence[Faces]
+    mesh: dmesh.Mesh,
+    links: Sequence[FlexibleLink],
+    link_of_cell: np.ndarray,
+    faces: Sequence[Faces],
+    *,
+    half: bool = False,
 ) -> dict[Faces, Boundary]:
     """Where each of ``faces`` is (collective).
 
@@ -68,6 +77,7 @@ def find_boundaries(
         links: all flexible links.
         link_of_cell: index of the link of each local cell, (cells,).
         faces: the parts asked for; without any nothing is made.
+        half: the mesh is the half of the links above their mid-plane z = 0.
 
     Raises:
         DescriptionError: a part has no facet.
@@ -80,9 +90,12 @@ def find_boundaries(
     corners = _corners(mesh, cells, opposite)
     places = mesh.geometry.x[corners.ravel(), :dim]
     numbers = original_nodes(mesh)[corners]
+    joined = np.zeros_like(corners, dtype=bool)
+    if half:
+        joined = on_mid_plane(places, mesh.comm).reshape(joined.shape)
     within = np.zeros((len(facets), len(faces)), dtype=bool)
     for k, part in enumerate(faces):
-        within[:, k] = owner == links.index(part.link)
+        within[:, k] = (owner == links.index(part.link)) & ~joined.all(axis=1)
         if part.where is not None:
             inside = np.asarray(part.where(places), dtype=bool)
             within[:, k] &= inside.reshape(len(facets), dim).all(axis=1)
@@ -101,7 +114,8 @@ def find_boundaries(
                 "no facet has all its corners where the predicate says",
                 "Widen it; it is asked about the drawn link, (n, dim)",
             )
-        boundaries[part] = Boundary(facets[within[:, k]], numbers[within[:, k]], measures)
+        mine = within[:, k]
+        boundaries[part] = Boundary(facets[mine], numbers[mine], joined[mine], measures)
     return boundaries
 
 

@@ -86,9 +86,11 @@ class Gravity(LinkEffect, BodyEffect):
         if not self.densities:
             return None
         g = ufl.as_vector(in_dimension(self.acceleration, fields.dim))
-        depths = [link.shape.depth if fields.dim == 2 else 1.0 for link in fields.links]
         density = fields.cellwise(
-            [depth * self.densities.get(link.material, 0.0) for link, depth in zip(fields.links, depths, strict=True)]
+            [
+                fields.model.multiplier(link.shape.depth) * self.densities.get(link.material, 0.0)
+                for link in fields.links
+            ]
         )
         return fields.integral(-density * ufl.dot(g, fields.u), degree=fields.order)
 

@@ -28,6 +28,7 @@ from fenicsmech.effects.protocol import LinkEffect
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import FlexibleLink
 from fenicsmech.mechanism.checks import finite, point
+from fenicsmech.mechanism.places import in_dimension
 
 
 @dataclass(frozen=True)
@@ -79,10 +80,16 @@ class Pressure(LinkEffect):
                 "the part it acts on is open: its load has an energy only if the rim is held",
                 "Hold the rim and give about=…, or press on a closed part",
             )
+        if fields.model.symmetric and self.about is not None and in_dimension(self.about, 3)[2] != 0.0:
+            raise DescriptionError(
+                f"pressure on {self.link.name!r}",
+                f"the point {self.about} it goes about is not on the mid-plane",
+                "Give about=… with two coordinates or z = 0, or use space='3d'",
+            )
         dim, order = fields.dim, fields.order
         centre = (0.0,) * dim if self.about is None else self.about[:dim]
         along = len(centre)
-        depth = self.link.shape.depth if dim == 2 else 1.0
+        depth = fields.model.multiplier(self.link.shape.depth)
         pressure = fem.Constant(fields.mesh, self.pressure * depth / along)
         start = fem.Constant(fields.mesh, np.array(centre))
         arm = [fields.position[k] - start[k] for k in range(along)] + [0.0] * (dim - along)

@@ -38,6 +38,11 @@ class LinkFields:
     boundaries: Mapping[Faces, Boundary]
 
     @property
+    def model(self) -> ElasticModel:
+        """What is assumed about the third dimension."""
+        return self.body.model
+
+    @property
     def u(self) -> fem.Function:
         """Displacement field."""
         return self.body.u
@@ -58,8 +63,8 @@ class LinkFields:
 
     @property
     def dim(self) -> int:
-        """Dimension of the space."""
-        return self.mesh.geometry.dim
+        """Dimension of the mesh."""
+        return self.model.dim
 
     @property
     def mesh(self):
@@ -77,11 +82,11 @@ class LinkFields:
         return ufl.det(self.body.rest_gradient)
 
     def integral(self, density, *, degree: int) -> ufl.Form:
-        """∫ density dV over all links at rest, dV without the depth of planar links; ``degree`` of the quadrature."""
+        """∫ density dV over the mesh at rest, to be multiplied as ``model`` says; ``degree`` of the quadrature."""
         return density * self.stretch * self.dx(metadata={"quadrature_degree": degree})
 
     def boundary_integral(self, density, faces: Faces, *, degree: int) -> ufl.Form:
-        """∫ density dA over ``faces`` at rest, per depth of planar links; ``degree`` of the quadrature.
+        """∫ density dA over ``faces`` of the mesh at rest, to be multiplied as ``model`` says.
 
         By Nanson's formula dA = |det(∇X) (∇X)⁻ᵀ N| dA₀.
         """
@@ -89,9 +94,9 @@ class LinkFields:
         return self.reference_integral(density * ufl.sqrt(ufl.dot(area, area)), faces, degree=degree)
 
     def flux(self, vector, faces: Faces, *, degree: int) -> ufl.Form:
-        """∫ vector · n da over ``faces`` as deformed, n out of the link, per depth of planar links.
+        """∫ vector · n da over ``faces`` of the mesh as deformed, to be multiplied as ``model`` says.
 
-        By Nanson's formula n da = cof(∇X + ∇u) N dA₀.
+        n points out of the link. By Nanson's formula n da = cof(∇X + ∇u) N dA₀.
         """
         motion = self.body.rest_gradient + ufl.grad(self.u)
         area = ufl.dot(cofactor(motion), ufl.FacetNormal(self.mesh))

@@ -1,6 +1,6 @@
 """Strain energy of flexible links in UFL, on the fixed reference mesh with the design field in place.
 
-- ``models``: what is assumed about the third dimension (3D, plane strain, plane stress)
+- ``models``: what is assumed about the third dimension (3D, whole or half; plane strain, plane stress)
 - ``strain``: the invariants an energy is written in, free of cancellation
 - ``remainders``: the nonlinear remainders of logarithms and roots, free of cancellation
 - ``energies``: one strain energy density per material law
@@ -12,10 +12,11 @@
 from fenicsmech.elasticity.body import ElasticBody, Quadrature
 from fenicsmech.elasticity.energies import density
 from fenicsmech.elasticity.growth import Stretch
-from fenicsmech.elasticity.models import PLANE_STRAIN, PLANE_STRESS, SPATIAL, ElasticModel
+from fenicsmech.elasticity.models import MID_PLANE_SYMMETRIC, PLANE_STRAIN, PLANE_STRESS, SPATIAL, ElasticModel
 from fenicsmech.elasticity.strain import Moduli, Strain
 
 __all__ = [
+    "MID_PLANE_SYMMETRIC",
     "PLANE_STRAIN",
     "PLANE_STRESS",
     "SPATIAL",

@@ -5,7 +5,8 @@ shape X = X₀ + c + d and displacement u from the rest shape:
 
     H = F − I = ∇u (∇X)⁻¹,     E(u, d) = ∫ W(H) det(∇X) b dX₀,     ∇X = I + ∇c + ∇d,
 
-b the depth of a planar link (1 in space). Interface cells move rigidly and store no energy: they are left out.
+b the depth of a planar link; in space 1, or 2 where only one half is meshed. Interface cells move rigidly and store no
+energy: they are left out.
 """
 
 from __future__ import annotations
@@ -57,7 +58,7 @@ class ElasticBody:
         free: whether each local cell can deform (False inside interfaces), (cells,).
         materials: material of each link.
         depths: depth of each link, used by planar models.
-        model: 3D, plane strain or plane stress.
+        model: 3D, whole or half, plane strain or plane stress.
         order: degree of the displacement field.
         quadrature: explicit degree; never UFL's estimate.
         effects: energies beside the elastic one, as functions of this body; none costs nothing.
@@ -125,8 +126,7 @@ class ElasticBody:
 
     @cached_property
     def _strain_ufl(self) -> ufl.Form:
-        thick = self._depth if self.model.dim == 2 else 1.0
-        volume = ufl.det(self.rest_gradient) * thick
+        volume = ufl.det(self.rest_gradient) * self.model.multiplier(self._depth)
         if self._growth is not None:
             volume *= self._growth.volume
         terms = [self._density(law) * volume * dx for law, dx in self._terms]
@@ -186,7 +186,7 @@ class ElasticBody:
         i, j, k, m = ufl.indices(4)
         H = ufl.variable(self.gradient(self.u))
         elastic = H if self._growth is None else self._growth.elastic(H)
-        scale = self._depth if self.model.dim == 2 else 1.0
+        scale = self.model.multiplier(self._depth)
         if self._growth is not None:
             scale *= self._growth.volume
         terms = []

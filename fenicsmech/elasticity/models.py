@@ -19,10 +19,21 @@ class ElasticModel(ABC):
     Attributes:
         name: as shown in summaries and accepted on command lines.
         dim: dimension of the mesh.
+        mechanism_dim: dimension of the space in which bodies move and joints and forces act.
     """
 
     name: str
     dim: int
+    mechanism_dim: int
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether the mesh is one half of the links, the other its mirror image at the plane z = 0."""
+        return self.mechanism_dim < self.dim
+
+    @abstractmethod
+    def multiplier(self, depth: Expr | float) -> Expr | float:
+        """What integrals over the mesh of a link are multiplied by to be those over the link, from its ``depth``."""
 
     @abstractmethod
     def check(self, link: str, material: Material) -> None:
@@ -44,7 +55,10 @@ class ElasticModel(ABC):
 class Spatial(ElasticModel):
     """Three dimensions, nothing assumed."""
 
-    name, dim = "3d", 3
+    name, dim, mechanism_dim = "3d", 3, 3
+
+    def multiplier(self, depth):
+        return 1.0
 
     def check(self, link, material):
         pass
@@ -56,10 +70,34 @@ class Spatial(ElasticModel):
         return H
 
 
-class PlaneStrain(ElasticModel):
+class MidPlaneSymmetric(Spatial):
+    """Three dimensions, the halves of all links on either side of the plane z = 0 mirror images of each other.
+
+    Only the half z ≥ 0 is meshed and counts twice; u₃ = 0 on the mid-plane, and bodies move in the plane. What joints
+    do and forces is taken to be symmetric, as in models in the plane, whatever heights links are stacked at.
+    Equilibria are those of the whole, as long as these are symmetric: motion out of the plane is not seen, nor
+    buckling out of the plane, so that an equilibrium called stable may give way there.
+    """
+
+    name, mechanism_dim = "3d-symmetric", 2
+
+    def multiplier(self, depth):
+        return 2.0
+
+
+class Planar(ElasticModel):
+    """Two dimensions, everything constant across the depth."""
+
+    dim, mechanism_dim = 2, 2
+
+    def multiplier(self, depth):
+        return depth
+
+
+class PlaneStrain(Planar):
     """Two dimensions, F₃₃ = 1: links that cannot contract across their depth."""
 
-    name, dim = "plane-strain", 2
+    name = "plane-strain"
 
     def check(self, link, material):
         pass
@@ -71,10 +109,10 @@ class PlaneStrain(ElasticModel):
         return _embed(H, 0.0)
 
 
-class PlaneStress(ElasticModel):
+class PlaneStress(Planar):
     """Two dimensions, S₃₃ = 0: links free to contract across their depth."""
 
-    name, dim = "plane-stress", 2
+    name = "plane-stress"
 
     def check(self, link, material):
         if transverse_strain.dispatch(type(material.law)) is transverse_strain.dispatch(EnergyLaw):
@@ -100,4 +138,4 @@ def _embed(H: Expr, H33: Expr | float) -> Expr:
     return as_matrix([[H[0, 0], H[0, 1], 0], [H[1, 0], H[1, 1], 0], [0, 0, H33]])
 
 
-SPATIAL, PLANE_STRAIN, PLANE_STRESS = Spatial(), PlaneStrain(), PlaneStress()
+SPATIAL, MID_PLANE_SYMMETRIC, PLANE_STRAIN, PLANE_STRESS = Spatial(), MidPlaneSymmetric(), PlaneStrain(), PlaneStress()

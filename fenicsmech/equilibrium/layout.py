@@ -20,6 +20,7 @@ class Layout:
 
     Attributes:
         last: whether this rank holds the extras.
+        block: displacements per node.
         free: owned finite-element DOFs that are unknowns, (owned free dofs,).
         local_rows, local_unknowns: sizes on this rank.
         first_extra_row, first_extra: global numbers of the first extra row and unknown.
@@ -29,9 +30,9 @@ class Layout:
 
     def __init__(self, comm: MPI.Comm, interfaces: InterfaceMap, joints: JointSystem) -> None:
         self.comm, self.last = comm, comm.rank == comm.size - 1
-        block = interfaces.block
+        self.block = block = interfaces.block
         owned = interfaces.owned * block
-        self.free = np.flatnonzero(np.repeat(interfaces.body[: interfaces.owned] < 0, block))
+        self.free = np.flatnonzero(interfaces.unknown)
         self.z = slice(0, joints.size)
         self.multipliers = slice(joints.size, joints.size + joints.rows)
         self.force = joints.size + joints.rows

@@ -11,7 +11,7 @@ from fenicsmech.bodies import MaterialPoint
 
 @dataclass(frozen=True)
 class PointLoad:
-    """A dead force along ``direction`` (dim,) at a material point: work f · direction · u(point)."""
+    """A dead force along ``direction``, of as many coordinates as u(point): work f · direction · u(point)."""
 
     name: str
     point: MaterialPoint

@@ -65,7 +65,7 @@ def create_map_matrix(layout: Layout, interfaces: InterfaceMap, joints: JointSys
     entries: dict[int, np.ndarray] = {}
     for body, nodes in interfaces.nodes.items():
         for node in nodes[nodes < interfaces.owned]:
-            for row in range(dim * node, dim * node + dim):
+            for row in range(layout.block * node, layout.block * node + dim):
                 entries[row] = node_columns[body]
                 counts[row] = len(node_columns[body])
     if layout.last:

@@ -174,7 +174,7 @@ class EquilibriumSystem:
         with self.clock.phase("residual"):
             self._update_map(state)
             self.elastic.residual(self._nodal)
-            layout, dim = self.layout, self.joints.space.dim
+            layout = self.layout
             r = self._nodal.array_r[: layout.owned].copy()
             loads = np.zeros_like(r)
             g = np.zeros(layout.extras)
@@ -184,7 +184,7 @@ class EquilibriumSystem:
             reactions = self.joints.gradient(state.poses, state.motors).T @ state.multipliers
             forces = np.linalg.norm(g * self.scale) ** 2 + np.linalg.norm(reactions * self.scale[layout.z]) ** 2
             forces += layout.comm.allreduce(float(np.linalg.norm(loads * self.unit_u) ** 2))
-            moments = layout.comm.allreduce(self.interfaces.moments(r.reshape(-1, dim)), op=_add_moments)
+            moments = layout.comm.allreduce(self.interfaces.moments(r.reshape(-1, layout.block)), op=_add_moments)
             extras = -g
             extras[layout.z] += self._potentials.gradient(state) - reactions
             extras[layout.multipliers] = -self.constraints(state, state.multipliers)
@@ -314,10 +314,10 @@ class EquilibriumSystem:
                 if body in self.joints.columns:
                     extras[self.joints.columns[body]] += magnitude * load.direction @ point.gradient(state.poses)
             case LinkPoint(global_nodes=nodes, weights=weights):
-                dim = self.joints.space.dim
-                first = self.layout.first_row // dim
-                mine = (nodes >= first) & (nodes < first + self.layout.owned // dim)
-                forces = nodal.reshape(-1, dim)
+                block = self.layout.block
+                first = self.layout.first_row // block
+                mine = (nodes >= first) & (nodes < first + self.layout.owned // block)
+                forces = nodal.reshape(-1, block)
                 np.add.at(forces, nodes[mine] - first, magnitude * np.outer(weights[mine], load.direction))
 
     def _update_map(self, state: State) -> None:
@@ -328,7 +328,7 @@ class EquilibriumSystem:
             if not len(nodes):
                 continue
             columns = self.joints.columns[body]
-            rows = (dim * nodes[:, None] + np.arange(dim)).ravel()
+            rows = (layout.block * nodes[:, None] + np.arange(dim)).ravel()
             self._map.setValuesIJV(
                 np.arange(0, len(columns) * len(rows) + 1, len(columns), dtype=PETSc.IntType),
                 np.tile(layout.first_extra + columns, len(rows)).astype(PETSc.IntType),

@@ -26,13 +26,22 @@ def extrude(plan: LinkMesh, depth: float, layers: int) -> LinkMesh:
         depth: extent along z.
         layers: number of layers, at least 1.
     """
-    count = len(plan.points)
-    heights = np.linspace(-0.5 * depth, 0.5 * depth, layers + 1)
+    return _stack(plan, np.linspace(-0.5 * depth, 0.5 * depth, layers + 1), mirrored_from=(layers + 1) // 2)
+
+
+def extrude_half(plan: LinkMesh, depth: float, layers: int) -> LinkMesh:
+    """The upper half, z ≥ 0, of what ``extrude`` makes of twice as many ``layers``."""
+    return _stack(plan, np.linspace(0.0, 0.5 * depth, layers + 1), mirrored_from=0)
+
+
+def _stack(plan: LinkMesh, heights: np.ndarray, *, mirrored_from: int) -> LinkMesh:
+    """Layers of tetrahedra between ``heights``; those from number ``mirrored_from`` on are cut upside down."""
+    count, layers = len(plan.points), len(heights) - 1
     points = np.column_stack([np.tile(plan.points, (layers + 1, 1)), np.repeat(heights, count)])
     a, b, c = np.sort(plan.cells, axis=1).T
+    sides = [(layer, layer + 1) if layer < mirrored_from else (layer + 1, layer) for layer in range(layers)]
     cells = []
-    for layer in range(layers):
-        near, far = (layer, layer + 1) if 2 * layer < layers else (layer + 1, layer)
+    for near, far in sides:
         below, above = near * count, far * count
         cells += [
             np.column_stack([a + below, b + below, c + below, c + above]),
@@ -40,16 +49,14 @@ def extrude(plan: LinkMesh, depth: float, layers: int) -> LinkMesh:
             np.column_stack([a + below, a + above, b + above, c + above]),
         ]
     return LinkMesh.from_cells(
-        points, np.concatenate(cells), np.tile(plan.interface, 3 * layers), _walls(plan.curved, layers, count)
+        points, np.concatenate(cells), np.tile(plan.interface, 3 * layers), _walls(plan.curved, sides, count)
     )
 
 
-def _walls(plan: CurvedEdges, layers: int, count: int) -> CurvedEdges:
+def _walls(plan: CurvedEdges, sides: list[tuple[int, int]], count: int) -> CurvedEdges:
     """Curved edges of an extruded mesh: copies at every height, and the diagonals of the walls between them."""
     lower, upper = plan.ends.T
-    ends = [plan.ends + layer * count for layer in range(layers + 1)]
-    for layer in range(layers):
-        near, far = (layer, layer + 1) if 2 * layer < layers else (layer + 1, layer)
-        ends.append(np.column_stack([lower + near * count, upper + far * count]))
+    ends = [plan.ends + height * count for height in range(len(sides) + 1)]
+    ends += [np.column_stack([lower + near * count, upper + far * count]) for near, far in sides]
     bulges = np.column_stack([plan.bulges, np.zeros(len(plan.ends))])
-    return CurvedEdges(np.sort(np.concatenate(ends), axis=1), np.tile(bulges, (2 * layers + 1, 1)))
+    return CurvedEdges(np.sort(np.concatenate(ends), axis=1), np.tile(bulges, (len(ends), 1)))

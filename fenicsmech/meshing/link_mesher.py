@@ -22,6 +22,7 @@ def mesh_link(
     dim: int,
     size: float,
     layers: int | None = None,
+    half: bool = False,
 ) -> LinkMesh:
     """Mesh one link so that the cells of each interface fill the region where its joint holds the link.
 
@@ -34,13 +35,14 @@ def mesh_link(
         dim: 2 (triangles) or 3 (tetrahedra).
         size: target edge length, in the plane for links that are extruded.
         layers: layers through the depth of an extruded link; None: one per two element sizes.
+        half: mesh the half above the mid-plane z = 0 only, which ``layers`` count through then.
 
     Raises:
         MeshingError: the link cannot be meshed as described, a joint is not on the link or holds no cell, or the
             regions of two joints touch.
-        DescriptionError: an argument makes no sense.
+        DescriptionError: an argument makes no sense, or the shape has no half that is known.
     """
-    request = _request(name, sites, dim, size, layers)
+    request = _request(name, sites, dim, size, layers, half)
     check_shape(shape, request)
     return check_link_mesh(mesh_shape(shape, request), request)
 
@@ -53,6 +55,7 @@ def check_link(
     *,
     dim: int,
     size: float,
+    half: bool = False,
 ) -> None:
     """Refuse what can be seen to be wrong with a link before it is meshed; arguments as in ``mesh_link``.
 
@@ -61,8 +64,9 @@ def check_link(
 
     Raises:
         MeshingError: as ``mesh_link``, or one of ``points`` is not on the link.
+        DescriptionError: as ``mesh_link``.
     """
-    request = _request(name, sites, dim, size, None)
+    request = _request(name, sites, dim, size, None, half)
     check_shape(shape, request)
     for part, at in points.items():
         if not holds(shape, request, tuple(at)):
@@ -70,13 +74,16 @@ def check_link(
             raise MeshingError(f"{part!r}", f"the point ({shown}) is not on link {name!r}", "Move it onto the link")
 
 
-def _request(name: str, sites: Sequence[InterfaceSite], dim: int, size: float, layers: int | None) -> MeshRequest:
+def _request(
+    name: str, sites: Sequence[InterfaceSite], dim: int, size: float, layers: int | None, half: bool
+) -> MeshRequest:
     part = f"mesh of link {name!r}"
     size = positive(f"element size, {part}", size)
     if dim not in (2, 3):
         raise DescriptionError(part, f"dim is {dim!r}", "Give 2 or 3")
     if layers is not None and not (isinstance(layers, int) and layers > 0):
         raise DescriptionError(part, f"the number of layers is {layers!r}", "Give a whole number from 1 up")
-    # in the plane there is only one way to sweep a region, whatever the joint's own axis (of a slider, say)
-    sites = tuple(sites) if dim == 3 else tuple(replace(site, axis=(0.0, 0.0, 1.0)) for site in sites)
-    return MeshRequest(name, sites, dim, size, layers)
+    if dim == 2 or half:
+        # in the plane there is only one way to sweep a region, whatever the joint's own axis (of a slider, say)
+        sites = [replace(site, axis=(0.0, 0.0, 1.0)) for site in sites]
+    return MeshRequest(name, tuple(sites), dim, size, layers, half)

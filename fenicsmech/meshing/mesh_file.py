@@ -10,7 +10,7 @@ from fenicsmech.meshing.gmsh_session import gmsh, gmsh_session
 from fenicsmech.meshing.holders import sole_holder
 from fenicsmech.meshing.interface_site import across
 from fenicsmech.meshing.link_mesh import LinkMesh
-from fenicsmech.meshing.mesh_request import MeshRequest, check_shape, mesh_shape
+from fenicsmech.meshing.mesh_request import MeshRequest, check_shape, mesh_shape, refuse_half
 from fenicsmech.meshing.part_file import require_header
 from fenicsmech.meshing.regions import contains
 
@@ -29,6 +29,7 @@ def _(shape: MeshPart, request: MeshRequest) -> LinkMesh:
 
 @check_shape.register
 def _(shape: MeshPart, request: MeshRequest) -> None:
+    refuse_half(request, "a mesh file")
     require_header(shape.path, _HEADER, kind="gmsh mesh file", part=request.part)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from fenicsmech.meshing.extrude import extrude, layer_count
+from fenicsmech.meshing.extrude import extrude, extrude_half, layer_count
 from fenicsmech.meshing.fragments import mesh_fragments
 from fenicsmech.meshing.gmsh_session import gmsh, gmsh_session
 from fenicsmech.meshing.interface_site import InterfaceSite
@@ -57,9 +57,11 @@ def mesh_plan_view(
         else:
             mesh = _mesh_solid(request, plan, in_units_of(depth, request.size))
     mesh = replace(mesh, points=mesh.points * request.size, curved=mesh.curved.times(request.size))
-    if request.dim > mesh.dim:
-        return extrude(mesh, depth, request.layers or layer_count(depth, request.size))
-    return mesh
+    if request.dim == mesh.dim:
+        return mesh
+    if request.half:
+        return extrude_half(mesh, depth, request.layers or layer_count(0.5 * depth, request.size))
+    return extrude(mesh, depth, request.layers or layer_count(depth, request.size))
 
 
 def _mesh_plan(request: MeshRequest, plan: PlanView) -> LinkMesh:

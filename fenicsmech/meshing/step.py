@@ -9,7 +9,7 @@ from fenicsmech.mechanism.shapes import StepPart
 from fenicsmech.meshing.fragments import mesh_fragments
 from fenicsmech.meshing.gmsh_session import gmsh, gmsh_session
 from fenicsmech.meshing.link_mesh import LinkMesh
-from fenicsmech.meshing.mesh_request import MeshRequest, check_shape, mesh_shape
+from fenicsmech.meshing.mesh_request import MeshRequest, check_shape, mesh_shape, refuse_half
 from fenicsmech.meshing.part_file import require_header
 from fenicsmech.meshing.regions import DimTag, region_face, region_prism, solid_reach
 from fenicsmech.meshing.sizing import pin_refinements
@@ -26,6 +26,7 @@ def _(shape: StepPart, request: MeshRequest) -> LinkMesh:
 
 @check_shape.register
 def _(shape: StepPart, request: MeshRequest) -> None:
+    refuse_half(request, "a STEP file")
     require_header(shape.path, _HEADER, kind="STEP file", part=request.part)
 
 

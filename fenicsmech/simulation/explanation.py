@@ -107,7 +107,7 @@ def _weight_hint(model, newton, curve: Curve, frame: Frame, tolerance: float, un
 
 
 def weight_influence(model: MechanismModel, newton, curve: Curve, frame: Frame) -> np.ndarray:
-    """Derivative of the displacement by a weight per volume along each axis, (dim,) (collective).
+    """Derivative of the displacement by a weight per volume along each axis the mechanism moves in (collective).
 
     du/dw_k = x · ∫ e_k dV,     KKT x = ∂(a · u_P)/∂y
     """
@@ -118,13 +118,13 @@ def weight_influence(model: MechanismModel, newton, curve: Curve, frame: Frame) 
         newton.factor(frame.state, control, balance, IDLE_STIFFNESS if curve.freedom.mobility else 0.0)
         x = newton.solve_linear(system.travel_gradient(system.controlled, frame.state))
         influence, _ = system.expand(x)
-        depths = [link.shape.depth if model.linkage.dim == 2 else 1.0 for link in model.mechanism.flexible_links]
+        depths = [elastic.model.multiplier(link.shape.depth) for link in model.mechanism.flexible_links]
         v = ufl.TestFunction(elastic.u.function_space)
         depth = elastic.cellwise(depths) * ufl.det(elastic.rest_gradient)
-        direction = fem.Constant(elastic.mesh, np.zeros(model.linkage.dim))
+        direction = fem.Constant(elastic.mesh, np.zeros(elastic.model.dim))
         form = compile_form(ufl.dot(direction, v) * depth * elastic.dx(metadata={"quadrature_degree": elastic.order}))
         slopes = []
-        for axis in np.eye(model.linkage.dim):
+        for axis in np.eye(elastic.model.dim)[: model.linkage.dim]:
             direction.value = axis
             slopes.append(model.mesh.mesh.comm.allreduce(float(elastic.assembled(form) @ influence)))
     return np.array(slopes)

@@ -33,7 +33,7 @@ def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame])
     comm = model.mesh.mesh.comm
     displacement = fem.Function(vector_space(model.mesh.mesh, 1))
     stress = fem.Function(cellwise_space(model.mesh.mesh))
-    dim = model.linkage.dim
+    dim = model.elastic.model.dim
 
     def update(index: int) -> None:
         with model.shaped(frames[index].design):
@@ -68,7 +68,7 @@ def _mesh_of(model: MechanismModel, design: np.ndarray) -> Iterator[dmesh.Mesh]:
     """The mesh with its nodes where ``design`` puts them: files show the links at rest."""
     mesh, drawn = model.mesh.mesh, model.mesh.mesh.geometry.x.copy()
     with model.shaped(design):
-        mesh.geometry.x[:, : model.linkage.dim] += at_vertices(model, model.elastic.d)
+        mesh.geometry.x[:, : model.elastic.model.dim] += at_vertices(model, model.elastic.d)
     try:
         yield mesh
     finally:

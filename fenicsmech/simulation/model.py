@@ -31,7 +31,7 @@ class Fidelity:
     """How finely a scene is computed.
 
     Attributes:
-        model: 3D, plane strain or plane stress.
+        model: 3D, whole or half, plane strain or plane stress.
         order: degree of the displacement field.
         sizes: element size per flexible link.
         quadrature: quadrature degree.
@@ -48,15 +48,20 @@ def check_links(mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> N
     for link in mechanism.flexible_links:
         points = {part.name: part.at for part in (*mechanism.forces, *mechanism.outputs) if part.on == link}
         sites = interface_sites(linkage, link)
-        check_link(link.name, link.shape, sites, points, dim=linkage.dim, size=fidelity.sizes[link])
+        check_link(link.name, link.shape, sites, points, **_asked(link, fidelity))
 
 
 def mesh_links(mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> list[LinkMesh]:
     """The mesh of every flexible link, on the calling rank."""
     return [
-        mesh_link(link.name, link.shape, interface_sites(linkage, link), dim=linkage.dim, size=fidelity.sizes[link])
+        mesh_link(link.name, link.shape, interface_sites(linkage, link), **_asked(link, fidelity))
         for link in mechanism.flexible_links
     ]
+
+
+def _asked(link: FlexibleLink, fidelity: Fidelity) -> dict:
+    """What is asked of the mesh of ``link``."""
+    return {"dim": fidelity.model.dim, "size": fidelity.sizes[link], "half": fidelity.model.symmetric}
 
 
 def interface_sites(linkage: Linkage, link: FlexibleLink) -> list[InterfaceSite]:
@@ -109,7 +114,7 @@ class MechanismModel:
         links = mechanism.flexible_links
         link_effects = [effect for effect in effects if isinstance(effect, LinkEffect)]
         faces = [part for effect in link_effects for part in effect.faces]
-        self._boundaries = find_boundaries(mesh.mesh, links, mesh.link, faces)
+        self._boundaries = find_boundaries(mesh.mesh, links, mesh.link, faces, half=fidelity.model.symmetric)
         self.elastic = ElasticBody(
             mesh.mesh,
             link=mesh.link,
@@ -147,9 +152,8 @@ class MechanismModel:
 
     @property
     def flexible_dofs(self) -> int:
-        """Finite-element unknowns of the flexible links, interfaces excluded (collective)."""
-        own = int(np.sum(self.interfaces.body[: self.interfaces.owned] < 0)) * self.linkage.dim
-        return self.mesh.mesh.comm.allreduce(own)
+        """Finite-element unknowns of the flexible links, interfaces and mid-planes excluded (collective)."""
+        return self.mesh.mesh.comm.allreduce(int(np.sum(self.interfaces.unknown)))
 
     @property
     def rigid_dofs(self) -> int:
@@ -191,8 +195,8 @@ class MechanismModel:
 
     def point(self, part: Force | Output) -> MaterialPoint:
         """The material point of a force or output (collective)."""
-        at = np.array(in_dimension(part.at, self.linkage.dim))
         if not isinstance(part.on, FlexibleLink):
+            at = np.array(in_dimension(part.at, self.linkage.dim))
             body = self.linkage.body_of(part.on)
             return body_point(at, body, self.linkage.bodies[body].centre, self.linkage.joints.space)
         topology = self.mesh.mesh.topology
@@ -200,12 +204,15 @@ class MechanismModel:
         index = self.mechanism.flexible_links.index(part.on)
         cells = np.flatnonzero(self.mesh.link[:owned] == index)
         corners = self.mesh.corners(cells)
+        # seen from a model in the plane, a point at any height is on the mid-plane
+        at = np.array(in_dimension(in_dimension(part.at, self.linkage.dim), self.elastic.model.dim))
         return link_point(f"{part.name!r}", at, self.elastic.u, cells, corners, self._bulges(cells))
 
     def point_load(self, force: Force | Output) -> PointLoad:
         """The point load of a force, or of a unit force along an output (collective)."""
         if force not in self._point_loads:
-            direction = np.array(in_dimension(force.direction, self.linkage.dim))
+            dim = self.elastic.model.dim if isinstance(force.on, FlexibleLink) else self.linkage.dim
+            direction = np.array(in_dimension(force.direction, dim))
             self._point_loads[force] = PointLoad(force.name, self.point(force), direction)
         return self._point_loads[force]
 
@@ -230,13 +237,13 @@ class MechanismModel:
     def assembled_state(self, poses: np.ndarray, motors: np.ndarray) -> State:
         """The state of a rigid assembly: every flexible link carried along by its first interface (collective)."""
         dim, owned = self.linkage.dim, self.interfaces.owned
-        positions = self.elastic.drawn_nodes[:owned] + self.design_nodes.values()[:owned]
-        u = np.zeros((owned, dim))
+        positions = self.elastic.drawn_nodes[:owned, :dim] + self.design_nodes.values()[:owned, :dim]
+        u = np.zeros((owned, self.interfaces.block))
         for index, link in enumerate(self.mechanism.flexible_links):
             body = self.linkage.interfaces[link][0]
             nodes = np.flatnonzero(self._node_link[:owned] == index)
             offsets = positions[nodes] - np.array(self.linkage.bodies[body].centre)
-            u[nodes] = self.linkage.joints.space.displace(poses[body], offsets)
+            u[nodes, :dim] = self.linkage.joints.space.displace(poses[body], offsets)
         return State(u.ravel(), poses, np.zeros(self.linkage.joints.rows), 0.0, motors)
 
     @property

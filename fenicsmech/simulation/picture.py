@@ -74,7 +74,7 @@ class Draughtsman:
     def _visible(self, index: int) -> tuple[np.ndarray, np.ndarray]:
         """Triangles of a link seen from above, and the cell each belongs to."""
         cells = np.flatnonzero(self._mesh.link_of_cell == index)
-        if self._linkage.dim == 2:
+        if self._mesh.vertices.shape[1] == 2:
             return self._mesh.cells[cells], cells
         view = plan_view(self._mesh.vertices, self._mesh.cells[cells])
         return view.triangles, cells[view.cells]

@@ -10,7 +10,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenicsmech.clock import Clock
-from fenicsmech.elasticity import PLANE_STRAIN, PLANE_STRESS, SPATIAL, Quadrature
+from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRAIN, PLANE_STRESS, SPATIAL, Quadrature
 from fenicsmech.equilibrium import Hermite, Newton, NewtonOptions, Predictor
 from fenicsmech.errors import AssemblyError, DescriptionError
 from fenicsmech.linkage import assemble, build_linkage, count_freedom
@@ -30,7 +30,7 @@ from fenicsmech.simulation.request import CurveRequest, read_request
 from fenicsmech.simulation.snapshot import gather, rest_vertices
 from fenicsmech.simulation.tracer import Tracer
 
-SPACES = {model.name: model for model in (SPATIAL, PLANE_STRESS, PLANE_STRAIN)}
+SPACES = {model.name: model for model in (SPATIAL, MID_PLANE_SYMMETRIC, PLANE_STRESS, PLANE_STRAIN)}
 """Names of the elastic models, as users type them."""
 
 
@@ -41,7 +41,8 @@ class Simulation:
 
     Args:
         scene: the mechanism and what acts on it.
-        space: "3d", "plane-stress" or "plane-strain".
+        space: "3d"; "3d-symmetric", which meshes half the depth of links that joints and forces move in the plane;
+            "plane-stress" or "plane-strain".
         order: degree of the displacement field, 1, 2 or 3.
         size: element size in the plane of the links, or one per flexible link.
         quadrature: quadrature degree; the measured optimum by default.
@@ -71,7 +72,7 @@ class Simulation:
             raise DescriptionError("order", f"{order!r} is not 1, 2 or 3", "Choose 1 for speed, 2 for accuracy")
         model = SPACES[space]
         mechanism = scene.mechanism
-        validate(mechanism, model.dim)
+        validate(mechanism, model.mechanism_dim)
         links = mechanism.flexible_links
         if not links:
             raise DescriptionError(
@@ -82,11 +83,11 @@ class Simulation:
         for link in links:
             model.check(link.name, link.material)
         for effect in scene.effects:
-            effect.check(mechanism, model.dim)
+            effect.check(mechanism, model.mechanism_dim)
         self.scene, self.comm, self.clock = scene, comm, Clock()
         self._described = _description(mechanism)
         self.fidelity = Fidelity(model, order, sizes, quadrature or Quadrature.for_order(order, model.dim))
-        self.linkage = build_linkage(mechanism, model.dim)
+        self.linkage = build_linkage(mechanism, model.mechanism_dim)
         check_links(mechanism, self.linkage, self.fidelity)
         self._options, self._predictor = newton or NewtonOptions(), predictor or Hermite()
         self._newtons: dict[tuple, Newton] = {}
@@ -320,7 +321,7 @@ class Simulation:
         """Largest ratio of circumradius to inradius among the cells of the rest shape (collective)."""
         rest, ratio = rest_vertices(self.model), None
         if rest is not None:
-            ratio = self.linkage.dim / float(radius_ratios(rest, self.model.mesh.cells).min())
+            ratio = self.fidelity.model.dim / float(radius_ratios(rest, self.model.mesh.cells).min())
         return self.comm.bcast(ratio, root=0)
 
     def _chosen(self, curve: Curve | None) -> Curve:

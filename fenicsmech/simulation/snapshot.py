@@ -31,7 +31,7 @@ class Snapshot:
 
 def at_vertices(model: MechanismModel, field: fem.Function) -> np.ndarray:
     """Values of a Lagrange field (d or u) at this rank's geometry nodes, (nodes, dim)."""
-    mesh, dim = model.mesh.mesh, model.linkage.dim
+    mesh, dim = model.mesh.mesh, model.elastic.model.dim
     values = field.x.array.reshape(-1, dim)
     vertices = np.zeros((len(mesh.geometry.x), dim))
     for nodes, cell in zip(cell_nodes(mesh), range(len(model.mesh.link)), strict=False):

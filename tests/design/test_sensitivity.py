@@ -13,6 +13,7 @@ from fenicsmech.design.sensitivity import Adjoint, Gradient
 from fenicsmech.equilibrium import State
 
 from ..oracles.dense import taylor_rates
+from .in_plane import design_field
 
 pytestmark = pytest.mark.parallel
 
@@ -57,7 +58,7 @@ class Bench:
         dim = self.model.linkage.dim
         positions = self.space.tabulate_dof_coordinates()
         waves, phases = random.uniform(-0.08, 0.08, (3, dim)), random.uniform(0.0, 6.0, dim)
-        return (0.3 * np.sin(positions @ waves + phases)).ravel()
+        return design_field(self.model, 0.3 * np.sin(positions @ waves + phases))
 
     def state(self, design: np.ndarray, force: float = FORCE) -> State:
         """The equilibrium under ``force`` of the given design."""
@@ -78,7 +79,9 @@ class Bench:
 
 
 @pytest.fixture(
-    scope="module", params=[(s, c) for s in ("plane-stress", "plane-strain", "3d") for c in COMMS], ids="-".join
+    scope="module",
+    params=[(s, c) for s in ("plane-stress", "plane-strain", "3d-symmetric", "3d") for c in COMMS],
+    ids="-".join,
 )
 def bench(request) -> Bench:
     space, comm = request.param

@@ -28,7 +28,7 @@ def cantilever(space: str, effects, *, size: float = 2.0) -> tuple[fm.Simulation
 
 
 @pytest.mark.parallel
-@pytest.mark.parametrize("space", ["plane-stress", "3d"])
+@pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
 def test_a_cantilever_sags_as_a_beam_does_under_its_weight_and_that_of_its_end(space):
     mass = 2e-6
     simulation, push = cantilever(
@@ -44,7 +44,7 @@ def test_a_cantilever_sags_as_a_beam_does_under_its_weight_and_that_of_its_end(s
     assert frame.stable
 
 
-@pytest.mark.parametrize("space", ["plane-stress", "3d"])
+@pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
 def test_a_pendulum_on_a_flexible_hinge_hangs_where_its_force_and_its_weight_balance(space):
     rig = fm.Mechanism("pendulum")
     wall, rod = rig.rigid("wall", fixed=True), rig.rigid("rod")

@@ -18,7 +18,7 @@ from ..design.mechanisms import objective, truss
 from .levers import ARM, PLASTIC, TILTED, UPRIGHT, lever
 
 STIFFNESS, COMPLIANCE = 50.0, 0.4
-every_space = pytest.mark.parametrize("space", ["plane-stress", "3d"])
+every_space = pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
 
 
 @pytest.mark.parametrize(("space", "frame"), [("plane-stress", UPRIGHT), ("3d", UPRIGHT), ("3d", TILTED)])

@@ -22,7 +22,7 @@ class Crowded:
     on_flexible: Force
 
 
-def crowded(dim: int, comm: MPI.Comm = MPI.COMM_SELF) -> Crowded:
+def crowded(space: str, comm: MPI.Comm = MPI.COMM_SELF) -> Crowded:
     """Parallelogram of rigid links with a motor, a flexible third leg (redundant) and a flexible diagonal."""
     mechanism = fm.Mechanism("crowded")
     base = mechanism.rigid("base", fixed=True)
@@ -36,7 +36,8 @@ def crowded(dim: int, comm: MPI.Comm = MPI.COMM_SELF) -> Crowded:
     mechanism.weld(base, diagonal, at=(0, 0), radius=2.5)
     mechanism.weld(diagonal, slide, at=(16, 16), radius=2.5)
     mechanism.prismatic(slide, tip, at=(16, 16), axis=(0.8, 0.6))
-    if dim == 2:
+    planar = space != "3d"
+    if planar:
         mechanism.revolute(base, leg, at=(8, 0), radius=2.5)
         mechanism.revolute(leg, tip, at=(8, 16), radius=2.5)
         mechanism.revolute(plate, right, at=(20, 8))
@@ -46,10 +47,9 @@ def crowded(dim: int, comm: MPI.Comm = MPI.COMM_SELF) -> Crowded:
         mechanism.cylindrical(plate, right, at=(20, 8), axis=(0, 0.6, 0.8))
         mechanism.planar(plate, tip, at=(24, 12), axis=(0.6, 0, 0.8))
     mechanism.motor(shaft)
-    across = (0.8, 0.6) if dim == 2 else (0.48, 0.6, 0.64)
+    across = (0.8, 0.6) if planar else (0.48, 0.6, 0.64)
     on_rigid = mechanism.force(on=plate, at=(22, 9), direction=across, name="on rigid")
     on_flexible = mechanism.force(on=leg, at=(8.3, 8.7), direction=across[::-1], name="on flexible")
-    space = {2: "plane-stress", 3: "3d"}[dim]
     simulation = fm.Simulation(fm.Scene(mechanism), space=space, order=1, size=SIZE, comm=comm)
     return Crowded(simulation, on_rigid, on_flexible)
 
@@ -87,8 +87,9 @@ def random_state(case: Crowded, system: EquilibriumSystem, *, seed: int = 5) -> 
     motors = np.where([c.motor is not None for c in joints.connections], 0.7, 0.0)
     carried = model.assembled_state(poses, motors)
     # the same field on any number of ranks: a function of position
-    positions = model.elastic.u.function_space.tabulate_dof_coordinates()[: model.interfaces.owned, : space.dim]
-    waves, phases = random.uniform(0.2, 0.5, (space.dim, space.dim)), random.uniform(0.0, 6.0, space.dim)
+    block = model.interfaces.block
+    positions = model.elastic.u.function_space.tabulate_dof_coordinates()[: model.interfaces.owned, :block]
+    waves, phases = random.uniform(0.2, 0.5, (block, block)), random.uniform(0.0, 6.0, block)
     u = carried.u + 0.1 * SIZE * np.sin(positions @ waves.T + phases).ravel()
     multipliers = system.scale[system.layout.multipliers] * 0.1 * random.standard_normal(joints.rows)
     return State(u, poses, multipliers, 1.3, motors)

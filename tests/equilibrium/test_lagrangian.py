@@ -18,6 +18,7 @@ from ..oracles import dense
 from .crowded import SIZE, control_of, crowded, random_state, system_of
 
 CONTROLS = [LoadControl, DisplacementControl]
+SPACES = ["plane-stress", "3d-symmetric", "3d"]
 
 
 def shifted(system: EquilibriumSystem, state: State, x: np.ndarray) -> State:
@@ -43,7 +44,7 @@ def largest_steps(system: EquilibriumSystem) -> np.ndarray:
 def sample(system: EquilibriumSystem, control: Control) -> np.ndarray:
     """The unknowns by which to differentiate: all, but in space only some of the displacements."""
     parts = blocks(system)
-    displacements = parts["u"][:: {2: 1, 3: 9}[system.joints.space.dim]]
+    displacements = parts["u"][:: {2: 1, 3: 8}[system.elastic.model.dim]]
     force = parts["f"] if control.constrained else []
     return np.concatenate([displacements, parts["z"], parts["λ"], force]).astype(int)
 
@@ -63,9 +64,9 @@ def blocks(system: EquilibriumSystem) -> dict[str, np.ndarray]:
 
 @pytest.mark.parametrize("kind", CONTROLS)
 @pytest.mark.parametrize("where", ["on_rigid", "on_flexible"])
-@pytest.mark.parametrize("dim", [2, 3])
-def test_balance_is_the_gradient_of_the_lagrangian(dim, where, kind):
-    case = crowded(dim)
+@pytest.mark.parametrize("space", SPACES)
+def test_balance_is_the_gradient_of_the_lagrangian(space, where, kind):
+    case = crowded(space)
     system = system_of(case, controlled=getattr(case, where))
     state, control = random_state(case, system), control_of(kind)
 
@@ -91,9 +92,9 @@ def test_balance_is_the_gradient_of_the_lagrangian(dim, where, kind):
 
 @pytest.mark.parametrize("kind", CONTROLS)
 @pytest.mark.parametrize("where", ["on_rigid", "on_flexible"])
-@pytest.mark.parametrize("dim", [2, 3])
-def test_kkt_matrix_is_the_derivative_of_the_balance(dim, where, kind):
-    case = crowded(dim)
+@pytest.mark.parametrize("space", SPACES)
+def test_kkt_matrix_is_the_derivative_of_the_balance(space, where, kind):
+    case = crowded(space)
     system = system_of(case, controlled=getattr(case, where))
     state, control = random_state(case, system), control_of(kind)
     parts, columns = blocks(system), sample(system, control)
@@ -117,9 +118,9 @@ def test_kkt_matrix_is_the_derivative_of_the_balance(dim, where, kind):
 
 
 @pytest.mark.parametrize("kind", CONTROLS)
-@pytest.mark.parametrize("dim", [2, 3])
-def test_kkt_matrix_is_symmetric(dim, kind):
-    case = crowded(dim)
+@pytest.mark.parametrize("space", SPACES)
+def test_kkt_matrix_is_symmetric(space, kind):
+    case = crowded(space)
     system = system_of(case, controlled=case.on_flexible)
     state, control = random_state(case, system), control_of(kind)
     system.load(state)
@@ -128,9 +129,9 @@ def test_kkt_matrix_is_symmetric(dim, kind):
     assert np.abs(matrix - matrix.T).max() <= 1e-12 * np.abs(matrix).max()
 
 
-@pytest.mark.parametrize("dim", [2, 3])
-def test_shift_raises_the_curvature_of_displacements_and_poses_alone(dim):
-    case = crowded(dim)
+@pytest.mark.parametrize("space", SPACES)
+def test_shift_raises_the_curvature_of_displacements_and_poses_alone(space):
+    case = crowded(space)
     system = system_of(case, controlled=case.on_rigid)
     state, control = random_state(case, system), control_of(LoadControl)
     system.load(state)
@@ -147,9 +148,9 @@ def test_shift_raises_the_curvature_of_displacements_and_poses_alone(dim):
 @pytest.mark.parallel
 @pytest.mark.parametrize("kind", CONTROLS)
 @pytest.mark.parametrize("where", ["on_rigid", "on_flexible"])
-@pytest.mark.parametrize("dim", [2, 3])
-def test_kkt_matrix_times_a_direction_is_the_change_of_the_balance_on_any_number_of_ranks(dim, where, kind):
-    case = crowded(dim, MPI.COMM_WORLD)
+@pytest.mark.parametrize("space", SPACES)
+def test_kkt_matrix_times_a_direction_is_the_change_of_the_balance_on_any_number_of_ranks(space, where, kind):
+    case = crowded(space, MPI.COMM_WORLD)
     system = system_of(case, controlled=getattr(case, where))
     state, control = random_state(case, system), control_of(kind)
     random = np.random.default_rng(MPI.COMM_WORLD.rank)
@@ -174,11 +175,11 @@ def test_kkt_matrix_times_a_direction_is_the_change_of_the_balance_on_any_number
 
 
 @pytest.mark.parallel
-@pytest.mark.parametrize("dim", [2, 3])
-def test_balance_is_the_same_on_any_number_of_ranks(dim):
+@pytest.mark.parametrize("space", SPACES)
+def test_balance_is_the_same_on_any_number_of_ranks(space):
     values = []
     for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
-        case = crowded(dim, comm)
+        case = crowded(space, comm)
         system = system_of(case, controlled=case.on_flexible)
         state, control = random_state(case, system), control_of(DisplacementControl)
         system.load(state)

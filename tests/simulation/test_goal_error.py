@@ -59,7 +59,7 @@ def test_effectivity_in_space_is_between_a_half_and_two(name, size):
 
 
 @pytest.mark.parallel
-@pytest.mark.parametrize("space", ["plane-stress", "3d"])
+@pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
 def test_estimate_is_the_same_on_any_number_of_processes(space):
     shared = estimated("claw", space, 2, 4.0)[1]
     alone = estimated("claw", space, 2, 4.0, comm=MPI.COMM_SELF)[1]

@@ -62,7 +62,7 @@ def test_klann_in_space_in_another_configuration_under_displacement_control():
     assert_alike(*curves)
 
 
-@pytest.mark.parametrize("space", ["plane-stress", "3d"])
+@pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
 def test_force_and_output_on_points_of_a_flexible_link(space):
     curves = []
     for comm in COMMS:
