@@ -181,6 +181,16 @@ class ElasticBody:
         metadata = {"quadrature_degree": degree}
         return sum((dx(metadata=metadata) for _, dx in self._terms[1:]), start=self._terms[0][1](metadata=metadata))
 
+    def contraction_energy(self, weight, *, degree: int) -> ufl.Form:
+        """½ ∫ w E (F₃₃ − 1)² dV with a scalar field w, of links in plane stress."""
+        terms = []
+        for law, dx in self._terms:
+            contraction = self.model.contraction(law, self._strain, self._moduli)
+            density_ = 0.5 * weight * self.youngs_modulus * contraction**2
+            scale = ufl.det(self.rest_gradient) * self.model.multiplier(self._depth)
+            terms.append(density_ * scale * dx(metadata={"quadrature_degree": degree}))
+        return sum(terms[1:], start=terms[0])
+
     def curvature(self, A, B, *, degree: int) -> ufl.Form:
         """∫ A : ∂²W/∂F∂F : B dV at the present displacement, for gradients A, B on the rest shape."""
         i, j, k, m = ufl.indices(4)

@@ -126,8 +126,12 @@ class PlaneStress(Planar):
         return plane_strain_stretched(H, self._transverse(law, H, moduli))
 
     def embed(self, law, H, moduli):
+        return _embed(H, self.contraction(law, H, moduli))
+
+    def contraction(self, law: EnergyLaw, H: Expr, moduli: Moduli) -> Expr:
+        """F₃₃ − 1 = e / (1 + √(1 + e))."""
         e = self._transverse(law, H, moduli)
-        return _embed(H, e / (1 + (1 + e) ** 0.5))
+        return e / (1 + (1 + e) ** 0.5)
 
     @staticmethod
     def _transverse(law: EnergyLaw, H: Expr, moduli: Moduli) -> Expr:

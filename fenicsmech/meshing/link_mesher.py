@@ -12,6 +12,7 @@ from fenicsmech.meshing.interface_site import InterfaceSite
 from fenicsmech.meshing.link_mesh import LinkMesh
 from fenicsmech.meshing.mesh_checks import check_link_mesh
 from fenicsmech.meshing.mesh_request import MeshRequest, check_shape, holds, mesh_shape
+from fenicsmech.meshing.sizing import LEAST_SEGMENTS
 
 
 def mesh_link(
@@ -22,6 +23,7 @@ def mesh_link(
     dim: int,
     size: float,
     layers: int | None = None,
+    segments: int = LEAST_SEGMENTS,
     half: bool = False,
 ) -> LinkMesh:
     """Mesh one link so that the cells of each interface fill the region where its joint holds the link.
@@ -35,6 +37,7 @@ def mesh_link(
         dim: 2 (triangles) or 3 (tetrahedra).
         size: target edge length, in the plane for links that are extruded.
         layers: layers through the depth of an extruded link; None: one per two element sizes.
+        segments: of which the circle around a pin has at least so many.
         half: mesh the half above the mid-plane z = 0 only, which ``layers`` count through then.
 
     Raises:
@@ -42,7 +45,7 @@ def mesh_link(
             regions of two joints touch.
         DescriptionError: an argument makes no sense, or the shape has no half that is known.
     """
-    request = _request(name, sites, dim, size, layers, half)
+    request = _request(name, sites, dim, size, layers, segments, half)
     check_shape(shape, request)
     return check_link_mesh(mesh_shape(shape, request), request)
 
@@ -66,7 +69,7 @@ def check_link(
         MeshingError: as ``mesh_link``, or one of ``points`` is not on the link.
         DescriptionError: as ``mesh_link``.
     """
-    request = _request(name, sites, dim, size, None, half)
+    request = _request(name, sites, dim, size, None, LEAST_SEGMENTS, half)
     check_shape(shape, request)
     for part, at in points.items():
         if not holds(shape, request, tuple(at)):
@@ -75,7 +78,13 @@ def check_link(
 
 
 def _request(
-    name: str, sites: Sequence[InterfaceSite], dim: int, size: float, layers: int | None, half: bool
+    name: str,
+    sites: Sequence[InterfaceSite],
+    dim: int,
+    size: float,
+    layers: int | None,
+    segments: int,
+    half: bool,
 ) -> MeshRequest:
     part = f"mesh of link {name!r}"
     size = positive(f"element size, {part}", size)
@@ -86,4 +95,4 @@ def _request(
     if dim == 2 or half:
         # in the plane there is only one way to sweep a region, whatever the joint's own axis (of a slider, say)
         sites = [replace(site, axis=(0.0, 0.0, 1.0)) for site in sites]
-    return MeshRequest(name, tuple(sites), dim, size, layers, half)
+    return MeshRequest(name, tuple(sites), dim, size, layers, segments, half)

@@ -8,6 +8,7 @@ from functools import singledispatch
 from fenicsmech.errors import DescriptionError
 from fenicsmech.meshing.interface_site import InterfaceSite
 from fenicsmech.meshing.link_mesh import LinkMesh
+from fenicsmech.meshing.sizing import LEAST_SEGMENTS
 
 
 @dataclass(frozen=True)
@@ -20,6 +21,7 @@ class MeshRequest:
         dim: 2 or 3.
         size: target edge length in the plane of the link (everywhere, for a solid).
         layers: number of layers through the depth of an extruded link; None: chosen from depth and size.
+        segments: of which the circle around a pin has at least so many.
         half: in space, mesh the half above the mid-plane z = 0 only; ``layers`` are those of the half.
     """
 
@@ -28,6 +30,7 @@ class MeshRequest:
     dim: int
     size: float
     layers: int | None = None
+    segments: int = LEAST_SEGMENTS
     half: bool = False
 
     @property

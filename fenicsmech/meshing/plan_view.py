@@ -66,7 +66,7 @@ def mesh_plan_view(
 
 def _mesh_plan(request: MeshRequest, plan: PlanView) -> LinkMesh:
     cutters = [region_face(site, corners=c) for site, c in zip(plan.sites, plan.corners, strict=True)]
-    refinements = [*plan.refinements, *pin_refinements(plan.sites, 1.0)]
+    refinements = [*plan.refinements, *pin_refinements(plan.sites, 1.0, request.segments)]
     return mesh_fragments(request, plan.faces, cutters, size=1.0, refinements=refinements)
 
 
@@ -75,5 +75,5 @@ def _mesh_solid(request: MeshRequest, plan: PlanView, depth: float) -> LinkMesh:
     occ.translate(plan.faces, 0.0, 0.0, -0.5 * depth)
     solids = [entity for entity in occ.extrude(plan.faces, 0.0, 0.0, depth) if entity[0] == 3]
     cutters = [region_prism(site, solid_reach(solids, site)) for site in plan.sites]
-    refinements = [*plan.refinements, *pin_refinements(plan.sites, 1.0)]
+    refinements = [*plan.refinements, *pin_refinements(plan.sites, 1.0, request.segments)]
     return mesh_fragments(request, solids, cutters, size=1.0, refinements=refinements)

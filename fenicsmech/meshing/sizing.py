@@ -9,7 +9,9 @@ from fenicsmech.mechanism.shapes import Disc
 from fenicsmech.meshing.gmsh_session import gmsh
 from fenicsmech.meshing.interface_site import InterfaceSite, axis_frame
 
-_LEAST_SEGMENTS = 8  # of a circle
+LEAST_SEGMENTS = 8
+"""Of a circle."""
+
 _GROWTH = 1.0  # of the element size per unit of distance
 _GAP_ASPECT = 4.0  # length over height of the elements in a narrow gap
 _LEAST_GAP_SIZE = 0.25  # of the size next to it: bounds what a vanishing gap may cost
@@ -17,21 +19,21 @@ _LEAST_GAP_SIZE = 0.25  # of the size next to it: bounds what a vanishing gap ma
 
 def circle_segments(radius: float, size: float) -> int:
     """Number of segments that stand for a whole circle."""
-    return max(_LEAST_SEGMENTS, math.ceil(2.0 * math.pi * radius / size))
+    return max(LEAST_SEGMENTS, math.ceil(2.0 * math.pi * radius / size))
 
 
-def _segment_length(radius: float) -> float:
-    """Greatest length of a segment of a circle."""
-    return 2.0 * math.pi * radius / _LEAST_SEGMENTS
+def _segment_length(radius: float, segments: int = LEAST_SEGMENTS) -> float:
+    """Greatest length of a segment of a circle of ``segments``."""
+    return 2.0 * math.pi * radius / segments
 
 
-def pin_refinements(sites: Iterable[InterfaceSite], size: float) -> list[str]:
-    """Element sizes, as gmsh expressions, that give small pins their eight segments."""
+def pin_refinements(sites: Iterable[InterfaceSite], size: float, segments: int = LEAST_SEGMENTS) -> list[str]:
+    """Element sizes, as gmsh expressions, that give pins at least so many ``segments``."""
     expressions = []
     for site in sites:
-        if isinstance(site.region, Disc) and _segment_length(site.region.radius) < size:
+        if isinstance(site.region, Disc) and _segment_length(site.region.radius, segments) < size:
             distance = _distance_from_axis(site)
-            fine = 0.999 * _segment_length(site.region.radius)
+            fine = 0.999 * _segment_length(site.region.radius, segments)
             expressions.append(f"{fine!r} + {_GROWTH} * max(0, {distance} - {site.region.radius!r})")
     return expressions
 

@@ -48,7 +48,7 @@ def _only_solid(path: Path, request: MeshRequest) -> DimTag:
 
 def _mesh_solid(shape: StepPart, solid: DimTag, request: MeshRequest) -> LinkMesh:
     cutters = [region_prism(site, solid_reach([solid], site)) for site in request.sites]
-    refinements = pin_refinements(request.sites, request.size)
+    refinements = pin_refinements(request.sites, request.size, request.segments)
     return mesh_fragments(request, [solid], cutters, size=request.size, refinements=refinements)
 
 
@@ -71,5 +71,5 @@ def _mesh_section(shape: StepPart, solid: DimTag, request: MeshRequest) -> LinkM
             "Choose a section in between",
         )
     cutters = [region_face(site, height=shape.section) for site in request.sites]
-    refinements = pin_refinements(request.sites, request.size)
+    refinements = pin_refinements(request.sites, request.size, request.segments)
     return mesh_fragments(request, faces, cutters, size=request.size, refinements=refinements)

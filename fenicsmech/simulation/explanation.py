@@ -13,10 +13,10 @@ from scipy.spatial import cKDTree
 
 from fenicsmech.compat import compile_form
 from fenicsmech.effects import Gravity
-from fenicsmech.equilibrium import IDLE_STIFFNESS, LoadControl
 from fenicsmech.mechanism import FlexibleLink, Strip, Units
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.frame import Frame
+from fenicsmech.simulation.influence import influence
 from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.snapshot import gather
 
@@ -109,15 +109,10 @@ def _weight_hint(model, newton, curve: Curve, frame: Frame, tolerance: float, un
 def weight_influence(model: MechanismModel, newton, curve: Curve, frame: Frame) -> np.ndarray:
     """Derivative of the displacement by a weight per volume along each axis the mechanism moves in (collective).
 
-    du/dw_k = x · ∫ e_k dV,     KKT x = ∂(a · u_P)/∂y
+    dQ/dw_k = z · ∫ e_k dV, z the adjoint of the displacement
     """
-    system, control, elastic = newton.system, LoadControl(frame.force), model.elastic
-    with model.shaped(frame.design):
-        system.load(frame.state)
-        balance = system.balance(frame.state, control)
-        newton.factor(frame.state, control, balance, IDLE_STIFFNESS if curve.freedom.mobility else 0.0)
-        x = newton.solve_linear(system.travel_gradient(system.controlled, frame.state))
-        influence, _ = system.expand(x)
+    elastic = model.elastic
+    with influence(model, newton, frame, curve.freedom) as z:
         depths = [elastic.model.multiplier(link.shape.depth) for link in model.mechanism.flexible_links]
         v = ufl.TestFunction(elastic.u.function_space)
         depth = elastic.cellwise(depths) * ufl.det(elastic.rest_gradient)
@@ -126,7 +121,7 @@ def weight_influence(model: MechanismModel, newton, curve: Curve, frame: Frame) 
         slopes = []
         for axis in np.eye(elastic.model.dim)[: model.linkage.dim]:
             direction.value = axis
-            slopes.append(model.mesh.mesh.comm.allreduce(float(elastic.assembled(form) @ influence)))
+            slopes.append(model.mesh.mesh.comm.allreduce(float(elastic.assembled(form) @ z)))
     return np.array(slopes)
 
 

@@ -1,0 +1,88 @@
+"""What plane stress gets wrong: pins hold links all through their depth, so that near them links cannot contract there.
+
+Blocked contraction stores the energy
+
+    V = ½ ∫ w E (F₃₃ − 1)² dV,     w = exp(−r / (c b)),
+
+r the distance from the nearest interface, b the depth of the link. With w = 1 and small strain it is what lies between
+plane stress and plane strain. By it a displacement changes, to first order with its adjoint z, by
+
+    Q(space) − Q(plane stress) ≈ −∂V/∂u · z.
+
+c was measured once, see ``_DECAY``. Source for estimates of what a model leaves out by an adjoint: Oden & Vemaganti
+(doi:10.1006/jcph.2000.6585). Not included: wide links that bend so sharply that they cannot bulge across their depth
+(b² times the curvature over the thickness far above 1), and motion out of the plane.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from scipy.spatial import cKDTree
+
+from fenicsmech.compat import cell_nodes, compile_form, original_nodes, scalar_space
+from fenicsmech.elasticity import PLANE_STRESS
+from fenicsmech.equilibrium import Newton
+from fenicsmech.errors import DescriptionError
+from fenicsmech.linkage import Freedom
+from fenicsmech.simulation.frame import Frame
+from fenicsmech.simulation.influence import influence
+from fenicsmech.simulation.model import MechanismModel
+
+_DECAY = 0.2  # c, so that claw, truss and Klann leg are estimated within a factor of 1.5 (test_depth_error.py)
+_DEGREE = 4  # of the quadrature
+
+
+class DepthError:
+    """Estimates of what space would add to the travel of one force's point in plane stress.
+
+    Args:
+        model: of the simulation.
+        newton: its solver for this force.
+
+    Raises:
+        DescriptionError: the simulation is not in plane stress.
+    """
+
+    def __init__(self, model: MechanismModel, newton: Newton) -> None:
+        space = model.elastic.model
+        if space is not PLANE_STRESS:
+            raise DescriptionError(
+                "modelling error",
+                f"there is no estimate for space={space.name!r}",
+                "Simulate in plane stress, or in 3D",
+            )
+        self._model, self._newton = model, newton
+
+    def estimate(self, frame: Frame, freedom: Freedom) -> float:
+        """Q(space) − Q(plane stress) of a frame (collective)."""
+        model = self._model
+        with model.clock.phase("estimate"), influence(model, self._newton, frame, freedom) as z:
+            return -model.mesh.mesh.comm.allreduce(float(model.elastic.assembled(self._force) @ z))
+
+    @cached_property
+    def _force(self):
+        """∂V/∂u, compiled."""
+        elastic = self._model.elastic
+        energy = elastic.contraction_energy(self._weight(), degree=_DEGREE)
+        return compile_form(ufl.derivative(energy, elastic.u))
+
+    def _weight(self) -> fem.Function:
+        """w, linear in each cell (collective)."""
+        mesh, links = self._model.mesh, self._model.mechanism.flexible_links
+        numbers = original_nodes(mesh.mesh)[cell_nodes(mesh.mesh)]
+        held = np.concatenate(mesh.mesh.comm.allgather(np.unique(numbers[mesh.interface >= 0])))
+        owner = np.empty(len(mesh.vertices), dtype=int)
+        owner[mesh.cells] = mesh.link_of_cell[:, None]
+        weight = np.empty(len(mesh.vertices))
+        for k, link in enumerate(links):
+            mine = np.flatnonzero(owner == k)
+            distance, _ = cKDTree(mesh.vertices[held[owner[held] == k]]).query(mesh.vertices[mine])
+            weight[mine] = np.exp(-distance / (_DECAY * link.shape.depth))
+        field = fem.Function(scalar_space(mesh.mesh, 1), name="weight")
+        for cell, vertices in enumerate(numbers):
+            field.x.array[field.function_space.dofmap.cell_dofs(cell)] = weight[vertices]
+        return field
