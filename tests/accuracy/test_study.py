@@ -34,7 +34,7 @@ def test_limits_are_those_of_beam_theory(study):
 
 
 def test_without_contraction_across_the_depth_models_agree_within_their_uncertainty(study):
-    assert len(study.limits) == 3
+    assert len(study.limits) == 4
     for limit in study.limits.values():
         assert abs(limit.value - study.reference.value) <= limit.uncertainty + study.reference.uncertainty
 

@@ -254,11 +254,10 @@ def test_shapes_from_files_are_refused(shape, tmp_path):
     )
 
 
-def test_pressure_about_a_point_off_the_mid_plane_is_refused():
+@pytest.mark.parametrize(("about", "problem"), [((20, 0, 1), "not on the mid-plane"), (None, "is open")])
+def test_pressure_on_an_open_part_needs_a_point_on_the_mid_plane(about, problem):
     scene, push = arch()
     (bow,) = scene.mechanism.flexible_links
-    effect = Pressure(bow, 0.01, where=lambda x: x[:, 1] > 7.0, about=(20, 0, 1))
+    effect = Pressure(bow, 0.01, where=lambda x: x[:, 1] > 7.0, about=about)
     simulation = simulate(fm.Scene(scene.mechanism, effects=[effect]), HALF)
-    refused(
-        lambda: simulation.load_displacement(push, forces=[1.0]), part="'bow'", problem="mid-plane", remedy="about="
-    )
+    refused(lambda: simulation.load_displacement(push, forces=[1.0]), part="'bow'", problem=problem, remedy="about=")
