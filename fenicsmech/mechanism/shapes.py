@@ -73,7 +73,10 @@ class Outline:
 
 @dataclass(frozen=True)
 class StepPart:
-    """A solid from a STEP file; in 2D its section with the plane z = ``section``, of depth ``depth``."""
+    """A solid from a STEP file; in 2D its section with the plane z = ``section``, of depth ``depth``.
+
+    With mid-plane symmetry, the half above the middle of its height.
+    """
 
     path: Path
     depth: float

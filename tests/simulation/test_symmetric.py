@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import pi
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from .demo_scenes import describe
 
 PLASTIC = fm.Material("plastic", 2000.0, 0.35)
 RUBBER = fm.Material("rubber", 5.0, 0.45)
+MESHES = Path(__file__).parents[2] / "meshes"
 WHOLE, HALF = "3d", "3d-symmetric"
 SHARES = (0.1, 0.4, 1.4)  # of the buckling load in the plane
 
@@ -238,20 +240,32 @@ def test_scenes_that_leave_the_plane_are_refused():
     )
 
 
-@pytest.mark.parametrize("shape", ["step", "mesh"])
-def test_shapes_from_files_are_refused(shape, tmp_path):
-    path = tmp_path / shape
-    part = {"step": fm.step, "mesh": fm.gmsh_mesh}[shape](path, depth=5.0)
+def from_file(shape) -> tuple[fm.Scene, Force]:
+    """A link 60 mm long between hinges, one of them on a slide that is pushed."""
     mechanism = fm.Mechanism("from a file")
-    base = mechanism.rigid("base", fixed=True)
-    link = mechanism.flexible("link", part, PLASTIC)
-    mechanism.revolute(base, link, at=(0, 0), radius=2.0)
-    refused(
-        lambda: fm.Simulation(fm.Scene(mechanism), space=HALF, size=2.0),
-        part="'link'",
-        problem="symmetric about its mid-plane",
-        remedy="space='3d'",
-    )
+    base, slide = mechanism.rigid("base", fixed=True), mechanism.rigid("slide")
+    link = mechanism.flexible("link", shape, PLASTIC)
+    mechanism.revolute(base, link, at=(0, 0), radius=3.0)
+    mechanism.revolute(link, slide, at=(60, 0), radius=3.0)
+    mechanism.prismatic(base, slide, at=(60, 0), axis=(1, 0))
+    return fm.Scene(mechanism), mechanism.force(on=slide, at=(60, 0), direction=(-1, 0))
+
+
+def test_half_of_a_step_part_moves_as_the_whole_does_but_for_the_mesh():
+    values = []
+    for space in (WHOLE, HALF):
+        scene, push = from_file(fm.step(MESHES / "curved_link.step", depth=10.0))
+        simulation = simulate(scene, space, size=3.0)
+        curve = simulation.load_displacement(push, forces=[5.0])
+        values.append((curve.displacements[0], simulation.error_estimates()[0], simulation.model.flexible_dofs))
+    (whole, error, size), (half, _, half_size) = values
+    assert abs(half - whole) < abs(error)
+    assert half_size < 0.75 * size
+
+
+def test_mesh_files_are_refused():
+    scene, _ = from_file(fm.gmsh_mesh(MESHES / "strip3d.msh", depth=10.0))
+    refused(lambda: simulate(scene, HALF), part="'link'", problem="symmetric about a mid-plane", remedy="space='3d'")
 
 
 @pytest.mark.parametrize(("about", "problem"), [((20, 0, 1), "not on the mid-plane"), (None, "is open")])
