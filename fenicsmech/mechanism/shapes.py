@@ -75,7 +75,7 @@ class Outline:
 class StepPart:
     """A solid from a STEP file; in 2D its section with the plane z = ``section``, of depth ``depth``.
 
-    With mid-plane symmetry, the half above the middle of its height.
+    With mid-plane symmetry, the half above its middle, at whatever height it was drawn.
     """
 
     path: Path

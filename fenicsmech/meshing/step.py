@@ -62,7 +62,7 @@ def _mesh_solid(shape: StepPart, solid: DimTag, request: MeshRequest) -> LinkMes
 
 
 def _upper_half(shape: StepPart, solid: DimTag, request: MeshRequest) -> list[DimTag]:
-    """What of the solid lies above the middle of its height, which becomes z = 0.
+    """What of the solid lies above its centroid, which comes to lie at z = 0.
 
     Whether the halves are mirror images is told by their volumes, centroids and moments of inertia.
 
@@ -72,7 +72,7 @@ def _upper_half(shape: StepPart, solid: DimTag, request: MeshRequest) -> list[Di
     occ = gmsh.model.occ
     x, y, bottom, right, far, top = occ.getBoundingBox(*solid)
     width, breadth, height = right - x, far - y, top - bottom
-    occ.translate([solid], 0.0, 0.0, -0.5 * (bottom + top))
+    occ.translate([solid], 0.0, 0.0, -occ.getCenterOfMass(*solid)[2])
     above = 3, occ.addBox(x - width, y - breadth, 0.0, 3.0 * width, 3.0 * breadth, height)
     upper = occ.intersect([solid], [above], removeObject=False, removeTool=False)[0]
     lower = occ.cut([solid], [above])[0]
