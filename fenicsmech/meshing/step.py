@@ -18,7 +18,7 @@ from fenicsmech.meshing.regions import DimTag, region_face, region_prism, solid_
 from fenicsmech.meshing.sizing import pin_refinements
 
 _HEADER = "ISO-10303-21"
-_MIRRORED = 1e-5  # by how much two halves may differ, of their extent, area and so on; modellers round
+_MIRRORED = 1e-6  # by how much two halves may differ, relative to their size: modellers round
 
 
 @mesh_shape.register
