@@ -8,7 +8,6 @@ from pathlib import Path
 
 from fenicsmech.accuracy.measurement import Measurement
 from fenicsmech.accuracy.study import Study
-from fenicsmech.elasticity import SPATIAL
 from fenicsmech.report import (
     ErrorLevel,
     WorkSeries,
@@ -169,7 +168,7 @@ def plot_study(path: str | Path, study: Study) -> None:
     levels = [
         ErrorLevel(names[model], abs(study.relative(limit.value - study.reference.value)))
         for model, limit in study.limits.items()
-        if model is not SPATIAL
+        if model.dim == 2
     ]
     plot_work_precision(
         path,

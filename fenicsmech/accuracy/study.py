@@ -54,9 +54,15 @@ class Study:
         return None if error is None or self.reference is None else error / abs(self.reference.value)
 
     def split(self, measurement: Measurement) -> ErrorSplit | None:
-        """The parts of a rung's error; None if it failed, or a limit is missing."""
+        """The parts of a rung's error; None if it failed, or a limit is missing.
+
+        The limit of half the depth is that of all of it, so that symmetry counts as no modelling error.
+        """
         model = measurement.rung.model
-        own = Limit(self.quantity.rigid_value, 0.0, None, 0) if model is None else self.limits.get(model)
+        if model is None:
+            own = Limit(self.quantity.rigid_value, 0.0, None, 0)
+        else:
+            own = self.reference if model.symmetric else self.limits.get(model)
         if measurement.value is None or own is None or self.reference is None:
             return None
         return split_error(measurement, self.measurements, own=own, reference=self.reference)

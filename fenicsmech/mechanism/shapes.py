@@ -73,7 +73,10 @@ class Outline:
 
 @dataclass(frozen=True)
 class StepPart:
-    """A solid from a STEP file; in 2D its section with the plane z = ``section``, of depth ``depth``."""
+    """A solid from a STEP file; in 2D its section with the plane z = ``section``, of depth ``depth``.
+
+    With mid-plane symmetry, the half above its middle, at whatever height it was drawn.
+    """
 
     path: Path
     depth: float

@@ -43,7 +43,7 @@ def mesh_link(
     Raises:
         MeshingError: the link cannot be meshed as described, a joint is not on the link or holds no cell, or the
             regions of two joints touch.
-        DescriptionError: an argument makes no sense, or the shape has no half that is known.
+        DescriptionError: an argument makes no sense, or half is asked of a shape without mirror symmetry.
     """
     request = _request(name, sites, dim, size, layers, segments, half)
     check_shape(shape, request)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenicsmech.errors import MeshingError
+from fenicsmech.errors import DescriptionError, MeshingError
 from fenicsmech.mechanism.shapes import MeshPart
 from fenicsmech.meshing.gmsh_session import gmsh, gmsh_session
 from fenicsmech.meshing.holders import sole_holder
 from fenicsmech.meshing.interface_site import across
 from fenicsmech.meshing.link_mesh import LinkMesh
-from fenicsmech.meshing.mesh_request import MeshRequest, check_shape, mesh_shape, refuse_half
+from fenicsmech.meshing.mesh_request import MeshRequest, check_shape, mesh_shape
 from fenicsmech.meshing.part_file import require_header
 from fenicsmech.meshing.regions import contains
 
@@ -29,7 +29,12 @@ def _(shape: MeshPart, request: MeshRequest) -> LinkMesh:
 
 @check_shape.register
 def _(shape: MeshPart, request: MeshRequest) -> None:
-    refuse_half(request, "a mesh file")
+    if request.half:
+        raise DescriptionError(
+            request.part,
+            "a mesh file does not tell whether its cells are symmetric about a mid-plane",
+            "Use space='3d', or give the link as a strip, an outline or a STEP file",
+        )
     require_header(shape.path, _HEADER, kind="gmsh mesh file", part=request.part)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import singledispatch
 
-from fenicsmech.errors import DescriptionError
 from fenicsmech.meshing.interface_site import InterfaceSite
 from fenicsmech.meshing.link_mesh import LinkMesh
 from fenicsmech.meshing.sizing import LEAST_SEGMENTS
@@ -41,24 +40,6 @@ class MeshRequest:
     def part_at(self, site: InterfaceSite) -> str:
         """The joint and the link as messages name them."""
         return f"joint {site.name!r} on link {self.link!r}"
-
-
-def refuse_half(request: MeshRequest, kind: str) -> None:
-    """Refuses the half of a shape of which nobody knows whether it is symmetric.
-
-    Args:
-        request: what is asked for.
-        kind: what the shape comes from.
-
-    Raises:
-        DescriptionError: half of the link is asked for.
-    """
-    if request.half:
-        raise DescriptionError(
-            request.part,
-            f"{kind} does not tell whether the link is symmetric about its mid-plane",
-            "Use space='3d', or describe the link as a strip or an outline",
-        )
 
 
 @singledispatch

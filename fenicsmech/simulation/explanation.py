@@ -175,7 +175,7 @@ def _buckling_hint(model: MechanismModel, frame: Frame) -> Hint | None:
     return Hint(
         "bending out of the plane",
         f"the compression of {name} is about {share:.2g} of what buckles it out of the plane"
-        + ("; simulate in space" if share > _SLENDER else ""),
+        + ("; use space='3d'" if share > _SLENDER else ""),
         share > _SLENDER,
     )
 

@@ -2,7 +2,7 @@ import pytest
 
 import fenicsmech as fm
 from fenicsmech.accuracy import RIGID, Displacement, Rung, ladder
-from fenicsmech.elasticity import PLANE_STRAIN, PLANE_STRESS, SPATIAL
+from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRAIN, PLANE_STRESS, SPATIAL
 from fenicsmech.errors import DescriptionError
 
 from .cantilever import cantilever
@@ -12,8 +12,9 @@ def test_every_rung_has_its_own_name_and_families_run_from_coarse_to_fine():
     rungs = ladder(cantilever().scene)
     assert len({rung.name for rung in rungs}) == len(set(rungs)) == len(rungs)
     assert rungs[0] == RIGID
-    for model, orders in ((PLANE_STRAIN, (1, 2)), (PLANE_STRESS, (1, 2)), (SPATIAL, (1, 2, 3))):
-        for order in orders:
+    planar, spatial = (PLANE_STRAIN, PLANE_STRESS), (MID_PLANE_SYMMETRIC, SPATIAL)
+    for model in (*planar, *spatial):
+        for order in (1, 2) if model in planar else (1, 2, 3):
             factors = [r.factor for r in rungs if r.model is model and r.order == order and not r.is_variant]
             assert factors == sorted(factors, reverse=True)
             assert set(factors) >= {4.0, 2.0, 1.0, 0.5}
@@ -28,12 +29,13 @@ def test_quadrature_and_tolerance_are_varied_one_at_a_time():
 
 def test_names_say_what_sets_a_rung_apart():
     assert Rung(PLANE_STRESS, 2, 0.5).name == "plane stress P2 h×0.5"
+    assert Rung(MID_PLANE_SYMMETRIC, 2, 1.0).name == "3D symmetric P2 h×1"
     assert Rung(SPATIAL, 3, 4.0, quadrature=5, tolerance=1e-4).name == "3D P3 h×4, degree 5, tol 1e-4"
 
 
 def test_a_model_without_a_form_for_the_material_is_left_out():
     models = {rung.model for rung in ladder(cantilever(law=fm.LogarithmicNeoHookean()).scene)}
-    assert models == {None, PLANE_STRAIN, SPATIAL}
+    assert models == {None, PLANE_STRAIN, MID_PLANE_SYMMETRIC, SPATIAL}
 
 
 def test_a_load_that_moves_nothing_is_refused():

@@ -6,7 +6,7 @@ from mpi4py import MPI
 import fenicsmech as fm
 from fenicsmech.accuracy import RIGID, Rung, Study, ladder, run_study, save_study
 from fenicsmech.accuracy.files import front_of, study_text
-from fenicsmech.elasticity import PLANE_STRESS, SPATIAL
+from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRESS, SPATIAL
 from fenicsmech.errors import DescriptionError
 
 from .cantilever import THICKNESS, cantilever
@@ -34,7 +34,7 @@ def test_limits_are_those_of_beam_theory(study):
 
 
 def test_without_contraction_across_the_depth_models_agree_within_their_uncertainty(study):
-    assert len(study.limits) == 3
+    assert len(study.limits) == 4
     for limit in study.limits.values():
         assert abs(limit.value - study.reference.value) <= limit.uncertainty + study.reference.uncertainty
 
@@ -45,6 +45,15 @@ def test_finer_meshes_and_higher_orders_err_less(study):
         assert error[Rung(model, 2, 0.5)] < error[Rung(model, 2, 1.0)] < error[Rung(model, 2, 2.0)]
         assert error[Rung(model, 2, 1.0)] < error[Rung(model, 1, 1.0)]
     assert study.relative(error[Rung(SPATIAL, 2, 0.5)]) < 0.01
+
+
+def test_half_the_depth_has_the_limit_of_all_of_it(study):
+    halves = [m for m in study.measurements if m.rung.model is MID_PLANE_SYMMETRIC]
+    assert len(halves) == 4
+    assert all(study.split(m).modelling == 0.0 for m in halves)
+    assert abs(study.limits[MID_PLANE_SYMMETRIC].value - study.reference.value) < 0.005 * study.reference.value
+    fine, coarse = (next(m for m in halves if m.rung.factor == f and m.rung.order == 2) for f in (0.5, 2.0))
+    assert abs(study.split(fine).discretisation) < abs(study.split(coarse).discretisation)
 
 
 def test_errors_add_up_and_rigid_links_miss_everything(study):

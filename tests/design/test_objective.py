@@ -44,7 +44,9 @@ def test_targets_that_are_next_to_nothing_are_measured_by_the_largest_one():
     assert target_scales(wanted[:1]) == pytest.approx([1.0])
 
 
-@pytest.mark.parametrize(("space", "size", "order"), [("plane-stress", 3.0, 2), ("3d", 4.0, 1)])
+@pytest.mark.parametrize(
+    ("space", "size", "order"), [("plane-stress", 3.0, 2), ("3d-symmetric", 4.0, 1), ("3d", 4.0, 1)]
+)
 def test_gradient_agrees_with_central_differences_away_from_the_initial_design(space, size, order):
     whole, bench = objective(truss(*TARGETS), REGULARISER, space=space, size=size, order=order)
     p, direction = away(bench)

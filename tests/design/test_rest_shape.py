@@ -56,11 +56,16 @@ def test_penalty_sums_its_barrier_over_the_cells():
 @pytest.mark.parametrize("comm", [MPI.COMM_SELF, MPI.COMM_WORLD], ids=["alone", "together"])
 @pytest.mark.parametrize(
     ("name", "space", "size"),
-    [(name, "plane-stress", 3.0) for name in CASES] + [("truss", "3d", 4.0), ("force on a link", "plane-strain", 3.0)],
+    [
+        *((name, "plane-stress", 3.0) for name in CASES),
+        ("truss", "3d", 4.0),
+        ("force on a link", "plane-strain", 3.0),
+        ("force on a link", "3d-symmetric", 4.0),
+    ],
 )
 def test_displacements_pass_the_taylor_test_by_the_parameters(name, space, size, comm):
     case = CASES[name]()
-    order = 1 if space == "3d" else 2
+    order = 1 if space.startswith("3d") else 2
     both = bench(case, case.simulate(space, size=size, order=order, comm=comm))
     placed = both.rest.place(both.design(0.06), None)
     known = both.equilibria.trace()

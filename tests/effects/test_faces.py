@@ -42,15 +42,20 @@ class Bars:
 
     def fields(self, *faces: Faces) -> LinkFields:
         mesh = self.model.mesh
-        found = find_boundaries(mesh.mesh, self.bars, mesh.link, faces)
-        return LinkFields(tuple(self.bars), self.model.elastic, found)
+        body = self.model.elastic
+        found = find_boundaries(mesh.mesh, self.bars, mesh.link, faces, half=body.model.symmetric)
+        return LinkFields(tuple(self.bars), body, found)
 
     def area(self, fields: LinkFields, part: Faces) -> float:
-        form = compile_form(fields.boundary_integral(1.0, part, degree=1))
+        """Of the whole depth."""
+        form = compile_form(fields.boundary_integral(fields.model.multiplier(DEPTH), part, degree=1))
         return self.model.mesh.mesh.comm.allreduce(fem.assemble_scalar(form))
 
 
-@pytest.fixture(params=[("plane-stress", "alone"), ("plane-stress", "together"), ("3d", "alone")], ids="-".join)
+CASES = [("plane-stress", "alone"), ("plane-stress", "together"), ("3d-symmetric", "together"), ("3d", "alone")]
+
+
+@pytest.fixture(params=CASES, ids="-".join)
 def bars(request) -> Bars:
     space, comm = request.param
     return Bars(space, {"alone": MPI.COMM_SELF, "together": MPI.COMM_WORLD}[comm])
@@ -60,9 +65,8 @@ def test_parts_may_overlap(bars):
     lower, upper = bars.bars
     whole, end, flank, other = Faces(lower), Faces(lower, left), Faces(lower, top), Faces(upper)
     fields = bars.fields(whole, end, flank, other, Faces(lower))
-    deep = 1.0 if fields.dim == 2 else DEPTH
-    around = 2.0 * (LENGTH + THICKNESS) * deep + (0.0 if fields.dim == 2 else 2.0 * LENGTH * THICKNESS)
-    for part, expected in ((whole, around), (other, around), (end, THICKNESS * deep), (flank, LENGTH * deep)):
+    around = 2.0 * (LENGTH + THICKNESS) * DEPTH + (0.0 if fields.dim == 2 else 2.0 * LENGTH * THICKNESS)
+    for part, expected in ((whole, around), (other, around), (end, THICKNESS * DEPTH), (flank, LENGTH * DEPTH)):
         assert bars.area(fields, part) == pytest.approx(expected, rel=1e-12)
 
 
@@ -76,9 +80,8 @@ def test_areas_are_those_of_the_rest_shape(bars):
     change = np.zeros((dim, dim))
     change[0, 0], change[0, 1], change[1, 1] = 0.5, 0.75, -0.5
     fields.body.d.x.array[:] = (places @ change.T).ravel()
-    deep = 1.0 if dim == 2 else DEPTH
-    assert bars.area(fields, end) == pytest.approx(THICKNESS * np.hypot(0.75, 0.5) * deep, rel=1e-12)
-    assert bars.area(fields, flank) == pytest.approx(1.5 * LENGTH * deep, rel=1e-12)
+    assert bars.area(fields, end) == pytest.approx(THICKNESS * np.hypot(0.75, 0.5) * DEPTH, rel=1e-12)
+    assert bars.area(fields, flank) == pytest.approx(1.5 * LENGTH * DEPTH, rel=1e-12)
 
 
 def test_a_part_without_a_facet_is_refused(bars):

@@ -7,7 +7,7 @@ import pytest
 
 from fenicsmech.mechanism.shapes import Disc, strip
 from fenicsmech.meshing import InterfaceSite, cell_measures, mesh_link
-from fenicsmech.meshing.extrude import extrude, layer_count
+from fenicsmech.meshing.extrude import extrude, extrude_half, layer_count
 
 BOW = strip([(0.0, 0.0), (10.0, 4.0), (22.0, 3.0)], thickness=2.0, depth=7.0)
 SITES = [InterfaceSite((0.0, 0.0), Disc(2.0), name="pin")]
@@ -47,6 +47,30 @@ def test_an_even_number_of_layers_is_symmetric_about_the_middle_plane(plan):
         return {frozenset(map(tuple, cell)) for cell in corners}
 
     assert keys(mesh.points) == keys(mesh.points * (1.0, 1.0, -1.0))
+
+
+def cells_at(mesh) -> set:
+    """The cells by the places of their corners."""
+    corners = np.round(mesh.points[mesh.cells], 9) + 0.0  # no negative zeros
+    return {frozenset(map(tuple, cell)) for cell in corners}
+
+
+@pytest.mark.parametrize("layers", [1, 2])
+def test_half_is_what_the_whole_of_twice_as_many_layers_has_above_its_middle_plane(plan, layers):
+    whole, half = extrude(plan, 7.0, 2 * layers), extrude_half(plan, 7.0, layers)
+    assert cells_at(half) == {cell for cell in cells_at(whole) if all(z >= 0.0 for *_, z in cell)}
+    assert 2 * len(half.cells) == len(whole.cells)
+    assert np.all(cell_measures(half.points, half.cells) > 0.0)
+    assert cell_measures(half.points, half.cells_of(0)).sum() * 2.0 == pytest.approx(
+        cell_measures(whole.points, whole.cells_of(0)).sum(), rel=1e-13
+    )
+
+
+def test_half_links_have_layers_as_high_as_whole_ones_and_at_least_one():
+    for depth, layers in ((16.0, 4), (8.0, 2), (2.0, 1)):
+        shape = strip(BOW.centreline, thickness=2.0, depth=depth)
+        mesh = mesh_link("bow", shape, SITES, dim=3, size=1.0, half=True)
+        assert np.unique(mesh.points[:, 2]) == pytest.approx(np.linspace(0.0, 0.5 * depth, layers + 1), abs=1e-12)
 
 
 def test_interfaces_pass_through_the_depth(plan):

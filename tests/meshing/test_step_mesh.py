@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism.shapes import Disc, step
 from fenicsmech.meshing import InterfaceSite, cell_measures, mesh_link, radius_ratios
+from fenicsmech.meshing.gmsh_session import gmsh, gmsh_session
 
 PART = Path(__file__).parents[2] / "meshes" / "curved_link.step"
 SITES = [InterfaceSite(at, Disc(3.0), name=f"pin at {at}") for at in ((0.0, 0.0), (60.0, 0.0))]
@@ -41,6 +43,36 @@ def test_the_solid_has_its_volume():
     assert volumes.sum() == pytest.approx(10.0 * PLAN_AREA, rel=1e-2)
     assert np.ptp(mesh.points[:, 2]) == pytest.approx(10.0)
     assert radius_ratios(mesh.points, mesh.cells).min() > 0.1
+
+
+@pytest.mark.parametrize("height", [0.0, 7.3])
+def test_half_of_the_solid_stands_on_its_mid_plane_wherever_it_was_drawn(height, tmp_path):
+    with gmsh_session("moved part"):
+        gmsh.model.occ.importShapes(str(PART))
+        gmsh.model.occ.translate(gmsh.model.occ.getEntities(3), 0.0, 0.0, height)
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(tmp_path / "moved.step"))
+    mesh = mesh_link("part", step(tmp_path / "moved.step", depth=10.0), SITES, dim=3, size=1.5, half=True)
+    volumes = cell_measures(mesh.points, mesh.cells)
+    assert np.all(volumes > 0.0)
+    assert volumes.sum() == pytest.approx(5.0 * PLAN_AREA, rel=1e-2)
+    heights = mesh.points[:, 2]
+    assert heights.max() == pytest.approx(5.0, rel=1e-6)
+    assert np.sum(heights == 0.0) > 100 and heights[heights != 0.0].min() > 0.05
+    assert set(mesh.interface) == {-1, 0, 1}
+
+
+@pytest.mark.parametrize("radius", [1.0, 0.1])
+def test_a_solid_with_a_boss_or_a_bump_on_one_side_has_no_half(radius, tmp_path):
+    with gmsh_session("boss"):
+        occ = gmsh.model.occ
+        plate = occ.addBox(0.0, 0.0, 0.0, 20.0, 4.0, 4.0)
+        boss = occ.addCylinder(5.0, 2.0, 4.0, 0.0, 0.0, radius, radius)
+        occ.fuse([(3, plate)], [(3, boss)])
+        occ.synchronize()
+        gmsh.write(str(tmp_path / "boss.step"))
+    with pytest.raises(DescriptionError, match="not symmetric"):
+        mesh_link("plate", step(tmp_path / "boss.step", depth=4.0), dim=3, size=2.0, half=True)
 
 
 def test_the_element_size_is_met_in_the_solid():

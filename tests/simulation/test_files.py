@@ -38,7 +38,7 @@ def names(folder: Path) -> set[str]:
     return found
 
 
-@pytest.mark.parametrize("space", ["plane-stress", "3d"])
+@pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
 def test_fields_are_written_as_a_time_series_over_the_force(space, shared_tmp_path):
     simulation, curve = claw(space)
     path = shared_tmp_path / "new folder" / "claw.xdmf"
@@ -80,7 +80,7 @@ def test_files_of_an_earlier_run_are_replaced(shared_tmp_path):
     assert names(shared_tmp_path) == {"claw.xdmf", "claw.h5"}
 
 
-@pytest.mark.parametrize("space", ["plane-stress", "3d"])
+@pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
 def test_picture_shows_links_rigid_and_flexible(space, shared_tmp_path):
     simulation, curve = claw(space)
     (motor,) = simulation.scene.mechanism.motors
@@ -122,7 +122,7 @@ def test_nothing_can_be_drawn_or_written_before_a_curve_is_computed(shared_tmp_p
     assert names(shared_tmp_path) == set()
 
 
-@pytest.mark.parametrize("space", ["plane-stress", "3d"])
+@pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
 def test_stress_field_peaks_at_the_largest_stress_of_the_frame_and_vanishes_in_interfaces(space):
     simulation, curve = claw(space)
     stress = simulation.von_mises(curve.frames[-1])

@@ -42,11 +42,12 @@ def test_claw(space):
     assert_alike(*curves)
 
 
-def test_truss_in_space():
+@pytest.mark.parametrize("space", ["3d-symmetric", "3d"])
+def test_truss_in_space(space):
     curves = []
     for comm in COMMS:
         scene, push = describe("truss")
-        simulation = fm.Simulation(scene, space="3d", size=5.0, comm=comm)
+        simulation = fm.Simulation(scene, space=space, size=5.0, comm=comm)
         curves.append(simulation.load_displacement(push, forces=[0.01, 0.02, 0.05]))
     assert_alike(*curves)
 
