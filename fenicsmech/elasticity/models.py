@@ -19,10 +19,12 @@ class ElasticModel(ABC):
     Attributes:
         name: as shown in summaries and accepted on command lines.
         dim: dimension of the mesh.
+        confined: whether strains on the mesh alone must keep the volume of incompressible material.
     """
 
     name: str
     dim: int
+    confined: bool = True
 
     @abstractmethod
     def check(self, link: str, material: Material) -> None:
@@ -74,7 +76,7 @@ class PlaneStrain(ElasticModel):
 class PlaneStress(ElasticModel):
     """Two dimensions, S₃₃ = 0: links free to contract across their depth."""
 
-    name, dim = "plane-stress", 2
+    name, dim, confined = "plane-stress", 2, False
 
     def check(self, link, material):
         if transverse_strain.dispatch(type(material.law)) is transverse_strain.dispatch(EnergyLaw):

@@ -20,11 +20,30 @@ def log_remainder(j):
         φ = j y − 2 y³ (1/3 + y²/5 + y⁴/7 + …)     for small |j|.
     """
     y = j / (2 + j)
+    return ufl.conditional(ufl.lt(abs(j), _SERIES), j * y - 2 * y * (y * y) * _series(j), j - ufl.ln(1 + j))
+
+
+def _series(j):
+    """1/3 + y²/5 + y⁴/7 + … with y = j / (2 + j)."""
+    y = j / (2 + j)
     square = y * y
     tail = 0.0
     for k in reversed(range(1, _TERMS)):
         tail = 1.0 / (2 * k + 1) + square * tail
-    return ufl.conditional(ufl.lt(abs(j), _SERIES), j * y - 2 * y * square * tail, j - ufl.ln(1 + j))
+    return tail
+
+
+def log_curvature(j):
+    """φ(j) / j² = (j − ln(1 + j)) / j², 1/2 at j = 0.
+
+    The series of ``log_remainder`` over j²:  1 / (2 + j) − 2 j / (2 + j)³ (1/3 + y²/5 + y⁴/7 + …).
+    """
+    small = ufl.lt(abs(j), _SERIES)
+    # UFL differentiates both branches and multiplies one by zero, so the logarithm's must be finite at j = 0
+    away = ufl.conditional(small, _SERIES, j)
+    return ufl.conditional(
+        small, (1 - 2 * j * _series(j) / (2 + j) ** 2) / (2 + j), (away - ufl.ln(1 + away)) / away**2
+    )
 
 
 def cube_root_remainder(j):

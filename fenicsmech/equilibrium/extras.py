@@ -43,7 +43,7 @@ class ExtraEntries:
         potentials: BodyPotentials,
         compliances: np.ndarray,
     ) -> None:
-        self._joints, self._controlled, self._potentials = joints, controlled, potentials
+        self._joints, self._controlled, self._potentials, self._layout = joints, controlled, potentials, layout
         self._z = layout.first_extra_row
         self._multipliers = layout.first_extra_row + joints.size
         self._force = np.array([layout.first_extra_row + layout.force])
@@ -121,5 +121,4 @@ class ExtraEntries:
             case BodyPoint(body=body):
                 return self._z + self._joints.columns[body]
             case LinkPoint(global_nodes=nodes):
-                dim = self._joints.space.dim
-                return (dim * nodes[:, None] + np.arange(dim)).ravel()
+                return self._layout.rows_of(nodes)

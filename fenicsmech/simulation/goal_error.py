@@ -57,7 +57,7 @@ class GoalError:
             newton.factor(frame.state, control, balance, IDLE_STIFFNESS if freedom.mobility else 0.0)
             influence, _ = system.expand(newton.solve_linear(system.travel_gradient(system.controlled, frame.state)))
             vector = petsc_vector(self._adjoint)
-            vector.array_w[:] = influence
+            vector.array_w[:] = model.elastic.split(influence)[0]
             vector.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
             for field, form in zip(self._recovered, self._gradient_forms, strict=True):
                 self._project(form, field)
