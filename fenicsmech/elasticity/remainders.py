@@ -10,6 +10,7 @@ import ufl
 
 _TERMS = 9  # of the series below: truncation 0.05¹⁷ ≈ 1e-22 against the leading term
 _SERIES = 0.1  # |j| below which the series is used
+_WIDE_TERMS, _WIDE_SERIES = 17, 0.3  # the same for quotients: truncation 0.18³⁴ ≈ 1e-26
 
 
 def log_remainder(j):
@@ -23,12 +24,12 @@ def log_remainder(j):
     return ufl.conditional(ufl.lt(abs(j), _SERIES), j * y - 2 * y * (y * y) * _series(j), j - ufl.ln(1 + j))
 
 
-def _series(j):
-    """1/3 + y²/5 + y⁴/7 + … with y = j / (2 + j)."""
+def _series(j, terms: int = _TERMS):
+    """1/3 + y²/5 + y⁴/7 + … with y = j / (2 + j), to ``terms``."""
     y = j / (2 + j)
     square = y * y
     tail = 0.0
-    for k in reversed(range(1, _TERMS)):
+    for k in reversed(range(1, terms)):
         tail = 1.0 / (2 * k + 1) + square * tail
     return tail
 
@@ -38,12 +39,12 @@ def log_curvature(j):
 
     The series of ``log_remainder`` over j²:  1 / (2 + j) − 2 j / (2 + j)³ (1/3 + y²/5 + y⁴/7 + …).
     """
-    small = ufl.lt(abs(j), _SERIES)
+    # wider than that one's: the quotient's derivatives lose two digits more
+    small = ufl.lt(abs(j), _WIDE_SERIES)
     # UFL differentiates both branches and multiplies one by zero, so the logarithm's must be finite at j = 0
-    away = ufl.conditional(small, _SERIES, j)
-    return ufl.conditional(
-        small, (1 - 2 * j * _series(j) / (2 + j) ** 2) / (2 + j), (away - ufl.ln(1 + away)) / away**2
-    )
+    away = ufl.conditional(small, _WIDE_SERIES, j)
+    series = (1 - 2 * j * _series(j, _WIDE_TERMS) / (2 + j) ** 2) / (2 + j)
+    return ufl.conditional(small, series, (away - ufl.ln(1 + away)) / away**2)
 
 
 def cube_root_remainder(j):
