@@ -51,7 +51,7 @@ def test_effects_that_are_listed_are_named_and_not_hinted_at():
     assert "Left out:" in str(explanation)
 
 
-def pinned(material: fm.Material, *, depth: float = 4.0, space: str = "plane-stress", order: int = 2):
+def pinned(material: fm.Material, *, depth: float = 4.0, space: str = "plane-stress", order: int = 2, formulation=None):
     """A straight link on a slider, compressed along its axis."""
     rig = fm.Mechanism("strut")
     ground, slide = rig.rigid("ground", fixed=True), rig.rigid("slide")
@@ -60,7 +60,7 @@ def pinned(material: fm.Material, *, depth: float = 4.0, space: str = "plane-str
     rig.revolute(strut, slide, at=(60, 0), radius=2.0)
     rig.prismatic(ground, slide, at=(60, 0), axis=(1, 0, 0))
     push = rig.force(on=slide, at=(60, 0), direction=(-1, 0))
-    return fm.Simulation(fm.Scene(rig), space=space, size=4.0, order=order), push
+    return fm.Simulation(fm.Scene(rig), space=space, size=4.0, order=order, formulation=formulation), push
 
 
 def test_compression_is_compared_with_the_load_that_buckles_a_link_out_of_the_plane():
