@@ -1,12 +1,12 @@
 """Strain energy densities with the pressure p as an unknown of its own, for nearly incompressible materials.
 
-Every law is W = W̃(F) + M g(J)²/2 with W̃ its density without volumetric modulus, M that modulus (λ or κ) and
-g(1) = 0, g′(1) = 1. The perturbed Lagrangian
+Every law is W = W̃(F) + M U(θ), with W̃ its density without volumetric modulus, M that modulus (λ or κ), θ(J) a measure
+of dilatation and U convex. With the complement U*(q) = sup_θ q θ − U(θ), the perturbed Lagrangian
 
-    Π(F, p) = W̃(F) − p g(J) − p² / (2 M)
+    Π(F, p) = W̃(F) − p θ(J) − M U*(−p / M)
 
-is stationary in p at p = −M g(J), where it equals W: the exact solution is the same, but no number in it grows as ν
-goes to 0.5, and g = 0 remains. p is positive in compression, and the hydrostatic pressure at small strain.
+is stationary in p at p = −M U′(θ), where it equals W: the exact solution is the same, but no number in it grows as ν
+goes to 0.5, and θ = 0 remains. p is positive in compression, and the hydrostatic pressure at small strain.
 
 With p one degree lower than u and continuous (Taylor–Hood), volumes are as free to stay constant as the material
 demands. Sources: Sussman & Bathe (doi:10.1016/0045-7949(87)90265-3), Brink & Stein (doi:10.1007/BF02824849) for the
@@ -21,7 +21,7 @@ from ufl import sqrt
 from ufl.core.expr import Expr
 
 from fenicsmech.elasticity.energies import density
-from fenicsmech.elasticity.remainders import log_curvature
+from fenicsmech.elasticity.remainders import log_remainder
 from fenicsmech.elasticity.strain import Moduli, Strain
 from fenicsmech.mechanism import (
     EnergyLaw,
@@ -41,7 +41,13 @@ class ShearOnly(Moduli):
 
 @singledispatch
 def dilatation(law: EnergyLaw, j: Expr) -> Expr:
-    """g from ``j`` = J − 1. Register a function for a new law to let it have a pressure of its own."""
+    """θ from ``j`` = J − 1: j, unless a law says otherwise."""
+    return j
+
+
+@singledispatch
+def complement(law: EnergyLaw, q: Expr) -> Expr:
+    """U*. Register a function for a new law to let it have a pressure of its own."""
     raise NotImplementedError(f"no mixed form is registered for {law!r}")
 
 
@@ -54,7 +60,8 @@ def volumetric_modulus(law: EnergyLaw, moduli: Moduli) -> Expr:
 def mixed_density(law: EnergyLaw, strain: Strain, moduli: Moduli, p: Expr) -> Expr:
     """Π per volume of the undeformed material."""
     shear = density(law, strain, ShearOnly(moduli.youngs_modulus, moduli.poissons_ratio))
-    return shear - p * dilatation(law, strain.j) - p**2 / (2 * volumetric_modulus(law, moduli))
+    modulus = volumetric_modulus(law, moduli)
+    return shear - p * dilatation(law, strain.j) - modulus * complement(law, -p / modulus)
 
 
 @volumetric_modulus.register(NeoHookean)
@@ -65,18 +72,20 @@ def _(law: EnergyLaw, moduli: Moduli) -> Expr:
 
 @dilatation.register
 def _(law: LogarithmicNeoHookean, j: Expr) -> Expr:
-    """g = ln J = j − φ = j (1 − j φ/j²)."""
-    return j * (1 - j * log_curvature(j))
+    """θ = ln J = j − φ."""
+    return j - log_remainder(j)
 
 
-@dilatation.register
-def _(law: IsochoricNeoHookean, j: Expr) -> Expr:
-    """g = j."""
-    return j
+@complement.register(LogarithmicNeoHookean)
+@complement.register(IsochoricNeoHookean)
+def _(law: EnergyLaw, q: Expr) -> Expr:
+    """U = θ²/2, U* = q²/2."""
+    return q**2 / 2
 
 
-@dilatation.register(NeoHookean)
-@dilatation.register(IsochoricSimoNeoHookean)
-def _(law: EnergyLaw, j: Expr) -> Expr:
-    """g²/2 = (j² + 2 φ)/4, with the sign of j."""
-    return j * sqrt((1 + 2 * log_curvature(j)) / 2)
+@complement.register(NeoHookean)
+@complement.register(IsochoricSimoNeoHookean)
+def _(law: EnergyLaw, q: Expr) -> Expr:
+    """U = (j² + 2 φ)/4, U′ = (J − 1/J)/2 = q at J = q + √(1 + q²), U* = q j − U."""
+    j = q + q**2 / (1 + sqrt(1 + q**2))
+    return q * j - (j**2 + 2 * log_remainder(j)) / 4

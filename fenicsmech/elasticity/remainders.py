@@ -10,7 +10,6 @@ import ufl
 
 _TERMS = 9  # of the series below: truncation 0.05¹⁷ ≈ 1e-22 against the leading term
 _SERIES = 0.1  # |j| below which the series is used
-_WIDE_TERMS, _WIDE_SERIES = 17, 0.3  # the same for quotients: truncation 0.18³⁴ ≈ 1e-26
 
 
 def log_remainder(j):
@@ -21,30 +20,11 @@ def log_remainder(j):
         φ = j y − 2 y³ (1/3 + y²/5 + y⁴/7 + …)     for small |j|.
     """
     y = j / (2 + j)
-    return ufl.conditional(ufl.lt(abs(j), _SERIES), j * y - 2 * y * (y * y) * _series(j), j - ufl.ln(1 + j))
-
-
-def _series(j, terms: int = _TERMS):
-    """1/3 + y²/5 + y⁴/7 + … with y = j / (2 + j), to ``terms``."""
-    y = j / (2 + j)
     square = y * y
     tail = 0.0
-    for k in reversed(range(1, terms)):
+    for k in reversed(range(1, _TERMS)):
         tail = 1.0 / (2 * k + 1) + square * tail
-    return tail
-
-
-def log_curvature(j):
-    """φ(j) / j² = (j − ln(1 + j)) / j², 1/2 at j = 0.
-
-    The series of ``log_remainder`` over j²:  1 / (2 + j) − 2 j / (2 + j)³ (1/3 + y²/5 + y⁴/7 + …).
-    """
-    # wider than that one's: the quotient's derivatives lose two digits more
-    small = ufl.lt(abs(j), _WIDE_SERIES)
-    # UFL differentiates both branches and multiplies one by zero, so the logarithm's must be finite at j = 0
-    away = ufl.conditional(small, _WIDE_SERIES, j)
-    series = (1 - 2 * j * _series(j, _WIDE_TERMS) / (2 + j) ** 2) / (2 + j)
-    return ufl.conditional(small, series, (away - ufl.ln(1 + away)) / away**2)
+    return ufl.conditional(ufl.lt(abs(j), _SERIES), j * y - 2 * y * square * tail, j - ufl.ln(1 + j))
 
 
 def cube_root_remainder(j):
