@@ -30,6 +30,7 @@ from fenicsmech.effects import (
     Pressure,
     Prestrain,
 )
+from fenicsmech.elasticity import Displacement, Mixed
 from fenicsmech.errors import AssemblyError, DescriptionError, EquilibriumError, FenicsmechError, MeshingError
 from fenicsmech.mechanism import (
     DRAWN,
@@ -71,6 +72,7 @@ __all__ = [
     "DesignProblem",
     "DesignResult",
     "Disc",
+    "Displacement",
     "EquilibriumError",
     "Experiment",
     "FenicsmechError",
@@ -86,6 +88,7 @@ __all__ = [
     "Mechanism",
     "MeshQuality",
     "MeshingError",
+    "Mixed",
     "ModulusFit",
     "NeoHookean",
     "Rectangle",

@@ -4,7 +4,7 @@ At an equilibrium F(y, p) = Gᵀ ∇L = 0 with y = (s, λ). For an output O(y), 
 
     KKT x = ∂O/∂y,     dO/dp = −xᵀ ∂F/∂p.
 
-With û = ∂u/∂y · x at all nodes and ẑ the poses' part of x,
+With û = ∂u/∂y · x at all nodes, pressures included where links have some of their own, and ẑ the poses' part of x,
 
     xᵀ ∂F/∂d = ∂(r · û)/∂d  +  Σ_i over interface nodes [ (K û)_i · (R − I) + r_i · (ẑ_r ∂R/∂r) ] ∂X_i/∂d,
 
@@ -49,7 +49,7 @@ class Adjoint:
 
     def __init__(self, model: MechanismModel, newton: Newton) -> None:
         self._model, self._newton, self._system = model, newton, newton.system
-        self._weight = fem.Function(model.elastic.u.function_space, name="adjoint")
+        self._weights = [fem.Function(field.function_space, name="adjoint") for field in model.elastic.fields]
 
     def gradients(self, state: State, outputs: list[PointLoad], *, floor: float = 0.0) -> list[Gradient]:
         """The derivatives of the travel of each of ``outputs`` at the equilibrium ``state`` (collective)."""
@@ -65,9 +65,10 @@ class Adjoint:
         right = system.travel_gradient(output, state)
         x = self._newton.solve_linear(right)
         u, z = system.expand(x)
-        weight = petsc_vector(self._weight)
-        weight.array_w[:] = u
-        weight.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
+        for field, values in zip(self._weights, self._model.elastic.split(u), strict=True):
+            weight = petsc_vector(field)
+            weight.array_w[:] = values
+            weight.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
 
         design = self._assemble(self._forms["design"])
         stiff = self._assemble(self._forms["displacement"]).array_r
@@ -98,7 +99,11 @@ class Adjoint:
     def _forms(self) -> dict:
         """r · û, differentiated by the design, the displacement and the moduli."""
         elastic = self._model.elastic
-        work = ufl.derivative(elastic.energy_ufl, elastic.u, self._weight)
+        works = [
+            ufl.derivative(elastic.energy_ufl, field, weight)
+            for field, weight in zip(elastic.fields, self._weights, strict=True)
+        ]
+        work = sum(works[1:], start=works[0])
         by = {
             "design": elastic.d,
             "displacement": elastic.u,

@@ -4,6 +4,9 @@
 - ``strain``: the invariants an energy is written in, free of cancellation
 - ``remainders``: the nonlinear remainders of logarithms and roots, free of cancellation
 - ``energies``: one strain energy density per material law
+- ``mixed``: the same densities with the pressure as an unknown of its own
+- ``formulation``: which links have such a pressure
+- ``pressure``: its field
 - ``transverse``: the stretch out of the plane in plane stress, per material law
 - ``growth``: links whose strain-free state is not the drawn one
 - ``body``: energy, residual, tangent and stress of all links
@@ -11,6 +14,7 @@
 
 from fenicsmech.elasticity.body import ElasticBody, Quadrature
 from fenicsmech.elasticity.energies import density
+from fenicsmech.elasticity.formulation import Displacement, Formulation, Mixed
 from fenicsmech.elasticity.growth import Stretch
 from fenicsmech.elasticity.models import MID_PLANE_SYMMETRIC, PLANE_STRAIN, PLANE_STRESS, SPATIAL, ElasticModel
 from fenicsmech.elasticity.strain import Moduli, Strain
@@ -20,8 +24,11 @@ __all__ = [
     "PLANE_STRAIN",
     "PLANE_STRESS",
     "SPATIAL",
+    "Displacement",
     "ElasticBody",
     "ElasticModel",
+    "Formulation",
+    "Mixed",
     "Moduli",
     "Quadrature",
     "Strain",

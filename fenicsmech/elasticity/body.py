@@ -6,7 +6,8 @@ shape X = X₀ + c + d and displacement u from the rest shape:
     H = F − I = ∇u (∇X)⁻¹,     E(u, d) = ∫ W(H) det(∇X) b dX₀,     ∇X = I + ∇c + ∇d,
 
 b the depth of a planar link; in space 1, or 2 where only one half is meshed. Interface cells move rigidly and store no
-energy: they are left out.
+energy: they are left out. Where links have a pressure p of their own, Π(H, p) of ``mixed`` takes the place of W, and E
+has a saddle there: a minimum in u, a maximum in p.
 """
 
 from __future__ import annotations
@@ -31,7 +32,9 @@ from fenicsmech.compat import (
 )
 from fenicsmech.elasticity.energies import density
 from fenicsmech.elasticity.growth import UNSTRETCHED, Growth, Stretch
+from fenicsmech.elasticity.mixed import mixed_density
 from fenicsmech.elasticity.models import ElasticModel
+from fenicsmech.elasticity.pressure import PressureField
 from fenicsmech.elasticity.strain import Moduli
 from fenicsmech.elasticity.stress import cauchy_stress, von_mises
 from fenicsmech.mechanism import EnergyLaw, Material
@@ -49,6 +52,15 @@ class Quadrature:
         return Quadrature({1: 1, 2: 3 if dim == 3 else 4}.get(order, 2 * order))
 
 
+@dataclass(frozen=True)
+class _Term:
+    """The cells of one law, all with a pressure of their own or all without."""
+
+    law: EnergyLaw
+    mixed: bool
+    dx: ufl.Measure
+
+
 class ElasticBody:
     """The flexible links as one hyperelastic body.
 
@@ -64,11 +76,13 @@ class ElasticBody:
         effects: energies beside the elastic one, as functions of this body; none costs nothing.
         stretches: of the strain-free state of each link, None where it is as drawn; none costs nothing.
         bulge: c, by which curved cells differ from straight ones; None if all are straight.
+        with_pressure: whether each link has a pressure of its own; none costs nothing.
 
     Attributes:
         u: displacement field, vector P_order.
         d: design field, vector P1.
         bulge: c, vector P2, or None.
+        pressure: of the links that have one of their own, P_(order − 1); None if no link has.
         youngs_modulus, poissons_ratio: per cell.
         dx: measure of all cells, interfaces included.
         share: how much of the effects acts.
@@ -88,6 +102,7 @@ class ElasticBody:
         effects: Sequence[Callable[[ElasticBody], ufl.Form | None]] = (),
         stretches: Sequence[Stretch | None] = (),
         bulge: fem.Function | None = None,
+        with_pressure: Sequence[bool] = (),
     ) -> None:
         self.mesh, self.model, self.order = mesh, model, order
         self.u = fem.Function(vector_space(mesh, order), name="displacement")
@@ -97,10 +112,13 @@ class ElasticBody:
         self.youngs_modulus = self.cellwise([m.youngs_modulus for m in materials])
         self.poissons_ratio = self.cellwise([m.poissons_ratio for m in materials])
         self._depth = self.cellwise(depths)
-        laws = sorted({m.law for m in materials}, key=repr)
-        law_of_cell = np.array([laws.index(m.law) for m in materials])[link]
+        mixed = tuple(with_pressure) or (False,) * len(materials)
+        kinds = [(m.law, own) for m, own in zip(materials, mixed, strict=True)]
+        terms = sorted(set(kinds), key=repr)
+        term_of_cell = np.array([terms.index(kind) for kind in kinds])[link]
         cells = np.flatnonzero(free).astype(np.int32)
-        tags = dmesh.meshtags(mesh, mesh.topology.dim, cells, law_of_cell[cells].astype(np.int32))
+        self.pressure = PressureField(mesh, order - 1, cells[np.array(mixed)[link[cells]]]) if any(mixed) else None
+        tags = dmesh.meshtags(mesh, mesh.topology.dim, cells, term_of_cell[cells].astype(np.int32))
         measure = ufl.Measure("dx", domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": quadrature.degree})
         self.dx = measure
         self.share = fem.Constant(mesh, PETSc.ScalarType(1.0))
@@ -108,8 +126,8 @@ class ElasticBody:
         if any(stretches):
             known = [stretch or UNSTRETCHED for stretch in stretches]
             self._growth = Growth(known, self.cellwise, free=free, dim=model.dim, share=self.share)
-        self._terms = [(law, measure(tag)) for tag, law in enumerate(laws)]
-        self._law_cells = [np.flatnonzero(law_of_cell == tag).astype(np.int32) for tag in range(len(laws))]
+        self._terms = [_Term(law, own, measure(tag)) for tag, (law, own) in enumerate(terms)]
+        self._term_cells = [np.flatnonzero(term_of_cell == tag).astype(np.int32) for tag in range(len(terms))]
 
     @cached_property
     def energy_ufl(self) -> ufl.Form:
@@ -126,10 +144,8 @@ class ElasticBody:
 
     @cached_property
     def _strain_ufl(self) -> ufl.Form:
-        volume = ufl.det(self.rest_gradient) * self.model.multiplier(self._depth)
-        if self._growth is not None:
-            volume *= self._growth.volume
-        terms = [self._density(law) * volume * dx for law, dx in self._terms]
+        volume = self._volume
+        terms = [self._density(term, self._strain) * volume * term.dx for term in self._terms]
         return sum(terms[1:], start=terms[0])
 
     @cached_property
@@ -148,6 +164,21 @@ class ElasticBody:
     @cached_property
     def tangent_form(self):
         return compile_form(ufl.derivative(self.residual_ufl, self.u))
+
+    @cached_property
+    def tangent_blocks(self) -> list[list]:
+        """∂²E/∂(u, p)², where links have a pressure of their own."""
+        by_p, u, p = self._pressure_ufl, self.u, self.pressure.p
+        return [
+            [self.tangent_form, compile_form(ufl.derivative(self.residual_ufl, p))],
+            [compile_form(ufl.derivative(by_p, u)), compile_form(ufl.derivative(by_p, p))],
+        ]
+
+    def compile(self) -> None:
+        """Compiles what equilibria need (collective)."""
+        _ = self.energy_form, self.residual_form, self.tangent_form
+        if self.pressure is not None:
+            _ = self._pressure_form, self.tangent_blocks
 
     def gradient(self, field: fem.Function):
         """H = ∇field (∇X)⁻¹, the gradient of a field on the rest shape, symbolic."""
@@ -179,20 +210,21 @@ class ElasticBody:
     def free(self, degree: int) -> ufl.Measure:
         """The measure of all cells that can deform, with quadrature of ``degree``."""
         metadata = {"quadrature_degree": degree}
-        return sum((dx(metadata=metadata) for _, dx in self._terms[1:]), start=self._terms[0][1](metadata=metadata))
+        first, *others = [term.dx(metadata=metadata) for term in self._terms]
+        return sum(others, start=first)
 
     def contraction_energy(self, weight, *, degree: int) -> ufl.Form:
         """½ ∫ w E (F₃₃ − 1)² dV with a scalar field w, of links in plane stress."""
         terms = []
-        for law, dx in self._terms:
-            contraction = self.model.contraction(law, self._strain, self._moduli)
+        for term in self._terms:
+            contraction = self.model.contraction(term.law, self._strain, self._moduli)
             density_ = 0.5 * weight * self.youngs_modulus * contraction**2
             scale = ufl.det(self.rest_gradient) * self.model.multiplier(self._depth)
-            terms.append(density_ * scale * dx(metadata={"quadrature_degree": degree}))
+            terms.append(density_ * scale * term.dx(metadata={"quadrature_degree": degree}))
         return sum(terms[1:], start=terms[0])
 
     def curvature(self, A, B, *, degree: int) -> ufl.Form:
-        """∫ A : ∂²W/∂F∂F : B dV at the present displacement, for gradients A, B on the rest shape."""
+        """∫ A : ∂²W/∂F∂F : B dV at the present fields, for gradients A, B on the rest shape."""
         i, j, k, m = ufl.indices(4)
         H = ufl.variable(self.gradient(self.u))
         elastic = H if self._growth is None else self._growth.elastic(H)
@@ -200,11 +232,10 @@ class ElasticBody:
         if self._growth is not None:
             scale *= self._growth.volume
         terms = []
-        for law, dx in self._terms:
-            density_ = density(law, self.model.strain(law, elastic, self._moduli), self._moduli)
-            C = ufl.diff(ufl.diff(density_, H), H)
+        for term in self._terms:
+            C = ufl.diff(ufl.diff(self._density(term, elastic), H), H)
             product = A[i, j] * C[i, j, k, m] * B[k, m] * ufl.det(self.rest_gradient) * scale
-            terms.append(product * dx(metadata={"quadrature_degree": degree}))
+            terms.append(product * term.dx(metadata={"quadrature_degree": degree}))
         return sum(terms[1:], start=terms[0])
 
     def energy(self) -> float:
@@ -221,6 +252,17 @@ class ElasticBody:
         """Whether the energy depends on the share."""
         return self.effects_ufl is not None or self._growth is not None
 
+    def share_residuals(self) -> np.ndarray:
+        """The derivative of ``residuals`` by the share (collective)."""
+        vector = petsc_vector(self.u).duplicate()
+        self.share_residual(vector)
+        if self.pressure is None:
+            return vector.array_r.copy()
+        by_p = np.zeros(len(self.pressure.unknown))
+        if self._growth is not None:
+            by_p = self._assembled(self._pressure_share_form, self.pressure.p)
+        return np.concatenate([vector.array_r, by_p])
+
     def share_residual(self, vector: PETSc.Vec) -> None:
         """Assembles the derivative of the residual by the share into the ghosted ``vector`` (collective)."""
         self._assemble(self._share_form, vector)
@@ -229,15 +271,60 @@ class ElasticBody:
         """Assembles ∂E/∂u into the ghosted ``vector`` (collective)."""
         self._assemble(self.residual_form, vector)
 
+    def residuals(self) -> np.ndarray:
+        """∂E/∂(u, p) at this rank's owned values, those of u first, flat (collective)."""
+        by_u = self.assembled(self.residual_form)
+        if self.pressure is None:
+            return by_u
+        return np.concatenate([by_u, self._assembled(self._pressure_form, self.pressure.p)])
+
     def assembled(self, form) -> np.ndarray:
         """A compiled linear form on the space of u, this rank's owned values, flat (collective)."""
-        vector = petsc_vector(self.u).duplicate()
-        self._assemble(form, vector)
-        return vector.array_r.copy()
+        return self._assembled(form, self.u)
+
+    def create_tangent(self) -> PETSc.Mat:
+        """An empty matrix for ``tangent``: per rank, the owned values of u, then those of p (collective)."""
+        if self.pressure is None:
+            return fem.petsc.create_matrix(self.tangent_form)
+        return fem.petsc.create_matrix_block(self.tangent_blocks)
 
     def tangent(self, matrix: PETSc.Mat) -> None:
-        """Adds ∂²E/∂u² into ``matrix`` (collective; leaves it unassembled)."""
-        fem.petsc.assemble_matrix(matrix, self.tangent_form)
+        """Adds ∂²E/∂(u, p)² into ``matrix`` (collective; leaves it unassembled)."""
+        if self.pressure is None:
+            fem.petsc.assemble_matrix(matrix, self.tangent_form)
+        else:
+            fem.petsc.assemble_matrix_block(matrix, self.tangent_blocks)
+
+    def take(self, values: np.ndarray) -> None:
+        """Sets the owned values of u, and of p behind them, flat; ghosts follow in ``update``."""
+        displacements, *pressures = self.split(values)
+        petsc_vector(self.u).array_w[:] = displacements
+        if self.pressure is not None:
+            petsc_vector(self.pressure.p).array_w[:] = pressures[0]
+
+    def values(self) -> np.ndarray:
+        """This rank's owned values of u, and of p behind them, flat."""
+        return np.concatenate([petsc_vector(field).array_r for field in self.fields])
+
+    def split(self, values: np.ndarray) -> list[np.ndarray]:
+        """Owned values as in ``values``, field by field."""
+        ends = np.cumsum([petsc_vector(field).local_size for field in self.fields])
+        return np.split(values, ends[:-1])
+
+    @property
+    def fields(self) -> list[fem.Function]:
+        """u, and p where links have one."""
+        return [self.u] if self.pressure is None else [self.u, self.pressure.p]
+
+    @cached_property
+    def pressure_unit(self) -> float:
+        """√(n / ∫ dV/μ) over the n unknowns of p, in whose units p is as large as u in an energy (collective).
+
+        Volumes resist with p² / μ per volume once shear has done what it can.
+        """
+        first, *others = [self._volume / self._moduli.mu * term.dx for term in self._terms if term.mixed]
+        volume = fem.assemble_scalar(compile_form(sum(others, start=first)))
+        return float(np.sqrt(self.pressure.count / self.mesh.comm.allreduce(volume)))
 
     def carried(self, change: np.ndarray) -> np.ndarray:
         """Displacements after the rest shape changes by δ, every node's change carried along by the deformation:
@@ -257,13 +344,14 @@ class ElasticBody:
         return self.u.x.array + self._carried.x.array
 
     def update(self) -> None:
-        """Makes ghost values of u agree with their owners (collective)."""
-        petsc_vector(self.u).ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
+        """Makes ghost values of u and p agree with their owners (collective)."""
+        for field in self.fields:
+            petsc_vector(field).ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
 
     def von_mises(self) -> np.ndarray:
         """Von Mises stress at the midpoint of each local cell, (cells,)."""
-        values = np.zeros(sum(map(len, self._law_cells)))
-        for expression, cells in zip(self._stresses, self._law_cells, strict=True):
+        values = np.zeros(sum(map(len, self._term_cells)))
+        for expression, cells in zip(self._stresses, self._term_cells, strict=True):
             values[cells] = evaluate_expression(expression, self.mesh, cells)[:, 0]
         return values
 
@@ -271,7 +359,8 @@ class ElasticBody:
     def _stresses(self) -> list[fem.Expression]:
         """The compiled von Mises stress at cell midpoints, per law."""
         midpoint = np.full((1, self.model.dim), 1.0 / (self.model.dim + 1))
-        stresses = [von_mises(cauchy_stress(self.model, law, self._strain, self._moduli)) for law, _ in self._terms]
+        # no pressure in it: von Mises stress does not see any
+        stresses = [von_mises(cauchy_stress(self.model, term.law, self._strain, self._moduli)) for term in self._terms]
         return [compile_expression(stress, midpoint, self.mesh.comm) for stress in stresses]
 
     @cached_property
@@ -300,8 +389,31 @@ class ElasticBody:
         H = self.gradient(self.u)
         return H if self._growth is None else self._growth.elastic(H)
 
-    def _density(self, law: EnergyLaw):
-        return density(law, self.model.strain(law, self._strain, self._moduli), self._moduli)
+    def _density(self, term: _Term, H):
+        """W, or Π, of the elastic strain H."""
+        strain = self.model.strain(term.law, H, self._moduli)
+        if term.mixed:
+            return mixed_density(term.law, strain, self._moduli, self.pressure.p)
+        return density(term.law, strain, self._moduli)
+
+    @property
+    def _volume(self):
+        """Strain-free volume per volume of the mesh."""
+        volume = ufl.det(self.rest_gradient) * self.model.multiplier(self._depth)
+        return volume if self._growth is None else volume * self._growth.volume
+
+    @property
+    def _pressure_ufl(self) -> ufl.Form:
+        """∂E/∂p in direction of a test function."""
+        return ufl.derivative(self._strain_ufl, self.pressure.p)
+
+    @cached_property
+    def _pressure_form(self):
+        return compile_form(self._pressure_ufl)
+
+    @cached_property
+    def _pressure_share_form(self):
+        return compile_form(ufl.derivative(ufl.diff(self._strain_ufl, self._growth.share), self.pressure.p))
 
     @cached_property
     def _strain_form(self):
@@ -313,6 +425,12 @@ class ElasticBody:
         if self._growth is not None:
             terms.append(ufl.diff(self._strain_ufl, self._growth.share))
         return compile_form(ufl.derivative(sum(terms[1:], start=terms[0]), self.u))
+
+    def _assembled(self, form, field: fem.Function) -> np.ndarray:
+        """A compiled linear form on the space of ``field``, this rank's owned values, flat."""
+        vector = petsc_vector(field).duplicate()
+        self._assemble(form, vector)
+        return vector.array_r.copy()
 
     def _assemble(self, form, vector: PETSc.Vec) -> None:
         with vector.localForm() as local:

@@ -20,11 +20,13 @@ class ElasticModel(ABC):
         name: as shown in summaries and accepted on command lines.
         dim: dimension of the mesh.
         mechanism_dim: dimension of the space in which bodies move and joints and forces act.
+        confined: whether strains on the mesh alone must keep the volume of incompressible material.
     """
 
     name: str
     dim: int
     mechanism_dim: int
+    confined: bool = True
 
     @property
     def symmetric(self) -> bool:
@@ -112,7 +114,7 @@ class PlaneStrain(Planar):
 class PlaneStress(Planar):
     """Two dimensions, S₃₃ = 0: links free to contract across their depth."""
 
-    name = "plane-stress"
+    name, confined = "plane-stress", False
 
     def check(self, link, material):
         if transverse_strain.dispatch(type(material.law)) is transverse_strain.dispatch(EnergyLaw):

@@ -43,8 +43,8 @@ class ExtraEntries:
         potentials: BodyPotentials,
         compliances: np.ndarray,
     ) -> None:
-        self._joints, self._controlled, self._potentials = joints, controlled, potentials
-        self._z, self._block = layout.first_extra_row, layout.block
+        self._joints, self._controlled, self._potentials, self._layout = joints, controlled, potentials, layout
+        self._z = layout.first_extra_row
         self._multipliers = layout.first_extra_row + joints.size
         self._force = np.array([layout.first_extra_row + layout.force])
         self._compliances, self._proximal = compliances, np.zeros(joints.rows)
@@ -121,4 +121,4 @@ class ExtraEntries:
             case BodyPoint(body=body):
                 return self._z + self._joints.columns[body]
             case LinkPoint(global_nodes=nodes):
-                return (self._block * nodes[:, None] + np.arange(self._block)).ravel()
+                return self._layout.rows_of(nodes)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-import dolfinx.fem.petsc
 import numpy as np
 from petsc4py import PETSc
 
@@ -19,9 +18,9 @@ def create_extended_matrix(
 ) -> PETSc.Mat:
     """K̂ with the finite-element pattern and the extra ``pattern``: (global rows, global columns) of full blocks.
 
-    Holds ∂²E/∂u² of the current displacements (collective).
+    Holds ∂²E/∂(u, p)² of the current fields (collective).
     """
-    fem = dolfinx.fem.petsc.create_matrix(elastic.tangent_form)
+    fem = elastic.create_tangent()
     elastic.tangent(fem)
     fem.assemble()
     starts, columns, values = fem.getValuesCSR()
@@ -48,7 +47,7 @@ def create_extended_matrix(
     matrix = PETSc.Mat().createAIJ(
         [(size, total), (size, total)],
         csr=(starts.astype(PETSc.IntType), column.astype(PETSc.IntType), number),
-        bsize=elastic.model.dim,
+        bsize=layout.block,
         comm=layout.comm,
     )
     matrix.setLGMap(*fem.getLGMap())
@@ -56,7 +55,9 @@ def create_extended_matrix(
     return matrix
 
 
-def create_map_matrix(layout: Layout, interfaces: InterfaceMap, joints: JointSystem, unit_u: float, scale: np.ndarray):
+def create_map_matrix(
+    layout: Layout, interfaces: InterfaceMap, joints: JointSystem, units: np.ndarray, scale: np.ndarray
+) -> PETSc.Mat:
     """G with its constant entries: the scaled identity on free DOFs and extras, zeros for ∂u/∂z (collective)."""
     dim = joints.space.dim
     counts = np.zeros(layout.local_rows, dtype=int)
@@ -65,7 +66,7 @@ def create_map_matrix(layout: Layout, interfaces: InterfaceMap, joints: JointSys
     entries: dict[int, np.ndarray] = {}
     for body, nodes in interfaces.nodes.items():
         for node in nodes[nodes < interfaces.owned]:
-            for row in range(layout.block * node, layout.block * node + dim):
+            for row in range(layout.per_node * node, layout.per_node * node + dim):
                 entries[row] = node_columns[body]
                 counts[row] = len(node_columns[body])
     if layout.last:
@@ -74,7 +75,7 @@ def create_map_matrix(layout: Layout, interfaces: InterfaceMap, joints: JointSys
     columns = np.zeros(starts[-1], dtype=PETSc.IntType)
     values = np.zeros(starts[-1])
     columns[starts[layout.free]] = layout.first_unknown + np.arange(len(layout.free))
-    values[starts[layout.free]] = unit_u
+    values[starts[layout.free]] = units
     for row, cols in entries.items():
         columns[starts[row] : starts[row + 1]] = cols
     if layout.last:

@@ -6,10 +6,13 @@ Each iteration solves, with the symmetric factor LDLᵀ,
 
 the Newton step of the augmented Lagrangian, which tends to the KKT step for large ρ and stays regular for
 redundant constraints. If the factor has more negative pivots than there are multipliers, the step need not
-descend, and δ grows until it does; close to an equilibrium δ stays zero, so that unstable equilibria on the path are
+descend, and δ grows until it does (every pressure of near-incompressible links counts as a multiplier: E has a maximum
+there); close to an equilibrium δ stays zero, so that unstable equilibria on the path are
 found and reported as such. Merit of a step: the augmented Lagrangian
 
-    Φ(s) = E(s) − λᵀC + ½ ρ_m |C + cλ|²  at the new multipliers λ, with the compliance c of joints.
+    Φ(s) = E(s) − λᵀC + ½ ρ_m |C + cλ|²  at the new multipliers λ, with the compliance c of joints,
+
+and at the new pressures p, with ½ ρ_m |∂E/∂p|² beside it.
 
 Slender links bend at far smaller forces than they stretch, so a good step may raise every merit for a few
 iterations: steps are taken in full while a small allowance lasts, then the iteration returns to its best
@@ -196,8 +199,8 @@ class Newton:
 
     @property
     def _expected(self) -> int:
-        """Negative pivots of a stable equilibrium: one per multiplier, one for the controlled force."""
-        return self.system.joints.rows + 1
+        """Negative pivots of a stable equilibrium: one per multiplier and pressure, one for the controlled force."""
+        return self.system.joints.rows + 1 + self.system.layout.pressures
 
     def _full_step(
         self, state: State, control: Control, step: Step, balance: Balance, iteration: int
@@ -217,6 +220,7 @@ class Newton:
     ) -> tuple[State, Balance]:
         """Armijo backtracking on the augmented Lagrangian; near convergence a smaller residual will do."""
         system = self.system
+        state, step = system.pressed(state, step)
         system.load(state)
         towards = (state.multipliers + step.multipliers, state.force + step.force)
         before = self._merit(state, control, *towards)
@@ -236,7 +240,7 @@ class Newton:
         system, stiffness = self.system, 10.0 * self.system.unit**2
         violation = system.joints.row_scale * system.constraints(state, multipliers)
         value = system.potential(state, force) - multipliers @ system.joints.value(state.poses, state.motors)
-        value += 0.5 * stiffness * float(violation @ violation)
+        value += 0.5 * stiffness * float(violation @ violation) + 5.0 * system.volume_violation() ** 2
         if control.constrained:
             gap = (system.load_displacement(state) - control.target) / system.joints.length
             value += force * control.target + 0.5 * stiffness * gap**2

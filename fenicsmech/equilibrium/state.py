@@ -12,7 +12,8 @@ class State:
     """A point (s, λ, f) of the equilibrium equations.
 
     Attributes:
-        u: displacements of this rank's owned nodes, flat (owned dofs,).
+        u: displacements of this rank's owned nodes, then its owned pressures where links have some of their own, flat
+            (owned dofs,).
         poses: poses of all bodies, on every rank, (bodies, pose_size).
         multipliers: λ, one per constraint row, on every rank.
         force: magnitude f of the controlled force.

@@ -7,6 +7,7 @@
          [0       , −A   , −ε−c, 0 ],           KKT = Gᵀ K̂ G,   right-hand side −Gᵀ ∇L
          [−a_uᵀ   , −a_zᵀ, 0  , 0   ]]
 
+Where links have a pressure p of their own, u stands for (u, p) in all of this; E is a saddle then, stationary in p.
 B is the curvature of the rigid coordinates, c the compliance of joints, 0 unless an effect softens them. One sparse
 triple product forms the whole matrix; D makes x dimensionless.
 """
@@ -22,7 +23,6 @@ from petsc4py import PETSc
 
 from fenicsmech.bodies import BodyPoint, InterfaceMap, LinkPoint
 from fenicsmech.clock import Clock
-from fenicsmech.compat import petsc_vector
 from fenicsmech.effects import PosePotential
 from fenicsmech.elasticity import ElasticBody
 from fenicsmech.equilibrium.control import Control
@@ -67,7 +67,8 @@ class EquilibriumSystem:
 
     Attributes:
         unit: a residual of this norm is a displacement of the mechanism's length against the mean stiffness.
-        unit_u, scale: what a unit of each scaled unknown stands for: displacements; (z, λ, f).
+        unit_u, units, scale: what a unit of each scaled unknown stands for: displacements; all free finite-element
+            DOFs; (z, λ, f).
     """
 
     def __init__(
@@ -84,28 +85,30 @@ class EquilibriumSystem:
     ) -> None:
         self.elastic, self.interfaces, self.joints = elastic, interfaces, joints
         self.controlled, self.loads, self.clock = controlled, loads, clock
-        self.layout = Layout(elastic.mesh.comm, interfaces, joints)
+        self.layout = Layout(elastic.mesh.comm, interfaces, joints, elastic.pressure)
         self._potentials = BodyPotentials(potentials, joints)
         self._compliances = np.array([compliances.get(row, 0.0) for row in range(joints.rows)])
         self._extras = ExtraEntries(joints, self.layout, controlled, self._potentials, self._compliances)
-        self._u = petsc_vector(elastic.u)
-        self._nodal = self._u.duplicate()
         with clock.phase("compile"):
-            self._forms = (elastic.energy_form, elastic.residual_form, elastic.tangent_form)
+            elastic.compile()
         with clock.phase("setup"):
-            self._u.set(0.0)
+            elastic.take(np.zeros(self.layout.owned))
+            elastic.update()
             self._hat = create_extended_matrix(elastic, self.layout, self._extras.pattern())
             # mean diagonal of the stiffness k: D = (ℓ, 1, …) / (ℓ √k) makes the KKT matrix dimensionless
-            diagonal = self._hat.getDiagonal().array_r[self.layout.free]
-            comm = self.layout.comm
-            mean = comm.allreduce(float(diagonal.sum())) / comm.allreduce(len(self.layout.free))
+            comm, free = self.layout.comm, self.layout.free_displacements
+            diagonal = self._hat.getDiagonal().array_r[self.layout.free[:free]]
+            mean = comm.allreduce(float(diagonal.sum())) / comm.allreduce(free)
             self.unit = float(np.sqrt(mean)) * joints.length
             self.unit_u = joints.length / self.unit
+            self.units = np.full(len(self.layout.free), self.unit_u)
+            if elastic.pressure is not None:
+                self.units[free:] = elastic.pressure_unit
             self.scale = np.concatenate(
                 [joints.pose_scale / self.unit, joints.row_scale * self.unit, [self.unit / joints.length]]
             )
             self._extras.set_regularisation(self.scale[self.layout.multipliers], self.scale[self.layout.force])
-            self._map = create_map_matrix(self.layout, interfaces, joints, self.unit_u, self.scale)
+            self._map = create_map_matrix(self.layout, interfaces, joints, self.units, self.scale)
         self._rows = self._hat.createVecLeft()
         self._matrix: PETSc.Mat | None = None
         self._diagonal: PETSc.Vec | None = None
@@ -124,11 +127,21 @@ class EquilibriumSystem:
             force=state.force + step.force,
         )
         self.load(moved)
-        return replace(moved, u=self._u.array_r.copy())
+        return replace(moved, u=self.elastic.values())
+
+    def pressed(self, state: State, step: Step) -> tuple[State, Step]:
+        """``state`` with the pressures that ``step`` leads to, and the rest of ``step``."""
+        first = self.layout.displacements
+        if self.elastic.pressure is None:
+            return state, step
+        u, rest = state.u.copy(), step.u.copy()
+        u[first:] += step.u[first:]
+        rest[first:] = 0.0
+        return replace(state, u=u), replace(step, u=rest)
 
     def load(self, state: State) -> None:
-        """Makes the finite-element field hold ``state`` (collective)."""
-        self._u.array_w[:] = state.u
+        """Makes the finite-element fields hold ``state`` (collective)."""
+        self.elastic.take(state.u)
         self.elastic.share.value = state.share
         self.elastic.update()
         self.interfaces.place(state.poses)
@@ -144,7 +157,7 @@ class EquilibriumSystem:
 
     def size(self, step: Step) -> float:
         """Largest displacement over the mechanism's length, or rotation, in ``step`` (collective)."""
-        nodes = float(np.max(np.abs(step.u), initial=0.0)) / self.joints.length
+        nodes = float(np.max(np.abs(step.u[: self.layout.displacements]), initial=0.0)) / self.joints.length
         bodies = float(np.max(np.abs(step.z / self.joints.pose_scale), initial=0.0))
         return max(self.layout.comm.allgather(max(nodes, bodies)))
 
@@ -165,6 +178,14 @@ class EquilibriumSystem:
         work += state.share * sum(magnitude * self._travel(load, state) for load, magnitude in self.loads)
         return self.elastic_energy() + self._potentials.value(state) - work
 
+    def volume_violation(self) -> float:
+        """Norm of ∂E/∂p of the loaded state in scaled units: by how much volumes miss their pressures (collective)."""
+        if self.elastic.pressure is None:
+            return 0.0
+        layout = self.layout
+        missed = (self.elastic.residuals()[layout.free] * self.units)[layout.free_displacements :]
+        return float(np.sqrt(layout.comm.allreduce(float(missed @ missed))))
+
     def constraints(self, state: State, multipliers: np.ndarray) -> np.ndarray:
         """C(s) + c λ at ``multipliers`` λ, (rows,)."""
         return self.joints.value(state.poses, state.motors) + self._compliances * multipliers
@@ -173,9 +194,8 @@ class EquilibriumSystem:
         """Gᵀ ∇L (collective). Brings G to the poses of ``state``."""
         with self.clock.phase("residual"):
             self._update_map(state)
-            self.elastic.residual(self._nodal)
             layout = self.layout
-            r = self._nodal.array_r[: layout.owned].copy()
+            r = self.elastic.residuals()
             loads = np.zeros_like(r)
             g = np.zeros(layout.extras)
             for load, magnitude in self._acting(state):
@@ -184,7 +204,8 @@ class EquilibriumSystem:
             reactions = self.joints.gradient(state.poses, state.motors).T @ state.multipliers
             forces = np.linalg.norm(g * self.scale) ** 2 + np.linalg.norm(reactions * self.scale[layout.z]) ** 2
             forces += layout.comm.allreduce(float(np.linalg.norm(loads * self.unit_u) ** 2))
-            moments = layout.comm.allreduce(self.interfaces.moments(r.reshape(-1, layout.block)), op=_add_moments)
+            nodal = r[: layout.displacements].reshape(-1, layout.per_node)
+            moments = layout.comm.allreduce(self.interfaces.moments(nodal), op=_add_moments)
             extras = -g
             extras[layout.z] += self._potentials.gradient(state) - reactions
             extras[layout.multipliers] = -self.constraints(state, state.multipliers)
@@ -225,8 +246,10 @@ class EquilibriumSystem:
 
     def shift(self, shift: float) -> None:
         """Makes the KKT matrix hold ``shift`` · I more than it was assembled with, in the block of s (collective)."""
-        shifted = self._diagonal.copy()
-        shifted.array_w[: len(self.layout.free) + (self.joints.size if self.layout.last else 0)] += shift
+        shifted, layout = self._diagonal.copy(), self.layout
+        shifted.array_w[: layout.free_displacements] += shift
+        if layout.last:
+            shifted.array_w[len(layout.free) :][layout.z] += shift
         self._matrix.setDiagonal(shifted)
 
     def force_rate(self, state: State) -> PETSc.Vec:
@@ -246,8 +269,7 @@ class EquilibriumSystem:
             self._add_load(load, magnitude, state, nodal, extras)
         extras[self.layout.z] -= self._potentials.rate(state)
         if self.elastic.shares:
-            self.elastic.share_residual(self._nodal)
-            nodal -= self._nodal.array_r[: self.layout.owned]
+            nodal -= self.elastic.share_residuals()
         return self._right_hand_side(nodal, extras)
 
     def target_rate(self) -> PETSc.Vec:
@@ -264,14 +286,14 @@ class EquilibriumSystem:
         return self._right_hand_side(np.zeros(self.layout.owned), extras)
 
     def expand(self, x: PETSc.Vec) -> tuple[np.ndarray, np.ndarray]:
-        """∂u/∂x · x at the owned nodes, interface nodes too, (owned dofs,), and the poses' part z (collective)."""
+        """∂u/∂x · x as in ``State.u``, interface nodes too, (owned dofs,), and the poses' part z (collective)."""
         rows = self._hat.createVecLeft()
         self._map.mult(x, rows)
         return rows.array_r[: self.layout.owned].copy(), self.step(x).z
 
     def nodal_forces(self) -> np.ndarray:
-        """∂E/∂u minus the loads on links of the last ``balance``, (owned dofs,)."""
-        return self._rows.array_r[: self.layout.owned].copy()
+        """∂E/∂u minus the loads on links of the last ``balance``, (owned displacements,)."""
+        return self._rows.array_r[: self.layout.displacements].copy()
 
     def control_row(self) -> PETSc.Vec:
         """The unit vector of the unknown f (collective)."""
@@ -285,7 +307,7 @@ class EquilibriumSystem:
         local, layout = x.array_r, self.layout
         free = len(layout.free)
         u = np.zeros(layout.owned)
-        u[layout.free] = self.unit_u * local[:free]
+        u[layout.free] = self.units * local[:free]
         extras = self.scale * local[free:] if layout.last else None
         extras = layout.comm.bcast(extras, root=layout.comm.size - 1)
         return Step(u, extras[layout.z], extras[layout.multipliers], float(extras[layout.force]))
@@ -314,10 +336,9 @@ class EquilibriumSystem:
                 if body in self.joints.columns:
                     extras[self.joints.columns[body]] += magnitude * load.direction @ point.gradient(state.poses)
             case LinkPoint(global_nodes=nodes, weights=weights):
-                block = self.layout.block
-                first = self.layout.first_row // block
-                mine = (nodes >= first) & (nodes < first + self.layout.owned // block)
-                forces = nodal.reshape(-1, block)
+                first = self.layout.first_node
+                forces = nodal[: self.layout.displacements].reshape(-1, self.layout.per_node)
+                mine = (nodes >= first) & (nodes < first + len(forces))
                 np.add.at(forces, nodes[mine] - first, magnitude * np.outer(weights[mine], load.direction))
 
     def _update_map(self, state: State) -> None:
@@ -328,7 +349,7 @@ class EquilibriumSystem:
             if not len(nodes):
                 continue
             columns = self.joints.columns[body]
-            rows = (layout.block * nodes[:, None] + np.arange(dim)).ravel()
+            rows = (layout.per_node * nodes[:, None] + np.arange(dim)).ravel()
             self._map.setValuesIJV(
                 np.arange(0, len(columns) * len(rows) + 1, len(columns), dtype=PETSc.IntType),
                 np.tile(layout.first_extra + columns, len(rows)).astype(PETSc.IntType),

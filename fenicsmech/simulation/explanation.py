@@ -61,12 +61,15 @@ def simulated(model: MechanismModel, space: str, order: int) -> tuple[str, ...]:
     links = ", ".join(
         f"{link.name} ({link.material.name}, {type(link.material.law).__name__})" for link in mechanism.flexible_links
     )
+    bulky = [link.name for link, own in zip(mechanism.flexible_links, model.with_pressure, strict=True) if own]
     items = [
         f"flexible links in large deformation ({space}, order {order}): {links}",
         f"rigid links: {', '.join(link.name for link in mechanism.rigid_links)}",
         f"ideal joints, without play, friction or compliance: {', '.join(kinds)}",
         "forces that keep their direction, applied without inertia",
     ]
+    if bulky:
+        items.insert(1, f"pressure as an unknown of its own in {', '.join(bulky)}")
     return (*items, *(effect.explain() for effect in model.effects))
 
 
@@ -113,6 +116,7 @@ def weight_influence(model: MechanismModel, newton, curve: Curve, frame: Frame) 
     """
     elastic = model.elastic
     with influence(model, newton, frame, curve.freedom) as z:
+        z = elastic.split(z)[0]
         depths = [elastic.model.multiplier(link.shape.depth) for link in model.mechanism.flexible_links]
         v = ufl.TestFunction(elastic.u.function_space)
         depth = elastic.cellwise(depths) * ufl.det(elastic.rest_gradient)
@@ -126,14 +130,19 @@ def weight_influence(model: MechanismModel, newton, curve: Curve, frame: Frame) 
 
 
 def _compressibility_hint(model: MechanismModel, order: int) -> Hint | None:
-    limit = _LOCKS[order]
-    stiff = [link.name for link in model.mechanism.flexible_links if link.material.poissons_ratio > limit]
+    limit, links = _LOCKS[order], model.mechanism.flexible_links
+    stiff = [
+        link.name
+        for link, own in zip(links, model.with_pressure, strict=True)
+        if link.material.poissons_ratio > limit and model.elastic.model.confined and not own
+    ]
     if not stiff:
         return None
+    remedy = "use order 2 or 3 with" if order == 1 else "use"
     return Hint(
         "pressure as an unknown of its own",
         f"Poisson's ratio of {', '.join(stiff)} is above {limit:g}: elements of order {order} are too stiff there; "
-        "refine, raise the order, or compare two sizes",
+        f"{remedy} formulation=Mixed(above={limit:g}), or compare two sizes",
         True,
     )
 

@@ -12,7 +12,7 @@ import numpy as np
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 
-from fenicsmech.compat import cell_nodes, cellwise_space, vector_space, write_series
+from fenicsmech.compat import cell_nodes, cellwise_space, scalar_space, vector_space, write_series
 from fenicsmech.errors import DescriptionError
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.model import MechanismModel
@@ -22,7 +22,8 @@ from fenicsmech.simulation.snapshot import at_vertices
 def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame]) -> None:
     """Writes vertex displacements and von Mises stress of ``frames`` of one design; time is the force (collective).
 
-    The files appear when they are complete.
+    And pressures at vertices, where links have some of their own: zero in all other links. The files appear when they
+    are complete.
 
     Raises:
         DescriptionError: the path does not end in .xdmf.
@@ -33,15 +34,20 @@ def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame])
     comm = model.mesh.mesh.comm
     displacement = fem.Function(vector_space(model.mesh.mesh, 1))
     stress = fem.Function(cellwise_space(model.mesh.mesh))
-    dim = model.elastic.model.dim
+    fields = {"displacement": displacement, "von Mises stress": stress}
+    nodal = {displacement: model.elastic.u}
+    if model.elastic.pressure is not None:
+        fields["pressure"] = fem.Function(scalar_space(model.mesh.mesh, 1))
+        nodal[fields["pressure"]] = model.elastic.pressure.p
 
     def update(index: int) -> None:
         with model.shaped(frames[index].design):
             model.load(frames[index].state)
-            nodal = at_vertices(model, model.elastic.u)
-            values = displacement.x.array.reshape(-1, dim)
-            for cell, nodes in enumerate(cell_nodes(model.mesh.mesh)):
-                values[displacement.function_space.dofmap.cell_dofs(cell)] = nodal[nodes]
+            for written, field in nodal.items():
+                vertices = at_vertices(model, field)
+                values = written.x.array.reshape(-1, vertices.shape[1])
+                for cell, nodes in enumerate(cell_nodes(model.mesh.mesh)):
+                    values[written.function_space.dofmap.cell_dofs(cell)] = vertices[nodes]
             von_mises = model.elastic.von_mises()
             stress.x.array[: len(von_mises)] = von_mises
 
@@ -52,9 +58,7 @@ def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame])
     folder = Path(comm.bcast(folder, root=0))
     forces = np.array([frame.force for frame in frames])
     with _mesh_of(model, frames[0].design) as mesh:
-        write_series(
-            folder / path.name, mesh, {"displacement": displacement, "von Mises stress": stress}, forces, update, comm
-        )
+        write_series(folder / path.name, mesh, fields, forces, update, comm)
     comm.barrier()
     if comm.rank == 0:
         # the heavy data first: the light file that names it must never point at nothing

@@ -13,9 +13,9 @@ from mpi4py import MPI
 
 from fenicsmech.bodies import DesignAtNodes, InterfaceMap, MaterialPoint, body_point, link_point
 from fenicsmech.clock import Clock
-from fenicsmech.compat import cell_nodes, original_nodes, petsc_vector
+from fenicsmech.compat import cell_nodes, original_nodes
 from fenicsmech.effects import BodyEffect, JointSoftening, LinkEffect, LinkFields, RestStretch, find_boundaries
-from fenicsmech.elasticity import ElasticBody, ElasticModel, Quadrature, Stretch
+from fenicsmech.elasticity import ElasticBody, ElasticModel, Formulation, Quadrature, Stretch
 from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State
 from fenicsmech.errors import DescriptionError, FenicsmechError
 from fenicsmech.linkage import Linkage
@@ -35,12 +35,14 @@ class Fidelity:
         order: degree of the displacement field.
         sizes: element size per flexible link.
         quadrature: quadrature degree.
+        formulation: which links have the pressure as an unknown of its own.
     """
 
     model: ElasticModel
     order: int
     sizes: Mapping[FlexibleLink, float]
     quadrature: Quadrature
+    formulation: Formulation
 
 
 def check_links(mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> None:
@@ -97,6 +99,7 @@ class MechanismModel:
         interfaces: interface nodes as functions of body poses.
         design_nodes: the design field at the nodes of the displacement.
         clock: where time goes.
+        with_pressure: whether each flexible link has the pressure as an unknown of its own.
         effects: what acts beside links, joints and forces.
     """
 
@@ -112,6 +115,9 @@ class MechanismModel:
         self.mechanism, self.linkage, self.mesh, self.clock = mechanism, linkage, mesh, clock
         self.effects = tuple(effects)
         links = mechanism.flexible_links
+        self.with_pressure = fidelity.formulation.with_pressure(
+            [link.material for link in links], fidelity.model, fidelity.order
+        )
         link_effects = [effect for effect in effects if isinstance(effect, LinkEffect)]
         faces = [part for effect in link_effects for part in effect.faces]
         self._boundaries = find_boundaries(mesh.mesh, links, mesh.link, faces, half=fidelity.model.symmetric)
@@ -128,6 +134,7 @@ class MechanismModel:
             stretches=_stretches(links, fidelity.model, effects),
             # only fields of the bulge's degree can move curved cells rigidly
             bulge=bulge_field(mesh) if fidelity.order > 1 else None,
+            with_pressure=self.with_pressure,
         )
         self._potentials = [
             potential
@@ -152,8 +159,13 @@ class MechanismModel:
 
     @property
     def flexible_dofs(self) -> int:
-        """Finite-element unknowns of the flexible links, interfaces and mid-planes excluded (collective)."""
+        """Displacements of the flexible links that are unknown, interfaces and mid-planes excluded (collective)."""
         return self.mesh.mesh.comm.allreduce(int(np.sum(self.interfaces.unknown)))
+
+    @property
+    def pressure_dofs(self) -> int:
+        """Pressures that are unknown."""
+        return 0 if self.elastic.pressure is None else self.elastic.pressure.count
 
     @property
     def rigid_dofs(self) -> int:
@@ -182,13 +194,14 @@ class MechanismModel:
     def carry(self, state: State, design: np.ndarray) -> State:
         """Reshapes the links and guesses the equilibrium there from the one at the present shape (collective)."""
         self.load(state)
-        u = self.elastic.carried(design - self.elastic.d.x.array)
+        carried = self.elastic.carried(design - self.elastic.d.x.array)
         self.reshape(design)
-        return replace(state, u=u[: len(state.u)])
+        displacements, *pressures = self.elastic.split(state.u)
+        return replace(state, u=np.concatenate([carried[: len(displacements)], *pressures]))
 
     def load(self, state: State) -> None:
-        """Makes the finite-element field hold ``state`` (collective)."""
-        petsc_vector(self.elastic.u).array_w[:] = state.u
+        """Makes the finite-element fields hold ``state`` (collective)."""
+        self.elastic.take(state.u)
         self.elastic.share.value = state.share
         self.elastic.update()
         self.interfaces.place(state.poses)
@@ -244,7 +257,8 @@ class MechanismModel:
             nodes = np.flatnonzero(self._node_link[:owned] == index)
             offsets = positions[nodes] - np.array(self.linkage.bodies[body].centre)
             u[nodes, :dim] = self.linkage.joints.space.displace(poses[body], offsets)
-        return State(u.ravel(), poses, np.zeros(self.linkage.joints.rows), 0.0, motors)
+        unpressed = np.zeros(0 if self.elastic.pressure is None else len(self.elastic.pressure.unknown))
+        return State(np.concatenate([u.ravel(), unpressed]), poses, np.zeros(self.linkage.joints.rows), 0.0, motors)
 
     @property
     def fields(self) -> LinkFields:

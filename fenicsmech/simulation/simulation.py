@@ -10,7 +10,15 @@ import numpy as np
 from mpi4py import MPI
 
 from fenicsmech.clock import Clock
-from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRAIN, PLANE_STRESS, SPATIAL, Quadrature
+from fenicsmech.elasticity import (
+    MID_PLANE_SYMMETRIC,
+    PLANE_STRAIN,
+    PLANE_STRESS,
+    SPATIAL,
+    Formulation,
+    Mixed,
+    Quadrature,
+)
 from fenicsmech.equilibrium import Hermite, Newton, NewtonOptions, Predictor
 from fenicsmech.errors import AssemblyError, DescriptionError
 from fenicsmech.linkage import assemble, build_linkage, count_freedom
@@ -46,6 +54,8 @@ class Simulation:
         order: degree of the displacement field, 1, 2 or 3.
         size: element size in the plane of the links, or one per flexible link.
         quadrature: quadrature degree; the measured optimum by default.
+        formulation: ``Mixed()`` gives nearly incompressible links the pressure as an unknown of its own;
+            ``Displacement()`` none.
         newton: limits of the equilibrium iteration.
         predictor: how the next equilibrium on a curve is guessed.
         comm: processes that share the work.
@@ -62,6 +72,7 @@ class Simulation:
         order: int = 2,
         size: float | Mapping[FlexibleLink, float],
         quadrature: Quadrature | None = None,
+        formulation: Formulation | None = None,
         newton: NewtonOptions | None = None,
         predictor: Predictor | None = None,
         comm: MPI.Comm = MPI.COMM_WORLD,
@@ -86,7 +97,10 @@ class Simulation:
             effect.check(mechanism, model.mechanism_dim)
         self.scene, self.comm, self.clock = scene, comm, Clock()
         self._described = _description(mechanism)
-        self.fidelity = Fidelity(model, order, sizes, quadrature or Quadrature.for_order(order, model.dim))
+        if formulation is not None and not isinstance(formulation, Formulation):
+            raise DescriptionError("formulation", f"it is {formulation!r}", "Give Mixed() or Displacement()")
+        rule = quadrature or Quadrature.for_order(order, model.dim)
+        self.fidelity = Fidelity(model, order, sizes, rule, formulation or Mixed())
         self.linkage = build_linkage(mechanism, model.mechanism_dim)
         check_links(mechanism, self.linkage, self.fidelity)
         self._options, self._predictor = newton or NewtonOptions(), predictor or Hermite()
@@ -178,6 +192,7 @@ class Simulation:
             order=self.fidelity.order,
             size=self.fidelity.sizes,
             quadrature=self.fidelity.quadrature,
+            formulation=self.fidelity.formulation,
             newton=self._options,
             predictor=self._predictor,
             comm=comm,

@@ -30,10 +30,10 @@ class Snapshot:
 
 
 def at_vertices(model: MechanismModel, field: fem.Function) -> np.ndarray:
-    """Values of a Lagrange field (d or u) at this rank's geometry nodes, (nodes, dim)."""
-    mesh, dim = model.mesh.mesh, model.elastic.model.dim
-    values = field.x.array.reshape(-1, dim)
-    vertices = np.zeros((len(mesh.geometry.x), dim))
+    """Values of a Lagrange field (d, u or p) at this rank's geometry nodes, (nodes, components)."""
+    mesh, dim, components = model.mesh.mesh, model.elastic.model.dim, field.function_space.dofmap.index_map_bs
+    values = field.x.array.reshape(-1, components)
+    vertices = np.zeros((len(mesh.geometry.x), components))
     for nodes, cell in zip(cell_nodes(mesh), range(len(model.mesh.link)), strict=False):
         # the first DOFs of a Lagrange cell are its vertices, in the order of the geometry
         vertices[nodes] = values[field.function_space.dofmap.cell_dofs(cell)[: dim + 1]]

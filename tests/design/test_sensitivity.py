@@ -28,7 +28,7 @@ class Bench:
     Travels are those of the loaded point, of another point of the same link, and of one on a flexible link.
     """
 
-    def __init__(self, space: str, comm: MPI.Comm) -> None:
+    def __init__(self, space: str, comm: MPI.Comm, formulation: fm.Mixed | None = None) -> None:
         mechanism = fm.Mechanism("four-bar")
         ground, coupler = mechanism.rigid("ground", fixed=True), mechanism.rigid("coupler")
         left = mechanism.flexible("left", fm.strip([(0, 0), (-4, 15), (0, 30)], thickness=3.0, depth=6.0), PLASTIC)
@@ -46,7 +46,7 @@ class Bench:
         self.parts = (self.force, *points)
         scene = fm.Scene(mechanism)
         self.turned = scene.configuration("turned", {motor: 0.3})
-        self.simulation = fm.Simulation(scene, space=space, size=4.0, comm=comm)
+        self.simulation = fm.Simulation(scene, space=space, size=4.0, formulation=formulation, comm=comm)
         self.model = self.simulation.model
         self.adjoint = Adjoint(self.model, self.simulation.newton(self.force))
         self.space = self.model.elastic.d.function_space
@@ -78,14 +78,16 @@ class Bench:
         return self.adjoint.gradients(state, [self.model.point_load(part) for part in self.parts])
 
 
-@pytest.fixture(
-    scope="module",
-    params=[(s, c) for s in ("plane-stress", "plane-strain", "3d-symmetric", "3d") for c in COMMS],
-    ids="-".join,
-)
+# with "pressure", links have one of their own
+SPACES = ("plane-stress", "plane-strain", "3d-symmetric", "3d", "plane-strain pressure", "3d pressure")
+
+
+@pytest.fixture(scope="module", params=[(s, c) for s in SPACES for c in COMMS], ids="-".join)
 def bench(request) -> Bench:
-    space, comm = request.param
-    return Bench(space, COMMS[comm])
+    (space, *pressure), comm = request.param[0].split(), request.param[1]
+    made = Bench(space, COMMS[comm], fm.Mixed(above=0.3) if pressure else None)
+    assert bool(made.model.pressure_dofs) == bool(pressure)
+    return made
 
 
 def assert_slopes(travels: Callable[[float], np.ndarray], slopes: Sequence[float], steps: Sequence[float]) -> None:

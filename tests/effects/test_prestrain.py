@@ -21,14 +21,23 @@ from ..oracles.dense import taylor_rates
 SPACES = ["plane-stress", "plane-strain", "3d"]
 LENGTH, THICKNESS, DEPTH, BLOCK = 40.0, 2.0, 3.0, 2.0
 NYLON = fm.Material("nylon", 2000.0, 0.0)
+RUBBER = fm.Material("rubber", 2000.0, 0.4999)  # has a pressure of its own
 
 
-def bar(space: str, stretch: float, *, along=(1.0, 0.0), held: bool = False, bow: float = 0.0):
+def bar(
+    space: str,
+    stretch: float,
+    *,
+    along=(1.0, 0.0),
+    held: bool = False,
+    bow: float = 0.0,
+    material: fm.Material = NYLON,
+):
     """A bar between a wall at x = 0 and a block, which is free to move or ``held`` by a slider in y; the force."""
     mechanism = fm.Mechanism("bar")
     wall, block = mechanism.rigid("wall", fixed=True), mechanism.rigid("block")
     line = [(-BLOCK, 0), (0.5 * LENGTH, bow), (LENGTH + BLOCK, 0)] if bow else [(-BLOCK, 0), (LENGTH + BLOCK, 0)]
-    link = mechanism.flexible("bar", fm.strip(line, thickness=THICKNESS, depth=DEPTH), NYLON)
+    link = mechanism.flexible("bar", fm.strip(line, thickness=THICKNESS, depth=DEPTH), material)
     clamp = fm.Rectangle(2.0 * BLOCK, 4.0 * THICKNESS)
     mechanism.weld(wall, link, at=(-BLOCK, 0), region=clamp)
     mechanism.weld(link, block, at=(LENGTH + BLOCK, 0), region=clamp)
@@ -48,6 +57,37 @@ def test_a_free_bar_takes_its_strain_free_length(space, stretch):
     assert frame.strain_energy < 1e-12 * 2000.0 * (stretch - 1.0) ** 2 * LENGTH * THICKNESS * DEPTH + 1e-20
     assert frame.max_stress < 1e-6 * 2000.0 * abs(stretch - 1.0)
     assert frame.stable
+
+
+@pytest.mark.parametrize("stretch", [0.7, 1.4])
+@pytest.mark.parametrize("space", ["plane-strain", "3d"])
+def test_a_free_bar_of_rubber_does_so_without_pressure(space, stretch):
+    simulation, push = bar(space, stretch, material=RUBBER)
+    (frame,) = simulation.load_displacement(push, forces=[0.0]).frames
+    assert frame.displacement == pytest.approx((stretch - 1.0) * LENGTH, rel=1e-9)
+    assert frame.max_stress < 1e-6 * 2000.0 * abs(stretch - 1.0)
+    simulation.model.load(frame.state)
+    assert simulation.model.pressure_dofs > 0
+    assert simulation.model.elastic.pressure.p.x.array == pytest.approx(0.0, abs=1e-6 * 2000.0)
+    assert frame.stable
+
+
+@pytest.mark.parametrize("space", ["plane-strain", "3d"])
+def test_residuals_of_displacement_and_pressure_are_differentiated_by_the_share(space):
+    body = bar(space, 1.2, along=(0.8, 0.6), material=RUBBER)[0].model.elastic
+    for field, size, seed in ((body.d, 0.1, 1), (body.u, 0.1, 2)):
+        interpolate(field, wave(body.model.dim, size, seed=seed))
+    body.pressure.p.x.array[:] = np.linspace(-30.0, 20.0, len(body.pressure.p.x.array))
+    weights = np.random.default_rng(4).uniform(-1.0, 1.0, len(body.values()))
+
+    def at_share(values):
+        body.share.value = values[0]
+        return weights @ body.residuals()
+
+    body.share.value = 0.8
+    rate = weights @ body.share_residuals()
+    rates = taylor_rates(at_share, [0.8], [1.0], [rate], [0.1, 0.05, 0.025])
+    assert rates.with_gradient.min() > 1.9
 
 
 @pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])

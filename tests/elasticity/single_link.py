@@ -24,6 +24,7 @@ def single_link(
     poisson: float = 0.4,
     depth: float = 1.0,
     quadrature: Quadrature | None = None,
+    with_pressure: bool = False,
     comm: MPI.Comm = MPI.COMM_SELF,
 ) -> ElasticBody:
     """The mesh (points, cells), the same on every rank of ``comm``, as one link that deforms everywhere."""
@@ -41,6 +42,7 @@ def single_link(
         model=model,
         order=order,
         quadrature=quadrature or Quadrature.for_order(order, model.dim),
+        with_pressure=[with_pressure],
     )
 
 

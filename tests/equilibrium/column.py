@@ -21,8 +21,15 @@ class Column:
     push: Force
 
 
-def column(*, slides: int = 1, poisson: float = 0.3, comm: MPI.Comm = MPI.COMM_SELF) -> Column:
-    """The column in plane stress; every slide beyond the first is redundant."""
+def column(
+    *,
+    slides: int = 1,
+    poisson: float = 0.3,
+    space: str = "plane-stress",
+    size: float = 0.5 * THICKNESS,
+    comm: MPI.Comm = MPI.COMM_SELF,
+) -> Column:
+    """The column, by default in plane stress; every slide beyond the first is redundant."""
     mechanism = fm.Mechanism("column")
     base, head = mechanism.rigid("base", fixed=True), mechanism.rigid("head")
     shape = fm.strip([(0, 0), (LENGTH, 0)], thickness=THICKNESS, depth=DEPTH)
@@ -32,7 +39,7 @@ def column(*, slides: int = 1, poisson: float = 0.3, comm: MPI.Comm = MPI.COMM_S
     for k in range(slides):
         mechanism.prismatic(base, head, at=(LENGTH + 5.0 * k, 3.0 * k), axis=(1, 0))
     push = mechanism.force(on=head, at=(LENGTH, 0), direction=(-1, 0))
-    return Column(fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=0.5 * THICKNESS, comm=comm), push)
+    return Column(fm.Simulation(fm.Scene(mechanism), space=space, size=size, comm=comm), push)
 
 
 def critical_load(arm: float) -> float:

@@ -22,12 +22,15 @@ class Crowded:
     on_flexible: Force
 
 
-def crowded(space: str, comm: MPI.Comm = MPI.COMM_SELF) -> Crowded:
-    """Parallelogram of rigid links with a motor, a flexible third leg (redundant) and a flexible diagonal."""
+def crowded(space: str, comm: MPI.Comm = MPI.COMM_SELF, *, rubber: fm.Material | None = None) -> Crowded:
+    """Parallelogram of rigid links with a motor, a flexible third leg (redundant) and a flexible diagonal.
+
+    A leg of ``rubber`` has a pressure of its own.
+    """
     mechanism = fm.Mechanism("crowded")
     base = mechanism.rigid("base", fixed=True)
     left, right, tip, plate, slide = (mechanism.rigid(name) for name in ("left", "right", "tip", "plate", "slide"))
-    leg = mechanism.flexible("leg", fm.strip([(8, 0), (8, 16)], thickness=4.0, depth=5.0), RUBBER)
+    leg = mechanism.flexible("leg", fm.strip([(8, 0), (8, 16)], thickness=4.0, depth=5.0), rubber or RUBBER)
     diagonal = mechanism.flexible("diagonal", fm.strip([(0, 0), (10, 6), (16, 16)], thickness=4.0, depth=5.0), RUBBER)
     shaft = mechanism.revolute(base, left, at=(0, 0))
     mechanism.revolute(base, right, at=(16, 0))
@@ -50,7 +53,8 @@ def crowded(space: str, comm: MPI.Comm = MPI.COMM_SELF) -> Crowded:
     across = (0.8, 0.6) if planar else (0.48, 0.6, 0.64)
     on_rigid = mechanism.force(on=plate, at=(22, 9), direction=across, name="on rigid")
     on_flexible = mechanism.force(on=leg, at=(8.3, 8.7), direction=across[::-1], name="on flexible")
-    simulation = fm.Simulation(fm.Scene(mechanism), space=space, order=1, size=SIZE, comm=comm)
+    order = 2 if rubber else 1
+    simulation = fm.Simulation(fm.Scene(mechanism), space=space, order=order, size=SIZE, comm=comm)
     return Crowded(simulation, on_rigid, on_flexible)
 
 
@@ -90,6 +94,10 @@ def random_state(case: Crowded, system: EquilibriumSystem, *, seed: int = 5) -> 
     block = model.interfaces.block
     positions = model.elastic.u.function_space.tabulate_dof_coordinates()[: model.interfaces.owned, :block]
     waves, phases = random.uniform(0.2, 0.5, (block, block)), random.uniform(0.0, 6.0, block)
-    u = carried.u + 0.1 * SIZE * np.sin(positions @ waves.T + phases).ravel()
+    wave = 0.1 * SIZE * np.sin(positions @ waves.T + phases).ravel()
+    u = carried.u + np.concatenate([wave, np.zeros(len(carried.u) - len(wave))])
+    if model.elastic.pressure is not None:
+        places = model.elastic.pressure.p.function_space.tabulate_dof_coordinates()[: len(carried.u) - len(wave)]
+        u[len(wave) :] = np.where(model.elastic.pressure.unknown, np.cos(places @ np.array([0.3, 0.4, 0.5])), 0.0)
     multipliers = system.scale[system.layout.multipliers] * 0.1 * random.standard_normal(joints.rows)
     return State(u, poses, multipliers, 1.3, motors)

@@ -23,6 +23,16 @@ def test_column_is_stable_below_the_euler_load_and_has_one_unstable_mode_above_i
     assert not above.stable_under_control
 
 
+def test_incompressible_column_between_walls_buckles_at_its_euler_load_with_one_unstable_mode():
+    case = column(poisson=0.4999, space="plane-strain", size=THICKNESS)
+    wide = EULER / (1.0 - 0.4999**2)
+    below, above, beyond = case.simulation.load_displacement(
+        case.push, forces=[0.98 * wide, 1.02 * wide, 4.2 * wide]
+    ).frames
+    assert case.simulation.model.pressure_dofs > 0
+    assert [frame.unstable_modes for frame in (below, above, beyond)] == [0, 1, 2]
+
+
 def test_discrete_critical_load_is_that_of_the_beam():
     case = column(slides=2)
     low, high = 0.95 * EULER, 1.05 * EULER

@@ -42,6 +42,17 @@ def test_order_that_is_not_1_2_or_3(order):
     refused("order", lambda: simulate(scene, order=order))
 
 
+@pytest.mark.parametrize("formulation", ["mixed", 0.49, fm.Mixed])
+def test_formulation_that_is_none(formulation):
+    scene, _ = describe("truss")
+    refused("formulation", lambda: simulate(scene, formulation=formulation))
+
+
+@pytest.mark.parametrize("above", [-0.1, 0.5, math.nan])
+def test_mixed_formulation_without_a_sensible_limit(above):
+    refused("mixed formulation", lambda: fm.Mixed(above=above))
+
+
 @pytest.mark.parametrize("size", [0.0, -2.0, math.nan, math.inf, "fine", None])
 def test_element_size_that_is_no_positive_number(size):
     scene, _ = describe("truss")

@@ -1,0 +1,40 @@
+"""The pressure field of links that have one, continuous, a degree below the displacement.
+
+Its nodes that touch only cells of other links, or of interfaces, where nothing deforms, are no unknowns.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+from petsc4py import PETSc
+
+from fenicsmech.compat import petsc_vector, scalar_space
+
+
+class PressureField:
+    """p and which of its nodes are unknowns.
+
+    Args:
+        mesh: reference mesh.
+        degree: of p.
+        cells: local cells in which p acts.
+
+    Attributes:
+        p: the field, zero where it does not act.
+        unknown: whether each owned node is an unknown, (owned,).
+        count: number of unknowns on all ranks.
+    """
+
+    def __init__(self, mesh: dmesh.Mesh, degree: int, cells: np.ndarray) -> None:
+        V = scalar_space(mesh, degree)
+        self.p = fem.Function(V, name="pressure")
+        marker = fem.Function(V)
+        for cell in cells:
+            marker.x.array[V.dofmap.cell_dofs(cell)] = 1.0
+        # a node may touch such a cell only on another rank
+        vector = petsc_vector(marker)
+        vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        self.unknown = vector.array_r > 0.0
+        self.count = int(mesh.comm.allreduce(int(self.unknown.sum())))

@@ -1,0 +1,113 @@
+"""Gradient and KKT matrix with pressures of their own in one of two links, against finite differences."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import fenicsmech as fm
+from fenicsmech.equilibrium import DisplacementControl
+from fenicsmech.equilibrium.extras import REGULARISATION
+
+from .crowded import control_of, crowded, random_state, system_of
+from .test_lagrangian import shifted
+
+BULKY = fm.Material("bulky", 2.0, 0.499)
+
+pytestmark = pytest.mark.parallel
+
+COMMS = {"alone": MPI.COMM_SELF, "together": MPI.COMM_WORLD}
+
+
+def case_of(dim: int, comm: MPI.Comm):
+    case = crowded({2: "plane-strain", 3: "3d"}[dim], comm, rubber=BULKY)
+    system = system_of(case, controlled=case.on_flexible)
+    return system, random_state(case, system), control_of(DisplacementControl)
+
+
+def unknowns(system, state, seed: int) -> np.ndarray:
+    """Small scaled unknowns of this rank, each block of a size its kind bears."""
+    random = np.random.default_rng(seed + system.layout.comm.rank)
+    layout = system.layout
+    displacements = 0.01 / system.unit_u * random.uniform(-1.0, 1.0, layout.free_displacements)
+    pressures = 0.3 / system.elastic.pressure_unit
+    pressures = pressures * random.uniform(-1.0, 1.0, len(layout.free) - layout.free_displacements)
+    extras = random.uniform(-1.0, 1.0, layout.extras)
+    extras[layout.z] *= 0.01 / system.unit_u
+    return np.concatenate([displacements, pressures, *([extras] if layout.last else [])])
+
+
+def extrapolated(value) -> np.ndarray:
+    """The derivative of ``value``(t) at 0 from three central differences."""
+    slopes = [(value(h) - value(-h)) / (2.0 * h) for h in (0.1, 0.05, 0.025)]
+    finer = [(4.0 * b - a) / 3.0 for a, b in zip(slopes[:-1], slopes[1:], strict=True)]
+    return (16.0 * finer[1] - finer[0]) / 15.0
+
+
+@pytest.mark.parametrize("comm", COMMS.values(), ids=COMMS)
+@pytest.mark.parametrize("dim", [2, 3])
+def test_balance_and_kkt_matrix_are_derivatives_of_the_lagrangian(dim, comm):
+    system, state, control = case_of(dim, comm)
+    assert 0 < system.layout.pressures < comm.allreduce(len(system.elastic.pressure.unknown))
+    direction, weights = (unknowns(system, state, seed) for seed in (1, 2))
+
+    def lagrangian(h):
+        moved = shifted(system, state, h * direction)
+        value = system.potential(moved, moved.force) + moved.force * control.target
+        return value - moved.multipliers @ system.joints.value(moved.poses, moved.motors)
+
+    def balance(h):
+        return comm.allreduce(weights @ system.balance(shifted(system, state, h * direction), control).vector.array)
+
+    system.load(state)
+    at = system.balance(state, control)
+    slope = comm.allreduce(at.vector.array @ direction)
+    matrix = system.kkt(state, control, at)
+    vector = matrix.createVecRight()
+    vector.array[:] = direction
+    curvature = comm.allreduce(weights @ (matrix * vector).array)
+    assert slope == pytest.approx(extrapolated(lagrangian), rel=1e-7)
+    # the proximal term of the multipliers is in the matrix alone
+    multipliers = slice(len(system.layout.free) + system.joints.size, -1)
+    proximal = REGULARISATION * comm.allreduce(
+        weights[multipliers] @ direction[multipliers] if system.layout.last else 0.0
+    )
+    assert curvature == pytest.approx(extrapolated(balance) - proximal, rel=1e-8)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_shift_leaves_pressures_alone(dim):
+    system, state, control = case_of(dim, MPI.COMM_WORLD)
+    system.load(state)
+    matrix = system.kkt(state, control, system.balance(state, control))
+    plain = matrix.getDiagonal().array.copy()
+    system.shift(0.25)
+    change, layout = matrix.getDiagonal().array - plain, system.layout
+    assert change[: layout.free_displacements] == pytest.approx(0.25, abs=1e-12)
+    assert not np.any(change[layout.free_displacements : len(layout.free)])
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_balance_is_the_same_on_any_number_of_ranks(dim):
+    values = []
+    for comm in COMMS.values():
+        system, state, control = case_of(dim, comm)
+        system.load(state)
+        balance = system.balance(state, control)
+        values.append((system.potential(state, state.force), balance.norm, balance.forces, system.volume_violation()))
+    assert values[1] == pytest.approx(values[0], rel=1e-11)
+
+
+def test_pressures_are_about_as_large_as_displacements_in_scaled_units():
+    system, state, control = case_of(2, MPI.COMM_WORLD)
+    system.load(state)
+    matrix = system.kkt(state, control, system.balance(state, control))
+    comm, layout = system.layout.comm, system.layout
+    # how much of the pressures' rows lies at displacements: their coupling, about one per unit
+    probe, rows = matrix.createVecRight(), []
+    for seed in range(5):
+        values = np.random.default_rng(seed + 10 * comm.rank).choice([-1.0, 1.0], len(probe.array))
+        values[layout.free_displacements :] = 0.0
+        probe.array[:] = values
+        rows.append((matrix * probe).array[layout.free_displacements : len(layout.free)])
+    squares = comm.allreduce(float(np.sum(np.square(rows)))) / 5.0 / layout.pressures
+    assert 0.1 < np.sqrt(squares) < 10.0
