@@ -30,6 +30,7 @@ from fenicsmech.effects import (
     Pressure,
     Prestrain,
 )
+from fenicsmech.equilibrium import AugmentedLagrangian, Globalisation, KktNewton, PrimalDualNewton, Snes
 from fenicsmech.errors import AssemblyError, DescriptionError, EquilibriumError, FenicsmechError, MeshingError
 from fenicsmech.mechanism import (
     DRAWN,
@@ -64,6 +65,7 @@ __all__ = [
     "SMOOTH_SIL_950",
     "Arc",
     "AssemblyError",
+    "AugmentedLagrangian",
     "Bfgs",
     "Configuration",
     "Curve",
@@ -79,6 +81,7 @@ __all__ = [
     "IsochoricNeoHookean",
     "IsochoricSimoNeoHookean",
     "LevenbergMarquardt",
+    "KktNewton",
     "Line",
     "LogarithmicNeoHookean",
     "Mass",
@@ -88,10 +91,12 @@ __all__ = [
     "MeshingError",
     "ModulusFit",
     "NeoHookean",
+    "PrimalDualNewton",
     "Rectangle",
     "Scene",
     "ShapeBounds",
     "Simulation",
+    "Snes",
     "SplineDesign",
     "StayClose",
     "Target",
@@ -104,6 +109,7 @@ __all__ = [
     "strip",
     "Contact",
     "Cylinder",
+    "Globalisation",
     "HalfPlane",
     "JointCompliance",
     "JointSpring",

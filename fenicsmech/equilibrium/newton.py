@@ -20,13 +20,13 @@ chapters 17–19; Chamberlain et al. on the watchdog (Mathematical Programming S
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
-from petsc4py import PETSc
 
 from fenicsmech.equilibrium.control import Control
-from fenicsmech.equilibrium.factor import Factor, Inertia
+from fenicsmech.equilibrium.factor import Inertia
+from fenicsmech.equilibrium.solver import EquilibriumSolver, Iteration, NotConverged, Solution
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import Balance, EquilibriumSystem
 from fenicsmech.log import logger
@@ -35,13 +35,11 @@ _log = logger(__name__)
 _LEAST_SHIFT = 1e-9  # in units of the mean stiffness; slender links bend with 1e-6 of it and less
 
 
-@dataclass(frozen=True)
-class NewtonOptions:
-    """Limits of the iteration.
+@dataclass(frozen=True, kw_only=True)
+class PrimalDualNewton(EquilibriumSolver):
+    """Newton's method on the KKT system with inertia control, the default solver.
 
     Attributes:
-        tolerance: residual over the forces that balance in it, at convergence.
-        roundoff: residual in units of mean stiffness times length below which digits are lost.
         near: residual over the forces below which any equilibrium, unstable ones too, is converged to; farther
             off, steps descend.
         iterations: most iterations.
@@ -49,62 +47,21 @@ class NewtonOptions:
         largest_turn: largest rotation (rad), or displacement over the mechanism's length, of one step.
     """
 
-    tolerance: float = 1e-10
-    roundoff: float = 1e-14
     near: float = 1e-2
     iterations: int = 25
     allowance: int = 4
     largest_turn: float = 0.5
 
-
-@dataclass(frozen=True)
-class Solution:
-    """A converged equilibrium.
-
-    Attributes:
-        state: the equilibrium.
-        residuals: relative residual before each iteration and at the end.
-        iterations: KKT systems factored and solved on the way.
-        unstable_modes: number of directions in which the energy has a maximum, under dead loads.
-        unstable_under_control: the same with the control's constraint.
-        tangent: rate of the state with the control's target.
-    """
-
-    state: State
-    residuals: tuple[float, ...]
-    iterations: int
-    unstable_modes: int
-    unstable_under_control: int
-    tangent: Step
+    def on(self, system: EquilibriumSystem) -> Newton:
+        return Newton(system, self)
 
 
-class NotConverged(Exception):
-    """The iteration ended without an equilibrium; ``reason`` says why."""
-
-    def __init__(self, reason: str, iterations: int) -> None:
-        super().__init__(reason)
-        self.reason, self.iterations = reason, iterations
-
-
-@dataclass
-class Newton:
+class Newton(Iteration):
     """The iteration, with the factor it keeps between solves."""
 
-    system: EquilibriumSystem
-    options: NewtonOptions = field(default_factory=NewtonOptions)
-    _factor: Factor | None = None
+    options: PrimalDualNewton
 
     def solve(self, start: State, control: Control, *, floor: float = 0.0) -> Solution:
-        """The equilibrium near ``start`` under ``control`` (collective).
-
-        Args:
-            start: first guess.
-            control: what is asked for.
-            floor: least shift δ, for mechanisms with idle freedoms.
-
-        Raises:
-            NotConverged: too many iterations, no descent, or elements inverted all along.
-        """
         system, options = self.system, self.options
         start = control.prepare(start)
         system.load(start)
@@ -116,7 +73,9 @@ class Newton:
         for iteration in range(options.iterations + 1):
             residuals.append(self._relative(balance))
             if self._converged(balance) and iteration > 0:
-                return self._accept(state, control, balance, inertia, shift, floor, residuals, iteration)
+                if shift > floor:  # stability is of the true matrix
+                    inertia = self._true_inertia(state, control, balance, floor)
+                return self._accept(state, control, inertia, residuals, iteration)
             if iteration == options.iterations:
                 break
             near = trusted and residuals[-1] < options.near
@@ -143,28 +102,6 @@ class Newton:
             options.iterations,
         )
 
-    def factor(self, state: State, control: Control, balance: Balance, floor: float) -> None:
-        """Factors the KKT matrix of the loaded ``state``, for linear solves with it (collective).
-
-        Raises:
-            NotConverged: it cannot be factored.
-        """
-        if self._refactor(self.system.kkt(state, control, balance), floor) is None:
-            raise NotConverged("the tangent at the equilibrium cannot be factored", 0)
-
-    def solve_linear(self, right: PETSc.Vec) -> PETSc.Vec:
-        """The solution of KKT x = ``right`` with the last factor (collective)."""
-        with self.system.clock.phase("solve"):
-            x = right.duplicate()
-            self._factor.solve(right, x)
-            return x
-
-    def _relative(self, balance: Balance) -> float:
-        return balance.norm / max(balance.forces, self.options.roundoff * self.system.unit)
-
-    def _converged(self, balance: Balance) -> bool:
-        return balance.norm <= max(self.options.tolerance * balance.forces, self.options.roundoff * self.system.unit)
-
     def _direction(
         self, state: State, control: Control, balance: Balance, floor: float, *, last: float, any_inertia: bool
     ) -> tuple[Step, Inertia, float]:
@@ -186,18 +123,6 @@ class Newton:
         x = self.solve_linear(balance.vector)
         x.scale(-1.0)
         return system.step(x), inertia, shift
-
-    def _refactor(self, matrix: PETSc.Mat, shift: float) -> Inertia | None:
-        with self.system.clock.phase("factor"):
-            self.system.shift(shift)
-            if self._factor is None:
-                self._factor = Factor(matrix)
-            return self._factor.refactor()
-
-    @property
-    def _expected(self) -> int:
-        """Negative pivots of a stable equilibrium: one per multiplier, one for the controlled force."""
-        return self.system.joints.rows + 1
 
     def _full_step(
         self, state: State, control: Control, step: Step, balance: Balance, iteration: int
@@ -241,19 +166,3 @@ class Newton:
             gap = (system.load_displacement(state) - control.target) / system.joints.length
             value += force * control.target + 0.5 * stiffness * gap**2
         return value
-
-    def _accept(self, state, control, balance, inertia, shift, floor, residuals, iteration) -> Solution:
-        """Stability and tangent at the equilibrium, from the last factor if it was of the true matrix."""
-        system = self.system
-        if shift > floor:
-            inertia = self._refactor(system.kkt(state, control, balance), floor)
-        if inertia is None:
-            raise NotConverged("the tangent at the equilibrium cannot be factored", iteration)
-        x = self.solve_linear(control.rate(system, state))
-        under_control = inertia.negative - self._expected
-        unstable = under_control
-        if control.constrained:
-            row = system.control_row()
-            # Schur complement of the control row: negative exactly if removing the row leaves stability as it is
-            unstable += 1 - int(self.solve_linear(row).dot(row) < 0.0)
-        return Solution(state, tuple(residuals), iteration, max(unstable, 0), max(under_control, 0), system.step(x))

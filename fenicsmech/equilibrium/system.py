@@ -26,7 +26,7 @@ from fenicsmech.compat import petsc_vector
 from fenicsmech.effects import PosePotential
 from fenicsmech.elasticity import ElasticBody
 from fenicsmech.equilibrium.control import Control
-from fenicsmech.equilibrium.extras import ExtraEntries
+from fenicsmech.equilibrium.extras import REGULARISATION, ExtraEntries
 from fenicsmech.equilibrium.layout import Layout
 from fenicsmech.equilibrium.load import PointLoad
 from fenicsmech.equilibrium.matrices import create_extended_matrix, create_map_matrix
@@ -67,6 +67,7 @@ class EquilibriumSystem:
 
     Attributes:
         unit: a residual of this norm is a displacement of the mechanism's length against the mean stiffness.
+        compliances: c, (rows,).
         unit_u, scale: what a unit of each scaled unknown stands for: displacements; (z, λ, f).
     """
 
@@ -86,8 +87,8 @@ class EquilibriumSystem:
         self.controlled, self.loads, self.clock = controlled, loads, clock
         self.layout = Layout(elastic.mesh.comm, interfaces, joints)
         self._potentials = BodyPotentials(potentials, joints)
-        self._compliances = np.array([compliances.get(row, 0.0) for row in range(joints.rows)])
-        self._extras = ExtraEntries(joints, self.layout, controlled, self._potentials, self._compliances)
+        self.compliances = np.array([compliances.get(row, 0.0) for row in range(joints.rows)])
+        self._extras = ExtraEntries(joints, self.layout, controlled, self._potentials, self.compliances)
         self._u = petsc_vector(elastic.u)
         self._nodal = self._u.duplicate()
         with clock.phase("compile"):
@@ -167,7 +168,7 @@ class EquilibriumSystem:
 
     def constraints(self, state: State, multipliers: np.ndarray) -> np.ndarray:
         """C(s) + c λ at ``multipliers`` λ, (rows,)."""
-        return self.joints.value(state.poses, state.motors) + self._compliances * multipliers
+        return self.joints.value(state.poses, state.motors) + self.compliances * multipliers
 
     def balance(self, state: State, control: Control) -> Balance:
         """Gᵀ ∇L (collective). Brings G to the poses of ``state``."""
@@ -228,6 +229,17 @@ class EquilibriumSystem:
         shifted = self._diagonal.copy()
         shifted.array_w[: len(self.layout.free) + (self.joints.size if self.layout.last else 0)] += shift
         self._matrix.setDiagonal(shifted)
+
+    def soften(self, softness: float, control: Control) -> None:
+        """Makes the KKT matrix hold −``softness`` · I instead of −ε · I in the block of multipliers (collective).
+
+        The force is one of them under a ``control`` that constrains. Before ``shift``, which makes it take effect.
+        """
+        if self.layout.last:
+            extras = self._diagonal.array_w[len(self.layout.free) :]
+            extras[self.layout.multipliers] += REGULARISATION - softness
+            if control.constrained:
+                extras[self.layout.force] -= softness
 
     def force_rate(self, state: State) -> PETSc.Vec:
         """Right-hand side whose KKT solution is the rate of x with the controlled force (collective)."""

@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.equilibrium import Constant, Hermite, NewtonOptions, Tangent
+from fenicsmech.equilibrium import Constant, Hermite, Tangent
 
 from .finger import RUBBER, finger
 
@@ -29,7 +29,7 @@ def test_number_of_correct_digits_nearly_doubles_in_each_of_the_last_iterations(
 
 @pytest.mark.parametrize("space", SPACES)
 def test_residual_at_the_end_is_below_the_tolerance(space):
-    simulation, push = finger(space, newton=NewtonOptions(tolerance=1e-6))
+    simulation, push = finger(space, solver=fm.PrimalDualNewton(tolerance=1e-6))
     rough = simulation.load_displacement(push, forces=[3.0]).frames[0]
     assert 1e-12 < rough.residuals[-1] <= 1e-6
     simulation, push = finger(space)
@@ -88,6 +88,6 @@ def test_force_that_nothing_resists_is_refused():
 
 
 def test_too_few_iterations_are_told_as_the_reason():
-    simulation, push = finger("plane-stress", newton=NewtonOptions(iterations=1))
+    simulation, push = finger("plane-stress", solver=fm.PrimalDualNewton(iterations=1))
     with pytest.raises(fm.EquilibriumError, match="after 1 iterations"):
         simulation.load_displacement(push, forces=[5.0])
