@@ -78,8 +78,8 @@ class AugmentedLagrangianIteration(Iteration):
             residuals.append(self._relative(balance))
             if self._converged(balance) and iteration > 0:
                 inertia = self._true_inertia(current, control, balance, floor)
-                current = system.moved(current, step.scaled(0.0))  # quaternions to the last digit of unit length
-                return self._accept(current, control, inertia, residuals, iteration)
+                rounded = system.moved(current, system.difference(current, current))  # quaternions of unit length
+                return self._accept(rounded, control, inertia, residuals, iteration)
             if iteration == options.iterations:
                 break
             gradient, violation = self._parts(balance)

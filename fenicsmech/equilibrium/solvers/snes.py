@@ -64,13 +64,18 @@ class SnesIteration(Iteration):
         if not math.isfinite(self.system.elastic_energy()):
             raise NotConverged("elements are inverted in the predicted state", 0)
         equations = _Equations(self, start, control, floor)
+        if self._converged(equations.balance):  # there is nothing that a line search could lower
+            equations.test(None, 0, (0.0, 0.0, equations.balance.norm))
+            equations.setUp(None)
+            return self._accept(start, control, equations.inertia, equations.residuals, 1)
         x = equations.balance.vector.duplicate()
         snes = self._create(equations)
         snes.solve(None, x)
         reason, iterations = snes.getConvergedReason(), snes.getLinearSolveIterations()
         snes.destroy()
-        equations.evaluate(x)
-        if reason <= 0 or not self._converged(equations.balance):
+        if not equations.evaluate(x):
+            raise NotConverged("elements are inverted", iterations)
+        if equations.inertia is None or not self._converged(equations.balance):
             raise NotConverged(f"SNES stops: {_REASONS.get(reason, f'reason {reason}')}", iterations)
         return self._accept(equations.state, control, equations.inertia, equations.residuals, iterations)
 
