@@ -7,11 +7,13 @@
 - ``transverse``: the stretch out of the plane in plane stress, per material law
 - ``growth``: links whose strain-free state is not the drawn one
 - ``body``: energy, residual, tangent and stress of all links
+- ``mixed_stress``: the stress that a step promises, for the next tangent
 """
 
 from fenicsmech.elasticity.body import ElasticBody, Quadrature
 from fenicsmech.elasticity.energies import density
 from fenicsmech.elasticity.growth import Stretch
+from fenicsmech.elasticity.mixed_stress import MixedStress
 from fenicsmech.elasticity.models import PLANE_STRAIN, PLANE_STRESS, SPATIAL, ElasticModel
 from fenicsmech.elasticity.strain import Moduli, Strain
 
@@ -21,6 +23,7 @@ __all__ = [
     "SPATIAL",
     "ElasticBody",
     "ElasticModel",
+    "MixedStress",
     "Moduli",
     "Quadrature",
     "Strain",

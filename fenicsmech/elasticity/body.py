@@ -144,7 +144,7 @@ class ElasticBody:
     def tangent_form(self):
         return compile_form(ufl.derivative(self.residual_ufl, self.u))
 
-    def gradient(self, field: fem.Function):
+    def gradient(self, field):
         """H = ∇field (I + ∇d)⁻¹, the gradient of a field on the rest shape, symbolic."""
         return ufl.dot(ufl.grad(field), ufl.inv(self._design_gradient))
 
@@ -152,6 +152,15 @@ class ElasticBody:
         """The measure of all cells that can deform, with quadrature of ``degree``."""
         metadata = {"quadrature_degree": degree}
         return sum((dx(metadata=metadata) for _, dx in self._terms[1:]), start=self._terms[0][1](metadata=metadata))
+
+    def densities(self, H) -> list[tuple]:
+        """Elastic energy per volume of the mesh at the gradient H on the rest shape, and where it holds, per law."""
+        elastic = H if self._growth is None else self._growth.elastic(H)
+        volume = ufl.det(self._design_gradient) * (self._depth if self.model.dim == 2 else 1.0)
+        if self._growth is not None:
+            volume *= self._growth.volume
+        moduli = self._moduli
+        return [(density(law, self.model.strain(law, elastic, moduli), moduli) * volume, dx) for law, dx in self._terms]
 
     def curvature(self, A, B, *, degree: int) -> ufl.Form:
         """∫ A : ∂²W/∂F∂F : B dV at the present displacement, for gradients A, B on the rest shape."""

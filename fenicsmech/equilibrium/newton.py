@@ -23,6 +23,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from petsc4py import PETSc
 
 from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.factor import Inertia
@@ -44,12 +45,15 @@ class PrimalDualNewton(EquilibriumSolver):
             off, steps descend.
         iterations: most iterations.
         allowance: iterations in a row that may fail to improve on the best residual.
+        mixed_stress: whether tangents, as long as the residual is large, hold the stress that the last step solved
+            for instead of the one it led to.
         largest_turn: largest rotation (rad), or displacement over the mechanism's length, of one step.
     """
 
     near: float = 1e-2
     iterations: int = 25
-    allowance: int = 4
+    allowance: int = 12
+    mixed_stress: bool = True
     largest_turn: float = 0.5
 
     def on(self, system: EquilibriumSystem) -> Newton:
@@ -68,25 +72,32 @@ class Newton(Iteration):
         if not math.isfinite(system.elastic_energy()):
             raise NotConverged("elements are inverted in the predicted state", 0)
         state, balance = start, system.balance(start, control)
-        best, spent, careful = (state, balance.norm), 0, False
-        residuals, inertia, shift, trusted = [], None, floor, True
+        best, spent, careful, passed = (state, balance.norm), 0, False, None
+        residuals, inertia, shift, trusted, mixed = [], None, floor, True, False
         for iteration in range(options.iterations + 1):
             residuals.append(self._relative(balance))
             if self._converged(balance) and iteration > 0:
-                if shift > floor:  # stability is of the true matrix
+                if mixed or shift > floor:  # stability is of the true matrix
                     inertia = self._true_inertia(state, control, balance, floor)
                 return self._accept(state, control, inertia, residuals, iteration)
             if iteration == options.iterations:
                 break
             near = trusted and residuals[-1] < options.near
-            step, inertia, shift = self._direction(state, control, balance, floor, last=shift, any_inertia=near)
+            mixed = not near and passed is not None
+            if mixed:
+                matrix = system.mixed_kkt(state, control, balance, *passed)
+            else:
+                matrix = system.kkt(state, control, balance)
+            x, inertia, shift = self._direction(matrix, balance, floor, last=shift, any_inertia=near)
+            step, motion = system.step(x), system.expand(x)[0]
             _log.debug("iteration %d: residual %.2e, shift %.1e, %s", iteration, residuals[-1], shift, inertia)
             before, norm = state, balance.norm
             advance = self._search if careful else self._full_step
-            state, balance = advance(state, control, step, balance, iteration)
+            state, balance, length = advance(state, control, step, balance, iteration)
+            passed = (before, length * motion) if options.mixed_stress else None
             if near and balance.norm > norm and not self._converged(balance):
                 # no contraction: near a limit or bifurcation point, where only descent leads on
-                state, trusted, careful = before, False, True
+                state, trusted, careful, passed = before, False, True, None
                 system.load(state)
                 balance = system.balance(state, control)
             if balance.norm < best[1]:
@@ -94,7 +105,7 @@ class Newton(Iteration):
             else:
                 spent += 1
             if spent > options.allowance and not careful:
-                state, careful = best[0], True
+                state, careful, passed = best[0], True, None
                 system.load(state)
                 balance = system.balance(state, control)
         raise NotConverged(
@@ -103,14 +114,12 @@ class Newton(Iteration):
         )
 
     def _direction(
-        self, state: State, control: Control, balance: Balance, floor: float, *, last: float, any_inertia: bool
-    ) -> tuple[Step, Inertia, float]:
+        self, matrix: PETSc.Mat, balance: Balance, floor: float, *, last: float, any_inertia: bool
+    ) -> tuple[PETSc.Vec, Inertia, float]:
         """The Newton step; unless ``any_inertia`` will do, raises δ until the inertia promises descent.
 
         δ = ``floor`` is tried first; then a third of the ``last`` one that served, and eight times that, …
         """
-        system = self.system
-        matrix = system.kkt(state, control, balance)
         shift, following = floor, max(_LEAST_SHIFT, last / 3.0)
         for _ in range(20):
             inertia = self._refactor(matrix, shift)
@@ -122,24 +131,24 @@ class Newton(Iteration):
             raise NotConverged("no shift of the tangent gives a direction of descent", 0)
         x = self.solve_linear(balance.vector)
         x.scale(-1.0)
-        return system.step(x), inertia, shift
+        return x, inertia, shift
 
     def _full_step(
         self, state: State, control: Control, step: Step, balance: Balance, iteration: int
-    ) -> tuple[State, Balance]:
+    ) -> tuple[State, Balance, float]:
         """The whole step, shortened only where it turns too far or inverts elements."""
         system = self.system
         length = min(1.0, self.options.largest_turn / max(system.size(step), 1e-300))
         for _ in range(12):
             trial = system.moved(state, step.scaled(length))
             if math.isfinite(system.elastic_energy()):
-                return trial, system.balance(trial, control)
+                return trial, system.balance(trial, control), length
             length *= 0.5
         raise NotConverged("every step along the Newton direction inverts elements", iteration + 1)
 
     def _search(
         self, state: State, control: Control, step: Step, balance: Balance, iteration: int
-    ) -> tuple[State, Balance]:
+    ) -> tuple[State, Balance, float]:
         """Armijo backtracking on the augmented Lagrangian; near convergence a smaller residual will do."""
         system = self.system
         system.load(state)
@@ -152,7 +161,7 @@ class Newton(Iteration):
             if math.isfinite(after):
                 new = system.balance(trial, control)
                 if after < before or new.norm < 0.9 * balance.norm:
-                    return trial, new
+                    return trial, new, length
             length *= 0.5
         raise NotConverged("the line search finds no descent", iteration + 1)
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -24,7 +25,7 @@ from fenicsmech.bodies import BodyPoint, InterfaceMap, LinkPoint
 from fenicsmech.clock import Clock
 from fenicsmech.compat import petsc_vector
 from fenicsmech.effects import PosePotential
-from fenicsmech.elasticity import ElasticBody
+from fenicsmech.elasticity import ElasticBody, MixedStress
 from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.extras import REGULARISATION, ExtraEntries
 from fenicsmech.equilibrium.layout import Layout
@@ -110,6 +111,10 @@ class EquilibriumSystem:
         self._rows = self._hat.createVecLeft()
         self._matrix: PETSc.Mat | None = None
         self._diagonal: PETSc.Vec | None = None
+
+    @cached_property
+    def _mixed(self) -> MixedStress:
+        return MixedStress(self.elastic)
 
     # -- states --------------------------------------------------------------------------------------------
 
@@ -203,13 +208,35 @@ class EquilibriumSystem:
 
     def kkt(self, state: State, control: Control, balance: Balance) -> PETSc.Mat:
         """The KKT matrix (collective); the same object at every call."""
-        layout = self.layout
         with self.clock.phase("assemble"):
             self._hat.zeroEntries()
             self.elastic.tangent(self._hat)
+        return self._assembled(state, control, balance.moments)
+
+    def mixed_kkt(self, state: State, control: Control, balance: Balance, before: State, motion: np.ndarray):
+        """The KKT matrix with the stress that the step δu = ``motion`` from ``before`` promised (collective).
+
+        Args:
+            state, control, balance: as in ``kkt``, which returns the same object.
+            before: the state before the step.
+            motion: δu of owned nodes, linear in the step on interface nodes too, (owned dofs,).
+        """
+        with self.clock.phase("assemble"):
+            self._mixed.follow(before.u, motion)
+            self._hat.zeroEntries()
+            self.elastic.tangent(self._hat)
+            self._mixed.tangent(self._hat)
+            promised = self.interfaces.moments(self._mixed.forces().reshape(-1, self.joints.space.dim))
+            moments = _add_moments(balance.moments, self.layout.comm.allreduce(promised, op=_add_moments))
+        return self._assembled(state, control, moments)
+
+    def _assembled(self, state: State, control: Control, moments: dict[int, np.ndarray]) -> PETSc.Mat:
+        """K̂ from the tangent that it holds, and the KKT matrix from it."""
+        layout = self.layout
+        with self.clock.phase("assemble"):
             self._hat.assemble()
             if layout.last:
-                entries = self._extras.entries(state, control, self._acting(state), balance.moments)
+                entries = self._extras.entries(state, control, self._acting(state), moments)
                 for rows, columns, block in entries:
                     # petsc4py reads transposed arrays in memory order
                     self._hat.setValues(
