@@ -13,7 +13,7 @@ from fenicsmech.equilibrium.state import State
 
 _SMALLEST = 1.0 / 1024.0  # of the distance asked for
 _EASY = 5  # iterations
-_STRIDE = 0.1  # of the mechanism's length, or rad: how far a step may move anything, by the tangent (measured)
+_STRIDE = 0.2  # of the mechanism's length, or rad: how far a step may move anything, by the tangent (measured)
 IDLE_STIFFNESS = 1e-10
 """What is lent to idle freedoms, in units of the mean stiffness."""
 

@@ -6,6 +6,7 @@ sensitivities) is the same for all: linear solves with the symmetric factor of t
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
@@ -103,7 +104,8 @@ class Iteration(ABC):
         return balance.norm / max(balance.forces, self.options.roundoff * self.system.unit)
 
     def _converged(self, balance: Balance) -> bool:
-        return balance.norm <= max(self.options.tolerance * balance.forces, self.options.roundoff * self.system.unit)
+        limit = max(self.options.tolerance * balance.forces, self.options.roundoff * self.system.unit)
+        return balance.norm <= limit < math.inf
 
     def _refactor(self, matrix: PETSc.Mat, shift: float) -> Inertia | None:
         with self.system.clock.phase("factor"):
