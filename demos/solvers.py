@@ -24,15 +24,13 @@ from fenicsmech.report import format_table
 
 SOLVERS = {
     "default": fm.PrimalDualNewton(),
+    "without mixed stress": fm.PrimalDualNewton(mixed_stress=False, allowance=4),
     "augmented Lagrangian": fm.AugmentedLagrangian(),
     "KKT Newton": fm.KktNewton(),
     "with backtracking": fm.KktNewton(backtracking=True),
-    "SNES bt": fm.Snes(),
-    "SNES l2": fm.Snes(globalisation=fm.Globalisation.SECANT),
-    "SNES cp": fm.Snes(globalisation=fm.Globalisation.CRITICAL_POINT),
-    "SNES trust region": fm.Snes(globalisation=fm.Globalisation.TRUST_REGION),
+    **{f"SNES {kind.value}": fm.Snes(iterations=25, globalisation=kind) for kind in fm.Globalisation},
 }
-SAME = 1e-6  # of a displacement
+SAME = 1e-6  # of the largest displacement, or force, on the curve
 ROUNDS = 2
 
 
@@ -202,7 +200,7 @@ def arch():
     made.revolute(base, bow, at=points[0], radius=0.5 * thickness)
     made.revolute(base, bow, at=points[-1], radius=0.5 * thickness)
     push = made.force(on=bow, at=(0.5 * span, rise), direction=(0, -1))
-    return fm.Scene(made), push, np.linspace(0.0, 2.0 * rise, 9)[1:]
+    return fm.Scene(made), push, np.linspace(0.0, 2.0 * rise, 5)[1:]
 
 
 def rubber_band():
@@ -236,6 +234,7 @@ def cases():
         "truss, whole load at once": at_once(*finger, truss.FORCES[-1], size=3.0),
         "truss, five random starts": at_once(*finger, 0.1, size=3.0, seeds=range(5)),
         "elastica, thickness/length 1/100": curve(bent, tip, size=2.0, forces=[load]),
+        "elastica, at once": at_once(bent, tip, load, size=2.0),
         "elastica, a tenth of it at once": at_once(bent, tip, 0.1 * load, size=2.0),
         "column past buckling": curve(strut, push, size=2.0, forces=[f * euler for f in (0.5, 0.9, 1.1, 1.5)]),
         "stiffness contrast 1e6": curve(*contrast(), size=3.0, forces=[0.002, 0.005, 0.01]),
@@ -270,13 +269,18 @@ def measure(name, prepare):
     for solver in SOLVERS:
         if solver not in runs:
             cells.append("fails")
-        elif not np.allclose(found[solver], found.get("default", found[solver]), rtol=SAME, atol=0.0):
+        elif "default" in runs and np.ptp([found[solver], found["default"]], axis=0).max() > SAME * largest(found):
             cells.append("elsewhere")
         else:
             count = counts[solver]
             halved = f" ({count.failures})" if count.failures else ""
             cells.append(f"{count.iterations}{halved} · {seconds[solver] / seconds.get('default', np.nan):.1f}")
     return cells
+
+
+def largest(found):
+    """The largest displacement or force that the default solver found."""
+    return np.abs(found["default"]).max()
 
 
 def main():

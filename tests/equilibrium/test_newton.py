@@ -5,8 +5,9 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.equilibrium import Constant, Hermite, Tangent
+from fenicsmech.equilibrium import Constant, Hermite, LoadControl, Tangent
 
+from ..simulation.clamped import cantilever
 from .finger import RUBBER, finger
 
 SPACES = ["plane-stress", "plane-strain", "3d"]
@@ -85,6 +86,17 @@ def test_force_that_nothing_resists_is_refused():
     simulation = fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=4.0, comm=MPI.COMM_SELF)
     with pytest.raises(fm.EquilibriumError, match="no equilibrium at force 0.5"):
         simulation.load_displacement(push, forces=[0.5])
+
+
+@pytest.mark.parallel
+def test_slender_link_takes_a_load_that_rolls_it_up_in_one_solve():
+    case = cantilever("plane-stress", size=2.0, comm=MPI.COMM_WORLD)
+    rest = case.simulation.load_displacement(case.force, forces=[0.0]).frames[0].state
+    iteration, length = case.simulation.newton(case.force), 100.0
+    solution = iteration.solve(rest, LoadControl(10.0 * case.bending / length**2))
+    iteration.system.load(solution.state)
+    assert iteration.system.load_displacement(solution.state) == pytest.approx(0.81061 * length, rel=2e-3)  # elastica
+    assert solution.iterations <= 16
 
 
 def test_too_few_iterations_are_told_as_the_reason():
