@@ -31,6 +31,7 @@ from fenicsmech.effects import (
     Prestrain,
 )
 from fenicsmech.elasticity import Displacement, Mixed
+from fenicsmech.equilibrium import AugmentedLagrangian, Globalisation, KktNewton, PrimalDualNewton, Snes
 from fenicsmech.errors import AssemblyError, DescriptionError, EquilibriumError, FenicsmechError, MeshingError
 from fenicsmech.mechanism import (
     DRAWN,
@@ -65,6 +66,7 @@ __all__ = [
     "SMOOTH_SIL_950",
     "Arc",
     "AssemblyError",
+    "AugmentedLagrangian",
     "Bfgs",
     "Configuration",
     "Curve",
@@ -81,6 +83,7 @@ __all__ = [
     "IsochoricNeoHookean",
     "IsochoricSimoNeoHookean",
     "LevenbergMarquardt",
+    "KktNewton",
     "Line",
     "LogarithmicNeoHookean",
     "Mass",
@@ -91,10 +94,12 @@ __all__ = [
     "Mixed",
     "ModulusFit",
     "NeoHookean",
+    "PrimalDualNewton",
     "Rectangle",
     "Scene",
     "ShapeBounds",
     "Simulation",
+    "Snes",
     "SplineDesign",
     "StayClose",
     "Target",
@@ -107,6 +112,7 @@ __all__ = [
     "strip",
     "Contact",
     "Cylinder",
+    "Globalisation",
     "HalfPlane",
     "JointCompliance",
     "JointSpring",

@@ -13,7 +13,7 @@ from petsc4py import PETSc
 from fenicsmech.accuracy.quantity import Quantity
 from fenicsmech.accuracy.rung import RIGID, Rung
 from fenicsmech.elasticity import Quadrature
-from fenicsmech.equilibrium import NewtonOptions
+from fenicsmech.equilibrium import PrimalDualNewton
 from fenicsmech.errors import FenicsmechError
 from fenicsmech.linkage import assemble, build_linkage
 from fenicsmech.mechanism import FlexibleLink, Scene
@@ -119,7 +119,7 @@ def _measure_elastic(
         order=rung.order,
         size=_scaled(size, rung.factor),
         quadrature=None if rung.quadrature is None else Quadrature(rung.quadrature),
-        newton=NewtonOptions(tolerance=rung.tolerance),
+        solver=PrimalDualNewton(tolerance=rung.tolerance),
         comm=comm,
     )
     simulation.trace(_request(scene, quantity, (0.0,)))  # compiles, and touches every page for the first time

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRAIN, PLANE_STRESS, SPATIAL, ElasticModel, Quadrature
-from fenicsmech.equilibrium import NewtonOptions
+from fenicsmech.equilibrium import PrimalDualNewton
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import Scene, validate
 
-TOLERANCE = NewtonOptions().tolerance
+TOLERANCE = PrimalDualNewton().tolerance
 """Newton's tolerance unless a rung says otherwise."""
 
 _PLANAR_SIZES = MappingProxyType({order: (4.0, 2.0, 1.0, 0.5, 0.25) for order in (1, 2)})

@@ -14,7 +14,7 @@ import numpy as np
 from fenicsmech.design.optimisers import Infeasible
 from fenicsmech.design.sensitivity import Adjoint
 from fenicsmech.design.spline_design import Target
-from fenicsmech.equilibrium import IDLE_STIFFNESS, LoadControl, Newton, NotConverged, State
+from fenicsmech.equilibrium import IDLE_STIFFNESS, Iteration, LoadControl, NotConverged, State
 from fenicsmech.errors import EquilibriumError
 from fenicsmech.linkage import assemble
 from fenicsmech.mechanism import FlexibleLink
@@ -151,7 +151,7 @@ class TargetEquilibria:
         """The equilibrium at design ``after``, from the one at ``before``, halfway first if need be."""
         self._model.reshape(before)
         guess = self._model.carry(state, after)
-        newton: Newton = self._newtons[target.force_part]
+        newton: Iteration = self._newtons[target.force_part]
         try:
             solution = newton.solve(guess, control, floor=self._floor[target])
         except NotConverged as failure:

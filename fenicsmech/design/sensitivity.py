@@ -24,7 +24,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from fenicsmech.compat import compile_form, petsc_vector
-from fenicsmech.equilibrium import LoadControl, Newton, PointLoad, State
+from fenicsmech.equilibrium import Iteration, LoadControl, PointLoad, State
 from fenicsmech.simulation.model import MechanismModel
 
 
@@ -47,7 +47,7 @@ class Gradient:
 class Adjoint:
     """Sensitivities at equilibria of one model under one controlled force."""
 
-    def __init__(self, model: MechanismModel, newton: Newton) -> None:
+    def __init__(self, model: MechanismModel, newton: Iteration) -> None:
         self._model, self._newton, self._system = model, newton, newton.system
         self._weights = [fem.Function(field.function_space, name="adjoint") for field in model.elastic.fields]
 

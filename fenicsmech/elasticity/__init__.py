@@ -10,12 +10,14 @@
 - ``transverse``: the stretch out of the plane in plane stress, per material law
 - ``growth``: links whose strain-free state is not the drawn one
 - ``body``: energy, residual, tangent and stress of all links
+- ``mixed_stress``: the stress that a step promises, for the next tangent
 """
 
 from fenicsmech.elasticity.body import ElasticBody, Quadrature
 from fenicsmech.elasticity.energies import density
 from fenicsmech.elasticity.formulation import Displacement, Formulation, Mixed
 from fenicsmech.elasticity.growth import Stretch
+from fenicsmech.elasticity.mixed_stress import MixedStress
 from fenicsmech.elasticity.models import MID_PLANE_SYMMETRIC, PLANE_STRAIN, PLANE_STRESS, SPATIAL, ElasticModel
 from fenicsmech.elasticity.strain import Moduli, Strain
 
@@ -29,6 +31,7 @@ __all__ = [
     "ElasticModel",
     "Formulation",
     "Mixed",
+    "MixedStress",
     "Moduli",
     "Quadrature",
     "Strain",

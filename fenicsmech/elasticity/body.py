@@ -180,7 +180,7 @@ class ElasticBody:
         if self.pressure is not None:
             _ = self._pressure_form, self.tangent_blocks
 
-    def gradient(self, field: fem.Function):
+    def gradient(self, field):
         """H = ∇field (∇X)⁻¹, the gradient of a field on the rest shape, symbolic."""
         return ufl.dot(ufl.grad(field), ufl.inv(self.rest_gradient))
 
@@ -222,6 +222,11 @@ class ElasticBody:
             scale = ufl.det(self.rest_gradient) * self.model.multiplier(self._depth)
             terms.append(density_ * scale * term.dx(metadata={"quadrature_degree": degree}))
         return sum(terms[1:], start=terms[0])
+
+    def densities(self, H) -> list[tuple]:
+        """Elastic energy per volume of the mesh at the gradient H on the rest shape, and where it holds, per law."""
+        elastic = H if self._growth is None else self._growth.elastic(H)
+        return [(self._density(term, elastic) * self._volume, term.dx) for term in self._terms]
 
     def curvature(self, A, B, *, degree: int) -> ufl.Form:
         """∫ A : ∂²W/∂F∂F : B dV at the present fields, for gradients A, B on the rest shape."""

@@ -7,13 +7,13 @@ equilibria that were reached are never lost.
 from __future__ import annotations
 
 from fenicsmech.equilibrium.control import Control
-from fenicsmech.equilibrium.newton import Newton, NotConverged, Solution
 from fenicsmech.equilibrium.predictor import Anchor, Predictor
+from fenicsmech.equilibrium.solver import Iteration, NotConverged, Solution
 from fenicsmech.equilibrium.state import State
 
 _SMALLEST = 1.0 / 1024.0  # of the distance asked for
 _EASY = 5  # iterations
-_STRIDE = 0.1  # of the mechanism's length, or rad: how far a step may move anything, by the tangent (measured)
+_STRIDE = 0.2  # of the mechanism's length, or rad: how far a step may move anything, by the tangent (measured)
 IDLE_STIFFNESS = 1e-10
 """What is lent to idle freedoms, in units of the mean stiffness."""
 
@@ -44,7 +44,7 @@ class Path:
         idle: whether the mechanism has freedoms without stiffness.
     """
 
-    def __init__(self, newton: Newton, start: State, value: float, *, predictor: Predictor, idle: bool) -> None:
+    def __init__(self, newton: Iteration, start: State, value: float, *, predictor: Predictor, idle: bool) -> None:
         self._newton, self._start, self._value, self._predictor = newton, start, value, predictor
         self._floor = IDLE_STIFFNESS if idle else 0.0
         self._anchors: list[Anchor] = []

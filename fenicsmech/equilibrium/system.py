@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -24,9 +25,9 @@ from petsc4py import PETSc
 from fenicsmech.bodies import BodyPoint, InterfaceMap, LinkPoint
 from fenicsmech.clock import Clock
 from fenicsmech.effects import PosePotential
-from fenicsmech.elasticity import ElasticBody
+from fenicsmech.elasticity import ElasticBody, MixedStress
 from fenicsmech.equilibrium.control import Control
-from fenicsmech.equilibrium.extras import ExtraEntries
+from fenicsmech.equilibrium.extras import REGULARISATION, ExtraEntries
 from fenicsmech.equilibrium.layout import Layout
 from fenicsmech.equilibrium.load import PointLoad
 from fenicsmech.equilibrium.matrices import create_extended_matrix, create_map_matrix
@@ -67,6 +68,7 @@ class EquilibriumSystem:
 
     Attributes:
         unit: a residual of this norm is a displacement of the mechanism's length against the mean stiffness.
+        compliances: c, (rows,).
         unit_u, units, scale: what a unit of each scaled unknown stands for: displacements; all free finite-element
             DOFs; (z, λ, f).
     """
@@ -87,8 +89,8 @@ class EquilibriumSystem:
         self.controlled, self.loads, self.clock = controlled, loads, clock
         self.layout = Layout(elastic.mesh.comm, interfaces, joints, elastic.pressure)
         self._potentials = BodyPotentials(potentials, joints)
-        self._compliances = np.array([compliances.get(row, 0.0) for row in range(joints.rows)])
-        self._extras = ExtraEntries(joints, self.layout, controlled, self._potentials, self._compliances)
+        self.compliances = np.array([compliances.get(row, 0.0) for row in range(joints.rows)])
+        self._extras = ExtraEntries(joints, self.layout, controlled, self._potentials, self.compliances)
         with clock.phase("compile"):
             elastic.compile()
         with clock.phase("setup"):
@@ -112,6 +114,10 @@ class EquilibriumSystem:
         self._rows = self._hat.createVecLeft()
         self._matrix: PETSc.Mat | None = None
         self._diagonal: PETSc.Vec | None = None
+
+    @cached_property
+    def _mixed(self) -> MixedStress:
+        return MixedStress(self.elastic)
 
     # -- states --------------------------------------------------------------------------------------------
 
@@ -188,7 +194,7 @@ class EquilibriumSystem:
 
     def constraints(self, state: State, multipliers: np.ndarray) -> np.ndarray:
         """C(s) + c λ at ``multipliers`` λ, (rows,)."""
-        return self.joints.value(state.poses, state.motors) + self._compliances * multipliers
+        return self.joints.value(state.poses, state.motors) + self.compliances * multipliers
 
     def balance(self, state: State, control: Control) -> Balance:
         """Gᵀ ∇L (collective). Brings G to the poses of ``state``."""
@@ -223,13 +229,35 @@ class EquilibriumSystem:
 
     def kkt(self, state: State, control: Control, balance: Balance) -> PETSc.Mat:
         """The KKT matrix (collective); the same object at every call."""
-        layout = self.layout
         with self.clock.phase("assemble"):
             self._hat.zeroEntries()
             self.elastic.tangent(self._hat)
+        return self._assembled(state, control, balance.moments)
+
+    def mixed_kkt(self, state: State, control: Control, balance: Balance, before: State, motion: np.ndarray):
+        """The KKT matrix with the stress that the step δu = ``motion`` from ``before`` promised (collective).
+
+        Args:
+            state, control, balance: as in ``kkt``, which returns the same object.
+            before: the state before the step.
+            motion: δu of owned nodes, linear in the step on interface nodes too, (owned dofs,).
+        """
+        with self.clock.phase("assemble"):
+            self._mixed.follow(before.u, motion)
+            self._hat.zeroEntries()
+            self.elastic.tangent(self._hat)
+            self._mixed.tangent(self._hat)
+            promised = self.interfaces.moments(self._mixed.forces().reshape(-1, self.layout.per_node))
+            moments = _add_moments(balance.moments, self.layout.comm.allreduce(promised, op=_add_moments))
+        return self._assembled(state, control, moments)
+
+    def _assembled(self, state: State, control: Control, moments: dict[int, np.ndarray]) -> PETSc.Mat:
+        """K̂ from the tangent that it holds, and the KKT matrix from it."""
+        layout = self.layout
+        with self.clock.phase("assemble"):
             self._hat.assemble()
             if layout.last:
-                entries = self._extras.entries(state, control, self._acting(state), balance.moments)
+                entries = self._extras.entries(state, control, self._acting(state), moments)
                 for rows, columns, block in entries:
                     # petsc4py reads transposed arrays in memory order
                     self._hat.setValues(
@@ -251,6 +279,17 @@ class EquilibriumSystem:
         if layout.last:
             shifted.array_w[len(layout.free) :][layout.z] += shift
         self._matrix.setDiagonal(shifted)
+
+    def soften(self, softness: float, control: Control) -> None:
+        """Makes the KKT matrix hold −``softness`` · I instead of −ε · I in the block of multipliers (collective).
+
+        The force is one of them under a ``control`` that constrains. Before ``shift``, which makes it take effect.
+        """
+        if self.layout.last:
+            extras = self._diagonal.array_w[len(self.layout.free) :]
+            extras[self.layout.multipliers] += REGULARISATION - softness
+            if control.constrained:
+                extras[self.layout.force] -= softness
 
     def force_rate(self, state: State) -> PETSc.Vec:
         """Right-hand side whose KKT solution is the rate of x with the controlled force (collective)."""

@@ -25,7 +25,7 @@ from scipy.spatial import cKDTree
 
 from fenicsmech.compat import cell_nodes, compile_form, original_nodes, scalar_space
 from fenicsmech.elasticity import PLANE_STRESS
-from fenicsmech.equilibrium import Newton
+from fenicsmech.equilibrium import Iteration
 from fenicsmech.errors import DescriptionError
 from fenicsmech.linkage import Freedom
 from fenicsmech.simulation.frame import Frame
@@ -47,7 +47,7 @@ class DepthError:
         DescriptionError: the simulation is not in plane stress.
     """
 
-    def __init__(self, model: MechanismModel, newton: Newton) -> None:
+    def __init__(self, model: MechanismModel, newton: Iteration) -> None:
         space = model.elastic.model
         if space is not PLANE_STRESS:
             raise DescriptionError(
@@ -61,7 +61,9 @@ class DepthError:
         """Q(space) − Q(plane stress) of a frame (collective)."""
         model = self._model
         with model.clock.phase("estimate"), influence(model, self._newton, frame, freedom) as z:
-            return -model.mesh.mesh.comm.allreduce(float(model.elastic.assembled(self._force) @ z))
+            return -model.mesh.mesh.comm.allreduce(
+                float(model.elastic.assembled(self._force) @ model.elastic.split(z)[0])
+            )
 
     @cached_property
     def _force(self):

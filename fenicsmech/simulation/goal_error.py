@@ -27,7 +27,7 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from fenicsmech.compat import compile_form, petsc_vector, scalar_space, tensor_space
-from fenicsmech.equilibrium import Newton
+from fenicsmech.equilibrium import Iteration
 from fenicsmech.linkage import Freedom
 from fenicsmech.meshing.mid_plane import on_mid_plane
 from fenicsmech.simulation.frame import Frame
@@ -46,7 +46,7 @@ class GoalError:
         newton: its solver for this force.
     """
 
-    def __init__(self, model: MechanismModel, newton: Newton) -> None:
+    def __init__(self, model: MechanismModel, newton: Iteration) -> None:
         self._model, self._newton, elastic = model, newton, model.elastic
         self._adjoint = fem.Function(elastic.u.function_space, name="adjoint")
         tensors = tensor_space(elastic.mesh, self._degree)

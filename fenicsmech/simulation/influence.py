@@ -7,14 +7,14 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from fenicsmech.equilibrium import IDLE_STIFFNESS, LoadControl, Newton
+from fenicsmech.equilibrium import IDLE_STIFFNESS, Iteration, LoadControl
 from fenicsmech.linkage import Freedom
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.model import MechanismModel
 
 
 @contextmanager
-def influence(model: MechanismModel, newton: Newton, frame: Frame, freedom: Freedom) -> Iterator[np.ndarray]:
+def influence(model: MechanismModel, newton: Iteration, frame: Frame, freedom: Freedom) -> Iterator[np.ndarray]:
     """z with δQ = z · δF at the frame's equilibrium, Q the travel of the point of ``newton``'s force (collective).
 
         KKT x = ∂(a · u_P)/∂y,     z = ∂u/∂y x

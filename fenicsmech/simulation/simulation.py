@@ -19,7 +19,7 @@ from fenicsmech.elasticity import (
     Mixed,
     Quadrature,
 )
-from fenicsmech.equilibrium import Hermite, Newton, NewtonOptions, Predictor
+from fenicsmech.equilibrium import EquilibriumSolver, Hermite, Iteration, Predictor, PrimalDualNewton
 from fenicsmech.errors import AssemblyError, DescriptionError
 from fenicsmech.linkage import assemble, build_linkage, count_freedom
 from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Mechanism, Output, Scene, validate
@@ -56,7 +56,7 @@ class Simulation:
         quadrature: quadrature degree; the measured optimum by default.
         formulation: ``Mixed()`` gives nearly incompressible links the pressure as an unknown of its own;
             ``Displacement()`` none.
-        newton: limits of the equilibrium iteration.
+        solver: how equilibria are found.
         predictor: how the next equilibrium on a curve is guessed.
         comm: processes that share the work.
 
@@ -73,7 +73,7 @@ class Simulation:
         size: float | Mapping[FlexibleLink, float],
         quadrature: Quadrature | None = None,
         formulation: Formulation | None = None,
-        newton: NewtonOptions | None = None,
+        solver: EquilibriumSolver | None = None,
         predictor: Predictor | None = None,
         comm: MPI.Comm = MPI.COMM_WORLD,
     ) -> None:
@@ -103,8 +103,8 @@ class Simulation:
         self.fidelity = Fidelity(model, order, sizes, rule, formulation or Mixed())
         self.linkage = build_linkage(mechanism, model.mechanism_dim)
         check_links(mechanism, self.linkage, self.fidelity)
-        self._options, self._predictor = newton or NewtonOptions(), predictor or Hermite()
-        self._newtons: dict[tuple, Newton] = {}
+        self._solver, self._predictor = solver or PrimalDualNewton(), predictor or Hermite()
+        self._newtons: dict[tuple, Iteration] = {}
         self._errors: dict[Force, GoalError] = {}
         self._last: Curve | None = None
 
@@ -193,7 +193,7 @@ class Simulation:
             size=self.fidelity.sizes,
             quadrature=self.fidelity.quadrature,
             formulation=self.fidelity.formulation,
-            newton=self._options,
+            solver=self._solver,
             predictor=self._predictor,
             comm=comm,
         )
@@ -234,13 +234,13 @@ class Simulation:
         )
         return Explanation(simulated(self.model, fidelity.model.name, fidelity.order), tuple(left_out))
 
-    def newton(self, force: Force, others: tuple[tuple[Force, float], ...] = ()) -> Newton:
+    def newton(self, force: Force, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
         """The solver for one controlled and some fixed forces, kept for all configurations (collective)."""
         key = (force, others)
         if key not in self._newtons:
             model = self.model
             loads = tuple((model.point_load(other), float(magnitude)) for other, magnitude in others)
-            self._newtons[key] = Newton(model.system(model.point_load(force), loads), self._options)
+            self._newtons[key] = self._solver.on(model.system(model.point_load(force), loads))
         return self._newtons[key]
 
     def von_mises(self, frame: Frame) -> np.ndarray | None:

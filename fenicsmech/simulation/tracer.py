@@ -11,8 +11,8 @@ from mpi4py import MPI
 
 from fenicsmech.equilibrium import (
     Control,
+    Iteration,
     MotorControl,
-    Newton,
     Path,
     PathFailed,
     Predictor,
@@ -49,7 +49,7 @@ class Tracer:
     def __init__(
         self,
         model: MechanismModel,
-        newton: Newton,
+        newton: Iteration,
         request: CurveRequest,
         *,
         assembly: Assembly,

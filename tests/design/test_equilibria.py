@@ -9,7 +9,7 @@ from mpi4py import MPI
 import fenicsmech as fm
 from fenicsmech.design.equilibria import Known, TargetEquilibria
 from fenicsmech.design.optimisers import Infeasible
-from fenicsmech.equilibrium import Newton, NewtonOptions, NotConverged
+from fenicsmech.equilibrium import Newton, NotConverged
 
 from .mechanisms import Bench, Case, bench, bow, strained, strains, truss, turned_beam
 
@@ -112,10 +112,10 @@ def test_a_large_change_of_design_is_halved_on_the_way(monkeypatch):
             raise
 
     monkeypatch.setattr(Newton, "solve", counted)
-    newton.options = NewtonOptions(iterations=6)
+    newton.options = fm.PrimalDualNewton(iterations=6, mixed_stress=False)
     followed = both.equilibria.follow(known)
     assert len(failures) >= 1
-    newton.options = NewtonOptions()
+    newton.options = fm.PrimalDualNewton()
     assert_alike(followed, both.equilibria.trace())
 
 
@@ -125,7 +125,7 @@ def test_a_change_that_is_too_large_is_infeasible_and_leaves_the_design_in_place
     known = both.equilibria.trace()
     both.rest.place(bulged(both), start)
     design = both.rest.design()
-    both.simulation.newton(both.equilibria.targets[0].force_part).options = NewtonOptions(iterations=2)
+    both.simulation.newton(both.equilibria.targets[0].force_part).options = fm.PrimalDualNewton(iterations=2)
     with pytest.raises(Infeasible, match="no equilibrium at 0.1"):
         both.equilibria.follow(known)
     assert np.array_equal(both.rest.design(), design)

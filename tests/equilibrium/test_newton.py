@@ -5,8 +5,9 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.equilibrium import Constant, Hermite, NewtonOptions, Tangent
+from fenicsmech.equilibrium import Constant, Hermite, LoadControl, Tangent
 
+from ..simulation.clamped import cantilever
 from .finger import RUBBER, finger
 
 SPACES = ["plane-stress", "plane-strain", "3d"]
@@ -29,7 +30,7 @@ def test_number_of_correct_digits_nearly_doubles_in_each_of_the_last_iterations(
 
 @pytest.mark.parametrize("space", SPACES)
 def test_residual_at_the_end_is_below_the_tolerance(space):
-    simulation, push = finger(space, newton=NewtonOptions(tolerance=1e-6))
+    simulation, push = finger(space, solver=fm.PrimalDualNewton(tolerance=1e-6))
     rough = simulation.load_displacement(push, forces=[3.0]).frames[0]
     assert 1e-12 < rough.residuals[-1] <= 1e-6
     simulation, push = finger(space)
@@ -87,7 +88,18 @@ def test_force_that_nothing_resists_is_refused():
         simulation.load_displacement(push, forces=[0.5])
 
 
+@pytest.mark.parallel
+def test_slender_link_takes_a_load_that_rolls_it_up_in_one_solve():
+    case = cantilever("plane-stress", size=2.0, comm=MPI.COMM_WORLD)
+    rest = case.simulation.load_displacement(case.force, forces=[0.0]).frames[0].state
+    iteration, length = case.simulation.newton(case.force), 100.0
+    solution = iteration.solve(rest, LoadControl(10.0 * case.bending / length**2))
+    iteration.system.load(solution.state)
+    assert iteration.system.load_displacement(solution.state) == pytest.approx(0.81061 * length, rel=2e-3)  # elastica
+    assert solution.iterations <= 16
+
+
 def test_too_few_iterations_are_told_as_the_reason():
-    simulation, push = finger("plane-stress", newton=NewtonOptions(iterations=1))
+    simulation, push = finger("plane-stress", solver=fm.PrimalDualNewton(iterations=1))
     with pytest.raises(fm.EquilibriumError, match="after 1 iterations"):
         simulation.load_displacement(push, forces=[5.0])

@@ -1,0 +1,140 @@
+"""What every equilibrium solver is: a description with its limits, and the iteration it makes for one system.
+
+An iteration finds equilibria its own way; what follows an equilibrium (its stability, its rate along the path,
+sensitivities) is the same for all: linear solves with the symmetric factor of the true KKT matrix there.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+from petsc4py import PETSc
+
+from fenicsmech.equilibrium.control import Control
+from fenicsmech.equilibrium.factor import Factor, Inertia
+from fenicsmech.equilibrium.state import State, Step
+from fenicsmech.equilibrium.system import Balance, EquilibriumSystem
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A converged equilibrium.
+
+    Attributes:
+        state: the equilibrium.
+        residuals: relative residual before each iteration and at the end.
+        iterations: KKT systems factored and solved on the way.
+        unstable_modes: number of directions in which the energy has a maximum, under dead loads.
+        unstable_under_control: the same with the control's constraint.
+        tangent: rate of the state with the control's target.
+    """
+
+    state: State
+    residuals: tuple[float, ...]
+    iterations: int
+    unstable_modes: int
+    unstable_under_control: int
+    tangent: Step
+
+
+class NotConverged(Exception):
+    """The iteration ended without an equilibrium; ``reason`` says why."""
+
+    def __init__(self, reason: str, iterations: int) -> None:
+        super().__init__(reason)
+        self.reason, self.iterations = reason, iterations
+
+
+@dataclass(frozen=True, kw_only=True)
+class EquilibriumSolver(ABC):
+    """How equilibria are found.
+
+    Attributes:
+        tolerance: residual over the forces that balance in it, at convergence.
+        roundoff: residual in units of mean stiffness times length below which digits are lost.
+    """
+
+    tolerance: float = 1e-10
+    roundoff: float = 1e-14
+
+    @abstractmethod
+    def on(self, system: EquilibriumSystem) -> Iteration:
+        """The iteration for one system."""
+
+
+class Iteration(ABC):
+    """One system's solver, with the factor it keeps between solves."""
+
+    def __init__(self, system: EquilibriumSystem, options: EquilibriumSolver) -> None:
+        self.system, self.options = system, options
+        self._factor: Factor | None = None
+
+    @abstractmethod
+    def solve(self, start: State, control: Control, *, floor: float = 0.0) -> Solution:
+        """The equilibrium near ``start`` under ``control`` (collective).
+
+        Args:
+            start: first guess.
+            control: what is asked for.
+            floor: least shift δ, for mechanisms with idle freedoms.
+
+        Raises:
+            NotConverged: too many iterations, no descent, or elements inverted all along.
+        """
+
+    def factor(self, state: State, control: Control, balance: Balance, floor: float) -> None:
+        """Factors the KKT matrix of the loaded ``state``, for linear solves with it (collective).
+
+        Raises:
+            NotConverged: it cannot be factored.
+        """
+        if self._true_inertia(state, control, balance, floor) is None:
+            raise NotConverged("the tangent at the equilibrium cannot be factored", 0)
+
+    def solve_linear(self, right: PETSc.Vec) -> PETSc.Vec:
+        """The solution of KKT x = ``right`` with the last factor (collective)."""
+        with self.system.clock.phase("solve"):
+            x = right.duplicate()
+            self._factor.solve(right, x)
+            return x
+
+    def _relative(self, balance: Balance) -> float:
+        return balance.norm / max(balance.forces, self.options.roundoff * self.system.unit)
+
+    def _converged(self, balance: Balance) -> bool:
+        limit = max(self.options.tolerance * balance.forces, self.options.roundoff * self.system.unit)
+        return balance.norm <= limit < math.inf
+
+    def _refactor(self, matrix: PETSc.Mat, shift: float) -> Inertia | None:
+        with self.system.clock.phase("factor"):
+            self.system.shift(shift)
+            if self._factor is None:
+                self._factor = Factor(matrix)
+            return self._factor.refactor()
+
+    def _true_inertia(self, state: State, control: Control, balance: Balance, floor: float) -> Inertia | None:
+        """Factors the KKT matrix of the loaded ``state`` with the least shift."""
+        return self._refactor(self.system.kkt(state, control, balance), floor)
+
+    @property
+    def _expected(self) -> int:
+        """Negative pivots of a stable equilibrium: one per multiplier and pressure, one for the controlled force."""
+        return self.system.joints.rows + 1 + self.system.layout.pressures
+
+    def _accept(
+        self, state: State, control: Control, inertia: Inertia | None, residuals: list[float], iteration: int
+    ) -> Solution:
+        """Stability and tangent at the equilibrium, from the last factor, of the true matrix with its ``inertia``."""
+        system = self.system
+        if inertia is None:
+            raise NotConverged("the tangent at the equilibrium cannot be factored", iteration)
+        x = self.solve_linear(control.rate(system, state))
+        under_control = inertia.negative - self._expected
+        unstable = under_control
+        if control.constrained:
+            row = system.control_row()
+            # Schur complement of the control row: negative exactly if removing the row leaves stability as it is
+            unstable += 1 - int(self.solve_linear(row).dot(row) < 0.0)
+        return Solution(state, tuple(residuals), iteration, max(unstable, 0), max(under_control, 0), system.step(x))

@@ -1,0 +1,86 @@
+"""Newton's method on the KKT equations as they stand: full steps, no inertia, no shift.
+
+    [[∇²L, −Aᵀ], [−A, −ε]] (ds, dλ) = −(∇L, −C),     (s, λ) ← (s, λ) + α (ds, dλ)
+
+with α = 1, or, on request, the largest of 1, ½, ¼, … that lowers the residual r by Armijo's rule
+|r(α)| ≤ (1 − 10⁻⁴ α) |r(0)|. Any equilibrium will do, stable or not. Source: Nocedal & Wright, Numerical Optimization
+(doi:10.1007/978-0-387-40065-5), section 18.1 and algorithm 11.4.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from fenicsmech.equilibrium.control import Control
+from fenicsmech.equilibrium.solver import EquilibriumSolver, Iteration, NotConverged, Solution
+from fenicsmech.equilibrium.state import State, Step
+from fenicsmech.equilibrium.system import Balance, EquilibriumSystem
+
+_DECREASE = 1e-4
+_HALVINGS = 20
+
+
+@dataclass(frozen=True, kw_only=True)
+class KktNewton(EquilibriumSolver):
+    """Newton's method on the KKT equations, nothing else.
+
+    Attributes:
+        iterations: most iterations.
+        backtracking: whether steps are shortened until the residual falls.
+    """
+
+    iterations: int = 25
+    backtracking: bool = False
+
+    def on(self, system: EquilibriumSystem) -> KktIteration:
+        return KktIteration(system, self)
+
+
+class KktIteration(Iteration):
+    """The iteration, with the factor it keeps between solves."""
+
+    options: KktNewton
+
+    def solve(self, start: State, control: Control, *, floor: float = 0.0) -> Solution:
+        system, options = self.system, self.options
+        state = control.prepare(start)
+        system.load(state)
+        if not math.isfinite(system.elastic_energy()):
+            raise NotConverged("elements are inverted in the predicted state", 0)
+        balance, residuals, inertia = system.balance(state, control), [], None
+        for iteration in range(options.iterations + 1):
+            residuals.append(self._relative(balance))
+            if not math.isfinite(residuals[-1]):
+                raise NotConverged("the residual overflows", iteration)
+            if self._converged(balance) and iteration > 0:
+                return self._accept(state, control, inertia, residuals, iteration)
+            if iteration == options.iterations:
+                break
+            inertia = self._true_inertia(state, control, balance, floor)
+            if inertia is None:
+                raise NotConverged("the tangent cannot be factored", iteration)
+            x = self.solve_linear(balance.vector)
+            x.scale(-1.0)
+            state, balance = self._advance(state, control, system.step(x), balance, iteration)
+        raise NotConverged(
+            f"the residual is {residuals[-1]:.1e} of the forces after {options.iterations} iterations",
+            options.iterations,
+        )
+
+    def _advance(
+        self, state: State, control: Control, step: Step, balance: Balance, iteration: int
+    ) -> tuple[State, Balance]:
+        """The state after the whole step, or after as much of it as lowers the residual."""
+        system = self.system
+        for halvings in range(_HALVINGS if self.options.backtracking else 1):
+            length = 0.5**halvings
+            trial = system.moved(state, step.scaled(length))
+            if not math.isfinite(system.elastic_energy()):
+                continue
+            new = system.balance(trial, control)
+            falls = new.norm <= (1.0 - _DECREASE * length) * balance.norm
+            if falls or self._converged(new) or not self.options.backtracking:
+                return trial, new
+        reason = "no step lowers the residual" if self.options.backtracking else "the step inverts elements"
+        raise NotConverged(reason, iteration + 1)

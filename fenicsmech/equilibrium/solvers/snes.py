@@ -1,0 +1,162 @@
+"""PETSc's SNES on the KKT equations, with the same residual, matrix and LDLᵀ factor as the default solver.
+
+The unknowns are scaled increments from the last iterate, so that rotations are put back on their manifold once per
+iteration, as they are by the other solvers. States that invert elements have an infinite residual. Source: the PETSc
+manual (doi:10.2172/2205494), chapter on nonlinear solvers.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+from petsc4py import PETSc
+
+from fenicsmech.equilibrium.control import Control
+from fenicsmech.equilibrium.factor import Inertia
+from fenicsmech.equilibrium.solver import EquilibriumSolver, Iteration, NotConverged, Solution
+from fenicsmech.equilibrium.state import State
+from fenicsmech.equilibrium.system import EquilibriumSystem
+
+_PREFIX = "fenicsmech_"
+_FIRST_RADIUS = 0.1  # of the trust region: mean motion over the mechanism's length
+_REASONS = {
+    getattr(PETSc.SNES.ConvergedReason, name): name.removeprefix("DIVERGED_").lower().replace("_", " ")
+    for name in vars(PETSc.SNES.ConvergedReason)
+    if name.startswith("DIVERGED_")
+}
+
+
+class Globalisation(Enum):
+    """What keeps SNES's steps in bounds."""
+
+    BACKTRACKING = "bt"
+    SECANT = "l2"
+    CRITICAL_POINT = "cp"
+    TRUST_REGION = "newtontr"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Snes(EquilibriumSolver):
+    """Newton's method of PETSc's SNES on the KKT equations.
+
+    Attributes:
+        iterations: most iterations.
+        globalisation: one of SNES's line searches, or its trust region.
+    """
+
+    iterations: int = 50
+    globalisation: Globalisation = Globalisation.BACKTRACKING
+
+    def on(self, system: EquilibriumSystem) -> SnesIteration:
+        return SnesIteration(system, self)
+
+
+class SnesIteration(Iteration):
+    """The iteration, with the factor it keeps between solves."""
+
+    options: Snes
+
+    def solve(self, start: State, control: Control, *, floor: float = 0.0) -> Solution:
+        start = control.prepare(start)
+        self.system.load(start)
+        if not math.isfinite(self.system.elastic_energy()):
+            raise NotConverged("elements are inverted in the predicted state", 0)
+        equations = _Equations(self, start, control, floor)
+        if self._converged(equations.balance):  # there is nothing that a line search could lower
+            equations.test(None, 0, (0.0, 0.0, equations.balance.norm))
+            equations.setUp(None)
+            return self._accept(start, control, equations.inertia, equations.residuals, 1)
+        x = equations.balance.vector.duplicate()
+        snes = self._create(equations)
+        snes.solve(None, x)
+        reason, iterations = snes.getConvergedReason(), snes.getLinearSolveIterations()
+        snes.destroy()
+        if not equations.evaluate(x):
+            raise NotConverged("elements are inverted", iterations)
+        if equations.inertia is None or not self._converged(equations.balance):
+            raise NotConverged(f"SNES stops: {_REASONS.get(reason, f'reason {reason}')}", iterations)
+        return self._accept(equations.state, control, equations.inertia, equations.residuals, iterations)
+
+    def _create(self, equations: _Equations) -> PETSc.SNES:
+        system, chosen = self.system, self.options.globalisation
+        snes = PETSc.SNES().create(system.layout.comm)
+        options = PETSc.Options(_PREFIX)
+        options["snes_linesearch_type"] = "basic" if chosen is Globalisation.TRUST_REGION else chosen.value
+        options["snes_tr_delta0"] = _FIRST_RADIUS * system.unit * math.sqrt(equations.balance.vector.size)
+        snes.setOptionsPrefix(_PREFIX)
+        snes.setType("newtontr" if chosen is Globalisation.TRUST_REGION else "newtonls")
+        snes.setFunction(equations.residual, equations.balance.vector.duplicate())
+        snes.setJacobian(equations.jacobian, equations.matrix)
+        snes.setUpdate(equations.rebase)
+        snes.setConvergenceTest(equations.test)
+        snes.setTolerances(max_it=self.options.iterations)
+        ksp = snes.getKSP()
+        ksp.setType(PETSc.KSP.Type.PREONLY)
+        ksp.getPC().setType(PETSc.PC.Type.PYTHON)
+        ksp.getPC().setPythonContext(equations)
+        snes.setFromOptions()
+        return snes
+
+
+class _Equations:
+    """What SNES calls: residual, matrix, factor and convergence test at x, an increment from ``base``.
+
+    Attributes:
+        state, balance: where they were evaluated last.
+        matrix: the KKT matrix.
+        inertia: of its last factor.
+        residuals: relative residual of each iterate.
+    """
+
+    def __init__(self, iteration: SnesIteration, base: State, control: Control, floor: float) -> None:
+        self._iteration, self._system, self._base = iteration, iteration.system, base
+        self._control, self._floor = control, floor
+        self.state, self.balance = base, self._system.balance(base, control)
+        self.matrix = self._system.kkt(base, control, self.balance)
+        self.inertia: Inertia | None = None
+        self.residuals: list[float] = []
+
+    def evaluate(self, x: PETSc.Vec) -> bool:
+        """Brings ``state`` and ``balance`` to x; False, with the balance as it was, if elements are inverted there."""
+        self.state = self._system.moved(self._base, self._system.step(x))
+        if not math.isfinite(self._system.elastic_energy()):
+            return False
+        self.balance = self._system.balance(self.state, self._control)
+        return True
+
+    def residual(self, snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
+        if self.evaluate(x):
+            self.balance.vector.copy(f)
+        else:
+            f.set(math.inf)
+
+    def jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, matrix: PETSc.Mat, preconditioner: PETSc.Mat) -> None:
+        self.evaluate(x)
+        self._system.kkt(self.state, self._control, self.balance)
+
+    def rebase(self, snes: PETSc.SNES, iteration: int) -> None:
+        """Counts x from the present iterate."""
+        x = snes.getSolution()
+        self.evaluate(x)
+        self._base = self.state
+        x.set(0.0)
+
+    def test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
+        """Convergence as the other solvers see it."""
+        self.residuals.append(self._iteration._relative(self.balance))
+        if not math.isfinite(norms[2]):
+            return PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
+        if iteration > 0 and self._iteration._converged(self.balance):
+            return PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE
+        return PETSc.SNES.ConvergedReason.ITERATING
+
+    def setUp(self, pc: PETSc.PC) -> None:
+        self.inertia = self._iteration._refactor(self.matrix, self._floor)
+
+    def apply(self, pc: PETSc.PC, right: PETSc.Vec, x: PETSc.Vec) -> None:
+        if self.inertia is None:
+            x.set(math.nan)
+        else:
+            self._iteration.solve_linear(right).copy(x)

@@ -1,0 +1,50 @@
+"""The augmented Lagrangian's value, gradient and matrix belong together, in the plane and in space."""
+
+import numpy as np
+import pytest
+
+import fenicsmech as fm
+from fenicsmech.equilibrium import DisplacementControl, LoadControl
+
+from ..crowded import control_of, crowded, random_state, system_of
+
+SOFTNESS = 0.05
+H = 1e-3
+
+
+@pytest.mark.parametrize("kind", [LoadControl, DisplacementControl])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_gradient_and_matrix_are_derivatives_of_the_value(dim, kind):
+    case = crowded(dim)
+    system, control = system_of(case, controlled=case.on_rigid), control_of(kind)
+    iteration = fm.AugmentedLagrangian().on(system)
+    state = control.prepare(random_state(case, system))
+    states = len(system.layout.free) + system.joints.size
+
+    way = system.control_row()
+    way.array[:] = np.random.default_rng(2).standard_normal(len(way.array))
+    way.array[states:] = 0.0
+    way.scale(1e-2 / system.size(system.step(way)))
+    step = system.step(way)
+
+    def value(length):
+        return iteration._value(iteration._moved(state, step, length), control, SOFTNESS)
+
+    values = [value(length) for length in (-2 * H, -H, 0.0, H, 2 * H)]
+    slope = np.dot(values, [1.0, -8.0, 0.0, 8.0, -1.0]) / (12.0 * H)
+    curvature = np.dot(values, [-1.0, 16.0, -30.0, 16.0, -1.0]) / (12.0 * H**2)
+
+    system.load(state)
+    current = iteration._updated(state, control, SOFTNESS)
+    balance = system.balance(current, control)
+    assert balance.vector.dot(way) == pytest.approx(slope, rel=1e-6)
+
+    matrix = system.kkt(current, control, balance)
+    system.soften(SOFTNESS, control)
+    system.shift(0.0)
+    # the multipliers eliminated: their rows of K (s, λ) are zero
+    full, product = way.copy(), way.duplicate()
+    matrix.mult(way, product)
+    full.array[states:] = -product.array[states:] / matrix.getDiagonal().array[states:]
+    matrix.mult(full, product)
+    assert product.dot(way) == pytest.approx(curvature, rel=1e-4)

@@ -1,0 +1,106 @@
+"""All solvers find the same equilibria, with the same stability and rates, or say that they did not converge."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import fenicsmech as fm
+from fenicsmech.equilibrium import EquilibriumSolver, LoadControl, NotConverged
+
+from ..finger import RUBBER, finger
+
+SOLVERS = {
+    "without mixed stress": fm.PrimalDualNewton(mixed_stress=False),
+    "augmented Lagrangian": fm.AugmentedLagrangian(),
+    "KKT Newton": fm.KktNewton(),
+    "KKT Newton with backtracking": fm.KktNewton(backtracking=True),
+    **{f"SNES {kind.value}": fm.Snes(globalisation=kind) for kind in fm.Globalisation},
+}
+each_solver = pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
+
+
+def assert_alike(solver: EquilibriumSolver, space: str, samples: dict, **options) -> None:
+    """The curve is that of the default solver: displacements, forces, stability, states, forces of the joints."""
+    (_, reference), (simulation, curve) = (
+        (sim, sim.load_displacement(push, **samples))
+        for sim, push in (finger(space, solver=chosen, **options) for chosen in (fm.PrimalDualNewton(), solver))
+    )
+    joints = simulation.linkage.joints
+    for frame, expected in zip(curve.frames, reference.frames, strict=True):
+        assert frame.displacement == pytest.approx(expected.displacement, rel=1e-8)
+        assert frame.force == pytest.approx(expected.force, rel=1e-8)
+        assert frame.unstable_modes == expected.unstable_modes
+        a, b = frame.state, expected.state
+        assert a.u == pytest.approx(b.u, abs=1e-8 * np.abs(b.u).max(initial=0.0))
+        assert a.poses == pytest.approx(b.poses, abs=1e-8 * np.abs(b.poses).max())
+        # multipliers of redundant constraints are not unique, what they do to the bodies is
+        pulls = [joints.gradient(s.poses, s.motors).T @ s.multipliers for s in (a, b)]
+        assert pulls[0] == pytest.approx(pulls[1], abs=1e-7 * np.abs(pulls[1]).max())
+
+
+@each_solver
+@pytest.mark.parametrize("samples", [{"forces": [1.0, 3.0, -1.0]}, {"displacements": [2.0, 5.0]}])
+def test_curve_of_a_finger_in_the_plane(solver, samples):
+    assert_alike(solver, "plane-stress", samples)
+
+
+@pytest.mark.parallel
+@each_solver
+def test_curve_of_a_finger_in_space_on_any_number_of_ranks(solver):
+    assert_alike(solver, "3d", {"forces": [0.5, 1.0]}, order=1, size=8.0, comm=MPI.COMM_WORLD)
+
+
+@each_solver
+def test_joints_with_compliance(solver):
+    """A constraint that gives way under its multiplier."""
+    found = []
+    for chosen in (fm.PrimalDualNewton(), solver):
+        scene, push = truss_of_soft_joints()
+        sim = fm.Simulation(scene, space="plane-stress", size=4.0, solver=chosen, comm=MPI.COMM_SELF)
+        found.append(sim.load_displacement(push, forces=[0.05, 0.1]).displacements)
+    assert found[1] == pytest.approx(found[0], rel=1e-8)
+
+
+@each_solver
+@pytest.mark.parametrize("load", [1e5, -1e5, 1e100, np.nan])
+def test_load_out_of_reach_is_refused_in_one_solve(solver, load):
+    simulation, push = finger("plane-stress", solver=solver)
+    rest = simulation.load_displacement(push, forces=[0.0]).frames[0].state
+    with pytest.raises(NotConverged) as caught:
+        simulation.newton(push).solve(rest, LoadControl(load))
+    assert caught.value.reason
+
+
+@each_solver
+def test_start_with_inverted_elements_is_refused(solver):
+    simulation, push = finger("plane-stress", solver=solver)
+    rest = simulation.load_displacement(push, forces=[0.0]).frames[0].state
+    torn = replace(rest, u=50.0 * np.random.default_rng(1).standard_normal(len(rest.u)))
+    with pytest.raises(NotConverged, match="inverted"):
+        simulation.newton(push).solve(torn, LoadControl(1.0))
+
+
+@each_solver
+def test_failure_of_a_curve_is_an_error_with_the_frames_before(solver):
+    simulation, push = finger("plane-stress", solver=solver)
+    with pytest.raises(fm.EquilibriumError) as caught:
+        simulation.load_displacement(push, displacements=[3.0, 200.0])
+    assert [frame.displacement for frame in caught.value.frames] == pytest.approx([3.0], rel=1e-9)
+    assert np.isfinite(caught.value.last.displacement)
+
+
+def truss_of_soft_joints():
+    mechanism = fm.Mechanism("finger")
+    base = mechanism.rigid("base", fixed=True)
+    left, right, tip = (mechanism.rigid(name) for name in ("left", "right", "tip"))
+    diagonal = mechanism.flexible("diagonal", fm.strip([(0, 0), (14, 36), (40, 60)], thickness=6.0, depth=20.0), RUBBER)
+    soft = mechanism.revolute(base, left, at=(0, 0))
+    mechanism.revolute(base, right, at=(40, 0))
+    mechanism.revolute(left, tip, at=(0, 60))
+    mechanism.revolute(right, tip, at=(40, 60))
+    mechanism.revolute(base, diagonal, at=(0, 0), radius=3.0)
+    mechanism.revolute(diagonal, tip, at=(40, 60), radius=3.0)
+    push = mechanism.force(on=tip, at=(20, 70), direction=(1, 0))
+    return fm.Scene(mechanism, effects=[fm.JointCompliance(soft, 0.5)]), push
