@@ -30,6 +30,7 @@ from fenicsmech.effects import (
     Pressure,
     Prestrain,
 )
+from fenicsmech.equilibrium import ArcSteps, Critical
 from fenicsmech.errors import AssemblyError, DescriptionError, EquilibriumError, FenicsmechError, MeshingError
 from fenicsmech.mechanism import (
     DRAWN,
@@ -54,7 +55,16 @@ from fenicsmech.mechanism import (
     step,
     strip,
 )
-from fenicsmech.simulation import Curve, Frame, PinFriction, Simulation, friction_band
+from fenicsmech.simulation import (
+    Curve,
+    FollowedCurve,
+    Frame,
+    PathEvent,
+    PinFriction,
+    Simulation,
+    Until,
+    friction_band,
+)
 
 __version__ = "0.1.0"
 
@@ -111,4 +121,9 @@ __all__ = [
     "Prestrain",
     "PinFriction",
     "friction_band",
+    "ArcSteps",
+    "Critical",
+    "FollowedCurve",
+    "PathEvent",
+    "Until",
 ]

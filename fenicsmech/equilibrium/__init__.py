@@ -7,10 +7,17 @@
 - ``factor``: LDLᵀ with inertia
 - ``newton``: the primal–dual iteration
 - ``predictor``, ``path``: first guesses and load steps
+- ``lead``, ``arc_length``, ``continuation``: paths that turn back in load and displacement
+- ``critical``, ``branching``: their limit points and bifurcations, and the paths that cross there
+- ``eigen``: the softest modes of a tangent, and buckling loads
 - ``reactions``: what joints and motors exert
 """
 
+from fenicsmech.equilibrium.arc_length import ArcLength, ArcMetric, ArcSteps, PathPoint, metric_at
+from fenicsmech.equilibrium.continuation import Goal, Stretch, follow
 from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadControl, MotorControl, ShareControl
+from fenicsmech.equilibrium.critical import Critical, CriticalPoint
+from fenicsmech.equilibrium.lead import ForceLead, Heading, Lead, MotorLead
 from fenicsmech.equilibrium.load import PointLoad
 from fenicsmech.equilibrium.newton import Newton, NewtonOptions, NotConverged, Solution
 from fenicsmech.equilibrium.path import IDLE_STIFFNESS, Path, PathFailed
@@ -21,18 +28,29 @@ from fenicsmech.equilibrium.system import EquilibriumSystem
 
 __all__ = [
     "IDLE_STIFFNESS",
+    "ArcLength",
+    "ArcMetric",
+    "ArcSteps",
     "Constant",
     "Control",
+    "Critical",
+    "CriticalPoint",
     "DisplacementControl",
     "EquilibriumSystem",
+    "ForceLead",
+    "Goal",
+    "Heading",
     "Hermite",
+    "Lead",
     "LoadControl",
     "MotorControl",
+    "MotorLead",
     "Newton",
     "NewtonOptions",
     "NotConverged",
     "Path",
     "PathFailed",
+    "PathPoint",
     "PointLoad",
     "Predictor",
     "Reaction",
@@ -40,7 +58,10 @@ __all__ = [
     "Solution",
     "State",
     "Step",
+    "Stretch",
     "Tangent",
+    "follow",
     "joint_reactions",
+    "metric_at",
     "motor_torques",
 ]

@@ -114,8 +114,8 @@ class Newton:
         best, spent, careful = (state, balance.norm), 0, False
         residuals, inertia, shift, trusted = [], None, floor, True
         for iteration in range(options.iterations + 1):
-            residuals.append(self._relative(balance))
-            if self._converged(balance) and iteration > 0:
+            residuals.append(self.relative(balance))
+            if self.converged(balance) and iteration > 0:
                 return self._accept(state, control, balance, inertia, shift, floor, residuals, iteration)
             if iteration == options.iterations:
                 break
@@ -125,7 +125,7 @@ class Newton:
             before, norm = state, balance.norm
             advance = self._search if careful else self._full_step
             state, balance = advance(state, control, step, balance, iteration)
-            if near and balance.norm > norm and not self._converged(balance):
+            if near and balance.norm > norm and not self.converged(balance):
                 # no contraction: near a limit or bifurcation point, where only descent leads on
                 state, trusted, careful = before, False, True
                 system.load(state)
@@ -143,14 +143,16 @@ class Newton:
             options.iterations,
         )
 
-    def factor(self, state: State, control: Control, balance: Balance, floor: float) -> None:
+    def factor(self, state: State, control: Control, balance: Balance, floor: float) -> Inertia:
         """Factors the KKT matrix of the loaded ``state``, for linear solves with it (collective).
 
         Raises:
             NotConverged: it cannot be factored.
         """
-        if self._refactor(self.system.kkt(state, control, balance), floor) is None:
+        inertia = self._refactor(self.system.kkt(state, control, balance), floor)
+        if inertia is None:
             raise NotConverged("the tangent at the equilibrium cannot be factored", 0)
+        return inertia
 
     def solve_linear(self, right: PETSc.Vec) -> PETSc.Vec:
         """The solution of KKT x = ``right`` with the last factor (collective)."""
@@ -159,10 +161,12 @@ class Newton:
             self._factor.solve(right, x)
             return x
 
-    def _relative(self, balance: Balance) -> float:
+    def relative(self, balance: Balance) -> float:
+        """The residual over the forces that balance in it."""
         return balance.norm / max(balance.forces, self.options.roundoff * self.system.unit)
 
-    def _converged(self, balance: Balance) -> bool:
+    def converged(self, balance: Balance) -> bool:
+        """Whether the residual is as small as asked for, or as rounding lets it be."""
         return balance.norm <= max(self.options.tolerance * balance.forces, self.options.roundoff * self.system.unit)
 
     def _direction(
@@ -177,7 +181,7 @@ class Newton:
         shift, following = floor, max(_LEAST_SHIFT, last / 3.0)
         for _ in range(20):
             inertia = self._refactor(matrix, shift)
-            descends = inertia is not None and inertia.negative <= self._expected and inertia.zero == 0
+            descends = inertia is not None and inertia.negative <= self.expected and inertia.zero == 0
             if descends or (any_inertia and inertia is not None):
                 break
             shift, following = following, 8.0 * following
@@ -195,7 +199,7 @@ class Newton:
             return self._factor.refactor()
 
     @property
-    def _expected(self) -> int:
+    def expected(self) -> int:
         """Negative pivots of a stable equilibrium: one per multiplier, one for the controlled force."""
         return self.system.joints.rows + 1
 
@@ -250,7 +254,7 @@ class Newton:
         if inertia is None:
             raise NotConverged("the tangent at the equilibrium cannot be factored", iteration)
         x = self.solve_linear(control.rate(system, state))
-        under_control = inertia.negative - self._expected
+        under_control = inertia.negative - self.expected
         unstable = under_control
         if control.constrained:
             row = system.control_row()

@@ -11,9 +11,9 @@ from mpi4py import MPI
 
 from fenicsmech.clock import Clock
 from fenicsmech.elasticity import PLANE_STRAIN, PLANE_STRESS, SPATIAL, Quadrature
-from fenicsmech.equilibrium import Hermite, Newton, NewtonOptions, Predictor
+from fenicsmech.equilibrium import ArcSteps, Hermite, Newton, NewtonOptions, Predictor
 from fenicsmech.errors import AssemblyError, DescriptionError
-from fenicsmech.linkage import assemble, build_linkage, count_freedom
+from fenicsmech.linkage import Freedom, assemble, build_linkage, count_freedom
 from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Mechanism, Output, Scene, validate
 from fenicsmech.mechanism.checks import positive
 from fenicsmech.mechanism.places import in_dimension
@@ -22,6 +22,8 @@ from fenicsmech.report import Panel, Progress, Silent, Trace, draw_configuration
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.explanation import Explanation, hints, simulated
 from fenicsmech.simulation.export import write_xdmf
+from fenicsmech.simulation.followed import FollowedCurve
+from fenicsmech.simulation.follower import Follower
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.goal_error import GoalError
 from fenicsmech.simulation.model import Fidelity, MechanismModel, check_links, mesh_mechanism
@@ -29,6 +31,7 @@ from fenicsmech.simulation.picture import Draughtsman
 from fenicsmech.simulation.request import CurveRequest, read_request
 from fenicsmech.simulation.snapshot import gather, rest_vertices
 from fenicsmech.simulation.tracer import Tracer
+from fenicsmech.simulation.until import Until
 
 SPACES = {model.name: model for model in (SPATIAL, PLANE_STRESS, PLANE_STRAIN)}
 """Names of the elastic models, as users type them."""
@@ -126,12 +129,7 @@ class Simulation:
             AssemblyError: the configuration does not assemble.
             EquilibriumError: a sample was not reached; carries the frames before it.
         """
-        if _description(self.scene.mechanism) != self._described:
-            raise DescriptionError(
-                f"mechanism {self.scene.mechanism.name!r}",
-                "links, joints or motors were added after the simulation was made",
-                "Make a new Simulation",
-            )
+        self._check_description()
         request = read_request(
             self.scene.mechanism,
             force,
@@ -151,11 +149,7 @@ class Simulation:
             request: what is asked for.
             watch: called with the number of frames so far.
         """
-        assembly = assemble(self.linkage, request.configuration)
-        rigid = self.linkage.rigid
-        freedom = count_freedom(rigid, assembly.poses, rigid.motor_values(request.configuration.position))
-        newton = self.newton(request.force, request.others)
-        tracer = Tracer(self.model, newton, request, assembly=assembly, freedom=freedom, predictor=self._predictor)
+        tracer, _, freedom = self._tracer(request)
         frames: list[Frame] = []
         for control in request.controls:
             frames.append(tracer.frame(control, frames))
@@ -167,7 +161,59 @@ class Simulation:
             tuple(frames),
             units=self.scene.units,
             leads=self.comm.rank == 0,
+            others=request.others,
         )
+
+    def follow(
+        self,
+        force: Force,
+        *,
+        until: Until,
+        configuration: Configuration = DRAWN,
+        others: Mapping[Force, float] | None = None,
+        steps: ArcSteps | None = None,
+    ) -> FollowedCurve:
+        """The whole curve under a changing force, past limit points and where it turns back (collective).
+
+        Starts without the force and goes towards the first displacement, or else the first force, of ``until``.
+
+        Args:
+            force: the force that changes.
+            until: where the curve ends.
+            configuration: motor positions.
+            others: constant magnitudes of other forces.
+            steps: how finely it is followed.
+
+        Raises:
+            DescriptionError: the request makes no sense.
+            AssemblyError: the configuration does not assemble.
+            EquilibriumError: the curve ends early; carries the frames before that.
+        """
+        self._check_description()
+        if not isinstance(until, Until):
+            raise DescriptionError("end of a path", f"{until!r} does not say where", "Give until=Until(displacement=…)")
+        request = read_request(
+            self.scene.mechanism, force, forces=[0.0], displacements=None, configuration=configuration, others=others
+        )
+        with Progress(until.frames, configuration.name) if self.comm.rank == 0 else Silent() as progress:
+            follower, freedom = self._follower(request, until, steps or ArcSteps())
+            follower.from_rest(progress.update)
+        self._last = FollowedCurve(
+            force,
+            configuration,
+            freedom,
+            tuple(follower.frames),
+            units=self.scene.units,
+            leads=self.comm.rank == 0,
+            others=request.others,
+            events=tuple(follower.events),
+        )
+        return self._last
+
+    def _follower(self, request: CurveRequest, until: Until, steps: ArcSteps) -> tuple[Follower, Freedom]:
+        tracer, newton, freedom = self._tracer(request)
+        idle = freedom.mobility > 0
+        return Follower(self.model, newton, request, tracer, until=until, steps=steps, idle=idle), freedom
 
     def on(self, comm: MPI.Comm) -> Simulation:
         """The same scene at the same fidelity for other processes, as drawn."""
@@ -322,6 +368,24 @@ class Simulation:
         if rest is not None:
             ratio = self.linkage.dim / float(radius_ratios(rest, self.model.mesh.cells).min())
         return self.comm.bcast(ratio, root=0)
+
+    def _tracer(self, request: CurveRequest) -> tuple[Tracer, Newton, Freedom]:
+        """What starts the path of a request, its solver, and the freedom of its configuration (collective)."""
+        assembly = assemble(self.linkage, request.configuration)
+        rigid = self.linkage.rigid
+        freedom = count_freedom(rigid, assembly.poses, rigid.motor_values(request.configuration.position))
+        newton = self.newton(request.force, request.others)
+        tracer = Tracer(self.model, newton, request, assembly=assembly, freedom=freedom, predictor=self._predictor)
+        return tracer, newton, freedom
+
+    def _check_description(self) -> None:
+        """Refuses a mechanism that is not the one this simulation was made for."""
+        if _description(self.scene.mechanism) != self._described:
+            raise DescriptionError(
+                f"mechanism {self.scene.mechanism.name!r}",
+                "links, joints or motors were added after the simulation was made",
+                "Make a new Simulation",
+            )
 
     def _chosen(self, curve: Curve | None) -> Curve:
         chosen = curve or self._last
