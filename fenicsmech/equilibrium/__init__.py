@@ -14,9 +14,11 @@
 """
 
 from fenicsmech.equilibrium.arc_length import ArcLength, ArcMetric, ArcSteps, PathPoint, metric_at
+from fenicsmech.equilibrium.branching import Sense, crossing, null_heading
 from fenicsmech.equilibrium.continuation import Goal, Stretch, follow
 from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadControl, MotorControl, ShareControl
 from fenicsmech.equilibrium.critical import Critical, CriticalPoint
+from fenicsmech.equilibrium.eigen import Mode, critical_changes, softest_modes
 from fenicsmech.equilibrium.lead import ForceLead, Heading, Lead, MotorLead
 from fenicsmech.equilibrium.load import PointLoad
 from fenicsmech.equilibrium.newton import Newton, NewtonOptions, NotConverged, Solution
@@ -43,6 +45,7 @@ __all__ = [
     "Hermite",
     "Lead",
     "LoadControl",
+    "Mode",
     "MotorControl",
     "MotorLead",
     "Newton",
@@ -54,14 +57,19 @@ __all__ = [
     "PointLoad",
     "Predictor",
     "Reaction",
+    "Sense",
     "ShareControl",
     "Solution",
     "State",
     "Step",
     "Stretch",
     "Tangent",
+    "critical_changes",
+    "crossing",
     "follow",
     "joint_reactions",
     "metric_at",
     "motor_torques",
+    "null_heading",
+    "softest_modes",
 ]

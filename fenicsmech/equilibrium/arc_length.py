@@ -169,7 +169,10 @@ class ArcLength:
         metric: what steps are measured in.
         steps: how finely.
         floor: least shift of the tangent, for mechanisms with idle freedoms.
-        travel_reference: largest change of the point's displacement per step; infinite if it is of no interest.
+        travel_reference: displacement of the point that is of interest; infinite if it is not.
+
+    Attributes:
+        length: of the next step, to begin with.
     """
 
     def __init__(
@@ -177,7 +180,7 @@ class ArcLength:
     ) -> None:
         self.newton, self.system, self.lead, self.metric = newton, newton.system, lead, metric
         self.steps, self.floor, self._travel_reference = steps, floor, travel_reference
-        self._length = steps.first
+        self.length = steps.first
 
     # -- points --------------------------------------------------------------------------------------------
 
@@ -264,24 +267,24 @@ class ArcLength:
         """
         tangent = point.tangent
         longest = self._longest(point)
-        self._length = min(self._length, longest)
+        self.length = min(self.length, longest)
         while True:
             reason = "the path bends too sharply, or another one is too near"
             try:
-                guess = self.lead.moved(self.system, point.state, tangent.scaled(self._length))
+                guess = self.lead.moved(self.system, point.state, tangent.scaled(self.length))
                 if not math.isfinite(self.system.elastic_energy()):
                     raise NotConverged("elements are inverted in the predicted state", 0)
                 found = self.correct(guess, tangent, point)
                 turn = self._turn(point, found)
-                _log.debug("arc %.2e: turn %.2f, %d iterations", self._length, turn, found.iterations)
+                _log.debug("arc %.2e: turn %.2f, %d iterations", self.length, turn, found.iterations)
                 if turn <= _LARGEST_TURN:
                     ease = min(_TURN / max(turn, 1e-12), math.sqrt(_ITERATIONS / found.iterations))
-                    self._length *= min(max(ease, 0.5), 2.0)
+                    self.length *= min(max(ease, 0.5), 2.0)
                     return found
             except NotConverged as failure:
                 reason = str(failure)
-            self._length *= 0.5
-            if self._length < self.steps.smallest * min(longest / self.steps.largest, 1.0):
+            self.length *= 0.5
+            if self.length < self.steps.smallest * min(longest / self.steps.largest, 1.0):
                 raise NotConverged(reason, 0)
 
     def _longest(self, point: PathPoint) -> float:

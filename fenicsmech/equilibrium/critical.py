@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from fenicsmech.equilibrium.arc_length import ArcLength, PathPoint
+from fenicsmech.equilibrium.lead import Heading
 from fenicsmech.equilibrium.newton import NotConverged
 from fenicsmech.log import logger
 
@@ -39,11 +40,14 @@ class CriticalPoint:
         kind: what it is.
         point: the equilibrium.
         modes: by how many the unstable modes change there.
+        course: the direction of the path over the step in which it lies. The tangent in the point itself is no measure
+            of it: rounding and the asymmetry of meshes let it lean towards the paths that cross.
     """
 
     kind: Critical
     point: PathPoint
     modes: int
+    course: Heading
 
 
 def locate(arc: ArcLength, before: PathPoint, after: PathPoint) -> list[CriticalPoint]:
@@ -51,7 +55,9 @@ def locate(arc: ArcLength, before: PathPoint, after: PathPoint) -> list[Critical
     if not _changes(arc, before, after):
         return []
     width = arc.along(before, after)
-    return _search(_Piece(arc, before, after), (0.0, before), (width, after), arc.steps.tolerance * width)
+    course = arc.metric.unit(arc.difference(after.state, before.state))
+    piece = _Piece(arc, before, after, course)
+    return _search(piece, (0.0, before), (width, after), arc.steps.tolerance * width)
 
 
 @dataclass(frozen=True)
@@ -61,6 +67,7 @@ class _Piece:
     arc: ArcLength
     before: PathPoint
     after: PathPoint
+    course: Heading
 
     def at(self, distance: float) -> PathPoint:
         return self.arc.between(self.before, self.after, distance)
@@ -83,7 +90,7 @@ def _search(
         if left and right:
             return _search(piece, low, middle, tolerance) + _search(piece, middle, high, tolerance)
         low, high = (low, middle) if left else (middle, high)
-    return _classified(piece.arc, low[1], high[1])
+    return _classified(piece, low[1], high[1])
 
 
 def _guess(
@@ -121,15 +128,17 @@ def _changes(arc: ArcLength, a: PathPoint, b: PathPoint) -> bool:
     )
 
 
-def _classified(arc: ArcLength, a: PathPoint, b: PathPoint) -> list[CriticalPoint]:
+def _classified(piece: _Piece, a: PathPoint, b: PathPoint) -> list[CriticalPoint]:
     """What lies between two points that are as good as one."""
+    arc, course = piece.arc, piece.course
     found, modes = [], abs(b.unstable_modes - a.unstable_modes)
     if _parameter_rate(arc, a) * _parameter_rate(arc, b) < 0.0:
         nearer = min(a, b, key=lambda point: abs(point.tangent.parameter))
-        found.append(CriticalPoint(Critical.LIMIT, nearer, 1))
+        found.append(CriticalPoint(Critical.LIMIT, nearer, 1, course))
         modes = abs(modes - 1)
     if modes:
-        found.append(CriticalPoint(Critical.BIFURCATION, b, modes))
+        found.append(CriticalPoint(Critical.BIFURCATION, b, modes, course))
     if _travel_rate(arc, a) * _travel_rate(arc, b) < 0.0:
-        found.append(CriticalPoint(Critical.TURNING, min(a, b, key=lambda point: abs(point.travel)), 0))
+        nearer = min(a, b, key=lambda point: abs(point.travel))
+        found.append(CriticalPoint(Critical.TURNING, nearer, 0, course))
     return found

@@ -280,6 +280,12 @@ class EquilibriumSystem:
             vector.array_w[-1] = 1.0
         return vector
 
+    def coordinates_mask(self) -> PETSc.Vec:
+        """One for each of the coordinates s, zero for multipliers and the controlled force (collective)."""
+        vector = self._map.createVecRight()
+        vector.array_w[: len(self.layout.free) + (self.joints.size if self.layout.last else 0)] = 1.0
+        return vector
+
     def step(self, x: PETSc.Vec) -> Step:
         """The change of state that the scaled unknowns ``x`` stand for (collective)."""
         local, layout = x.array_r, self.layout

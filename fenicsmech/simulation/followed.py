@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from fenicsmech.equilibrium import Critical, PathPoint
+from fenicsmech.equilibrium import Critical, CriticalPoint
 from fenicsmech.report import CurveMark, CurveSeries
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.frame import Frame
@@ -18,15 +18,18 @@ class PathEvent:
         kind: limit point of the load, turning point of the displacement, or bifurcation.
         frame: the equilibrium; also one of the curve's frames.
         index: which.
-        modes: by how many the unstable modes change there.
-        point: the equilibrium with the direction of the path.
+        critical: the point of the path that branches start from.
     """
 
     kind: Critical
     frame: Frame
     index: int
-    modes: int
-    point: PathPoint
+    critical: CriticalPoint
+
+    @property
+    def modes(self) -> int:
+        """By how many the unstable modes change there."""
+        return self.critical.modes
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,9 +16,12 @@ from fenicsmech.equilibrium import (
     Newton,
     NotConverged,
     PathPoint,
+    Sense,
     State,
+    crossing,
     follow,
     metric_at,
+    null_heading,
 )
 from fenicsmech.errors import EquilibriumError
 from fenicsmech.simulation.followed import PathEvent
@@ -79,9 +82,25 @@ class Follower:
             start = start.reversed()
         self._walk(arc, start, goals, watch)
 
+    def from_bifurcation(self, event: PathEvent, sense: Sense, watch: Callable[[int], None]) -> None:
+        """Follows the path that crosses another one at ``event``.
+
+        Raises:
+            EquilibriumError: the path is not found, or ends early; carries the frames before that.
+        """
+        self.frames.append(event.frame)
+        rest = self._tracer.frame(LoadControl(0.0), ())  # the tangent at the bifurcation tells no scale
+        try:
+            arc = self._arc(rest.state)
+            first = crossing(arc, event.critical, null_heading(arc, event.critical), sense)
+        except NotConverged as failure:
+            raise self._ended(failure) from failure
+        self.frames.append(self._tracer.record(first.solution()))
+        self._walk(arc, first, self._goals(), watch)
+
     def _walk(self, arc: ArcLength, start: PathPoint, goals: list[Goal], watch: Callable[[int], None]) -> None:
         clock = self._model.clock
-        path = follow(arc, start, goals, most=self._until.frames - 1)
+        path = follow(arc, start, goals, most=self._until.frames - len(self.frames))
         while True:
             began, seconds = perf_counter(), dict(clock.seconds)
             try:
@@ -92,7 +111,7 @@ class Follower:
                 return
             for critical in stretch.critical:
                 frame = self._tracer.record(critical.point.solution())
-                self.events.append(PathEvent(critical.kind, frame, len(self.frames), critical.modes, critical.point))
+                self.events.append(PathEvent(critical.kind, frame, len(self.frames), critical))
                 self.frames.append(frame)
             frame = self._tracer.record(stretch.point.solution())
             self.frames.append(replace(frame, seconds=perf_counter() - began, phases=clock.since(seconds)))

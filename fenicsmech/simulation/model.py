@@ -90,6 +90,7 @@ class MechanismModel:
         elastic: their elastic energy.
         interfaces: interface nodes as functions of body poses.
         design_nodes: the design field at the nodes of the displacement.
+        node_link: index of the flexible link of every local node.
         clock: where time goes.
         effects: what acts beside links, joints and forces.
     """
@@ -137,7 +138,7 @@ class MechanismModel:
         centres = np.array([body.centre for body in linkage.bodies])
         self.interfaces = InterfaceMap(self.elastic.u, cell_body, centres, linkage.joints.space)
         self.design_nodes = DesignAtNodes(self.elastic.d, self.elastic.u)
-        self._node_link = self._link_of_nodes()
+        self.node_link = self._link_of_nodes()
         self._point_loads: dict[Force | Output, PointLoad] = {}
 
     @property
@@ -230,7 +231,7 @@ class MechanismModel:
         u = np.zeros((owned, dim))
         for index, link in enumerate(self.mechanism.flexible_links):
             body = self.linkage.interfaces[link][0]
-            nodes = np.flatnonzero(self._node_link[:owned] == index)
+            nodes = np.flatnonzero(self.node_link[:owned] == index)
             offsets = positions[nodes] - np.array(self.linkage.bodies[body].centre)
             u[nodes] = self.linkage.joints.space.displace(poses[body], offsets)
         return State(u.ravel(), poses, np.zeros(self.linkage.joints.rows), 0.0, motors)

@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from fenicsmech.clock import Clock
 from fenicsmech.elasticity import PLANE_STRAIN, PLANE_STRESS, SPATIAL, Quadrature
-from fenicsmech.equilibrium import ArcSteps, Hermite, Newton, NewtonOptions, Predictor
+from fenicsmech.equilibrium import ArcSteps, Hermite, LoadControl, Newton, NewtonOptions, Predictor, Sense
 from fenicsmech.errors import AssemblyError, DescriptionError
 from fenicsmech.linkage import Freedom, assemble, build_linkage, count_freedom
 from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Mechanism, Output, Scene, validate
@@ -19,10 +19,11 @@ from fenicsmech.mechanism.checks import positive
 from fenicsmech.mechanism.places import in_dimension
 from fenicsmech.meshing import radius_ratios
 from fenicsmech.report import Panel, Progress, Silent, Trace, draw_configurations
+from fenicsmech.simulation.buckling import BucklingLoad, SoftMode, buckling_loads, soft_modes
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.explanation import Explanation, hints, simulated
 from fenicsmech.simulation.export import write_xdmf
-from fenicsmech.simulation.followed import FollowedCurve
+from fenicsmech.simulation.followed import FollowedCurve, PathEvent
 from fenicsmech.simulation.follower import Follower
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.goal_error import GoalError
@@ -190,17 +191,89 @@ class Simulation:
             EquilibriumError: the curve ends early; carries the frames before that.
         """
         self._check_description()
-        if not isinstance(until, Until):
-            raise DescriptionError("end of a path", f"{until!r} does not say where", "Give until=Until(displacement=…)")
+        _check_until(until)
         request = read_request(
             self.scene.mechanism, force, forces=[0.0], displacements=None, configuration=configuration, others=others
         )
         with Progress(until.frames, configuration.name) if self.comm.rank == 0 else Silent() as progress:
-            follower, freedom = self._follower(request, until, steps or ArcSteps())
+            follower, freedom = self._follower(request, until, steps)
             follower.from_rest(progress.update)
-        self._last = FollowedCurve(
-            force,
-            configuration,
+        self._last = self._followed(request, freedom, follower)
+        return self._last
+
+    def branches(
+        self, curve: FollowedCurve, event: PathEvent, *, until: Until, steps: ArcSteps | None = None
+    ) -> tuple[FollowedCurve, FollowedCurve]:
+        """The curve that crosses ``curve`` at a simple bifurcation, from there in both senses (collective).
+
+        Args:
+            curve: a followed curve.
+            event: one of its bifurcations.
+            until: where each of the two ends.
+            steps: how finely they are followed.
+
+        Raises:
+            DescriptionError: the event is no bifurcation of the curve, or not a simple one.
+            EquilibriumError: the curve is not found, or ends early; carries the frames before that.
+        """
+        self._check_description()
+        _check_until(until)
+        if event not in curve.bifurcations:
+            raise DescriptionError("branches", "the event is no bifurcation of the curve", "Choose from its bifurcations")
+        if event.modes != 1:
+            raise DescriptionError(
+                "branches",
+                f"{event.modes} modes become unstable at once",
+                "Break the symmetry a little, or follow the curve with a smaller tolerance in ArcSteps",
+            )
+        request = CurveRequest(curve.force_part, (LoadControl(0.0),), curve.configuration, curve.others)
+        found = []
+        with self.model.shaped(event.frame.design):
+            for sense in Sense:
+                follower, freedom = self._follower(request, until, steps)
+                follower.from_bifurcation(event, sense, lambda done: None)
+                found.append(self._followed(request, freedom, follower))
+        return found[0], found[1]
+
+    def buckling_loads(
+        self, curve: Curve | None = None, *, frame: Frame | None = None, count: int = 3
+    ) -> tuple[BucklingLoad, ...]:
+        """Forces at which the equilibrium would stop being unique, from the tangent and its rate (collective).
+
+        Exact for columns and others that hardly move before they buckle; else the better the nearer the frame is.
+
+        Args:
+            curve: the last curve computed by default.
+            frame: the equilibrium; the last one of the curve by default.
+            count: how many, those nearest to the force of the frame, in both senses, nearest first.
+
+        Raises:
+            DescriptionError: no curve was computed yet.
+        """
+        chosen = self._chosen(curve)
+        newton = self.newton(chosen.force_part, chosen.others)
+        return buckling_loads(self.model, newton, chosen, frame or chosen.frames[-1], count)
+
+    def soft_modes(
+        self, curve: Curve | None = None, *, frame: Frame | None = None, count: int = 3
+    ) -> tuple[SoftMode, ...]:
+        """The directions in which an equilibrium is softest under dead loads, softest first (collective).
+
+        Arguments and errors as those of ``buckling_loads``.
+        """
+        chosen = self._chosen(curve)
+        newton = self.newton(chosen.force_part, chosen.others)
+        return soft_modes(self.model, newton, chosen, frame or chosen.frames[-1], count)
+
+    def _follower(self, request: CurveRequest, until: Until, steps: ArcSteps | None) -> tuple[Follower, Freedom]:
+        tracer, newton, freedom = self._tracer(request)
+        idle, steps = freedom.mobility > 0, steps or ArcSteps()
+        return Follower(self.model, newton, request, tracer, until=until, steps=steps, idle=idle), freedom
+
+    def _followed(self, request: CurveRequest, freedom: Freedom, follower: Follower) -> FollowedCurve:
+        return FollowedCurve(
+            request.force,
+            request.configuration,
             freedom,
             tuple(follower.frames),
             units=self.scene.units,
@@ -208,12 +281,6 @@ class Simulation:
             others=request.others,
             events=tuple(follower.events),
         )
-        return self._last
-
-    def _follower(self, request: CurveRequest, until: Until, steps: ArcSteps) -> tuple[Follower, Freedom]:
-        tracer, newton, freedom = self._tracer(request)
-        idle = freedom.mobility > 0
-        return Follower(self.model, newton, request, tracer, until=until, steps=steps, idle=idle), freedom
 
     def on(self, comm: MPI.Comm) -> Simulation:
         """The same scene at the same fidelity for other processes, as drawn."""
@@ -392,6 +459,11 @@ class Simulation:
         if chosen is None:
             raise DescriptionError("simulation", "no curve was computed yet", "Call load_displacement first")
         return chosen
+
+
+def _check_until(until: Until) -> None:
+    if not isinstance(until, Until):
+        raise DescriptionError("end of a path", f"{until!r} does not say where", "Give until=Until(displacement=…)")
 
 
 def _description(mechanism: Mechanism) -> tuple[tuple, ...]:
