@@ -113,11 +113,10 @@ def metric_at(
 
 
 def mean_product(system: EquilibriumSystem, a: Heading, b: Heading) -> float:
-    """Mean product of two motions, displacements over the mechanism's length (collective)."""
-    comm, joints = system.layout.comm, system.joints
-    nodes, count = comm.allreduce(
-        np.array([float(a.step.u @ b.step.u) / joints.length**2, float(len(system.layout.free))])
-    )
+    """Mean product of two motions of free nodes and bodies, displacements over the mechanism's length (collective)."""
+    comm, joints, free = system.layout.comm, system.joints, system.layout.free
+    own = np.array([float(a.step.u[free] @ b.step.u[free]) / joints.length**2, float(len(free))])
+    nodes, count = comm.allreduce(own)
     bodies = float(np.sum(a.step.z * b.step.z / joints.pose_scale**2))
     return nodes / max(count, 1.0) + bodies / max(len(a.step.z), 1)
 
@@ -181,6 +180,7 @@ class ArcLength:
         self.newton, self.system, self.lead, self.metric = newton, newton.system, lead, metric
         self.steps, self.floor, self._travel_reference = steps, floor, travel_reference
         self.length = steps.first
+        self._before: PathPoint | None = None
 
     # -- points --------------------------------------------------------------------------------------------
 
@@ -271,7 +271,7 @@ class ArcLength:
         while True:
             reason = "the path bends too sharply, or another one is too near"
             try:
-                guess = self.lead.moved(self.system, point.state, tangent.scaled(self.length))
+                guess = self._guess(point)
                 if not math.isfinite(self.system.elastic_energy()):
                     raise NotConverged("elements are inverted in the predicted state", 0)
                 found = self.correct(guess, tangent, point)
@@ -280,12 +280,26 @@ class ArcLength:
                 if turn <= _LARGEST_TURN:
                     ease = min(_TURN / max(turn, 1e-12), math.sqrt(_ITERATIONS / found.iterations))
                     self.length *= min(max(ease, 0.5), 2.0)
+                    self._before = point
                     return found
             except NotConverged as failure:
                 reason = str(failure)
             self.length *= 0.5
             if self.length < self.steps.smallest * min(longest / self.steps.largest, 1.0):
                 raise NotConverged(reason, 0)
+
+    def _guess(self, point: PathPoint) -> State:
+        """Along the tangent, and along the curvature if the last two tangents tell it.
+
+        y = y₁ + h y₁′ + ½ h² (y₁′ − y₀′) / |y₁ − y₀|
+        """
+        ahead, before = point.tangent.scaled(self.length), self._before
+        if before is not None:
+            width = self.metric.norm(self.difference(point.state, before.state))
+            bend = point.tangent + before.tangent.scaled(-1.0)
+            if width > 0.0 and self.length * self.metric.norm(bend) <= 2.0 * _TURN * width:
+                ahead = ahead + bend.scaled(0.5 * self.length**2 / width)
+        return self.lead.moved(self.system, point.state, ahead)
 
     def _longest(self, point: PathPoint) -> float:
         """The arc that changes neither parameter nor displacement nor anything's place too much."""
