@@ -56,12 +56,15 @@ from fenicsmech.mechanism import (
     strip,
 )
 from fenicsmech.simulation import (
+    BucklingLoad,
     Curve,
     FollowedCurve,
     Frame,
+    ModeShape,
     PathEvent,
     PinFriction,
     Simulation,
+    SoftMode,
     Until,
     friction_band,
 )
@@ -122,8 +125,11 @@ __all__ = [
     "PinFriction",
     "friction_band",
     "ArcSteps",
+    "BucklingLoad",
     "Critical",
     "FollowedCurve",
+    "ModeShape",
     "PathEvent",
+    "SoftMode",
     "Until",
 ]

@@ -14,7 +14,7 @@
 """
 
 from fenicsmech.equilibrium.arc_length import ArcLength, ArcMetric, ArcSteps, PathPoint, metric_at
-from fenicsmech.equilibrium.branching import Sense, crossing, null_heading
+from fenicsmech.equilibrium.branching import Sense, crossing, null_vector
 from fenicsmech.equilibrium.continuation import Goal, Stretch, follow
 from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadControl, MotorControl, ShareControl
 from fenicsmech.equilibrium.critical import Critical, CriticalPoint
@@ -70,6 +70,6 @@ __all__ = [
     "joint_reactions",
     "metric_at",
     "motor_torques",
-    "null_heading",
+    "null_vector",
     "softest_modes",
 ]

@@ -17,6 +17,7 @@ from fenicsmech.equilibrium.critical import CriticalPoint
 from fenicsmech.equilibrium.eigen import softest_modes
 from fenicsmech.equilibrium.lead import Heading
 from fenicsmech.equilibrium.newton import NotConverged
+from fenicsmech.equilibrium.state import Step
 
 _FIRST = 0.02  # of the mechanism's length, or rad: ε
 _TRIES = 8  # of half the size each
@@ -29,8 +30,8 @@ class Sense(Enum):
     AGAINST = -1.0
 
 
-def crossing(arc: ArcLength, critical: CriticalPoint, mode: Heading, sense: Sense) -> PathPoint:
-    """The first point of the path that crosses at ``critical``, whose direction ``mode`` tells (collective).
+def crossing(arc: ArcLength, critical: CriticalPoint, mode: Step, sense: Sense) -> PathPoint:
+    """The first point of the path that crosses at ``critical``, with the null vector ``mode`` (collective).
 
     Steps of ``arc`` go on from there.
 
@@ -39,7 +40,8 @@ def crossing(arc: ArcLength, critical: CriticalPoint, mode: Heading, sense: Sens
     """
     metric, point = arc.metric, critical.point
     course = metric.unit(critical.course)
-    across = mode + course.scaled(-metric.dot(mode, course))
+    across = Heading(mode, 0.0)
+    across = across + course.scaled(-metric.dot(across, course))
     across = metric.unit(across).scaled(sense.value)
     size = _FIRST / arc.system.size(across.step)
     for _ in range(_TRIES):
@@ -54,7 +56,7 @@ def crossing(arc: ArcLength, critical: CriticalPoint, mode: Heading, sense: Sens
     raise NotConverged("no path was found across the bifurcation", 0)
 
 
-def null_heading(arc: ArcLength, critical: CriticalPoint) -> Heading:
-    """The null vector of the tangent at a bifurcation (collective)."""
+def null_vector(arc: ArcLength, critical: CriticalPoint) -> Step:
+    """The null vector of the tangent at a bifurcation, its largest displacement the mechanism's length (collective)."""
     (mode,) = softest_modes(arc.newton, arc.lead, critical.point.state, floor=arc.floor, count=1)
-    return Heading(mode.step, 0.0)
+    return mode.step

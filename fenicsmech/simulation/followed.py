@@ -8,9 +8,10 @@ from fenicsmech.equilibrium import Critical, CriticalPoint
 from fenicsmech.report import CurveMark, CurveSeries
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.frame import Frame
+from fenicsmech.simulation.mode_shape import ModeShape
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PathEvent:
     """A critical point of a followed curve.
 
@@ -18,12 +19,14 @@ class PathEvent:
         kind: limit point of the load, turning point of the displacement, or bifurcation.
         frame: the equilibrium; also one of the curve's frames.
         index: which.
+        mode: where to the mechanism gives way: of a bifurcation the null vector of the tangent, else the path's direction.
         critical: the point of the path that branches start from.
     """
 
     kind: Critical
     frame: Frame
     index: int
+    mode: ModeShape
     critical: CriticalPoint
 
     @property

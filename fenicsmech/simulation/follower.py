@@ -10,6 +10,8 @@ from fenicsmech.equilibrium import (
     IDLE_STIFFNESS,
     ArcLength,
     ArcSteps,
+    Critical,
+    CriticalPoint,
     ForceLead,
     Goal,
     LoadControl,
@@ -21,11 +23,12 @@ from fenicsmech.equilibrium import (
     crossing,
     follow,
     metric_at,
-    null_heading,
+    null_vector,
 )
 from fenicsmech.errors import EquilibriumError
 from fenicsmech.simulation.followed import PathEvent
 from fenicsmech.simulation.frame import Frame
+from fenicsmech.simulation.mode_shape import mode_shape
 from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.request import CurveRequest
 from fenicsmech.simulation.tracer import Tracer
@@ -92,7 +95,7 @@ class Follower:
         rest = self._tracer.frame(LoadControl(0.0), ())  # the tangent at the bifurcation tells no scale
         try:
             arc = self._arc(rest.state)
-            first = crossing(arc, event.critical, null_heading(arc, event.critical), sense)
+            first = crossing(arc, event.critical, event.mode.step, sense)
         except NotConverged as failure:
             raise self._ended(failure) from failure
         self.frames.append(self._tracer.record(first.solution()))
@@ -110,12 +113,21 @@ class Follower:
             if stretch is None:
                 return
             for critical in stretch.critical:
-                frame = self._tracer.record(critical.point.solution())
-                self.events.append(PathEvent(critical.kind, frame, len(self.frames), critical))
-                self.frames.append(frame)
+                self._record_event(arc, critical)
             frame = self._tracer.record(stretch.point.solution())
             self.frames.append(replace(frame, seconds=perf_counter() - began, phases=clock.since(seconds)))
             watch(len(self.frames))
+
+    def _record_event(self, arc: ArcLength, critical: CriticalPoint) -> None:
+        if critical.kind is Critical.BIFURCATION:
+            step = null_vector(arc, critical)
+        else:
+            step = critical.point.tangent.step
+            step = step.scaled(1.0 / arc.system.size(step))
+        frame = self._tracer.record(critical.point.solution())
+        mode = mode_shape(self._model, step)
+        self.events.append(PathEvent(critical.kind, frame, len(self.frames), mode, critical))
+        self.frames.append(frame)
 
     def _arc(self, state: State) -> ArcLength:
         """The continuation, in units of what is asked for."""
