@@ -1,28 +1,37 @@
 """The softest modes of the tangent at an equilibrium, and the loads at which it becomes singular, by SLEPc.
 
-With the KKT matrix K, the identity M of the coordinates s (0 for multipliers and force), and the rate K′ of the matrix
-along a path, both by the factor of K that Newton's method uses:
+With the KKT matrix K and the identity M of the coordinates s (0 for multipliers and force), the stiffnesses μ of the
+softest modes under the constraints are
 
-    K φ = μ M φ              K⁻¹ M φ = φ / μ           stiffness μ of the softest modes, under the constraints
-    (K + Δ K′) φ = 0         −K⁻¹ K′ φ = φ / Δ         Δ: how far to go along the path until K is singular
+    K φ = μ M φ,      K⁻¹ M φ = φ / μ.
 
-K′ is a symmetric difference. Source of the second: linear buckling at a prestressed state, e.g. Wriggers, Nonlinear
-Finite Element Methods (doi:10.1007/978-3-540-71001-1), chapter 7.
+Let K′ and K″ be the derivatives of K by the path's parameter along the path y + Δ ẏ + ½ Δ² ÿ, K ÿ = −K′ ẏ. How far to
+go until K is singular is a quadratic eigenvalue problem, linear in v = φ / Δ:
+
+    (K + Δ K′ + ½ Δ² K″) φ = 0,      −K⁻¹ (K′ v + ½ K″ φ) = v / Δ,   v = φ / Δ.
+
+Slender links need K″: as a link bends, its modes must bend with it to stay free of strain, which costs them no energy
+only in second order. All use the factor of K that Newton's method uses; derivatives are symmetric differences.
+Source: Wriggers, Nonlinear Finite Element Methods (doi:10.1007/978-3-540-71001-1), chapter 7, for the linear problem;
+Tisseur & Meerbergen (doi:10.1137/S0036144500381988) for the quadratic one.
 """
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from fenicsmech.equilibrium.lead import Heading, Lead
 from fenicsmech.equilibrium.newton import Newton, NotConverged
 from fenicsmech.equilibrium.state import State, Step
+from fenicsmech.equilibrium.system import EquilibriumSystem
 
-_DIFFERENCE = 1e-5  # of the mechanism's length, or rad: half the span of the difference K′ is taken from
+_FIRST, _SECOND = 1e-5, 1e-3  # of the mechanism's length, or rad: half the spans of the differences for K′ and K″
+_UNIT = 1e-2  # likewise: the change that eigenvalues are measured in
 _TOLERANCE = 1e-10  # relative, of eigenvalues
 _REAL = 1e-6  # imaginary over absolute value of an eigenvalue that rounding made complex
 
@@ -42,31 +51,59 @@ def softest_modes(newton: Newton, lead: Lead, state: State, *, floor: float, cou
     """
     _factor(newton, lead, state, floor)
     mask = newton.system.coordinates_mask()
+    own = len(mask.array_r)
 
-    def times(x: PETSc.Vec, y: PETSc.Vec) -> None:
-        y.pointwiseMult(mask, x)
+    def apply(x: np.ndarray, y: np.ndarray) -> None:
+        right = mask.duplicate()
+        right.array_w[:] = mask.array_r * x
+        y[:] = newton.solve_linear(right).array_r
 
-    return _inverse_modes(newton, times, count)
+    return _largest(newton.system, own, lambda x: x, apply, count)
 
 
 def critical_changes(newton: Newton, lead: Lead, state: State, *, floor: float, count: int) -> list[Mode]:
     """The ``count`` changes Δ of the lead's parameter that make the tangent singular, nearest first (collective).
 
-    Both senses count. Exact if the path is straight and the tangent linear along it, as for a column; else the better
-    the smaller Δ is.
+    Both senses count. Exact to second order in Δ.
+
+    Raises:
+        NotConverged: the parameter moves nothing.
     """
     system = newton.system
     control = lead.holding(state)
     _factor(newton, lead, state, floor)
-    rate = lead.heading(system.step(newton.solve_linear(control.rate(system, state))), control)
-    change = _tangent_rate(newton, lead, state, rate)
+    x = newton.solve_linear(control.rate(system, state))
+    rate = lead.heading(system.step(x), control)
+    size = system.size(rate.step)
+    if not size > 0.0:
+        raise NotConverged("it moves nothing", 0)
+    unit = _UNIT / size
+    later, earlier = (_tangent(newton, lead, state, rate.scaled(sign * _FIRST / size)) for sign in (1.0, -1.0))
+    first = _combined([(0.5 * unit * size / _FIRST, later), (-0.5 * unit * size / _FIRST, earlier)])
     _factor(newton, lead, state, floor)
+    bend = x.duplicate()
+    first.mult(x, bend)
+    bend.scale(-1.0 / unit)
+    bend = Heading(system.step(newton.solve_linear(bend)), 0.0)
+    amount = _SECOND / size
+    later, here, earlier = (
+        _tangent(newton, lead, state, rate.scaled(t) + bend.scaled(0.5 * t * t)) for t in (amount, 0.0, -amount)
+    )
+    weight = 0.5 * (unit / amount) ** 2
+    second = _combined([(weight, later), (-2.0 * weight, here), (weight, earlier)])
+    _factor(newton, lead, state, floor)
+    own = len(x.array_r)
 
-    def times(x: PETSc.Vec, y: PETSc.Vec) -> None:
-        change.mult(x, y)
-        y.scale(-1.0)
+    def apply(x: np.ndarray, y: np.ndarray) -> None:
+        v, shape = template.duplicate(), template.duplicate()
+        v.array_w[:], shape.array_w[:] = x[:own], x[own:]
+        right = first * v + second * shape
+        right.scale(-1.0)
+        y[:own], y[own:] = newton.solve_linear(right).array_r, v.array_r
 
-    return _inverse_modes(newton, times, count)
+    template = system.control_row()
+    values = _largest(system, 2 * own, lambda x: x[own:], apply, count)
+    return [Mode(unit * mode.value, mode.step) for mode in values]
 
 
 def _factor(newton: Newton, lead: Lead, state: State, floor: float) -> None:
@@ -75,57 +112,68 @@ def _factor(newton: Newton, lead: Lead, state: State, floor: float) -> None:
     newton.factor(state, control, newton.system.balance(state, control), floor)
 
 
-def _tangent_rate(newton: Newton, lead: Lead, state: State, rate: Heading) -> PETSc.Mat:
-    """K′ by the lead's parameter."""
-    system = newton.system
-    size = system.size(rate.step)
-    if not size > 0.0:
-        raise NotConverged("it moves nothing", 0)
-    amount, ends = _DIFFERENCE / size, []
-    for sign in (1.0, -1.0):
-        moved = lead.moved(system, state, rate.scaled(sign * amount))
-        control = lead.holding(moved)
-        ends.append(system.kkt(moved, control, system.balance(moved, control)).copy())
-    later, earlier = ends
-    later.axpy(-1.0, earlier, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-    later.scale(0.5 / amount)
-    return later
+def _tangent(newton: Newton, lead: Lead, state: State, change: Heading) -> PETSc.Mat:
+    """A copy of K after a change of state."""
+    moved = lead.moved(newton.system, state, change)
+    control = lead.holding(moved)
+    return newton.system.kkt(moved, control, newton.system.balance(moved, control)).copy()
 
 
-class _Inverse:
-    """x ↦ K⁻¹ (B x), as SLEPc sees it."""
+def _combined(terms: Sequence[tuple[float, PETSc.Mat]]) -> PETSc.Mat:
+    """Σ weight · matrix, in the first of them."""
+    (weight, total), *others = terms
+    total.scale(weight)
+    for weight, matrix in others:
+        total.axpy(weight, matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+    return total
 
-    def __init__(self, newton: Newton, times) -> None:
-        self._newton, self._times = newton, times
+
+class _Operator:
+    """A linear map of this rank's values, as SLEPc sees it."""
+
+    def __init__(self, apply: Callable[[np.ndarray, np.ndarray], None]) -> None:
+        self._apply = apply
 
     def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        product = x.duplicate()
-        self._times(x, product)
-        self._newton.solve_linear(product).copy(y)
+        self._apply(x.array_r, y.array_w)
 
 
-def _inverse_modes(newton: Newton, times, count: int) -> list[Mode]:
-    """The eigenvalues θ of K⁻¹ B largest in size, as modes with the values 1 / θ."""
-    system = newton.system
-    template = system.control_row()
-    size = template.getSizes()
-    operator = PETSc.Mat().createPython((size, size), _Inverse(newton, times), comm=system.layout.comm)
-    solver = SLEPc.EPS().create(system.layout.comm)
+def _largest(
+    system: EquilibriumSystem,
+    size: int,
+    part: Callable[[np.ndarray], np.ndarray],
+    apply: Callable[[np.ndarray, np.ndarray], None],
+    count: int,
+) -> list[Mode]:
+    """Modes with the values 1 / θ, θ the ``count`` real eigenvalues of a map that are largest in size (collective).
+
+    Args:
+        system: whose scaled unknowns are the ``part`` of an eigenvector.
+        size: of the map on this rank.
+        part: takes the unknowns from this rank's values of an eigenvector.
+        apply: the map.
+        count: how many.
+    """
+    comm = system.layout.comm
+    total = comm.allreduce(size)
+    operator = PETSc.Mat().createPython(((size, total), (size, total)), _Operator(apply), comm=comm)
+    solver = SLEPc.EPS().create(comm)
     solver.setOperators(operator)
     solver.setProblemType(SLEPc.EPS.ProblemType.NHEP)
     solver.setWhichEigenpairs(SLEPc.EPS.Which.LARGEST_MAGNITUDE)
     wanted = count + 2  # a pair may be complex
-    solver.setDimensions(nev=wanted, ncv=min(size[1], 2 * wanted + 20))
+    solver.setDimensions(nev=wanted, ncv=min(total, 2 * wanted + 20))
     solver.setTolerances(tol=_TOLERANCE, max_it=200)
     solver.solve()
-    modes, vector = [], template.duplicate()
+    modes, vector, shape = [], operator.createVecRight(), system.control_row()
     for index in range(solver.getConverged()):
         theta = solver.getEigenpair(index, vector)
         if theta != 0.0 and abs(theta.imag) <= _REAL * abs(theta):
-            step = system.step(vector)
-            size_of = system.size(step)
-            if math.isfinite(size_of) and size_of > 0.0:
-                modes.append(Mode(1.0 / theta.real, step.scaled(1.0 / size_of)))
+            shape.array_w[:] = part(vector.array_r)
+            step = system.step(shape)
+            largest = system.size(step)
+            if largest > 0.0:
+                modes.append(Mode(1.0 / theta.real, step.scaled(1.0 / largest)))
     solver.destroy()
     operator.destroy()
     return sorted(modes, key=lambda mode: abs(mode.value))[:count]
