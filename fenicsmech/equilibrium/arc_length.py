@@ -230,9 +230,7 @@ class ArcLength:
 
     def difference(self, later: State, earlier: State) -> Heading:
         """``later`` − ``earlier``."""
-        return Heading(
-            self.system.difference(later, earlier), self.lead.value(later) - self.lead.value(earlier)
-        )
+        return Heading(self.system.difference(later, earlier), self.lead.value(later) - self.lead.value(earlier))
 
     def along(self, start: PathPoint, end: PathPoint) -> float:
         """How far ``end`` lies ahead of ``start`` along the tangent there."""

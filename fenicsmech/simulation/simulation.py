@@ -219,7 +219,9 @@ class Simulation:
         self._check_description()
         _check_until(until)
         if event not in curve.bifurcations:
-            raise DescriptionError("branches", "the event is no bifurcation of the curve", "Choose from its bifurcations")
+            raise DescriptionError(
+                "branches", "the event is no bifurcation of the curve", "Choose from its bifurcations"
+            )
         if event.modes != 1:
             raise DescriptionError(
                 "branches",

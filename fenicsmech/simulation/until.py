@@ -16,7 +16,7 @@ class Until:
     Args:
         displacement: of the force's point along it, counted as on curves; one value or several.
         force: its magnitude; one value or several.
-        frames: most frames; the path ends there without complaint.
+        frames: most frames, critical points aside; the path ends there without complaint.
 
     Raises:
         DescriptionError: neither a displacement nor a force, or numbers that make no sense.

@@ -17,7 +17,9 @@ SUNK = 12.0  # mm at the end
 
 def extremum(function, low: float, high: float) -> float:
     """Where a smooth function of how far the toggle has sunk has its maximum, to rounding."""
-    return minimize_scalar(lambda sunk: -function(sunk), bounds=(low, high), method="bounded", options={"xatol": 1e-10}).x
+    return minimize_scalar(
+        lambda sunk: -function(sunk), bounds=(low, high), method="bounded", options={"xatol": 1e-10}
+    ).x
 
 
 @pytest.mark.parametrize("space", ["plane-stress", "3d"])
@@ -76,7 +78,7 @@ def test_path_against_the_force_and_end_at_a_force():
     assert back.forces[-1] == pytest.approx(0.0, abs=1e-9) and len(back.limit_points) == 1
     assert back.frames[-1].outputs[case.sunk] == pytest.approx(toggle.RISE, rel=1e-6)
     few = case.simulation.follow(case.push, until=fm.Until(force=2.0, frames=4))
-    assert len(few.frames) == 4 and few.forces[-1] < 2.0
+    assert len(few.frames) == 4 and few.forces[-1] < 2.0 and not few.events
 
 
 @pytest.mark.parametrize("largest", [0.02, 0.2])
@@ -100,20 +102,18 @@ def test_shallow_arch_follows_the_beam_through_both_limit_points():
     assert lower.frame.force == pytest.approx(fine.min(), rel=1e-2)
 
 
-def test_deep_arch_reaches_the_limit_load_of_the_literature_and_hangs_through():
+def test_deep_arch_reaches_the_limit_load_of_the_literature():
     simulation, push, drop = deep_arch()
     curve = simulation.follow(push, until=fm.Until(displacement=drop))
-    first = curve.limit_points[0]
-    assert first.frame.force == pytest.approx(LIMIT_LOAD, rel=1e-2)
-    assert not curve.stable[first.index + 1 : first.index + 4].any()
+    (limit,) = curve.limit_points
+    assert limit.frame.force == pytest.approx(LIMIT_LOAD, rel=1e-2)
+    assert curve.stable[: limit.index].all() and not curve.stable[limit.index + 1 :].any()
 
 
 @pytest.mark.parallel
 def test_path_is_the_same_on_any_number_of_ranks():
-    case = toggle.toggle(stilt_modulus=SOFT, comm=MPI.COMM_WORLD)
-    curve = case.simulation.follow(case.push, until=fm.Until(displacement=16.0))
+    case = toggle.toggle(stilt_modulus=STIFF, comm=MPI.COMM_WORLD)
+    curve = case.simulation.follow(case.push, until=fm.Until(displacement=3.0))
     sunk = np.array([frame.outputs[case.sunk] for frame in curve.frames])
     assert curve.forces == pytest.approx(toggle.force(sunk), abs=1e-8)
-    assert [event.kind.value for event in curve.events] == [
-        "limit point", "turning point", "turning point", "limit point",
-    ]  # fmt: skip
+    assert [event.kind for event in curve.events] == [fm.Critical.LIMIT]

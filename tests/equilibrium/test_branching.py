@@ -25,7 +25,7 @@ def elastica(shortening: float) -> float:
 
 
 def straight(case: Column) -> fm.FollowedCurve:
-    return case.simulation.follow(case.push, until=fm.Until(force=1.5 * EULER))
+    return case.simulation.follow(case.push, until=fm.Until(force=1.1 * EULER))
 
 
 def test_first_two_bifurcations_of_a_column_are_those_of_euler():
@@ -82,7 +82,6 @@ def test_bifurcation_and_branch_are_the_same_on_any_number_of_ranks():
     curve = straight(case)
     (event,) = curve.bifurcations
     assert event.frame.force == pytest.approx(CRITICAL, rel=5e-4)
-    one, other = case.simulation.branches(curve, event, until=fm.Until(displacement=10.0))
-    for branch in (one, other):
+    for branch in case.simulation.branches(curve, event, until=fm.Until(displacement=1.0)):
         squeezed = branch.forces[-1] * LENGTH / (YOUNG * THICKNESS)
-        assert branch.forces[-1] / CRITICAL == pytest.approx(elastica(10.0 - squeezed), rel=1e-2)
+        assert branch.forces[-1] / CRITICAL == pytest.approx(elastica(1.0 - squeezed), rel=1e-2)

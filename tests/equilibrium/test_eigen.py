@@ -82,4 +82,6 @@ def test_buckling_loads_are_the_same_on_any_number_of_ranks():
     alone = strut(Hold.CLAMPED_CLAMPED)
     reference = alone.simulation.load_displacement(alone.push, forces=[0.0])
     found = [load.force for load in case.simulation.buckling_loads(curve, count=3)]
-    assert found == pytest.approx([load.force for load in alone.simulation.buckling_loads(reference, count=3)], rel=1e-6)
+    assert found == pytest.approx(
+        [load.force for load in alone.simulation.buckling_loads(reference, count=3)], rel=1e-6
+    )
