@@ -19,7 +19,7 @@ from fenicsmech.equilibrium.continuation import Goal, Stretch, follow
 from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadControl, MotorControl, ShareControl
 from fenicsmech.equilibrium.critical import Critical, CriticalPoint
 from fenicsmech.equilibrium.eigen import Mode, critical_changes, softest_modes
-from fenicsmech.equilibrium.lead import ForceLead, Heading, Lead, MotorLead
+from fenicsmech.equilibrium.lead import ForceLead, Heading, Lead
 from fenicsmech.equilibrium.load import PointLoad
 from fenicsmech.equilibrium.newton import Newton, NewtonOptions, NotConverged, Solution
 from fenicsmech.equilibrium.path import IDLE_STIFFNESS, Path, PathFailed
@@ -47,7 +47,6 @@ __all__ = [
     "LoadControl",
     "Mode",
     "MotorControl",
-    "MotorLead",
     "Newton",
     "NewtonOptions",
     "NotConverged",

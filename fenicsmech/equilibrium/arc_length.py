@@ -23,7 +23,9 @@ from fenicsmech.equilibrium.lead import Heading, Lead
 from fenicsmech.equilibrium.newton import Newton, NotConverged, Solution
 from fenicsmech.equilibrium.state import State
 from fenicsmech.equilibrium.system import Balance, EquilibriumSystem
+from fenicsmech.errors import DescriptionError
 from fenicsmech.log import logger
+from fenicsmech.mechanism.checks import positive
 
 _log = logger(__name__)
 _TURN = 0.25  # rad between the tangents at both ends of a step that is as long as it should be
@@ -44,6 +46,9 @@ class ArcSteps:
         smallest: the shortest step, likewise; where even that fails the path ends with an error.
         motion: how far a step may move anything, in lengths of the mechanism or rad.
         tolerance: how closely limit points and bifurcations are located, as a part of the step they lie in.
+
+    Raises:
+        DescriptionError: a length is not positive, or the tolerance not between 0 and 1.
     """
 
     first: float = 0.02
@@ -51,6 +56,14 @@ class ArcSteps:
     smallest: float = 1e-6
     motion: float = 0.1
     tolerance: float = 1e-4
+
+    def __post_init__(self) -> None:
+        for name in ("first", "largest", "smallest", "motion", "tolerance"):
+            positive(f"{name} of arc-length steps", getattr(self, name))
+        if not self.tolerance < 1.0:
+            raise DescriptionError(
+                "tolerance of arc-length steps", f"{self.tolerance:g} is not below 1", "Give a part of a step, as 1e-4"
+            )
 
 
 @dataclass(frozen=True)
@@ -246,7 +259,8 @@ class ArcLength:
         t = distance / width
         slope = self.metric.dot(start.tangent, end.tangent)
         chord = self.difference(end.state, start.state)
-        # the cubic with the tangents by the distance: y = y₀ + t² (3 − 2 t) (y₁ − y₀) + w t (1 − t)² y₀′ − w t² (1 − t) y₁′
+        # the cubic with the rates by the distance:
+        # y = y₀ + t² (3 − 2 t) (y₁ − y₀) + w t (1 − t)² y₀′ − w t² (1 − t) y₁′
         ahead = (
             chord.scaled(t * t * (3.0 - 2.0 * t))
             + start.tangent.scaled(width * t * (1.0 - t) ** 2)

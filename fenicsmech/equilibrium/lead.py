@@ -1,4 +1,4 @@
-"""What leads a path that may turn back on itself: a force, or motors that turn together.
+"""What leads a path that may turn back on itself: a force.
 
 The parameter p of the path is one more unknown beside the state. A heading is a direction (ẏ, ṗ) in both.
 """
@@ -8,9 +8,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadControl, MotorControl
+from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadControl
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem
 
@@ -74,25 +72,3 @@ class ForceLead(Lead):
 
     def moved(self, system, state, heading):
         return system.moved(state, heading.step)
-
-
-@dataclass(frozen=True, eq=False)
-class MotorLead(Lead):
-    """p scales ``motors`` (values per connection); the controlled force keeps its magnitude."""
-
-    motors: np.ndarray
-
-    def value(self, state):
-        return float(state.motors @ self.motors / (self.motors @ self.motors))
-
-    def holding(self, state):
-        return MotorControl(self.value(state), self.motors)
-
-    def holding_travel(self, system, state):
-        return None
-
-    def heading(self, step, control):
-        return Heading(step, 1.0)
-
-    def moved(self, system, state, heading):
-        return system.moved(replace(state, motors=state.motors + heading.parameter * self.motors), heading.step)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from fenicsmech.equilibrium import IDLE_STIFFNESS, ForceLead, Mode, Newton, critical_changes, softest_modes
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.mode_shape import ModeShape, mode_shape
+from fenicsmech.simulation.model import MechanismModel
 
 
 @dataclass(frozen=True)

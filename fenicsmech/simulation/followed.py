@@ -19,7 +19,7 @@ class PathEvent:
         kind: limit point of the load, turning point of the displacement, or bifurcation.
         frame: the equilibrium; also one of the curve's frames.
         index: which.
-        mode: where to the mechanism gives way: of a bifurcation the null vector of the tangent, else the path's direction.
+        mode: how the mechanism gives way: the null vector of a bifurcation, else the direction of the path.
         critical: the point of the path that branches start from.
     """
 
