@@ -21,6 +21,16 @@ from fenicsmech.equilibrium.newton import NotConverged
 from fenicsmech.log import logger
 
 _log = logger(__name__)
+_ELSEWHERE = (
+    0.5,
+    0.35,
+    0.65,
+    0.2,
+    0.8,
+    0.1,
+    0.9,
+)  # of an interval: where to look if there is no equilibrium to be found
+_STRAYED = 1.0  # of the way along a step: how far off it a point is none of the path any more
 _NO_RATE = 1e-9  # of the references: less is rounding
 
 
@@ -70,22 +80,35 @@ class _Piece:
     course: Heading
 
     def at(self, distance: float) -> PathPoint:
-        return self.arc.between(self.before, self.after, distance)
+        """The equilibrium on the way, unless it strays off it.
+
+        Meshes without a column's symmetry turn its bifurcation into two paths that pass each other closely; what turns
+        off from one to the other there is none of this path's points.
+        """
+        point = self.arc.between(self.before, self.after, distance)
+        metric, chord = self.arc.metric, self.arc.difference(point.state, self.before.state)
+        off = chord + self.course.scaled(-metric.dot(chord, self.course))
+        if metric.norm(off) > _STRAYED * metric.dot(chord, self.course):
+            raise NotConverged("it strays off the path", point.iterations)
+        return point
 
 
 def _search(
     piece: _Piece, low: tuple[float, PathPoint], high: tuple[float, PathPoint], tolerance: float
 ) -> list[CriticalPoint]:
     """The critical points between two distances along ``piece``."""
-    turn = 0
-    while high[0] - low[0] > tolerance:
+    turn, failures = 0, 0
+    while high[0] - low[0] > tolerance and failures < len(_ELSEWHERE):
         distance = _guess(piece.arc, low, high, tolerance, halve=turn % 3 == 2)
+        if failures:
+            distance = low[0] + _ELSEWHERE[failures] * (high[0] - low[0])
         turn += 1
         try:
-            middle = (distance, piece.at(distance))
+            middle, failures = (distance, piece.at(distance)), 0
         except NotConverged as failure:
             _log.debug("no equilibrium on the way to a critical point: %s", failure)
-            break
+            failures += 1
+            continue
         left, right = _changes(piece.arc, low[1], middle[1]), _changes(piece.arc, middle[1], high[1])
         if left and right:
             return _search(piece, low, middle, tolerance) + _search(piece, middle, high, tolerance)

@@ -28,17 +28,14 @@ def test_displacement_sensitivities_hold_close_to_a_limit_point(gap):
         assert frame.stable and frame.displacement < 0.7 * RISE
         return frame.displacement
 
-    curve = simulation.load_displacement(push, forces=[0.9 * force, force])
-    adjoint = Adjoint(model, simulation.newton(push))
-    (loaded,) = adjoint.gradients(curve.frames[-1].state, [model.point_load(push)])
-    (unloaded,) = adjoint.gradients(
-        simulation.load_displacement(push, forces=[0.0]).frames[0].state, [model.point_load(push)]
-    )
+    curve = simulation.load_displacement(push, forces=[0.0, 0.9 * force, force])
+    adjoint, outputs = Adjoint(model, simulation.newton(push)), [model.point_load(push)]
+    (loaded,) = adjoint.gradients(curve.frames[-1].state, outputs)
+    (unloaded,) = adjoint.gradients(curve.frames[0].state, outputs)
     slope = float((loaded.design - unloaded.design) @ rise.ravel())
     steps = 0.04 * gap * RISE * np.array([1.0, 0.5, 0.25])
     rates = taylor_rates(lambda t: travel(t, force), [0.0], [1.0], [slope], steps)
     assert np.all(rates.without > 0.9) and np.all(rates.with_gradient > 1.9)
-    rates = taylor_rates(
-        lambda t: travel(np.zeros(1), force + t[0]), [0.0], [-1.0], [loaded.force], steps * force / RISE
-    )
+    steps *= force / RISE
+    rates = taylor_rates(lambda t: travel(np.zeros(1), force - t[0]), [0.0], [1.0], [-loaded.force], steps)
     assert np.all(rates.without > 0.9) and np.all(rates.with_gradient > 1.9)
