@@ -31,7 +31,15 @@ from fenicsmech.effects import (
     Prestrain,
 )
 from fenicsmech.elasticity import Displacement, Mixed
-from fenicsmech.equilibrium import AugmentedLagrangian, Globalisation, KktNewton, PrimalDualNewton, Snes
+from fenicsmech.equilibrium import (
+    ArcSteps,
+    AugmentedLagrangian,
+    Critical,
+    Globalisation,
+    KktNewton,
+    PrimalDualNewton,
+    Snes,
+)
 from fenicsmech.errors import AssemblyError, DescriptionError, EquilibriumError, FenicsmechError, MeshingError
 from fenicsmech.mechanism import (
     DRAWN,
@@ -56,7 +64,19 @@ from fenicsmech.mechanism import (
     step,
     strip,
 )
-from fenicsmech.simulation import Curve, Frame, PinFriction, Simulation, friction_band
+from fenicsmech.simulation import (
+    BucklingLoad,
+    Curve,
+    FollowedCurve,
+    Frame,
+    ModeShape,
+    PathEvent,
+    PinFriction,
+    Simulation,
+    SoftMode,
+    Until,
+    friction_band,
+)
 
 __version__ = "0.1.0"
 
@@ -120,4 +140,12 @@ __all__ = [
     "Prestrain",
     "PinFriction",
     "friction_band",
+    "ArcSteps",
+    "BucklingLoad",
+    "Critical",
+    "FollowedCurve",
+    "ModeShape",
+    "PathEvent",
+    "SoftMode",
+    "Until",
 ]

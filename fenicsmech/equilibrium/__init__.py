@@ -9,10 +9,19 @@
 - ``newton``: the default one, the primal–dual iteration
 - ``solvers``: others to choose and to compare
 - ``predictor``, ``path``: first guesses and load steps
+- ``lead``, ``arc_length``, ``continuation``: paths that turn back in load and displacement
+- ``critical``, ``branching``: their limit points and bifurcations, and the paths that cross there
+- ``eigen``: the softest modes of a tangent, and buckling loads
 - ``reactions``: what joints and motors exert
 """
 
+from fenicsmech.equilibrium.arc_length import ArcLength, ArcMetric, ArcSteps, PathPoint, metric_at
+from fenicsmech.equilibrium.branching import Sense, crossing, null_vector
+from fenicsmech.equilibrium.continuation import Goal, Stretch, follow
 from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadControl, MotorControl, ShareControl
+from fenicsmech.equilibrium.critical import Critical, CriticalPoint
+from fenicsmech.equilibrium.eigen import Mode, critical_changes, softest_modes
+from fenicsmech.equilibrium.lead import ForceLead, Heading, Lead
 from fenicsmech.equilibrium.load import PointLoad
 from fenicsmech.equilibrium.newton import Newton, PrimalDualNewton
 from fenicsmech.equilibrium.path import IDLE_STIFFNESS, Path, PathFailed
@@ -25,9 +34,14 @@ from fenicsmech.equilibrium.system import EquilibriumSystem
 
 __all__ = [
     "IDLE_STIFFNESS",
+    "ArcLength",
+    "ArcMetric",
+    "ArcSteps",
     "AugmentedLagrangian",
     "Constant",
     "Control",
+    "Critical",
+    "CriticalPoint",
     "DisplacementControl",
     "EquilibriumSolver",
     "EquilibriumSystem",
@@ -35,22 +49,37 @@ __all__ = [
     "Hermite",
     "Iteration",
     "KktNewton",
+    "ForceLead",
+    "Goal",
+    "Heading",
+    "Hermite",
+    "Lead",
     "LoadControl",
+    "Mode",
     "MotorControl",
     "Newton",
     "NotConverged",
     "Path",
     "PathFailed",
+    "PathPoint",
     "PointLoad",
     "Predictor",
     "PrimalDualNewton",
     "Reaction",
+    "Sense",
     "ShareControl",
     "Snes",
     "Solution",
     "State",
     "Step",
+    "Stretch",
     "Tangent",
+    "critical_changes",
+    "crossing",
+    "follow",
     "joint_reactions",
+    "metric_at",
     "motor_torques",
+    "null_vector",
+    "softest_modes",
 ]

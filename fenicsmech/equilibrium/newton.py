@@ -80,8 +80,8 @@ class Newton(Iteration):
         best, spent, careful, passed = (state, balance.norm), 0, False, None
         residuals, inertia, shift, trusted, mixed = [], None, floor, True, False
         for iteration in range(options.iterations + 1):
-            residuals.append(self._relative(balance))
-            if self._converged(balance) and iteration > 0:
+            residuals.append(self.relative(balance))
+            if self.converged(balance) and iteration > 0:
                 if mixed or shift > floor:  # stability is of the true matrix
                     inertia = self._true_inertia(state, control, balance, floor)
                 return self._accept(state, control, inertia, residuals, iteration)
@@ -101,7 +101,7 @@ class Newton(Iteration):
             state, balance, length = advance(state, control, step, balance, iteration)
             # a pressure of its own is a stress that the step solves for already
             passed = (before, length * motion) if options.mixed_stress and not system.layout.pressures else None
-            if near and balance.norm > norm and not self._converged(balance):
+            if near and balance.norm > norm and not self.converged(balance):
                 # no contraction: near a limit or bifurcation point, where only descent leads on
                 state, trusted, careful, passed = before, False, True, None
                 system.load(state)
@@ -129,7 +129,7 @@ class Newton(Iteration):
         shift, following = floor, max(_LEAST_SHIFT, last / 3.0)
         for _ in range(20):
             inertia = self._refactor(matrix, shift)
-            descends = inertia is not None and inertia.negative <= self._expected and inertia.zero == 0
+            descends = inertia is not None and inertia.negative <= self.expected and inertia.zero == 0
             if descends or (any_inertia and inertia is not None):
                 break
             shift, following = following, 8.0 * following

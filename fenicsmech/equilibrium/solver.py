@@ -84,14 +84,16 @@ class Iteration(ABC):
             NotConverged: too many iterations, no descent, or elements inverted all along.
         """
 
-    def factor(self, state: State, control: Control, balance: Balance, floor: float) -> None:
+    def factor(self, state: State, control: Control, balance: Balance, floor: float) -> Inertia:
         """Factors the KKT matrix of the loaded ``state``, for linear solves with it (collective).
 
         Raises:
             NotConverged: it cannot be factored.
         """
-        if self._true_inertia(state, control, balance, floor) is None:
+        inertia = self._true_inertia(state, control, balance, floor)
+        if inertia is None:
             raise NotConverged("the tangent at the equilibrium cannot be factored", 0)
+        return inertia
 
     def solve_linear(self, right: PETSc.Vec) -> PETSc.Vec:
         """The solution of KKT x = ``right`` with the last factor (collective)."""
@@ -100,10 +102,12 @@ class Iteration(ABC):
             self._factor.solve(right, x)
             return x
 
-    def _relative(self, balance: Balance) -> float:
+    def relative(self, balance: Balance) -> float:
+        """The residual over the forces that balance in it."""
         return balance.norm / max(balance.forces, self.options.roundoff * self.system.unit)
 
-    def _converged(self, balance: Balance) -> bool:
+    def converged(self, balance: Balance) -> bool:
+        """Whether the residual is as small as asked for, or as rounding lets it be."""
         limit = max(self.options.tolerance * balance.forces, self.options.roundoff * self.system.unit)
         return balance.norm <= limit < math.inf
 
@@ -119,7 +123,7 @@ class Iteration(ABC):
         return self._refactor(self.system.kkt(state, control, balance), floor)
 
     @property
-    def _expected(self) -> int:
+    def expected(self) -> int:
         """Negative pivots of a stable equilibrium: one per multiplier and pressure, one for the controlled force."""
         return self.system.joints.rows + 1 + self.system.layout.pressures
 
@@ -131,7 +135,7 @@ class Iteration(ABC):
         if inertia is None:
             raise NotConverged("the tangent at the equilibrium cannot be factored", iteration)
         x = self.solve_linear(control.rate(system, state))
-        under_control = inertia.negative - self._expected
+        under_control = inertia.negative - self.expected
         unstable = under_control
         if control.constrained:
             row = system.control_row()

@@ -341,6 +341,14 @@ class EquilibriumSystem:
             vector.array_w[-1] = 1.0
         return vector
 
+    def coordinates_mask(self) -> PETSc.Vec:
+        """One for each of the coordinates s, zero for multipliers and the controlled force (collective)."""
+        vector, layout = self._map.createVecRight(), self.layout
+        vector.array_w[: layout.free_displacements] = 1.0
+        if layout.last:
+            vector.array_w[len(layout.free) :][layout.z] = 1.0
+        return vector
+
     def step(self, x: PETSc.Vec) -> Step:
         """The change of state that the scaled unknowns ``x`` stand for (collective)."""
         local, layout = x.array_r, self.layout

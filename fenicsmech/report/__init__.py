@@ -25,7 +25,7 @@ Nothing here knows elements, joints or ranks; call it on one rank.
 
 from fenicsmech.report.atomic import atomic_write
 from fenicsmech.report.canvas import PALETTE
-from fenicsmech.report.curve import CurveSeries, CurveTarget, plot_curve, read_curve_csv, write_curve_csv
+from fenicsmech.report.curve import CurveMark, CurveSeries, CurveTarget, plot_curve, read_curve_csv, write_curve_csv
 from fenicsmech.report.design_shapes import DesignShape, LinkOutline
 from fenicsmech.report.designs import draw_designs
 from fenicsmech.report.outline import rigid_outline
@@ -40,6 +40,7 @@ from fenicsmech.report.work_precision import ErrorLevel, WorkSeries, pareto_fron
 __all__ = [
     "PALETTE",
     "Arrow",
+    "CurveMark",
     "CurveSeries",
     "CurveTarget",
     "DesignShape",

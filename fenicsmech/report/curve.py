@@ -22,6 +22,16 @@ from fenicsmech.report.canvas import INK, PALETTE, house_style, new_figure, open
 _DASHES = (0, (3.0, 1.6))  # of unstable parts
 _FAINT = 0.45  # of the colour remains
 _MIXED = "#777777"  # what curves of several colours share
+_MARKERS = ("s", "^", "X", "P", "v", "*")  # of the kinds of marks, in the order of their names
+
+
+@dataclass(frozen=True)
+class CurveMark:
+    """A point of a curve that stands out, and what it is: marks of one kind look alike."""
+
+    displacement: float
+    force: float
+    kind: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +46,7 @@ class CurveSeries:
         joined: draw the line through the samples; False for measurements.
         colour: a matplotlib colour; None takes the next of the palette.
         faint: draw it thin and light behind the others, as what was before.
+        marks: points that stand out.
 
     Raises:
         DescriptionError: the arrays differ in length or are not finite.
@@ -48,6 +59,7 @@ class CurveSeries:
     joined: bool = True
     colour: str | None = None
     faint: bool = False
+    marks: tuple[CurveMark, ...] = ()
 
     def __post_init__(self) -> None:
         part = f"curve '{self.label}'"
@@ -106,6 +118,7 @@ def plot_curve(
         for index, curve in enumerate(series):
             _draw_series(axes, curve, _colour(curve, index))
         _draw_targets(axes, targets)
+        _draw_marks(axes, series)
         axes.margins(0.05)
         axes.axhline(0.0, color="#bbbbbb", lw=0.8, zorder=0.5)
         axes.axvline(0.0, color="#bbbbbb", lw=0.8, zorder=0.5)
@@ -157,6 +170,20 @@ def _draw_targets(axes: Axes, targets: Sequence[CurveTarget]) -> None:
         axes.plot(*place, "D", ms=size, mfc="none", mec=target.colour or INK, mew=1.5, clip_on=False, zorder=5)
 
 
+def _markers(series: Sequence[CurveSeries]) -> dict[str, str]:
+    """The marker of each kind of marks."""
+    kinds = sorted({mark.kind for curve in series for mark in curve.marks})
+    return {kind: _MARKERS[index % len(_MARKERS)] for index, kind in enumerate(kinds)}
+
+
+def _draw_marks(axes: Axes, series: Sequence[CurveSeries]) -> None:
+    markers = _markers(series)
+    for curve in series:
+        for mark in curve.marks:
+            place = mark.displacement, mark.force
+            axes.plot(*place, markers[mark.kind], ms=8.0, mfc="white", mec=INK, mew=1.5, zorder=6)
+
+
 def _draw_legend(axes: Axes, series: Sequence[CurveSeries], targets: Sequence[CurveTarget]) -> None:
     same: dict[str, list[tuple[CurveSeries, str]]] = {}  # curves and colours of each label
     for index, curve in enumerate(series):
@@ -173,6 +200,8 @@ def _draw_legend(axes: Axes, series: Sequence[CurveSeries], targets: Sequence[Cu
         handles.append(
             Line2D([], [], color=_MIXED, ls=_DASHES, lw=2.0, marker="o", ms=4.5, mfc="white", label="unstable")
         )
+    for kind, marker in _markers(series).items():
+        handles.append(Line2D([], [], lw=0, marker=marker, ms=8, mfc="white", mec=INK, mew=1.5, label=kind))
     if targets:
         colour = _common([target.colour or INK for target in targets])
         handles.append(Line2D([], [], lw=0, marker="D", ms=8, mfc="none", mec=colour, mew=1.5, label="target"))

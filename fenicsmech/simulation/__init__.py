@@ -4,13 +4,32 @@
 - ``model``: the discretised mechanism behind it
 - ``request``, ``tracer``: what a curve is asked for, and how it is traced
 - ``frame``, ``curve``: what comes out
+- ``until``, ``follower``, ``followed``: curves that are followed wherever they lead, and their events
+- ``buckling``, ``mode_shape``: buckling loads and soft modes of an equilibrium
 - ``friction``: how far friction in hinges holds a curve's load
 - ``snapshot``, ``picture``, ``export``: a state gathered, drawn, written
 """
 
+from fenicsmech.simulation.buckling import BucklingLoad, SoftMode
 from fenicsmech.simulation.curve import Curve
+from fenicsmech.simulation.followed import FollowedCurve, PathEvent
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.friction import PinFriction, friction_band
+from fenicsmech.simulation.mode_shape import ModeShape
 from fenicsmech.simulation.simulation import SPACES, Simulation
+from fenicsmech.simulation.until import Until
 
-__all__ = ["SPACES", "Curve", "Frame", "PinFriction", "Simulation", "friction_band"]
+__all__ = [
+    "SPACES",
+    "BucklingLoad",
+    "Curve",
+    "FollowedCurve",
+    "Frame",
+    "ModeShape",
+    "PathEvent",
+    "PinFriction",
+    "Simulation",
+    "SoftMode",
+    "Until",
+    "friction_band",
+]

@@ -24,6 +24,7 @@ class Curve:
         frames: one per sample, in the order asked for.
         units: of the scene, for labels.
         leads: whether this process writes files.
+        others: constant magnitudes of other forces.
     """
 
     force_part: Force
@@ -32,6 +33,7 @@ class Curve:
     frames: tuple[Frame, ...]
     units: Units
     leads: bool
+    others: tuple[tuple[Force, float], ...] = ()
 
     @property
     def forces(self) -> np.ndarray:

@@ -98,6 +98,7 @@ class MechanismModel:
         elastic: their elastic energy.
         interfaces: interface nodes as functions of body poses.
         design_nodes: the design field at the nodes of the displacement.
+        node_link: index of the flexible link of every local node.
         clock: where time goes.
         with_pressure: whether each flexible link has the pressure as an unknown of its own.
         effects: what acts beside links, joints and forces.
@@ -154,7 +155,7 @@ class MechanismModel:
             self.elastic.u, self.elastic.drawn_nodes, cell_body, centres, linkage.joints.space
         )
         self.design_nodes = DesignAtNodes(self.elastic.d, self.elastic.u)
-        self._node_link = self._link_of_nodes()
+        self.node_link = self._link_of_nodes()
         self._point_loads: dict[Force | Output, PointLoad] = {}
 
     @property
@@ -254,7 +255,7 @@ class MechanismModel:
         u = np.zeros((owned, self.interfaces.block))
         for index, link in enumerate(self.mechanism.flexible_links):
             body = self.linkage.interfaces[link][0]
-            nodes = np.flatnonzero(self._node_link[:owned] == index)
+            nodes = np.flatnonzero(self.node_link[:owned] == index)
             offsets = positions[nodes] - np.array(self.linkage.bodies[body].centre)
             u[nodes, :dim] = self.linkage.joints.space.displace(poses[body], offsets)
         unpressed = np.zeros(0 if self.elastic.pressure is None else len(self.elastic.pressure.unknown))

@@ -19,17 +19,29 @@ from fenicsmech.elasticity import (
     Mixed,
     Quadrature,
 )
-from fenicsmech.equilibrium import EquilibriumSolver, Hermite, Iteration, Predictor, PrimalDualNewton
+from fenicsmech.equilibrium import (
+    ArcSteps,
+    EquilibriumSolver,
+    Hermite,
+    Iteration,
+    LoadControl,
+    Predictor,
+    PrimalDualNewton,
+    Sense,
+)
 from fenicsmech.errors import AssemblyError, DescriptionError
-from fenicsmech.linkage import assemble, build_linkage, count_freedom
+from fenicsmech.linkage import Freedom, assemble, build_linkage, count_freedom
 from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Mechanism, Output, Scene, validate
 from fenicsmech.mechanism.checks import positive
 from fenicsmech.mechanism.places import in_dimension
 from fenicsmech.meshing import radius_ratios
 from fenicsmech.report import Panel, Progress, Silent, Trace, draw_configurations
+from fenicsmech.simulation.buckling import BucklingLoad, SoftMode, buckling_loads, soft_modes
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.explanation import Explanation, hints, simulated
 from fenicsmech.simulation.export import write_xdmf
+from fenicsmech.simulation.followed import FollowedCurve, PathEvent
+from fenicsmech.simulation.follower import Follower
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.goal_error import GoalError
 from fenicsmech.simulation.model import Fidelity, MechanismModel, check_links, mesh_mechanism
@@ -37,6 +49,7 @@ from fenicsmech.simulation.picture import Draughtsman
 from fenicsmech.simulation.request import CurveRequest, read_request
 from fenicsmech.simulation.snapshot import gather, rest_vertices
 from fenicsmech.simulation.tracer import Tracer
+from fenicsmech.simulation.until import Until
 
 SPACES = {model.name: model for model in (SPATIAL, MID_PLANE_SYMMETRIC, PLANE_STRESS, PLANE_STRAIN)}
 """Names of the elastic models, as users type them."""
@@ -141,12 +154,7 @@ class Simulation:
             AssemblyError: the configuration does not assemble.
             EquilibriumError: a sample was not reached; carries the frames before it.
         """
-        if _description(self.scene.mechanism) != self._described:
-            raise DescriptionError(
-                f"mechanism {self.scene.mechanism.name!r}",
-                "links, joints or motors were added after the simulation was made",
-                "Make a new Simulation",
-            )
+        self._check_description()
         request = read_request(
             self.scene.mechanism,
             force,
@@ -166,11 +174,7 @@ class Simulation:
             request: what is asked for.
             watch: called with the number of frames so far.
         """
-        assembly = assemble(self.linkage, request.configuration)
-        rigid = self.linkage.rigid
-        freedom = count_freedom(rigid, assembly.poses, rigid.motor_values(request.configuration.position))
-        newton = self.newton(request.force, request.others)
-        tracer = Tracer(self.model, newton, request, assembly=assembly, freedom=freedom, predictor=self._predictor)
+        tracer, _, freedom = self._tracer(request)
         frames: list[Frame] = []
         for control in request.controls:
             frames.append(tracer.frame(control, frames))
@@ -182,6 +186,126 @@ class Simulation:
             tuple(frames),
             units=self.scene.units,
             leads=self.comm.rank == 0,
+            others=request.others,
+        )
+
+    def follow(
+        self,
+        force: Force,
+        *,
+        until: Until,
+        configuration: Configuration = DRAWN,
+        others: Mapping[Force, float] | None = None,
+        steps: ArcSteps | None = None,
+    ) -> FollowedCurve:
+        """The whole curve under a changing force, past limit points and where it turns back (collective).
+
+        Starts without the force and goes towards the first displacement, or else the first force, of ``until``.
+
+        Args:
+            force: the force that changes.
+            until: where the curve ends.
+            configuration: motor positions.
+            others: constant magnitudes of other forces.
+            steps: how finely it is followed.
+
+        Raises:
+            DescriptionError: the request makes no sense.
+            AssemblyError: the configuration does not assemble.
+            EquilibriumError: the curve ends early; carries the frames before that.
+        """
+        self._check_description()
+        _check_until(until)
+        request = read_request(
+            self.scene.mechanism, force, forces=[0.0], displacements=None, configuration=configuration, others=others
+        )
+        with Progress(until.frames, configuration.name) if self.comm.rank == 0 else Silent() as progress:
+            follower, freedom = self._follower(request, until, steps)
+            follower.from_rest(progress.update)
+        self._last = self._followed(request, freedom, follower)
+        return self._last
+
+    def branches(
+        self, curve: FollowedCurve, event: PathEvent, *, until: Until, steps: ArcSteps | None = None
+    ) -> tuple[FollowedCurve, FollowedCurve]:
+        """The curve that crosses ``curve`` at a simple bifurcation, from there in both senses (collective).
+
+        Args:
+            curve: a followed curve.
+            event: one of its bifurcations.
+            until: where each of the two ends.
+            steps: how finely they are followed.
+
+        Raises:
+            DescriptionError: the event is no bifurcation of the curve, or not a simple one.
+            EquilibriumError: the curve is not found, or ends early; carries the frames before that.
+        """
+        self._check_description()
+        _check_until(until)
+        if event not in curve.bifurcations:
+            raise DescriptionError(
+                "branches", "the event is no bifurcation of the curve", "Choose from its bifurcations"
+            )
+        if event.modes != 1:
+            raise DescriptionError(
+                "branches",
+                f"{event.modes} modes become unstable at once",
+                "Break the symmetry a little, or follow the curve with a smaller tolerance in ArcSteps",
+            )
+        request = CurveRequest(curve.force_part, (LoadControl(0.0),), curve.configuration, curve.others)
+        found = []
+        with self.model.shaped(event.frame.design):
+            for sense in Sense:
+                follower, freedom = self._follower(request, until, steps)
+                follower.from_bifurcation(event, sense, lambda done: None)
+                found.append(self._followed(request, freedom, follower))
+        return found[0], found[1]
+
+    def buckling_loads(
+        self, curve: Curve | None = None, *, frame: Frame | None = None, count: int = 3
+    ) -> tuple[BucklingLoad, ...]:
+        """Forces at which the equilibrium would stop being unique, from the tangent and its rate (collective).
+
+        Exact for columns and others that hardly move before they buckle; else the better the nearer the frame is.
+
+        Args:
+            curve: the last curve computed by default.
+            frame: the equilibrium; the last one of the curve by default.
+            count: how many, those nearest to the force of the frame, in both senses, nearest first.
+
+        Raises:
+            DescriptionError: no curve was computed yet.
+        """
+        chosen = self._chosen(curve)
+        newton = self.newton(chosen.force_part, chosen.others)
+        return buckling_loads(self.model, newton, chosen, frame or chosen.frames[-1], count)
+
+    def soft_modes(
+        self, curve: Curve | None = None, *, frame: Frame | None = None, count: int = 3
+    ) -> tuple[SoftMode, ...]:
+        """The directions in which an equilibrium is softest under dead loads, softest first (collective).
+
+        Arguments and errors as those of ``buckling_loads``.
+        """
+        chosen = self._chosen(curve)
+        newton = self.newton(chosen.force_part, chosen.others)
+        return soft_modes(self.model, newton, chosen, frame or chosen.frames[-1], count)
+
+    def _follower(self, request: CurveRequest, until: Until, steps: ArcSteps | None) -> tuple[Follower, Freedom]:
+        tracer, newton, freedom = self._tracer(request)
+        idle, steps = freedom.mobility > 0, steps or ArcSteps()
+        return Follower(self.model, newton, request, tracer, until=until, steps=steps, idle=idle), freedom
+
+    def _followed(self, request: CurveRequest, freedom: Freedom, follower: Follower) -> FollowedCurve:
+        return FollowedCurve(
+            request.force,
+            request.configuration,
+            freedom,
+            tuple(follower.frames),
+            units=self.scene.units,
+            leads=self.comm.rank == 0,
+            others=request.others,
+            events=tuple(follower.events),
         )
 
     def on(self, comm: MPI.Comm) -> Simulation:
@@ -339,11 +463,34 @@ class Simulation:
             ratio = self.fidelity.model.dim / float(radius_ratios(rest, self.model.mesh.cells).min())
         return self.comm.bcast(ratio, root=0)
 
+    def _tracer(self, request: CurveRequest) -> tuple[Tracer, Iteration, Freedom]:
+        """What starts the path of a request, its solver, and the freedom of its configuration (collective)."""
+        assembly = assemble(self.linkage, request.configuration)
+        rigid = self.linkage.rigid
+        freedom = count_freedom(rigid, assembly.poses, rigid.motor_values(request.configuration.position))
+        newton = self.newton(request.force, request.others)
+        tracer = Tracer(self.model, newton, request, assembly=assembly, freedom=freedom, predictor=self._predictor)
+        return tracer, newton, freedom
+
+    def _check_description(self) -> None:
+        """Refuses a mechanism that is not the one this simulation was made for."""
+        if _description(self.scene.mechanism) != self._described:
+            raise DescriptionError(
+                f"mechanism {self.scene.mechanism.name!r}",
+                "links, joints or motors were added after the simulation was made",
+                "Make a new Simulation",
+            )
+
     def _chosen(self, curve: Curve | None) -> Curve:
         chosen = curve or self._last
         if chosen is None:
             raise DescriptionError("simulation", "no curve was computed yet", "Call load_displacement first")
         return chosen
+
+
+def _check_until(until: Until) -> None:
+    if not isinstance(until, Until):
+        raise DescriptionError("end of a path", f"{until!r} does not say where", "Give until=Until(displacement=…)")
 
 
 def _description(mechanism: Mechanism) -> tuple[tuple, ...]:

@@ -70,6 +70,11 @@ class Tracer:
         start = self._system.load_displacement(state) if request.controls[0].constrained else 0.0
         self._path = Path(newton, state, start, predictor=predictor, idle=self._idle)
 
+    @property
+    def origin(self) -> float:
+        """Displacement of the force's point in the unloaded configuration, from where it was drawn."""
+        return self._origin
+
     def frame(self, control: Control, before: Sequence[Frame]) -> Frame:
         """The equilibrium under ``control``; ``before`` are the frames so far (collective).
 
@@ -84,7 +89,7 @@ class Tracer:
             solution = path.advance(control)
         except PathFailed as failure:
             raise self._unreached(control, failure, before) from failure
-        record = self._record(solution)
+        record = self.record(solution)
         return replace(
             record,
             iterations=path.iterations - iterations,
@@ -153,10 +158,10 @@ class Tracer:
 
     def _last(self, failure: PathFailed) -> Frame | None:
         """The last equilibrium reached, on the way to a sample too."""
-        return None if failure.last is None else self._record(failure.last)
+        return None if failure.last is None else self.record(failure.last)
 
-    def _record(self, solution: Solution) -> Frame:
-        """What is measured in an equilibrium; the caller adds what it cost."""
+    def record(self, solution: Solution) -> Frame:
+        """What is measured in an equilibrium; the caller adds what it cost (collective)."""
         model, state = self._model, solution.state
         self._system.load(state)
         with model.clock.phase("measure"):

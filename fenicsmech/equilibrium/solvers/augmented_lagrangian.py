@@ -83,8 +83,8 @@ class AugmentedLagrangianIteration(Iteration):
             # multipliers of ``state`` are λ, those of ``current`` λ⁺
             current = self._updated(state, control, 1.0 / penalty)
             balance = system.balance(current, control)
-            residuals.append(self._relative(balance))
-            if self._converged(balance) and iteration > 0:
+            residuals.append(self.relative(balance))
+            if self.converged(balance) and iteration > 0:
                 inertia = self._true_inertia(current, control, balance, floor)
                 rounded = system.moved(current, system.difference(current, current))  # quaternions of unit length
                 return self._accept(rounded, control, inertia, residuals, iteration)
@@ -152,7 +152,7 @@ class AugmentedLagrangianIteration(Iteration):
         shift, following = floor, max(_LEAST_SHIFT, last / 3.0)
         for _ in range(20):
             inertia = self._refactor(matrix, shift)
-            if inertia is not None and inertia.negative <= self._expected and inertia.zero == 0:
+            if inertia is not None and inertia.negative <= self.expected and inertia.zero == 0:
                 break
             shift, following = following, 8.0 * following
         else:

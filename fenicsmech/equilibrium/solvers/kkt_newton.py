@@ -50,10 +50,10 @@ class KktIteration(Iteration):
             raise NotConverged("elements are inverted in the predicted state", 0)
         balance, residuals, inertia = system.balance(state, control), [], None
         for iteration in range(options.iterations + 1):
-            residuals.append(self._relative(balance))
+            residuals.append(self.relative(balance))
             if not math.isfinite(residuals[-1]):
                 raise NotConverged("the residual overflows", iteration)
-            if self._converged(balance) and iteration > 0:
+            if self.converged(balance) and iteration > 0:
                 return self._accept(state, control, inertia, residuals, iteration)
             if iteration == options.iterations:
                 break
@@ -80,7 +80,7 @@ class KktIteration(Iteration):
                 continue
             new = system.balance(trial, control)
             falls = new.norm <= (1.0 - _DECREASE * length) * balance.norm
-            if falls or self._converged(new) or not self.options.backtracking:
+            if falls or self.converged(new) or not self.options.backtracking:
                 return trial, new
         reason = "no step lowers the residual" if self.options.backtracking else "the step inverts elements"
         raise NotConverged(reason, iteration + 1)

@@ -64,7 +64,7 @@ class SnesIteration(Iteration):
         if not math.isfinite(self.system.elastic_energy()):
             raise NotConverged("elements are inverted in the predicted state", 0)
         equations = _Equations(self, start, control, floor)
-        if self._converged(equations.balance):  # there is nothing that a line search could lower
+        if self.converged(equations.balance):  # there is nothing that a line search could lower
             equations.test(None, 0, (0.0, 0.0, equations.balance.norm))
             equations.setUp(None)
             return self._accept(start, control, equations.inertia, equations.residuals, 1)
@@ -75,7 +75,7 @@ class SnesIteration(Iteration):
         snes.destroy()
         if not equations.evaluate(x):
             raise NotConverged("elements are inverted", iterations)
-        if equations.inertia is None or not self._converged(equations.balance):
+        if equations.inertia is None or not self.converged(equations.balance):
             raise NotConverged(f"SNES stops: {_REASONS.get(reason, f'reason {reason}')}", iterations)
         return self._accept(equations.state, control, equations.inertia, equations.residuals, iterations)
 
@@ -145,10 +145,10 @@ class _Equations:
 
     def test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
         """Convergence as the other solvers see it."""
-        self.residuals.append(self._iteration._relative(self.balance))
+        self.residuals.append(self._iteration.relative(self.balance))
         if not math.isfinite(norms[2]):
             return PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
-        if iteration > 0 and self._iteration._converged(self.balance):
+        if iteration > 0 and self._iteration.converged(self.balance):
             return PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE
         return PETSc.SNES.ConvergedReason.ITERATING
 

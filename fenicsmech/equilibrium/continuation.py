@@ -1,0 +1,82 @@
+"""A path from an equilibrium until it passes given values, with its critical points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from fenicsmech.equilibrium.arc_length import ArcLength, PathPoint
+from fenicsmech.equilibrium.critical import CriticalPoint, locate
+from fenicsmech.equilibrium.solver import NotConverged
+
+_ROOT = 1e-10  # how closely a path ends where it is asked to, in units of its references
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A value some quantity of the path ends at.
+
+    Attributes:
+        value: of the quantity at a point (collective).
+        rate: of the quantity along the path at a point.
+        target: where the path ends.
+        scale: of the quantity.
+    """
+
+    value: Callable[[PathPoint], float]
+    rate: Callable[[PathPoint], float]
+    target: float
+    scale: float
+
+    def passed(self, before: PathPoint, after: PathPoint) -> bool:
+        """Whether the target lies between two neighbouring points (collective)."""
+        a, b = self.value(before) - self.target, self.value(after) - self.target
+        return a * b < 0.0 or (b == 0.0 and a != 0.0)
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A step of a path: its end, the critical points on the way there, and whether the path ends with it."""
+
+    point: PathPoint
+    critical: tuple[CriticalPoint, ...]
+    last: bool
+
+
+def follow(arc: ArcLength, start: PathPoint, goals: Sequence[Goal], *, most: int) -> Iterator[Stretch]:
+    """Steps along the path from ``start`` until a goal is passed, or ``most`` of them (collective).
+
+    Raises:
+        NotConverged: the path cannot be followed further.
+    """
+    point = start
+    for _ in range(most):
+        following = arc.advance(point)
+        ends = [_end(arc, point, following, goal) for goal in goals if goal.passed(point, following)]
+        if ends:
+            following = min(ends, key=lambda end: arc.along(point, end))
+        yield Stretch(following, tuple(locate(arc, point, following)), bool(ends))
+        if ends:
+            return
+        point = following
+
+
+def _end(arc: ArcLength, before: PathPoint, after: PathPoint, goal: Goal) -> PathPoint:
+    """Where the path has the goal's value, by Newton's method within the step."""
+    width = arc.along(before, after)
+    low, high = 0.0, width
+    rising = goal.value(after) > goal.value(before)
+    distance, best = width, after
+    for _ in range(30):
+        gap = goal.value(best) - goal.target
+        if abs(gap) <= _ROOT * goal.scale:
+            break
+        low, high = (low, distance) if (gap > 0.0) == rising else (distance, high)
+        slope = goal.rate(best) / arc.metric.dot(before.tangent, best.tangent)
+        wanted = distance - gap / slope if slope else low
+        distance = wanted if low < wanted < high else 0.5 * (low + high)
+        try:
+            best = arc.between(before, after, distance)
+        except NotConverged:
+            break
+    return best

@@ -1,0 +1,69 @@
+"""A curve that was followed wherever it led, with its limit points and bifurcations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from fenicsmech.equilibrium import Critical, CriticalPoint
+from fenicsmech.report import CurveMark, CurveSeries
+from fenicsmech.simulation.curve import Curve
+from fenicsmech.simulation.frame import Frame
+from fenicsmech.simulation.mode_shape import ModeShape
+
+
+@dataclass(frozen=True, eq=False)
+class PathEvent:
+    """A critical point of a followed curve.
+
+    Attributes:
+        kind: limit point of the load, turning point of the displacement, or bifurcation.
+        frame: the equilibrium; also one of the curve's frames.
+        index: which.
+        mode: how the mechanism gives way: the null vector of a bifurcation, else the direction of the path.
+        critical: the point of the path that branches start from.
+    """
+
+    kind: Critical
+    frame: Frame
+    index: int
+    mode: ModeShape
+    critical: CriticalPoint
+
+    @property
+    def modes(self) -> int:
+        """By how many the unstable modes change there."""
+        return self.critical.modes
+
+
+@dataclass(frozen=True, kw_only=True)
+class FollowedCurve(Curve):
+    """Frames in the order of the path, however often it turns back.
+
+    Attributes:
+        events: limit points, turning points and bifurcations, in the order of the path.
+    """
+
+    events: tuple[PathEvent, ...] = ()
+
+    @property
+    def limit_points(self) -> tuple[PathEvent, ...]:
+        """Where a dead load would snap."""
+        return self._of(Critical.LIMIT)
+
+    @property
+    def turning_points(self) -> tuple[PathEvent, ...]:
+        """Where a held displacement would snap."""
+        return self._of(Critical.TURNING)
+
+    @property
+    def bifurcations(self) -> tuple[PathEvent, ...]:
+        """Where other curves cross this one."""
+        return self._of(Critical.BIFURCATION)
+
+    def series(self, label: str = "", *, colour: str | None = None, faint: bool = False) -> CurveSeries:
+        """The curve as a plot draws it, with its events marked; arguments as those of ``CurveSeries``."""
+        marks = tuple(CurveMark(event.frame.displacement, event.frame.force, event.kind.value) for event in self.events)
+        return replace(super().series(label, colour=colour, faint=faint), marks=marks)
+
+    def _of(self, kind: Critical) -> tuple[PathEvent, ...]:
+        return tuple(event for event in self.events if event.kind is kind)

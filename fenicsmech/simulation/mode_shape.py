@@ -1,0 +1,36 @@
+"""A direction in which a mechanism moves, and what stands out in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenicsmech.equilibrium import Step
+from fenicsmech.simulation.model import MechanismModel
+
+
+@dataclass(frozen=True)
+class ModeShape:
+    """A direction in which a mechanism moves.
+
+    Attributes:
+        link: name of the flexible link that moves most.
+        out_of_plane: share of its squared displacements that is across the plane of the mechanism, 0 … 1.
+        step: the direction itself, its largest displacement the mechanism's length (or one rad).
+    """
+
+    link: str
+    out_of_plane: float
+    step: Step
+
+
+def mode_shape(model: MechanismModel, step: Step) -> ModeShape:
+    """What stands out in the direction ``step`` (collective)."""
+    comm, dim, links = model.mesh.mesh.comm, model.linkage.dim, model.mechanism.flexible_links
+    squares = step.u.reshape(-1, dim) ** 2
+    owners = model.node_link[: len(squares)]
+    sums = comm.allreduce(np.array([squares[owners == index].sum(axis=0) for index in range(len(links))]))
+    whole = float(sums.sum())
+    across = float(sums[:, 2].sum()) / whole if dim == 3 and whole > 0.0 else 0.0
+    return ModeShape(links[int(np.argmax(sums.sum(axis=1)))].name, across, step)

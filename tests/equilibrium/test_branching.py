@@ -1,0 +1,86 @@
+"""Bifurcations are found on straight paths, and the paths that cross there are followed."""
+
+from math import pi
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipk
+
+import fenicsmech as fm
+
+from .column import EULER, LENGTH, THICKNESS, YOUNG, Column, column, critical_load
+
+CRITICAL = critical_load(0.5 * THICKNESS)
+
+
+def elastica(shortening: float) -> float:
+    """The load over that of Euler of an inextensible pinned column whose pins have come so much closer.
+
+    With k = sin(α/2) of the angle α at the pins: P / P_E = (2 K(k) / π)², shortening / L = 2 − 2 E(k) / K(k).
+    """
+    m = brentq(lambda m: 2.0 - 2.0 * ellipe(m) / ellipk(m) - shortening / LENGTH, 1e-12, 0.99)
+    return (2.0 * ellipk(m) / pi) ** 2
+
+
+def straight(case: Column) -> fm.FollowedCurve:
+    return case.simulation.follow(case.push, until=fm.Until(force=1.1 * EULER))
+
+
+def test_first_two_bifurcations_of_a_column_are_those_of_euler():
+    case = column()
+    curve = case.simulation.follow(case.push, until=fm.Until(force=5.0 * EULER))
+    assert [event.kind for event in curve.events] == [fm.Critical.BIFURCATION] * 2
+    assert [event.frame.force for event in curve.events] == pytest.approx([EULER, 4.0 * EULER], rel=1e-2)
+    assert [event.modes for event in curve.events] == [1, 1]
+    modes = [frame.unstable_modes for frame in curve.frames]
+    first, second = (event.index for event in curve.events)
+    assert modes[:first] == [0] * first and set(modes[first + 1 : second]) == {1} and modes[-1] == 2
+
+
+def test_buckled_column_follows_the_elastica_to_both_sides():
+    case = column()
+    curve = straight(case)
+    branches = case.simulation.branches(curve, curve.bifurcations[0], until=fm.Until(displacement=50.0))
+    for branch in branches:
+        assert branch.frames[0] == curve.bifurcations[0].frame
+        assert branch.displacements[-1] == pytest.approx(50.0, rel=1e-9)
+        assert branch.stable[1:].all()
+        for frame in branch.frames[2:]:
+            squeezed = frame.force * LENGTH / (YOUNG * THICKNESS)
+            assert frame.force / CRITICAL == pytest.approx(elastica(frame.displacement - squeezed), rel=1e-2)
+    motion = [branch.frames[-1].state.u.reshape(-1, 2)[:, 1] for branch in branches]
+    assert motion[0].max() > 0.3 * LENGTH or motion[0].min() < -0.3 * LENGTH
+    assert np.sign(motion[0].sum()) == -np.sign(motion[1].sum())
+    assert np.abs(motion[0] + motion[1]).max() < THICKNESS  # the upper side is now the lower one
+
+
+def test_second_branch_is_found_where_it_crosses():
+    case = column()
+    curve = case.simulation.follow(case.push, until=fm.Until(force=5.0 * EULER))
+    branch, _ = case.simulation.branches(curve, curve.bifurcations[1], until=fm.Until(displacement=1.0))
+    assert branch.forces[-1] == pytest.approx(4.0 * CRITICAL, rel=2e-2)
+    assert branch.frames[-1].unstable_modes == 1
+
+
+def test_what_is_no_bifurcation_of_the_curve_is_refused():
+    case = column()
+    curve = straight(case)
+    event = curve.bifurcations[0]
+    other = column()
+    with pytest.raises(fm.DescriptionError, match="no bifurcation of the curve"):
+        other.simulation.branches(straight(other), event, until=fm.Until(force=1.0))
+    with pytest.raises(fm.DescriptionError, match="does not say where"):
+        case.simulation.branches(curve, event, until=1.0)
+
+
+@pytest.mark.parallel
+def test_bifurcation_and_branch_are_the_same_on_any_number_of_ranks():
+    case = column(comm=MPI.COMM_WORLD)
+    curve = straight(case)
+    (event,) = curve.bifurcations
+    assert event.frame.force == pytest.approx(CRITICAL, rel=1e-2)
+    for branch in case.simulation.branches(curve, event, until=fm.Until(displacement=1.0)):
+        squeezed = branch.forces[-1] * LENGTH / (YOUNG * THICKNESS)
+        assert branch.forces[-1] / CRITICAL == pytest.approx(elastica(1.0 - squeezed), rel=1e-2)

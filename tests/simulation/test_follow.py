@@ -1,0 +1,85 @@
+"""Followed curves as users ask for them, draw them and go on from them."""
+
+import numpy as np
+import pytest
+
+import fenicsmech as fm
+
+from ..equilibrium import toggle
+
+STIFF = 200.0
+
+
+@pytest.mark.parametrize(
+    "given, told",
+    [
+        ({}, "neither displacement nor force"),
+        ({"displacement": float("nan")}, "nan"),
+        ({"force": (1.0, "much")}, "not a number"),
+        ({"force": 1.0, "frames": 1}, "1 frames"),
+        ({"force": 1.0, "frames": 2.5}, "2.5 frames"),
+    ],
+)
+def test_ends_that_make_no_sense_are_refused(given, told):
+    with pytest.raises(fm.DescriptionError, match=told):
+        fm.Until(**given)
+
+
+@pytest.mark.parametrize(
+    "given", [{"first": 0.0}, {"largest": -1.0}, {"smallest": float("nan")}, {"motion": 0.0}, {"tolerance": 2.0}]
+)
+def test_steps_that_make_no_sense_are_refused(given):
+    with pytest.raises(fm.DescriptionError):
+        fm.ArcSteps(**given)
+
+
+def test_what_does_not_say_where_to_end_is_refused():
+    case = toggle.toggle(stilt_modulus=STIFF)
+    with pytest.raises(fm.DescriptionError, match="does not say where"):
+        case.simulation.follow(case.push, until=12.0)
+    with pytest.raises(fm.DescriptionError, match="no curve was computed"):
+        case.simulation.buckling_loads()
+
+
+def test_curve_that_cannot_be_followed_says_how_far_it_came():
+    case = toggle.toggle(stilt_modulus=STIFF)
+    steps = fm.ArcSteps(first=0.5, largest=0.5, smallest=0.4)
+    with pytest.raises(fm.EquilibriumError, match="cannot be followed beyond displacement") as caught:
+        case.simulation.follow(case.push, until=fm.Until(displacement=20.0), steps=steps)
+    assert caught.value.frames and caught.value.last is caught.value.frames[-1]
+
+
+def test_followed_curve_is_drawn_and_written_like_others(tmp_path):
+    case = toggle.toggle(stilt_modulus=STIFF)
+    curve = case.simulation.follow(case.push, until=fm.Until(displacement=12.0))
+    marks = curve.series().marks
+    assert [mark.kind for mark in marks] == ["limit point"] * 2
+    assert [mark.force for mark in marks] == pytest.approx([event.frame.force for event in curve.events])
+    curve.plot(tmp_path / "curve.png")
+    curve.write_csv(tmp_path / "curve.csv")
+    case.simulation.picture(tmp_path / "toggle.png")
+    assert all((tmp_path / name).stat().st_size > 0 for name in ("curve.png", "curve.csv", "toggle.png"))
+    assert curve.frames[3].iterations >= 2 and curve.frames[3].seconds > 0.0
+
+
+def test_limit_points_tell_what_snaps():
+    case = toggle.toggle(stilt_modulus=STIFF)
+    curve = case.simulation.follow(case.push, until=fm.Until(displacement=4.0))
+    assert {event.mode.link for event in curve.limit_points} == {"stilt"}  # it sinks, the spring hardly moves
+
+
+def test_constant_forces_act_along_the_whole_path():
+    case = toggle.toggle(stilt_modulus=STIFF)
+    mechanism = case.simulation.scene.mechanism
+    weight = mechanism.force(on=case.push.on, at=case.push.at, direction=(0, -1), name="weight")
+    alone = case.simulation.follow(case.push, until=fm.Until(displacement=4.0))
+    both = case.simulation.follow(case.push, until=fm.Until(displacement=4.0), others={weight: 0.25})
+    assert both.limit_points[0].frame.force + 0.25 == pytest.approx(alone.limit_points[0].frame.force, rel=1e-8)
+    sunk = np.array([frame.outputs[case.sunk] for frame in both.frames])
+    assert both.forces + 0.25 == pytest.approx(toggle.force(sunk), abs=1e-8)
+    # the tangent is that of both forces together
+    near = both.frames[both.limit_points[0].index - 1]
+    ahead = min(
+        abs(load.force - both.limit_points[0].frame.force) for load in case.simulation.buckling_loads(both, frame=near)
+    )
+    assert ahead < 0.05 * toggle.force(2.1)
