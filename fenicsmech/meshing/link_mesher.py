@@ -58,6 +58,8 @@ def check_link(
     *,
     dim: int,
     size: float,
+    layers: int | None = None,
+    segments: int = LEAST_SEGMENTS,
     half: bool = False,
 ) -> None:
     """Refuse what can be seen to be wrong with a link before it is meshed; arguments as in ``mesh_link``.
@@ -69,7 +71,7 @@ def check_link(
         MeshingError: as ``mesh_link``, or one of ``points`` is not on the link.
         DescriptionError: as ``mesh_link``.
     """
-    request = _request(name, sites, dim, size, None, LEAST_SEGMENTS, half)
+    request = _request(name, sites, dim, size, layers, segments, half)
     check_shape(shape, request)
     for part, at in points.items():
         if not holds(shape, request, tuple(at)):
@@ -92,6 +94,10 @@ def _request(
         raise DescriptionError(part, f"dim is {dim!r}", "Give 2 or 3")
     if layers is not None and not (isinstance(layers, int) and layers > 0):
         raise DescriptionError(part, f"the number of layers is {layers!r}", "Give a whole number from 1 up")
+    if not (isinstance(segments, int) and segments >= LEAST_SEGMENTS):
+        raise DescriptionError(
+            part, f"the number of segments around pins is {segments!r}", f"Give a whole number from {LEAST_SEGMENTS} up"
+        )
     if dim == 2 or half:
         # in the plane there is only one way to sweep a region, whatever the joint's own axis (of a slider, say)
         sites = [replace(site, axis=(0.0, 0.0, 1.0)) for site in sites]

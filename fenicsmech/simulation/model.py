@@ -19,11 +19,12 @@ from fenicsmech.elasticity import ElasticBody, ElasticModel, Formulation, Quadra
 from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State
 from fenicsmech.errors import DescriptionError, FenicsmechError
 from fenicsmech.linkage import Linkage
-from fenicsmech.mechanism import Effect, FlexibleLink, Force, Mechanism, Output
+from fenicsmech.mechanism import Effect, FlexibleLink, Force, Mechanism, Output, Scene, validate
 from fenicsmech.mechanism.places import in_dimension
 from fenicsmech.meshing import InterfaceSite, LinkMesh, check_link, mesh_link
 from fenicsmech.meshing.bulge import bulge_field
 from fenicsmech.meshing.distribute import MechanismMesh, distribute
+from fenicsmech.meshing.sizing import LEAST_SEGMENTS
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,8 @@ class Fidelity:
         sizes: element size per flexible link.
         quadrature: quadrature degree.
         formulation: which links have the pressure as an unknown of its own.
+        layers: through the depth, or through half of it where half is meshed; None: chosen from depth and size.
+        segments: around a pin, at least.
     """
 
     model: ElasticModel
@@ -43,6 +46,26 @@ class Fidelity:
     sizes: Mapping[FlexibleLink, float]
     quadrature: Quadrature
     formulation: Formulation
+    layers: int | None = None
+    segments: int = LEAST_SEGMENTS
+
+
+def check_scene(scene: Scene, model: ElasticModel) -> None:
+    """Refuses a scene that has no form in ``model``.
+
+    Raises:
+        DescriptionError: it has none.
+    """
+    mechanism = scene.mechanism
+    validate(mechanism, model.mechanism_dim)
+    if not mechanism.flexible_links:
+        raise DescriptionError(
+            f"mechanism {mechanism.name!r}", "no link is flexible: nothing would bend", "Add one with flexible()"
+        )
+    for link in mechanism.flexible_links:
+        model.check(link.name, link.material)
+    for effect in scene.effects:
+        effect.check(mechanism, model.mechanism_dim)
 
 
 def check_links(mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> None:
@@ -50,7 +73,8 @@ def check_links(mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> N
     for link in mechanism.flexible_links:
         points = {part.name: part.at for part in (*mechanism.forces, *mechanism.outputs) if part.on == link}
         sites = interface_sites(linkage, link)
-        check_link(link.name, link.shape, sites, points, **_asked(link, fidelity))
+        asked = _asked(link, fidelity)
+        check_link(link.name, link.shape, sites, points, **asked)
 
 
 def mesh_links(mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> list[LinkMesh]:
@@ -63,7 +87,13 @@ def mesh_links(mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> li
 
 def _asked(link: FlexibleLink, fidelity: Fidelity) -> dict:
     """What is asked of the mesh of ``link``."""
-    return {"dim": fidelity.model.dim, "size": fidelity.sizes[link], "half": fidelity.model.symmetric}
+    return {
+        "dim": fidelity.model.dim,
+        "size": fidelity.sizes[link],
+        "layers": fidelity.layers,
+        "segments": fidelity.segments,
+        "half": fidelity.model.symmetric,
+    }
 
 
 def interface_sites(linkage: Linkage, link: FlexibleLink) -> list[InterfaceSite]:

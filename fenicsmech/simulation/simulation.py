@@ -31,20 +31,23 @@ from fenicsmech.equilibrium import (
 )
 from fenicsmech.errors import AssemblyError, DescriptionError
 from fenicsmech.linkage import Freedom, assemble, build_linkage, count_freedom
-from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Mechanism, Output, Scene, validate
+from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Mechanism, Output, Scene
 from fenicsmech.mechanism.checks import positive
 from fenicsmech.mechanism.places import in_dimension
 from fenicsmech.meshing import radius_ratios
+from fenicsmech.meshing.sizing import LEAST_SEGMENTS
 from fenicsmech.report import Panel, Progress, Silent, Trace, draw_configurations
 from fenicsmech.simulation.buckling import BucklingLoad, SoftMode, buckling_loads, soft_modes
 from fenicsmech.simulation.curve import Curve
+from fenicsmech.simulation.depth_error import DepthError
+from fenicsmech.simulation.dial import Choice, Dial, Outcome, Rung
 from fenicsmech.simulation.explanation import Explanation, hints, simulated
 from fenicsmech.simulation.export import write_xdmf
 from fenicsmech.simulation.followed import FollowedCurve, PathEvent
 from fenicsmech.simulation.follower import Follower
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.goal_error import GoalError
-from fenicsmech.simulation.model import Fidelity, MechanismModel, check_links, mesh_mechanism
+from fenicsmech.simulation.model import Fidelity, MechanismModel, check_links, check_scene, mesh_mechanism
 from fenicsmech.simulation.picture import Draughtsman
 from fenicsmech.simulation.request import CurveRequest, read_request
 from fenicsmech.simulation.snapshot import gather, rest_vertices
@@ -56,7 +59,7 @@ SPACES = {model.name: model for model in (SPATIAL, MID_PLANE_SYMMETRIC, PLANE_ST
 
 
 class Simulation:
-    """Equilibria of a scene at one fidelity.
+    """Equilibria of a scene at one fidelity: the one given, or the cheapest that is accurate enough.
 
     Nothing is meshed or compiled until the first curve; the description is checked at once.
 
@@ -66,6 +69,11 @@ class Simulation:
             "plane-stress" or "plane-strain".
         order: degree of the displacement field, 1, 2 or 3.
         size: element size in the plane of the links, or one per flexible link.
+        accuracy: instead of ``space``, ``order`` and ``size``: relative error allowed in the largest displacement of
+            every curve. ``load_displacement`` finds the cheapest fidelity whose estimated error is below it, see
+            ``choice``. With links known from files only, ``size`` stands for their thickness.
+        layers: of elements through the depth, or half of it where half is meshed; by default from depth and size.
+        segments: of elements around pins, at least.
         quadrature: quadrature degree; the measured optimum by default.
         formulation: ``Mixed()`` gives nearly incompressible links the pressure as an unknown of its own;
             ``Displacement()`` none.
@@ -83,7 +91,10 @@ class Simulation:
         *,
         space: str = "3d",
         order: int = 2,
-        size: float | Mapping[FlexibleLink, float],
+        size: float | Mapping[FlexibleLink, float] | None = None,
+        accuracy: float | None = None,
+        layers: int | None = None,
+        segments: int = LEAST_SEGMENTS,
         quadrature: Quadrature | None = None,
         formulation: Formulation | None = None,
         solver: EquilibriumSolver | None = None,
@@ -94,32 +105,28 @@ class Simulation:
             raise DescriptionError("space", f"{space!r} is not known", f"Choose one of {', '.join(SPACES)}")
         if order not in (1, 2, 3):
             raise DescriptionError("order", f"{order!r} is not 1, 2 or 3", "Choose 1 for speed, 2 for accuracy")
-        model = SPACES[space]
-        mechanism = scene.mechanism
-        validate(mechanism, model.mechanism_dim)
-        links = mechanism.flexible_links
-        if not links:
-            raise DescriptionError(
-                f"mechanism {mechanism.name!r}", "no link is flexible: nothing would bend", "Add one with flexible()"
-            )
-        per_link = size if isinstance(size, Mapping) else dict.fromkeys(links, size)
-        sizes = {link: positive(f"element size of {link.name!r}", per_link.get(link)) for link in links}
-        for link in links:
-            model.check(link.name, link.material)
-        for effect in scene.effects:
-            effect.check(mechanism, model.mechanism_dim)
-        self.scene, self.comm, self.clock = scene, comm, Clock()
-        self._described = _description(mechanism)
         if formulation is not None and not isinstance(formulation, Formulation):
             raise DescriptionError("formulation", f"it is {formulation!r}", "Give Mixed() or Displacement()")
-        rule = quadrature or Quadrature.for_order(order, model.dim)
-        self.fidelity = Fidelity(model, order, sizes, rule, formulation or Mixed())
-        self.linkage = build_linkage(mechanism, model.mechanism_dim)
-        check_links(mechanism, self.linkage, self.fidelity)
+        self.scene, self.comm, self.clock = scene, comm, Clock()
+        self._described = _description(scene.mechanism)
         self._solver, self._predictor = solver or PrimalDualNewton(), predictor or Hermite()
-        self._newtons: dict[tuple, Iteration] = {}
-        self._errors: dict[Force, GoalError] = {}
         self._last: Curve | None = None
+        self.choice: Choice | None = None
+        self._dial: Dial | None = None
+        formulation = formulation or Mixed()
+        if accuracy is not None:
+            self._dial = Dial(scene, positive("accuracy", accuracy), size, formulation)
+            self._take(self._dial.fidelity(self._dial.rung))
+            return
+        model, links = SPACES[space], scene.mechanism.flexible_links
+        if size is None:
+            raise DescriptionError("size", "it is missing", "Give an element size, or accuracy=… to have one chosen")
+        per_link = size if isinstance(size, Mapping) else dict.fromkeys(links, size)
+        sizes = {link: positive(f"element size of {link.name!r}", per_link.get(link)) for link in links}
+        rule = quadrature or Quadrature.for_order(order, model.dim)
+        fidelity = Fidelity(model, order, sizes, rule, formulation, layers, segments)
+        check_scene(scene, model)
+        self._take(fidelity)
 
     @cached_property
     def model(self) -> MechanismModel:
@@ -164,7 +171,10 @@ class Simulation:
             others=others,
         )
         with Progress(len(request.controls), configuration.name) if self.comm.rank == 0 else Silent() as progress:
-            self._last = self.trace(request, watch=progress.update)
+            if self._dial is None:
+                self._last = self.trace(request, watch=progress.update)
+            else:
+                self.choice = self._dial.settle(lambda rung: self._outcome(rung, request, progress.update))
         return self._last
 
     def trace(self, request: CurveRequest, *, watch: Callable[[int], None] = lambda done: None) -> Curve:
@@ -316,6 +326,8 @@ class Simulation:
             order=self.fidelity.order,
             size=self.fidelity.sizes,
             quadrature=self.fidelity.quadrature,
+            layers=self.fidelity.layers,
+            segments=self.fidelity.segments,
             formulation=self.fidelity.formulation,
             solver=self._solver,
             predictor=self._predictor,
@@ -332,10 +344,21 @@ class Simulation:
             DescriptionError: no curve was computed yet.
         """
         chosen = self._chosen(curve)
-        part = chosen.force_part
-        if part not in self._errors:
-            self._errors[part] = GoalError(self.model, self.newton(part))
-        return np.array([self._errors[part].estimate(frame, chosen.freedom) for frame in chosen.frames])
+        error = self._goal_error(chosen)
+        return np.array([error.estimate(frame, chosen.freedom) for frame in chosen.frames])
+
+    def modelling_errors(self, curve: Curve | None = None) -> np.ndarray:
+        """What a simulation in space would add to displacements in plane stress, (frames,) (collective).
+
+        Args:
+            curve: the last curve computed by default.
+
+        Raises:
+            DescriptionError: no curve was computed yet, or this is not plane stress.
+        """
+        chosen = self._chosen(curve)
+        error = DepthError(self.model, self.newton(chosen.force_part, chosen.others))
+        return np.array([error.estimate(frame, chosen.freedom) for frame in chosen.frames])
 
     def explain(self, curve: Curve | None = None, *, tolerance: float = 0.01) -> Explanation:
         """What is simulated and what is left out, with figures where that may matter (collective).
@@ -480,6 +503,35 @@ class Simulation:
                 "links, joints or motors were added after the simulation was made",
                 "Make a new Simulation",
             )
+
+    def _take(self, fidelity: Fidelity) -> None:
+        """Goes on at ``fidelity``; what was computed at another one stays with its curves."""
+        linkage = build_linkage(self.scene.mechanism, fidelity.model.mechanism_dim)
+        check_links(self.scene.mechanism, linkage, fidelity)
+        self.fidelity, self.linkage = fidelity, linkage
+        self.__dict__.pop("model", None)
+        self._newtons: dict[tuple, Iteration] = {}
+        self._errors: dict[tuple, GoalError] = {}
+
+    def _outcome(self, rung: Rung, request: CurveRequest, watch: Callable[[int], None]) -> Outcome:
+        """What a rung of the dial gives for a curve, and how wrong it may be (collective)."""
+        fidelity = self._dial.fidelity(rung)
+        if fidelity != self.fidelity:
+            self._take(fidelity)
+        self._last = curve = self.trace(request, watch=watch)
+        frame = max(curve.frames, key=lambda frame: abs(frame.displacement))
+        elements = self._goal_error(curve).estimate(frame, curve.freedom)
+        depth = 0.0
+        if fidelity.model is PLANE_STRESS:
+            depth = DepthError(self.model, self.newton(curve.force_part, curve.others)).estimate(frame, curve.freedom)
+        unknowns = self.model.rigid_dofs + self.model.flexible_dofs + self.model.pressure_dofs
+        return Outcome(frame.displacement, elements, depth, unknowns)
+
+    def _goal_error(self, curve: Curve) -> GoalError:
+        key = (curve.force_part, curve.others)
+        if key not in self._errors:
+            self._errors[key] = GoalError(self.model, self.newton(*key))
+        return self._errors[key]
 
     def _chosen(self, curve: Curve | None) -> Curve:
         chosen = curve or self._last
