@@ -208,8 +208,6 @@ class Dial:
         reached = self._does(trials[-1].error)
         if not reached:
             _log.warning("accuracy %g: the error of the finest rung is about %.2g", self._accuracy, trials[-1].error)
-                "the finest rung of the dial is estimated to miss %g by %.2g", self._accuracy, trials[-1].error
-            )
         return Choice(self._accuracy, tuple(trials), reached, self._tenfold(trials[-1]))
 
     def _does(self, error: float) -> bool:
