@@ -30,6 +30,7 @@ from fenicsmech.equilibrium.factor import Factor, Inertia
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import Balance, EquilibriumSystem
 from fenicsmech.log import logger
+from fenicsmech.mechanism.checks import positive
 
 _log = logger(__name__)
 _LEAST_SHIFT = 1e-9  # in units of the mean stiffness; slender links bend with 1e-6 of it and less
@@ -47,6 +48,9 @@ class NewtonOptions:
         iterations: most iterations.
         allowance: iterations in a row that may fail to improve on the best residual.
         largest_turn: largest rotation (rad), or displacement over the mechanism's length, of one step.
+
+    Raises:
+        DescriptionError: a limit is not a positive number.
     """
 
     tolerance: float = 1e-10
@@ -55,6 +59,10 @@ class NewtonOptions:
     iterations: int = 25
     allowance: int = 4
     largest_turn: float = 0.5
+
+    def __post_init__(self) -> None:
+        for limit in ("tolerance", "roundoff", "near", "largest_turn"):
+            positive(f"Newton's {limit}", getattr(self, limit))
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,16 @@ that ``make hard-cases`` prints (``__main__``). Here they stand in the order of 
 
 from __future__ import annotations
 
-from . import buckling, slender, straining
+from . import buckling, linkages, meshes, numbers, requests, scaling, slender, straining
 from .case import HardCase
 
-CASES: tuple[HardCase, ...] = (*slender.CASES, *straining.CASES, *buckling.CASES)
+CASES: tuple[HardCase, ...] = (
+    *slender.CASES,
+    *straining.CASES,
+    *buckling.CASES,
+    *linkages.CASES,
+    *meshes.CASES,
+    *requests.CASES,
+    *scaling.CASES,
+    *numbers.CASES,
+)
