@@ -31,14 +31,14 @@ def crane(space: str, comm: MPI.Comm, *, axis=(0, 0, 1)):
 def _tiny_strain(space: str, comm: MPI.Comm) -> Iterator[Check]:
     """Displacements under 1 and 2 units of a force that strains the link by 1e-9 are 1 : 2 up to that strain.
 
-    A link that a motor has carried along by the length ℓ in elements of size h has its strains from differences of
-    numbers of size ℓ, whose rounding is worth a strain of 1e-16 ℓ/h: of one of 1e-9 six digits can be left.
+    Nodes of a link that a motor has carried along by 70 mm are stored to 7e-15 mm; over the 2 mm between them that is
+    a strain of 5e-15, 5e-6 of the largest one here. A few of those is what can be asked for.
     """
     simulation, push, motor = crane(space, comm)
     strain, arm, modulus = 1e-9, 36.0, 4.0**3 / 6.0  # largest bending strain; lever arm; section modulus
     force = strain * YOUNG * modulus / arm
     turned = simulation.scene.configuration("turned", {motor: 2.0})
-    for where, configuration, bound in (("as drawn", fm.DRAWN, 1e-8), ("turned by 2 rad", turned, 1e-5)):
+    for where, configuration, bound in (("as drawn", fm.DRAWN, 1e-8), ("turned by 2 rad", turned, 3e-5)):
         curve = simulation.load_displacement(push, forces=[force, 2.0 * force], configuration=configuration)
         single, double = curve.displacements
         yield deviation(f"{where}: half the displacement under half the force", 2.0 * single, double, bound)
