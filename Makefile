@@ -27,7 +27,7 @@ export PRTE_MCA_hwloc_default_binding_policy := none
 MPIRUN = OPENBLAS_NUM_THREADS=1 mpirun -n $(RANKS)
 heading = @printf '\n--- %s\n' '$(1)'
 
-.PHONY: help demo test install install-test lint test-serial test-parallel test-slow test-debian13 demos-quick bench clean
+.PHONY: help demo test install install-test lint test-serial test-parallel test-slow test-debian13 demos-quick hard-cases bench clean
 
 help: ## list the targets
 	@sed -nE 's/^([a-z0-9-]+):.*## (.*)/\1\t\2/p' Makefile | expand -t 16
@@ -76,6 +76,9 @@ demos-quick: $(DEMOS:%=demo-quick-%) ## every demo, coarse, in results/quick/
 $(DEMOS:%=demo-quick-%): demo-quick-%: install
 	$(call heading,demo $*)
 	$(PYTHON) demos/$*.py --quick --out results/quick/$*
+
+hard-cases: install-test ## every case of tests/hard/, slow ones too, as the table in README.md
+	$(PYTHON) -m tests.hard
 
 bench: $(MECHANISMS:%=bench-%) ## seconds per frame (frame_median) of every demo's initial design: 3D, on ranks, plane stress
 

@@ -10,6 +10,7 @@ from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRAIN, PLANE_STRES
 from fenicsmech.equilibrium import PrimalDualNewton
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import Scene, validate
+from fenicsmech.mechanism.checks import positive
 
 TOLERANCE = PrimalDualNewton().tolerance
 """Newton's tolerance unless a rung says otherwise."""
@@ -31,6 +32,9 @@ class Rung:
         factor: element size over the base size of the study.
         quadrature: degree; None: the default of model and order.
         tolerance: of Newton's residual over the forces that balance in it.
+
+    Raises:
+        DescriptionError: factor or tolerance is not a positive number.
     """
 
     model: ElasticModel | None
@@ -38,6 +42,10 @@ class Rung:
     factor: float = 1.0
     quadrature: int | None = None
     tolerance: float = TOLERANCE
+
+    def __post_init__(self) -> None:
+        positive("factor of a rung", self.factor)
+        positive("tolerance of a rung", self.tolerance)
 
     @property
     def model_name(self) -> str:

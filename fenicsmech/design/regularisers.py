@@ -15,6 +15,7 @@ from fenicsmech.design.barrier import Barrier
 from fenicsmech.design.handle_optimum import Placement
 from fenicsmech.design.optimisers import Quadratic
 from fenicsmech.design.rest_shape import DesignedLink, RestShape
+from fenicsmech.mechanism.checks import finite, positive
 
 Model = Callable[[np.ndarray], Quadratic]
 
@@ -38,7 +39,7 @@ class Regulariser(ABC):
         return Weighted((self, other), (1.0, 1.0))
 
     def __mul__(self, factor: float) -> Regulariser:
-        return Weighted((self,), (float(factor),))
+        return Weighted((self,), (finite("weight of a regulariser", factor),))
 
     __rmul__ = __mul__
 
@@ -169,11 +170,18 @@ class MeshQuality(Regulariser):
     Attributes:
         limit: aspect ratio up to which nothing is penalised.
         width, strength: ε and m of the barrier.
+
+    Raises:
+        DescriptionError: one of them is not a positive number.
     """
 
     limit: float = 30.0
     width: float = 30.0
     strength: float = 5.0
+
+    def __post_init__(self) -> None:
+        for constant in ("limit", "width", "strength"):
+            positive(f"{constant} of the mesh quality", getattr(self, constant))
 
     def around(self, rest, placement):
         size, here = len(placement.p), Quadratic.zero(len(placement.p))

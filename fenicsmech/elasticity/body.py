@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from numbers import Integral
 
 import numpy as np
 import ufl
@@ -37,14 +38,23 @@ from fenicsmech.elasticity.models import ElasticModel
 from fenicsmech.elasticity.pressure import PressureField
 from fenicsmech.elasticity.strain import Moduli
 from fenicsmech.elasticity.stress import cauchy_stress, von_mises
+from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import EnergyLaw, Material
 
 
 @dataclass(frozen=True)
 class Quadrature:
-    """Degree of the quadrature, per order of the displacement field."""
+    """Degree of the quadrature, per order of the displacement field.
+
+    Raises:
+        DescriptionError: it is not a whole number of at least 1.
+    """
 
     degree: int
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.degree, Integral) or self.degree < 1:
+            raise DescriptionError("quadrature", f"degree {self.degree!r}", "Give a whole number of at least 1")
 
     @staticmethod
     def for_order(order: int, dim: int) -> Quadrature:

@@ -26,7 +26,7 @@ class Inertia:
 
 
 class Factor:
-    """MUMPS LDLᵀ of a matrix whose pattern does not change: the symbolic analysis is done once.
+    """MUMPS LDLᵀ of a matrix whose pattern does not change: the symbolic analysis is kept as long as it serves.
 
     Args:
         matrix: the matrix; refactor after changing its values.
@@ -34,21 +34,36 @@ class Factor:
 
     def __init__(self, matrix: PETSc.Mat) -> None:
         self._matrix = matrix
+        self._analyse()
+
+    def refactor(self) -> Inertia | None:
+        """Factors the matrix's current values; None if the factorisation failed."""
+        inertia = self._numeric()
+        if not self._fresh and (inertia is None or inertia.zero):
+            # the analysis pairs unknowns by the values it sees: in other ones a pair may be zero, the matrix regular
+            self._solver.destroy()
+            self._analyse()
+            inertia = self._numeric()
+        self._fresh = False
+        return inertia
+
+    def _analyse(self) -> None:
+        """A solver that orders and pairs the unknowns by the values it is first given."""
         # the only way that reaches all of MUMPS's controls, the ordering among them
         options = PETSc.Options(_PREFIX)
         for number, value in _MUMPS.items():
             options[f"mat_mumps_icntl_{number}"] = value
-        self._solver = PETSc.KSP().create(matrix.comm)
+        self._solver = PETSc.KSP().create(self._matrix.comm)
         self._solver.setOptionsPrefix(_PREFIX)
         self._solver.setType(PETSc.KSP.Type.PREONLY)
-        self._solver.setOperators(matrix)
+        self._solver.setOperators(self._matrix)
         pc = self._solver.getPC()
         pc.setType(PETSc.PC.Type.CHOLESKY)
         pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
         self._solver.setFromOptions()
+        self._fresh = True
 
-    def refactor(self) -> Inertia | None:
-        """Factors the matrix's current values; None if the factorisation failed."""
+    def _numeric(self) -> Inertia | None:
         self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         for _ in range(4):
             self._solver.setOperators(self._matrix)

@@ -36,6 +36,7 @@ from fenicsmech.equilibrium.solver import EquilibriumSolver, Iteration, NotConve
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import Balance, EquilibriumSystem
 from fenicsmech.log import logger
+from fenicsmech.mechanism.checks import positive
 
 _log = logger(__name__)
 _LEAST_SHIFT = 1e-9  # in units of the mean stiffness; slender links bend with 1e-6 of it and less
@@ -53,6 +54,9 @@ class PrimalDualNewton(EquilibriumSolver):
         mixed_stress: whether tangents, as long as the residual is large, hold the stress that the last step solved
             for instead of the one it led to.
         largest_turn: largest rotation (rad), or displacement over the mechanism's length, of one step.
+
+    Raises:
+        DescriptionError: a limit is not a positive number.
     """
 
     near: float = 1e-2
@@ -60,6 +64,11 @@ class PrimalDualNewton(EquilibriumSolver):
     allowance: int = 12
     mixed_stress: bool = True
     largest_turn: float = 0.5
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for limit in ("near", "largest_turn"):
+            positive(f"Newton's {limit}", getattr(self, limit))
 
     def on(self, system: EquilibriumSystem) -> Newton:
         return Newton(system, self)

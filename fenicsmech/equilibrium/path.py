@@ -7,13 +7,15 @@ equilibria that were reached are never lost.
 from __future__ import annotations
 
 from fenicsmech.equilibrium.control import Control
-from fenicsmech.equilibrium.predictor import Anchor, Predictor
+from fenicsmech.equilibrium.predictor import Anchor, Predictor, Tangent
 from fenicsmech.equilibrium.solver import Iteration, NotConverged, Solution
 from fenicsmech.equilibrium.state import State
 
 _SMALLEST = 1.0 / 1024.0  # of the distance asked for
 _EASY = 5  # iterations
 _STRIDE = 0.2  # of the mechanism's length, or rad: how far a step may move anything, by the tangent (measured)
+_SINGULAR = 1e-6  # of the distance asked for: a tangent that wants steps this small has no meaning
+_RUNAWAY = 5.0 * _STRIDE  # a prediction that moves anything this far is none
 IDLE_STIFFNESS = 1e-10
 """What is lent to idle freedoms, in units of the mean stiffness."""
 
@@ -63,7 +65,7 @@ class Path:
         step, tried = distance, []
         while True:
             remaining = control.target - self._value
-            step = self._strided(step)
+            step = self._strided(step, least=_SINGULAR * abs(distance))
             last = abs(step) >= abs(remaining) * (1.0 - 1e-9)
             value = control.target if last else self._value + step
             try:
@@ -94,17 +96,27 @@ class Path:
         self._last = solution
         self._remember(Anchor(self._value, solution.state, solution.tangent))
 
-    def _strided(self, step: float) -> float:
-        """``step``, shortened if it moves anything farther than Newton's method takes in its stride."""
+    def _strided(self, step: float, *, least: float) -> float:
+        """``step``, shortened if it moves anything farther than Newton's method takes in its stride.
+
+        Not to less than ``least``: a tangent that runs away, as in a singular position, does not tell how far to go.
+        """
         if not self._anchors:
             return step
         motion = self._newton.system.size(self._anchors[-1].tangent) * abs(step)
-        return step * min(1.0, _STRIDE / max(motion, _STRIDE))
+        shortened = step * min(1.0, _STRIDE / max(motion, _STRIDE))
+        return shortened if abs(shortened) > least else step
 
     def _guess(self, value: float) -> State:
+        """The prediction at ``value``, a plainer one where it runs away, in the end the last equilibrium."""
         if not self._anchors:
             return self._start
-        return self._predictor.predict(self._newton.system, self._anchors, value)
+        system, last = self._newton.system, self._anchors[-1].state
+        for predictor in (self._predictor, Tangent()):
+            guess = predictor.predict(system, self._anchors, value)
+            if system.size(system.difference(guess, last)) <= _RUNAWAY:
+                return guess
+        return last
 
     def _remember(self, anchor: Anchor) -> None:
         """Keeps the last two equilibria at different values."""

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem
 
+_REACH = 4.0  # widths between two equilibria that their cubic is trusted to go on for: its error grows as t⁴
+
 
 @dataclass(frozen=True)
 class Anchor:
@@ -43,7 +45,9 @@ class Tangent(Predictor):
 
 
 class Hermite(Predictor):
-    """The cubic through the last two equilibria and their tangents; along the tangent while there is only one.
+    """The cubic through the last two equilibria and their tangents.
+
+    While there is only one, and where the two lie close together compared with the step, along the tangent.
 
     With t = (v − v₀) / w, w = v₀ − v₋₁:
 
@@ -56,6 +60,8 @@ class Hermite(Predictor):
         before, last = anchors[-2:]
         width = last.value - before.value
         t = (value - last.value) / width
+        if abs(t) > _REACH:
+            return Tangent().predict(system, anchors, value)
         step = (
             system.difference(before.state, last.state).scaled(t * t * (3.0 + 2.0 * t))
             + before.tangent.scaled(width * t * t * (1.0 + t))

@@ -16,6 +16,7 @@ from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.factor import Factor, Inertia
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import Balance, EquilibriumSystem
+from fenicsmech.mechanism.checks import positive
 
 
 @dataclass(frozen=True)
@@ -54,10 +55,17 @@ class EquilibriumSolver(ABC):
     Attributes:
         tolerance: residual over the forces that balance in it, at convergence.
         roundoff: residual in units of mean stiffness times length below which digits are lost.
+
+    Raises:
+        DescriptionError: a limit is not a positive number.
     """
 
     tolerance: float = 1e-10
     roundoff: float = 1e-14
+
+    def __post_init__(self) -> None:
+        for limit in ("tolerance", "roundoff"):
+            positive(f"Newton's {limit}", getattr(self, limit))
 
     @abstractmethod
     def on(self, system: EquilibriumSystem) -> Iteration:

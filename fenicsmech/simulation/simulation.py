@@ -368,8 +368,9 @@ class Simulation:
             tolerance: relative change of the displacement from which something matters.
 
         Raises:
-            DescriptionError: no curve was computed yet.
+            DescriptionError: no curve was computed yet, or the tolerance is not a positive number.
         """
+        positive("tolerance of an explanation", tolerance)
         chosen, fidelity = self._chosen(curve), self.fidelity
         left_out = hints(
             self.model,

@@ -22,6 +22,7 @@ from fenicsmech.design.optimisers.problem import (
     Reason,
     Start,
 )
+from fenicsmech.mechanism.checks import positive
 
 _ARMIJO = 1e-4
 _HALVINGS = 30
@@ -32,10 +33,16 @@ class Bfgs(Minimiser):
     """Stops when the expected reduction is below ``tolerance`` times the objective, or after ``iterations``.
 
     What it expects hangs on an approximate Hessian: a tolerance that is not small ends it far from a minimum.
+
+    Raises:
+        DescriptionError: the tolerance is not a positive number.
     """
 
     iterations: int = 300
     tolerance: float = 1e-6
+
+    def __post_init__(self) -> None:
+        positive("tolerance of BFGS", self.tolerance)
 
     def minimise(self, problem: LeastSquaresProblem, start: Start, *, watch: Callable[[Iterate], None]) -> Iterate:
         here, size = problem.evaluate(start.parameters), len(start.parameters)

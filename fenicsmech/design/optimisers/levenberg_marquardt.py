@@ -26,6 +26,7 @@ from fenicsmech.design.optimisers.problem import (
     Start,
     TooHigh,
 )
+from fenicsmech.mechanism.checks import positive
 
 _POOR, _GOOD = 0.1, 0.75  # actual over promised reduction: below, the step is refused; above, damping falls
 _REFUSALS = 20
@@ -36,11 +37,19 @@ _INNER = 50
 
 @dataclass(frozen=True)
 class LevenbergMarquardt(Minimiser):
-    """Ends when the undamped step promises less than ``tolerance`` of O, or three steps in a row gained less."""
+    """Ends when the undamped step promises less than ``tolerance`` of O, or three steps in a row gained less.
+
+    Raises:
+        DescriptionError: tolerance or damping is not a positive number.
+    """
 
     iterations: int = 60
     tolerance: float = 5e-3
     damping: float = 1e-2
+
+    def __post_init__(self) -> None:
+        positive("tolerance of Levenberg–Marquardt", self.tolerance)
+        positive("damping of Levenberg–Marquardt", self.damping)
 
     def minimise(self, problem: LeastSquaresProblem, start: Start, *, watch: Callable[[Iterate], None]) -> Iterate:
         here, metric = problem.evaluate(start.parameters), 1.0 / problem.lengths**2

@@ -1,0 +1,21 @@
+"""Hard cases: scenes on which simulations of flexible mechanisms are known to fail, each with a known answer.
+
+Each is defined once (``case.HardCase``) and used twice: as a test (``test_hard_cases``), and as a line of the table
+that ``make hard-cases`` prints (``__main__``). Here they stand in the order of the table.
+"""
+
+from __future__ import annotations
+
+from . import buckling, linkages, meshes, numbers, requests, scaling, slender, straining
+from .case import HardCase
+
+CASES: tuple[HardCase, ...] = (
+    *slender.CASES,
+    *straining.CASES,
+    *buckling.CASES,
+    *linkages.CASES,
+    *meshes.CASES,
+    *requests.CASES,
+    *scaling.CASES,
+    *numbers.CASES,
+)

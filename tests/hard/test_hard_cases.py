@@ -1,0 +1,33 @@
+"""Every hard case finds what is known about it."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from mpi4py import MPI
+
+from .case import HardCase
+from .cases import CASES
+
+README = Path(__file__).parents[2] / "README.md"
+
+
+def _parameter(case: HardCase, space: str):
+    marks = [pytest.mark.parallel] * case.parallel + [pytest.mark.slow] * case.slow
+    return pytest.param(case, space, id=f"{case.name}, {space}", marks=marks)
+
+
+@pytest.mark.parametrize("case, space", [_parameter(case, space) for case in CASES for space in case.spaces])
+def test_hard_case(case, space):
+    checks = list(case.run(space, MPI.COMM_WORLD))
+    assert checks
+    assert [str(check) for check in checks if not check.holds] == []
+
+
+def test_readme_tells_what_happened_in_every_case():
+    told = re.findall(r"^\| ([^|]+?) +\|", README.read_text().partition("## Hard cases")[2], flags=re.M)
+    names = [case.name for case in CASES]
+    assert len(set(names)) == len(names)
+    assert [name for name in told if name in names] == names
