@@ -18,13 +18,15 @@ LIMIT_LOAD = 897.0 * BENDING / 1e6  # R = 100
 
 def deep_arch(comm: MPI.Comm = MPI.COMM_SELF) -> tuple[fm.Simulation, Force, float]:
     """The simulation, the force on the crown, and a displacement just beyond the limit point."""
-    half = 0.5 * OPENING
-    points = [(RADIUS * np.sin(a), RADIUS * np.cos(a)) for a in np.linspace(-half, half, 41)]
+    half, rim = 0.5 * OPENING, 0.5 * THICKNESS
+    # links are elastic from the rims of their discs: that of the clamp is where the arch begins
+    angles = [-half - rim / RADIUS, *np.linspace(-half, half, 41)]
+    points = [(RADIUS * np.sin(a), RADIUS * np.cos(a)) for a in angles]
     mechanism = fm.Mechanism("deep arch")
     base = mechanism.rigid("base", fixed=True)
     bow = mechanism.flexible("bow", fm.strip(points, thickness=THICKNESS, depth=DEPTH), fm.Material("m", YOUNG, 0.3))
-    mechanism.weld(base, bow, at=points[0], radius=0.5 * THICKNESS)
-    mechanism.revolute(base, bow, at=points[-1], radius=0.5 * THICKNESS)
-    push = mechanism.force(on=bow, at=points[20], direction=(0, -1), name="push")
+    mechanism.weld(base, bow, at=points[0], radius=rim)
+    mechanism.revolute(base, bow, at=points[-1], radius=rim)
+    push = mechanism.force(on=bow, at=(0.0, RADIUS), direction=(0, -1), name="push")
     simulation = fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=2.0 * THICKNESS, comm=comm)
     return simulation, push, 1.16 * RADIUS
