@@ -73,6 +73,22 @@ def test_points_on_curved_edges_are_found_where_they_are_drawn_and_move_with_the
         assert found == pytest.approx(turned(place[None])[0], abs=1e-11 * OUTER)
 
 
+def test_points_are_found_in_the_most_curved_cells_too():
+    # few edges around pins and along a narrow bend: bulges of a tenth of the chord
+    mechanism = fm.Mechanism("hook")
+    base = mechanism.rigid("base", fixed=True)
+    shape = fm.strip([(0.0, 0.0), (8.0, 6.0), (16.0, 0.0)], thickness=3.0, depth=2.0)
+    hook = mechanism.flexible("hook", shape, fm.ONYX)
+    mechanism.revolute(base, hook, at=(0.0, 0.0), radius=2.4)
+    mechanism.revolute(base, hook, at=(16.0, 0.0), radius=2.4)
+    model = fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=4.0, comm=MPI.COMM_SELF).model
+    move(model)
+    for place in middles(model.mesh):
+        output = Output(hook, tuple(place), (1.0, 0.0), "there")
+        found = model.point(output).displacement(model.elastic.u, None)
+        assert found == pytest.approx(turned(place[None])[0], abs=1e-11)
+
+
 def test_linear_fields_have_straight_cells_and_find_points_on_their_chords():
     simulation, top, _ = bow("plane-stress", 1)
     model = simulation.model
