@@ -88,6 +88,12 @@ def test_bulges_of_cells_are_those_of_their_pairs_of_corners_however_numbered(ce
     assert np.array_equal(edges.of_cells(cells)[0], expected)
 
 
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_rank_without_cells_of_a_link_asks_for_no_bulges(dim):
+    edges = CurvedEdges(np.array([[0, 2], [1, 2]]), np.ones((2, dim)))
+    assert edges.of_cells(np.zeros((0, dim + 1), dtype=np.int32)).shape == (0, dim * (dim + 1) // 2, dim)
+
+
 def test_renumbered_edges_keep_their_bulges_and_lose_those_without_an_end():
     edges = CurvedEdges(np.array([[0, 1], [1, 2], [2, 3]]), np.array([[1.0, 0.0], [2.0, 0.0], [3.0, 0.0]]))
     renumbered = edges.renumbered(np.array([7, 4, 5, -1]))
