@@ -30,9 +30,7 @@ from fenicsmech.simulation import Simulation
 from fenicsmech.simulation.request import CurveRequest
 
 _HALVINGS = 2  # of a change of design whose equilibrium is not found, or lies elsewhere
-_ASTRAY = (
-    2.0  # times δ: how far the backward prediction may miss (measured: up to 1.7 on one branch, from 3.8 across a fold)
-)
+_ASTRAY = 2.0  # times δ, how far the prediction may miss: up to 1.7 on one branch, 3.8 and more across folds
 _LEAST_MISS = 1e-6  # of the mechanism's length, or rad: what is a miss at all
 
 
