@@ -50,6 +50,11 @@ class Curve:
         """(frames,)."""
         return np.array([frame.stable for frame in self.frames])
 
+    @property
+    def jumped(self) -> np.ndarray:
+        """Whether the mechanism snapped on the way to each frame, (frames,)."""
+        return np.array([frame.jumped for frame in self.frames])
+
     def series(self, label: str = "", *, colour: str | None = None, faint: bool = False) -> CurveSeries:
         """The curve as a plot draws it, arguments as those of ``CurveSeries``."""
         return CurveSeries(self.displacements, self.forces, label=label, stable=self.stable, colour=colour, faint=faint)
