@@ -21,7 +21,7 @@ from fenicsmech.equilibrium.continuation import Goal, Stretch, follow
 from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadControl, MotorControl, ShareControl
 from fenicsmech.equilibrium.critical import Critical, CriticalPoint
 from fenicsmech.equilibrium.eigen import Mode, critical_changes, softest_modes
-from fenicsmech.equilibrium.lead import ForceLead, Heading, Lead
+from fenicsmech.equilibrium.lead import ForceLead, Heading, Lead, MotorLead
 from fenicsmech.equilibrium.load import PointLoad
 from fenicsmech.equilibrium.newton import Newton, PrimalDualNewton
 from fenicsmech.equilibrium.path import IDLE_STIFFNESS, Path, PathFailed
@@ -57,6 +57,7 @@ __all__ = [
     "LoadControl",
     "Mode",
     "MotorControl",
+    "MotorLead",
     "Newton",
     "NotConverged",
     "Path",
