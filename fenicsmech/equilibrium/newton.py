@@ -32,6 +32,7 @@ from fenicsmech.equilibrium.system import Balance, EquilibriumSystem
 from fenicsmech.log import logger
 
 _log = logger(__name__)
+_LEAST_MOTION = 1e-9  # of the mechanism's length: what is smaller counts as no displacement
 _LEAST_SHIFT = 1e-9  # in units of the mean stiffness; slender links bend with 1e-6 of it and less
 
 
@@ -41,7 +42,7 @@ class NewtonOptions:
 
     Attributes:
         tolerance: residual over the forces that balance in it, at convergence.
-        roundoff: residual in units of mean stiffness times length below which digits are lost.
+        roundoff: residual in units of mean stiffness times the largest displacement below which digits are lost.
         near: residual over the forces below which any equilibrium, unstable ones too, is converged to; farther
             off, steps descend.
         iterations: most iterations.
@@ -160,10 +161,14 @@ class Newton:
             return x
 
     def _relative(self, balance: Balance) -> float:
-        return balance.norm / max(balance.forces, self.options.roundoff * self.system.unit)
+        return balance.norm / max(balance.forces, self._rounding(balance))
 
     def _converged(self, balance: Balance) -> bool:
-        return balance.norm <= max(self.options.tolerance * balance.forces, self.options.roundoff * self.system.unit)
+        return balance.norm <= max(self.options.tolerance * balance.forces, self._rounding(balance))
+
+    def _rounding(self, balance: Balance) -> float:
+        """Rounding of displacements, which are counted from the drawn configuration."""
+        return self.options.roundoff * self.system.unit * max(balance.motion, _LEAST_MOTION)
 
     def _direction(
         self, state: State, control: Control, balance: Balance, floor: float, *, last: float, any_inertia: bool

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from fenicsmech.bodies import BodyPoint, InterfaceMap, LinkPoint
@@ -43,12 +44,14 @@ class Balance:
         vector: Gᵀ ∇L, dimensionless.
         norm: its norm.
         forces: norm of the loads and reactions that should cancel in it.
+        motion: largest displacement from the drawn configuration, over the mechanism's length.
         moments: Σ r_i ⊗ (X_i − c) of each interface body.
     """
 
     vector: PETSc.Vec
     norm: float
     forces: float
+    motion: float
     moments: dict[int, np.ndarray]
 
 
@@ -196,7 +199,8 @@ class EquilibriumSystem:
                 rows[layout.owned : layout.owned + layout.extras] = extras
             vector = self._map.createVecRight()
             self._map.multTranspose(self._rows, vector)
-            return Balance(vector, vector.norm(), float(np.sqrt(forces)), moments)
+            motion = layout.comm.allreduce(float(np.max(np.abs(state.u), initial=0.0)), op=MPI.MAX) / self.joints.length
+            return Balance(vector, vector.norm(), float(np.sqrt(forces)), motion, moments)
 
     # -- derivatives at the loaded state -------------------------------------------------------------------
 

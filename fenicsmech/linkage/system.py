@@ -16,6 +16,8 @@ from fenicsmech.kinematics import RIGID_SPACES
 from fenicsmech.linkage.bodies import Body
 from fenicsmech.mechanism import Motor
 
+_ROUNDING = 4.0 * np.finfo(float).eps
+
 
 @dataclass(frozen=True)
 class Connection:
@@ -103,7 +105,9 @@ class JointSystem:
         for k, rows in enumerate(self._joint_rows):
             residual[rows] = self._constraints[k].value(*self._arguments(k, poses, motors))
         for body, rows in self._norm_rows.items():
-            residual[rows] = self.space.norm_residual(poses[body])
+            norm = self.space.norm_residual(poses[body])
+            # rotations come normalised: what is left then is rounding, and larger than the smallest loads
+            residual[rows] = np.where(np.abs(norm) > _ROUNDING, norm, 0.0)
         return residual
 
     def gradient(self, poses: np.ndarray, motors: np.ndarray) -> np.ndarray:

@@ -1,6 +1,7 @@
 """Joints as positions of pin centres: how far apart the two links of each joint are, and how far turned.
 
-A link's place is a displacement of its centre and a rotation matrix. Both may be complex (see ``strain_energy``).
+A link's place is a displacement of its centre and a rotation matrix. Both may be complex, and are as precise as
+strains are (see ``strain_energy``): small rotations are the difference of matrices close to one.
 """
 
 from __future__ import annotations
@@ -10,11 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 import fenicsmech as fm
 
 from .blueprint import Blueprint, CompliancePlan, JointPlan
+from .strain_energy import REAL
 
 
 @dataclass(frozen=True)
@@ -45,12 +46,20 @@ class Place:
 
 def place(centre: Sequence[float], pose: np.ndarray) -> Place:
     """The place that a pose stands for: (x, y, angle), or (x, y, z, quaternion w first)."""
-    centre = np.asarray(centre, dtype=float)
+    centre, pose = np.asarray(centre, dtype=REAL), np.asarray(pose, dtype=REAL)
     if len(centre) == 2:
-        c, s = math.cos(pose[2]), math.sin(pose[2])
+        c, s = np.cos(pose[2]), np.sin(pose[2])
         return Place(centre, pose[:2], np.array([[c, -s], [s, c]]), pose[2])
-    w, x, y, z = pose[3:]
-    return Place(centre, pose[:3], Rotation.from_quat([x, y, z, w]).as_matrix())
+    w, x, y, z = pose[3:] / np.sqrt(np.sum(pose[3:] ** 2))
+    # Rodrigues' formula, written out
+    turn = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    return Place(centre, pose[:3], turn)
 
 
 @dataclass(frozen=True)

@@ -95,6 +95,7 @@ def _links(rng: Random, skeleton: Skeleton, space: str) -> tuple[LinkPlan, ...]:
         for a, b in zip(skeleton.links[name], skeleton.links[name][1:], strict=False)
     )
     slender = _decade(rng, -1.3 if space == "3d" else -2.0, -0.75)
+    law = "NeoHookean" if space == "plane-stress" else rng.choice(_LAWS)  # one per scene: each must be compiled
     materials = [rng.choice(_MATERIALS) for _ in range(2)]
     links = []
     for name, at in skeleton.links.items():
@@ -111,7 +112,7 @@ def _links(rng: Random, skeleton: Skeleton, space: str) -> tuple[LinkPlan, ...]:
                 depth=thickness * rng.uniform(0.5, 3.0),
                 young=young,
                 poisson=poisson,
-                law="NeoHookean" if space == "plane-stress" else rng.choice(_LAWS),
+                law=law,
                 size=thickness * rng.uniform(0.9, 1.5),
             )
         )

@@ -306,7 +306,8 @@ def law_without_plane_stress(rng: Random, scene: Blueprint) -> Spoiled:
     """A law that has no closed form in plane stress."""
     link = rng.choice(scene.flexible)
     law = rng.choice(("LogarithmicNeoHookean", "IsochoricNeoHookean", "IsochoricSimoNeoHookean"))
-    return _refused("law in plane stress", replace(_with_link(scene, link, law=law), space="plane-stress"), link.name)
+    flat = replace(scene, links=tuple(replace(x, law="NeoHookean") for x in scene.links), space="plane-stress")
+    return _refused("law in plane stress", _with_link(flat, flat.link(link.name), law=law), link.name)
 
 
 def interfaces_cover_link(rng: Random, scene: Blueprint) -> Spoiled:
@@ -315,7 +316,7 @@ def interfaces_cover_link(rng: Random, scene: Blueprint) -> Spoiled:
     joint = next(joint for joint in scene.joints if joint.at == link.centreline[0])
     clamp = Clamp(9.0 * scene.length, 9.0 * scene.length, 0.0)
     spoiled = replace(_with_joint(scene, joint, kind="weld", axis=None, interface=clamp), motors=(), effects=())
-    return _refused("clamp as big as its link", spoiled, link.name, joint.name, errors=(MeshingError,))
+    return _refused("clamp as big as its link", spoiled, joint.a, joint.b, joint.name, errors=(MeshingError,))
 
 
 SPOILERS: tuple[Spoiler, ...] = (

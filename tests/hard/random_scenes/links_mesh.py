@@ -6,12 +6,14 @@ Only numbers are taken from the simulation: where nodes are, which nodes a cell 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import combinations, combinations_with_replacement
+from itertools import combinations
 
 import basix
 import numpy as np
 
 import fenicsmech as fm
+
+from .strain_energy import REAL
 
 
 @dataclass(frozen=True)
@@ -50,8 +52,7 @@ class LinksMesh:
 
     def gradients(self, barycentric: np.ndarray) -> np.ndarray:
         """∂N/∂X at points (q, dim + 1) of all cells, (m, q, k, dim)."""
-        edges = self.corners[:, 1:] - self.corners[:, :1]
-        inner = np.linalg.inv(edges).transpose(0, 2, 1)  # rows: gradients of the last dim barycentric coordinates
+        inner = _dual((self.corners[:, 1:] - self.corners[:, :1]).astype(REAL))
         slopes = np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)
         return np.einsum("qkb,mbd->mqkd", shape_slopes(barycentric, self.order), slopes)
 
@@ -62,6 +63,15 @@ class LinksMesh:
         inside = np.linalg.solve(matrix, np.broadcast_to(np.append(at, 1.0), (len(cells), self.dim + 1))[..., None])
         best = int(np.argmax(inside[..., 0].min(axis=1)))
         return int(cells[best]), inside[best, :, 0]
+
+
+def _dual(edges: np.ndarray) -> np.ndarray:
+    """Rows g_a with g_a · e_b = δ_ab for the rows e_b of ``edges`` (m, dim, dim): ∇L of all corners but the first."""
+    if edges.shape[-1] == 2:
+        turned = np.stack([edges[:, 1, ::-1] * [1, -1], edges[:, 0, ::-1] * [-1, 1]], axis=1)
+        return turned / (edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])[:, None, None]
+    normals = np.stack([np.cross(edges[:, (a + 1) % 3], edges[:, (a + 2) % 3]) for a in range(3)], axis=1)
+    return normals / np.sum(normals[:, 0] * edges[:, 0], axis=-1)[:, None, None]
 
 
 def shape_functions(barycentric: np.ndarray, order: int) -> np.ndarray:
@@ -113,19 +123,19 @@ def _ordered(nodes: np.ndarray, dofs: np.ndarray, dim: int, order: int) -> np.nd
     """Nodes of each cell in this module's order, told by where they are: midpoints lie between two corners."""
     if order == 1:
         return dofs
-    at = nodes[dofs]
-    size = np.ptp(at, axis=1).max()
-    columns = []
-    for cell, points in enumerate(at):
-        middle = {}
-        for a, b in combinations_with_replacement(range(len(points)), 2):
-            if a < b:
-                gap = np.linalg.norm(points - 0.5 * (points[a] + points[b]), axis=1)
-                nearest = int(np.argmin(gap))
-                if gap[nearest] < 1e-9 * size and nearest not in (a, b):
-                    middle[nearest] = (a, b)
-        corners = [i for i in range(len(points)) if i not in middle]
-        assert len(corners) == dim + 1
-        edges = {pair: i for i, pair in middle.items() if set(pair) <= set(corners)}
-        columns.append([*corners, *(edges[pair] for pair in combinations(corners, 2))])
-    return np.take_along_axis(dofs, np.array(columns), axis=1)
+    at, count = nodes[dofs], dofs.shape[1]
+
+    def halfway(pair: tuple[int, int], node: int) -> bool:
+        """Whether ``node`` lies halfway between two others, in all cells."""
+        gap = np.abs(at[:, node] - 0.5 * (at[:, pair[0]] + at[:, pair[1]])).max(axis=1)
+        return bool(np.all(gap <= 1e-9 * np.ptp(at, axis=1).max(axis=1)))
+
+    middle = {
+        pair: node
+        for pair in combinations(range(count), 2)
+        for node in range(count)
+        if node not in pair and halfway(pair, node)
+    }
+    corners = [node for node in range(count) if node not in middle.values()]
+    assert len(corners) == dim + 1
+    return dofs[:, [*corners, *(middle[pair] for pair in combinations(corners, 2))]]

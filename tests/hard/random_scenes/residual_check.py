@@ -40,6 +40,11 @@ class Residual:
     travel_error: float
     energy_error: float
 
+    @property
+    def relative(self) -> float:
+        """The residual over the largest load or reaction; 0 where nothing acts."""
+        return self.force / self.scale if self.scale > 0.0 else float(self.force > 0.0)
+
 
 def check(potential: Potential, frame: fm.Frame, origin: float, seed: int = 0) -> Residual:
     """The residual of a frame.
@@ -89,7 +94,8 @@ def body_modes(potential: Potential, places: list[Place]) -> np.ndarray:
         for k in range(size):
             velocity = np.zeros((count, size), dtype=complex)
             velocity[body, k] = 1j * _STEP * scale[k]
-            columns.append(potential.closure.residual(moved(places, velocity)).imag / _STEP * length)
+            rates = potential.closure.residual(moved(places, velocity)).imag / _STEP * length
+            columns.append(rates.astype(float))
     jacobian = np.array(columns).T.reshape(-1, len(columns))
     _, values, right = np.linalg.svd(jacobian, full_matrices=True)
     null = right[int(np.sum(values > 1e-9 * max(values.max(initial=0.0), 1.0))) :]

@@ -1,8 +1,8 @@
 """Strain energy densities as textbooks write them, in F: no invariants of ∇u, no symbolic derivatives.
 
-Textbook forms lose digits at small strain, so they are evaluated in extended precision (``REAL``, 64 bits of mantissa or
-more). Arguments may be complex: a step along the imaginary axis, W(F + i h D), gives ∂W/∂F : D as Im W / h without the
-difference of two close numbers (Squire & Trapp, doi:10.1137/S003614459631241X).
+Textbook forms lose digits at small strain, so they are evaluated in extended precision (``REAL``: 64 bits of mantissa
+or more). Arguments may be complex: a step along the imaginary axis, W(F + i h D), gives ∂W/∂F : D as Im W / h without
+the difference of two close numbers (Squire & Trapp, doi:10.1137/S003614459631241X).
 """
 
 from __future__ import annotations

@@ -114,13 +114,13 @@ def judge_frames(blueprint: Blueprint, built: Built, frames) -> tuple[str, str, 
             return "wrong: NaN", repr(frame), math.inf
         found = check(potential, frame, origin)
         error = _error(blueprint, frame, sample, found)
-        if worst is None or found.force / found.scale > worst.force / worst.scale:
+        if worst is None or found.relative > worst.relative:
             worst = found
         if error:
-            return f"wrong: {error}", str(found), found.force / found.scale
+            return f"wrong: {error}", str(found), found.relative
         if found.force > TOLERANCE * found.scale:
             outcome = "equilibrium to rounding"
-    return outcome, str(worst), worst.force / max(worst.scale, 1e-300)
+    return outcome, str(worst), worst.relative
 
 
 def unloaded_travel(potential: Potential, built: Built) -> float:
