@@ -33,6 +33,7 @@ from fenicsmech.log import logger
 
 _log = logger(__name__)
 _LEAST_MOTION = 1e-9  # of the mechanism's length: what is smaller counts as no displacement
+_FALLING = 0.25  # of the residual before: soft springs and modes feel what is left below rounding of stiff links
 _LEAST_SHIFT = 1e-9  # in units of the mean stiffness; slender links bend with 1e-6 of it and less
 
 
@@ -113,10 +114,10 @@ class Newton:
             raise NotConverged("elements are inverted in the predicted state", 0)
         state, balance = start, system.balance(start, control)
         best, spent, careful = (state, balance.norm), 0, False
-        residuals, inertia, shift, trusted = [], None, floor, True
+        residuals, inertia, shift, trusted, norm = [], None, floor, True, math.inf
         for iteration in range(options.iterations + 1):
             residuals.append(self._relative(balance))
-            if self._converged(balance) and iteration > 0:
+            if self._converged(balance, norm) and iteration > 0:
                 return self._accept(state, control, balance, inertia, shift, floor, residuals, iteration)
             if iteration == options.iterations:
                 break
@@ -126,7 +127,7 @@ class Newton:
             before, norm = state, balance.norm
             advance = self._search if careful else self._full_step
             state, balance = advance(state, control, step, balance, iteration)
-            if near and balance.norm > norm and not self._converged(balance):
+            if near and balance.norm > norm and not self._converged(balance, norm):
                 # no contraction: near a limit or bifurcation point, where only descent leads on
                 state, trusted, careful = before, False, True
                 system.load(state)
@@ -163,8 +164,11 @@ class Newton:
     def _relative(self, balance: Balance) -> float:
         return balance.norm / max(balance.forces, self._rounding(balance))
 
-    def _converged(self, balance: Balance) -> bool:
-        return balance.norm <= max(self.options.tolerance * balance.forces, self._rounding(balance))
+    def _converged(self, balance: Balance, before: float) -> bool:
+        """Whether the residual is small beside the forces, or rounding that does not fall any more."""
+        if balance.norm <= self.options.tolerance * balance.forces:
+            return True
+        return _FALLING * before < balance.norm <= self._rounding(balance)
 
     def _rounding(self, balance: Balance) -> float:
         """Rounding of displacements, which are counted from the drawn configuration."""

@@ -113,6 +113,11 @@ class EquilibriumSystem:
         self._matrix: PETSc.Mat | None = None
         self._diagonal: PETSc.Vec | None = None
 
+    @property
+    def rigid_rows(self) -> np.ndarray:
+        """Constraints that do not give way, (n,)."""
+        return np.flatnonzero(self._compliances == 0.0)
+
     # -- states --------------------------------------------------------------------------------------------
 
     def moved(self, state: State, step: Step) -> State:

@@ -38,7 +38,7 @@ def random_scene(seed: int) -> Blueprint:
     draft = _hold(rng, skeleton, _Draft(links, _joints(rng, skeleton, links)))
     force = _force(rng, skeleton, links, "load")
     others = [_force(rng, skeleton, links, "second load")] if rng.random() < 0.15 else []
-    bend = min(map(_bending_force, (link for link in links if link.centreline)))
+    bend = min(map(bending_force, (link for link in links if link.centreline)))
     size = bend * (_decade(rng, 1.0, 3.0) if rng.random() < 0.06 else _decade(rng, -6.0, 0.7))
     others = [replace(other, magnitude=bend * _decade(rng, -4.0, 0.0)) for other in others]
     control = rng.choices(("forces", "displacements"), (75, 25))[0]
@@ -193,8 +193,8 @@ def _hold_joint(rng: Random, draft: _Draft, joint: JointPlan, ways: tuple[str, .
             position = reach * (0.2 * extent if joint.kind == "prismatic" else 1.0)
             return replace(draft, motors=(*draft.motors, MotorPlan(joint.name, position)))
         case "spring":
-            link = min((link for link in draft.links if link.centreline), key=_bending_force)
-            stiffness = _bending_force(link) * _length(link) ** (-1 if joint.kind == "prismatic" else 1)
+            link = min((link for link in draft.links if link.centreline), key=bending_force)
+            stiffness = bending_force(link) * _length(link) ** (-1 if joint.kind == "prismatic" else 1)
             rest = rng.choice((0.0, rng.uniform(-0.3, 0.3))) * (_length(link) if joint.kind == "prismatic" else 1.0)
             spring = SpringPlan(joint.name, stiffness * _decade(rng, -1.0, 1.0), rest)
             return replace(draft, effects=(*draft.effects, spring))
@@ -218,16 +218,16 @@ def _force(rng: Random, skeleton: Skeleton, links: tuple[LinkPlan, ...], name: s
 
 def _effects(rng: Random, links: tuple[LinkPlan, ...], joints: tuple[JointPlan, ...]) -> list[EffectPlan]:
     effects: list[EffectPlan] = []
-    soft = min((link for link in links if link.centreline), key=_bending_force)
+    soft = min((link for link in links if link.centreline), key=bending_force)
     if rng.random() < 0.12:
         # the weight of the softest link is a share of what bends it
         area = soft.thickness * soft.depth
-        weight = _bending_force(soft) / (area * _length(soft)) * _decade(rng, -3.0, 0.0)
+        weight = bending_force(soft) / (area * _length(soft)) * _decade(rng, -3.0, 0.0)
         angle = rng.uniform(-math.pi, math.pi)
         effects.append(GravityPlan((9810.0 * math.cos(angle), 9810.0 * math.sin(angle)), weight / 9810.0))
     if rng.random() < 0.12:
         pins = [joint for joint in joints if joint.kind in ("revolute", "weld")]
-        compliance = _length(soft) / _bending_force(soft) * _decade(rng, -6.0, -1.0)
+        compliance = _length(soft) / bending_force(soft) * _decade(rng, -6.0, -1.0)
         effects.append(CompliancePlan(rng.choice(pins).name, compliance))
     return effects
 
@@ -236,6 +236,6 @@ def _length(link: LinkPlan) -> float:
     return sum(math.dist(a, b) for a, b in zip(link.centreline, link.centreline[1:], strict=False))
 
 
-def _bending_force(link: LinkPlan) -> float:
+def bending_force(link: LinkPlan) -> float:
     """EI/ℓ², a force that bends the link a good way."""
     return link.young * link.depth * link.thickness**3 / 12.0 / _length(link) ** 2

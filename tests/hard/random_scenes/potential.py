@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,7 +13,7 @@ import numpy as np
 
 import fenicsmech as fm
 
-from .blueprint import Blueprint, ForcePlan, GravityPlan, SpringPlan
+from .blueprint import Blueprint, ForcePlan, GravityPlan, LinkPlan, SpringPlan
 from .closure import Closure, Place, place
 from .links_mesh import LinksMesh, gather, quadrature, shape_functions
 from .strain_energy import COMPLEX, REAL, energy_density
@@ -93,6 +93,37 @@ class Potential:
             depth = link.depth if self.mesh.dim == 2 else 1.0
             total = total + depth * np.einsum("mq,q,m->", density, weights, self.mesh.volumes[cells])
         return total
+
+    def tangents(self, u: np.ndarray, *, imaginary: float, real: float) -> Iterator[tuple[np.ndarray, ...]]:
+        """∂²W/∂F∂F times b w at quadrature points of each link, by a real difference of imaginary ones.
+
+        Yields:
+            Cells (m,), ∂N/∂X (m, q, k, dim), and the tangents (m, q, dim, dim, dim, dim).
+        """
+        _, weights = self._rule
+        dim = self.mesh.dim
+        entries = [(i, j) for i in range(dim) for j in range(dim)]
+        for link, cells in self._groups:
+            slopes = self._slopes[cells]
+            F = np.eye(dim) + np.einsum("mki,mqkj->mqij", u[self.mesh.cells[cells]].astype(REAL), slopes)
+            tangent = np.zeros((*F.shape, dim, dim))
+
+            def stress(G: np.ndarray, link: LinkPlan = link) -> np.ndarray:
+                P = np.zeros(G.shape, dtype=REAL)
+                for i, j in entries:
+                    step = np.zeros((dim, dim), dtype=COMPLEX)
+                    step[i, j] = 1j * imaginary
+                    density = energy_density(G + step, link.law, link.young, link.poisson, self.blueprint.space)
+                    P[..., i, j] = density.imag / imaginary
+                return P
+
+            for i, j in entries:
+                step = np.zeros((dim, dim))
+                step[i, j] = real
+                tangent[..., i, j] = (stress(F + step) - stress(F - step)) / (2 * real)
+            depth = link.depth if dim == 2 else 1.0
+            size = depth * weights * self.mesh.volumes[cells][:, None]
+            yield cells, slopes.astype(float), size[..., None, None, None, None] * tangent
 
     def body_potential(self, u: np.ndarray, places: Sequence[Place]) -> complex:
         """Of effects."""

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 import fenicsmech as fm
 
-from .blueprint import Blueprint, Built
+from .blueprint import Blueprint, Built, GravityPlan, SpringPlan
+from .generator import bending_force
 from .potential import Potential
 from .residual_check import body_modes, moved
+from .stability_check import eigenvalues
 
 _STEP = 1e-30
 _IMMOBILE = 1e-9
+_SOFT = 0.1
+_HUGE = 10.0
 
 
 def true_reason(blueprint: Blueprint, built: Built | None, failure: fm.FenicsmechError) -> str:
@@ -20,7 +26,23 @@ def true_reason(blueprint: Blueprint, built: Built | None, failure: fm.Fenicsmec
         return ""
     if blueprint.control == "displacements" and failure.last is not None and immobile(blueprint, built, failure.last):
         return "the point cannot move that way"
+    if adrift(blueprint):
+        return "nothing but the force holds the mechanism"
+    if blueprint.control == "forces" and max(map(abs, blueprint.samples)) > _HUGE * min(
+        map(bending_force, blueprint.flexible)
+    ):
+        return "a load ten times and more what bends the softest link"
+    if failure.last is not None and at_limit(blueprint, built, failure.last):
+        return "at a limit point"
     return ""
+
+
+def adrift(blueprint: Blueprint) -> bool:
+    """Whether a mechanism of mobility one has neither motor, clamp nor spring."""
+    if blueprint.topology == "two-link arch" or blueprint.motors:
+        return False
+    held = any(joint.kind == "weld" for joint in blueprint.joints)
+    return not held and not any(isinstance(plan, SpringPlan) for plan in blueprint.effects)
 
 
 def immobile(blueprint: Blueprint, built: Built, frame: fm.Frame) -> bool:
@@ -37,3 +59,28 @@ def immobile(blueprint: Blueprint, built: Built, frame: fm.Frame) -> bool:
         for there in (moved(places, 1j * _STEP * mode) for mode in body_modes(potential, places))
     ]
     return float(np.linalg.norm(rates)) < _IMMOBILE
+
+
+def at_limit(blueprint: Blueprint, built: Built, frame: fm.Frame) -> bool:
+    """Whether the last equilibrium has all but lost the stiffness of its softest mode, that of the unloaded scene."""
+    share = frame.state.share
+    loaded = Potential.of(_scaled(blueprint, share), built.simulation)
+    unloaded = Potential.of(_scaled(blueprint, 0.0), built.simulation)
+    drawn = built.simulation.linkage.joints.drawn
+    before = eigenvalues(unloaded, np.zeros(unloaded.mesh.nodes.size), drawn, 0.0)[0]
+    return eigenvalues(loaded, frame.state.u, frame.state.poses, frame.force)[0] < _SOFT * before
+
+
+def _scaled(blueprint: Blueprint, share: float) -> Blueprint:
+    """With a share of all constant loads; springs wind up with it."""
+    effects = []
+    for plan in blueprint.effects:
+        match plan:
+            case SpringPlan():
+                effects.append(replace(plan, rest=share * plan.rest))
+            case GravityPlan():
+                effects.append(replace(plan, density=share * plan.density))
+            case _:
+                effects.append(plan)
+    forces = tuple(replace(force, magnitude=share * force.magnitude) for force in blueprint.forces)
+    return replace(blueprint, effects=tuple(effects), forces=forces)
