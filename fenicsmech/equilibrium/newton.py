@@ -34,6 +34,7 @@ from fenicsmech.log import logger
 _log = logger(__name__)
 _LEAST_MOTION = 1e-9  # of the mechanism's length: what is smaller counts as no displacement
 _FALLING = 0.25  # of the residual before: soft springs and modes feel what is left below rounding of stiff links
+_BEARABLE = 1e-4  # of the forces, where the tangent is all but singular
 _LEAST_SHIFT = 1e-9  # in units of the mean stiffness; slender links bend with 1e-6 of it and less
 
 
@@ -43,7 +44,8 @@ class NewtonOptions:
 
     Attributes:
         tolerance: residual over the forces that balance in it, at convergence.
-        roundoff: residual in units of mean stiffness times the largest displacement below which digits are lost.
+        roundoff: residual in units of mean stiffness times the largest displacement below which digits are lost;
+            of mean stiffness times length where the tangent is all but singular.
         near: residual over the forces below which any equilibrium, unstable ones too, is converged to; farther
             off, steps descend.
         iterations: most iterations.
@@ -113,13 +115,18 @@ class Newton:
         if not math.isfinite(system.elastic_energy()):
             raise NotConverged("elements are inverted in the predicted state", 0)
         state, balance = start, system.balance(start, control)
-        best, spent, careful = (state, balance.norm), 0, False
+        best, spent, careful = (state, balance), 0, False
         residuals, inertia, shift, trusted, norm = [], None, floor, True, math.inf
         for iteration in range(options.iterations + 1):
             residuals.append(self._relative(balance))
             if self._converged(balance, norm) and iteration > 0:
                 return self._accept(state, control, balance, inertia, shift, floor, residuals, iteration)
             if iteration == options.iterations:
+                if self._bearable(best[1]):
+                    state = best[0]
+                    system.load(state)
+                    balance = system.balance(state, control)
+                    return self._accept(state, control, balance, inertia, math.inf, floor, residuals, iteration)
                 break
             near = trusted and residuals[-1] < options.near
             step, inertia, shift = self._direction(state, control, balance, floor, last=shift, any_inertia=near)
@@ -132,8 +139,8 @@ class Newton:
                 state, trusted, careful = before, False, True
                 system.load(state)
                 balance = system.balance(state, control)
-            if balance.norm < best[1]:
-                best, spent = (state, balance.norm), 0
+            if balance.norm < best[1].norm:
+                best, spent = (state, balance), 0
             else:
                 spent += 1
             if spent > options.allowance and not careful:
@@ -169,6 +176,11 @@ class Newton:
         if balance.norm <= self.options.tolerance * balance.forces:
             return True
         return _FALLING * before < balance.norm <= self._rounding(balance)
+
+    def _bearable(self, balance: Balance) -> bool:
+        """Whether the best state will do where nothing better is found, as at a bifurcation."""
+        limit = min(_BEARABLE * balance.forces, self.options.roundoff * self.system.unit)
+        return balance.norm <= limit
 
     def _rounding(self, balance: Balance) -> float:
         """Rounding of displacements, which are counted from the drawn configuration."""
