@@ -105,9 +105,10 @@ class JointSystem:
         for k, rows in enumerate(self._joint_rows):
             residual[rows] = self._constraints[k].value(*self._arguments(k, poses, motors))
         for body, rows in self._norm_rows.items():
-            norm = self.space.norm_residual(poses[body])
-            # rotations come normalised: what is left then is rounding, and larger than the smallest loads
-            residual[rows] = np.where(np.abs(norm) > _ROUNDING, norm, 0.0)
+            residual[rows] = self.space.norm_residual(poses[body])
+        if self.space.dim == 3:
+            # products of unit vectors and quaternions: their rounding would outweigh the smallest loads
+            residual[np.abs(self.row_scale * residual) <= _ROUNDING] = 0.0
         return residual
 
     def gradient(self, poses: np.ndarray, motors: np.ndarray) -> np.ndarray:
