@@ -27,7 +27,7 @@ export PRTE_MCA_hwloc_default_binding_policy := none
 MPIRUN = OPENBLAS_NUM_THREADS=1 mpirun -n $(RANKS)
 heading = @printf '\n--- %s\n' '$(1)'
 
-.PHONY: help demo test install install-test lint test-serial test-parallel test-slow test-debian13 demos-quick hard-cases bench clean
+.PHONY: help demo test install install-test lint test-serial test-parallel test-slow test-debian13 demos-quick hard-cases random-scenes bench clean
 
 help: ## list the targets
 	@sed -nE 's/^([a-z0-9-]+):.*## (.*)/\1\t\2/p' Makefile | expand -t 16
@@ -64,6 +64,14 @@ test-parallel: install-test ## the tests marked `parallel`, on two MPI ranks
 test-slow: install-test ## the tests marked `slow`
 	$(call heading,slow tests)
 	$(PYTHON) -m pytest -m slow
+
+# Verdicts are kept: the same command goes on after an interruption.
+N := 1000
+SEED := 0
+
+random-scenes: install-test ## N random scenes from SEED on (1000, 0), each checked independently; prints a table
+	$(call heading,random scenes)
+	OPENBLAS_NUM_THREADS=1 $(PYTHON) -m tests.hard.random_scenes --count $(N) --seed $(SEED)
 
 test-debian13: install-test ## the tests in a Debian 13 root (built once, about two minutes)
 	$(call heading,tests in Debian 13)

@@ -225,19 +225,20 @@ class ArcLength:
         """
         newton, metric = self.newton, self.metric
         held = abs(near.travel) / metric.travel > abs(near.tangent.parameter) / metric.parameter
-        state, residuals = guess, []
+        state, residuals, before = guess, [], math.inf
         for iteration in range(_MOST_ITERATIONS + 1):
             control = self.lead.holding_travel(self.system, state) if held else None
             control = control or self.lead.holding(state)
             balance = self._balance(state, control)
             residuals.append(newton.relative(balance))
-            if iteration > 0 and newton.converged(balance):
+            if iteration > 0 and newton.converged(balance, before):
                 point = self._point(state, balance, control, tuple(residuals), iteration + 1)
                 return point if metric.dot(point.tangent, normal) > 0.0 else point.reversed()
             if not math.isfinite(balance.norm):
                 raise NotConverged("elements are inverted", iteration)
             if residuals[-1] > _DIVERGED * max(min(residuals), newton.options.near):
                 break
+            before = balance.norm
             newton.factor(state, control, balance, self.floor)
             correction = self._correction(balance)
             rate = self._rate(state, control)

@@ -9,7 +9,8 @@ from fenicsmech.equilibrium.arc_length import ArcLength, PathPoint
 from fenicsmech.equilibrium.critical import CriticalPoint, locate
 from fenicsmech.equilibrium.solver import NotConverged
 
-_ROOT = 1e-10  # how closely a path ends where it is asked to, in units of its references
+_ROOT = 1e-10  # how closely a path ends where it is asked to, in units of its references,
+_WITHIN = 1e-8  # and of the change over the step it ends in
 
 
 @dataclass(frozen=True)
@@ -65,11 +66,12 @@ def _end(arc: ArcLength, before: PathPoint, after: PathPoint, goal: Goal) -> Pat
     """Where the path has the goal's value, by Newton's method within the step."""
     width = arc.along(before, after)
     low, high = 0.0, width
-    rising = goal.value(after) > goal.value(before)
+    change = goal.value(after) - goal.value(before)
+    near, rising = min(_ROOT * goal.scale, _WITHIN * abs(change)), change > 0.0
     distance, best = width, after
     for _ in range(30):
         gap = goal.value(best) - goal.target
-        if abs(gap) <= _ROOT * goal.scale:
+        if abs(gap) <= near:
             break
         low, high = (low, distance) if (gap > 0.0) == rising else (distance, high)
         slope = goal.rate(best) / arc.metric.dot(before.tangent, best.tangent)

@@ -86,11 +86,11 @@ class Newton(Iteration):
         if not math.isfinite(system.elastic_energy()):
             raise NotConverged("elements are inverted in the predicted state", 0)
         state, balance = start, system.balance(start, control)
-        best, spent, careful, passed = (state, balance.norm), 0, False, None
-        residuals, inertia, shift, trusted, mixed = [], None, floor, True, False
+        best, spent, careful, passed = (state, balance), 0, False, None
+        residuals, inertia, shift, trusted, mixed, norm = [], None, floor, True, False, math.inf
         for iteration in range(options.iterations + 1):
             residuals.append(self.relative(balance))
-            if self.converged(balance) and iteration > 0:
+            if self.converged(balance, norm) and iteration > 0:
                 if mixed or shift > floor:  # stability is of the true matrix
                     inertia = self._true_inertia(state, control, balance, floor)
                 return self._accept(state, control, inertia, residuals, iteration)
@@ -107,26 +107,26 @@ class Newton(Iteration):
             _log.debug("iteration %d: residual %.2e, shift %.1e, %s", iteration, residuals[-1], shift, inertia)
             before, norm = state, balance.norm
             advance = self._search if careful else self._full_step
-            state, balance, length = advance(state, control, step, balance, iteration)
+            try:
+                state, balance, length = advance(state, control, step, balance, iteration)
+            except NotConverged as failure:
+                return self._bear(*best, control, floor, residuals, failure)
             # a pressure of its own is a stress that the step solves for already
             passed = (before, length * motion) if options.mixed_stress and not system.layout.pressures else None
-            if near and balance.norm > norm and not self.converged(balance):
+            if near and balance.norm > norm and not self.converged(balance, norm):
                 # no contraction: near a limit or bifurcation point, where only descent leads on
                 state, trusted, careful, passed = before, False, True, None
                 system.load(state)
                 balance = system.balance(state, control)
-            if balance.norm < best[1]:
-                best, spent = (state, balance.norm), 0
+            if balance.norm < best[1].norm:
+                best, spent = (state, balance), 0
             else:
                 spent += 1
             if spent > options.allowance and not careful:
                 state, careful, passed = best[0], True, None
                 system.load(state)
                 balance = system.balance(state, control)
-        raise NotConverged(
-            f"the residual is {residuals[-1]:.1e} of the forces after {options.iterations} iterations",
-            options.iterations,
-        )
+        return self._bear(*best, control, floor, residuals, self._spent(residuals, options.iterations))
 
     def _direction(
         self, matrix: PETSc.Mat, balance: Balance, floor: float, *, last: float, any_inertia: bool

@@ -27,6 +27,7 @@ _LEAST_MOTION = 1e-6  # of the mechanism's length, or rad: what is no leap in an
 _SMALLEST_LEAP = 1.0 / 64.0  # of the distance asked for: a step that is not halved any more because it leaps
 IDLE_STIFFNESS = 1e-10
 """What is lent to idle freedoms, in units of the mean stiffness."""
+_LESS = (1.0, 1e-3, 0.0)  # shares of it that are tried: soft springs, or forces, may hold what is idle with less yet
 
 
 class PathFailed(Exception):
@@ -61,7 +62,7 @@ class Path:
 
     def __init__(self, newton: Iteration, start: State, value: float, *, predictor: Predictor, idle: bool) -> None:
         self._newton, self._start, self._value, self._predictor = newton, start, value, predictor
-        self._floor = IDLE_STIFFNESS if idle else 0.0
+        self._floors = tuple(share * IDLE_STIFFNESS for share in _LESS) if idle else (0.0,)
         self._anchors: list[Anchor] = []
         self._last: Solution | None = None
         self._rate = math.inf  # at which the last step moved, by the control value
@@ -83,15 +84,13 @@ class Path:
             last = abs(step) >= abs(remaining) * (1.0 - 1e-9)
             value = control.target if last else self._value + step
             try:
-                solution = self._newton.solve(self._guess(value), control.at(value), floor=self._floor)
+                solution = self._solve(self._guess(value), control.at(value))
             except NotConverged as failure:
-                self.iterations += failure.iterations
                 tried.append(value)
                 step = 0.5 * (value - self._value)
                 if abs(step) <= _SMALLEST * abs(distance):
                     raise PathFailed(self._last, self._value, failure.reason, tuple(tried)) from failure
                 continue
-            self.iterations += solution.iterations
             if self._leapt(value, solution):
                 if abs(value - self._value) > _SMALLEST_LEAP * abs(distance):
                     step = 0.5 * (value - self._value)
@@ -109,13 +108,31 @@ class Path:
     def _settle(self, control: Control) -> None:
         """The equilibrium at the start, whose tangent tells how far to go at first."""
         try:
-            solution = self._newton.solve(self._start, control, floor=self._floor)
-        except NotConverged as failure:
-            self.iterations += failure.iterations
+            solution = self._solve(self._start, control)
+        except NotConverged:
             return
-        self.iterations += solution.iterations
         self._last = solution
         self._remember(Anchor(self._value, solution.state, solution.tangent))
+
+    def _solve(self, guess: State, control: Control) -> Solution:
+        """The equilibrium near ``guess``, with the largest loan to idle freedoms that leads there.
+
+        A loan slows Newton's method down where the true stiffness is smaller still.
+
+        Raises:
+            NotConverged: none leads there.
+        """
+        for place, floor in enumerate(self._floors):
+            try:
+                solution = self._newton.solve(guess, control, floor=floor)
+            except NotConverged as failure:
+                self.iterations += failure.iterations
+                reason = failure.reason
+                continue
+            self.iterations += solution.iterations
+            self._floors = self._floors[place:]
+            return solution
+        raise NotConverged(reason, 0)
 
     def _strided(self, step: float, *, least: float) -> float:
         """``step``, shortened if it moves anything farther than Newton's method takes in its stride.

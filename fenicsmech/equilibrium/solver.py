@@ -18,6 +18,10 @@ from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import Balance, EquilibriumSystem
 from fenicsmech.mechanism.checks import positive
 
+_LEAST_MOTION = 1e-9  # of the mechanism's length: what is smaller counts as no displacement
+_FALLING = 0.25  # of the residual before: soft springs and modes feel what is left below rounding of stiff links
+_BEARABLE = 1e-4  # of the forces, where the tangent is all but singular
+
 
 @dataclass(frozen=True)
 class Solution:
@@ -54,7 +58,8 @@ class EquilibriumSolver(ABC):
 
     Attributes:
         tolerance: residual over the forces that balance in it, at convergence.
-        roundoff: residual in units of mean stiffness times length below which digits are lost.
+        roundoff: residual in units of mean stiffness times the largest displacement (rotations: times length) below
+            which digits are lost; of mean stiffness times length where the tangent is all but singular.
 
     Raises:
         DescriptionError: a limit is not a positive number.
@@ -112,12 +117,27 @@ class Iteration(ABC):
 
     def relative(self, balance: Balance) -> float:
         """The residual over the forces that balance in it."""
-        return balance.norm / max(balance.forces, self.options.roundoff * self.system.unit)
+        return balance.norm / max(balance.forces, self._rounding(balance))
 
-    def converged(self, balance: Balance) -> bool:
-        """Whether the residual is as small as asked for, or as rounding lets it be."""
-        limit = max(self.options.tolerance * balance.forces, self.options.roundoff * self.system.unit)
+    def converged(self, balance: Balance, before: float = 0.0) -> bool:
+        """Whether the residual is small beside the forces, or rounding that does not fall any more.
+
+        Args:
+            balance: with the residual.
+            before: norm of the residual one iteration ago; 0 if no other iteration can follow.
+        """
+        if balance.norm <= self.options.tolerance * balance.forces < math.inf:
+            return True
+        return _FALLING * before < balance.norm <= self._rounding(balance) < math.inf
+
+    def bearable(self, balance: Balance) -> bool:
+        """Whether a state will do where nothing better is found, as at a bifurcation."""
+        limit = min(_BEARABLE * balance.forces, self.options.roundoff * self.system.unit)
         return balance.norm <= limit < math.inf
+
+    def _rounding(self, balance: Balance) -> float:
+        """Rounding of displacements and rotations, which are counted from the drawn configuration."""
+        return self.options.roundoff * self.system.unit * max(balance.motion, _LEAST_MOTION)
 
     def _refactor(self, matrix: PETSc.Mat, shift: float) -> Inertia | None:
         with self.system.clock.phase("factor"):
@@ -134,6 +154,30 @@ class Iteration(ABC):
     def expected(self) -> int:
         """Negative pivots of a stable equilibrium: one per multiplier and pressure, one for the controlled force."""
         return self.system.joints.rows + 1 + self.system.layout.pressures
+
+    def _bear(
+        self,
+        best: State,
+        balance: Balance,
+        control: Control,
+        floor: float,
+        residuals: list[float],
+        failure: NotConverged,
+    ) -> Solution:
+        """The ``best`` state where nothing better is found; raises ``failure`` unless it is bearable (collective)."""
+        if not self.bearable(balance):
+            raise failure
+        self.system.load(best)
+        balance = self.system.balance(best, control)
+        inertia = self._true_inertia(best, control, balance, floor)
+        residuals = [*residuals[: failure.iterations], self.relative(balance)]
+        return self._accept(best, control, inertia, residuals, failure.iterations)
+
+    def _spent(self, residuals: list[float], iterations: int) -> NotConverged:
+        """The failure after the last iteration."""
+        return NotConverged(
+            f"the residual is {residuals[-1]:.1e} of the forces after {iterations} iterations", iterations
+        )
 
     def _accept(
         self, state: State, control: Control, inertia: Inertia | None, residuals: list[float], iteration: int

@@ -44,12 +44,14 @@ class Balance:
         vector: Gᵀ ∇L, dimensionless.
         norm: its norm.
         forces: norm of the loads and reactions that should cancel in it.
+        motion: largest displacement from the drawn configuration over the mechanism's length, or rotation.
         moments: Σ r_i ⊗ (X_i − c) of each interface body.
     """
 
     vector: PETSc.Vec
     norm: float
     forces: float
+    motion: float
     moments: dict[int, np.ndarray]
 
 
@@ -118,6 +120,11 @@ class EquilibriumSystem:
     @cached_property
     def _mixed(self) -> MixedStress:
         return MixedStress(self.elastic)
+
+    @property
+    def rigid_rows(self) -> np.ndarray:
+        """Constraints that do not give way, (n,)."""
+        return np.flatnonzero(self.compliances == 0.0)
 
     # -- states --------------------------------------------------------------------------------------------
 
@@ -223,7 +230,7 @@ class EquilibriumSystem:
                 rows[layout.owned : layout.owned + layout.extras] = extras
             vector = self._map.createVecRight()
             self._map.multTranspose(self._rows, vector)
-            return Balance(vector, vector.norm(), float(np.sqrt(forces)), moments)
+            return Balance(vector, vector.norm(), float(np.sqrt(forces)), self._motion(state), moments)
 
     # -- derivatives at the loaded state -------------------------------------------------------------------
 
@@ -360,6 +367,11 @@ class EquilibriumSystem:
         return Step(u, extras[layout.z], extras[layout.multipliers], float(extras[layout.force]))
 
     # -- pieces --------------------------------------------------------------------------------------------
+
+    def _motion(self, state: State) -> float:
+        """Largest displacement from the drawn configuration over the mechanism's length, or rotation (collective)."""
+        z = self.joints.unknowns(state.poses) - self.joints.unknowns(self.joints.drawn)
+        return self.size(Step(state.u, z, state.multipliers, state.force))
 
     def _right_hand_side(self, nodal: np.ndarray, extras: np.ndarray) -> PETSc.Vec:
         rows = self._rows.array_w

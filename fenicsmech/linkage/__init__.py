@@ -10,7 +10,7 @@
 from fenicsmech.linkage.assembly import Assembly, assemble
 from fenicsmech.linkage.bodies import Body
 from fenicsmech.linkage.build import Linkage, build_linkage
-from fenicsmech.linkage.mobility import Freedom, count_freedom
+from fenicsmech.linkage.mobility import Freedom, count_freedom, is_held
 from fenicsmech.linkage.system import Connection, JointSystem
 
 __all__ = [
@@ -23,4 +23,5 @@ __all__ = [
     "assemble",
     "build_linkage",
     "count_freedom",
+    "is_held",
 ]

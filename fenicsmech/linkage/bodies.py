@@ -12,7 +12,7 @@ class Body:
     """A rigid link, or one interface of a flexible link.
 
     Attributes:
-        name: for messages.
+        name: for messages: of the rigid link, or of the (first) joint that an interface belongs to.
         link: the link it is, or is part of.
         centre: reference centre c of its pose, (dim,).
         fixed: it never moves and carries no unknowns.

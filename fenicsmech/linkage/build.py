@@ -51,7 +51,7 @@ def build_linkage(mechanism: Mechanism, dim: int) -> Linkage:
                 region = joint.regions[(joint.a, joint.b).index(link)]
                 axis = joint.axis if joint.kind.bored else (0.0, 0.0, 1.0)
                 at = in_dimension(joint.at, dim)
-                bodies.append(Body(f"{link.name} at {joint.at}", link, at, False, region, axis))
+                bodies.append(Body(joint.name, link, at, False, region, axis))
         interfaces[link] = tuple(range(first, len(bodies)))
 
     def body(joint: Joint, link: Link) -> int:

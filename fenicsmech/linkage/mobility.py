@@ -57,3 +57,19 @@ def count_freedom(system: JointSystem, poses: np.ndarray, motors: np.ndarray) ->
         redundancy=system.rows - rank,
         redundant=tuple(dict.fromkeys(redundant)),
     )
+
+
+def is_held(system: JointSystem, poses: np.ndarray, motors: np.ndarray, rate: np.ndarray, rows: np.ndarray) -> bool:
+    """Whether something that changes with the poses at ``rate`` (size,) stays as it is in every motion that is left.
+
+    Args:
+        system: the constraints.
+        poses: (bodies, pose_size).
+        motors: motor values, (connections,).
+        rate: derivative by the pose unknowns, (size,).
+        rows: constraints that count.
+    """
+    scaled = (system.row_scale[:, None] * system.gradient(poses, motors) * system.pose_scale)[rows]
+    wanted = rate * system.pose_scale
+    left = wanted - scaled.T @ np.linalg.lstsq(scaled.T, wanted, rcond=_RANK)[0]
+    return bool(np.linalg.norm(left) <= _RANK * np.linalg.norm(wanted))

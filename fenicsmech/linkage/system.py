@@ -16,6 +16,8 @@ from fenicsmech.kinematics import RIGID_SPACES
 from fenicsmech.linkage.bodies import Body
 from fenicsmech.mechanism import Motor
 
+_ROUNDING = 4.0 * np.finfo(float).eps
+
 
 @dataclass(frozen=True)
 class Connection:
@@ -104,6 +106,9 @@ class JointSystem:
             residual[rows] = self._constraints[k].value(*self._arguments(k, poses, motors))
         for body, rows in self._norm_rows.items():
             residual[rows] = self.space.norm_residual(poses[body])
+        if self.space.dim == 3:
+            # products of unit vectors and quaternions: their rounding would outweigh the smallest loads
+            residual[np.abs(self.row_scale * residual) <= _ROUNDING] = 0.0
         return residual
 
     def gradient(self, poses: np.ndarray, motors: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ from time import perf_counter
 import numpy as np
 from mpi4py import MPI
 
+from fenicsmech.bodies import BodyPoint
 from fenicsmech.equilibrium import (
     Control,
     Iteration,
@@ -23,7 +24,7 @@ from fenicsmech.equilibrium import (
     motor_torques,
 )
 from fenicsmech.errors import EquilibriumError
-from fenicsmech.linkage import Assembly, Freedom
+from fenicsmech.linkage import Assembly, Freedom, is_held
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.request import CurveRequest
@@ -68,6 +69,7 @@ class Tracer:
         if request.others or model.effects:
             state = self._under_constant_loads(state)
             self._system.load(state)
+        self._state = state
         start = self._system.load_displacement(state) if request.controls[0].constrained else 0.0
         self._path = Path(newton, state, start, predictor=predictor, idle=self._idle)
 
@@ -146,6 +148,15 @@ class Tracer:
         return state
 
     def _unreached(self, control: Control, failure: PathFailed, before: Sequence[Frame]) -> EquilibriumError:
+        if control.constrained and self._held():
+            return EquilibriumError(
+                f"{self._request.force.name!r} in configuration {self._request.configuration.name!r}",
+                f"no equilibrium at displacement {control.target - self._origin:g}: joints and motors hold its point, "
+                "which cannot move along its direction",
+                "Choose another point or direction, or load control",
+                last=self._last(failure),
+                frames=before,
+            )
         what, origin = ("displacement", self._origin) if control.constrained else ("force", 0.0)
         return EquilibriumError(
             f"{self._request.force.name!r} in configuration {self._request.configuration.name!r}",
@@ -155,6 +166,15 @@ class Tracer:
             last=self._last(failure),
             frames=before,
         )
+
+    def _held(self) -> bool:
+        """Whether no motion of the joints takes the force's point along its direction."""
+        load, joints, poses = self._system.controlled, self._joints, self._state.poses
+        if not isinstance(load.point, BodyPoint):
+            return False
+        rate = np.zeros(joints.size)
+        rate[joints.columns[load.point.body]] = load.direction @ load.point.gradient(poses)
+        return is_held(joints, poses, self._state.motors, rate, self._system.rigid_rows)
 
     def _remedy(self) -> str:
         if self._freedom.mobility:

@@ -78,18 +78,20 @@ class AugmentedLagrangianIteration(Iteration):
             raise NotConverged("elements are inverted in the predicted state", 0)
         penalty = options.penalty
         omega, eta = 1.0 / penalty, penalty**-0.1
-        shift, residuals = floor, []
+        shift, residuals, before, best = floor, [], math.inf, None
         for iteration in range(options.iterations + 1):
             # multipliers of ``state`` are λ, those of ``current`` λ⁺
             current = self._updated(state, control, 1.0 / penalty)
             balance = system.balance(current, control)
             residuals.append(self.relative(balance))
-            if self.converged(balance) and iteration > 0:
+            if self.converged(balance, before) and iteration > 0:
                 inertia = self._true_inertia(current, control, balance, floor)
-                rounded = system.moved(current, system.difference(current, current))  # quaternions of unit length
-                return self._accept(rounded, control, inertia, residuals, iteration)
+                return self._accept(self._normalised(current), control, inertia, residuals, iteration)
+            if best is None or balance.norm < best[1].norm:
+                best = current, balance
             if iteration == options.iterations:
                 break
+            before = balance.norm
             gradient, violation = self._parts(balance)
             if gradient <= max(omega, options.tolerance) * balance.forces:
                 if violation <= eta:
@@ -102,11 +104,16 @@ class AugmentedLagrangianIteration(Iteration):
                 balance = system.balance(current, control)
                 gradient, violation = self._parts(balance)
             step, descent, shift = self._direction(current, control, balance, 1.0 / penalty, floor, last=shift)
-            state = self._search(state, control, step, descent, gradient, 1.0 / penalty, iteration)
-        raise NotConverged(
-            f"the residual is {residuals[-1]:.1e} of the forces after {options.iterations} iterations",
-            options.iterations,
-        )
+            try:
+                state = self._search(state, control, step, descent, gradient, 1.0 / penalty, iteration)
+            except NotConverged as failure:
+                return self._bear(self._normalised(best[0]), best[1], control, floor, residuals, failure)
+        failure = self._spent(residuals, options.iterations)
+        return self._bear(self._normalised(best[0]), best[1], control, floor, residuals, failure)
+
+    def _normalised(self, state: State) -> State:
+        """``state`` with quaternions of unit length."""
+        return self.system.moved(state, self.system.difference(state, state))
 
     def _updated(self, state: State, control: Control, softness: float) -> State:
         """``state``, whose multipliers are λ, with λ⁺ instead; softness is 1/μ."""

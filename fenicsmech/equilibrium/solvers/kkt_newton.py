@@ -48,12 +48,13 @@ class KktIteration(Iteration):
         system.load(state)
         if not math.isfinite(system.elastic_energy()):
             raise NotConverged("elements are inverted in the predicted state", 0)
-        balance, residuals, inertia = system.balance(state, control), [], None
+        balance, residuals, inertia, before = system.balance(state, control), [], None, math.inf
+        best = state, balance
         for iteration in range(options.iterations + 1):
             residuals.append(self.relative(balance))
             if not math.isfinite(residuals[-1]):
                 raise NotConverged("the residual overflows", iteration)
-            if self.converged(balance) and iteration > 0:
+            if self.converged(balance, before) and iteration > 0:
                 return self._accept(state, control, inertia, residuals, iteration)
             if iteration == options.iterations:
                 break
@@ -62,11 +63,14 @@ class KktIteration(Iteration):
                 raise NotConverged("the tangent cannot be factored", iteration)
             x = self.solve_linear(balance.vector)
             x.scale(-1.0)
-            state, balance = self._advance(state, control, system.step(x), balance, iteration)
-        raise NotConverged(
-            f"the residual is {residuals[-1]:.1e} of the forces after {options.iterations} iterations",
-            options.iterations,
-        )
+            before = balance.norm
+            try:
+                state, balance = self._advance(state, control, system.step(x), balance, iteration)
+            except NotConverged as failure:
+                return self._bear(*best, control, floor, residuals, failure)
+            if balance.norm < best[1].norm:
+                best = state, balance
+        return self._bear(*best, control, floor, residuals, self._spent(residuals, options.iterations))
 
     def _advance(
         self, state: State, control: Control, step: Step, balance: Balance, iteration: int

@@ -75,9 +75,10 @@ class SnesIteration(Iteration):
         snes.destroy()
         if not equations.evaluate(x):
             raise NotConverged("elements are inverted", iterations)
-        if equations.inertia is None or not self.converged(equations.balance):
-            raise NotConverged(f"SNES stops: {_REASONS.get(reason, f'reason {reason}')}", iterations)
-        return self._accept(equations.state, control, equations.inertia, equations.residuals, iterations)
+        if equations.inertia is not None and self.converged(equations.balance):
+            return self._accept(equations.state, control, equations.inertia, equations.residuals, iterations)
+        failure = NotConverged(f"SNES stops: {_REASONS.get(reason, f'reason {reason}')}", iterations)
+        return self._bear(equations.state, equations.balance, control, floor, equations.residuals, failure)
 
     def _create(self, equations: _Equations) -> PETSc.SNES:
         system, chosen = self.system, self.options.globalisation
@@ -108,6 +109,7 @@ class _Equations:
         matrix: the KKT matrix.
         inertia: of its last factor.
         residuals: relative residual of each iterate.
+        norm: of the last iterate's residual.
     """
 
     def __init__(self, iteration: SnesIteration, base: State, control: Control, floor: float) -> None:
@@ -117,6 +119,7 @@ class _Equations:
         self.matrix = self._system.kkt(base, control, self.balance)
         self.inertia: Inertia | None = None
         self.residuals: list[float] = []
+        self.norm = math.inf
 
     def evaluate(self, x: PETSc.Vec) -> bool:
         """Brings ``state`` and ``balance`` to x; False, with the balance as it was, if elements are inverted there."""
@@ -145,10 +148,11 @@ class _Equations:
 
     def test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
         """Convergence as the other solvers see it."""
+        before, self.norm = self.norm, self.balance.norm
         self.residuals.append(self._iteration.relative(self.balance))
         if not math.isfinite(norms[2]):
             return PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
-        if iteration > 0 and self._iteration.converged(self.balance):
+        if iteration > 0 and self._iteration.converged(self.balance, before):
             return PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE
         return PETSc.SNES.ConvergedReason.ITERATING
 

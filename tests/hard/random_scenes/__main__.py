@@ -1,0 +1,47 @@
+"""Judges random scenes, shows progress and prints the table of outcomes: `python -m tests.hard.random_scenes`.
+
+Verdicts are kept in DIR/seed-SEED.jsonl; the same command goes on after an interruption. Exits with 1 if any is wrong.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+from .record import append, read
+from .summary import table
+from .worker import Worker
+
+
+def main() -> int:
+    """Runs what the command line asks for."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=1000, help="number of scenes")
+    parser.add_argument("--seed", type=int, default=0, help="the first scene")
+    parser.add_argument("--limit", type=float, default=300.0, help="seconds after which a scene hangs")
+    parser.add_argument("--out", type=Path, default=Path("results/random-scenes"), metavar="DIR")
+    options = parser.parse_args()
+    seeds = range(options.seed, options.seed + options.count)
+    path = options.out / f"seed-{options.seed}.jsonl"
+    verdicts = {seed: verdict for seed, verdict in read(path).items() if seed in seeds}
+    worker, start, before = Worker(options.limit), time.monotonic(), len(verdicts)
+    for seed in seeds:
+        if seed in verdicts:
+            continue
+        verdicts[seed] = worker.judge(seed)
+        append(path, verdicts[seed])
+        done, wrong = len(verdicts), sum(verdict.wrong for verdict in verdicts.values())
+        left = (time.monotonic() - start) / (done - before) * (options.count - done)
+        print(
+            f"\r{done}/{options.count} scenes, {wrong} wrong, {left:.0f} s left ", end="", file=sys.stderr, flush=True
+        )
+    worker.close()
+    print(file=sys.stderr)
+    print(table(verdicts[seed] for seed in seeds))
+    return int(any(verdict.wrong for verdict in verdicts.values()))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,94 @@
+"""Random scenes end in equilibria that an independent check accepts, or in one clear, correct error."""
+
+from dataclasses import replace
+
+import hypothesis
+import numpy as np
+import pytest
+from hypothesis import strategies as st
+
+from .blueprint import build
+from .generator import random_scene
+from .potential import Potential
+from .residual_check import check
+from .stability_check import unstable_directions
+from .verdict import TOLERANCE, judge
+
+SOUND = st.integers(0, 10**6).map(lambda n: 10 * n + 5)
+SPOILED = st.integers(0, 10**6).map(lambda n: 10 * n + 1)
+
+
+def small(seed: int) -> bool:
+    """Whether a scene is quick: in the plane, under loads, with forms that other tests compile too."""
+    scene = random_scene(seed)
+    cells = sum(link.thickness / link.size**2 * scene.length for link in scene.flexible)
+    return scene.space == "plane-stress" and not scene.effects and scene.control == "forces" and cells < 300
+
+
+@hypothesis.given(SPOILED)
+@hypothesis.settings(max_examples=12)
+def test_scenes_that_make_no_sense_are_refused_by_name(seed):
+    verdict = judge(seed)
+    assert not verdict.wrong, verdict
+
+
+@hypothesis.given(SOUND.filter(small))
+@hypothesis.settings(max_examples=4, suppress_health_check=list(hypothesis.HealthCheck))
+def test_scenes_that_make_sense_end_well(seed):
+    verdict = judge(seed)
+    assert not verdict.wrong, verdict
+
+
+def test_every_seed_gives_the_same_scene_again():
+    assert [random_scene(seed) for seed in range(50)] == [random_scene(seed) for seed in range(50)]
+    assert len({repr(random_scene(seed)) for seed in range(50)}) == 50
+
+
+@pytest.fixture(scope="module")
+def solved():
+    """A scene in equilibrium: its potential and its last frame."""
+    seed = next(seed for seed in range(5, 5000, 10) if small(seed) and not random_scene(seed).motors)
+    scene = random_scene(seed)
+    scene = replace(scene, samples=(scene.samples[-1],))
+    built = build(scene)
+    return Potential.of(scene, built.simulation), built.curve(scene).frames[-1]
+
+
+def test_the_check_accepts_an_equilibrium_and_nothing_near_it(solved):
+    potential, frame = solved
+    assert check(potential, frame, 0.0).relative < TOLERANCE
+    doubled = replace(frame, force=1.001 * frame.force)
+    assert check(potential, doubled, 0.0).relative > 1e-4
+    moved = replace(frame, state=replace(frame.state, u=1.001 * frame.state.u))
+    assert check(potential, moved, 0.0).relative > TOLERANCE
+
+
+def test_imaginary_differences_of_the_potential_are_real_ones(solved):
+    potential, frame = solved
+    mesh, places = potential.mesh, potential.places(frame.state.poses)
+    rng, size = np.random.default_rng(1), 1e-2 * min(link.size for link in potential.blueprint.flexible)
+    free = (potential.held < 0)[:, None]
+    strained = frame.state.u.reshape(mesh.nodes.shape) + size * rng.standard_normal(mesh.nodes.shape) * free
+    direction = rng.standard_normal(strained.shape) * free
+
+    def value(step: complex) -> complex:
+        return potential.value(strained + step * direction, places, frame.force)
+
+    exact = value(1e-30j).imag / 1e-30
+    coarse, fine = ((value(h) - value(-h)) / (2 * h) for h in (2e-1 * size, 1e-1 * size))
+    assert float((4 * fine - coarse) / 3) == pytest.approx(float(exact), rel=1e-7)
+
+
+def test_order_of_links_and_joints_does_not_matter(solved):
+    potential, frame = solved
+    scene = potential.blueprint
+    other = scene.shuffled(3)
+    again = build(other).curve(other).frames[-1]
+    assert again.displacement == pytest.approx(frame.displacement, rel=1e-6, abs=1e-12 * scene.length)
+    assert again.strain_energy == pytest.approx(frame.strain_energy, rel=1e-6)
+    assert again.unstable_modes == frame.unstable_modes
+
+
+def test_stability_agrees_with_second_differences(solved):
+    potential, frame = solved
+    assert unstable_directions(potential, frame) == frame.unstable_modes

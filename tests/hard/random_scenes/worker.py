@@ -1,0 +1,58 @@
+"""Scenes judged in a process of their own, which may be stopped when it hangs, and may crash without harm."""
+
+from __future__ import annotations
+
+import multiprocessing
+from multiprocessing.connection import Connection
+
+from .verdict import Verdict, judge
+
+
+class Worker:
+    """One process that judges scene after scene.
+
+    Args:
+        limit: seconds after which a scene is taken to hang.
+    """
+
+    def __init__(self, limit: float) -> None:
+        self._limit = limit
+        self._process, self._pipe = None, None
+
+    def judge(self, seed: int) -> Verdict:
+        """The verdict on a scene; a hang or a crash is one too."""
+        if self._process is None:
+            self._start()
+        self._pipe.send(seed)
+        try:
+            if self._pipe.poll(self._limit):
+                return self._pipe.recv()
+            end = "wrong: hangs"
+        except (EOFError, ConnectionError):
+            end = "wrong: crashes"
+        self.close()
+        return Verdict(seed, "", end, f"limit {self._limit:g} s", self._limit)
+
+    def close(self) -> None:
+        """Ends the process."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.join()
+            self._pipe.close()
+            self._process = None
+
+    def _start(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._pipe, theirs = context.Pipe()
+        self._process = context.Process(target=_serve, args=(theirs,), daemon=True)
+        self._process.start()
+        theirs.close()
+
+
+def _serve(pipe: Connection) -> None:
+    while True:
+        try:
+            seed = pipe.recv()
+        except EOFError:
+            return
+        pipe.send(judge(seed))

@@ -1,0 +1,39 @@
+"""A spring far softer than the links holds a mechanism, and loads far below rounding of its length are balanced.
+
+A blade that turns strains by rounding, 1e-16 of its stiffness times its way, which limits how soft a spring may be.
+"""
+
+import pytest
+from mpi4py import MPI
+
+import fenicsmech as fm
+
+
+def lever(stiffness: float) -> tuple[fm.Simulation, object]:
+    """A steel blade clamped to a rigid arm that turns about the origin against a spring."""
+    mechanism = fm.Mechanism("lever")
+    base, arm = mechanism.rigid("base", fixed=True), mechanism.rigid("arm")
+    blade = mechanism.flexible(
+        "blade", fm.strip([(20, 0), (50, 0)], thickness=2.0, depth=4.0), fm.Material("steel", 2e5, 0.3)
+    )
+    hinge = mechanism.revolute(base, arm, at=(0, 0), name="hinge")
+    mechanism.weld(arm, blade, at=(20, 0), radius=1.5)
+    push = mechanism.force(on=arm, at=(10, 0), direction=(0, 1))
+    scene = fm.Scene(mechanism, effects=[fm.JointSpring(hinge, stiffness)])
+    return fm.Simulation(scene, space="plane-stress", size=2.0, comm=MPI.COMM_SELF), push
+
+
+@pytest.mark.parametrize("stiffness", [10.0, 0.1])
+def test_spring_softer_than_what_is_lent_to_idle_freedoms(stiffness):
+    simulation, push = lever(stiffness)
+    force = 1e-3 * stiffness  # turns the arm by f r / k = 0.01
+    (frame,) = simulation.load_displacement(push, forces=[force]).frames
+    assert frame.displacement == pytest.approx(10.0 * 0.01, rel=1e-3)
+
+
+@pytest.mark.parametrize("force", [1e-3, 1e-8, 1e-13])
+def test_displacement_is_proportional_to_small_forces(force):
+    simulation, push = lever(1e3)
+    (frame,) = simulation.load_displacement(push, forces=[force]).frames
+    assert frame.displacement == pytest.approx(force * 10.0**2 / 1e3, rel=1e-6)
+    assert frame.residuals[-1] < 1e-3
