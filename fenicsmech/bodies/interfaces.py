@@ -30,7 +30,7 @@ class InterfaceMap:
     """
 
     def __init__(self, u: fem.Function, cell_body: np.ndarray, centres: np.ndarray, space: RigidSpace) -> None:
-        self.space, self._u = space, u
+        self.space, self._u, self._cell_body, self._centres = space, u, cell_body, centres
         V = u.function_space
         self.block = V.dofmap.index_map_bs
         self.owned = V.dofmap.index_map.size_local
@@ -40,6 +40,10 @@ class InterfaceMap:
         positions = V.tabulate_dof_coordinates()[:, : self.block]
         self._drawn = {b: positions[nodes] - centres[b] for b, nodes in self.nodes.items()}
         self.offsets = dict(self._drawn)
+
+    def on(self, u: fem.Function) -> InterfaceMap:
+        """The same interfaces, as drawn, of another field on the same mesh (collective)."""
+        return InterfaceMap(u, self._cell_body, self._centres, self.space)
 
     def reshape(self, design: np.ndarray) -> None:
         """Takes the design at all local nodes, (nodes, dim): offsets become X₀ + d − c."""

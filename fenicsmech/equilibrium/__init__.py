@@ -5,12 +5,15 @@
 - ``control``: what is led along a path: a force, a displacement, motors
 - ``layout``, ``matrices``, ``extras``, ``system``: the distributed KKT system
 - ``factor``: LDLᵀ with inertia
+- ``coarse``, ``smoother``, ``two_level``: conjugate gradients where the factor is too large
+- ``linear``: which of the two solves, and by what rule
 - ``newton``: the primal–dual iteration
 - ``predictor``, ``path``: first guesses and load steps
 - ``reactions``: what joints and motors exert
 """
 
 from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadControl, MotorControl, ShareControl
+from fenicsmech.equilibrium.linear import BySize, Direct, LinearMethod, LinearSolver, TwoLevel
 from fenicsmech.equilibrium.load import PointLoad
 from fenicsmech.equilibrium.newton import Newton, NewtonOptions, NotConverged, Solution
 from fenicsmech.equilibrium.path import IDLE_STIFFNESS, Path, PathFailed
@@ -21,11 +24,15 @@ from fenicsmech.equilibrium.system import EquilibriumSystem
 
 __all__ = [
     "IDLE_STIFFNESS",
+    "BySize",
     "Constant",
     "Control",
+    "Direct",
     "DisplacementControl",
     "EquilibriumSystem",
     "Hermite",
+    "LinearMethod",
+    "LinearSolver",
     "LoadControl",
     "MotorControl",
     "Newton",
@@ -41,6 +48,7 @@ __all__ = [
     "State",
     "Step",
     "Tangent",
+    "TwoLevel",
     "joint_reactions",
     "motor_torques",
 ]

@@ -47,8 +47,8 @@ class Factor:
         pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
         self._solver.setFromOptions()
 
-    def refactor(self) -> Inertia | None:
-        """Factors the matrix's current values; None if the factorisation failed."""
+    def refactor(self) -> bool:
+        """Factors the matrix's current values; whether it could be done (collective)."""
         self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         for _ in range(4):
             self._solver.setOperators(self._matrix)
@@ -56,12 +56,17 @@ class Factor:
             mumps = self._solver.getPC().getFactorMatrix()
             status = mumps.getMumpsInfog(1)
             if status >= 0:
-                return Inertia(mumps.getMumpsInfog(12), mumps.getMumpsInfog(28))
+                return True
             if status not in _WORKSPACE:
-                return None
+                return False
             mumps.setMumpsIcntl(14, 2 * mumps.getMumpsIcntl(14))
             self._matrix.stateIncrease()  # marks the values as new
-        return None
+        return False
+
+    def inertia(self) -> Inertia:
+        """Of the matrix last factored."""
+        mumps = self._solver.getPC().getFactorMatrix()
+        return Inertia(mumps.getMumpsInfog(12), mumps.getMumpsInfog(28))
 
     def solve(self, right: PETSc.Vec, solution: PETSc.Vec) -> None:
         """Solves with the last factor."""

@@ -21,6 +21,7 @@ class Layout:
     Attributes:
         last: whether this rank holds the extras.
         free: owned finite-element DOFs that are unknowns, (owned free dofs,).
+        whole_nodes: whether all components of every node with an unknown are unknowns, on all ranks.
         local_rows, local_unknowns: sizes on this rank.
         first_extra_row, first_extra: global numbers of the first extra row and unknown.
         z, multipliers, force: slices of the extras.
@@ -32,6 +33,10 @@ class Layout:
         block = interfaces.block
         owned = interfaces.owned * block
         self.free = np.flatnonzero(np.repeat(interfaces.body[: interfaces.owned] < 0, block))
+        starts = self.free[::block]
+        whole = len(self.free) == block * len(starts) and bool(np.all(starts % block == 0))
+        whole = whole and bool(np.all(self.free.reshape(-1, block) == starts[:, None] + np.arange(block)))
+        self.whole_nodes = bool(comm.allreduce(int(not whole)) == 0)
         self.z = slice(0, joints.size)
         self.multipliers = slice(joints.size, joints.size + joints.rows)
         self.force = joints.size + joints.rows

@@ -88,3 +88,28 @@ def create_map_matrix(layout: Layout, interfaces: InterfaceMap, joints: JointSys
         csr=(starts.astype(PETSc.IntType), columns, values),
         comm=layout.comm,
     )
+
+
+def update_map_matrix(
+    matrix: PETSc.Mat,
+    layout: Layout,
+    interfaces: InterfaceMap,
+    joints: JointSystem,
+    poses: np.ndarray,
+    scale: np.ndarray,
+) -> None:
+    """Brings ∂u/∂z in G to ``poses`` (collective)."""
+    dim = joints.space.dim
+    for body in interfaces.nodes:
+        nodes, gradient = interfaces.gradient_rows(poses, body)
+        if not len(nodes):
+            continue
+        columns = joints.columns[body]
+        rows = (dim * nodes[:, None] + np.arange(dim)).ravel()
+        matrix.setValuesIJV(
+            np.arange(0, len(columns) * len(rows) + 1, len(columns), dtype=PETSc.IntType),
+            np.tile(layout.first_extra + columns, len(rows)).astype(PETSc.IntType),
+            (gradient * scale[columns]).ravel(),
+            rowmap=(layout.first_row + rows).astype(PETSc.IntType),
+        )
+    matrix.assemble()

@@ -1,11 +1,11 @@
 """Primal–dual Newton iteration with inertia control for min E(s) s.t. C(s) = 0.
 
-Each iteration solves, with the symmetric factor LDLᵀ,
+Each iteration solves
 
     [[∇²L + δ I, −Aᵀ], [−A, −1/ρ]] (ds, dλ) = −(∇L, −C),
 
 the Newton step of the augmented Lagrangian, which tends to the KKT step for large ρ and stays regular for
-redundant constraints. If the factor has more negative pivots than there are multipliers, the step need not
+redundant constraints. If the matrix has more negative eigenvalues than there are multipliers, the step need not
 descend, and δ grows until it does; close to an equilibrium δ stays zero, so that unstable equilibria on the path are
 found and reported as such. Merit of a step: the augmented Lagrangian
 
@@ -26,9 +26,11 @@ import numpy as np
 from petsc4py import PETSc
 
 from fenicsmech.equilibrium.control import Control
-from fenicsmech.equilibrium.factor import Factor, Inertia
+from fenicsmech.equilibrium.factor import Inertia
+from fenicsmech.equilibrium.linear import BySize, LinearMethod, LinearSolver
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import Balance, EquilibriumSystem
+from fenicsmech.equilibrium.two_level import Stalled
 from fenicsmech.log import logger
 
 _log = logger(__name__)
@@ -47,6 +49,7 @@ class NewtonOptions:
         iterations: most iterations.
         allowance: iterations in a row that may fail to improve on the best residual.
         largest_turn: largest rotation (rad), or displacement over the mechanism's length, of one step.
+        linear: how the linear systems are solved; by their size unless said otherwise.
     """
 
     tolerance: float = 1e-10
@@ -55,6 +58,7 @@ class NewtonOptions:
     iterations: int = 25
     allowance: int = 4
     largest_turn: float = 0.5
+    linear: LinearMethod = field(default_factory=BySize)
 
 
 @dataclass(frozen=True)
@@ -88,11 +92,11 @@ class NotConverged(Exception):
 
 @dataclass
 class Newton:
-    """The iteration, with the factor it keeps between solves."""
+    """The iteration, with the linear solver it keeps between solves."""
 
     system: EquilibriumSystem
     options: NewtonOptions = field(default_factory=NewtonOptions)
-    _factor: Factor | None = None
+    _solver: LinearSolver | None = None
 
     def solve(self, start: State, control: Control, *, floor: float = 0.0) -> Solution:
         """The equilibrium near ``start`` under ``control`` (collective).
@@ -112,16 +116,16 @@ class Newton:
             raise NotConverged("elements are inverted in the predicted state", 0)
         state, balance = start, system.balance(start, control)
         best, spent, careful = (state, balance.norm), 0, False
-        residuals, inertia, shift, trusted = [], None, floor, True
+        residuals, shift, trusted = [], floor, True
         for iteration in range(options.iterations + 1):
             residuals.append(self._relative(balance))
             if self._converged(balance) and iteration > 0:
-                return self._accept(state, control, balance, inertia, shift, floor, residuals, iteration)
+                return self._accept(state, control, balance, shift, floor, residuals, iteration)
             if iteration == options.iterations:
                 break
             near = trusted and residuals[-1] < options.near
-            step, inertia, shift = self._direction(state, control, balance, floor, last=shift, any_inertia=near)
-            _log.debug("iteration %d: residual %.2e, shift %.1e, %s", iteration, residuals[-1], shift, inertia)
+            step, shift = self._direction(state, control, balance, floor, last=shift, any_inertia=near)
+            _log.debug("iteration %d: residual %.2e, shift %.1e", iteration, residuals[-1], shift)
             before, norm = state, balance.norm
             advance = self._search if careful else self._full_step
             state, balance = advance(state, control, step, balance, iteration)
@@ -149,14 +153,21 @@ class Newton:
         Raises:
             NotConverged: it cannot be factored.
         """
-        if self._refactor(self.system.kkt(state, control, balance), floor) is None:
+        if not self._refactor(self.system.kkt(state, control, balance), floor):
             raise NotConverged("the tangent at the equilibrium cannot be factored", 0)
 
     def solve_linear(self, right: PETSc.Vec) -> PETSc.Vec:
-        """The solution of KKT x = ``right`` with the last factor (collective)."""
+        """The solution of KKT x = ``right`` with the matrix last factored (collective).
+
+        Raises:
+            NotConverged: an iterative solver stalled.
+        """
         with self.system.clock.phase("solve"):
             x = right.duplicate()
-            self._factor.solve(right, x)
+            try:
+                self._solver.solve(right, x)
+            except Stalled as failure:
+                raise NotConverged(str(failure), 0) from failure
             return x
 
     def _relative(self, balance: Balance) -> float:
@@ -167,7 +178,7 @@ class Newton:
 
     def _direction(
         self, state: State, control: Control, balance: Balance, floor: float, *, last: float, any_inertia: bool
-    ) -> tuple[Step, Inertia, float]:
+    ) -> tuple[Step, float]:
         """The Newton step; unless ``any_inertia`` will do, raises δ until the inertia promises descent.
 
         δ = ``floor`` is tried first; then a third of the ``last`` one that served, and eight times that, …
@@ -176,27 +187,37 @@ class Newton:
         matrix = system.kkt(state, control, balance)
         shift, following = floor, max(_LEAST_SHIFT, last / 3.0)
         for _ in range(20):
-            inertia = self._refactor(matrix, shift)
-            descends = inertia is not None and inertia.negative <= self._expected and inertia.zero == 0
-            if descends or (any_inertia and inertia is not None):
+            if self._refactor(matrix, shift) and (any_inertia or self._descends()):
                 break
             shift, following = following, 8.0 * following
         else:
             raise NotConverged("no shift of the tangent gives a direction of descent", 0)
         x = self.solve_linear(balance.vector)
         x.scale(-1.0)
-        return system.step(x), inertia, shift
+        return system.step(x), shift
 
-    def _refactor(self, matrix: PETSc.Mat, shift: float) -> Inertia | None:
+    def _refactor(self, matrix: PETSc.Mat, shift: float) -> bool:
         with self.system.clock.phase("factor"):
             self.system.shift(shift)
-            if self._factor is None:
-                self._factor = Factor(matrix)
-            return self._factor.refactor()
+            if self._solver is None:
+                self._solver = self.options.linear.solver(self.system, matrix)
+            return self._solver.refactor()
+
+    def _inertia(self) -> Inertia:
+        with self.system.clock.phase("inertia"):
+            try:
+                return self._solver.inertia()
+            except Stalled as failure:
+                raise NotConverged(str(failure), 0) from failure
+
+    def _descends(self) -> bool:
+        """Whether the inertia of the matrix last factored promises a direction of descent."""
+        inertia = self._inertia()
+        return inertia.negative <= self._expected and inertia.zero == 0
 
     @property
     def _expected(self) -> int:
-        """Negative pivots of a stable equilibrium: one per multiplier, one for the controlled force."""
+        """Negative eigenvalues of a stable equilibrium: one per multiplier, one for the controlled force."""
         return self.system.joints.rows + 1
 
     def _full_step(
@@ -242,15 +263,13 @@ class Newton:
             value += force * control.target + 0.5 * stiffness * gap**2
         return value
 
-    def _accept(self, state, control, balance, inertia, shift, floor, residuals, iteration) -> Solution:
+    def _accept(self, state, control, balance, shift, floor, residuals, iteration) -> Solution:
         """Stability and tangent at the equilibrium, from the last factor if it was of the true matrix."""
         system = self.system
-        if shift > floor:
-            inertia = self._refactor(system.kkt(state, control, balance), floor)
-        if inertia is None:
+        if shift > floor and not self._refactor(system.kkt(state, control, balance), floor):
             raise NotConverged("the tangent at the equilibrium cannot be factored", iteration)
         x = self.solve_linear(control.rate(system, state))
-        under_control = inertia.negative - self._expected
+        under_control = self._inertia().negative - self._expected
         unstable = under_control
         if control.constrained:
             row = system.control_row()

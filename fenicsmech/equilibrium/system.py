@@ -29,7 +29,7 @@ from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.extras import ExtraEntries
 from fenicsmech.equilibrium.layout import Layout
 from fenicsmech.equilibrium.load import PointLoad
-from fenicsmech.equilibrium.matrices import create_extended_matrix, create_map_matrix
+from fenicsmech.equilibrium.matrices import create_extended_matrix, create_map_matrix, update_map_matrix
 from fenicsmech.equilibrium.potentials import BodyPotentials
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.linkage import JointSystem
@@ -68,6 +68,7 @@ class EquilibriumSystem:
     Attributes:
         unit: a residual of this norm is a displacement of the mechanism's length against the mean stiffness.
         unit_u, scale: what a unit of each scaled unknown stands for: displacements; (z, λ, f).
+        poses: those of the last ``balance``, which the KKT matrix is at.
     """
 
     def __init__(
@@ -106,6 +107,7 @@ class EquilibriumSystem:
             )
             self._extras.set_regularisation(self.scale[self.layout.multipliers], self.scale[self.layout.force])
             self._map = create_map_matrix(self.layout, interfaces, joints, self.unit_u, self.scale)
+        self.poses = joints.drawn
         self._rows = self._hat.createVecLeft()
         self._matrix: PETSc.Mat | None = None
         self._diagonal: PETSc.Vec | None = None
@@ -172,7 +174,8 @@ class EquilibriumSystem:
     def balance(self, state: State, control: Control) -> Balance:
         """Gᵀ ∇L (collective). Brings G to the poses of ``state``."""
         with self.clock.phase("residual"):
-            self._update_map(state)
+            update_map_matrix(self._map, self.layout, self.interfaces, self.joints, state.poses, self.scale)
+            self.poses = state.poses
             self.elastic.residual(self._nodal)
             layout, dim = self.layout, self.joints.space.dim
             r = self._nodal.array_r[: layout.owned].copy()
@@ -319,23 +322,6 @@ class EquilibriumSystem:
                 mine = (nodes >= first) & (nodes < first + self.layout.owned // dim)
                 forces = nodal.reshape(-1, dim)
                 np.add.at(forces, nodes[mine] - first, magnitude * np.outer(weights[mine], load.direction))
-
-    def _update_map(self, state: State) -> None:
-        """Brings ∂u/∂z in G to the poses of ``state``."""
-        dim, layout = self.joints.space.dim, self.layout
-        for body in self.interfaces.nodes:
-            nodes, gradient = self.interfaces.gradient_rows(state.poses, body)
-            if not len(nodes):
-                continue
-            columns = self.joints.columns[body]
-            rows = (dim * nodes[:, None] + np.arange(dim)).ravel()
-            self._map.setValuesIJV(
-                np.arange(0, len(columns) * len(rows) + 1, len(columns), dtype=PETSc.IntType),
-                np.tile(layout.first_extra + columns, len(rows)).astype(PETSc.IntType),
-                (gradient * self.scale[columns]).ravel(),
-                rowmap=(layout.first_row + rows).astype(PETSc.IntType),
-            )
-        self._map.assemble()
 
 
 def _add_moments(a: dict[int, np.ndarray], b: dict[int, np.ndarray]) -> dict[int, np.ndarray]:

@@ -1,0 +1,85 @@
+"""How linear systems with the KKT matrix are solved: by its factor, or on two levels where the factor is too large."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from petsc4py import PETSc
+
+from fenicsmech.equilibrium.factor import Factor, Inertia
+from fenicsmech.equilibrium.system import EquilibriumSystem
+from fenicsmech.equilibrium.two_level import TwoLevelSolver
+from fenicsmech.errors import DescriptionError
+
+
+class LinearSolver(Protocol):
+    """Solves with one matrix whose values change and whose pattern does not; all methods are collective."""
+
+    def refactor(self) -> bool:
+        """Takes the matrix's current values; whether that could be done."""
+
+    def inertia(self) -> Inertia:
+        """Of the matrix last refactored."""
+
+    def solve(self, right: PETSc.Vec, solution: PETSc.Vec) -> None:
+        """Solves with the matrix last refactored."""
+
+
+class LinearMethod(ABC):
+    """A way to solve linear systems."""
+
+    @abstractmethod
+    def solver(self, system: EquilibriumSystem, matrix: PETSc.Mat) -> LinearSolver:
+        """The solver for the KKT ``matrix`` of ``system`` (collective)."""
+
+
+@dataclass(frozen=True)
+class Direct(LinearMethod):
+    """The factor LDLᵀ of the whole matrix: fastest up to some hundred thousand unknowns, if it fits into memory."""
+
+    def solver(self, system, matrix):
+        return Factor(matrix)
+
+
+@dataclass(frozen=True)
+class TwoLevel(LinearMethod):
+    """Conjugate gradients over a factor for linear displacements, see ``two_level``.
+
+    Attributes:
+        tolerance: relative error of solutions, in the energy norm.
+    """
+
+    tolerance: float = 1e-8
+
+    @staticmethod
+    def suits(system: EquilibriumSystem) -> bool:
+        """Whether the displacement has a level below it, and all components of its free nodes are unknowns."""
+        return system.elastic.order > 1 and system.layout.whole_nodes
+
+    def solver(self, system, matrix):
+        if not self.suits(system):
+            raise DescriptionError(
+                "linear solver TwoLevel",
+                "it needs displacements of order 2 or 3, with all components of a node unknown",
+                "Use order=2, or Direct()",
+            )
+        return TwoLevelSolver(system, matrix, tolerance=self.tolerance)
+
+
+@dataclass(frozen=True)
+class BySize(LinearMethod):
+    """Two levels from so many unknowns on, in space and where they suit; the factor otherwise.
+
+    Attributes:
+        limit: unknowns.
+        large: the method beyond it.
+    """
+
+    limit: int = 300_000
+    large: TwoLevel = field(default_factory=TwoLevel)
+
+    def solver(self, system, matrix):
+        large = matrix.getSize()[0] > self.limit and system.joints.space.dim == 3 and self.large.suits(system)
+        return (self.large if large else Direct()).solver(system, matrix)
