@@ -68,6 +68,11 @@ class Factor:
         mumps = self._solver.getPC().getFactorMatrix()
         return Inertia(mumps.getMumpsInfog(12), mumps.getMumpsInfog(28))
 
-    def solve(self, right: PETSc.Vec, solution: PETSc.Vec) -> None:
-        """Solves with the last factor."""
+    def known_inertia(self) -> Inertia:
+        """The same: a factor knows all of it."""
+        return self.inertia()
+
+    def solve(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float = 0.0) -> bool:
+        """Solves with the last factor, always to roundoff (collective)."""
         self._solver.solve(right, solution)
+        return True

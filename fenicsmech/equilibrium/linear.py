@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
 from petsc4py import PETSc
@@ -23,8 +23,11 @@ class LinearSolver(Protocol):
     def inertia(self) -> Inertia:
         """Of the matrix last refactored."""
 
-    def solve(self, right: PETSc.Vec, solution: PETSc.Vec) -> None:
-        """Solves with the matrix last refactored."""
+    def known_inertia(self) -> Inertia:
+        """What the last ``solve`` has seen of it: no more than there is."""
+
+    def solve(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float) -> bool:
+        """Solves with the matrix last refactored, to a relative error of ``tolerance``; whether that could be done."""
 
 
 class LinearMethod(ABC):
@@ -45,13 +48,7 @@ class Direct(LinearMethod):
 
 @dataclass(frozen=True)
 class TwoLevel(LinearMethod):
-    """Conjugate gradients over a factor for linear displacements, see ``two_level``.
-
-    Attributes:
-        tolerance: relative error of solutions, in the energy norm.
-    """
-
-    tolerance: float = 1e-8
+    """Conjugate gradients over a factor for linear displacements, see ``two_level``."""
 
     @staticmethod
     def suits(system: EquilibriumSystem) -> bool:
@@ -65,7 +62,7 @@ class TwoLevel(LinearMethod):
                 "it needs displacements of order 2 or 3, with all components of a node unknown",
                 "Use order=2, or Direct()",
             )
-        return TwoLevelSolver(system, matrix, tolerance=self.tolerance)
+        return TwoLevelSolver(system, matrix)
 
 
 @dataclass(frozen=True)
@@ -74,12 +71,10 @@ class BySize(LinearMethod):
 
     Attributes:
         limit: unknowns.
-        large: the method beyond it.
     """
 
     limit: int = 300_000
-    large: TwoLevel = field(default_factory=TwoLevel)
 
     def solver(self, system, matrix):
-        large = matrix.getSize()[0] > self.limit and system.joints.space.dim == 3 and self.large.suits(system)
-        return (self.large if large else Direct()).solver(system, matrix)
+        large = matrix.getSize()[0] > self.limit and system.joints.space.dim == 3 and TwoLevel.suits(system)
+        return (TwoLevel() if large else Direct()).solver(system, matrix)

@@ -26,14 +26,14 @@ import numpy as np
 from petsc4py import PETSc
 
 from fenicsmech.equilibrium.control import Control
-from fenicsmech.equilibrium.factor import Inertia
 from fenicsmech.equilibrium.linear import BySize, LinearMethod, LinearSolver
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import Balance, EquilibriumSystem
-from fenicsmech.equilibrium.two_level import Stalled
 from fenicsmech.log import logger
 
 _log = logger(__name__)
+_STEP = 1e-6  # relative error of steps and tangents that iterative solvers may leave to the next iteration
+_EXACT = 1e-10  # the same of other solutions
 _LEAST_SHIFT = 1e-9  # in units of the mean stiffness; slender links bend with 1e-6 of it and less
 
 
@@ -156,19 +156,20 @@ class Newton:
         if not self._refactor(self.system.kkt(state, control, balance), floor):
             raise NotConverged("the tangent at the equilibrium cannot be factored", 0)
 
-    def solve_linear(self, right: PETSc.Vec) -> PETSc.Vec:
+    def solve_linear(self, right: PETSc.Vec, *, tolerance: float = _EXACT) -> PETSc.Vec:
         """The solution of KKT x = ``right`` with the matrix last factored (collective).
+
+        Args:
+            right: right-hand side.
+            tolerance: relative error that iterative solvers may leave.
 
         Raises:
             NotConverged: an iterative solver stalled.
         """
-        with self.system.clock.phase("solve"):
-            x = right.duplicate()
-            try:
-                self._solver.solve(right, x)
-            except Stalled as failure:
-                raise NotConverged(str(failure), 0) from failure
-            return x
+        x = self._solution(right, tolerance)
+        if x is None:
+            raise NotConverged("the linear solver stalled", 0)
+        return x
 
     def _relative(self, balance: Balance) -> float:
         return balance.norm / max(balance.forces, self.options.roundoff * self.system.unit)
@@ -187,12 +188,12 @@ class Newton:
         matrix = system.kkt(state, control, balance)
         shift, following = floor, max(_LEAST_SHIFT, last / 3.0)
         for _ in range(20):
-            if self._refactor(matrix, shift) and (any_inertia or self._descends()):
+            x = self._solution(balance.vector, _STEP) if self._refactor(matrix, shift) else None
+            if x is not None and (any_inertia or self._descends()):
                 break
             shift, following = following, 8.0 * following
         else:
             raise NotConverged("no shift of the tangent gives a direction of descent", 0)
-        x = self.solve_linear(balance.vector)
         x.scale(-1.0)
         return system.step(x), shift
 
@@ -203,16 +204,15 @@ class Newton:
                 self._solver = self.options.linear.solver(self.system, matrix)
             return self._solver.refactor()
 
-    def _inertia(self) -> Inertia:
-        with self.system.clock.phase("inertia"):
-            try:
-                return self._solver.inertia()
-            except Stalled as failure:
-                raise NotConverged(str(failure), 0) from failure
+    def _solution(self, right: PETSc.Vec, tolerance: float) -> PETSc.Vec | None:
+        """The solution with the matrix last factored, None if an iterative solver stalled."""
+        with self.system.clock.phase("solve"):
+            x = right.duplicate()
+            return x if self._solver.solve(right, x, tolerance) else None
 
     def _descends(self) -> bool:
-        """Whether the inertia of the matrix last factored promises a direction of descent."""
-        inertia = self._inertia()
+        """Whether what the solver saw of the matrix promises that its solution is a direction of descent."""
+        inertia = self._solver.known_inertia()
         return inertia.negative <= self._expected and inertia.zero == 0
 
     @property
@@ -268,11 +268,12 @@ class Newton:
         system = self.system
         if shift > floor and not self._refactor(system.kkt(state, control, balance), floor):
             raise NotConverged("the tangent at the equilibrium cannot be factored", iteration)
-        x = self.solve_linear(control.rate(system, state))
-        under_control = self._inertia().negative - self._expected
+        x = self.solve_linear(control.rate(system, state), tolerance=_STEP)
+        with system.clock.phase("inertia"):
+            under_control = self._solver.inertia().negative - self._expected
         unstable = under_control
         if control.constrained:
             row = system.control_row()
             # Schur complement of the control row: negative exactly if removing the row leaves stability as it is
-            unstable += 1 - int(self.solve_linear(row).dot(row) < 0.0)
+            unstable += 1 - int(self.solve_linear(row, tolerance=_STEP).dot(row) < 0.0)
         return Solution(state, tuple(residuals), iteration, max(unstable, 0), max(under_control, 0), system.step(x))

@@ -19,6 +19,7 @@ Sources: Tang, Nabben, Vuik & Erlangga on the preconditioner, A-DEF2 (doi:10.100
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,17 +29,11 @@ from fenicsmech.equilibrium.coarse import CoarseLevel
 from fenicsmech.equilibrium.factor import Inertia
 from fenicsmech.equilibrium.smoother import Chebyshev
 from fenicsmech.equilibrium.system import EquilibriumSystem
-from fenicsmech.log import logger
 
-_log = logger(__name__)
 _DEGREE, _RATIO = 8, 0.03  # of the smoother (measured)
 _MOST = 300  # iterations
 _SEEN = 1e-6  # how far a random start is followed for the inertia
 _ROUNDOFF = 1e-15  # of the solution, in units of the mean stiffness
-
-
-class Stalled(Exception):
-    """Conjugate gradients did not converge."""
 
 
 @dataclass(frozen=True)
@@ -56,15 +51,14 @@ class TwoLevelSolver:
     Args:
         system: with displacements of order 2 or more.
         matrix: its KKT matrix; refactor after changing its values.
-        tolerance: of the energy norm of the error, relative.
 
     Attributes:
         iterations: of each solve so far.
         probes: iterations spent on each inertia so far.
     """
 
-    def __init__(self, system: EquilibriumSystem, matrix: PETSc.Mat, *, tolerance: float) -> None:
-        self._matrix, self._tolerance = matrix, tolerance
+    def __init__(self, system: EquilibriumSystem, matrix: PETSc.Mat) -> None:
+        self._matrix = matrix
         self._coarse = CoarseLevel(system, matrix)
         self._smoother = Chebyshev(degree=_DEGREE, ratio=_RATIO)
         layout = system.layout
@@ -72,32 +66,47 @@ class TwoLevelSolver:
         self._free.setBlockSize(system.joints.space.dim)
         self._links: PETSc.Mat | None = None
         self._work = matrix.createVecLeft()
+        self._met = 0
         self.iterations: list[int] = []
         self.probes: list[int] = []
 
     def refactor(self) -> bool:
         """Takes the matrix's current values; whether that could be done."""
-        self._links = self._matrix.createSubMatrix(self._free, self._free, self._links)
+        links = self._matrix.createSubMatrix(self._free, self._free)
+        # blocks: half the time of a product
+        self._links = links.convert(PETSc.Mat.Type.BAIJ, self._links or PETSc.Mat())
+        links.destroy()
         self._nodal = self._links.createVecs()
         return self._smoother.update(self._links) and self._coarse.update()
 
-    def solve(self, right: PETSc.Vec, solution: PETSc.Vec) -> None:
-        """Solves with the matrix last refactored.
+    def solve(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float) -> bool:
+        """Solves with the matrix last refactored; False if that takes too many iterations.
 
-        Raises:
-            Stalled: too many iterations.
+        Args:
+            right: right-hand side.
+            solution: where the solution goes.
+            tolerance: of the energy norm of the error, relative to that of the error after one coarse correction.
         """
         self._coarse.correction(right, solution)
-        residual = right - self._matrix * solution
-        self._descend(residual, solution, self._tolerance)
-        self._coarse.correction(right - self._matrix * solution, self._work)
-        solution.axpy(1.0, self._work)
+        floor, first, self._met = _ROUNDOFF * solution.norm(), 0.0, 0
+        steps = self._conjugate(right - self._matrix * solution)
+        for iteration, (energy, direction) in zip(range(_MOST), steps, strict=False):
+            first = first or abs(energy)
+            if abs(energy) <= max(tolerance**2 * first, floor**2):
+                self.iterations.append(iteration)
+                return True
+            solution.axpy(energy / direction.curvature, direction.p)
+            self._met += int(direction.curvature < 0.0)
+        return False
+
+    def known_inertia(self) -> Inertia:
+        """What the last solve met: the coarse level's, and directions of negative curvature."""
+        coarse = self._coarse.inertia()
+        return Inertia(coarse.negative + self._met, coarse.zero)
 
     def inertia(self) -> Inertia:
         """Of the matrix last refactored."""
-        coarse = self._coarse.inertia()
-        found: list[Direction] = []
-        spent = 0
+        coarse, found, spent = self._coarse.inertia(), [], 0
         while True:
             direction, iterations = self._probe(found)
             spent += iterations
@@ -105,62 +114,51 @@ class TwoLevelSolver:
                 break
             found.append(direction)
         self.probes.append(spent)
-        _log.debug("inertia: %d negative on the coarse level, %d more", coarse.negative, len(found))
         return Inertia(coarse.negative + len(found), coarse.zero)
-
-    def _descend(self, r: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> None:
-        """Adds KKT⁻¹ r to x for a residual r of which Pᵀ r = 0."""
-        floor = _ROUNDOFF * x.norm()
-        p = q = None
-        before = first = 0.0
-        for iteration in range(_MOST):
-            z, image = self._preconditioned(r, ())
-            energy = r.dot(z)
-            first = first or energy
-            if abs(energy) <= max(tolerance**2 * abs(first), floor**2):
-                self.iterations.append(iteration)
-                return
-            p, q = (z, image) if p is None else (z + p * (energy / before), image + q * (energy / before))
-            length = energy / p.dot(q)
-            x.axpy(length, p)
-            r.axpy(-length, q)
-            before = energy
-        raise Stalled(f"conjugate gradients did not converge in {_MOST} iterations")
 
     def _probe(self, found: list[Direction]) -> tuple[Direction | None, int]:
         """A direction of negative curvature conjugate to those ``found``, None if there seems to be none."""
-        r = self._random()
+        r, first = self._random(), 0.0
         self._coarse.correction(r, self._work)
         r -= self._matrix * self._work
         for known in found:
             r.axpy(-known.p.dot(r) / known.curvature, known.image)
-        p = q = None
-        before = first = 0.0
-        for iteration in range(_MOST):
-            z, image = self._preconditioned(r, found)
-            energy = r.dot(z)
-            first = first or energy
-            if abs(energy) <= _SEEN**2 * abs(first):
-                return None, iteration
-            p, q = (z, image) if p is None else (z + p * (energy / before), image + q * (energy / before))
-            curvature = p.dot(q)
-            if curvature < 0.0:
-                return Direction(p, q, curvature), iteration
-            r.axpy(-energy / curvature, q)
-            before = energy
-        raise Stalled(f"the inertia is not known after {_MOST} iterations")
+        for iteration, (energy, direction) in zip(range(_MOST), self._conjugate(r, found), strict=False):
+            first = first or abs(energy)
+            if abs(energy) <= _SEEN**2 * first:
+                break
+            if direction.curvature < 0.0:
+                return direction, iteration
+        return None, iteration
 
-    def _preconditioned(self, r: PETSc.Vec, found) -> tuple[PETSc.Vec, PETSc.Vec]:
-        """z = S r, conjugate to P and to the directions ``found``, and KKT z."""
+    def _conjugate(self, r: PETSc.Vec, found: Sequence[Direction] = ()) -> Iterator[tuple[float, Direction]]:
+        """Conjugate directions for a residual r with Pᵀ r = 0: its energy rᵀ z, and where to go on.
+
+        A direction is good until the next one is asked for.
+        """
+        z, image = self._preconditioned(r, found)
+        p, q, energy = z, image, r.dot(z)
+        while True:
+            curvature = p.dot(q)
+            yield energy, Direction(p, q, curvature)
+            r.axpy(-energy / curvature, q)
+            z, image = self._preconditioned(r, found)
+            energy, before = r.dot(z), energy
+            p.aypx(energy / before, z)
+            q.aypx(energy / before, image)
+
+    def _preconditioned(self, r: PETSc.Vec, found: Sequence[Direction]) -> tuple[PETSc.Vec, PETSc.Vec]:
+        """z = S r made conjugate to P and to the directions ``found``, and KKT z."""
         rough, smooth = self._nodal
-        rough.array_w[:] = r.array_r[: rough.getLocalSize()]
+        count = rough.getLocalSize()
+        rough.array_w[:] = r.array_r[:count]
         self._smoother.apply(rough, smooth)
-        z = r.duplicate()
-        z.set(0.0)
-        z.array_w[: smooth.getLocalSize()] = smooth.array_r
-        self._coarse.correction(self._matrix * z, self._work)
-        z -= self._work
-        image = self._matrix * z
+        z, image = r.duplicate(), r.duplicate()
+        z.array_w[:count], z.array_w[count:] = smooth.array_r, 0.0
+        self._matrix.mult(z, image)
+        self._coarse.correction(image, self._work)
+        z.axpy(-1.0, self._work)
+        self._matrix.mult(z, image)
         for known in found:
             share = -known.image.dot(z) / known.curvature
             z.axpy(share, known.p)
@@ -170,7 +168,6 @@ class TwoLevelSolver:
     def _random(self) -> PETSc.Vec:
         """A random vector of forces on free nodes."""
         vector = self._matrix.createVecLeft()
-        vector.set(0.0)
         count = self._nodal[0].getLocalSize()
         vector.array_w[:count] = np.random.default_rng(self._matrix.comm.rank).standard_normal(count)
         return vector
