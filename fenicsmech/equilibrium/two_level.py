@@ -96,11 +96,12 @@ class TwoLevelSolver:
                 self.iterations.append(iteration)
                 return True
             solution.axpy(energy / direction.curvature, direction.p)
-            self._met += int(direction.curvature < 0.0)
+            # later ones may be copies of the first: long recurrences forget what they were conjugate to
+            self._met = max(self._met, int(direction.curvature < 0.0))
         return False
 
     def known_inertia(self) -> Inertia:
-        """What the last solve met: the coarse level's, and directions of negative curvature."""
+        """What is certain after the last solve: the coarse level's, and one more if it met a negative curvature."""
         coarse = self._coarse.inertia()
         return Inertia(coarse.negative + self._met, coarse.zero)
 
