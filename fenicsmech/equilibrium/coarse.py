@@ -56,6 +56,11 @@ class CoarseLevel:
         """Of KKT₁."""
         return self._factor.inertia()
 
+    @property
+    def memory(self) -> float:
+        """Bytes the factorisation took, on all ranks."""
+        return self._factor.memory
+
     def correction(self, r: PETSc.Vec, x: PETSc.Vec) -> None:
         """x = P KKT₁⁻¹ Pᵀ r (collective)."""
         self._prolongation.multTranspose(r, self._right)

@@ -72,6 +72,11 @@ class Factor:
         """The same: a factor knows all of it."""
         return self.inertia()
 
+    @property
+    def memory(self) -> float:
+        """Bytes the factorisation took, on all ranks."""
+        return 1e6 * self._solver.getPC().getFactorMatrix().getMumpsInfog(22)
+
     def solve(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float = 0.0) -> bool:
         """Solves with the last factor, always to roundoff (collective)."""
         self._solver.solve(right, solution)

@@ -79,6 +79,13 @@ class TwoLevelSolver:
         self._nodal = self._links.createVecs()
         return self._smoother.update(self._links) and self._coarse.update()
 
+    @property
+    def memory(self) -> float:
+        """Bytes of the factor of KKT₁ and of the blocked stiffness, on all ranks."""
+        blocks = self._links.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"]
+        size = self._links.getBlockSize() ** 2
+        return self._coarse.memory + blocks * (8.0 + 4.0 / size)
+
     def solve(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float) -> bool:
         """Solves with the matrix last refactored; False if that takes too many iterations.
 

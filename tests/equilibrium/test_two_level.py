@@ -46,7 +46,8 @@ def same(curve, reference):
         assert (frame.unstable_modes, frame.stable_under_control) == (other.unstable_modes, other.stable_under_control)
         largest = max(np.linalg.norm(reaction.force) for reaction in other.reactions.values())
         for name, reaction in other.reactions.items():
-            assert frame.reactions[name].force == pytest.approx(reaction.force, abs=1e-8 * largest)
+            # what redundant hinges carry across the plane is not determined
+            assert frame.reactions[name].force[:2] == pytest.approx(reaction.force[:2], abs=1e-8 * largest), name
 
 
 @pytest.mark.parallel
@@ -59,7 +60,6 @@ def test_curves_and_reactions_are_those_of_the_factor(asked):
     same(*curves)
 
 
-@pytest.mark.parallel
 @pytest.mark.parametrize("asked", [{"forces": [0.02]}, {"displacements": [6.0]}])
 def test_so_are_those_of_a_force_on_a_link(asked):
     curves = []
@@ -94,7 +94,6 @@ def test_inertia_and_solutions_are_those_of_the_factor_on_both_sides_of_buckling
     assert seen[0] == 0 and seen[-1] >= 3 and 1 in seen
 
 
-@pytest.mark.parallel
 def test_iterations_do_not_grow_with_the_mesh():
     counts = []
     for size in (3.0, 1.5):
