@@ -64,7 +64,11 @@ class TwoLevelSolver:
         layout = system.layout
         self._free = PETSc.IS().createStride(len(layout.free), layout.first_unknown, 1, comm=matrix.comm)
         self._free.setBlockSize(system.joints.space.dim)
+        extras = layout.extras if layout.last else 0
+        self._extra = PETSc.IS().createStride(extras, layout.first_extra, 1, comm=matrix.comm)
         self._links: PETSc.Mat | None = None
+        self._border: PETSc.Mat | None = None
+        self._corner: PETSc.Mat | None = None
         self._work = matrix.createVecLeft()
         self._met = 0
         self.iterations: list[int] = []
@@ -76,7 +80,9 @@ class TwoLevelSolver:
         # blocks: half the time of a product
         self._links = links.convert(PETSc.Mat.Type.BAIJ, self._links or PETSc.Mat())
         links.destroy()
-        self._nodal = self._links.createVecs()
+        self._border = self._matrix.createSubMatrix(self._extra, self._free, self._border)
+        self._corner = self._matrix.createSubMatrix(self._extra, self._extra, self._corner)
+        self._nodal, self._bordering = self._links.createVecs(), self._corner.createVecs()
         return self._smoother.update(self._links) and self._coarse.update()
 
     @property
@@ -163,15 +169,27 @@ class TwoLevelSolver:
         self._smoother.apply(rough, smooth)
         z, image = r.duplicate(), r.duplicate()
         z.array_w[:count], z.array_w[count:] = smooth.array_r, 0.0
-        self._matrix.mult(z, image)
+        self._multiply(z, image)
         self._coarse.correction(image, self._work)
         z.axpy(-1.0, self._work)
-        self._matrix.mult(z, image)
+        self._multiply(z, image)
         for known in found:
             share = -known.image.dot(z) / known.curvature
             z.axpy(share, known.p)
             image.axpy(share, known.image)
         return z, image
+
+    def _multiply(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """y = KKT x by its blocks, of which that of the free nodes costs half as much as in the whole matrix."""
+        nodes, rows = self._nodal
+        extras, sums = self._bordering
+        count = nodes.getLocalSize()
+        nodes.array_w[:], extras.array_w[:] = x.array_r[:count], x.array_r[count:]
+        self._links.mult(nodes, rows)
+        self._border.multTransposeAdd(extras, rows, rows)
+        self._corner.mult(extras, sums)
+        self._border.multAdd(nodes, sums, sums)
+        y.array_w[:count], y.array_w[count:] = rows.array_r, sums.array_r
 
     def _random(self) -> PETSc.Vec:
         """A random vector of forces on free nodes."""

@@ -94,6 +94,19 @@ def test_inertia_and_solutions_are_those_of_the_factor_on_both_sides_of_buckling
     assert seen[0] == 0 and seen[-1] >= 3 and 1 in seen
 
 
+def test_interfaces_of_another_rest_shape_are_followed():
+    curves = []
+    for linear in (TwoLevel(), Direct()):
+        simulation, push = finger("3d", size=6.0, newton=NewtonOptions(linear=linear))
+        model = simulation.model
+        positions = model.elastic.d.function_space.tabulate_dof_coordinates()
+        slope = np.zeros_like(positions)
+        slope[:, 0] = 0.05 * positions[:, 1]
+        with model.shaped(slope.ravel()):
+            curves.append(simulation.load_displacement(push, forces=[2.0]))
+    same(*curves)
+
+
 def test_iterations_do_not_grow_with_the_mesh():
     counts = []
     for size in (3.0, 1.5):
