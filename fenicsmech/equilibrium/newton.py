@@ -33,6 +33,7 @@ from fenicsmech.log import logger
 
 _log = logger(__name__)
 _STEP = 1e-6  # relative error of steps and tangents that iterative solvers may leave to the next iteration
+_ROUGH = 1e-3  # far from the equilibrium
 _EXACT = 1e-10  # the same of other solutions
 _LEAST_SHIFT = 1e-9  # in units of the mean stiffness; slender links bend with 1e-6 of it and less
 
@@ -187,8 +188,10 @@ class Newton:
         system = self.system
         matrix = system.kkt(state, control, balance)
         shift, following = floor, max(_LEAST_SHIFT, last / 3.0)
+        # a tenth of what the step leaves anyway
+        tolerance = min(max(0.1 * self._relative(balance), _STEP), _ROUGH)
         for _ in range(20):
-            x = self._solution(balance.vector, _STEP) if self._refactor(matrix, shift) else None
+            x = self._solution(balance.vector, tolerance) if self._refactor(matrix, shift) else None
             if x is not None and (any_inertia or self._descends()):
                 break
             shift, following = following, 8.0 * following
