@@ -28,10 +28,16 @@ class Chebyshev:
     def __init__(self, *, degree: int, ratio: float) -> None:
         self._degree, self._ratio = degree, ratio
         self._mode: PETSc.Vec | None = None
+        self._work: tuple[PETSc.Vec, ...] | None = None
+        self._blocks: PETSc.PC | None = None
 
     def update(self, matrix: PETSc.Mat) -> bool:
         """Takes A, of square blocks; whether its diagonal blocks can be inverted (collective)."""
         self._matrix = matrix
+        if self._work is None:
+            self._work = tuple(matrix.createVecLeft() for _ in range(3))
+        if self._blocks is not None:
+            self._blocks.destroy()
         self._blocks = PETSc.PC().create(matrix.comm)
         self._blocks.setType("pbjacobi")
         self._blocks.setOperators(matrix)
@@ -43,7 +49,8 @@ class Chebyshev:
         """x = S r (collective)."""
         a = self._ratio * self._b
         centre, half = 0.5 * (self._b + a), 0.5 * (self._b - a)
-        residual, step, damped = r.copy(), r.duplicate(), r.duplicate()
+        residual, step, damped = self._work
+        r.copy(residual)
         self._blocks.apply(residual, step)
         step.scale(1.0 / centre)
         step.copy(x)
@@ -67,7 +74,7 @@ class Chebyshev:
                 self._mode.getLocalSize()
             )
             self._mode.normalize()
-        product, largest = self._mode.duplicate(), np.nan
+        product, largest = self._work[0], np.nan
         for _ in range(count):
             self._matrix.mult(self._mode, product)
             self._blocks.apply(product, self._mode)

@@ -69,7 +69,9 @@ class TwoLevelSolver:
         self._links: PETSc.Mat | None = None
         self._border: PETSc.Mat | None = None
         self._corner: PETSc.Mat | None = None
-        self._work = matrix.createVecLeft()
+        # petsc4py destroys what it creates late: nothing is created per iteration
+        self._work, self._residual, self._z, self._image, self._p, self._q = (matrix.createVecLeft() for _ in range(6))
+        self._nodal: tuple[PETSc.Vec, PETSc.Vec] | None = None
         self._met = 0
         self.iterations: list[int] = []
         self.probes: list[int] = []
@@ -82,7 +84,8 @@ class TwoLevelSolver:
         links.destroy()
         self._border = self._matrix.createSubMatrix(self._extra, self._free, self._border)
         self._corner = self._matrix.createSubMatrix(self._extra, self._extra, self._corner)
-        self._nodal, self._bordering = self._links.createVecs(), self._corner.createVecs()
+        if self._nodal is None:
+            self._nodal, self._bordering = self._links.createVecs(), self._corner.createVecs()
         return self._smoother.update(self._links) and self._coarse.update()
 
     @property
@@ -102,7 +105,9 @@ class TwoLevelSolver:
         """
         self._coarse.correction(right, solution)
         floor, first, self._met = _ROUNDOFF * solution.norm(), 0.0, 0
-        steps = self._conjugate(right - self._matrix * solution)
+        self._multiply(solution, self._residual)
+        self._residual.aypx(-1.0, right)
+        steps = self._conjugate(self._residual)
         for iteration, (energy, direction) in zip(range(_MOST), steps, strict=False):
             first = first or abs(energy)
             if abs(energy) <= max(tolerance**2 * first, floor**2):
@@ -132,9 +137,11 @@ class TwoLevelSolver:
 
     def _probe(self, found: list[Direction]) -> tuple[Direction | None, int]:
         """A direction of negative curvature conjugate to those ``found``, None if there seems to be none."""
-        r, first = self._random(), 0.0
+        r, first = self._residual, 0.0
+        self._randomise(r)
         self._coarse.correction(r, self._work)
-        r -= self._matrix * self._work
+        self._multiply(self._work, self._image)
+        r.axpy(-1.0, self._image)
         for known in found:
             r.axpy(-known.p.dot(r) / known.curvature, known.image)
         for iteration, (energy, direction) in zip(range(_MOST), self._conjugate(r, found), strict=False):
@@ -142,7 +149,7 @@ class TwoLevelSolver:
             if abs(energy) <= _SEEN**2 * first:
                 break
             if direction.curvature < 0.0:
-                return direction, iteration
+                return Direction(direction.p.copy(), direction.image.copy(), direction.curvature), iteration
         return None, iteration
 
     def _conjugate(self, r: PETSc.Vec, found: Sequence[Direction] = ()) -> Iterator[tuple[float, Direction]]:
@@ -150,24 +157,27 @@ class TwoLevelSolver:
 
         A direction is good until the next one is asked for.
         """
-        z, image = self._preconditioned(r, found)
-        p, q, energy = z, image, r.dot(z)
+        z, image, p, q = self._z, self._image, self._p, self._q
+        self._precondition(r, found)
+        energy = r.dot(z)
+        z.copy(p)
+        image.copy(q)
         while True:
             curvature = p.dot(q)
             yield energy, Direction(p, q, curvature)
             r.axpy(-energy / curvature, q)
-            z, image = self._preconditioned(r, found)
+            self._precondition(r, found)
             energy, before = r.dot(z), energy
             p.aypx(energy / before, z)
             q.aypx(energy / before, image)
 
-    def _preconditioned(self, r: PETSc.Vec, found: Sequence[Direction]) -> tuple[PETSc.Vec, PETSc.Vec]:
-        """z = S r made conjugate to P and to the directions ``found``, and KKT z."""
+    def _precondition(self, r: PETSc.Vec, found: Sequence[Direction]) -> None:
+        """z = S r made conjugate to P and to the directions ``found``, and its image KKT z."""
+        z, image = self._z, self._image
         rough, smooth = self._nodal
         count = rough.getLocalSize()
         rough.array_w[:] = r.array_r[:count]
         self._smoother.apply(rough, smooth)
-        z, image = r.duplicate(), r.duplicate()
         z.array_w[:count], z.array_w[count:] = smooth.array_r, 0.0
         self._multiply(z, image)
         self._coarse.correction(image, self._work)
@@ -177,7 +187,6 @@ class TwoLevelSolver:
             share = -known.image.dot(z) / known.curvature
             z.axpy(share, known.p)
             image.axpy(share, known.image)
-        return z, image
 
     def _multiply(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """y = KKT x by its blocks, of which that of the free nodes costs half as much as in the whole matrix."""
@@ -191,9 +200,8 @@ class TwoLevelSolver:
         self._border.multAdd(nodes, sums, sums)
         y.array_w[:count], y.array_w[count:] = rows.array_r, sums.array_r
 
-    def _random(self) -> PETSc.Vec:
-        """A random vector of forces on free nodes."""
-        vector = self._matrix.createVecLeft()
+    def _randomise(self, r: PETSc.Vec) -> None:
+        """Makes r random forces on free nodes."""
         count = self._nodal[0].getLocalSize()
-        vector.array_w[:count] = np.random.default_rng(self._matrix.comm.rank).standard_normal(count)
-        return vector
+        r.array_w[:count] = np.random.default_rng(self._matrix.comm.rank).standard_normal(count)
+        r.array_w[count:] = 0.0
