@@ -13,8 +13,8 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
-_SAFETY = 1.15  # on the estimate of λ, which is one from below
-_FIRST, _AGAIN = 15, 3  # power iterations for the first matrix, and for those after it
+_SAFETY = 1.3  # on the estimate of λ, which is one from below: single bad cells are seen late
+_FIRST, _AGAIN = 40, 3  # power iterations for the first matrix, and for those after it
 
 
 class Chebyshev:
