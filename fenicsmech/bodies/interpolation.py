@@ -39,7 +39,7 @@ class DesignAtNodes:
         rows = np.repeat(nodes, dim + 1, axis=1).ravel()
         columns = np.tile(corners, (1, nodes.shape[1])).ravel()
         # cells that share a node give it the same values: keep one
-        _, first = np.unique(rows * shape[1] + columns, return_index=True)
+        _, first = np.unique(rows.astype(np.int64) * shape[1] + columns, return_index=True)
         self.matrix = csr_matrix((weights.ravel()[first], (rows[first], columns[first])), shape=shape)
         self.matrix.data[np.abs(self.matrix.data) < 1e-12] = 0.0
 
