@@ -88,6 +88,11 @@ def test_bulges_of_cells_are_those_of_their_pairs_of_corners_however_numbered(ce
     assert np.array_equal(edges.of_cells(cells)[0], expected)
 
 
+def test_a_rank_without_cells_has_no_bulges():
+    edges = CurvedEdges(np.array([[0, 1]]), np.array([[0.0, 0.1]]))
+    assert edges.of_cells(np.zeros((0, 3), dtype=int)).shape == (0, 3, 2)
+
+
 def test_renumbered_edges_keep_their_bulges_and_lose_those_without_an_end():
     edges = CurvedEdges(np.array([[0, 1], [1, 2], [2, 3]]), np.array([[1.0, 0.0], [2.0, 0.0], [3.0, 0.0]]))
     renumbered = edges.renumbered(np.array([7, 4, 5, -1]))
