@@ -37,7 +37,7 @@ class InterfaceMap:
     def __init__(
         self, u: fem.Function, drawn: np.ndarray, cell_body: np.ndarray, centres: np.ndarray, space: RigidSpace
     ) -> None:
-        self.space, self._u = space, u
+        self.space, self._u, self._cell_body, self._centres = space, u, cell_body, centres
         V = u.function_space
         self.block = V.dofmap.index_map_bs
         self.owned = V.dofmap.index_map.size_local
@@ -52,6 +52,11 @@ class InterfaceMap:
             self._mid_plane = on_mid_plane(positions, V.mesh.comm)
         self.unknown = np.tile(self.body[: self.owned, None] < 0, self.block)
         self.unknown[self._mid_plane[: self.owned], space.dim :] = False
+
+    def on(self, u: fem.Function) -> InterfaceMap:
+        """The same interfaces of a field of order 1, whose nodes lie on no curved edge but at its ends (collective)."""
+        drawn = u.function_space.tabulate_dof_coordinates()
+        return InterfaceMap(u, drawn, self._cell_body, self._centres, self.space)
 
     def reshape(self, design: np.ndarray) -> None:
         """Takes the design at all local nodes, (nodes, dim): added to the drawn positions."""

@@ -16,6 +16,10 @@ class DesignAtNodes:
     Args:
         d: design field.
         u: displacement field.
+
+    Attributes:
+        matrix: N_k(X_i), (local nodes of u, local nodes of d).
+        owned: number of owned nodes of u.
     """
 
     def __init__(self, d: fem.Function, u: fem.Function) -> None:
@@ -35,19 +39,19 @@ class DesignAtNodes:
         rows = np.repeat(nodes, dim + 1, axis=1).ravel()
         columns = np.tile(corners, (1, nodes.shape[1])).ravel()
         # cells that share a node give it the same values: keep one
-        _, first = np.unique(rows * shape[1] + columns, return_index=True)
-        self._matrix = csr_matrix((weights.ravel()[first], (rows[first], columns[first])), shape=shape)
-        self._matrix.data[np.abs(self._matrix.data) < 1e-12] = 0.0
+        _, first = np.unique(rows.astype(np.int64) * shape[1] + columns, return_index=True)
+        self.matrix = csr_matrix((weights.ravel()[first], (rows[first], columns[first])), shape=shape)
+        self.matrix.data[np.abs(self.matrix.data) < 1e-12] = 0.0
 
     def values(self) -> np.ndarray:
         """d at all local nodes of u, (nodes, dim)."""
         dim = self._d.function_space.dofmap.index_map_bs
-        return self._matrix @ self._d.x.array.reshape(-1, dim)
+        return self.matrix @ self._d.x.array.reshape(-1, dim)
 
     def add_transpose(self, nodal: np.ndarray, vector: PETSc.Vec) -> None:
         """Adds Nᵀ ``nodal`` ((owned nodes of u, dim)) to the ghosted ``vector`` on the space of d (collective)."""
         pulled = fem.Function(self._d.function_space)
-        pulled.x.array[:] = (self._matrix[: self.owned].T @ nodal).ravel()
+        pulled.x.array[:] = (self.matrix[: self.owned].T @ nodal).ravel()
         share = petsc_vector(pulled)
         share.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
         vector.array_w[:] += share.array_r

@@ -5,6 +5,8 @@
 - ``control``: what is led along a path: a force, a displacement, motors
 - ``layout``, ``matrices``, ``extras``, ``system``: the distributed KKT system
 - ``factor``: LDLᵀ with inertia
+- ``coarse``, ``smoother``, ``two_level``: conjugate gradients where the factor is too large
+- ``linear``: which of the two solves, and by what rule
 - ``solver``: what every equilibrium solver is
 - ``newton``: the default one, the primal–dual iteration
 - ``solvers``: others to choose and to compare
@@ -22,6 +24,7 @@ from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadCon
 from fenicsmech.equilibrium.critical import Critical, CriticalPoint
 from fenicsmech.equilibrium.eigen import Mode, critical_changes, softest_modes
 from fenicsmech.equilibrium.lead import ForceLead, Heading, Lead, MotorLead
+from fenicsmech.equilibrium.linear import BySize, Direct, LinearMethod, LinearSolver, TwoLevel
 from fenicsmech.equilibrium.load import PointLoad
 from fenicsmech.equilibrium.newton import Newton, PrimalDualNewton
 from fenicsmech.equilibrium.path import IDLE_STIFFNESS, Path, PathFailed
@@ -38,10 +41,12 @@ __all__ = [
     "ArcMetric",
     "ArcSteps",
     "AugmentedLagrangian",
+    "BySize",
     "Constant",
     "Control",
     "Critical",
     "CriticalPoint",
+    "Direct",
     "DisplacementControl",
     "EquilibriumSolver",
     "EquilibriumSystem",
@@ -54,6 +59,8 @@ __all__ = [
     "Heading",
     "Hermite",
     "Lead",
+    "LinearMethod",
+    "LinearSolver",
     "LoadControl",
     "Mode",
     "MotorControl",
@@ -75,6 +82,7 @@ __all__ = [
     "Step",
     "Stretch",
     "Tangent",
+    "TwoLevel",
     "critical_changes",
     "crossing",
     "follow",

@@ -36,16 +36,16 @@ class Factor:
         self._matrix = matrix
         self._analyse()
 
-    def refactor(self) -> Inertia | None:
-        """Factors the matrix's current values; None if the factorisation failed."""
-        inertia = self._numeric()
-        if not self._fresh and (inertia is None or inertia.zero):
+    def refactor(self) -> bool:
+        """Factors the matrix's current values; whether it could be done (collective)."""
+        done = self._numeric()
+        if not self._fresh and not (done and self.inertia().zero == 0):
             # the analysis pairs unknowns by the values it sees: in other ones a pair may be zero, the matrix regular
             self._solver.destroy()
             self._analyse()
-            inertia = self._numeric()
+            done = self._numeric()
         self._fresh = False
-        return inertia
+        return done
 
     def _analyse(self) -> None:
         """A solver that orders and pairs the unknowns by the values it is first given."""
@@ -63,7 +63,7 @@ class Factor:
         self._solver.setFromOptions()
         self._fresh = True
 
-    def _numeric(self) -> Inertia | None:
+    def _numeric(self) -> bool:
         self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         for _ in range(4):
             self._solver.setOperators(self._matrix)
@@ -71,13 +71,28 @@ class Factor:
             mumps = self._solver.getPC().getFactorMatrix()
             status = mumps.getMumpsInfog(1)
             if status >= 0:
-                return Inertia(mumps.getMumpsInfog(12), mumps.getMumpsInfog(28))
+                return True
             if status not in _WORKSPACE:
-                return None
+                return False
             mumps.setMumpsIcntl(14, 2 * mumps.getMumpsIcntl(14))
             self._matrix.stateIncrease()  # marks the values as new
-        return None
+        return False
 
-    def solve(self, right: PETSc.Vec, solution: PETSc.Vec) -> None:
-        """Solves with the last factor."""
+    def inertia(self) -> Inertia:
+        """Of the matrix last factored."""
+        mumps = self._solver.getPC().getFactorMatrix()
+        return Inertia(mumps.getMumpsInfog(12), mumps.getMumpsInfog(28))
+
+    def known_inertia(self) -> Inertia:
+        """The same: a factor knows all of it."""
+        return self.inertia()
+
+    @property
+    def memory(self) -> float:
+        """Bytes the factorisation took, on all ranks."""
+        return 1e6 * self._solver.getPC().getFactorMatrix().getMumpsInfog(22)
+
+    def solve(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float = 0.0) -> bool:
+        """Solves with the last factor, always to roundoff (collective)."""
         self._solver.solve(right, solution)
+        return True

@@ -28,6 +28,7 @@ class Layout:
         free_displacements: how many of them, the first ones, are displacements.
         pressures: number of unknown pressures on all ranks.
         block: rows come in blocks of this size.
+        whole_nodes: whether all components of every node with an unknown are unknowns, on all ranks.
         local_rows, local_unknowns: sizes on this rank.
         first_extra_row, first_extra: global numbers of the first extra row and unknown.
         z, multipliers, force: slices of the extras.
@@ -52,6 +53,8 @@ class Layout:
             self.pressures = pressure.count
             owned += here
         self.block = block
+        whole = pressure is None and np.all(interfaces.unknown.all(axis=1) == interfaces.unknown.any(axis=1))
+        self.whole_nodes = comm.allreduce(int(not whole)) == 0
         # first node of every rank, and what other DOFs stand before its displacements
         nodes = np.concatenate([[0], np.cumsum(comm.allgather(interfaces.owned))])
         self.first_node, self._starts = int(nodes[comm.rank]), nodes[1:-1]

@@ -24,33 +24,36 @@ def create_extended_matrix(
     elastic.tangent(fem)
     fem.assemble()
     starts, columns, values = fem.getValuesCSR()
+    numbering = fem.getLGMap()
+    fem.destroy()  # large, and not needed any more
     first, size = layout.first_row, layout.local_rows
-    shift = np.repeat(np.arange(layout.owned), np.diff(starts))
 
-    rows = [shift + first]
-    cols = [columns]
-    numbers = [values]
+    wanted: dict[int, list[np.ndarray]] = {}
     for block_rows, block_columns in pattern:
-        mine = block_rows[(block_rows >= first) & (block_rows < first + size)]
-        rows.append(np.repeat(mine, len(block_columns)))
-        cols.append(np.tile(block_columns, len(mine)))
-        numbers.append(np.zeros(len(mine) * len(block_columns)))
-    row, column = np.concatenate(rows) - first, np.concatenate(cols)
-    order = np.lexsort((column, row))
-    row, column, number = row[order], column[order], np.concatenate(numbers)[order]
-    new = np.concatenate([[True], (np.diff(row) != 0) | (np.diff(column) != 0)])
-    number = np.add.reduceat(number, np.flatnonzero(new))
-    row, column = row[new], column[new]
-    starts = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=size))])
+        for row in block_rows[(block_rows >= first) & (block_rows < first + size)] - first:
+            wanted.setdefault(int(row), []).append(block_columns)
+    # rows of the extras are empty so far
+    starts = np.concatenate([starts, np.full(size - layout.owned, starts[-1])]).astype(int)
+    places, added, counts = [], [], np.zeros(size, dtype=int)
+    for row in sorted(wanted):
+        there = columns[starts[row] : starts[row + 1]]
+        new = np.setdiff1d(np.concatenate(wanted[row]), there)
+        places.append(starts[row] + np.searchsorted(there, new))
+        added.append(new)
+        counts[row] = len(new)
+    if wanted:
+        columns = np.insert(columns, np.concatenate(places), np.concatenate(added))
+        values = np.insert(values, np.concatenate(places), 0.0)
+    starts += np.concatenate([[0], np.cumsum(counts)])
 
     total = layout.comm.allreduce(size)
     matrix = PETSc.Mat().createAIJ(
         [(size, total), (size, total)],
-        csr=(starts.astype(PETSc.IntType), column.astype(PETSc.IntType), number),
+        csr=(starts.astype(PETSc.IntType), columns.astype(PETSc.IntType, copy=False), values),
         bsize=layout.block,
         comm=layout.comm,
     )
-    matrix.setLGMap(*fem.getLGMap())
+    matrix.setLGMap(*numbering)
     matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_LOCATION_ERR, True)
     return matrix
 
@@ -89,3 +92,28 @@ def create_map_matrix(
         csr=(starts.astype(PETSc.IntType), columns, values),
         comm=layout.comm,
     )
+
+
+def update_map_matrix(
+    matrix: PETSc.Mat,
+    layout: Layout,
+    interfaces: InterfaceMap,
+    joints: JointSystem,
+    poses: np.ndarray,
+    scale: np.ndarray,
+) -> None:
+    """Brings ∂u/∂z in G to ``poses`` (collective)."""
+    dim = joints.space.dim
+    for body in interfaces.nodes:
+        nodes, gradient = interfaces.gradient_rows(poses, body)
+        if not len(nodes):
+            continue
+        columns = joints.columns[body]
+        rows = (layout.per_node * nodes[:, None] + np.arange(dim)).ravel()
+        matrix.setValuesIJV(
+            np.arange(0, len(columns) * len(rows) + 1, len(columns), dtype=PETSc.IntType),
+            np.tile(layout.first_extra + columns, len(rows)).astype(PETSc.IntType),
+            (gradient * scale[columns]).ravel(),
+            rowmap=(layout.first_row + rows).astype(PETSc.IntType),
+        )
+    matrix.assemble()

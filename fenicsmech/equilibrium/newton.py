@@ -1,11 +1,11 @@
 """Primal–dual Newton iteration with inertia control for min E(s) s.t. C(s) = 0.
 
-Each iteration solves, with the symmetric factor LDLᵀ,
+Each iteration solves
 
     [[∇²L + δ I, −Aᵀ], [−A, −1/ρ]] (ds, dλ) = −(∇L, −C),
 
 the Newton step of the augmented Lagrangian, which tends to the KKT step for large ρ and stays regular for
-redundant constraints. If the factor has more negative pivots than there are multipliers, the step need not
+redundant constraints. If the matrix has more negative eigenvalues than there are multipliers, the step need not
 descend, and δ grows until it does (every pressure of near-incompressible links counts as a multiplier: E has a maximum
 there); close to an equilibrium δ stays zero, so that unstable equilibria on the path are
 found and reported as such. Merit of a step: the augmented Lagrangian
@@ -31,7 +31,6 @@ import numpy as np
 from petsc4py import PETSc
 
 from fenicsmech.equilibrium.control import Control
-from fenicsmech.equilibrium.factor import Inertia
 from fenicsmech.equilibrium.solver import EquilibriumSolver, Iteration, NotConverged, Solution
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import Balance, EquilibriumSystem
@@ -75,7 +74,7 @@ class PrimalDualNewton(EquilibriumSolver):
 
 
 class Newton(Iteration):
-    """The iteration, with the factor it keeps between solves."""
+    """The iteration, with the linear solver it keeps between solves."""
 
     options: PrimalDualNewton
 
@@ -87,13 +86,13 @@ class Newton(Iteration):
             raise NotConverged("elements are inverted in the predicted state", 0)
         state, balance = start, system.balance(start, control)
         best, spent, careful, passed = (state, balance), 0, False, None
-        residuals, inertia, shift, trusted, mixed, norm = [], None, floor, True, False, math.inf
+        residuals, shift, trusted, mixed, norm = [], floor, True, False, math.inf
         for iteration in range(options.iterations + 1):
             residuals.append(self.relative(balance))
             if self.converged(balance, norm) and iteration > 0:
                 if mixed or shift > floor:  # stability is of the true matrix
-                    inertia = self._true_inertia(state, control, balance, floor)
-                return self._accept(state, control, inertia, residuals, iteration)
+                    self._factor_true(state, control, balance, floor, iteration)
+                return self._accept(state, control, residuals, iteration)
             if iteration == options.iterations:
                 break
             near = trusted and residuals[-1] < options.near
@@ -102,9 +101,9 @@ class Newton(Iteration):
                 matrix = system.mixed_kkt(state, control, balance, *passed)
             else:
                 matrix = system.kkt(state, control, balance)
-            x, inertia, shift = self._direction(matrix, balance, floor, last=shift, any_inertia=near)
+            x, shift = self._direction(matrix, balance, floor, last=shift, any_inertia=near)
             step, motion = system.step(x), system.expand(x)[0]
-            _log.debug("iteration %d: residual %.2e, shift %.1e, %s", iteration, residuals[-1], shift, inertia)
+            _log.debug("iteration %d: residual %.2e, shift %.1e", iteration, residuals[-1], shift)
             before, norm = state, balance.norm
             advance = self._search if careful else self._full_step
             try:
@@ -130,23 +129,21 @@ class Newton(Iteration):
 
     def _direction(
         self, matrix: PETSc.Mat, balance: Balance, floor: float, *, last: float, any_inertia: bool
-    ) -> tuple[PETSc.Vec, Inertia, float]:
+    ) -> tuple[PETSc.Vec, float]:
         """The Newton step; unless ``any_inertia`` will do, raises δ until the inertia promises descent.
 
         δ = ``floor`` is tried first; then a third of the ``last`` one that served, and eight times that, …
         """
         shift, following = floor, max(_LEAST_SHIFT, last / 3.0)
         for _ in range(20):
-            inertia = self._refactor(matrix, shift)
-            descends = inertia is not None and inertia.negative <= self.expected and inertia.zero == 0
-            if descends or (any_inertia and inertia is not None):
+            x = self._solution(balance.vector, self._accuracy(balance)) if self._refactor(matrix, shift) else None
+            if x is not None and (any_inertia or self._descends()):
                 break
             shift, following = following, 8.0 * following
         else:
             raise NotConverged("no shift of the tangent gives a direction of descent", 0)
-        x = self.solve_linear(balance.vector)
         x.scale(-1.0)
-        return x, inertia, shift
+        return x, shift
 
     def _full_step(
         self, state: State, control: Control, step: Step, balance: Balance, iteration: int

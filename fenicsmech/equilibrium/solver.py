@@ -1,23 +1,27 @@
 """What every equilibrium solver is: a description with its limits, and the iteration it makes for one system.
 
 An iteration finds equilibria its own way; what follows an equilibrium (its stability, its rate along the path,
-sensitivities) is the same for all: linear solves with the symmetric factor of the true KKT matrix there.
+sensitivities) is the same for all: linear solves with the true KKT matrix there, and its inertia.
 """
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from petsc4py import PETSc
 
 from fenicsmech.equilibrium.control import Control
-from fenicsmech.equilibrium.factor import Factor, Inertia
+from fenicsmech.equilibrium.factor import Inertia
+from fenicsmech.equilibrium.linear import BySize, LinearMethod, LinearSolver
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import Balance, EquilibriumSystem
 from fenicsmech.mechanism.checks import positive
 
+_STEP = 1e-6  # relative error of steps and tangents that iterative solvers may leave to the next iteration
+_ROUGH = 1e-3  # far from the equilibrium
+_EXACT = 1e-10  # the same of other solutions
 _LEAST_MOTION = 1e-9  # of the mechanism's length: what is smaller counts as no displacement
 _FALLING = 0.25  # of the residual before: soft springs and modes feel what is left below rounding of stiff links
 _BEARABLE = 1e-4  # of the forces, where the tangent is all but singular
@@ -60,6 +64,7 @@ class EquilibriumSolver(ABC):
         tolerance: residual over the forces that balance in it, at convergence.
         roundoff: residual in units of mean stiffness times the largest displacement (rotations: times length) below
             which digits are lost; of mean stiffness times length where the tangent is all but singular.
+        linear: how the linear systems are solved; by their size unless said otherwise.
 
     Raises:
         DescriptionError: a limit is not a positive number.
@@ -67,6 +72,7 @@ class EquilibriumSolver(ABC):
 
     tolerance: float = 1e-10
     roundoff: float = 1e-14
+    linear: LinearMethod = field(default_factory=BySize)
 
     def __post_init__(self) -> None:
         for limit in ("tolerance", "roundoff"):
@@ -78,11 +84,11 @@ class EquilibriumSolver(ABC):
 
 
 class Iteration(ABC):
-    """One system's solver, with the factor it keeps between solves."""
+    """One system's solver, with the linear solver it keeps between solves."""
 
     def __init__(self, system: EquilibriumSystem, options: EquilibriumSolver) -> None:
         self.system, self.options = system, options
-        self._factor: Factor | None = None
+        self._linear: LinearSolver | None = None
 
     @abstractmethod
     def solve(self, start: State, control: Control, *, floor: float = 0.0) -> Solution:
@@ -103,17 +109,23 @@ class Iteration(ABC):
         Raises:
             NotConverged: it cannot be factored.
         """
-        inertia = self._true_inertia(state, control, balance, floor)
-        if inertia is None:
-            raise NotConverged("the tangent at the equilibrium cannot be factored", 0)
-        return inertia
+        self._factor_true(state, control, balance, floor, 0)
+        return self._inertia()
 
-    def solve_linear(self, right: PETSc.Vec) -> PETSc.Vec:
-        """The solution of KKT x = ``right`` with the last factor (collective)."""
-        with self.system.clock.phase("solve"):
-            x = right.duplicate()
-            self._factor.solve(right, x)
-            return x
+    def solve_linear(self, right: PETSc.Vec, *, tolerance: float = _EXACT) -> PETSc.Vec:
+        """The solution of KKT x = ``right`` with the matrix last factored (collective).
+
+        Args:
+            right: right-hand side.
+            tolerance: relative error that iterative solvers may leave.
+
+        Raises:
+            NotConverged: an iterative solver stalled.
+        """
+        x = self._solution(right, tolerance)
+        if x is None:
+            raise NotConverged("the linear solver stalled", 0)
+        return x
 
     def relative(self, balance: Balance) -> float:
         """The residual over the forces that balance in it."""
@@ -139,20 +151,45 @@ class Iteration(ABC):
         """Rounding of displacements and rotations, which are counted from the drawn configuration."""
         return self.options.roundoff * self.system.unit * max(balance.motion, _LEAST_MOTION)
 
-    def _refactor(self, matrix: PETSc.Mat, shift: float) -> Inertia | None:
+    def _refactor(self, matrix: PETSc.Mat, shift: float) -> bool:
         with self.system.clock.phase("factor"):
             self.system.shift(shift)
-            if self._factor is None:
-                self._factor = Factor(matrix)
-            return self._factor.refactor()
+            if self._linear is None:
+                self._linear = self.options.linear.solver(self.system, matrix)
+            return self._linear.refactor()
 
-    def _true_inertia(self, state: State, control: Control, balance: Balance, floor: float) -> Inertia | None:
-        """Factors the KKT matrix of the loaded ``state`` with the least shift."""
-        return self._refactor(self.system.kkt(state, control, balance), floor)
+    def _factor_true(self, state: State, control: Control, balance: Balance, floor: float, iterations: int) -> None:
+        """Factors the KKT matrix of the loaded ``state`` with the least shift.
+
+        Raises:
+            NotConverged: it cannot be factored.
+        """
+        if not self._refactor(self.system.kkt(state, control, balance), floor):
+            raise NotConverged("the tangent at the equilibrium cannot be factored", iterations)
+
+    def _solution(self, right: PETSc.Vec, tolerance: float) -> PETSc.Vec | None:
+        """The solution with the matrix last factored, None if an iterative solver stalled."""
+        with self.system.clock.phase("solve"):
+            x = right.duplicate()
+            return x if self._linear.solve(right, x, tolerance) else None
+
+    def _accuracy(self, balance: Balance) -> float:
+        """Relative error of a step from there that does no harm: a tenth of what the step leaves anyway."""
+        return min(max(0.1 * self.relative(balance), _STEP), _ROUGH)
+
+    def _descends(self) -> bool:
+        """Whether what the last solve saw of the matrix promises that its solution is a direction of descent."""
+        inertia = self._linear.known_inertia()
+        return inertia.negative <= self.expected and inertia.zero == 0
+
+    def _inertia(self) -> Inertia:
+        """Of the matrix last factored."""
+        with self.system.clock.phase("inertia"):
+            return self._linear.inertia()
 
     @property
     def expected(self) -> int:
-        """Negative pivots of a stable equilibrium: one per multiplier and pressure, one for the controlled force."""
+        """Negative eigenvalues where stable: one per multiplier and pressure, one for the controlled force."""
         return self.system.joints.rows + 1 + self.system.layout.pressures
 
     def _bear(
@@ -169,9 +206,9 @@ class Iteration(ABC):
             raise failure
         self.system.load(best)
         balance = self.system.balance(best, control)
-        inertia = self._true_inertia(best, control, balance, floor)
+        self._factor_true(best, control, balance, floor, failure.iterations)
         residuals = [*residuals[: failure.iterations], self.relative(balance)]
-        return self._accept(best, control, inertia, residuals, failure.iterations)
+        return self._accept(best, control, residuals, failure.iterations)
 
     def _spent(self, residuals: list[float], iterations: int) -> NotConverged:
         """The failure after the last iteration."""
@@ -179,18 +216,14 @@ class Iteration(ABC):
             f"the residual is {residuals[-1]:.1e} of the forces after {iterations} iterations", iterations
         )
 
-    def _accept(
-        self, state: State, control: Control, inertia: Inertia | None, residuals: list[float], iteration: int
-    ) -> Solution:
-        """Stability and tangent at the equilibrium, from the last factor, of the true matrix with its ``inertia``."""
+    def _accept(self, state: State, control: Control, residuals: list[float], iteration: int) -> Solution:
+        """Stability and tangent at the equilibrium, from the matrix last factored, the true one."""
         system = self.system
-        if inertia is None:
-            raise NotConverged("the tangent at the equilibrium cannot be factored", iteration)
-        x = self.solve_linear(control.rate(system, state))
-        under_control = inertia.negative - self.expected
+        x = self.solve_linear(control.rate(system, state), tolerance=_STEP)
+        under_control = self._inertia().negative - self.expected
         unstable = under_control
         if control.constrained:
             row = system.control_row()
             # Schur complement of the control row: negative exactly if removing the row leaves stability as it is
-            unstable += 1 - int(self.solve_linear(row).dot(row) < 0.0)
+            unstable += 1 - int(self.solve_linear(row, tolerance=_STEP).dot(row) < 0.0)
         return Solution(state, tuple(residuals), iteration, max(unstable, 0), max(under_control, 0), system.step(x))

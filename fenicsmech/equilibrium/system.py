@@ -30,7 +30,7 @@ from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.extras import REGULARISATION, ExtraEntries
 from fenicsmech.equilibrium.layout import Layout
 from fenicsmech.equilibrium.load import PointLoad
-from fenicsmech.equilibrium.matrices import create_extended_matrix, create_map_matrix
+from fenicsmech.equilibrium.matrices import create_extended_matrix, create_map_matrix, update_map_matrix
 from fenicsmech.equilibrium.potentials import BodyPotentials
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.linkage import JointSystem
@@ -73,6 +73,7 @@ class EquilibriumSystem:
         compliances: c, (rows,).
         unit_u, units, scale: what a unit of each scaled unknown stands for: displacements; all free finite-element
             DOFs; (z, λ, f).
+        poses: those of the last ``balance``, which the KKT matrix is at.
     """
 
     def __init__(
@@ -113,6 +114,7 @@ class EquilibriumSystem:
             )
             self._extras.set_regularisation(self.scale[self.layout.multipliers], self.scale[self.layout.force])
             self._map = create_map_matrix(self.layout, interfaces, joints, self.units, self.scale)
+        self.poses = joints.drawn
         self._rows = self._hat.createVecLeft()
         self._matrix: PETSc.Mat | None = None
         self._diagonal: PETSc.Vec | None = None
@@ -206,7 +208,8 @@ class EquilibriumSystem:
     def balance(self, state: State, control: Control) -> Balance:
         """Gᵀ ∇L (collective). Brings G to the poses of ``state``."""
         with self.clock.phase("residual"):
-            self._update_map(state)
+            update_map_matrix(self._map, self.layout, self.interfaces, self.joints, state.poses, self.scale)
+            self.poses = state.poses
             layout = self.layout
             r = self.elastic.residuals()
             loads = np.zeros_like(r)
@@ -399,23 +402,6 @@ class EquilibriumSystem:
                 forces = nodal[: self.layout.displacements].reshape(-1, self.layout.per_node)
                 mine = (nodes >= first) & (nodes < first + len(forces))
                 np.add.at(forces, nodes[mine] - first, magnitude * np.outer(weights[mine], load.direction))
-
-    def _update_map(self, state: State) -> None:
-        """Brings ∂u/∂z in G to the poses of ``state``."""
-        dim, layout = self.joints.space.dim, self.layout
-        for body in self.interfaces.nodes:
-            nodes, gradient = self.interfaces.gradient_rows(state.poses, body)
-            if not len(nodes):
-                continue
-            columns = self.joints.columns[body]
-            rows = (layout.per_node * nodes[:, None] + np.arange(dim)).ravel()
-            self._map.setValuesIJV(
-                np.arange(0, len(columns) * len(rows) + 1, len(columns), dtype=PETSc.IntType),
-                np.tile(layout.first_extra + columns, len(rows)).astype(PETSc.IntType),
-                (gradient * self.scale[columns]).ravel(),
-                rowmap=(layout.first_row + rows).astype(PETSc.IntType),
-            )
-        self._map.assemble()
 
 
 def _add_moments(a: dict[int, np.ndarray], b: dict[int, np.ndarray]) -> dict[int, np.ndarray]:

@@ -66,7 +66,7 @@ class AugmentedLagrangian(EquilibriumSolver):
 
 
 class AugmentedLagrangianIteration(Iteration):
-    """The iteration, with the factor it keeps between solves."""
+    """The iteration, with the linear solver it keeps between solves."""
 
     options: AugmentedLagrangian
 
@@ -85,8 +85,8 @@ class AugmentedLagrangianIteration(Iteration):
             balance = system.balance(current, control)
             residuals.append(self.relative(balance))
             if self.converged(balance, before) and iteration > 0:
-                inertia = self._true_inertia(current, control, balance, floor)
-                return self._accept(self._normalised(current), control, inertia, residuals, iteration)
+                self._factor_true(current, control, balance, floor, iteration)
+                return self._accept(self._normalised(current), control, residuals, iteration)
             if best is None or balance.norm < best[1].norm:
                 best = current, balance
             if iteration == options.iterations:
@@ -156,18 +156,17 @@ class AugmentedLagrangianIteration(Iteration):
         system, layout = self.system, self.system.layout
         matrix = system.kkt(current, control, balance)
         system.soften(softness, control)
+        right = balance.vector.copy()
+        if layout.last:
+            right.array_w[len(layout.free) + system.joints.size :] = 0.0
         shift, following = floor, max(_LEAST_SHIFT, last / 3.0)
         for _ in range(20):
-            inertia = self._refactor(matrix, shift)
-            if inertia is not None and inertia.negative <= self.expected and inertia.zero == 0:
+            x = self._solution(right, self._accuracy(balance)) if self._refactor(matrix, shift) else None
+            if x is not None and self._descends():
                 break
             shift, following = following, 8.0 * following
         else:
             raise NotConverged("no shift of the tangent gives a direction of descent", 0)
-        right = balance.vector.copy()
-        if layout.last:
-            right.array_w[len(layout.free) + system.joints.size :] = 0.0
-        x = self.solve_linear(right)
         x.scale(-1.0)
         return system.step(x), x.dot(right), shift
 

@@ -38,7 +38,7 @@ class KktNewton(EquilibriumSolver):
 
 
 class KktIteration(Iteration):
-    """The iteration, with the factor it keeps between solves."""
+    """The iteration, with the linear solver it keeps between solves."""
 
     options: KktNewton
 
@@ -48,20 +48,18 @@ class KktIteration(Iteration):
         system.load(state)
         if not math.isfinite(system.elastic_energy()):
             raise NotConverged("elements are inverted in the predicted state", 0)
-        balance, residuals, inertia, before = system.balance(state, control), [], None, math.inf
+        balance, residuals, before = system.balance(state, control), [], math.inf
         best = state, balance
         for iteration in range(options.iterations + 1):
             residuals.append(self.relative(balance))
             if not math.isfinite(residuals[-1]):
                 raise NotConverged("the residual overflows", iteration)
             if self.converged(balance, before) and iteration > 0:
-                return self._accept(state, control, inertia, residuals, iteration)
+                return self._accept(state, control, residuals, iteration)
             if iteration == options.iterations:
                 break
-            inertia = self._true_inertia(state, control, balance, floor)
-            if inertia is None:
-                raise NotConverged("the tangent cannot be factored", iteration)
-            x = self.solve_linear(balance.vector)
+            self._factor_true(state, control, balance, floor, iteration)
+            x = self.solve_linear(balance.vector, tolerance=self._accuracy(balance))
             x.scale(-1.0)
             before = balance.norm
             try:

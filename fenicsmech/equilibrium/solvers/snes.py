@@ -1,4 +1,4 @@
-"""PETSc's SNES on the KKT equations, with the same residual, matrix and LDLᵀ factor as the default solver.
+"""PETSc's SNES on the KKT equations, with the same residual, matrix and linear solver as the default solver.
 
 The unknowns are scaled increments from the last iterate, so that rotations are put back on their manifold once per
 iteration, as they are by the other solvers. States that invert elements have an infinite residual. Source: the PETSc
@@ -14,7 +14,6 @@ from enum import Enum
 from petsc4py import PETSc
 
 from fenicsmech.equilibrium.control import Control
-from fenicsmech.equilibrium.factor import Inertia
 from fenicsmech.equilibrium.solver import EquilibriumSolver, Iteration, NotConverged, Solution
 from fenicsmech.equilibrium.state import State
 from fenicsmech.equilibrium.system import EquilibriumSystem
@@ -54,7 +53,7 @@ class Snes(EquilibriumSolver):
 
 
 class SnesIteration(Iteration):
-    """The iteration, with the factor it keeps between solves."""
+    """The iteration, with the linear solver it keeps between solves."""
 
     options: Snes
 
@@ -67,7 +66,7 @@ class SnesIteration(Iteration):
         if self.converged(equations.balance):  # there is nothing that a line search could lower
             equations.test(None, 0, (0.0, 0.0, equations.balance.norm))
             equations.setUp(None)
-            return self._accept(start, control, equations.inertia, equations.residuals, 1)
+            return self._accept(start, control, equations.residuals, 1)
         x = equations.balance.vector.duplicate()
         snes = self._create(equations)
         snes.solve(None, x)
@@ -75,8 +74,8 @@ class SnesIteration(Iteration):
         snes.destroy()
         if not equations.evaluate(x):
             raise NotConverged("elements are inverted", iterations)
-        if equations.inertia is not None and self.converged(equations.balance):
-            return self._accept(equations.state, control, equations.inertia, equations.residuals, iterations)
+        if equations.factored and self.converged(equations.balance):
+            return self._accept(equations.state, control, equations.residuals, iterations)
         failure = NotConverged(f"SNES stops: {_REASONS.get(reason, f'reason {reason}')}", iterations)
         return self._bear(equations.state, equations.balance, control, floor, equations.residuals, failure)
 
@@ -107,7 +106,7 @@ class _Equations:
     Attributes:
         state, balance: where they were evaluated last.
         matrix: the KKT matrix.
-        inertia: of its last factor.
+        factored: whether its last values could be.
         residuals: relative residual of each iterate.
         norm: of the last iterate's residual.
     """
@@ -117,7 +116,7 @@ class _Equations:
         self._control, self._floor = control, floor
         self.state, self.balance = base, self._system.balance(base, control)
         self.matrix = self._system.kkt(base, control, self.balance)
-        self.inertia: Inertia | None = None
+        self.factored = False
         self.residuals: list[float] = []
         self.norm = math.inf
 
@@ -157,10 +156,12 @@ class _Equations:
         return PETSc.SNES.ConvergedReason.ITERATING
 
     def setUp(self, pc: PETSc.PC) -> None:
-        self.inertia = self._iteration._refactor(self.matrix, self._floor)
+        self.factored = self._iteration._refactor(self.matrix, self._floor)
 
     def apply(self, pc: PETSc.PC, right: PETSc.Vec, x: PETSc.Vec) -> None:
-        if self.inertia is None:
+        accuracy = self._iteration._accuracy(self.balance)
+        solution = self._iteration._solution(right, accuracy) if self.factored else None
+        if solution is None:
             x.set(math.nan)
         else:
-            self._iteration.solve_linear(right).copy(x)
+            solution.copy(x)

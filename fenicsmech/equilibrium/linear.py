@@ -1,0 +1,85 @@
+"""How linear systems with the KKT matrix are solved: by its factor, or on two levels where the factor is too large."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Protocol
+
+from petsc4py import PETSc
+
+from fenicsmech.equilibrium.factor import Factor, Inertia
+from fenicsmech.equilibrium.system import EquilibriumSystem
+from fenicsmech.equilibrium.two_level import TwoLevelSolver
+from fenicsmech.errors import DescriptionError
+
+
+class LinearSolver(Protocol):
+    """Solves with one matrix whose values change and whose pattern does not; all methods are collective."""
+
+    def refactor(self) -> bool:
+        """Takes the matrix's current values; whether that could be done."""
+
+    def inertia(self) -> Inertia:
+        """Of the matrix last refactored."""
+
+    def known_inertia(self) -> Inertia:
+        """What the last ``solve`` has seen of it: no more than there is."""
+
+    def solve(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float) -> bool:
+        """Solves with the matrix last refactored, to a relative error of ``tolerance``; whether that could be done."""
+
+
+class LinearMethod(ABC):
+    """A way to solve linear systems."""
+
+    @abstractmethod
+    def solver(self, system: EquilibriumSystem, matrix: PETSc.Mat) -> LinearSolver:
+        """The solver for the KKT ``matrix`` of ``system`` (collective)."""
+
+
+@dataclass(frozen=True)
+class Direct(LinearMethod):
+    """The factor LDLᵀ of the whole matrix: fastest up to some 130,000 unknowns on slender links."""
+
+    def solver(self, system, matrix):
+        return Factor(matrix)
+
+
+@dataclass(frozen=True)
+class TwoLevel(LinearMethod):
+    """Conjugate gradients over a factor for linear displacements, see ``two_level``."""
+
+    @staticmethod
+    def suits(system: EquilibriumSystem) -> bool:
+        """Whether displacements have a level below them, all components of free nodes are unknown, pressures none."""
+        return system.elastic.order > 1 and system.layout.whole_nodes
+
+    def solver(self, system, matrix):
+        if not self.suits(system):
+            raise DescriptionError(
+                "linear solver TwoLevel",
+                "it needs displacements of order 2 or 3, all components of a node unknown, and no pressures",
+                "Use order=2, or Direct()",
+            )
+        return TwoLevelSolver(system, matrix)
+
+
+@dataclass(frozen=True)
+class BySize(LinearMethod):
+    """Two levels beyond so many unknowns, in space and where they suit; the factor otherwise.
+
+    In the plane a factor costs little at any size. Where two levels do not suit (order 1, pressures of their own, the
+    nodes of a mid-plane) the factor is all there is. In space, on the links of a claw, one linear solve costs as much
+    either way at 60,000 unknowns; an equilibrium with its verdict does, as is estimated, at 130,000. At 240,000 two
+    levels take half the time of a solve and a fifth of the memory (demos/large.py).
+
+    Attributes:
+        limit: unknowns.
+    """
+
+    limit: int = 150_000
+
+    def solver(self, system, matrix):
+        large = matrix.getSize()[0] > self.limit and system.joints.space.dim == 3 and TwoLevel.suits(system)
+        return (TwoLevel() if large else Direct()).solver(system, matrix)
