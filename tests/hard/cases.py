@@ -6,13 +6,15 @@ that ``make hard-cases`` prints (``__main__``). Here they stand in the order of 
 
 from __future__ import annotations
 
-from . import buckling, linkages, meshes, numbers, requests, scaling, slender, straining
+from . import buckling, linkages, meshes, numbers, requests, rubber, scaling, slender, snapping, straining
 from .case import HardCase
 
 CASES: tuple[HardCase, ...] = (
     *slender.CASES,
     *straining.CASES,
+    *rubber.CASES,
     *buckling.CASES,
+    *snapping.CASES,
     *linkages.CASES,
     *meshes.CASES,
     *requests.CASES,
