@@ -6,7 +6,20 @@ that ``make hard-cases`` prints (``__main__``). Here they stand in the order of 
 
 from __future__ import annotations
 
-from . import buckling, linkages, meshes, numbers, requests, rubber, scaling, slender, snapping, straining
+from . import (
+    buckling,
+    eigenvalues,
+    linkages,
+    meshes,
+    numbers,
+    requests,
+    rubber,
+    scaling,
+    slender,
+    snapping,
+    straining,
+    turned_ends,
+)
 from .case import HardCase
 
 CASES: tuple[HardCase, ...] = (
@@ -14,7 +27,9 @@ CASES: tuple[HardCase, ...] = (
     *straining.CASES,
     *rubber.CASES,
     *buckling.CASES,
+    *eigenvalues.CASES,
     *snapping.CASES,
+    *turned_ends.CASES,
     *linkages.CASES,
     *meshes.CASES,
     *requests.CASES,
