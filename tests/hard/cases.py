@@ -6,13 +6,30 @@ that ``make hard-cases`` prints (``__main__``). Here they stand in the order of 
 
 from __future__ import annotations
 
-from . import buckling, linkages, meshes, numbers, requests, scaling, slender, straining
+from . import (
+    buckling,
+    eigenvalues,
+    linkages,
+    meshes,
+    numbers,
+    requests,
+    rubber,
+    scaling,
+    slender,
+    snapping,
+    straining,
+    turned_ends,
+)
 from .case import HardCase
 
 CASES: tuple[HardCase, ...] = (
     *slender.CASES,
     *straining.CASES,
+    *rubber.CASES,
     *buckling.CASES,
+    *eigenvalues.CASES,
+    *snapping.CASES,
+    *turned_ends.CASES,
     *linkages.CASES,
     *meshes.CASES,
     *requests.CASES,
