@@ -52,13 +52,23 @@ lint: install-test ## style and layering: seconds
 	$(PYTHON) -m ruff format --check .
 	$(PYTHON) -m pytest -q tests/test_layering.py
 
-test-serial: install-test ## the tests on one process
+# The tests on one process in two runs side by side, of about the same length.
+CORE := tests/bodies tests/design tests/effects tests/elasticity tests/joints tests/kinematics tests/linkage \
+    tests/mechanism tests/meshing
+OTHERS := tests/equilibrium tests/simulation
+AROUND := tests/accuracy tests/demos tests/hard tests/oracles tests/report tests/test_log.py tests/test_readme.py
+PYTEST = OPENBLAS_NUM_THREADS=1 $(PYTHON) -m pytest -p no:cacheprovider --durations=5 --durations-min=5 -m "$(SELECT)"
+
+test-serial: install-test ## the tests on one process each
 	$(call heading,tests on one process)
-	$(PYTHON) -m pytest --durations=5 --durations-min=5 -m "$(SELECT)"
+	@log=$$(mktemp); $(PYTEST) $(CORE) >"$$log" 2>&1 & core=$$!; \
+	status=0; $(PYTEST) $(OTHERS) $(AROUND) || status=1; \
+	wait $$core || status=1; cat "$$log"; rm -f "$$log"; exit $$status
 
 test-parallel: install-test ## the tests marked `parallel`, on two MPI ranks
 	$(call heading,tests on $(RANKS) ranks)
-	$(MPIRUN) $(PYTHON) -m pytest --color=no -p no:cacheprovider -m "parallel and ($(SELECT))"
+	$(MPIRUN) $(PYTHON) -m pytest --color=no -p no:cacheprovider -m "parallel and ($(SELECT))" \
+	    $(CORE) $(OTHERS) $(AROUND)
 	OPENBLAS_NUM_THREADS=1 mpirun -n 4 $(PYTHON) -m pytest --color=no -p no:cacheprovider tests/simulation/test_ranks.py
 
 test-slow: install-test ## the tests marked `slow`
@@ -73,10 +83,10 @@ random-scenes: install-test ## N random scenes from SEED on (1000, 0), each chec
 	$(call heading,random scenes)
 	OPENBLAS_NUM_THREADS=1 $(PYTHON) -m tests.hard.random_scenes --count $(N) --seed $(SEED)
 
-test-debian13: install-test ## the tests in a Debian 13 root (built once, about two minutes)
+test-debian13: install-test ## the core tests in a Debian 13 root (built once, about two minutes)
 	$(call heading,tests in Debian 13)
 	tools/debian13.sh make --no-print-directory INSTALL= PYTHON=/usr/bin/python3 \
-	    SELECT="$(SELECT) and not calculix" test-serial test-parallel
+	    SELECT="$(SELECT) and not calculix" AROUND= test-serial test-parallel
 
 demos-quick: $(DEMOS:%=demo-quick-%) ## every demo, coarse, in results/quick/
 

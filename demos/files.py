@@ -60,13 +60,14 @@ def leave(outcome: Outcome) -> None:
     if result is not None:
         outcome.problem.picture(folder / "links.png", result)
         outcome.problem.export(folder / "links", pin=outcome.pin)
-    summary = summarise(outcome)
+    errors = [sim.error_estimates(curve) for curve in curves]
+    summary = summarise(outcome, errors)
     if not demo.leads:
         return
     draw_configurations(folder / "mechanism.png", panels, title=name, colour_label="von Mises stress [MPa]")
     _plot(outcome)
-    for curve in curves:
-        curve.write_csv(folder / f"curve{_suffix(curve, curves)}.csv")
+    for curve, estimates in zip(curves, errors, strict=True):
+        curve.write_csv(folder / f"curve{_suffix(curve, curves)}.csv", errors=estimates)
     if result is not None:
         result.save(folder / "design.json")
     check_summary(summary)
@@ -74,12 +75,11 @@ def leave(outcome: Outcome) -> None:
     tell(outcome, summary)
 
 
-def summarise(outcome: Outcome) -> dict:
-    """The summary of a run (collective)."""
+def summarise(outcome: Outcome, errors: Sequence[np.ndarray]) -> dict:
+    """The summary of a run, with the error estimates of its curves (collective)."""
     demo, sim, curves, result = outcome.demo, outcome.sim, outcome.curves, outcome.result
     peak = sim.comm.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, op=MPI.MAX) / 1024.0
     reached = [None] * len(outcome.targets) if result is None else [target.reached for target in result.targets]
-    errors = [sim.error_estimates(curve) for curve in curves]
     summary = {
         "demo": demo.name,
         "space": demo.options.space,

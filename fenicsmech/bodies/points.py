@@ -16,7 +16,7 @@ from dolfinx import fem
 from fenicsmech.errors import DescriptionError
 from fenicsmech.kinematics import RigidSpace
 
-_CORRECTIONS = 20  # of a point's place in curved cells; each gains a digit
+_CORRECTIONS = 60  # of a point's place in curved cells; each halves its error at least
 
 
 class MaterialPoint(ABC):

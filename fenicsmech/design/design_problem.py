@@ -19,7 +19,7 @@ from fenicsmech.design.link_files import draw_links, outline, rest_meshes, write
 from fenicsmech.design.link_shape import LinkShape, shape_links
 from fenicsmech.design.objective import Objective, target_errors
 from fenicsmech.design.optimisers import Infeasible, Iterate, LevenbergMarquardt, Minimiser, Reason, Start
-from fenicsmech.design.problem_checks import check_designs, check_targets
+from fenicsmech.design.problem_checks import check_designs, check_effects, check_targets
 from fenicsmech.design.progress import DesignProgress
 from fenicsmech.design.regularisers import MeshQuality, Regulariser, ShapeBounds, StayClose
 from fenicsmech.design.rest_shape import RestShape
@@ -107,7 +107,8 @@ class DesignProblem:
             resume: go on from ``checkpoint`` if it exists.
 
         Raises:
-            DescriptionError: the checkpoint or the start is one of another problem.
+            DescriptionError: the checkpoint or the start is one of another problem, or no shape that may change moves
+                the point of a target.
             EquilibriumError: the initial design does not carry its loads.
         """
         began = perf_counter()
@@ -126,6 +127,10 @@ class DesignProblem:
         with DesignProgress(minimiser, leads=self.simulation.comm.rank == 0) as progress:
 
             def watch(iterate: Iterate) -> None:
+                if iterate.number == begin.number:
+                    effects = objective.effects(iterate.evaluation)
+                    errors = target_errors(self.targets, objective.reached)
+                    check_effects(self.targets, self.designs, effects=effects, errors=errors)
                 if saved is not None:
                     saved.save(iterate, objective.placement.theta)
                 progress.update(iterate, target_errors(self.targets, objective.reached))

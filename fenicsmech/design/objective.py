@@ -74,7 +74,8 @@ class Objective:
     ) -> None:
         self._rest, self._equilibria, self._regulariser, self._group = rest, equilibria, regulariser, group
         self._wanted = np.array([target.displacement for target in targets])
-        self._scale = target_scales(targets) / np.sqrt([target.weight for target in targets])
+        self._root_weights = np.sqrt([target.weight for target in targets])
+        self._scale = target_scales(targets) / self._root_weights
         self._base: _Base | None = None
         self._near: Placement | None = None
         self.lengths, self._clock = rest.lengths, clock
@@ -126,6 +127,10 @@ class Objective:
         """
         _, model, known = self._together(lambda: self._solve(parameters, None))
         return self._value(parameters, model, self._displacements(known))
+
+    def effects(self, evaluation: Evaluation) -> np.ndarray:
+        """Relative change of each displacement when one parameter changes as much as counts, (targets, parameters)."""
+        return evaluation.jacobian * self.lengths / self._root_weights[:, None]
 
     def active(self, parameters: np.ndarray) -> tuple[str, ...]:
         """The bounds that hold the design ``parameters`` back, in words."""

@@ -229,8 +229,7 @@ class ElasticBody:
         for term in self._terms:
             contraction = self.model.contraction(term.law, self._strain, self._moduli)
             density_ = 0.5 * weight * self.youngs_modulus * contraction**2
-            scale = ufl.det(self.rest_gradient) * self.model.multiplier(self._depth)
-            terms.append(density_ * scale * term.dx(metadata={"quadrature_degree": degree}))
+            terms.append(density_ * self._volume * term.dx(metadata={"quadrature_degree": degree}))
         return sum(terms[1:], start=terms[0])
 
     def densities(self, H) -> list[tuple]:
@@ -243,13 +242,10 @@ class ElasticBody:
         i, j, k, m = ufl.indices(4)
         H = ufl.variable(self.gradient(self.u))
         elastic = H if self._growth is None else self._growth.elastic(H)
-        scale = self.model.multiplier(self._depth)
-        if self._growth is not None:
-            scale *= self._growth.volume
         terms = []
         for term in self._terms:
             C = ufl.diff(ufl.diff(self._density(term, elastic), H), H)
-            product = A[i, j] * C[i, j, k, m] * B[k, m] * ufl.det(self.rest_gradient) * scale
+            product = A[i, j] * C[i, j, k, m] * B[k, m] * self._volume
             terms.append(product * term.dx(metadata={"quadrature_degree": degree}))
         return sum(terms[1:], start=terms[0])
 

@@ -23,7 +23,7 @@ from fenicsmech.equilibrium.continuation import Goal, Stretch, follow
 from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadControl, MotorControl, ShareControl
 from fenicsmech.equilibrium.critical import Critical, CriticalPoint
 from fenicsmech.equilibrium.eigen import Mode, critical_changes, softest_modes
-from fenicsmech.equilibrium.lead import ForceLead, Heading, Lead
+from fenicsmech.equilibrium.lead import ForceLead, Heading, Lead, MotorLead
 from fenicsmech.equilibrium.linear import BySize, Direct, LinearMethod, LinearSolver, TwoLevel
 from fenicsmech.equilibrium.load import PointLoad
 from fenicsmech.equilibrium.newton import Newton, PrimalDualNewton
@@ -64,6 +64,7 @@ __all__ = [
     "LoadControl",
     "Mode",
     "MotorControl",
+    "MotorLead",
     "Newton",
     "NotConverged",
     "Path",

@@ -1,4 +1,4 @@
-"""What leads a path that may turn back on itself: a force.
+"""What leads a path that may turn back on itself: a force, or a motor.
 
 The parameter p of the path is one more unknown beside the state. A heading is a direction (ẏ, ṗ) in both.
 """
@@ -8,7 +8,9 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
-from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadControl
+import numpy as np
+
+from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadControl, MotorControl
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem
 
@@ -72,3 +74,29 @@ class ForceLead(Lead):
 
     def moved(self, system, state, heading):
         return system.moved(state, heading.step)
+
+
+@dataclass(frozen=True, eq=False)
+class MotorLead(Lead):
+    """p is the position of a motor; the others stand, and the force keeps its magnitude.
+
+    Attributes:
+        direction: motor values per unit of p, one for the motor's connection and else zero, (connections,).
+    """
+
+    direction: np.ndarray
+
+    def value(self, state):
+        return float(self.direction @ state.motors)
+
+    def holding(self, state):
+        return MotorControl(self.value(state), self.direction)
+
+    def holding_travel(self, system, state):
+        return None
+
+    def heading(self, step, control):
+        return Heading(step, 1.0)
+
+    def moved(self, system, state, heading):
+        return system.moved(replace(state, motors=state.motors + heading.parameter * self.direction), heading.step)

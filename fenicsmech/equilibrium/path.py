@@ -1,21 +1,30 @@
 """Load steps: from a known equilibrium to the wanted control value, by predictor and Newton.
 
 Steps halve when Newton fails and double when it was easy, and never go farther than a stride of the tangent;
-equilibria that were reached are never lost.
+equilibria that were reached are never lost. A step that moves much farther than the tangents at both its ends say may
+have leapt over a fold, where the path turns back: it halves too, and where that does not help the leap is kept and
+counted.
 """
 
 from __future__ import annotations
+
+import math
 
 from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.predictor import Anchor, Predictor, Tangent
 from fenicsmech.equilibrium.solver import Iteration, NotConverged, Solution
 from fenicsmech.equilibrium.state import State
+from fenicsmech.log import logger
 
+_log = logger(__name__)
 _SMALLEST = 1.0 / 1024.0  # of the distance asked for
 _EASY = 5  # iterations
 _STRIDE = 0.2  # of the mechanism's length, or rad: how far a step may move anything, by the tangent (measured)
 _SINGULAR = 1e-6  # of the distance asked for: a tangent that wants steps this small has no meaning
 _RUNAWAY = 5.0 * _STRIDE  # a prediction that moves anything this far is none
+_FARTHER = 1.25  # times what the larger tangent says: what moves farther may have leapt; kinks never do
+_LEAST_MOTION = 1e-6  # of the mechanism's length, or rad: what is no leap in any case
+_SMALLEST_LEAP = 1.0 / 64.0  # of the distance asked for: a step that is not halved any more because it leaps
 IDLE_STIFFNESS = 1e-10
 """What is lent to idle freedoms, in units of the mean stiffness."""
 _LESS = (1.0, 1e-3, 0.0)  # shares of it that are tried: soft springs, or forces, may hold what is idle with less yet
@@ -45,6 +54,10 @@ class Path:
         value: the control value there.
         predictor: how the next equilibrium is guessed.
         idle: whether the mechanism has freedoms without stiffness.
+
+    Attributes:
+        iterations: KKT systems factored and solved so far.
+        leaps: how often the path turned back, and the equilibrium that was reached lies on another one.
     """
 
     def __init__(self, newton: Iteration, start: State, value: float, *, predictor: Predictor, idle: bool) -> None:
@@ -52,7 +65,8 @@ class Path:
         self._floors = tuple(share * IDLE_STIFFNESS for share in _LESS) if idle else (0.0,)
         self._anchors: list[Anchor] = []
         self._last: Solution | None = None
-        self.iterations = 0
+        self._rate = math.inf  # at which the last step moved, by the control value
+        self.iterations = self.leaps = 0
 
     def advance(self, control: Control) -> Solution:
         """The equilibrium at ``control``'s target, reached in as many steps as it takes (collective).
@@ -77,6 +91,13 @@ class Path:
                 if abs(step) <= _SMALLEST * abs(distance):
                     raise PathFailed(self._last, self._value, failure.reason, tuple(tried)) from failure
                 continue
+            if self._leapt(value, solution):
+                if abs(value - self._value) > _SMALLEST_LEAP * abs(distance):
+                    step = 0.5 * (value - self._value)
+                    continue
+                self.leaps += 1
+                self._rate = math.inf
+                _log.warning("between %g and %g the path turns back; what follows is another one", self._value, value)
             self._last = solution
             self._remember(Anchor(value, solution.state, solution.tangent))
             if last:
@@ -123,6 +144,24 @@ class Path:
         motion = self._newton.system.size(self._anchors[-1].tangent) * abs(step)
         shortened = step * min(1.0, _STRIDE / max(motion, _STRIDE))
         return shortened if abs(shortened) > least else step
+
+    def _leapt(self, value: float, solution: Solution) -> bool:
+        """Whether a step to ``value`` moves much farther than the tangents at its ends say (collective).
+
+            |y₁ − y₀| > 1.25 max(|y₀′|, |y₁′|) |v₁ − v₀|
+
+        Close to a fold |y₀′| tells nothing, as it grows beyond all bounds; the rate of the step before does.
+        """
+        if not self._anchors or value == self._value:
+            return False
+        system, last = self._newton.system, self._anchors[-1]
+        distance = abs(value - self._value)
+        motion = system.size(system.difference(solution.state, last.state))
+        rate = max(min(system.size(last.tangent), self._rate), system.size(solution.tangent))
+        if motion > max(_FARTHER * rate * distance, _LEAST_MOTION):
+            return True
+        self._rate = motion / distance
+        return False
 
     def _guess(self, value: float) -> State:
         """The prediction at ``value``, a plainer one where it runs away, in the end the last equilibrium."""

@@ -64,8 +64,8 @@ class CurvedEdges:
         """Bulges of the edges of ``cells`` (m, n), pairs of corners in lexical order, (m, n (n − 1) / 2, dim)."""
         pairs = np.sort(cells[:, list(combinations(range(cells.shape[1]), 2))], axis=2)
         found = np.zeros((*pairs.shape[:2], self.bulges.shape[1]))
-        if len(self.ends) and len(cells):
-            count = int(max(cells.max(), self.ends.max())) + 1
+        if len(self.ends):
+            count = int(max(cells.max(initial=0), self.ends.max())) + 1
             keys, wanted = self.ends @ (count, 1), pairs @ (count, 1)
             order = np.argsort(keys)
             place = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)]

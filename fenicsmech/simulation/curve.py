@@ -50,6 +50,11 @@ class Curve:
         """(frames,)."""
         return np.array([frame.stable for frame in self.frames])
 
+    @property
+    def jumped(self) -> np.ndarray:
+        """Whether the mechanism snapped on the way to each frame, (frames,)."""
+        return np.array([frame.jumped for frame in self.frames])
+
     def series(self, label: str = "", *, colour: str | None = None, faint: bool = False) -> CurveSeries:
         """The curve as a plot draws it, arguments as those of ``CurveSeries``."""
         return CurveSeries(self.displacements, self.forces, label=label, stable=self.stable, colour=colour, faint=faint)
@@ -65,17 +70,22 @@ class Curve:
                 title=f"{self.force_part.name}, {self.configuration.name}",
             )
 
-    def write_csv(self, path: str | Path) -> None:
-        """Writes displacement, force, stability, energy and stress of every frame (rank 0)."""
+    def write_csv(self, path: str | Path, *, errors: np.ndarray | None = None) -> None:
+        """Writes displacement, force, stability, energy and stress of every frame (rank 0).
+
+        Args:
+            path: the file.
+            errors: what finer elements would add to the displacements, (frames,), for a column of their own.
+        """
         length, force, stress = self.units.length, self.units.force, self.units.stress
         if self.leads:
-            write_curve_csv(
-                Path(path),
-                {
-                    f"displacement [{length}]": self.displacements,
-                    f"force [{force}]": self.forces,
-                    "stable": self.stable.astype(float),
-                    f"strain energy [{force} {length}]": np.array([frame.strain_energy for frame in self.frames]),
-                    f"max von Mises [{stress}]": np.array([frame.max_stress for frame in self.frames]),
-                },
-            )
+            columns = {
+                f"displacement [{length}]": self.displacements,
+                f"force [{force}]": self.forces,
+                "stable": self.stable.astype(float),
+                f"strain energy [{force} {length}]": np.array([frame.strain_energy for frame in self.frames]),
+                f"max von Mises [{stress}]": np.array([frame.max_stress for frame in self.frames]),
+            }
+            if errors is not None:
+                columns[f"finer elements add [{length}]"] = errors
+            write_curve_csv(Path(path), columns)

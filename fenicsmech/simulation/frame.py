@@ -19,6 +19,8 @@ class Frame:
         force: magnitude of the controlled force.
         displacement: of its point along it, from the assembled configuration.
         stable: whether small disturbances die out under dead loads.
+        jumped: whether the mechanism snapped on the way from the frame before: the path turns back there, and this
+            equilibrium lies on another one, perhaps not the one that dynamics would lead to.
         unstable_modes: directions in which the energy has a maximum, under dead loads.
         stable_under_control: whether it is stable while its control is held.
         strain_energy: elastic energy of all links.
@@ -37,6 +39,7 @@ class Frame:
     force: float
     displacement: float
     stable: bool
+    jumped: bool
     unstable_modes: int
     stable_under_control: bool
     strain_energy: float

@@ -61,6 +61,7 @@ class Tracer:
         self._system, self._joints = newton.system, model.linkage.joints
         self._freedom, self._idle = freedom, freedom.mobility > 0
         self._origin, self._origins = 0.0, dict.fromkeys(model.mechanism.outputs, 0.0)
+        self._leaps = 0  # of the path so far that no frame tells of
         state = self._unloaded(assembly)
         self._system.load(state)
         self._origin = self._system.load_displacement(state)
@@ -84,7 +85,7 @@ class Tracer:
             EquilibriumError: it was not reached; carries the frames before it.
         """
         clock, path = self._model.clock, self._path
-        start, seconds, iterations = perf_counter(), dict(clock.seconds), path.iterations
+        start, seconds, iterations, leaps = perf_counter(), dict(clock.seconds), path.iterations, path.leaps
         if control.constrained:
             control = control.at(control.target + self._origin)
         try:
@@ -92,8 +93,10 @@ class Tracer:
         except PathFailed as failure:
             raise self._unreached(control, failure, before) from failure
         record = self.record(solution)
+        jumped, self._leaps = self._leaps + path.leaps > leaps, 0
         return replace(
             record,
+            jumped=jumped,
             iterations=path.iterations - iterations,
             seconds=perf_counter() - start,
             phases=clock.since(seconds),
@@ -114,6 +117,7 @@ class Tracer:
         try:
             for value in np.linspace(assembly.fraction, 1.0, steps + 1)[1:]:
                 state = path.advance(MotorControl(float(value), motors)).state
+            self._leaps += path.leaps
         except PathFailed as failure:
             raise EquilibriumError(
                 f"configuration {configuration.name!r}",
@@ -128,7 +132,8 @@ class Tracer:
         """The configuration under the request's constant forces and the scene's effects, which grow together."""
         path = Path(self._newton, replace(state, share=0.0), 0.0, predictor=self._predictor, idle=self._idle)
         try:
-            return path.advance(ShareControl(1.0)).state
+            state = path.advance(ShareControl(1.0)).state
+            self._leaps += path.leaps
         except PathFailed as failure:
             names = ", ".join(
                 [repr(force.name) for force, _ in self._request.others]
@@ -140,6 +145,7 @@ class Tracer:
                 "Choose smaller ones",
                 last=self._last(failure),
             ) from failure
+        return state
 
     def _unreached(self, control: Control, failure: PathFailed, before: Sequence[Frame]) -> EquilibriumError:
         if control.constrained and self._held():
@@ -174,7 +180,7 @@ class Tracer:
         if self._freedom.mobility:
             names = ", ".join(map(repr, self._freedom.mobile))
             return f"Nothing but the force holds {names}: add a joint or a motor, or check the force's direction"
-        return "Try displacement control past a limit point, other samples, or a finer mesh"
+        return "Try follow() or displacement control past a limit point, other samples, or a finer mesh"
 
     def _last(self, failure: PathFailed) -> Frame | None:
         """The last equilibrium reached, on the way to a sample too."""
@@ -190,6 +196,7 @@ class Tracer:
                 force=state.force,
                 displacement=self._system.load_displacement(state) - self._origin,
                 stable=solution.unstable_modes == 0,
+                jumped=False,
                 unstable_modes=solution.unstable_modes,
                 stable_under_control=solution.unstable_under_control == 0,
                 strain_energy=model.elastic.strain_energy(),

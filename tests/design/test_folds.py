@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
+from fenicsmech.design.equilibria import TargetEquilibria
+from fenicsmech.design.optimisers import Infeasible
 from fenicsmech.design.sensitivity import Adjoint
 
 from ..equilibrium.arch import RISE, SPAN, arch
@@ -39,3 +41,49 @@ def test_displacement_sensitivities_hold_close_to_a_limit_point(gap):
     steps *= force / RISE
     rates = taylor_rates(lambda t: travel(np.zeros(1), force - t[0]), [0.0], [1.0], [-loaded.force], steps)
     assert np.all(rates.without > 0.9) and np.all(rates.with_gradient > 1.9)
+
+
+def lowered(model, by: float) -> None:
+    """Makes the arch of ``model`` lower by a share of its rise."""
+    positions = model.elastic.d.function_space.tabulate_dof_coordinates()
+    fall = np.zeros((len(positions), 2))
+    fall[:, 1] = -by * RISE * np.sin(np.pi * positions[:, 0] / SPAN)
+    model.reshape(fall.ravel())
+
+
+@pytest.fixture(scope="module")
+def nearly_snapping():
+    """An arch under 0.97 of its limit load, which is below that of arches lower by 1.2 % or more."""
+    simulation, push = arch()
+    path = simulation.follow(push, until=fm.Until(displacement=0.7 * RISE))
+    limit = path.limit_points[0].frame
+    target = fm.Target(push, 0.97 * limit.force, limit.displacement)
+    return simulation, TargetEquilibria(simulation, [target])
+
+
+@pytest.mark.parametrize("fall", [0.012, 0.02, 0.05, 0.1, 0.3])
+def test_design_path_across_a_fold_is_reported(nearly_snapping, fall):
+    simulation, equilibria = nearly_snapping
+    lowered(simulation.model, 0.0)
+    known = equilibria.trace()
+    lowered(simulation.model, fall)
+    there = simulation.model.elastic.d.x.array.copy()
+    if fall > 0.012:
+        with pytest.raises(Infeasible, match="fold"):
+            equilibria.follow(known)
+        assert np.array_equal(simulation.model.elastic.d.x.array, there)
+        with pytest.raises(Infeasible, match="snaps"):
+            equilibria.trace()
+    else:
+        (followed,), (traced,) = equilibria.follow(known).samples, equilibria.trace().samples
+        assert followed.displacement == pytest.approx(traced.displacement, rel=1e-7)
+
+
+def test_large_change_of_design_away_from_the_fold_is_followed(nearly_snapping):
+    simulation, equilibria = nearly_snapping
+    lowered(simulation.model, 0.0)
+    known = equilibria.trace()
+    lowered(simulation.model, -0.3)
+    (followed,), (traced,) = equilibria.follow(known).samples, equilibria.trace().samples
+    assert followed.displacement == pytest.approx(traced.displacement, rel=1e-7)
+    assert followed.displacement < 0.5 * known.samples[0].displacement

@@ -26,7 +26,7 @@ def column(
     slides: int = 1,
     poisson: float = 0.3,
     space: str = "plane-stress",
-    size: float = 0.5 * THICKNESS,
+    size: float = THICKNESS,
     comm: MPI.Comm = MPI.COMM_SELF,
 ) -> Column:
     """The column, by default in plane stress; every slide beyond the first is redundant."""

@@ -88,9 +88,10 @@ def test_bulges_of_cells_are_those_of_their_pairs_of_corners_however_numbered(ce
     assert np.array_equal(edges.of_cells(cells)[0], expected)
 
 
-def test_a_rank_without_cells_has_no_bulges():
-    edges = CurvedEdges(np.array([[0, 1]]), np.array([[0.0, 0.1]]))
-    assert edges.of_cells(np.zeros((0, 3), dtype=int)).shape == (0, 3, 2)
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_rank_without_cells_of_a_link_asks_for_no_bulges(dim):
+    edges = CurvedEdges(np.array([[0, 2], [1, 2]]), np.ones((2, dim)))
+    assert edges.of_cells(np.zeros((0, dim + 1), dtype=np.int32)).shape == (0, dim * (dim + 1) // 2, dim)
 
 
 def test_renumbered_edges_keep_their_bulges_and_lose_those_without_an_end():

@@ -1,0 +1,107 @@
+"""The dial against brute force: is it right, and what does it cost?
+
+    OPENBLAS_NUM_THREADS=1 python3 demos/dial.py [truss|claw|klann …] [--accuracy A …]
+
+For each mechanism and accuracy: the rung that Simulation(scene, accuracy=A) chose, its estimated error, the true one
+against the finest rung with its estimate added, seconds from description to curve (rungs that were tried in vain, and
+estimates, included; forms are compiled before), and the same over those of the cheapest rung that brute force finds.
+"""
+
+import argparse
+import importlib
+from time import perf_counter
+
+import fenicsmech as fm
+from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRESS
+from fenicsmech.report import format_table
+from fenicsmech.simulation.dial import Dial, family
+
+MECHANISMS = ("truss", "claw", "klann")
+ACCURACIES = (0.05, 0.01, 0.002)
+REPEATS = 3
+
+
+class Case:
+    """A demo's mechanism, drawn, and a curve in five samples up to its largest load."""
+
+    def __init__(self, name):
+        module = importlib.import_module(name)
+        described = module.describe()
+        task = module.task(*described)
+        self.scene, self.force = described[0], task.force
+        self.configuration = task.configurations[len(task.configurations) // 2]
+        self.forces = [share * task.loads[-1] for share in (0.2, 0.4, 0.6, 0.8, 1.0)]
+
+    def curve(self, simulation):
+        return simulation.load_displacement(self.force, forces=self.forces, configuration=self.configuration)
+
+    def at(self, rung):
+        """A simulation on a rung of the dial."""
+        fidelity = Dial(self.scene, 1.0, None, fm.Mixed()).fidelity(rung)
+        return fm.Simulation(
+            self.scene,
+            space=fidelity.model.name,
+            order=fidelity.order,
+            size=fidelity.sizes,
+            layers=fidelity.layers,
+            segments=fidelity.segments,
+        )
+
+
+def quickest(make, case, choice):
+    """The last simulation and displacement that ``make`` gives, and the least seconds of a few runs."""
+    seconds = []
+    for _ in range(REPEATS + 1):  # the first one compiles
+        start = perf_counter()
+        simulation, curve = make(case, choice)
+        seconds.append(perf_counter() - start)
+    return simulation, curve.displacements[-1], min(seconds[1:])
+
+
+def on_rung(case, rung):
+    simulation = case.at(rung)
+    return simulation, case.curve(simulation)
+
+
+def by_dial(case, accuracy):
+    simulation = fm.Simulation(case.scene, accuracy=accuracy)
+    return simulation, case.curve(simulation)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("mechanisms", nargs="*", default=MECHANISMS, help="truss, claw, klann (default: all)")
+    parser.add_argument("--accuracy", type=float, nargs="+", default=ACCURACIES, help="default: 0.05 0.01 0.002")
+    options = parser.parse_args()
+    rows, reports = [], []
+    for name in options.mechanisms:
+        case = Case(name)
+        rungs = [*family(PLANE_STRESS), *family(MID_PLANE_SYMMETRIC)]
+        brute = [(rung, *quickest(on_rung, case, rung)) for rung in rungs]
+        _, finest, value, _ = brute[-1]
+        reference = value + finest.error_estimates()[-1]
+        for accuracy in options.accuracy:
+            simulation, value, seconds = quickest(by_dial, case, accuracy)
+            good = [row for row in brute if abs(row[2] / reference - 1.0) <= accuracy]
+            cheapest = min(good, key=lambda row: row[3])
+            trial, error = simulation.choice.chosen, abs(value / reference - 1.0)
+            rows.append(
+                (
+                    name,
+                    f"{accuracy:.1%}",
+                    trial.rung.name,
+                    f"{trial.error:.2%}",
+                    f"{error:.2%}",
+                    seconds,
+                    cheapest[0].name,
+                    seconds / cheapest[3],
+                )
+            )
+            reports.append(f"{name}: {simulation.choice}")
+    print("\n".join(reports))
+    headers = ("mechanism", "asked", "chosen", "estimated", "true error", "seconds", "cheapest that would do", "ratio")
+    print(format_table(headers, rows))
+
+
+if __name__ == "__main__":
+    main()

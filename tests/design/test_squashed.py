@@ -1,0 +1,54 @@
+"""Derivatives of displacements stay exact where a cell is nearly inverted."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenicsmech.simulation.snapshot import rest_vertices
+
+from .test_sensitivity import Bench, assert_slopes
+
+
+class Squashed:
+    """A four-bar with one vertex moved towards the opposite side of one of its cells until that is a sliver."""
+
+    def __init__(self, space: str, ratio: float) -> None:
+        self.bench = Bench(space, MPI.COMM_SELF)
+        model, smooth = self.bench.model, self.bench.field(1)
+        model.reshape(smooth)
+        mesh, vertices = model.mesh, rest_vertices(model)
+        cells = mesh.cells[mesh.link == 0]
+        inside = np.abs(mesh.vertices[cells].mean(axis=1)[:, 1] - 15.0)  # far from the pins
+        cell = cells[np.argmin(inside)]
+        corner, side = vertices[cell[0]], vertices[cell[1:]]
+        way = side.mean(axis=0) - corner
+        positions = self.bench.space.tabulate_dof_coordinates()[:, : len(corner)]
+        (node,) = np.flatnonzero(np.linalg.norm(positions - mesh.vertices[cell[0]], axis=1) < 1e-9)
+        self.inwards = np.zeros((len(positions), len(way)))
+        self.inwards[node] = way
+        self.inwards = self.inwards.ravel()
+        low, high = 0.0, 1.0
+        for _ in range(60):
+            share = 0.5 * (low + high)
+            model.reshape(smooth + share * self.inwards)
+            low, high = (share, high) if self.bench.simulation.mesh_ratio_max < ratio else (low, share)
+        self.design, self.left = smooth + low * self.inwards, 1.0 - low
+        model.reshape(self.design)
+
+
+@pytest.mark.parametrize("space", ["plane-stress", "3d"])
+@pytest.mark.parametrize("ratio", [60.0, 100.0])
+def test_derivatives_by_the_design_hold_at_slivers(space, ratio):
+    squashed = Squashed(space, ratio)
+    bench, base = squashed.bench, squashed.design
+    assert bench.simulation.mesh_ratio_max == pytest.approx(ratio, rel=1e-3)
+    gradients = bench.gradients(bench.state(base))
+    smooth = bench.field(2)
+    for direction, steps in (
+        (squashed.inwards, squashed.left * np.array([0.0125, 0.00625, 0.003125])),
+        (smooth, [0.1, 0.05, 0.025]),
+    ):
+        slopes = [float(gradient.design @ direction) for gradient in gradients]
+        assert_slopes(lambda t, by=direction: bench.travels(base + t * by), slopes, steps)

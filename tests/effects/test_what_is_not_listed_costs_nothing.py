@@ -1,0 +1,81 @@
+"""An effect that a scene does not list adds no form, no unknown, no matrix entry and no term to the energy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pytest
+
+import fenicsmech as fm
+from fenicsmech.elasticity import body
+from fenicsmech.equilibrium import potentials
+
+from ..simulation.refined import arch
+
+SPACES = ("plane-stress", "3d-symmetric")
+
+
+@dataclass(frozen=True)
+class Counts:
+    """What a simulation of two frames is made of."""
+
+    forms: int
+    terms: int
+    coefficients: int
+    unknowns: int
+    entries: int
+    body_potentials: int
+
+
+def counts(monkeypatch, space: str, effects=()) -> Counts:
+    compiled, made = [], []
+    plain = body.compile_form
+    monkeypatch.setattr(body, "compile_form", lambda form: compiled.append(form) or plain(form))
+    init = potentials.BodyPotentials.__init__
+    monkeypatch.setattr(
+        potentials.BodyPotentials,
+        "__init__",
+        lambda self, parts, joints: made.extend(parts) or init(self, parts, joints),
+    )
+    scene, push, load = arch()
+    scene = fm.Scene(scene.mechanism, effects=[effect(scene.mechanism) for effect in effects])
+    simulation = fm.Simulation(scene, space=space, order=1, size=4.0)
+    simulation.load_displacement(push, forces=[0.0, 0.1 * load])
+    energy, model = simulation.model.elastic.energy_ufl, simulation.model
+    matrix = simulation.newton(push).system._matrix
+    monkeypatch.undo()
+    return Counts(
+        len(compiled),
+        len(energy.integrals()),
+        len(energy.coefficients()),
+        model.rigid_dofs + model.flexible_dofs + model.pressure_dofs,
+        int(matrix.getInfo()["nz_used"]),
+        len(made),
+    )
+
+
+def link(mechanism):
+    return mechanism.flexible_links[0]
+
+
+@pytest.mark.parametrize("space", SPACES)
+def test_a_bare_scene_has_three_forms_and_one_term(space, monkeypatch):
+    bare = counts(monkeypatch, space)
+    assert bare.forms == 3  # energy, residual, tangent
+    assert bare.terms == 1
+    assert bare.body_potentials == 0
+
+
+@pytest.mark.parametrize("space", SPACES)
+def test_each_effect_adds_only_its_own(space, monkeypatch):
+    bare = counts(monkeypatch, space)
+    weight = counts(monkeypatch, space, [lambda m: fm.Gravity((0, -9810), {fm.ONYX: 1.2e-9})])
+    # its term, its density, and the form that tells how the residual grows with the share that acts
+    assert (weight.terms, weight.forms, weight.body_potentials) == (bare.terms + 1, bare.forms + 2, 0)
+    assert (weight.unknowns, weight.entries) == (bare.unknowns, bare.entries)
+    spring = counts(monkeypatch, space, [lambda m: fm.JointSpring(m.joints[0], 5.0)])
+    assert (spring.forms, spring.terms, spring.coefficients) == (bare.forms, bare.terms, bare.coefficients)
+    assert (spring.unknowns, spring.body_potentials) == (bare.unknowns, 1)
+    soft = counts(monkeypatch, space, [lambda m: fm.JointCompliance(m.joints[0], 1e-3)])
+    assert soft == bare
+    assert counts(monkeypatch, space) == bare

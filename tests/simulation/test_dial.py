@@ -1,0 +1,122 @@
+"""The dial takes the cheapest rung that it expects to do, climbs until the estimate agrees, and says so."""
+
+from __future__ import annotations
+
+import pytest
+
+import fenicsmech as fm
+from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRESS, SPATIAL, Mixed
+from fenicsmech.simulation.dial import Dial, Outcome, family
+
+from .demo_scenes import describe
+from .refined import cantilever
+
+LOADS = {"truss": 0.4, "claw": 10.0, "klann": 5.0}
+
+
+def dial(accuracy: float, **changes) -> Dial:
+    return Dial(cantilever()[0], accuracy, None, Mixed(), **changes)
+
+
+class Recorder:
+    """Pretends to simulate: errors of elements shrink as the rungs promise; that of plane stress is given."""
+
+    def __init__(self, elements: float, depth: float) -> None:
+        self.elements, self.depth, self.rungs = elements, depth, []
+
+    def __call__(self, rung) -> Outcome:
+        self.rungs.append(rung)
+        if rung.model is PLANE_STRESS:
+            return Outcome(10.0, 10.0 * self.elements * rung.gain, 10.0 * self.depth, 100)
+        return Outcome(10.0, 10.0 * (self.elements + 0.55 * self.depth) * rung.gain, 0.0, 1000)
+
+
+def test_the_pilot_is_taken_if_its_estimate_will_do():
+    run = Recorder(0.01, 0.01)
+    choice = dial(0.05).settle(run)
+    assert run.rungs == family(PLANE_STRESS)[:1]
+    assert choice.reached
+    assert choice.chosen.error == pytest.approx(0.02)
+
+
+def test_elements_are_refined_in_the_plane_as_long_as_they_are_what_is_wrong():
+    run = Recorder(0.03, 0.001)
+    assert dial(0.01).settle(run).reached
+    assert {rung.model for rung in run.rungs} == {PLANE_STRESS}
+    assert len(run.rungs) == 2
+
+
+@pytest.mark.parametrize("accuracy", [0.02, 0.01, 0.003, 0.001])
+def test_what_plane_stress_leaves_out_takes_the_dial_to_space_without_detours(accuracy):
+    run = Recorder(0.005, 0.03)
+    assert dial(accuracy).settle(run).reached
+    assert run.rungs[0].model is PLANE_STRESS
+    assert {rung.model for rung in run.rungs[1:]} == {MID_PLANE_SYMMETRIC}
+    assert len(run.rungs) <= 3
+
+
+def test_the_finest_rung_is_taken_and_reported_where_none_will_do(caplog):
+    run = Recorder(0.5, 0.5)
+    choice = dial(1e-5).settle(run)
+    assert not choice.reached
+    assert run.rungs[-1] == family(MID_PLANE_SYMMETRIC)[-1]
+    assert "the finest there is" in str(choice)
+    assert "error of the finest rung" in caplog.text
+
+
+def test_the_next_curve_starts_from_the_rung_that_did():
+    made = dial(0.01)
+    made.settle(Recorder(0.005, 0.03))
+    run = Recorder(0.005, 0.03)
+    made.settle(run)
+    assert len(run.rungs) == 1
+    assert run.rungs[0].model is MID_PLANE_SYMMETRIC
+
+
+def test_finer_rungs_promise_smaller_errors_and_more_work():
+    for model in (PLANE_STRESS, MID_PLANE_SYMMETRIC, SPATIAL):
+        rungs = family(model)
+        assert all(a.gain > b.gain and a.work < b.work for a, b in zip(rungs[:-1], rungs[1:], strict=True))
+
+
+def test_choice_tells_what_was_tried_and_what_ten_times_the_accuracy_would_cost():
+    choice = dial(0.05).settle(Recorder(0.01, 0.01))
+    text = str(choice)
+    assert "chosen: plane stress P2" in text
+    assert "ten times the accuracy: 3D symmetric" in text
+    assert text.rstrip().endswith(" s")
+
+
+def test_curves_are_as_accurate_as_asked_for():
+    scene, push = describe("truss")[:2]
+    forces = [0.2, LOADS["truss"]]
+    finest = fm.Simulation(scene, space="3d-symmetric", order=3, size=3.6, layers=2, segments=16)
+    reference = finest.load_displacement(push, forces=forces).displacements[-1]
+    for accuracy in (0.05, 0.01):
+        simulation = fm.Simulation(scene, accuracy=accuracy)
+        curve = simulation.load_displacement(push, forces=forces)
+        assert simulation.choice.reached
+        assert abs(curve.displacements[-1] / reference - 1.0) < accuracy
+    assert simulation.fidelity.model is MID_PLANE_SYMMETRIC
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["truss", "claw", "klann"])
+def test_all_accuracies_are_kept_on_the_demos(name):
+    scene, push = describe(name)[:2]
+    forces = [0.5 * LOADS[name], LOADS[name]]
+    finest = fm.Simulation(scene, space="3d-symmetric", order=3, size=3.0, layers=2, segments=24)
+    curve = finest.load_displacement(push, forces=forces)
+    reference = curve.displacements[-1] + finest.error_estimates(curve)[-1]
+    for accuracy in (0.05, 0.01, 0.002):
+        simulation = fm.Simulation(scene, accuracy=accuracy)
+        reached = simulation.load_displacement(push, forces=forces).displacements[-1]
+        assert abs(reached / reference - 1.0) < accuracy
+
+
+def test_nonsense_is_refused():
+    scene = cantilever()[0]
+    with pytest.raises(fm.DescriptionError, match="accuracy"):
+        fm.Simulation(scene, accuracy=0.0)
+    with pytest.raises(fm.DescriptionError, match="size"):
+        fm.Simulation(scene)
