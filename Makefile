@@ -52,17 +52,18 @@ lint: install-test ## style and layering: seconds
 	$(PYTHON) -m ruff format --check .
 	$(PYTHON) -m pytest -q tests/test_layering.py
 
-# The tests on one process in two runs side by side, of about the same length.
+# The tests on one process in two runs side by side, of about the same length. The demos come first: the peak memory of
+# a program starts from that of the process that calls it.
 CORE := tests/bodies tests/design tests/effects tests/elasticity tests/joints tests/kinematics tests/linkage \
     tests/mechanism tests/meshing
 OTHERS := tests/equilibrium tests/simulation
-AROUND := tests/accuracy tests/demos tests/hard tests/oracles tests/report tests/test_log.py tests/test_readme.py
+AROUND := tests/demos tests/accuracy tests/hard tests/oracles tests/report tests/test_log.py tests/test_readme.py
 PYTEST = OPENBLAS_NUM_THREADS=1 $(PYTHON) -m pytest -p no:cacheprovider --durations=5 --durations-min=5 -m "$(SELECT)"
 
 test-serial: install-test ## the tests on one process each
 	$(call heading,tests on one process)
 	@log=$$(mktemp); $(PYTEST) $(CORE) >"$$log" 2>&1 & core=$$!; \
-	status=0; $(PYTEST) $(OTHERS) $(AROUND) || status=1; \
+	status=0; $(PYTEST) $(AROUND) $(OTHERS) || status=1; \
 	wait $$core || status=1; cat "$$log"; rm -f "$$log"; exit $$status
 
 test-parallel: install-test ## the tests marked `parallel`, on two MPI ranks
