@@ -61,7 +61,8 @@ class Rung:
     def name(self) -> str:
         """In words."""
         where = self.model.name.replace("-", " ").replace("3d", "3D")
-        through = "" if self.model is PLANE_STRESS else f", {self.layers} layers through half the depth"
+        layers = "1 layer" if self.layers == 1 else f"{self.layers} layers"
+        through = "" if self.model is PLANE_STRESS else f", {layers} through half the depth"
         return f"{where} P{self.order}, elements of {self.size:g} thicknesses, {self.segments} around pins{through}"
 
 
