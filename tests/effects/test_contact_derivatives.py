@@ -53,11 +53,12 @@ def test_energy_and_its_gradient_are_differentiated_by_state_and_design(space, o
                 return fem.assemble_scalar(compiled)
 
             rates = taylor_rates(value, start, direction, slope, STEPS)
-            field.x.array[:] = start
             assert rates.without[-1] > 0.95
             # the gradient has kinks where points come into contact, none of them on the last step; on a half-plane it
-            # is linear in u between them
-            assert rates.with_gradient[-1] > 1.95 or rates.remainder[-1] < 1e-12 * abs(slope @ direction)
+            # is linear in u between them, and what remains is the rounding of values
+            rounding = 1e-12 * max(abs(slope @ direction), abs(value(start)))
+            field.x.array[:] = start
+            assert rates.with_gradient[-1] > 1.95 or rates.remainder[-1] < rounding
 
 
 @pytest.mark.parametrize("obstacle", OBSTACLES)
