@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import logging
+import math
 import os
 import platform
 from collections.abc import Mapping
@@ -133,7 +134,8 @@ def evaluate_expression(expression: fem.Expression, mesh: dmesh.Mesh, cells: np.
     """Values of a compiled expression in ``cells``, (cells, points × components)."""
     if _LEGACY:
         return expression.eval(cells)
-    return expression.eval(mesh, cells).reshape(len(cells), -1)
+    values = expression.eval(mesh, cells)
+    return values.reshape(len(cells), math.prod(values.shape[1:]))  # a rank may have no cells
 
 
 def petsc_vector(function: fem.Function) -> PETSc.Vec:
