@@ -8,9 +8,9 @@ from types import MappingProxyType
 
 from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRAIN, PLANE_STRESS, SPATIAL, ElasticModel, Quadrature
 from fenicsmech.equilibrium import PrimalDualNewton
-from fenicsmech.errors import DescriptionError
-from fenicsmech.mechanism import Scene, validate
+from fenicsmech.mechanism import Scene
 from fenicsmech.mechanism.checks import positive
+from fenicsmech.simulation.model import check_scene, fits
 
 TOLERANCE = PrimalDualNewton().tolerance
 """Newton's tolerance unless a rung says otherwise."""
@@ -98,10 +98,10 @@ def ladder(
         DescriptionError: the scene cannot be simulated in space.
     """
     rungs = [RIGID]
-    _check(scene, SPATIAL)
+    check_scene(scene, SPATIAL)
     families = {PLANE_STRAIN: planar, PLANE_STRESS: planar, MID_PLANE_SYMMETRIC: spatial, SPATIAL: spatial}
     for model, sizes in families.items():
-        if model is not SPATIAL and not _fits(scene, model):
+        if model is not SPATIAL and not fits(scene, model):
             continue
         for order, factors in sizes.items():
             rungs += [Rung(model, order, factor) for factor in sorted(factors, reverse=True)]
@@ -110,25 +110,3 @@ def ladder(
             rungs += [Rung(model, _VARIED_ORDER, quadrature=degree) for degree in quadratures if degree != default]
             rungs += [Rung(model, _VARIED_ORDER, tolerance=value) for value in tolerances if value != TOLERANCE]
     return rungs
-
-
-def _fits(scene: Scene, model: ElasticModel) -> bool:
-    """Whether ``scene`` can be simulated in ``model``."""
-    try:
-        _check(scene, model)
-    except DescriptionError:
-        return False
-    return True
-
-
-def _check(scene: Scene, model: ElasticModel) -> None:
-    """Refuses a scene that has no form in ``model``.
-
-    Raises:
-        DescriptionError: it has none.
-    """
-    validate(scene.mechanism, model.mechanism_dim)
-    for link in scene.mechanism.flexible_links:
-        model.check(link.name, link.material)
-    for effect in scene.effects:
-        effect.check(scene.mechanism, model.mechanism_dim)

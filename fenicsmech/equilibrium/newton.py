@@ -80,10 +80,7 @@ class Newton(Iteration):
 
     def solve(self, start: State, control: Control, *, floor: float = 0.0) -> Solution:
         system, options = self.system, self.options
-        start = control.prepare(start)
-        system.load(start)
-        if not math.isfinite(system.elastic_energy()):
-            raise NotConverged("elements are inverted in the predicted state", 0)
+        start = self._begin(start, control)
         state, balance = start, system.balance(start, control)
         best, spent, careful, passed = (state, balance), 0, False, None
         residuals, shift, trusted, mixed, norm = [], floor, True, False, math.inf

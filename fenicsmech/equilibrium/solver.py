@@ -103,6 +103,18 @@ class Iteration(ABC):
             NotConverged: too many iterations, no descent, or elements inverted all along.
         """
 
+    def _begin(self, start: State, control: Control) -> State:
+        """``start`` with what the control prescribes, loaded (collective).
+
+        Raises:
+            NotConverged: elements are inverted there.
+        """
+        state = control.prepare(start)
+        self.system.load(state)
+        if not math.isfinite(self.system.elastic_energy()):
+            raise NotConverged("elements are inverted in the predicted state", 0)
+        return state
+
     def factor(self, state: State, control: Control, balance: Balance, floor: float) -> Inertia:
         """Factors the KKT matrix of the loaded ``state``, for linear solves with it (collective).
 

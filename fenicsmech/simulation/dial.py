@@ -22,13 +22,12 @@ from fenicsmech.elasticity import (
     Formulation,
     Quadrature,
 )
-from fenicsmech.errors import DescriptionError
 from fenicsmech.log import logger
 from fenicsmech.mechanism import FlexibleLink, Scene
 from fenicsmech.mechanism.checks import positive
 from fenicsmech.mechanism.shapes import MeshPart, StepPart
 from fenicsmech.meshing.thickness import typical_thickness
-from fenicsmech.simulation.model import Fidelity, check_scene
+from fenicsmech.simulation.model import Fidelity, check_scene, fits
 
 _log = logger(__name__)
 _SAFETY = 1.3  # on estimates, which lie within a factor of two of the errors, mostly within 1.3
@@ -245,8 +244,4 @@ def _fits(scene: Scene, model: ElasticModel) -> bool:
     """Whether the scene can be simulated in ``model``, and its links be meshed for it."""
     if model.symmetric and any(isinstance(link.shape, StepPart | MeshPart) for link in scene.mechanism.flexible_links):
         return False
-    try:
-        check_scene(scene, model)
-    except DescriptionError:
-        return False
-    return True
+    return fits(scene, model)

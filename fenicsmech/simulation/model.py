@@ -68,6 +68,15 @@ def check_scene(scene: Scene, model: ElasticModel) -> None:
         effect.check(mechanism, model.mechanism_dim)
 
 
+def fits(scene: Scene, model: ElasticModel) -> bool:
+    """Whether a scene has a form in ``model``."""
+    try:
+        check_scene(scene, model)
+    except DescriptionError:
+        return False
+    return True
+
+
 def check_links(mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> None:
     """Refuses links, joints and points that cannot be right, before anything is meshed."""
     for link in mechanism.flexible_links:

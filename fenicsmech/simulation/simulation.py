@@ -357,7 +357,7 @@ class Simulation:
             DescriptionError: no curve was computed yet, or this is not plane stress.
         """
         chosen = self._chosen(curve)
-        error = DepthError(self.model, self.newton(chosen.force_part, chosen.others))
+        error = self._depth_error(chosen)
         return np.array([error.estimate(frame, chosen.freedom) for frame in chosen.frames])
 
     def explain(self, curve: Curve | None = None, *, tolerance: float = 0.01) -> Explanation:
@@ -513,6 +513,7 @@ class Simulation:
         self.__dict__.pop("model", None)
         self._newtons: dict[tuple, Iteration] = {}
         self._errors: dict[tuple, GoalError] = {}
+        self._depth_errors: dict[tuple, DepthError] = {}
 
     def _outcome(self, rung: Rung, request: CurveRequest, watch: Callable[[int], None]) -> Outcome:
         """What a rung of the dial gives for a curve, and how wrong it may be (collective)."""
@@ -524,7 +525,7 @@ class Simulation:
         elements = self._goal_error(curve).estimate(frame, curve.freedom)
         depth = 0.0
         if fidelity.model is PLANE_STRESS:
-            depth = DepthError(self.model, self.newton(curve.force_part, curve.others)).estimate(frame, curve.freedom)
+            depth = self._depth_error(curve).estimate(frame, curve.freedom)
         unknowns = self.model.rigid_dofs + self.model.flexible_dofs + self.model.pressure_dofs
         return Outcome(frame.displacement, elements, depth, unknowns)
 
@@ -533,6 +534,12 @@ class Simulation:
         if key not in self._errors:
             self._errors[key] = GoalError(self.model, self.newton(*key))
         return self._errors[key]
+
+    def _depth_error(self, curve: Curve) -> DepthError:
+        key = (curve.force_part, curve.others)
+        if key not in self._depth_errors:
+            self._depth_errors[key] = DepthError(self.model, self.newton(*key))
+        return self._depth_errors[key]
 
     def _chosen(self, curve: Curve | None) -> Curve:
         chosen = curve or self._last

@@ -72,10 +72,7 @@ class AugmentedLagrangianIteration(Iteration):
 
     def solve(self, start: State, control: Control, *, floor: float = 0.0) -> Solution:
         system, options = self.system, self.options
-        state = control.prepare(start)
-        system.load(state)
-        if not math.isfinite(system.elastic_energy()):
-            raise NotConverged("elements are inverted in the predicted state", 0)
+        state = self._begin(start, control)
         penalty = options.penalty
         omega, eta = 1.0 / penalty, penalty**-0.1
         shift, residuals, before, best = floor, [], math.inf, None

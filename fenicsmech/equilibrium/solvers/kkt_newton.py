@@ -44,10 +44,7 @@ class KktIteration(Iteration):
 
     def solve(self, start: State, control: Control, *, floor: float = 0.0) -> Solution:
         system, options = self.system, self.options
-        state = control.prepare(start)
-        system.load(state)
-        if not math.isfinite(system.elastic_energy()):
-            raise NotConverged("elements are inverted in the predicted state", 0)
+        state = self._begin(start, control)
         balance, residuals, before = system.balance(state, control), [], math.inf
         best = state, balance
         for iteration in range(options.iterations + 1):

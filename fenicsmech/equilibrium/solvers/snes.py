@@ -58,10 +58,7 @@ class SnesIteration(Iteration):
     options: Snes
 
     def solve(self, start: State, control: Control, *, floor: float = 0.0) -> Solution:
-        start = control.prepare(start)
-        self.system.load(start)
-        if not math.isfinite(self.system.elastic_energy()):
-            raise NotConverged("elements are inverted in the predicted state", 0)
+        start = self._begin(start, control)
         equations = _Equations(self, start, control, floor)
         if self.converged(equations.balance):  # there is nothing that a line search could lower
             equations.test(None, 0, (0.0, 0.0, equations.balance.norm))
