@@ -10,7 +10,7 @@ from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRAIN, PLANE_STRES
 from fenicsmech.equilibrium import PrimalDualNewton
 from fenicsmech.mechanism import Scene
 from fenicsmech.mechanism.checks import positive
-from fenicsmech.simulation.model import check_scene, fits
+from fenicsmech.simulation.fidelity import check_scene, fits
 
 TOLERANCE = PrimalDualNewton().tolerance
 """Newton's tolerance unless a rung says otherwise."""

@@ -1,22 +1,27 @@
 """What users run: a scene at some fidelity, and the curves it gives.
 
 - ``simulation``: the entry point
-- ``model``: the discretised mechanism behind it
-- ``request``, ``tracer``: what a curve is asked for, and how it is traced
+- ``fidelity``, ``dial``: how finely it is computed, as given or as found by the accuracy asked for
+- ``link_meshes``, ``model``: the discretised mechanism behind it
+- ``request``, ``curves``, ``tracer``: what a curve is asked for, and how it is traced
 - ``frame``, ``curve``: what comes out
 - ``until``, ``follower``, ``followed``: curves that are followed wherever they lead, and their events
 - ``buckling``, ``mode_shape``: buckling loads and soft modes of an equilibrium
+- ``estimates``, ``goal_error``, ``depth_error``, ``influence``: how wrong displacements are
+- ``explanation``: what is simulated and left out, in words
 - ``friction``: how far friction in hinges holds a curve's load
+- ``unloaded``: where points are while motors move
 - ``snapshot``, ``picture``, ``export``: a state gathered, drawn, written
 """
 
 from fenicsmech.simulation.buckling import BucklingLoad, SoftMode
 from fenicsmech.simulation.curve import Curve
+from fenicsmech.simulation.fidelity import SPACES
 from fenicsmech.simulation.followed import FollowedCurve, PathEvent
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.friction import PinFriction, friction_band
 from fenicsmech.simulation.mode_shape import ModeShape
-from fenicsmech.simulation.simulation import SPACES, Simulation
+from fenicsmech.simulation.simulation import Simulation
 from fenicsmech.simulation.until import Until
 
 __all__ = [

@@ -27,7 +27,7 @@ from fenicsmech.mechanism import FlexibleLink, Scene
 from fenicsmech.mechanism.checks import positive
 from fenicsmech.mechanism.shapes import MeshPart, StepPart
 from fenicsmech.meshing.thickness import typical_thickness
-from fenicsmech.simulation.model import Fidelity, check_scene, fits
+from fenicsmech.simulation.fidelity import Fidelity, check_scene, fits
 
 _log = logger(__name__)
 _SAFETY = 1.3  # on estimates, which lie within a factor of two of the errors, mostly within 1.3

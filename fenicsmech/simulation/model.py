@@ -2,131 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import ufl
-from mpi4py import MPI
 
 from fenicsmech.bodies import DesignAtNodes, InterfaceMap, MaterialPoint, body_point, link_point
 from fenicsmech.clock import Clock
 from fenicsmech.compat import cell_nodes, original_nodes
 from fenicsmech.effects import BodyEffect, JointSoftening, LinkEffect, LinkFields, RestStretch, find_boundaries
-from fenicsmech.elasticity import ElasticBody, ElasticModel, Formulation, Quadrature, Stretch
+from fenicsmech.elasticity import ElasticBody, ElasticModel, Stretch
 from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State
-from fenicsmech.errors import DescriptionError, FenicsmechError
+from fenicsmech.errors import DescriptionError
 from fenicsmech.linkage import Linkage
-from fenicsmech.mechanism import Effect, FlexibleLink, Force, Mechanism, Output, Scene, validate
+from fenicsmech.mechanism import Effect, FlexibleLink, Force, Mechanism, Output
 from fenicsmech.mechanism.places import in_dimension
-from fenicsmech.meshing import InterfaceSite, LinkMesh, check_link, mesh_link
 from fenicsmech.meshing.bulge import bulge_field
-from fenicsmech.meshing.distribute import MechanismMesh, distribute
-from fenicsmech.meshing.sizing import LEAST_SEGMENTS
-
-
-@dataclass(frozen=True)
-class Fidelity:
-    """How finely a scene is computed.
-
-    Attributes:
-        model: 3D, whole or half, plane strain or plane stress.
-        order: degree of the displacement field.
-        sizes: element size per flexible link.
-        quadrature: quadrature degree.
-        formulation: which links have the pressure as an unknown of its own.
-        layers: through the depth, or through half of it where half is meshed; None: chosen from depth and size.
-        segments: around a pin, at least.
-    """
-
-    model: ElasticModel
-    order: int
-    sizes: Mapping[FlexibleLink, float]
-    quadrature: Quadrature
-    formulation: Formulation
-    layers: int | None = None
-    segments: int = LEAST_SEGMENTS
-
-
-def check_scene(scene: Scene, model: ElasticModel) -> None:
-    """Refuses a scene that has no form in ``model``.
-
-    Raises:
-        DescriptionError: it has none.
-    """
-    mechanism = scene.mechanism
-    validate(mechanism, model.mechanism_dim)
-    if not mechanism.flexible_links:
-        raise DescriptionError(
-            f"mechanism {mechanism.name!r}", "no link is flexible: nothing would bend", "Add one with flexible()"
-        )
-    for link in mechanism.flexible_links:
-        model.check(link.name, link.material)
-    for effect in scene.effects:
-        effect.check(mechanism, model.mechanism_dim)
-
-
-def fits(scene: Scene, model: ElasticModel) -> bool:
-    """Whether a scene has a form in ``model``."""
-    try:
-        check_scene(scene, model)
-    except DescriptionError:
-        return False
-    return True
-
-
-def check_links(mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> None:
-    """Refuses links, joints and points that cannot be right, before anything is meshed."""
-    for link in mechanism.flexible_links:
-        points = {part.name: part.at for part in (*mechanism.forces, *mechanism.outputs) if part.on == link}
-        sites = interface_sites(linkage, link)
-        asked = _asked(link, fidelity)
-        check_link(link.name, link.shape, sites, points, **asked)
-
-
-def mesh_links(mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> list[LinkMesh]:
-    """The mesh of every flexible link, on the calling rank."""
-    return [
-        mesh_link(link.name, link.shape, interface_sites(linkage, link), **_asked(link, fidelity))
-        for link in mechanism.flexible_links
-    ]
-
-
-def _asked(link: FlexibleLink, fidelity: Fidelity) -> dict:
-    """What is asked of the mesh of ``link``."""
-    return {
-        "dim": fidelity.model.dim,
-        "size": fidelity.sizes[link],
-        "layers": fidelity.layers,
-        "segments": fidelity.segments,
-        "half": fidelity.model.symmetric,
-    }
-
-
-def interface_sites(linkage: Linkage, link: FlexibleLink) -> list[InterfaceSite]:
-    """Where joints hold ``link``."""
-    sites = []
-    for body in (linkage.bodies[i] for i in linkage.interfaces[link]):
-        # a pin along z holds its link at whatever height the link is
-        at = body.centre[:2] if body.axis[2] == 1.0 else body.centre
-        sites.append(InterfaceSite(at, body.region, body.axis, body.name))
-    return sites
-
-
-def mesh_mechanism(comm: MPI.Comm, mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> MechanismMesh:
-    """Meshes on rank 0 and distributes; an error there is raised on all ranks (collective)."""
-    meshes, failure = None, None
-    if comm.rank == 0:
-        try:
-            meshes = mesh_links(mechanism, linkage, fidelity)
-        except FenicsmechError as error:
-            failure = error
-    failure = comm.bcast(failure, root=0)
-    if failure is not None:
-        raise failure
-    return distribute(comm, meshes)
+from fenicsmech.meshing.distribute import MechanismMesh
+from fenicsmech.simulation.fidelity import Fidelity
 
 
 class MechanismModel:

@@ -10,8 +10,36 @@ from fenicsmech.linkage import Linkage
 from fenicsmech.mechanism import Force, Link, Mechanism
 from fenicsmech.mechanism.places import in_dimension
 from fenicsmech.meshing.distribute import MechanismMesh
-from fenicsmech.report import Arrow, FlexibleShape, MechanismShape, Pin, RigidShape, plan_view, rigid_outline
-from fenicsmech.simulation.snapshot import Snapshot
+from fenicsmech.report import (
+    Arrow,
+    FlexibleShape,
+    MechanismShape,
+    Panel,
+    Pin,
+    RigidShape,
+    Trace,
+    plan_view,
+    rigid_outline,
+)
+from fenicsmech.simulation.curve import Curve
+from fenicsmech.simulation.model import MechanismModel
+from fenicsmech.simulation.snapshot import Snapshot, gather
+
+
+def panel(model: MechanismModel, curve: Curve, *, stress: bool, traces: Sequence[Trace]) -> Panel | None:
+    """The picture of a curve's first and last frame, on rank 0; None elsewhere (collective)."""
+    first, last = (gather(model, curve.frames[k]) for k in (0, -1))
+    if first is None:
+        return None
+    pen = Draughtsman(model.mechanism, model.linkage, model.mesh)
+    force, units = curve.frames[-1].force, curve.units
+    return Panel(
+        pen.shape(first, stress=False),
+        (pen.shape(last, stress=stress),),
+        (pen.arrow(curve.force_part, force, last, label=f"{force:g} {units.force}"),),
+        tuple(traces),
+        f"{curve.configuration.name}: {force:.3g} {units.force}, {curve.frames[-1].displacement:.3g} {units.length}",
+    )
 
 
 class Draughtsman:

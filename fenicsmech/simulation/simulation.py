@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path as FilePath
 
@@ -11,10 +12,7 @@ from mpi4py import MPI
 
 from fenicsmech.clock import Clock
 from fenicsmech.elasticity import (
-    MID_PLANE_SYMMETRIC,
-    PLANE_STRAIN,
     PLANE_STRESS,
-    SPATIAL,
     Formulation,
     Mixed,
     Quadrature,
@@ -24,38 +22,33 @@ from fenicsmech.equilibrium import (
     EquilibriumSolver,
     Hermite,
     Iteration,
-    LoadControl,
     Predictor,
     PrimalDualNewton,
-    Sense,
 )
-from fenicsmech.errors import AssemblyError, DescriptionError
-from fenicsmech.linkage import Freedom, assemble, build_linkage, count_freedom
+from fenicsmech.errors import DescriptionError
+from fenicsmech.linkage import build_linkage
 from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Mechanism, Output, Scene
 from fenicsmech.mechanism.checks import positive
-from fenicsmech.mechanism.places import in_dimension
 from fenicsmech.meshing import radius_ratios
 from fenicsmech.meshing.sizing import LEAST_SEGMENTS
 from fenicsmech.report import Panel, Progress, Silent, Trace, draw_configurations
 from fenicsmech.simulation.buckling import BucklingLoad, SoftMode, buckling_loads, soft_modes
 from fenicsmech.simulation.curve import Curve
-from fenicsmech.simulation.depth_error import DepthError
+from fenicsmech.simulation.curves import Curves
 from fenicsmech.simulation.dial import Choice, Dial, Outcome, Rung
+from fenicsmech.simulation.estimates import Estimates
 from fenicsmech.simulation.explanation import Explanation, hints, simulated
 from fenicsmech.simulation.export import write_xdmf
+from fenicsmech.simulation.fidelity import Fidelity, read_fidelity
 from fenicsmech.simulation.followed import FollowedCurve, PathEvent
-from fenicsmech.simulation.follower import Follower
 from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.goal_error import GoalError
-from fenicsmech.simulation.model import Fidelity, MechanismModel, check_links, check_scene, mesh_mechanism
-from fenicsmech.simulation.picture import Draughtsman
+from fenicsmech.simulation.link_meshes import check_links, mesh_mechanism
+from fenicsmech.simulation.model import MechanismModel
+from fenicsmech.simulation.picture import panel
 from fenicsmech.simulation.request import CurveRequest, read_request
 from fenicsmech.simulation.snapshot import gather, rest_vertices
-from fenicsmech.simulation.tracer import Tracer
-from fenicsmech.simulation.until import Until
-
-SPACES = {model.name: model for model in (SPATIAL, MID_PLANE_SYMMETRIC, PLANE_STRESS, PLANE_STRAIN)}
-"""Names of the elastic models, as users type them."""
+from fenicsmech.simulation.unloaded import unloaded_positions
+from fenicsmech.simulation.until import Until, check_until
 
 
 class Simulation:
@@ -101,10 +94,6 @@ class Simulation:
         predictor: Predictor | None = None,
         comm: MPI.Comm = MPI.COMM_WORLD,
     ) -> None:
-        if space not in SPACES:
-            raise DescriptionError("space", f"{space!r} is not known", f"Choose one of {', '.join(SPACES)}")
-        if order not in (1, 2, 3):
-            raise DescriptionError("order", f"{order!r} is not 1, 2 or 3", "Choose 1 for speed, 2 for accuracy")
         if formulation is not None and not isinstance(formulation, Formulation):
             raise DescriptionError("formulation", f"it is {formulation!r}", "Give Mixed() or Displacement()")
         self.scene, self.comm, self.clock = scene, comm, Clock()
@@ -118,15 +107,18 @@ class Simulation:
             self._dial = Dial(scene, positive("accuracy", accuracy), size, formulation)
             self._take(self._dial.fidelity(self._dial.rung))
             return
-        model, links = SPACES[space], scene.mechanism.flexible_links
-        if size is None:
-            raise DescriptionError("size", "it is missing", "Give an element size, or accuracy=… to have one chosen")
-        per_link = size if isinstance(size, Mapping) else dict.fromkeys(links, size)
-        sizes = {link: positive(f"element size of {link.name!r}", per_link.get(link)) for link in links}
-        rule = quadrature or Quadrature.for_order(order, model.dim)
-        fidelity = Fidelity(model, order, sizes, rule, formulation, layers, segments)
-        check_scene(scene, model)
-        self._take(fidelity)
+        self._take(
+            read_fidelity(
+                scene,
+                space=space,
+                order=order,
+                size=size,
+                quadrature=quadrature,
+                formulation=formulation,
+                layers=layers,
+                segments=segments,
+            )
+        )
 
     @cached_property
     def model(self) -> MechanismModel:
@@ -184,20 +176,7 @@ class Simulation:
             request: what is asked for.
             watch: called with the number of frames so far.
         """
-        tracer, _, freedom = self._tracer(request)
-        frames: list[Frame] = []
-        for control in request.controls:
-            frames.append(tracer.frame(control, frames))
-            watch(len(frames))
-        return Curve(
-            request.force,
-            request.configuration,
-            freedom,
-            tuple(frames),
-            units=self.scene.units,
-            leads=self.comm.rank == 0,
-            others=request.others,
-        )
+        return self._curves.trace(request, watch)
 
     def follow(
         self,
@@ -225,14 +204,12 @@ class Simulation:
             EquilibriumError: the curve ends early; carries the frames before that.
         """
         self._check_description()
-        _check_until(until)
+        check_until(until)
         request = read_request(
             self.scene.mechanism, force, forces=[0.0], displacements=None, configuration=configuration, others=others
         )
         with Progress(until.frames, configuration.name) if self.comm.rank == 0 else Silent() as progress:
-            follower, freedom = self._follower(request, until, steps)
-            follower.from_rest(progress.update)
-        self._last = self._followed(request, freedom, follower)
+            self._last = self._curves.follow(request, until, steps, progress.update)
         return self._last
 
     def branches(
@@ -251,25 +228,8 @@ class Simulation:
             EquilibriumError: the curve is not found, or ends early; carries the frames before that.
         """
         self._check_description()
-        _check_until(until)
-        if event not in curve.bifurcations:
-            raise DescriptionError(
-                "branches", "the event is no bifurcation of the curve", "Choose from its bifurcations"
-            )
-        if event.modes != 1:
-            raise DescriptionError(
-                "branches",
-                f"{event.modes} modes become unstable at once",
-                "Break the symmetry a little, or follow the curve with a smaller tolerance in ArcSteps",
-            )
-        request = CurveRequest(curve.force_part, (LoadControl(0.0),), curve.configuration, curve.others)
-        found = []
-        with self.model.shaped(event.frame.design):
-            for sense in Sense:
-                follower, freedom = self._follower(request, until, steps)
-                follower.from_bifurcation(event, sense, lambda done: None)
-                found.append(self._followed(request, freedom, follower))
-        return found[0], found[1]
+        check_until(until)
+        return self._curves.branches(curve, event, until, steps)
 
     def buckling_loads(
         self, curve: Curve | None = None, *, frame: Frame | None = None, count: int = 3
@@ -301,23 +261,6 @@ class Simulation:
         newton = self.newton(chosen.force_part, chosen.others)
         return soft_modes(self.model, newton, chosen, frame or chosen.frames[-1], count)
 
-    def _follower(self, request: CurveRequest, until: Until, steps: ArcSteps | None) -> tuple[Follower, Freedom]:
-        tracer, newton, freedom = self._tracer(request)
-        idle, steps = freedom.mobility > 0, steps or ArcSteps()
-        return Follower(self.model, newton, request, tracer, until=until, steps=steps, idle=idle), freedom
-
-    def _followed(self, request: CurveRequest, freedom: Freedom, follower: Follower) -> FollowedCurve:
-        return FollowedCurve(
-            request.force,
-            request.configuration,
-            freedom,
-            tuple(follower.frames),
-            units=self.scene.units,
-            leads=self.comm.rank == 0,
-            others=request.others,
-            events=tuple(follower.events),
-        )
-
     def on(self, comm: MPI.Comm) -> Simulation:
         """The same scene at the same fidelity for other processes, as drawn."""
         return Simulation(
@@ -343,9 +286,7 @@ class Simulation:
         Raises:
             DescriptionError: no curve was computed yet.
         """
-        chosen = self._chosen(curve)
-        error = self._goal_error(chosen)
-        return np.array([error.estimate(frame, chosen.freedom) for frame in chosen.frames])
+        return self._estimates.elements(self._chosen(curve))
 
     def modelling_errors(self, curve: Curve | None = None) -> np.ndarray:
         """What a simulation in space would add to displacements in plane stress, (frames,) (collective).
@@ -356,9 +297,7 @@ class Simulation:
         Raises:
             DescriptionError: no curve was computed yet, or this is not plane stress.
         """
-        chosen = self._chosen(curve)
-        error = self._depth_error(chosen)
-        return np.array([error.estimate(frame, chosen.freedom) for frame in chosen.frames])
+        return self._estimates.depth(self._chosen(curve))
 
     def explain(self, curve: Curve | None = None, *, tolerance: float = 0.01) -> Explanation:
         """What is simulated and what is left out, with figures where that may matter (collective).
@@ -384,12 +323,7 @@ class Simulation:
 
     def newton(self, force: Force, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
         """The solver for one controlled and some fixed forces, kept for all configurations (collective)."""
-        key = (force, others)
-        if key not in self._newtons:
-            model = self.model
-            loads = tuple((model.point_load(other), float(magnitude)) for other, magnitude in others)
-            self._newtons[key] = self._solver.on(model.system(model.point_load(force), loads))
-        return self._newtons[key]
+        return self._curves.newton(force, others)
 
     def von_mises(self, frame: Frame) -> np.ndarray | None:
         """Von Mises stress at the midpoints of all cells, on rank 0; None elsewhere (collective).
@@ -439,19 +373,7 @@ class Simulation:
 
     def panel(self, curve: Curve, *, stress: bool = True, traces: Sequence[Trace] = ()) -> Panel | None:
         """The picture of a curve's first and last frame, on rank 0; None elsewhere (collective)."""
-        first, last = (gather(self.model, curve.frames[k]) for k in (0, -1))
-        if first is None:
-            return None
-        pen = Draughtsman(self.scene.mechanism, self.linkage, self.model.mesh)
-        force, units = curve.frames[-1].force, self.scene.units
-        return Panel(
-            pen.shape(first, stress=False),
-            (pen.shape(last, stress=stress),),
-            (pen.arrow(curve.force_part, force, last, label=f"{force:g} {units.force}"),),
-            tuple(traces),
-            f"{curve.configuration.name}: {force:.3g} {units.force}, "
-            f"{curve.frames[-1].displacement:.3g} {units.length}",
-        )
+        return panel(self.model, curve, stress=stress, traces=traces)
 
     def path(self, part: Force | Output, configurations: Sequence[Configuration]) -> np.ndarray:
         """Where the unloaded point of a force or output is in each configuration, (configurations, dim).
@@ -459,20 +381,7 @@ class Simulation:
         Raises:
             AssemblyError: one of the configurations does not assemble, or its motors strain the links.
         """
-        body = self.linkage.body_of(part.on)
-        space, centre = self.linkage.joints.space, np.array(self.linkage.bodies[body].centre)
-        drawn = np.array(in_dimension(part.at, self.linkage.dim))
-        positions = []
-        for configuration in configurations:
-            assembly = assemble(self.linkage, configuration)
-            if assembly.fraction < 1.0:
-                raise AssemblyError(
-                    f"configuration {configuration.name!r}",
-                    f"its motors strain the links beyond {assembly.fraction:.1%} of their way",
-                    "Use load_displacement with an output at the point",
-                )
-            positions.append(drawn + space.displace(assembly.poses[body], (drawn - centre)[None])[0])
-        return np.array(positions)
+        return unloaded_positions(self.linkage, part, configurations)
 
     @property
     def setup_seconds(self) -> float:
@@ -487,14 +396,13 @@ class Simulation:
             ratio = self.fidelity.model.dim / float(radius_ratios(rest, self.model.mesh.cells).min())
         return self.comm.bcast(ratio, root=0)
 
-    def _tracer(self, request: CurveRequest) -> tuple[Tracer, Iteration, Freedom]:
-        """What starts the path of a request, its solver, and the freedom of its configuration (collective)."""
-        assembly = assemble(self.linkage, request.configuration)
-        rigid = self.linkage.rigid
-        freedom = count_freedom(rigid, assembly.poses, rigid.motor_values(request.configuration.position))
-        newton = self.newton(request.force, request.others)
-        tracer = Tracer(self.model, newton, request, assembly=assembly, freedom=freedom, predictor=self._predictor)
-        return tracer, newton, freedom
+    @cached_property
+    def _curves(self) -> Curves:
+        return Curves(self.model, self._solver, self._predictor, self.scene.units)
+
+    @cached_property
+    def _estimates(self) -> Estimates:
+        return Estimates(self.model, self._curves.newton)
 
     def _check_description(self) -> None:
         """Refuses a mechanism that is not the one this simulation was made for."""
@@ -510,10 +418,8 @@ class Simulation:
         linkage = build_linkage(self.scene.mechanism, fidelity.model.mechanism_dim)
         check_links(self.scene.mechanism, linkage, fidelity)
         self.fidelity, self.linkage = fidelity, linkage
-        self.__dict__.pop("model", None)
-        self._newtons: dict[tuple, Iteration] = {}
-        self._errors: dict[tuple, GoalError] = {}
-        self._depth_errors: dict[tuple, DepthError] = {}
+        for derived in ("model", "_curves", "_estimates"):
+            self.__dict__.pop(derived, None)
 
     def _outcome(self, rung: Rung, request: CurveRequest, watch: Callable[[int], None]) -> Outcome:
         """What a rung of the dial gives for a curve, and how wrong it may be (collective)."""
@@ -521,36 +427,17 @@ class Simulation:
         if fidelity != self.fidelity:
             self._take(fidelity)
         self._last = curve = self.trace(request, watch=watch)
-        frame = max(curve.frames, key=lambda frame: abs(frame.displacement))
-        elements = self._goal_error(curve).estimate(frame, curve.freedom)
-        depth = 0.0
-        if fidelity.model is PLANE_STRESS:
-            depth = self._depth_error(curve).estimate(frame, curve.freedom)
+        largest = replace(curve, frames=(max(curve.frames, key=lambda frame: abs(frame.displacement)),))
+        (elements,) = self._estimates.elements(largest)
+        (depth,) = self._estimates.depth(largest) if fidelity.model is PLANE_STRESS else (0.0,)
         unknowns = self.model.rigid_dofs + self.model.flexible_dofs + self.model.pressure_dofs
-        return Outcome(frame.displacement, elements, depth, unknowns)
-
-    def _goal_error(self, curve: Curve) -> GoalError:
-        key = (curve.force_part, curve.others)
-        if key not in self._errors:
-            self._errors[key] = GoalError(self.model, self.newton(*key))
-        return self._errors[key]
-
-    def _depth_error(self, curve: Curve) -> DepthError:
-        key = (curve.force_part, curve.others)
-        if key not in self._depth_errors:
-            self._depth_errors[key] = DepthError(self.model, self.newton(*key))
-        return self._depth_errors[key]
+        return Outcome(largest.frames[0].displacement, elements, depth, unknowns)
 
     def _chosen(self, curve: Curve | None) -> Curve:
         chosen = curve or self._last
         if chosen is None:
             raise DescriptionError("simulation", "no curve was computed yet", "Call load_displacement first")
         return chosen
-
-
-def _check_until(until: Until) -> None:
-    if not isinstance(until, Until):
-        raise DescriptionError("end of a path", f"{until!r} does not say where", "Give until=Until(displacement=…)")
 
 
 def _description(mechanism: Mechanism) -> tuple[tuple, ...]:

@@ -35,3 +35,13 @@ class Until:
             raise DescriptionError("end of a path", "neither displacement nor force is given", "Give one of them")
         if isinstance(self.frames, bool) or not isinstance(self.frames, int) or self.frames < 2:
             raise DescriptionError("end of a path", f"{self.frames!r} frames", "Give a whole number of at least 2")
+
+
+def check_until(until: object) -> None:
+    """Refuses what is no end of a path.
+
+    Raises:
+        DescriptionError: it is none.
+    """
+    if not isinstance(until, Until):
+        raise DescriptionError("end of a path", f"{until!r} does not say where", "Give until=Until(displacement=…)")

@@ -7,7 +7,7 @@ import numpy as np
 import fenicsmech as fm
 from fenicsmech.meshing import LinkMesh
 from fenicsmech.meshing.curved_edges import CurvedEdges
-from fenicsmech.simulation import model
+from fenicsmech.simulation import link_meshes
 
 
 def quartered(mesh: LinkMesh) -> LinkMesh:
@@ -30,7 +30,7 @@ def quartered(mesh: LinkMesh) -> LinkMesh:
 
 def refine(monkeypatch, levels: int) -> None:
     """Makes the simulations made from now on use meshes refined ``levels`` times."""
-    plain = model.mesh_links
+    plain = link_meshes.mesh_links
 
     def mesh_links(*arguments):
         meshes = plain(*arguments)
@@ -38,7 +38,7 @@ def refine(monkeypatch, levels: int) -> None:
             meshes = [quartered(mesh) for mesh in meshes]
         return meshes
 
-    monkeypatch.setattr(model, "mesh_links", mesh_links)
+    monkeypatch.setattr(link_meshes, "mesh_links", mesh_links)
 
 
 def cantilever() -> tuple[fm.Scene, object, float]:

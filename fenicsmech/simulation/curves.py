@@ -1,0 +1,121 @@
+"""The curves of a scene at one fidelity: traced from sample to sample, or followed wherever they lead."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from fenicsmech.equilibrium import ArcSteps, EquilibriumSolver, Iteration, LoadControl, Predictor, Sense
+from fenicsmech.errors import DescriptionError
+from fenicsmech.linkage import Freedom, assemble, count_freedom
+from fenicsmech.mechanism import Force, Units
+from fenicsmech.simulation.curve import Curve
+from fenicsmech.simulation.followed import FollowedCurve, PathEvent
+from fenicsmech.simulation.follower import Follower
+from fenicsmech.simulation.frame import Frame
+from fenicsmech.simulation.model import MechanismModel
+from fenicsmech.simulation.request import CurveRequest
+from fenicsmech.simulation.tracer import Tracer
+from fenicsmech.simulation.until import Until
+
+
+class Curves:
+    """Computes the curves of one model (all methods are collective).
+
+    Args:
+        model: the discretised mechanism.
+        solver: how equilibria are found.
+        predictor: how the next equilibrium on a curve is guessed.
+        units: of the scene.
+    """
+
+    def __init__(self, model: MechanismModel, solver: EquilibriumSolver, predictor: Predictor, units: Units) -> None:
+        self._model, self._solver, self._predictor, self._units = model, solver, predictor, units
+        self._newtons: dict[tuple, Iteration] = {}
+
+    def newton(self, force: Force, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
+        """The solver for one controlled and some fixed forces, kept for all configurations."""
+        key, model = (force, others), self._model
+        if key not in self._newtons:
+            loads = tuple((model.point_load(other), float(magnitude)) for other, magnitude in others)
+            self._newtons[key] = self._solver.on(model.system(model.point_load(force), loads))
+        return self._newtons[key]
+
+    def trace(self, request: CurveRequest, watch: Callable[[int], None]) -> Curve:
+        """The frames of all samples of a request; ``watch`` is called with the number of frames so far.
+
+        Raises:
+            AssemblyError: the configuration does not assemble.
+            EquilibriumError: a sample was not reached; carries the frames before it.
+        """
+        tracer, _, freedom = self._tracer(request)
+        frames: list[Frame] = []
+        for control in request.controls:
+            frames.append(tracer.frame(control, frames))
+            watch(len(frames))
+        return Curve(
+            request.force,
+            request.configuration,
+            freedom,
+            tuple(frames),
+            units=self._units,
+            leads=self._model.mesh.mesh.comm.rank == 0,
+            others=request.others,
+        )
+
+    def follow(
+        self, request: CurveRequest, until: Until, steps: ArcSteps | None, watch: Callable[[int], None]
+    ) -> FollowedCurve:
+        """The curve from the configuration without the force that changes, as ``Simulation.follow``."""
+        follower, freedom = self._follower(request, until, steps)
+        follower.from_rest(watch)
+        return self._followed(request, freedom, follower)
+
+    def branches(
+        self, curve: FollowedCurve, event: PathEvent, until: Until, steps: ArcSteps | None
+    ) -> tuple[FollowedCurve, FollowedCurve]:
+        """The curve that crosses another one, in both senses, as ``Simulation.branches``."""
+        if event not in curve.bifurcations:
+            raise DescriptionError(
+                "branches", "the event is no bifurcation of the curve", "Choose from its bifurcations"
+            )
+        if event.modes != 1:
+            raise DescriptionError(
+                "branches",
+                f"{event.modes} modes become unstable at once",
+                "Break the symmetry a little, or follow the curve with a smaller tolerance in ArcSteps",
+            )
+        request = CurveRequest(curve.force_part, (LoadControl(0.0),), curve.configuration, curve.others)
+        found = []
+        with self._model.shaped(event.frame.design):
+            for sense in Sense:
+                follower, freedom = self._follower(request, until, steps)
+                follower.from_bifurcation(event, sense, lambda done: None)
+                found.append(self._followed(request, freedom, follower))
+        return found[0], found[1]
+
+    def _tracer(self, request: CurveRequest) -> tuple[Tracer, Iteration, Freedom]:
+        """What starts the path of a request, its solver, and the freedom of its configuration."""
+        linkage = self._model.linkage
+        assembly = assemble(linkage, request.configuration)
+        rigid = linkage.rigid
+        freedom = count_freedom(rigid, assembly.poses, rigid.motor_values(request.configuration.position))
+        newton = self.newton(request.force, request.others)
+        tracer = Tracer(self._model, newton, request, assembly=assembly, freedom=freedom, predictor=self._predictor)
+        return tracer, newton, freedom
+
+    def _follower(self, request: CurveRequest, until: Until, steps: ArcSteps | None) -> tuple[Follower, Freedom]:
+        tracer, newton, freedom = self._tracer(request)
+        idle, steps = freedom.mobility > 0, steps or ArcSteps()
+        return Follower(self._model, newton, request, tracer, until=until, steps=steps, idle=idle), freedom
+
+    def _followed(self, request: CurveRequest, freedom: Freedom, follower: Follower) -> FollowedCurve:
+        return FollowedCurve(
+            request.force,
+            request.configuration,
+            freedom,
+            tuple(follower.frames),
+            units=self._units,
+            leads=self._model.mesh.mesh.comm.rank == 0,
+            others=request.others,
+            events=tuple(follower.events),
+        )
