@@ -9,20 +9,21 @@ from fenicsmech.mechanism import Force
 from ..oracles import beam, centreline
 
 SPAN, RISE, THICKNESS, DEPTH = 60.0, 0.9, 1.0, 2.0
+SIZE = {"plane-stress": 0.5 * THICKNESS, "3d": THICKNESS}
 STEEL = fm.Material("steel", 1000.0, 0.3)
 POINTS = [(x, 4.0 * RISE * x / SPAN * (1.0 - x / SPAN)) for x in np.linspace(0.0, SPAN, 9)]
 DISPLACEMENTS = np.linspace(0.0, 2.4 * RISE, 25)
 
 
-def arch(comm: MPI.Comm = MPI.COMM_SELF) -> tuple[fm.Simulation, Force]:
-    """The simulation, in plane stress, and the force on a point of the flexible link."""
+def arch(comm: MPI.Comm = MPI.COMM_SELF, *, space: str = "plane-stress") -> tuple[fm.Simulation, Force]:
+    """The simulation and the force on a point of the flexible link."""
     mechanism = fm.Mechanism("arch")
     base = mechanism.rigid("base", fixed=True)
     bow = mechanism.flexible("bow", fm.strip(POINTS, thickness=THICKNESS, depth=DEPTH), STEEL)
     mechanism.revolute(base, bow, at=POINTS[0], radius=0.5 * THICKNESS)
     mechanism.revolute(base, bow, at=POINTS[-1], radius=0.5 * THICKNESS)
     push = mechanism.force(on=bow, at=(0.5 * SPAN, RISE), direction=(0, -1), name="push")
-    return fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=0.5 * THICKNESS, comm=comm), push
+    return fm.Simulation(fm.Scene(mechanism), space=space, size=SIZE[space], comm=comm), push
 
 
 def beam_forces(displacements: np.ndarray) -> np.ndarray:

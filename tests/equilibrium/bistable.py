@@ -21,7 +21,9 @@ RUN, RISE = 25.0, 8.0
 KNEE, PIN, ROOT = np.array([RUN, RISE]), np.array([2.0 * RUN, 0.0]), np.array([2.0 * RUN, -40.0])
 COUPLER = float(np.hypot(RUN, RISE))
 THICKNESS, DEPTH, BLOCK = 2.0, 5.0, 4.0
+SIZE = {"plane-stress": 1.0, "3d": THICKNESS}
 PLASTIC = fm.Material("plastic", 2000.0, 0.3)
+CORK = fm.Material("cork", 2000.0, 0.0)  # a clamp does not keep it from contracting, as none does a beam
 
 
 @dataclass(frozen=True)
@@ -32,30 +34,32 @@ class FourBar:
     push: Force
 
 
-def four_bar(comm: MPI.Comm = MPI.COMM_SELF) -> FourBar:
-    """The four-bar in plane stress."""
+def four_bar(
+    comm: MPI.Comm = MPI.COMM_SELF, *, space: str = "plane-stress", material: fm.Material = PLASTIC
+) -> FourBar:
+    """The four-bar as drawn."""
     mechanism = fm.Mechanism("bistable four-bar")
     base = mechanism.rigid("base", fixed=True)
     crank, coupler = mechanism.rigid("crank"), mechanism.rigid("coupler")
     shape = fm.strip([ROOT - (0.0, BLOCK), PIN], thickness=THICKNESS, depth=DEPTH)
-    follower = mechanism.flexible("follower", shape, PLASTIC)
+    follower = mechanism.flexible("follower", shape, material)
     mechanism.revolute(base, crank, at=(0, 0))
     mechanism.revolute(crank, coupler, at=tuple(KNEE))
     mechanism.revolute(coupler, follower, at=tuple(PIN), radius=0.5 * THICKNESS)
     region = fm.Rectangle(1.5 * THICKNESS, BLOCK)
     mechanism.weld(base, follower, at=tuple(ROOT - (0.0, 0.5 * BLOCK)), region=region)
     push = mechanism.force(on=crank, at=tuple(KNEE), direction=(0, -1), name="push")
-    return FourBar(fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=1.0, comm=comm), push)
+    return FourBar(fm.Simulation(fm.Scene(mechanism), space=space, size=SIZE[space], comm=comm), push)
 
 
-def forces(displacements: np.ndarray) -> np.ndarray:
+def forces(displacements: np.ndarray, material: fm.Material = PLASTIC) -> np.ndarray:
     """Forces of the four-bar with a beam for its follower.
 
     The knee A turns about the crank's pivot, the pin B about the knee. The coupler carries a force along itself only:
     that fixes B, and the moment about the crank's pivot the force, A × (F (0, −1) − P) = 0 with P on the follower.
     """
     section = beam.Section.rectangle(
-        young=PLASTIC.youngs_modulus, poisson=PLASTIC.poissons_ratio, thickness=THICKNESS, depth=DEPTH
+        young=material.youngs_modulus, poisson=material.poissons_ratio, thickness=THICKNESS, depth=DEPTH
     )
     line = centreline.through([tuple(ROOT), tuple(PIN)])
     line = line.trimmed(0.0, 0.5 * THICKNESS)
