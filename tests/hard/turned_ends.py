@@ -92,6 +92,4 @@ def _snap(space: str, comm: MPI.Comm) -> Iterator[Check]:
     yield Fact("stable as well", all(frame.stable for frame in frames))
 
 
-CASES = (
-    HardCase("clamps turned until the bow snaps", "motors lead past a fold, against the beam", _snap, parallel=False),
-)
+CASES = (HardCase("clamps turned until the bow snaps", "motors lead past a fold, against the beam", _snap),)
