@@ -46,6 +46,8 @@ _JIT = {
 if not _LEGACY:
     import basix.ufl
 
+_ADD = (dolfinx.la.ScatterMode if _LEGACY else dolfinx.la.InsertMode).add
+
 
 @contextmanager
 def _quiet_compiler():
@@ -138,9 +140,48 @@ def evaluate_expression(expression: fem.Expression, mesh: dmesh.Mesh, cells: np.
     return values.reshape(len(cells), math.prod(values.shape[1:]))  # a rank may have no cells
 
 
-def petsc_vector(function: fem.Function) -> PETSc.Vec:
-    """The ghosted PETSc vector of a function's values (shared memory)."""
-    return function.vector if _LEGACY else function.x.petsc_vec
+def owned_values(function: fem.Function) -> np.ndarray:
+    """This rank's owned values of a function, flat (shared memory)."""
+    dofmap = function.function_space.dofmap
+    return function.x.array[: dofmap.index_map.size_local * dofmap.index_map_bs]
+
+
+def add_ghosts(function: fem.Function) -> None:
+    """Adds the ghost values of all ranks to their owners' (collective)."""
+    function.x.scatter_reverse(_ADD)
+
+
+def assemble_vector(form, work: fem.Function) -> np.ndarray:
+    """A compiled linear form, this rank's owned values, flat (collective).
+
+    Args:
+        form: the form.
+        work: on the space of its test function; holds the result until it is used again.
+    """
+    work.x.array[:] = 0.0
+    fem.assemble_vector(work.x.array, form)
+    add_ghosts(work)
+    return owned_values(work)
+
+
+def assemble_matrix(form, comm: MPI.Comm) -> PETSc.Mat:
+    """A compiled bilinear form as a new matrix, on ``comm`` as ``destroy_garbage`` wants it (collective)."""
+    own = fem.petsc.assemble_matrix(form)
+    own.assemble()
+    matrix = PETSc.Mat().createAIJ(own.getSizes(), csr=own.getValuesCSR(), bsize=own.getBlockSize(), comm=comm)
+    matrix.setLGMap(*own.getLGMap())
+    own.destroy()
+    return matrix
+
+
+def destroy_garbage(comm: MPI.Comm) -> None:
+    """Destroys the PETSc objects on ``comm`` that no Python object refers to any more (collective).
+
+    petsc4py only queues them, in 3.18 on one process too, as processes may let go of them in different orders. Meshes
+    have communicators of their own, and what is queued there when a mesh dies is lost: matrices, vectors and solvers
+    belong on the communicator that the mesh was made with.
+    """
+    PETSc.garbage_cleanup(comm)
 
 
 def write_series(path, mesh: dmesh.Mesh, functions: Mapping[str, fem.Function], steps, update, comm: MPI.Comm) -> None:

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 from dolfinx import fem
-from petsc4py import PETSc
 
-from fenicsmech.compat import petsc_vector
+from fenicsmech.compat import add_ghosts
 from fenicsmech.kinematics import RigidSpace
 from fenicsmech.meshing.mid_plane import on_mid_plane
 
@@ -71,9 +70,8 @@ class InterfaceMap:
             local[V.dofmap.cell_dofs(cell), 0] = cell_body[cell] + 1
             local[V.dofmap.cell_dofs(cell), 1] = 1
         # sum over ranks of (body + 1) and of the number of ranks that said so
-        vector = petsc_vector(marker)
-        vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-        vector.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
+        add_ghosts(marker)
+        marker.x.scatter_forward()
         marked = local[:, 1] > 0
         body = np.full(len(local), -1)
         body[marked] = np.rint(local[marked, 0] / local[marked, 1]).astype(int) - 1

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from dolfinx import fem
-from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
-from fenicsmech.compat import petsc_vector
+from fenicsmech.compat import add_ghosts, owned_values
 
 
 class DesignAtNodes:
@@ -24,6 +23,7 @@ class DesignAtNodes:
 
     def __init__(self, d: fem.Function, u: fem.Function) -> None:
         self._d, coarse, fine = d, d.function_space, u.function_space
+        self._pulled = fem.Function(coarse)
         dim = coarse.dofmap.index_map_bs
         self.owned = fine.dofmap.index_map.size_local
         cells = range(coarse.mesh.topology.index_map(dim).size_local)
@@ -48,10 +48,8 @@ class DesignAtNodes:
         dim = self._d.function_space.dofmap.index_map_bs
         return self.matrix @ self._d.x.array.reshape(-1, dim)
 
-    def add_transpose(self, nodal: np.ndarray, vector: PETSc.Vec) -> None:
-        """Adds Nᵀ ``nodal`` ((owned nodes of u, dim)) to the ghosted ``vector`` on the space of d (collective)."""
-        pulled = fem.Function(self._d.function_space)
-        pulled.x.array[:] = (self.matrix[: self.owned].T @ nodal).ravel()
-        share = petsc_vector(pulled)
-        share.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-        vector.array_w[:] += share.array_r
+    def transpose(self, nodal: np.ndarray) -> np.ndarray:
+        """Nᵀ ``nodal`` ((owned nodes of u, dim)), this rank's owned values on the space of d, flat (collective)."""
+        self._pulled.x.array[:] = (self.matrix[: self.owned].T @ nodal).ravel()
+        add_ghosts(self._pulled)
+        return owned_values(self._pulled).copy()

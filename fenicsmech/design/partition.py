@@ -49,12 +49,12 @@ def solve_partition(Q: csr_matrix, c: np.ndarray, *, part: str) -> np.ndarray:
         gradient.axpy(1.0, linear)
         return value
 
-    w, lower, upper = (H.createVecRight() for _ in range(3))
+    w, lower, upper, slope = (H.createVecRight() for _ in range(4))
     w.set(1.0 / k)
     upper.set(PETSc.INFINITY)
     tao = PETSc.TAO().create(PETSc.COMM_SELF)
     tao.setType(PETSc.TAO.Type.TRON)
-    tao.setObjectiveGradient(objective, H.createVecRight())
+    tao.setObjectiveGradient(objective, slope)
     tao.setHessian(lambda *_: None, H)
     tao.setVariableBounds((lower, upper))
     tao.setTolerances(gatol=1e-2 * _CLOSE, grtol=0.0, gttol=0.0)
@@ -62,13 +62,18 @@ def solve_partition(Q: csr_matrix, c: np.ndarray, *, part: str) -> np.ndarray:
     tao.setSolution(w)
 
     multipliers = np.zeros(n)
-    for _ in range(_ROUNDS):
-        linear.array[:] = (c + (multipliers - penalty)[:, None]).ravel()
-        tao.solve()
-        excess = w.array.reshape(n, k).sum(axis=1) - 1.0
-        multipliers += penalty * excess
-        if np.abs(excess).max() < _CLOSE:
-            return w.array.reshape(n, k).copy()
+    try:
+        for _ in range(_ROUNDS):
+            linear.array[:] = (c + (multipliers - penalty)[:, None]).ravel()
+            tao.solve()
+            excess = w.array.reshape(n, k).sum(axis=1) - 1.0
+            multipliers += penalty * excess
+            if np.abs(excess).max() < _CLOSE:
+                return w.array.reshape(n, k).copy()
+    finally:
+        # at once: PETSc forgets what the functions of a solver hold if the solver itself was queued
+        for thing in (tao, w, lower, upper, slope, linear, H):
+            thing.destroy()
     raise FenicsmechError(
         part, f"the weights of its handles add up to 1 ± {np.abs(excess).max():.1e} only", "Use fewer handles"
     )

@@ -17,9 +17,10 @@ from math import factorial, inf, isnan
 import numpy as np
 import ufl
 from dolfinx import fem
+from mpi4py import MPI
 from petsc4py import PETSc
 
-from fenicsmech.compat import compile_expression, compile_form, evaluate_expression, petsc_vector
+from fenicsmech.compat import assemble_matrix, assemble_vector, compile_expression, compile_form, evaluate_expression
 
 
 def aspect_ratio(design: fem.Function):
@@ -55,10 +56,14 @@ class QualitySum:
     Args:
         design: the design field d, vector P1.
         penalty: φ, in UFL; ρ itself by default.
+        comm: the processes that share the mesh; the mesh's own communicator by default.
     """
 
-    def __init__(self, design: fem.Function, penalty: Callable = lambda rho: rho) -> None:
+    def __init__(
+        self, design: fem.Function, penalty: Callable = lambda rho: rho, *, comm: MPI.Comm | None = None
+    ) -> None:
         self.design, self._mesh = design, design.function_space.mesh
+        self._comm = comm or self._mesh.comm
         dim = self._mesh.geometry.dim
         volume = abs(ufl.JacobianDeterminant(self._mesh)) / factorial(dim)
         self._penalty = penalty(aspect_ratio(design))
@@ -79,12 +84,7 @@ class QualitySum:
 
     def gradient(self) -> np.ndarray:
         """∂/∂d at the owned nodes, (owned nodes, dim) (collective)."""
-        vector = self._vector
-        with vector.localForm() as local:
-            local.set(0.0)
-        fem.petsc.assemble_vector(vector, self._gradient_form)
-        vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-        return vector.array_r.reshape(-1, self._mesh.geometry.dim).copy()
+        return assemble_vector(self._gradient_form, self._sums).reshape(-1, self._mesh.geometry.dim).copy()
 
     def hessian(self) -> PETSc.Mat:
         """∂²/∂d²; overwritten by the next call (collective)."""
@@ -113,9 +113,10 @@ class QualitySum:
         return compile_form(ufl.derivative(ufl.derivative(self._sum, self.design), self.design))
 
     @cached_property
-    def _vector(self) -> PETSc.Vec:
-        return petsc_vector(self.design).duplicate()
+    def _sums(self) -> fem.Function:
+        """Where the gradient is assembled."""
+        return fem.Function(self.design.function_space)
 
     @cached_property
     def _matrix(self) -> PETSc.Mat:
-        return fem.petsc.create_matrix(self._hessian_form)
+        return assemble_matrix(self._hessian_form, self._comm)

@@ -64,7 +64,7 @@ class RestShape:
     ) -> None:
         self._model, design = model, model.elastic.d
         self._map = ShapeMap(model.mesh, design, shapes)
-        self._ratio = QualitySum(design)
+        self._ratio = QualitySum(design, comm=model.mesh.comm)
         self._optimum = HandleOptimum(self._map, self._ratio)
         self._penalties: dict[Barrier, QualitySum] = {}
         self.initial = self._map.initial

@@ -21,9 +21,8 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
-from petsc4py import PETSc
 
-from fenicsmech.compat import compile_form, petsc_vector
+from fenicsmech.compat import assemble_vector, compile_form, destroy_garbage, owned_values
 from fenicsmech.equilibrium import Iteration, LoadControl, PointLoad, State
 from fenicsmech.simulation.model import MechanismModel
 
@@ -58,7 +57,9 @@ class Adjoint:
         balance = system.balance(state, control)
         forces = system.nodal_forces()
         self._newton.factor(state, control, balance, floor)
-        return [self._gradient(state, output, forces) for output in outputs]
+        gradients = [self._gradient(state, output, forces) for output in outputs]
+        destroy_garbage(system.layout.comm)
+        return gradients
 
     def _gradient(self, state: State, output: PointLoad, forces: np.ndarray) -> Gradient:
         system = self._system
@@ -66,17 +67,15 @@ class Adjoint:
         x = self._newton.solve_linear(right)
         u, z = system.expand(x)
         for field, values in zip(self._weights, self._model.elastic.split(u), strict=True):
-            weight = petsc_vector(field)
-            weight.array_w[:] = values
-            weight.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
+            owned_values(field)[:] = values
+            field.x.scatter_forward()
 
-        design = self._assemble(self._forms["design"])
-        stiff = self._assemble(self._forms["displacement"]).array_r
-        self._model.design_nodes.add_transpose(self._interface_terms(state, z, stiff, forces), design)
+        stiff = self._assemble("displacement")
+        moved = self._model.design_nodes.transpose(self._interface_terms(state, z, stiff, forces))
         return Gradient(
-            design=-design.array_r,
-            youngs_moduli=-self._per_link(self._forms["youngs_modulus"]),
-            poissons_ratios=-self._per_link(self._forms["poissons_ratio"]),
+            design=-(self._assemble("design") + moved),
+            youngs_moduli=-self._per_link("youngs_modulus"),
+            poissons_ratios=-self._per_link("poissons_ratio"),
             force=x.dot(system.force_rate(state)),
         )
 
@@ -96,6 +95,22 @@ class Adjoint:
         return nodal
 
     @cached_property
+    def _by(self) -> dict[str, fem.Function]:
+        """What r · û is differentiated by."""
+        elastic = self._model.elastic
+        return {
+            "design": elastic.d,
+            "displacement": elastic.u,
+            "youngs_modulus": elastic.youngs_modulus,
+            "poissons_ratio": elastic.poissons_ratio,
+        }
+
+    @cached_property
+    def _sums(self) -> dict[str, fem.Function]:
+        """Where the derivatives are assembled."""
+        return {name: fem.Function(field.function_space) for name, field in self._by.items()}
+
+    @cached_property
     def _forms(self) -> dict:
         """r · û, differentiated by the design, the displacement and the moduli."""
         elastic = self._model.elastic
@@ -104,26 +119,15 @@ class Adjoint:
             for field, weight in zip(elastic.fields, self._weights, strict=True)
         ]
         work = sum(works[1:], start=works[0])
-        by = {
-            "design": elastic.d,
-            "displacement": elastic.u,
-            "youngs_modulus": elastic.youngs_modulus,
-            "poissons_ratio": elastic.poissons_ratio,
-        }
         with self._model.clock.phase("compile"):
-            return {name: compile_form(ufl.derivative(work, field)) for name, field in by.items()}
+            return {name: compile_form(ufl.derivative(work, field)) for name, field in self._by.items()}
 
-    def _assemble(self, form) -> PETSc.Vec:
+    def _assemble(self, name: str) -> np.ndarray:
         with self._model.clock.phase("adjoint"):
-            vector = fem.petsc.create_vector(form)
-            with vector.localForm() as local:
-                local.set(0.0)
-            fem.petsc.assemble_vector(vector, form)
-            vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-            return vector
+            return assemble_vector(self._forms[name], self._sums[name])
 
-    def _per_link(self, form) -> np.ndarray:
-        cells = self._assemble(form).array_r
+    def _per_link(self, name: str) -> np.ndarray:
+        cells = self._assemble(name)
         link = self._model.mesh.link[: len(cells)]
         sums = np.bincount(link, weights=cells, minlength=len(self._model.mechanism.flexible_links))
         return self._model.mesh.mesh.comm.allreduce(sums, op=MPI.SUM)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import dolfinx.fem.petsc
 import numpy as np
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
-from petsc4py import PETSc
 
-from fenicsmech.compat import compile_form
+from fenicsmech.compat import assemble_vector, compile_form
 from fenicsmech.effects.contact import Contact
 from fenicsmech.effects.faces import Faces
 from fenicsmech.effects.protocol import LinkFields
@@ -28,17 +26,13 @@ class ContactGauge:
         self._form = compile_form(-ufl.derivative(contact.energy(fields), fields.u))
         facets = fields.boundaries[Faces(contact.link)].facets
         V = fields.u.function_space
-        self._design = fem.Function(V)
+        self._design, self._forces = fem.Function(V), fem.Function(V)
         self._nodes = fem.locate_dofs_topological(V, fields.dim - 1, facets)
 
     def force(self) -> np.ndarray:
         """What the obstacle exerts on the link, (dim,) (collective)."""
-        vector = dolfinx.fem.petsc.create_vector(self._form)
-        dolfinx.fem.petsc.assemble_vector(vector, self._form)
-        vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
         # shape functions sum up to one: so do nodal forces to the resultant
-        force = vector.array_r.reshape(-1, self._fields.dim).sum(axis=0)
-        vector.destroy()
+        force = assemble_vector(self._form, self._forces).reshape(-1, self._fields.dim).sum(axis=0)
         return self._fields.mesh.comm.allreduce(force, op=MPI.SUM)
 
     def gap(self) -> float:

@@ -24,11 +24,12 @@ from dolfinx import mesh as dmesh
 from petsc4py import PETSc
 
 from fenicsmech.compat import (
+    assemble_vector,
     cellwise_space,
     compile_expression,
     compile_form,
     evaluate_expression,
-    petsc_vector,
+    owned_values,
     vector_space,
 )
 from fenicsmech.elasticity.energies import density
@@ -265,33 +266,24 @@ class ElasticBody:
 
     def share_residuals(self) -> np.ndarray:
         """The derivative of ``residuals`` by the share (collective)."""
-        vector = petsc_vector(self.u).duplicate()
-        self.share_residual(vector)
+        by_u = self.assembled(self._share_form)
         if self.pressure is None:
-            return vector.array_r.copy()
+            return by_u
         by_p = np.zeros(len(self.pressure.unknown))
         if self._growth is not None:
-            by_p = self._assembled(self._pressure_share_form, self.pressure.p)
-        return np.concatenate([vector.array_r, by_p])
-
-    def share_residual(self, vector: PETSc.Vec) -> None:
-        """Assembles the derivative of the residual by the share into the ghosted ``vector`` (collective)."""
-        self._assemble(self._share_form, vector)
-
-    def residual(self, vector: PETSc.Vec) -> None:
-        """Assembles ∂E/∂u into the ghosted ``vector`` (collective)."""
-        self._assemble(self.residual_form, vector)
+            by_p = assemble_vector(self._pressure_share_form, self._sums[1])
+        return np.concatenate([by_u, by_p])
 
     def residuals(self) -> np.ndarray:
         """∂E/∂(u, p) at this rank's owned values, those of u first, flat (collective)."""
         by_u = self.assembled(self.residual_form)
         if self.pressure is None:
             return by_u
-        return np.concatenate([by_u, self._assembled(self._pressure_form, self.pressure.p)])
+        return np.concatenate([by_u, assemble_vector(self._pressure_form, self._sums[1])])
 
     def assembled(self, form) -> np.ndarray:
         """A compiled linear form on the space of u, this rank's owned values, flat (collective)."""
-        return self._assembled(form, self.u)
+        return assemble_vector(form, self._sums[0]).copy()
 
     def create_tangent(self) -> PETSc.Mat:
         """An empty matrix for ``tangent``: per rank, the owned values of u, then those of p (collective)."""
@@ -309,17 +301,17 @@ class ElasticBody:
     def take(self, values: np.ndarray) -> None:
         """Sets the owned values of u, and of p behind them, flat; ghosts follow in ``update``."""
         displacements, *pressures = self.split(values)
-        petsc_vector(self.u).array_w[:] = displacements
+        owned_values(self.u)[:] = displacements
         if self.pressure is not None:
-            petsc_vector(self.pressure.p).array_w[:] = pressures[0]
+            owned_values(self.pressure.p)[:] = pressures[0]
 
     def values(self) -> np.ndarray:
         """This rank's owned values of u, and of p behind them, flat."""
-        return np.concatenate([petsc_vector(field).array_r for field in self.fields])
+        return np.concatenate([owned_values(field) for field in self.fields])
 
     def split(self, values: np.ndarray) -> list[np.ndarray]:
         """Owned values as in ``values``, field by field."""
-        ends = np.cumsum([petsc_vector(field).local_size for field in self.fields])
+        ends = np.cumsum([len(owned_values(field)) for field in self.fields])
         return np.split(values, ends[:-1])
 
     @property
@@ -357,7 +349,7 @@ class ElasticBody:
     def update(self) -> None:
         """Makes ghost values of u and p agree with their owners (collective)."""
         for field in self.fields:
-            petsc_vector(field).ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
+            field.x.scatter_forward()
 
     def von_mises(self) -> np.ndarray:
         """Von Mises stress at the midpoint of each local cell, (cells,)."""
@@ -437,17 +429,10 @@ class ElasticBody:
             terms.append(ufl.diff(self._strain_ufl, self._growth.share))
         return compile_form(ufl.derivative(sum(terms[1:], start=terms[0]), self.u))
 
-    def _assembled(self, form, field: fem.Function) -> np.ndarray:
-        """A compiled linear form on the space of ``field``, this rank's owned values, flat."""
-        vector = petsc_vector(field).duplicate()
-        self._assemble(form, vector)
-        return vector.array_r.copy()
-
-    def _assemble(self, form, vector: PETSc.Vec) -> None:
-        with vector.localForm() as local:
-            local.set(0.0)
-        fem.petsc.assemble_vector(vector, form)
-        vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+    @cached_property
+    def _sums(self) -> list[fem.Function]:
+        """Where vectors on the spaces of ``fields`` are assembled."""
+        return [fem.Function(field.function_space) for field in self.fields]
 
     def cellwise(self, per_link: Sequence[float]) -> fem.Function:
         """A field with one value per cell from one value per link, (links,)."""

@@ -19,7 +19,7 @@ import ufl
 from dolfinx import fem
 from petsc4py import PETSc
 
-from fenicsmech.compat import compile_form, petsc_vector
+from fenicsmech.compat import compile_form, owned_values
 from fenicsmech.elasticity.body import ElasticBody
 
 
@@ -46,9 +46,8 @@ class MixedStress:
     def follow(self, before: np.ndarray, motion: np.ndarray) -> None:
         """Takes the displacements u before the step, and the step δu, of this rank's owned nodes, flat (collective)."""
         for field, values in ((self._before, before), (self._motion, motion)):
-            vector = petsc_vector(field)
-            vector.array_w[:] = values
-            vector.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
+            owned_values(field)[:] = values
+            field.x.scatter_forward()
 
     def forces(self) -> np.ndarray:
         """∫ F ΔS : ∇v dV, this rank's owned values, flat (collective)."""

@@ -8,9 +8,8 @@ from __future__ import annotations
 import numpy as np
 from dolfinx import fem
 from dolfinx import mesh as dmesh
-from petsc4py import PETSc
 
-from fenicsmech.compat import petsc_vector, scalar_space
+from fenicsmech.compat import add_ghosts, owned_values, scalar_space
 
 
 class PressureField:
@@ -34,7 +33,6 @@ class PressureField:
         for cell in cells:
             marker.x.array[V.dofmap.cell_dofs(cell)] = 1.0
         # a node may touch such a cell only on another rank
-        vector = petsc_vector(marker)
-        vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-        self.unknown = vector.array_r > 0.0
+        add_ghosts(marker)
+        self.unknown = owned_values(marker) > 0.0
         self.count = int(mesh.comm.allreduce(int(self.unknown.sum())))

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 from petsc4py import PETSc
 
+from fenicsmech.compat import destroy_garbage
 from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.factor import Inertia
 from fenicsmech.equilibrium.linear import BySize, LinearMethod, LinearSolver
@@ -231,6 +232,7 @@ class Iteration(ABC):
     def _accept(self, state: State, control: Control, residuals: list[float], iteration: int) -> Solution:
         """Stability and tangent at the equilibrium, from the matrix last factored, the true one."""
         system = self.system
+        destroy_garbage(system.layout.comm)
         x = self.solve_linear(control.rate(system, state), tolerance=_STEP)
         under_control = self._inertia().negative - self.expected
         unstable = under_control

@@ -20,10 +20,12 @@ from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from fenicsmech.bodies import BodyPoint, InterfaceMap, LinkPoint
 from fenicsmech.clock import Clock
+from fenicsmech.compat import destroy_garbage
 from fenicsmech.effects import PosePotential
 from fenicsmech.elasticity import ElasticBody, MixedStress
 from fenicsmech.equilibrium.control import Control
@@ -67,6 +69,7 @@ class EquilibriumSystem:
         potentials: of body poses.
         compliances: c by constraint row; 0 where none is given.
         clock: where time is counted.
+        comm: the processes that share the links.
 
     Attributes:
         unit: a residual of this norm is a displacement of the mechanism's length against the mean stiffness.
@@ -87,10 +90,12 @@ class EquilibriumSystem:
         potentials: Sequence[PosePotential] = (),
         compliances: Mapping[int, float] = MappingProxyType({}),
         clock: Clock,
+        comm: MPI.Comm,
     ) -> None:
+        destroy_garbage(comm)  # of systems before this one
         self.elastic, self.interfaces, self.joints = elastic, interfaces, joints
         self.controlled, self.loads, self.clock = controlled, loads, clock
-        self.layout = Layout(elastic.mesh.comm, interfaces, joints, elastic.pressure)
+        self.layout = Layout(comm, interfaces, joints, elastic.pressure)
         self._potentials = BodyPotentials(potentials, joints)
         self.compliances = np.array([compliances.get(row, 0.0) for row in range(joints.rows)])
         self._extras = ExtraEntries(joints, self.layout, controlled, self._potentials, self.compliances)
@@ -101,7 +106,7 @@ class EquilibriumSystem:
             elastic.update()
             self._hat = create_extended_matrix(elastic, self.layout, self._extras.pattern())
             # mean diagonal of the stiffness k: D = (ℓ, 1, …) / (ℓ √k) makes the KKT matrix dimensionless
-            comm, free = self.layout.comm, self.layout.free_displacements
+            free = self.layout.free_displacements
             diagonal = self._hat.getDiagonal().array_r[self.layout.free[:free]]
             mean = comm.allreduce(float(diagonal.sum())) / comm.allreduce(free)
             self.unit = float(np.sqrt(mean)) * joints.length

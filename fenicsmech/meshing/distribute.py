@@ -25,6 +25,7 @@ class MechanismMesh:
         vertices, cells: the whole mesh as one array each, on every rank: (n, dim), (m, dim + 1).
         link_of_cell: index of the flexible link of each of ``cells``, (m,).
         curved: edges of the whole mesh that follow curves, on every rank.
+        comm: the processes that share it; the mesh itself keeps a duplicate.
     """
 
     mesh: dmesh.Mesh
@@ -34,6 +35,7 @@ class MechanismMesh:
     cells: np.ndarray
     link_of_cell: np.ndarray
     curved: CurvedEdges
+    comm: MPI.Comm
 
     def corners(self, cells: np.ndarray) -> np.ndarray:
         """Corner coordinates of local ``cells``, (cells, dim + 1, dim)."""
@@ -53,7 +55,7 @@ def distribute(comm: MPI.Comm, link_meshes: Sequence[LinkMesh] | None, *, root: 
     else:
         mesh = create_mesh(comm, np.zeros((0, dim + 1), np.int64), np.zeros((0, dim)))
     here = original_cells(mesh)
-    return MechanismMesh(mesh, link[here], interface[here], vertices, cells, link, curved)
+    return MechanismMesh(mesh, link[here], interface[here], vertices, cells, link, curved, comm)
 
 
 def _join(link_meshes: Sequence[LinkMesh]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, CurvedEdges]:

@@ -26,7 +26,15 @@ import ufl
 from dolfinx import fem
 from petsc4py import PETSc
 
-from fenicsmech.compat import compile_form, petsc_vector, scalar_space, tensor_space
+from fenicsmech.compat import (
+    assemble_matrix,
+    assemble_vector,
+    compile_form,
+    destroy_garbage,
+    owned_values,
+    scalar_space,
+    tensor_space,
+)
 from fenicsmech.equilibrium import Iteration
 from fenicsmech.linkage import Freedom
 from fenicsmech.meshing.mid_plane import on_mid_plane
@@ -51,47 +59,42 @@ class GoalError:
         self._adjoint = fem.Function(elastic.u.function_space, name="adjoint")
         tensors = tensor_space(elastic.mesh, self._degree)
         self._recovered = [fem.Function(tensors, name=name) for name in ("recovered_gradient", "recovered_adjoint")]
+        self._sums = fem.Function(tensors)
 
     def estimate(self, frame: Frame, freedom: Freedom) -> float:
         """Q(u) − Q(u_h) of a frame."""
         model = self._model
         with model.clock.phase("estimate"), influence(model, self._newton, frame, freedom) as z:
-            vector = petsc_vector(self._adjoint)
-            vector.array_w[:] = model.elastic.split(z)[0]
-            vector.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
+            owned_values(self._adjoint)[:] = model.elastic.split(z)[0]
+            self._adjoint.x.scatter_forward()
             for field, form in zip(self._recovered, self._gradient_forms, strict=True):
                 self._project(form, field)
             energy = model.mesh.mesh.comm.allreduce(fem.assemble_scalar(self._error_form))
+        destroy_garbage(model.mesh.comm)
         plain = model.elastic.pressure is None
         return (_CALIBRATION[model.elastic.order] if plain else _WITH_PRESSURE) * float(energy)
 
     def _project(self, form, field: fem.Function) -> None:
         """Makes ``field`` the L² projection whose right-hand side ``form`` is."""
-        right = fem.petsc.create_vector(form)
-        with right.localForm() as local:
-            local.set(0.0)
-        fem.petsc.assemble_vector(right, form)
-        right.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-        values, target = self._mass.createVecRight(), petsc_vector(field)
+        right = assemble_vector(form, self._sums)
+        values, part = self._mass.createVecs()
         components, dim = field.function_space.dofmap.index_map_bs, self._model.elastic.model.dim
         for k in range(components):
-            part = self._mass.createVecLeft()
-            part.array_w[:] = right.array_r[k::components]
+            part.array_w[:] = right[k::components]
             solver = self._solver
             if self._model.elastic.model.symmetric and (k // dim == 2) != (k % dim == 2):
                 part.array_w[self._mid_plane] = 0.0
                 solver = self._solver_off_mid_plane
             solver.solve(part, values)
-            target.array_w[k::components] = values.array_r
-        target.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
+            owned_values(field)[k::components] = values.array_r
+        field.x.scatter_forward()
 
     @cached_property
     def _mass(self) -> PETSc.Mat:
         """The mass matrix of continuous fields over the cells that can deform."""
         V = scalar_space(self._model.elastic.mesh, self._degree)
         test, trial = ufl.TestFunction(V), ufl.TrialFunction(V)
-        mass = fem.petsc.assemble_matrix(compile_form(test * trial * self._free(2 * self._degree)))
-        mass.assemble()
+        mass = assemble_matrix(compile_form(test * trial * self._free(2 * self._degree)), self._model.mesh.comm)
         diagonal = mass.getDiagonal()
         # vertices inside interfaces, where nothing deforms
         diagonal.array_w[diagonal.array_r == 0.0] = 1.0

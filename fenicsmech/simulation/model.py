@@ -181,6 +181,7 @@ class MechanismModel:
             potentials=self._potentials,
             compliances=self._compliances,
             clock=self.clock,
+            comm=self.mesh.comm,
         )
 
     def assembled_state(self, poses: np.ndarray, motors: np.ndarray) -> State:

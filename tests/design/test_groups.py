@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import pytest
 from mpi4py import MPI
@@ -17,6 +17,13 @@ class World:
 
     rank: int
     size: int
+    attributes: dict[int, object] = field(default_factory=dict)
+
+    def Get_attr(self, key: int) -> object | None:
+        return self.attributes.get(key)
+
+    def Set_attr(self, key: int, value: object) -> None:
+        self.attributes[key] = value
 
     def Split(self, *, color: int, key: int) -> Part:
         return Part(color, key)
@@ -92,3 +99,5 @@ def test_communicators_are_those_of_the_groups(targets):
     assert group.everyone is world
     assert group.comm.allgather(group.mine) == [group.mine] * group.comm.size
     assert world.allreduce(len(group.mine) if group.leads else 0) == targets
+    # a communicator is a scarce resource, and what a dead one's matrices were is destroyed on it
+    assert split(world, targets).comm is group.comm

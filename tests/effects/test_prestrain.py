@@ -8,7 +8,7 @@ import ufl
 from dolfinx import fem
 
 import fenicsmech as fm
-from fenicsmech.compat import compile_form, petsc_vector
+from fenicsmech.compat import compile_form
 from fenicsmech.design.sensitivity import Adjoint
 from fenicsmech.effects import Prestrain
 from fenicsmech.elasticity import PLANE_STRAIN
@@ -138,7 +138,7 @@ def test_energy_and_its_gradient_are_differentiated(space, along):
 
     # what the path of growing effects needs: the derivative of the residual by the share
     vector = work.x.array.copy()
-    rate = _share_residual(body) @ vector
+    rate = body.share_residuals()[: len(vector)] @ vector
 
     def at_share(values):
         body.share.value = values[0]
@@ -146,12 +146,6 @@ def test_energy_and_its_gradient_are_differentiated(space, along):
 
     rates = taylor_rates(at_share, [0.8], [1.0], [rate], [0.1, 0.05, 0.025])
     assert rates.with_gradient.min() > 1.9
-
-
-def _share_residual(body) -> np.ndarray:
-    vector = petsc_vector(body.u).duplicate()
-    body.share_residual(vector)
-    return vector.array.copy()
 
 
 @pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])

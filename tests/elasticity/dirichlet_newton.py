@@ -4,7 +4,6 @@ import numpy as np
 from dolfinx import fem
 from petsc4py import PETSc
 
-from fenicsmech.compat import petsc_vector
 from fenicsmech.elasticity import ElasticBody
 
 ITERATIONS = 20
@@ -38,7 +37,7 @@ def solve(
 def _newton(body: ElasticBody, fixed: np.ndarray, values: np.ndarray, force: np.ndarray) -> list[float]:
     u = body.u.x.array
     matrix = fem.petsc.create_matrix(body.tangent_form)
-    right, change = petsc_vector(body.u).duplicate(), petsc_vector(body.u).duplicate()
+    change, right = matrix.createVecs()
     solver = PETSc.KSP().create(matrix.comm)
     solver.setType(PETSc.KSP.Type.PREONLY)
     solver.getPC().setType(PETSc.PC.Type.LU)
@@ -47,8 +46,7 @@ def _newton(body: ElasticBody, fixed: np.ndarray, values: np.ndarray, force: np.
     try:
         for _ in range(ITERATIONS):
             missing = values - u[fixed]
-            body.residual(right)
-            right.array[:] = force - right.array
+            right.array[:] = force - body.assembled(body.residual_form)
             matrix.zeroEntries()
             body.tangent(matrix)
             matrix.assemble()

@@ -6,7 +6,7 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
-from fenicsmech.compat import create_mesh, petsc_vector
+from fenicsmech.compat import create_mesh
 from fenicsmech.elasticity import ElasticBody, ElasticModel, Quadrature
 from fenicsmech.mechanism import EnergyLaw, Material, NeoHookean
 
@@ -74,11 +74,7 @@ def rest_shape(body: ElasticBody) -> np.ndarray:
 
 def forces(body: ElasticBody) -> np.ndarray:
     """∂E/∂u, as u.x.array; on one rank."""
-    vector = petsc_vector(body.u).duplicate()
-    body.residual(vector)
-    values = vector.array.copy()
-    vector.destroy()
-    return values
+    return body.assembled(body.residual_form)
 
 
 def tangent(body: ElasticBody) -> np.ndarray:

@@ -5,7 +5,7 @@ import pytest
 from dolfinx import fem
 from mpi4py import MPI
 
-from fenicsmech.compat import original_cells, petsc_vector
+from fenicsmech.compat import original_cells, owned_values
 from fenicsmech.elasticity import PLANE_STRESS, SPATIAL
 
 from ..report.grids import box, rectangle
@@ -39,14 +39,20 @@ def test_residual_and_tangent(bodies):
         probe, other = (fem.Function(body.u.function_space) for _ in range(2))
         interpolate(probe, wave(body.model.dim, 1.0, seed=5))
         interpolate(other, wave(body.model.dim, 1.0, seed=6))
-        force = petsc_vector(body.u).duplicate()
-        body.residual(force)
+        force = body.residuals()
         matrix = fem.petsc.create_matrix(body.tangent_form)
         body.tangent(matrix)
         matrix.assemble()
-        image = matrix.createVecLeft()
-        matrix.mult(petsc_vector(probe), image)
-        seen.append((force.norm(), force.dot(petsc_vector(probe)), image.dot(petsc_vector(other)), image.norm()))
+        right, image = matrix.createVecs()
+        right.array_w[:] = owned_values(probe)
+        matrix.mult(right, image)
+        pairs = [
+            (force, force),
+            (force, right.array_r),
+            (image.array_r, owned_values(other)),
+            (image.array_r, image.array_r),
+        ]
+        seen.append([body.mesh.comm.allreduce(float(a @ b)) for a, b in pairs])
     assert seen[1] == pytest.approx(seen[0], rel=1e-11)
 
 

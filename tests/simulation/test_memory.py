@@ -1,0 +1,84 @@
+"""What simulations held is given back when they are gone, and what iterations hold while they go on."""
+
+from __future__ import annotations
+
+import gc
+import weakref
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from mpi4py import MPI
+
+import fenicsmech as fm
+
+from ..design.mechanisms import truss
+from .demo_scenes import describe
+
+STATUS = Path("/proc/self/status")
+pytestmark = [
+    pytest.mark.parallel,
+    pytest.mark.skipif(not STATUS.exists(), reason="the system does not tell how much memory a process holds"),
+]
+
+
+def megabytes() -> float:
+    """Memory this process holds."""
+    (line,) = (line for line in STATUS.read_text().splitlines() if line.startswith("VmRSS"))
+    return int(line.split()[1]) / 1024.0
+
+
+def growth(run: Callable[[], None], *, before: int, times: int) -> float:
+    """MB that the process grows by per run, once it has run a few times; on the rank that grows most."""
+    for _ in range(before):
+        run()
+    held = megabytes()
+    for _ in range(times):
+        run()
+    return MPI.COMM_WORLD.allreduce((megabytes() - held) / times, op=MPI.MAX)
+
+
+def simulate(**fidelity) -> tuple[fm.Simulation, fm.Curve]:
+    scene, push = describe("truss")
+    simulation = fm.Simulation(scene, **fidelity)
+    return simulation, simulation.load_displacement(push, forces=[0.0, 0.1])
+
+
+def test_simulations_give_their_memory_back():
+    # what one holds: 20 MB on one process, 10 MB on each of two
+    assert growth(lambda: simulate(space="3d", size=3.0), before=3, times=5) < 2.0
+
+
+def test_curves_of_one_simulation_give_their_memory_back():
+    simulation, curve = simulate(space="3d", size=3.0)
+
+    def run() -> None:
+        simulation.load_displacement(curve.force_part, forces=[0.1, 0.2])
+        simulation.error_estimates()
+
+    assert growth(run, before=3, times=5) < 0.5
+
+
+def test_designs_give_their_memory_back():
+    case = truss((0.1, 6.0), (0.4, 9.0))
+
+    def run() -> None:
+        problem = case.problem(size=1.0, comm=MPI.COMM_WORLD)
+        problem.optimize(minimiser=fm.LevenbergMarquardt(iterations=1))
+
+    assert growth(run, before=2, times=3) < 2.0
+
+
+def test_nothing_but_its_owner_keeps_a_simulation():
+    """No cycle of references waits for Python's collector, which counts objects and not their size."""
+    gc.collect()
+    gc.disable()
+    try:
+        simulation, curve = simulate(space="plane-stress", size=3.0)
+        simulation.error_estimates()
+        model, system = simulation.model, simulation.newton(curve.force_part).system
+        gone = [weakref.ref(thing) for thing in (simulation, model, model.elastic, system)]
+        del simulation, model, system
+        assert [thing() for thing in gone] == [None] * len(gone)
+    finally:
+        gc.enable()
