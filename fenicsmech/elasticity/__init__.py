@@ -13,12 +13,13 @@
 - ``mixed_stress``: the stress that a step promises, for the next tangent
 """
 
-from fenicsmech.elasticity.body import ElasticBody, Quadrature
+from fenicsmech.elasticity.body import ElasticBody
 from fenicsmech.elasticity.energies import density
 from fenicsmech.elasticity.formulation import Displacement, Formulation, Mixed
 from fenicsmech.elasticity.growth import Stretch
 from fenicsmech.elasticity.mixed_stress import MixedStress
 from fenicsmech.elasticity.models import MID_PLANE_SYMMETRIC, PLANE_STRAIN, PLANE_STRESS, SPATIAL, ElasticModel
+from fenicsmech.elasticity.quadrature import Quadrature
 from fenicsmech.elasticity.strain import Moduli, Strain
 
 __all__ = [

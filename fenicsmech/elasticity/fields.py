@@ -1,0 +1,165 @@
+"""The fields of all flexible links on the fixed reference mesh: shape, displacement, pressure, moduli.
+
+With reference coordinates X₀ of straight cells, the bulge c that curves them along the drawn outline, design d, rest
+shape X = X₀ + c + d and displacement u from the rest shape:
+
+    H = F − I = ∇u (∇X)⁻¹,     ∇X = I + ∇c + ∇d.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+from petsc4py import PETSc
+
+from fenicsmech.compat import cellwise_space, compile_expression, owned_values, vector_space
+from fenicsmech.elasticity.models import ElasticModel
+from fenicsmech.elasticity.pressure import PressureField
+from fenicsmech.elasticity.strain import Moduli
+from fenicsmech.mechanism import Material
+
+
+class BodyFields:
+    """What an elastic body is computed from: the state it is in, and what it is made of.
+
+    Args:
+        mesh: reference mesh.
+        link: index of the link of each local cell, (cells,).
+        materials: material of each link.
+        depths: depth of each link, used by planar models.
+        model: 3D, whole or half, plane strain or plane stress.
+        order: degree of the displacement field.
+        bulge: c, by which curved cells differ from straight ones; None if all are straight.
+        pressed: local cells whose pressure is an unknown of its own; None if there are none on any rank.
+
+    Attributes:
+        u: displacement field, vector P_order.
+        d: design field, vector P1.
+        bulge: c, vector P2, or None.
+        pressure: of the links that have one of their own, P_(order − 1); None if no link has.
+        youngs_modulus, poissons_ratio, depth: per cell.
+        share: how much of the effects acts.
+    """
+
+    def __init__(
+        self,
+        mesh: dmesh.Mesh,
+        *,
+        link: np.ndarray,
+        materials: Sequence[Material],
+        depths: Sequence[float],
+        model: ElasticModel,
+        order: int,
+        bulge: fem.Function | None,
+        pressed: np.ndarray | None,
+    ) -> None:
+        self.mesh, self.model, self.order, self.bulge, self._link = mesh, model, order, bulge, link
+        self.u = fem.Function(vector_space(mesh, order), name="displacement")
+        self.d = fem.Function(vector_space(mesh, 1), name="design")
+        self.youngs_modulus = self.cellwise([m.youngs_modulus for m in materials])
+        self.poissons_ratio = self.cellwise([m.poissons_ratio for m in materials])
+        self.depth = self.cellwise(depths)
+        self.pressure = None if pressed is None else PressureField(mesh, order - 1, pressed)
+        self.share = fem.Constant(mesh, PETSc.ScalarType(1.0))
+
+    def cellwise(self, per_link: Sequence[float]) -> fem.Function:
+        """A field with one value per cell from one value per link, (links,)."""
+        function = fem.Function(cellwise_space(self.mesh))
+        function.x.array[: len(self._link)] = np.asarray(per_link, dtype=float)[self._link]
+        return function
+
+    @property
+    def moduli(self) -> Moduli:
+        """Of each cell, symbolic."""
+        return Moduli(self.youngs_modulus, self.poissons_ratio)
+
+    def gradient(self, field):
+        """H = ∇field (∇X)⁻¹, the gradient of a field on the rest shape, symbolic."""
+        return ufl.dot(ufl.grad(field), ufl.inv(self.rest_gradient))
+
+    @property
+    def rest_gradient(self):
+        """∇X = I + ∇c + ∇d, symbolic."""
+        gradient = ufl.Identity(self.model.dim) + ufl.grad(self.d)
+        return gradient if self.bulge is None else gradient + ufl.grad(self.bulge)
+
+    @property
+    def rest(self):
+        """X = X₀ + c + d, symbolic."""
+        rest = ufl.SpatialCoordinate(self.mesh) + self.d
+        return rest if self.bulge is None else rest + self.bulge
+
+    @cached_property
+    def drawn_nodes(self) -> np.ndarray:
+        """X₀ + c at this rank's nodes of u, ghosts last, (nodes, dim)."""
+        V, dim = self.u.function_space, self.model.dim
+        nodes = V.tabulate_dof_coordinates()[:, :dim]
+        if self.bulge is None:
+            return nodes
+        bulge = fem.Function(V)
+        bulge.interpolate(self.bulge)
+        return nodes + bulge.x.array.reshape(-1, dim)
+
+    def take(self, values: np.ndarray) -> None:
+        """Sets the owned values of u, and of p behind them, flat; ghosts follow in ``update``."""
+        displacements, *pressures = self.split(values)
+        owned_values(self.u)[:] = displacements
+        if self.pressure is not None:
+            owned_values(self.pressure.p)[:] = pressures[0]
+
+    def values(self) -> np.ndarray:
+        """This rank's owned values of u, and of p behind them, flat."""
+        return np.concatenate([owned_values(field) for field in self.fields])
+
+    def split(self, values: np.ndarray) -> list[np.ndarray]:
+        """Owned values as in ``values``, field by field."""
+        ends = np.cumsum([len(owned_values(field)) for field in self.fields])
+        return np.split(values, ends[:-1])
+
+    @property
+    def fields(self) -> list[fem.Function]:
+        """u, and p where links have one."""
+        return [self.u] if self.pressure is None else [self.u, self.pressure.p]
+
+    def carried(self, change: np.ndarray) -> np.ndarray:
+        """Displacements after the rest shape changes by δ, every node's change carried along by the deformation:
+
+            x(X + δ) ≈ x(X) + F δ,     u ← u + H δ,
+
+        a first guess of the displacement from the new rest shape. Where links only move rigidly it is exact.
+
+        Args:
+            change: δ, this rank's P1 values with ghosts, flat.
+
+        Returns:
+            This rank's values of u, ghosts last, flat.
+        """
+        self._change.x.array[:] = change
+        self._carried.interpolate(self._carrying)
+        return self.u.x.array + self._carried.x.array
+
+    def update(self) -> None:
+        """Makes ghost values of u and p agree with their owners (collective)."""
+        for field in self.fields:
+            field.x.scatter_forward()
+
+    @cached_property
+    def _change(self) -> fem.Function:
+        return fem.Function(self.d.function_space, name="change_of_design")
+
+    @cached_property
+    def _carried(self) -> fem.Function:
+        return fem.Function(self.u.function_space, name="carried_change")
+
+    @cached_property
+    def _carrying(self) -> fem.Expression:
+        """H δ at the nodes of u."""
+        V = self.u.function_space
+        return compile_expression(
+            ufl.dot(self.gradient(self.u), self._change), V.element.interpolation_points(), self.mesh.comm
+        )
