@@ -1,9 +1,10 @@
 """Equilibria of a mechanism: elements and joints meet here.
 
 - ``state``: displacements, poses, multipliers
-- ``load``: point loads
+- ``load``, ``loads``: point loads
 - ``control``: what is led along a path: a force, a displacement, motors
-- ``layout``, ``matrices``, ``extras``, ``system``: the distributed KKT system
+- ``layout``, ``matrices``, ``extras``, ``kkt``: the distributed KKT matrix
+- ``system``: energy, balance and KKT matrix at a state
 - ``factor``: LDLᵀ with inertia
 - ``coarse``, ``smoother``, ``two_level``: conjugate gradients where the factor is too large
 - ``linear``: which of the two solves, and by what rule

@@ -23,16 +23,17 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fenicsmech.bodies import BodyPoint, InterfaceMap, LinkPoint
+from fenicsmech.bodies import InterfaceMap
 from fenicsmech.clock import Clock
 from fenicsmech.compat import destroy_garbage
 from fenicsmech.effects import PosePotential
 from fenicsmech.elasticity import ElasticBody, MixedStress
 from fenicsmech.equilibrium.control import Control
-from fenicsmech.equilibrium.extras import REGULARISATION, ExtraEntries
+from fenicsmech.equilibrium.extras import ExtraEntries
+from fenicsmech.equilibrium.kkt import KktMatrix
 from fenicsmech.equilibrium.layout import Layout
 from fenicsmech.equilibrium.load import PointLoad
-from fenicsmech.equilibrium.matrices import create_extended_matrix, create_map_matrix, update_map_matrix
+from fenicsmech.equilibrium.loads import Loads
 from fenicsmech.equilibrium.potentials import BodyPotentials
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.linkage import JointSystem
@@ -76,7 +77,6 @@ class EquilibriumSystem:
         compliances: c, (rows,).
         unit_u, units, scale: what a unit of each scaled unknown stands for: displacements; all free finite-element
             DOFs; (z, λ, f).
-        poses: those of the last ``balance``, which the KKT matrix is at.
     """
 
     def __init__(
@@ -94,8 +94,9 @@ class EquilibriumSystem:
     ) -> None:
         destroy_garbage(comm)  # of systems before this one
         self.elastic, self.interfaces, self.joints = elastic, interfaces, joints
-        self.controlled, self.loads, self.clock = controlled, loads, clock
+        self.controlled, self.clock = controlled, clock
         self.layout = Layout(comm, interfaces, joints, elastic.pressure)
+        self._loads = Loads(controlled, loads, elastic, joints, self.layout)
         self._potentials = BodyPotentials(potentials, joints)
         self.compliances = np.array([compliances.get(row, 0.0) for row in range(joints.rows)])
         self._extras = ExtraEntries(joints, self.layout, controlled, self._potentials, self.compliances)
@@ -104,29 +105,19 @@ class EquilibriumSystem:
         with clock.phase("setup"):
             elastic.take(np.zeros(self.layout.owned))
             elastic.update()
-            self._hat = create_extended_matrix(elastic, self.layout, self._extras.pattern())
-            # mean diagonal of the stiffness k: D = (ℓ, 1, …) / (ℓ √k) makes the KKT matrix dimensionless
-            free = self.layout.free_displacements
-            diagonal = self._hat.getDiagonal().array_r[self.layout.free[:free]]
-            mean = comm.allreduce(float(diagonal.sum())) / comm.allreduce(free)
-            self.unit = float(np.sqrt(mean)) * joints.length
-            self.unit_u = joints.length / self.unit
-            self.units = np.full(len(self.layout.free), self.unit_u)
-            if elastic.pressure is not None:
-                self.units[free:] = elastic.pressure_unit
-            self.scale = np.concatenate(
-                [joints.pose_scale / self.unit, joints.row_scale * self.unit, [self.unit / joints.length]]
-            )
-            self._extras.set_regularisation(self.scale[self.layout.multipliers], self.scale[self.layout.force])
-            self._map = create_map_matrix(self.layout, interfaces, joints, self.units, self.scale)
-        self.poses = joints.drawn
-        self._rows = self._hat.createVecLeft()
-        self._matrix: PETSc.Mat | None = None
-        self._diagonal: PETSc.Vec | None = None
+            self._kkt = KktMatrix(elastic, self.layout, interfaces, joints, self._extras, clock=clock)
+        self.unit, self.unit_u = self._kkt.unit, self._kkt.unit_u
+        self.units, self.scale = self._kkt.units, self._kkt.scale
+        self._unbalanced = np.zeros(self.layout.displacements)
 
     @cached_property
     def _mixed(self) -> MixedStress:
         return MixedStress(self.elastic)
+
+    @property
+    def poses(self) -> np.ndarray:
+        """Those of the last ``balance``, which the KKT matrix is at."""
+        return self._kkt.poses
 
     @property
     def rigid_rows(self) -> np.ndarray:
@@ -190,13 +181,11 @@ class EquilibriumSystem:
 
     def load_displacement(self, state: State) -> float:
         """a · u_P, how far the controlled force's point has moved along it (collective)."""
-        return self._travel(self.controlled, state)
+        return self._loads.travel(self.controlled, state)
 
     def potential(self, state: State, force: float) -> float:
         """E_int − Σ loads − f a · u_P with ``force`` for f (collective)."""
-        work = force * self._travel(self.controlled, state)
-        work += state.share * sum(magnitude * self._travel(load, state) for load, magnitude in self.loads)
-        return self.elastic_energy() + self._potentials.value(state) - work
+        return self.elastic_energy() + self._potentials.value(state) - self._loads.work(state, force)
 
     def volume_violation(self) -> float:
         """Norm of ∂E/∂p of the loaded state in scaled units: by how much volumes miss their pressures (collective)."""
@@ -213,31 +202,26 @@ class EquilibriumSystem:
     def balance(self, state: State, control: Control) -> Balance:
         """Gᵀ ∇L (collective). Brings G to the poses of ``state``."""
         with self.clock.phase("residual"):
-            update_map_matrix(self._map, self.layout, self.interfaces, self.joints, state.poses, self.scale)
-            self.poses = state.poses
+            self._kkt.turn(state.poses)
             layout = self.layout
             r = self.elastic.residuals()
             loads = np.zeros_like(r)
             g = np.zeros(layout.extras)
-            for load, magnitude in self._acting(state):
-                self._add_load(load, magnitude, state, loads, g)
+            for load, magnitude in self._loads.acting(state):
+                self._loads.add(load, magnitude, state, loads, g)
             r -= loads
             reactions = self.joints.gradient(state.poses, state.motors).T @ state.multipliers
             forces = np.linalg.norm(g * self.scale) ** 2 + np.linalg.norm(reactions * self.scale[layout.z]) ** 2
             forces += layout.comm.allreduce(float(np.linalg.norm(loads * self.unit_u) ** 2))
-            nodal = r[: layout.displacements].reshape(-1, layout.per_node)
+            self._unbalanced = r[: layout.displacements]
+            nodal = self._unbalanced.reshape(-1, layout.per_node)
             moments = layout.comm.allreduce(self.interfaces.moments(nodal), op=_add_moments)
             extras = -g
             extras[layout.z] += self._potentials.gradient(state) - reactions
             extras[layout.multipliers] = -self.constraints(state, state.multipliers)
             if control.constrained:
                 extras[layout.force] = -(self.load_displacement(state) - control.target)
-            rows = self._rows.array_w
-            rows[: layout.owned] = r
-            if layout.last:
-                rows[layout.owned : layout.owned + layout.extras] = extras
-            vector = self._map.createVecRight()
-            self._map.multTranspose(self._rows, vector)
+            vector = self._kkt.pull(r, extras)
             return Balance(vector, vector.norm(), float(np.sqrt(forces)), self._motion(state), moments)
 
     # -- derivatives at the loaded state -------------------------------------------------------------------
@@ -245,8 +229,7 @@ class EquilibriumSystem:
     def kkt(self, state: State, control: Control, balance: Balance) -> PETSc.Mat:
         """The KKT matrix (collective); the same object at every call."""
         with self.clock.phase("assemble"):
-            self._hat.zeroEntries()
-            self.elastic.tangent(self._hat)
+            self._kkt.tangent()
         return self._assembled(state, control, balance.moments)
 
     def mixed_kkt(self, state: State, control: Control, balance: Balance, before: State, motion: np.ndarray):
@@ -259,52 +242,25 @@ class EquilibriumSystem:
         """
         with self.clock.phase("assemble"):
             self._mixed.follow(before.u, motion)
-            self._hat.zeroEntries()
-            self.elastic.tangent(self._hat)
-            self._mixed.tangent(self._hat)
+            self._kkt.tangent()
+            self._mixed.tangent(self._kkt.hat)
             promised = self.interfaces.moments(self._mixed.forces().reshape(-1, self.layout.per_node))
             moments = _add_moments(balance.moments, self.layout.comm.allreduce(promised, op=_add_moments))
         return self._assembled(state, control, moments)
 
     def _assembled(self, state: State, control: Control, moments: dict[int, np.ndarray]) -> PETSc.Mat:
-        """K̂ from the tangent that it holds, and the KKT matrix from it."""
-        layout = self.layout
-        with self.clock.phase("assemble"):
-            self._hat.assemble()
-            if layout.last:
-                entries = self._extras.entries(state, control, self._acting(state), moments)
-                for rows, columns, block in entries:
-                    # petsc4py reads transposed arrays in memory order
-                    self._hat.setValues(
-                        rows.astype(PETSc.IntType),
-                        columns.astype(PETSc.IntType),
-                        np.ascontiguousarray(block),
-                        addv=PETSc.InsertMode.ADD,
-                    )
-            self._hat.assemble()
-        with self.clock.phase("project"):
-            self._matrix = self._hat.ptap(self._map, result=self._matrix)
-            self._diagonal = self._matrix.getDiagonal()
-        return self._matrix
+        return self._kkt.assembled(self._extras.entries(state, control, self._loads.acting(state), moments))
 
     def shift(self, shift: float) -> None:
         """Makes the KKT matrix hold ``shift`` · I more than it was assembled with, in the block of s (collective)."""
-        shifted, layout = self._diagonal.copy(), self.layout
-        shifted.array_w[: layout.free_displacements] += shift
-        if layout.last:
-            shifted.array_w[len(layout.free) :][layout.z] += shift
-        self._matrix.setDiagonal(shifted)
+        self._kkt.shift(shift)
 
     def soften(self, softness: float, control: Control) -> None:
         """Makes the KKT matrix hold −``softness`` · I instead of −ε · I in the block of multipliers (collective).
 
         The force is one of them under a ``control`` that constrains. Before ``shift``, which makes it take effect.
         """
-        if self.layout.last:
-            extras = self._diagonal.array_w[len(self.layout.free) :]
-            extras[self.layout.multipliers] += REGULARISATION - softness
-            if control.constrained:
-                extras[self.layout.force] -= softness
+        self._kkt.soften(softness, control)
 
     def force_rate(self, state: State) -> PETSc.Vec:
         """Right-hand side whose KKT solution is the rate of x with the controlled force (collective)."""
@@ -313,52 +269,50 @@ class EquilibriumSystem:
     def travel_gradient(self, load: PointLoad, state: State) -> PETSc.Vec:
         """Gᵀ ∂(a · u_P), of a load's travel with respect to the scaled unknowns x (collective)."""
         nodal, extras = np.zeros(self.layout.owned), np.zeros(self.layout.extras)
-        self._add_load(load, 1.0, state, nodal, extras)
-        return self._right_hand_side(nodal, extras)
+        self._loads.add(load, 1.0, state, nodal, extras)
+        return self._kkt.pull(nodal, extras)
 
     def share_rate(self, state: State) -> PETSc.Vec:
         """Right-hand side whose KKT solution is the rate of x with the share of the constant loads (collective)."""
         nodal, extras = np.zeros(self.layout.owned), np.zeros(self.layout.extras)
-        for load, magnitude in self.loads:
-            self._add_load(load, magnitude, state, nodal, extras)
+        for load, magnitude in self._loads.constant:
+            self._loads.add(load, magnitude, state, nodal, extras)
         extras[self.layout.z] -= self._potentials.rate(state)
         if self.elastic.shares:
             nodal -= self.elastic.share_residuals()
-        return self._right_hand_side(nodal, extras)
+        return self._kkt.pull(nodal, extras)
 
     def target_rate(self) -> PETSc.Vec:
         """Right-hand side whose KKT solution is the rate of x with the controlled displacement (collective)."""
         extras = np.zeros(self.layout.extras)
         extras[self.layout.force] = -1.0
-        return self._right_hand_side(np.zeros(self.layout.owned), extras)
+        return self._kkt.pull(np.zeros(self.layout.owned), extras)
 
     def motor_rate(self, state: State, direction: np.ndarray) -> PETSc.Vec:
         """Right-hand side whose KKT solution is the rate of x with motor values along ``direction`` (collective)."""
         extras = np.zeros(self.layout.extras)
         rate, twist = self.joints.motor_rate(state.poses, state.motors, state.multipliers, direction)
         extras[self.layout.multipliers], extras[self.layout.z] = rate, twist
-        return self._right_hand_side(np.zeros(self.layout.owned), extras)
+        return self._kkt.pull(np.zeros(self.layout.owned), extras)
 
     def expand(self, x: PETSc.Vec) -> tuple[np.ndarray, np.ndarray]:
         """∂u/∂x · x as in ``State.u``, interface nodes too, (owned dofs,), and the poses' part z (collective)."""
-        rows = self._hat.createVecLeft()
-        self._map.mult(x, rows)
-        return rows.array_r[: self.layout.owned].copy(), self.step(x).z
+        return self._kkt.push(x), self.step(x).z
 
     def nodal_forces(self) -> np.ndarray:
         """∂E/∂u minus the loads on links of the last ``balance``, (owned displacements,)."""
-        return self._rows.array_r[: self.layout.displacements].copy()
+        return self._unbalanced.copy()
 
     def control_row(self) -> PETSc.Vec:
         """The unit vector of the unknown f (collective)."""
-        vector = self._map.createVecRight()
+        vector = self._kkt.zeros()
         if self.layout.last:
             vector.array_w[-1] = 1.0
         return vector
 
     def coordinates_mask(self) -> PETSc.Vec:
         """One for each of the coordinates s, zero for multipliers and the controlled force (collective)."""
-        vector, layout = self._map.createVecRight(), self.layout
+        vector, layout = self._kkt.zeros(), self.layout
         vector.array_w[: layout.free_displacements] = 1.0
         if layout.last:
             vector.array_w[len(layout.free) :][layout.z] = 1.0
@@ -380,33 +334,6 @@ class EquilibriumSystem:
         """Largest displacement from the drawn configuration over the mechanism's length, or rotation (collective)."""
         z = self.joints.unknowns(state.poses) - self.joints.unknowns(self.joints.drawn)
         return self.size(Step(state.u, z, state.multipliers, state.force))
-
-    def _right_hand_side(self, nodal: np.ndarray, extras: np.ndarray) -> PETSc.Vec:
-        rows = self._rows.array_w
-        rows[: self.layout.owned] = nodal
-        if self.layout.last:
-            rows[self.layout.owned : self.layout.owned + self.layout.extras] = extras
-        vector = self._map.createVecRight()
-        self._map.multTranspose(self._rows, vector)
-        return vector
-
-    def _acting(self, state: State) -> list[tuple[PointLoad, float]]:
-        return [(self.controlled, state.force), *((load, state.share * size) for load, size in self.loads)]
-
-    def _travel(self, load: PointLoad, state: State) -> float:
-        return float(load.direction @ load.point.displacement(self.elastic.u, state.poses))
-
-    def _add_load(self, load: PointLoad, magnitude: float, state: State, nodal: np.ndarray, extras: np.ndarray) -> None:
-        """Adds magnitude · a · ∂u_P/∂(u, z) to owned ``nodal`` forces and ``extras``."""
-        match load.point:
-            case BodyPoint(body=body) as point:
-                if body in self.joints.columns:
-                    extras[self.joints.columns[body]] += magnitude * load.direction @ point.gradient(state.poses)
-            case LinkPoint(global_nodes=nodes, weights=weights):
-                first = self.layout.first_node
-                forces = nodal[: self.layout.displacements].reshape(-1, self.layout.per_node)
-                mine = (nodes >= first) & (nodes < first + len(forces))
-                np.add.at(forces, nodes[mine] - first, magnitude * np.outer(weights[mine], load.direction))
 
 
 def _add_moments(a: dict[int, np.ndarray], b: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
