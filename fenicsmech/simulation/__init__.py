@@ -7,7 +7,8 @@
 - ``frame``, ``curve``: what comes out
 - ``until``, ``follower``, ``followed``: curves that are followed wherever they lead, and their events
 - ``buckling``, ``mode_shape``: buckling loads and soft modes of an equilibrium
-- ``estimates``, ``goal_error``, ``depth_error``, ``influence``: how wrong displacements are
+- ``goal``, ``estimates``, ``influence``: how wrong displacements and forces are, by an adjoint: of elements
+  (``goal_error`` by ``recovery``, ``pressure_error``), of plane stress (``depth_error``)
 - ``explanation``: what is simulated and left out, in words
 - ``friction``: how far friction in hinges holds a curve's load
 - ``unloaded``: where points are while motors move

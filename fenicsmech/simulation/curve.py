@@ -11,6 +11,7 @@ from fenicsmech.linkage import Freedom
 from fenicsmech.mechanism import Configuration, Force, Units
 from fenicsmech.report import CurveSeries, plot_curve, write_curve_csv
 from fenicsmech.simulation.frame import Frame
+from fenicsmech.simulation.goal import Goal
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,7 @@ class Curve:
         units: of the scene, for labels.
         leads: whether this process writes files.
         others: constant magnitudes of other forces.
+        goal: what the samples leave open: displacements, or forces where displacements were prescribed.
     """
 
     force_part: Force
@@ -34,6 +36,7 @@ class Curve:
     units: Units
     leads: bool
     others: tuple[tuple[Force, float], ...] = ()
+    goal: Goal = Goal.DISPLACEMENT
 
     @property
     def forces(self) -> np.ndarray:
@@ -75,7 +78,8 @@ class Curve:
 
         Args:
             path: the file.
-            errors: what finer elements would add to the displacements, (frames,), for a column of their own.
+            errors: what finer elements would add to displacements, or to forces where displacements were prescribed
+                (``goal``), (frames,), for a column of their own.
         """
         length, force, stress = self.units.length, self.units.force, self.units.stress
         if self.leads:
@@ -87,5 +91,6 @@ class Curve:
                 f"max von Mises [{stress}]": np.array([frame.max_stress for frame in self.frames]),
             }
             if errors is not None:
-                columns[f"finer elements add [{length}]"] = errors
+                unit = force if self.goal is Goal.FORCE else length
+                columns[f"finer elements add to the {self.goal.value} [{unit}]"] = errors
             write_curve_csv(Path(path), columns)

@@ -12,6 +12,7 @@ from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.followed import FollowedCurve, PathEvent
 from fenicsmech.simulation.follower import Follower
 from fenicsmech.simulation.frame import Frame
+from fenicsmech.simulation.goal import Goal
 from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.request import CurveRequest
 from fenicsmech.simulation.tracer import Tracer
@@ -60,6 +61,7 @@ class Curves:
             units=self._units,
             leads=self._model.mesh.mesh.comm.rank == 0,
             others=request.others,
+            goal=Goal.FORCE if request.controls[0].constrained else Goal.DISPLACEMENT,
         )
 
     def follow(
@@ -117,5 +119,7 @@ class Curves:
             units=self._units,
             leads=self._model.mesh.mesh.comm.rank == 0,
             others=request.others,
+            # loads have limit points, where no displacement belongs to a slightly larger one
+            goal=Goal.FORCE,
             events=tuple(follower.events),
         )

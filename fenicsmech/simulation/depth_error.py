@@ -25,11 +25,7 @@ from scipy.spatial import cKDTree
 
 from fenicsmech.compat import cell_nodes, compile_form, original_nodes, scalar_space
 from fenicsmech.elasticity import PLANE_STRESS
-from fenicsmech.equilibrium import Iteration
 from fenicsmech.errors import DescriptionError
-from fenicsmech.linkage import Freedom
-from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.influence import influence
 from fenicsmech.simulation.model import MechanismModel
 
 _DECAY = 0.2  # c: estimates are 0.6 to 1.4 times what space adds to cantilever, arch, truss, claw and Klann leg
@@ -37,17 +33,16 @@ _DEGREE = 8  # of the quadrature: w decays within a cell
 
 
 class DepthError:
-    """Estimates of what space would add to the travel of one force's point in plane stress.
+    """Estimates of what space would add to goals in plane stress.
 
     Args:
-        model: of the simulation.
-        newton: its solver for this force.
+        model: of the simulation, which holds the equilibrium in question.
 
     Raises:
         DescriptionError: the simulation is not in plane stress.
     """
 
-    def __init__(self, model: MechanismModel, newton: Iteration) -> None:
+    def __init__(self, model: MechanismModel) -> None:
         space = model.elastic.model
         if space is not PLANE_STRESS:
             raise DescriptionError(
@@ -55,15 +50,16 @@ class DepthError:
                 f"there is no estimate for space={space.name!r}",
                 "Simulate in plane stress, or in 3D",
             )
-        self._model, self._newton = model, newton
+        self._model = model
 
-    def estimate(self, frame: Frame, freedom: Freedom) -> float:
-        """Q(space) − Q(plane stress) of a frame (collective)."""
-        model = self._model
-        with model.clock.phase("estimate"), influence(model, self._newton, frame, freedom) as z:
-            return -model.mesh.mesh.comm.allreduce(
-                float(model.elastic.assembled(self._force) @ model.elastic.split(z)[0])
-            )
+    def of(self, z: np.ndarray) -> float:
+        """Q(space) − Q(plane stress) (collective).
+
+        Args:
+            z: the goal's adjoint, this rank's owned values at the nodes of u, flat.
+        """
+        elastic = self._model.elastic
+        return -elastic.mesh.comm.allreduce(float(elastic.assembled(self._force) @ z))
 
     @cached_property
     def _force(self):

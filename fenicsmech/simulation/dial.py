@@ -22,6 +22,7 @@ from fenicsmech.elasticity import (
     Formulation,
     Quadrature,
 )
+from fenicsmech.errors import DescriptionError
 from fenicsmech.log import logger
 from fenicsmech.mechanism import FlexibleLink, Scene
 from fenicsmech.mechanism.checks import positive
@@ -32,6 +33,21 @@ from fenicsmech.simulation.fidelity import Fidelity, check_scene, fits
 _log = logger(__name__)
 _SAFETY = 1.3  # on estimates, which lie within a factor of two of the errors, mostly within 1.3
 _LEFT_IN_SPACE = 0.55  # of the plane-stress error: what the coarsest rung in space leaves of it
+
+
+def refuse_beside_accuracy(**given: object) -> None:
+    """Refuses what says how finely to compute, by name, beside an accuracy that is to decide that.
+
+    Raises:
+        DescriptionError: one of ``given`` is not None.
+    """
+    for name, value in given.items():
+        if value is not None:
+            raise DescriptionError(
+                f"accuracy and {name}",
+                f"both are given, and {name}={value!r} would decide what accuracy is to choose",
+                f"Leave out {name}, or give {name} and size=… instead of an accuracy",
+            )
 
 
 @dataclass(frozen=True)

@@ -49,19 +49,20 @@ class Fidelity:
 def read_fidelity(
     scene: Scene,
     *,
-    space: str,
-    order: int,
+    space: str | None,
+    order: int | None,
     size: float | Mapping[FlexibleLink, float] | None,
     quadrature: Quadrature | None,
     formulation: Formulation,
     layers: int | None,
-    segments: int,
+    segments: int | None,
 ) -> Fidelity:
     """The fidelity, if ``scene`` can be simulated at it; arguments as those of ``Simulation``.
 
     Raises:
         DescriptionError: it cannot.
     """
+    space, order = "3d" if space is None else space, 2 if order is None else order
     if space not in SPACES:
         raise DescriptionError("space", f"{space!r} is not known", f"Choose one of {', '.join(SPACES)}")
     if order not in (1, 2, 3):
@@ -73,7 +74,7 @@ def read_fidelity(
     sizes = {link: positive(f"element size of {link.name!r}", per_link.get(link)) for link in links}
     rule = quadrature or Quadrature.for_order(order, model.dim)
     check_scene(scene, model)
-    return Fidelity(model, order, sizes, rule, formulation, layers, segments)
+    return Fidelity(model, order, sizes, rule, formulation, layers, LEAST_SEGMENTS if segments is None else segments)
 
 
 def check_scene(scene: Scene, model: ElasticModel) -> None:

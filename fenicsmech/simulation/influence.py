@@ -1,38 +1,81 @@
-"""The adjoint of a displacement: what a force anywhere on the links does to the travel of one point."""
+"""The adjoint of a displacement or force: what forces anywhere on the links do to it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 import numpy as np
 
-from fenicsmech.equilibrium import IDLE_STIFFNESS, Iteration, LoadControl
-from fenicsmech.linkage import Freedom
+from fenicsmech.equilibrium import IDLE_STIFFNESS, DisplacementControl, Iteration, LoadControl, PointLoad, State
+from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.frame import Frame
+from fenicsmech.simulation.goal import Goal
 from fenicsmech.simulation.model import MechanismModel
 
 
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """An equilibrium and what is prescribed there.
+
+    Attributes:
+        state: the equilibrium.
+        design: the rest shape it belongs to, this rank's values of the design field, flat.
+        goal: the displacement under a prescribed force, or the force at a prescribed displacement.
+        floor: least shift of its tangent.
+    """
+
+    state: State
+    design: np.ndarray
+    goal: Goal
+    floor: float
+
+    @staticmethod
+    def on(curve: Curve, frame: Frame) -> Equilibrium:
+        """That of a frame, under what the curve prescribes."""
+        return Equilibrium(frame.state, frame.design, curve.goal, IDLE_STIFFNESS if curve.freedom.mobility else 0.0)
+
+
+class Influence:
+    """Adjoints at one equilibrium, which the model holds and whose KKT matrix ``newton`` has factored."""
+
+    def __init__(self, newton: Iteration, at: Equilibrium) -> None:
+        self._newton, self._at = newton, at
+
+    def on(self, output: PointLoad | None) -> np.ndarray:
+        """z with δQ = z · δF while what is prescribed stays as it is (collective).
+
+            KKT x = ∂Q/∂y,     z = ∂u/∂y x
+
+        Q is the travel a · u_P of a point, or the force f, which is one of the unknowns y then.
+
+        Args:
+            output: the point; None: the goal of the equilibrium.
+
+        Returns:
+            this rank's owned values at the nodes of u, and of pressures behind them, flat.
+        """
+        system, state = self._newton.system, self._at.state
+        if output is None and self._at.goal is Goal.FORCE:
+            # ∂f/∂y is the right-hand side of the rate with the displacement, but for its sign
+            return -system.expand(self._newton.solve_linear(system.target_rate()))[0]
+        right = system.travel_gradient(output or system.controlled, state)
+        return system.expand(self._newton.solve_linear(right))[0]
+
+
 @contextmanager
-def influence(model: MechanismModel, newton: Iteration, frame: Frame, freedom: Freedom) -> Iterator[np.ndarray]:
-    """z with δQ = z · δF at the frame's equilibrium, Q the travel of the point of ``newton``'s force (collective).
-
-        KKT x = ∂(a · u_P)/∂y,     z = ∂u/∂y x
-
-    Inside the block the model holds the frame.
+def influence(model: MechanismModel, newton: Iteration, at: Equilibrium) -> Iterator[Influence]:
+    """The adjoints of an equilibrium, for as long as the model holds it (collective).
 
     Args:
         model, newton: of a simulation.
-        frame: one of its equilibria.
-        freedom: mobility of its configuration.
-
-    Returns:
-        this rank's owned values at the nodes of u, flat.
+        at: one of its equilibria.
     """
-    system, control = newton.system, LoadControl(frame.force)
-    with model.shaped(frame.design):
-        system.load(frame.state)
-        balance = system.balance(frame.state, control)
-        newton.factor(frame.state, control, balance, IDLE_STIFFNESS if freedom.mobility else 0.0)
-        z, _ = system.expand(newton.solve_linear(system.travel_gradient(system.controlled, frame.state)))
-        yield z
+    system = newton.system
+    with model.shaped(at.design):
+        system.load(at.state)
+        held = at.goal is Goal.FORCE
+        control = DisplacementControl(system.load_displacement(at.state)) if held else LoadControl(at.state.force)
+        newton.factor(at.state, control, system.balance(at.state, control), at.floor)
+        yield Influence(newton, at)

@@ -30,18 +30,18 @@ from fenicsmech.linkage import build_linkage
 from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Mechanism, Output, Scene
 from fenicsmech.mechanism.checks import positive
 from fenicsmech.meshing import radius_ratios
-from fenicsmech.meshing.sizing import LEAST_SEGMENTS
 from fenicsmech.report import Panel, Progress, Silent, Trace, draw_configurations
 from fenicsmech.simulation.buckling import BucklingLoad, SoftMode, buckling_loads, soft_modes
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.curves import Curves
-from fenicsmech.simulation.dial import Choice, Dial, Outcome, Rung
+from fenicsmech.simulation.dial import Choice, Dial, Outcome, Rung, refuse_beside_accuracy
 from fenicsmech.simulation.estimates import Estimates
 from fenicsmech.simulation.explanation import Explanation, hints, simulated
 from fenicsmech.simulation.export import write_xdmf
 from fenicsmech.simulation.fidelity import Fidelity, read_fidelity
 from fenicsmech.simulation.followed import FollowedCurve, PathEvent
 from fenicsmech.simulation.frame import Frame
+from fenicsmech.simulation.goal import Goal
 from fenicsmech.simulation.link_meshes import check_links, mesh_mechanism
 from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.picture import panel
@@ -58,15 +58,16 @@ class Simulation:
 
     Args:
         scene: the mechanism and what acts on it.
-        space: "3d"; "3d-symmetric", which meshes half the depth of links that joints and forces move in the plane;
-            "plane-stress" or "plane-strain".
-        order: degree of the displacement field, 1, 2 or 3.
+        space: "3d", the default; "3d-symmetric", which meshes half the depth of links that joints and forces move in
+            the plane; "plane-stress" or "plane-strain".
+        order: degree of the displacement field, 1, 2 or 3; 2 by default.
         size: element size in the plane of the links, or one per flexible link.
-        accuracy: instead of ``space``, ``order`` and ``size``: relative error allowed in the largest displacement of
-            every curve. ``load_displacement`` finds the cheapest fidelity whose estimated error is below it, see
-            ``choice``. With links known from files only, ``size`` stands for their thickness.
+        accuracy: instead of all that says how finely: relative error allowed in the largest displacement of every
+            curve, or in the largest force where displacements are prescribed. ``load_displacement`` finds the cheapest
+            fidelity whose estimated error is below it, see ``choice``. With links known from files only, ``size``
+            stands for their thickness.
         layers: of elements through the depth, or half of it where half is meshed; by default from depth and size.
-        segments: of elements around pins, at least.
+        segments: of elements around pins, at least; 8 by default.
         quadrature: quadrature degree; the measured optimum by default.
         formulation: ``Mixed()`` gives nearly incompressible links the pressure as an unknown of its own;
             ``Displacement()`` none.
@@ -82,12 +83,12 @@ class Simulation:
         self,
         scene: Scene,
         *,
-        space: str = "3d",
-        order: int = 2,
+        space: str | None = None,
+        order: int | None = None,
         size: float | Mapping[FlexibleLink, float] | None = None,
         accuracy: float | None = None,
         layers: int | None = None,
-        segments: int = LEAST_SEGMENTS,
+        segments: int | None = None,
         quadrature: Quadrature | None = None,
         formulation: Formulation | None = None,
         solver: EquilibriumSolver | None = None,
@@ -104,6 +105,7 @@ class Simulation:
         self._dial: Dial | None = None
         formulation = formulation or Mixed()
         if accuracy is not None:
+            refuse_beside_accuracy(space=space, order=order, layers=layers, segments=segments, quadrature=quadrature)
             self._dial = Dial(scene, positive("accuracy", accuracy), size, formulation)
             self._take(self._dial.fidelity(self._dial.rung))
             return
@@ -277,27 +279,28 @@ class Simulation:
             comm=comm,
         )
 
-    def error_estimates(self, curve: Curve | None = None) -> np.ndarray:
-        """What finer elements would add to the displacement of each frame, (frames,) (collective).
+    def error_estimates(self, curve: Curve | None = None, *, output: Output | None = None) -> np.ndarray:
+        """What finer elements would add to what each frame leaves open, (frames,) (collective).
+
+        That is the displacement where forces were prescribed, the force where displacements were, or where the curve
+        was followed: ``curve.goal``.
 
         Args:
             curve: the last curve computed by default.
+            output: whose displacement is asked for instead, while what was prescribed stays as it is.
 
         Raises:
             DescriptionError: no curve was computed yet.
         """
-        return self._estimates.elements(self._chosen(curve))
+        return self._estimates.elements(self._chosen(curve), output)
 
-    def modelling_errors(self, curve: Curve | None = None) -> np.ndarray:
-        """What a simulation in space would add to displacements in plane stress, (frames,) (collective).
-
-        Args:
-            curve: the last curve computed by default.
+    def modelling_errors(self, curve: Curve | None = None, *, output: Output | None = None) -> np.ndarray:
+        """What a simulation in space would add to plane stress, arguments and result as of ``error_estimates``.
 
         Raises:
             DescriptionError: no curve was computed yet, or this is not plane stress.
         """
-        return self._estimates.depth(self._chosen(curve))
+        return self._estimates.depth(self._chosen(curve), output)
 
     def explain(self, curve: Curve | None = None, *, tolerance: float = 0.01) -> Explanation:
         """What is simulated and what is left out, with figures where that may matter (collective).
@@ -427,11 +430,15 @@ class Simulation:
         if fidelity != self.fidelity:
             self._take(fidelity)
         self._last = curve = self.trace(request, watch=watch)
-        largest = replace(curve, frames=(max(curve.frames, key=lambda frame: abs(frame.displacement)),))
-        (elements,) = self._estimates.elements(largest)
-        (depth,) = self._estimates.depth(largest) if fidelity.model is PLANE_STRESS else (0.0,)
+        values = curve.forces if curve.goal is Goal.FORCE else curve.displacements
+        largest = int(np.argmax(np.abs(values)))
+        frame = replace(curve, frames=curve.frames[largest : largest + 1])
+        if fidelity.model is PLANE_STRESS:
+            ((elements, depth),) = self._estimates.elements_and_depth(frame)
+        else:
+            elements, depth = float(self._estimates.elements(frame)[0]), 0.0
         unknowns = self.model.rigid_dofs + self.model.flexible_dofs + self.model.pressure_dofs
-        return Outcome(largest.frames[0].displacement, elements, depth, unknowns)
+        return Outcome(float(values[largest]), elements, depth, unknowns)
 
     def _chosen(self, curve: Curve | None) -> Curve:
         chosen = curve or self._last

@@ -6,6 +6,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
+from fenicsmech.elasticity import Quadrature
 
 from .demo_scenes import describe
 
@@ -30,16 +31,25 @@ def refused(part: str, action, *, simulation: fm.Simulation | None = None) -> No
     assert simulation is None or "model" not in vars(simulation)  # nothing was meshed
 
 
-@pytest.mark.parametrize("space", ["2d", "plane stress", "", 3, None])
+@pytest.mark.parametrize("space", ["2d", "plane stress", "", 3])
 def test_unknown_space(space):
     scene, _ = describe("truss")
     refused("space", lambda: simulate(scene, space=space))
 
 
-@pytest.mark.parametrize("order", [0, 4, -1, 1.5, "2", None])
+@pytest.mark.parametrize("order", [0, 4, -1, 1.5, "2"])
 def test_order_that_is_not_1_2_or_3(order):
     scene, _ = describe("truss")
     refused("order", lambda: simulate(scene, order=order))
+
+
+@pytest.mark.parametrize(
+    "beside", [{"space": "3d"}, {"order": 2}, {"layers": 2}, {"segments": 8}, {"quadrature": Quadrature(4)}]
+)
+def test_accuracy_and_what_it_is_to_choose(beside):
+    scene, _ = describe("truss")
+    (name,) = beside
+    refused(f"accuracy and {name}", lambda: fm.Simulation(scene, accuracy=0.01, comm=MPI.COMM_SELF, **beside))
 
 
 @pytest.mark.parametrize("formulation", ["mixed", 0.49, fm.Mixed])

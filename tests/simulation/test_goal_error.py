@@ -1,4 +1,4 @@
-"""Error estimates of displacements lie within a factor of two of the true errors, and cost less than half a frame."""
+"""Error estimates of displacements and forces: within a factor of two of the true errors, below half a frame in cost."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
+from fenicsmech.report import read_curve_csv
 
 from .demo_scenes import describe
 from .refined import arch, cantilever, refine
@@ -48,6 +49,63 @@ def test_effectivity_in_the_plane_is_between_a_half_and_two(name, order, size, m
     refine(monkeypatch, 2 if size > 2.0 else 1)
     error = reference(name, "plane-stress", size) - value
     assert 0.5 < estimate / error < 2.0
+
+
+@pytest.mark.parametrize("name", ["cantilever", "arch", "truss", "claw", "klann"])
+def test_effectivity_of_forces_at_prescribed_displacements_is_between_a_half_and_two(name, monkeypatch):
+    scene, push, load = case(name)
+    simulation = fm.Simulation(scene, space="plane-stress", size=2.0)
+    reached = simulation.load_displacement(push, forces=[0.5 * load, load]).displacements
+    curve = simulation.load_displacement(push, displacements=list(reached))
+    estimates = simulation.error_estimates(curve)
+    refine(monkeypatch, 1)
+    finer = fm.Simulation(scene, space="plane-stress", order=3, size=2.0)
+    errors = finer.load_displacement(push, displacements=list(reached)).forces - curve.forces
+    effectivity = estimates / errors
+    assert np.all((effectivity > 0.5) & (effectivity < 2.0))
+
+
+def test_errors_of_force_and_displacement_differ_by_the_stiffness():
+    """η_f = −η_u df/du."""
+    scene, push, load = arch()
+    simulation = fm.Simulation(scene, space="plane-stress", size=3.0)
+    loads = load * np.array([0.999, 1.0, 1.001])
+    curve = simulation.load_displacement(push, forces=list(loads))
+    at_force = simulation.error_estimates(curve)[1]
+    at_displacement = simulation.error_estimates(
+        simulation.load_displacement(push, displacements=[curve.displacements[1]])
+    )[0]
+    stiffness = (loads[2] - loads[0]) / (curve.displacements[2] - curve.displacements[0])
+    assert at_displacement == pytest.approx(-stiffness * at_force, rel=1e-4)
+
+
+@pytest.mark.parametrize("held", ["force", "displacement"])
+def test_effectivity_of_the_displacement_of_an_output_is_between_a_half_and_two(held, monkeypatch):
+    scene, push, load = arch()
+    (link,) = scene.mechanism.flexible_links
+    crown = scene.mechanism.output(on=link, at=(20, 9), direction=(0, 1))
+    samples = {"forces": [load]} if held == "force" else {"displacements": [0.05]}
+    simulation = fm.Simulation(scene, space="plane-stress", size=4.0)
+    curve = simulation.load_displacement(push, **samples)
+    (estimate,) = simulation.error_estimates(curve, output=crown)
+    refine(monkeypatch, 2)
+    finer = fm.Simulation(scene, space="plane-stress", order=3, size=4.0)
+    error = finer.load_displacement(push, **samples).frames[0].outputs[crown] - curve.frames[0].outputs[crown]
+    assert 0.5 < estimate / error < 2.0
+
+
+def test_curve_file_names_what_the_errors_are_of(tmp_path):
+    scene, push, load = cantilever()
+    simulation = fm.Simulation(scene, space="plane-stress", size=3.0)
+    curve = simulation.load_displacement(push, forces=[load])
+    followed = simulation.follow(push, until=fm.Until(displacement=curve.displacements[0]))
+    held = simulation.load_displacement(push, displacements=list(curve.displacements))
+    headers = []
+    for number, made in enumerate((curve, held, followed)):
+        made.write_csv(tmp_path / f"{number}.csv", errors=simulation.error_estimates(made))
+        (header,) = [name for name in read_curve_csv(tmp_path / f"{number}.csv") if name.startswith("finer")]
+        headers.append(header)
+    assert headers == ["finer elements add to the displacement [mm]", *2 * ["finer elements add to the force [N]"]]
 
 
 @pytest.mark.slow
