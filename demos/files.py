@@ -79,7 +79,9 @@ def summarise(outcome: Outcome, errors: Sequence[np.ndarray]) -> dict:
     """The summary of a run, with the error estimates of its curves (collective)."""
     demo, sim, curves, result = outcome.demo, outcome.sim, outcome.curves, outcome.result
     peak = sim.comm.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, op=MPI.MAX) / 1024.0
-    reached = [None] * len(outcome.targets) if result is None else [target.reached for target in result.targets]
+    reached = [(None, None)] * len(outcome.targets)
+    if result is not None:
+        reached = [(target.reached, target.finer_elements_add) for target in result.targets]
     summary = {
         "demo": demo.name,
         "space": demo.options.space,
@@ -88,11 +90,17 @@ def summarise(outcome: Outcome, errors: Sequence[np.ndarray]) -> dict:
         "dofs": {"rigid": sim.model.rigid_dofs, "flexible": sim.model.flexible_dofs},
         "parameters": result and result.parameters,
         "targets": [
-            {"configuration": t.configuration.name, "force": t.force, "wanted": t.displacement, "reached": there}
-            for t, there in zip(outcome.targets, reached, strict=True)
+            {
+                "configuration": t.configuration.name,
+                "force": t.force,
+                "wanted": t.displacement,
+                "reached": there,
+                "reached_error": error,
+            }
+            for t, (there, error) in zip(outcome.targets, reached, strict=True)
         ],
         "frames": [
-            frame | {"displacement_error": float(error)}
+            frame | {"displacement_error": float(error)}  # the forces are prescribed
             for frame, error in zip(_frames(curves), np.concatenate(errors), strict=True)
         ],
         "seconds": {
@@ -104,6 +112,7 @@ def summarise(outcome: Outcome, errors: Sequence[np.ndarray]) -> dict:
         "iterations": sum(frame.iterations for frame in _loaded(curves)) if result is None else result.iterations,
         "evaluations": result and result.evaluations,
         "objective": dict(zip(("initial", "final"), result.objective if result else (None, None), strict=True)),
+        "objective_error": result and result.objective_error,
         "thickness": result and result.thickness,
         "mesh_ratio_max": sim.mesh_ratio_max,
         "peak_memory_mb": peak,
@@ -149,8 +158,10 @@ def tell(outcome: Outcome, summary: dict) -> None:
 
 def _tell_design(outcome: Outcome, summary: dict) -> None:
     result, coarse, say = outcome.result, outcome.coarse, outcome.demo.say
-    headers = ("configuration", "force [N]", "wanted [mm]", "reached [mm]", "error [%]")
-    columns = [(t.configuration, t.force, t.wanted, t.reached, 100.0 * t.error) for t in result.targets]
+    headers = ("configuration", "force [N]", "wanted [mm]", "reached [mm]", "finer elements add [mm]", "error [%]")
+    columns = [
+        (t.configuration, t.force, t.wanted, t.reached, t.finer_elements_add, 100.0 * t.error) for t in result.targets
+    ]
     if coarse is not None:
         headers += ("plane-stress optimum [mm]", "simulated in 3D [mm]")
         columns = [
@@ -159,9 +170,10 @@ def _tell_design(outcome: Outcome, summary: dict) -> None:
         ]
     say(format_table(headers, columns))
     least, most = result.thickness
+    finer = "" if result.objective_error is None else f", to which finer elements add {result.objective_error:.2g}"
     say(
         f"{result.parameters} parameters, {result.iterations} iterations, {result.evaluations} evaluations: "
-        f"objective {result.objective[0]:.3g} -> {result.objective[1]:.3g} ({result.reason})"
+        f"objective {result.objective[0]:.3g} -> {result.objective[1]:.3g}{finer} ({result.reason})"
     )
     say(
         f"thickness {least:.2f} to {most:.2f} mm, curvature ratio up to {summary['curvature_ratio_max']:.3f}, "

@@ -23,6 +23,7 @@ What is minimised
                           ``barrier``
     ``equilibria``        the targets' equilibria, followed from design to design
     ``objective``         distances from targets plus regularisers, with derivatives
+    ``objective_error``   how wrong it is because elements are not infinitely fine
     ``groups``, ``team``  targets spread over groups of processes; one process decides
     ``optimisers``        Levenberg–Marquardt, BFGS
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,23 +22,35 @@ _log = logger(__name__)
 _SAME = 1e-6  # relative difference between displacements of one equilibrium
 
 
-def verify(simulation: Simulation, targets: Sequence[Target], followed: np.ndarray) -> tuple[np.ndarray, bool]:
-    """Displacements on the paths from zero load, which is where a user will find them (collective).
+@dataclass(frozen=True, eq=False)
+class Verification:
+    """What a user will find when loading the optimum from zero.
+
+    Attributes:
+        displacements: of the targets' points, (targets,); as followed, where one of them is not reached.
+        same: whether these are the ones that were followed.
+        errors: what finer elements would add to them, (targets,); None if one of them is not reached.
+    """
+
+    displacements: np.ndarray
+    same: bool
+    errors: np.ndarray | None
+
+
+def verify(simulation: Simulation, targets: Sequence[Target], followed: np.ndarray) -> Verification:
+    """Loads the targets from zero, which is what a user will do, and logs where that leads elsewhere (collective).
 
     Args:
         simulation: has the shapes of the optimum.
         targets: what was wanted.
         followed: displacements of the equilibria that were followed from design to design, (targets,).
-
-    Returns:
-        The displacements from zero load, (targets,), or ``followed`` if one of them is not reached; and whether both
-        are the same. If not, it is logged.
     """
+    equilibria = TargetEquilibria(simulation, targets)
     try:
-        traced = TargetEquilibria(simulation, targets).trace()
+        traced = equilibria.trace()
     except Infeasible as failure:
         _log.warning("loaded from zero, the optimum does not reach all its targets: %s", failure)
-        return followed, False
+        return Verification(followed, False, None)
     verified = np.array([sample.displacement for sample in traced.samples])
     different = np.flatnonzero(np.abs(verified - followed) > _SAME * target_scales(targets))
     for index in different:
@@ -47,22 +60,27 @@ def verify(simulation: Simulation, targets: Sequence[Target], followed: np.ndarr
             verified[index],
             followed[index],
         )
-    return verified, len(different) == 0
+    return Verification(verified, len(different) == 0, equilibria.errors(traced))
 
 
-def target_results(targets: Sequence[Target], started: np.ndarray, reached: np.ndarray) -> tuple[TargetResult, ...]:
-    """How far each target was reached, from displacements at the start and at the end, (targets,) each."""
+def target_results(
+    targets: Sequence[Target], started: np.ndarray, verification: Verification
+) -> tuple[TargetResult, ...]:
+    """How far each target was reached, from displacements at the start, (targets,), and at the end."""
+    reached, finer = verification.displacements, verification.errors
+    errors = target_errors(targets, reached)
     return tuple(
         TargetResult(
             force_name=target.force_part.name,
             configuration=target.configuration.name,
             force=target.force,
             wanted=target.displacement,
-            started=float(start),
-            reached=float(there),
-            error=float(error),
+            started=float(started[k]),
+            reached=float(reached[k]),
+            error=float(errors[k]),
+            finer_elements_add=None if finer is None else float(finer[k]),
         )
-        for target, start, there, error in zip(targets, started, reached, target_errors(targets, reached), strict=True)
+        for k, target in enumerate(targets)
     )
 
 

@@ -18,6 +18,7 @@ from fenicsmech.design.handle_optimum import Placement
 from fenicsmech.design.link_files import draw_links, outline, rest_meshes, write_solids
 from fenicsmech.design.link_shape import LinkShape, shape_links
 from fenicsmech.design.objective import Objective, target_errors
+from fenicsmech.design.objective_error import objective_error
 from fenicsmech.design.optimisers import Infeasible, Iterate, LevenbergMarquardt, Minimiser, Reason, Start
 from fenicsmech.design.problem_checks import check_designs, check_effects, check_targets
 from fenicsmech.design.progress import DesignProgress
@@ -150,16 +151,19 @@ class DesignProblem:
         comm, placement = self.simulation.comm, self.simulation.comm.bcast(objective.placement, root=0)
         with self._clock.phase("verification"):
             self._rest.place(outcome.parameters, placement)
-            reached, verified = verify(self.simulation, self.targets, objective.reached)
+            found = verify(self.simulation, self.targets, objective.reached)
         result = DesignResult(
             mechanism=self.simulation.scene.mechanism.name,
             links=link_designs(self._rest, placement),
-            targets=target_results(self.targets, outcome.started, reached),
+            targets=target_results(self.targets, outcome.started, found),
             reason=outcome.reason.value,
             converged=outcome.reason is Reason.CONVERGED,
-            verified=verified,
+            verified=found.same,
             active=objective.active(outcome.parameters),
             objective=(initial, final),
+            objective_error=None
+            if found.errors is None
+            else objective_error(self.targets, found.displacements, found.errors),
             iterations=outcome.number,
             evaluations=outcome.evaluations,
             mesh_ratio_max=self.simulation.mesh_ratio_max,

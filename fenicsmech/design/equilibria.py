@@ -27,6 +27,8 @@ from fenicsmech.errors import EquilibriumError
 from fenicsmech.linkage import assemble
 from fenicsmech.mechanism import FlexibleLink
 from fenicsmech.simulation import Simulation
+from fenicsmech.simulation.goal import Goal
+from fenicsmech.simulation.influence import Equilibrium
 from fenicsmech.simulation.request import CurveRequest
 
 _HALVINGS = 2  # of a change of design whose equilibrium is not found, or lies elsewhere
@@ -109,6 +111,18 @@ class TargetEquilibria:
         """Derivatives of the displacements by the design field that the model holds, (targets, owned values)."""
         fields = [self._gradient(*pair) for pair in zip(self.targets, known.samples, strict=True)]
         return np.array(fields).reshape(len(fields), -1)
+
+    def errors(self, known: Known) -> np.ndarray:
+        """What finer elements would add to the displacements, (targets,)."""
+        return np.array([self._error(*pair, known.design) for pair in zip(self.targets, known.samples, strict=True)])
+
+    def _error(self, target: Target, sample: Sample, design: np.ndarray) -> float:
+        newton, floor = self._newtons[target.force_part], self._floor[target]
+
+        def error(state: State) -> float:
+            return self._simulation.estimates.elements_at(newton, Equilibrium(state, design, Goal.DISPLACEMENT, floor))
+
+        return error(sample.state) - (0.0 if sample.origin is None else error(sample.origin))
 
     def _gradient(self, target: Target, sample: Sample) -> np.ndarray:
         adjoint, floor = self._adjoints[target.force_part], self._floor[target]

@@ -45,6 +45,8 @@ class TargetResult:
             the best design.
         error: of the reached displacement, relative to the wanted one (to a tenth of the largest wanted one where
             the wanted one is next to nothing).
+        finer_elements_add: estimate of what infinitely fine elements would add to the reached displacement; None if
+            loading the mechanism from zero does not lead there.
     """
 
     force_name: str
@@ -54,6 +56,7 @@ class TargetResult:
     started: float
     reached: float
     error: float
+    finer_elements_add: float | None
 
 
 @dataclass(frozen=True)
@@ -70,6 +73,8 @@ class DesignResult:
             design; the log says where not.
         active: the bounds that hold the design back, in words.
         objective: of the initial and of the final design.
+        objective_error: estimate of what infinitely fine elements would add to the final one; None if one of its
+            targets' displacements is not known.
         iterations, evaluations: of the objective.
         mesh_ratio_max: largest circumradius over inradius among the cells.
         seconds: wall-clock time.
@@ -86,6 +91,7 @@ class DesignResult:
     verified: bool
     active: tuple[str, ...]
     objective: tuple[float, float]
+    objective_error: float | None
     iterations: int
     evaluations: int
     mesh_ratio_max: float

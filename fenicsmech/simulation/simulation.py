@@ -292,7 +292,7 @@ class Simulation:
         Raises:
             DescriptionError: no curve was computed yet.
         """
-        return self._estimates.elements(self._chosen(curve), output)
+        return self.estimates.elements(self._chosen(curve), output)
 
     def modelling_errors(self, curve: Curve | None = None, *, output: Output | None = None) -> np.ndarray:
         """What a simulation in space would add to plane stress, arguments and result as of ``error_estimates``.
@@ -300,7 +300,7 @@ class Simulation:
         Raises:
             DescriptionError: no curve was computed yet, or this is not plane stress.
         """
-        return self._estimates.depth(self._chosen(curve), output)
+        return self.estimates.depth(self._chosen(curve), output)
 
     def explain(self, curve: Curve | None = None, *, tolerance: float = 0.01) -> Explanation:
         """What is simulated and what is left out, with figures where that may matter (collective).
@@ -404,7 +404,8 @@ class Simulation:
         return Curves(self.model, self._solver, self._predictor, self.scene.units)
 
     @cached_property
-    def _estimates(self) -> Estimates:
+    def estimates(self) -> Estimates:
+        """Error estimates at equilibria of the present fidelity (collective)."""
         return Estimates(self.model, self._curves.newton)
 
     def _check_description(self) -> None:
@@ -421,7 +422,7 @@ class Simulation:
         linkage = build_linkage(self.scene.mechanism, fidelity.model.mechanism_dim)
         check_links(self.scene.mechanism, linkage, fidelity)
         self.fidelity, self.linkage = fidelity, linkage
-        for derived in ("model", "_curves", "_estimates"):
+        for derived in ("model", "_curves", "estimates"):
             self.__dict__.pop(derived, None)
 
     def _outcome(self, rung: Rung, request: CurveRequest, watch: Callable[[int], None]) -> Outcome:
@@ -434,9 +435,9 @@ class Simulation:
         largest = int(np.argmax(np.abs(values)))
         frame = replace(curve, frames=curve.frames[largest : largest + 1])
         if fidelity.model is PLANE_STRESS:
-            ((elements, depth),) = self._estimates.elements_and_depth(frame)
+            ((elements, depth),) = self.estimates.elements_and_depth(frame)
         else:
-            elements, depth = float(self._estimates.elements(frame)[0]), 0.0
+            elements, depth = float(self.estimates.elements(frame)[0]), 0.0
         unknowns = self.model.rigid_dofs + self.model.flexible_dofs + self.model.pressure_dofs
         return Outcome(float(values[largest]), elements, depth, unknowns)
 

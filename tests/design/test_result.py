@@ -29,14 +29,19 @@ RESULT = DesignResult(
     mechanism="Zange “ß”",
     links=(link("coupler", (1.0 / 3.0, 2.0)), link("rocker", (0.7, 4.1))),
     targets=(
-        TargetResult("push", "as drawn", 0.1, wanted=2.0, started=0.3, reached=1.99, error=-0.005),
-        TargetResult("push", "geöffnet", 0.4, wanted=0.0, started=0.3, reached=0.02, error=0.1),
+        TargetResult(
+            "push", "as drawn", 0.1, wanted=2.0, started=0.3, reached=1.99, error=-0.005, finer_elements_add=1e-3 / 3.0
+        ),
+        TargetResult(
+            "push", "geöffnet", 0.4, wanted=0.0, started=0.3, reached=0.02, error=0.1, finer_elements_add=None
+        ),
     ),
     reason="a minimum was found",
     converged=True,
     verified=True,
     active=("least thickness 0.7 of 'rocker'",),
     objective=(0.4 / 7.0, 1e-17 / 3.0),
+    objective_error=1e-5 / 3.0,
     iterations=7,
     evaluations=9,
     mesh_ratio_max=4.0 / 3.0,

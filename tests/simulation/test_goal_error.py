@@ -1,4 +1,4 @@
-"""Error estimates of displacements and forces: within a factor of two of the true errors, below half a frame in cost."""
+"""Error estimates of displacements and forces: within a factor of two of the true errors, at half a frame at most."""
 
 from __future__ import annotations
 

@@ -1,0 +1,69 @@
+"""Error estimates of objectives: within a factor of two of what much finer elements give; results carry them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import fenicsmech as fm
+from fenicsmech.design.equilibria import TargetEquilibria
+from fenicsmech.design.objective import target_errors
+from fenicsmech.design.objective_error import objective_error
+
+from ..simulation.demo_scenes import describe
+from ..simulation.refined import arch, cantilever, refine
+from .mechanisms import truss
+
+LOADS = {"truss": 0.4, "claw": 10.0, "klann": 5.0}
+
+
+def case(name: str):
+    """Scene, force and load of a problem."""
+    made = {"cantilever": cantilever, "arch": arch}
+    if name in made:
+        return made[name]()
+    scene, push = describe(name)[:2]
+    return scene, push, LOADS[name]
+
+
+def value(targets, reached) -> float:
+    """Σ ½ w r²."""
+    return float(np.array([0.5 * target.weight for target in targets]) @ target_errors(targets, reached) ** 2)
+
+
+@pytest.mark.parametrize("name", ["cantilever", "arch", "truss", "claw", "klann"])
+def test_effectivity_is_between_a_half_and_two(name, monkeypatch):
+    scene, push, load = case(name)
+    simulation = fm.Simulation(scene, space="plane-stress", size=2.0, comm=MPI.COMM_SELF)
+    rough = simulation.load_displacement(push, forces=[load]).displacements[0]
+    targets = [fm.Target(push, load, 0.8 * rough, weight=2.0), fm.Target(push, 0.5 * load, 0.3 * rough)]
+    equilibria = TargetEquilibria(simulation, targets)
+    known = equilibria.trace()
+    reached = np.array([sample.displacement for sample in known.samples])
+    estimate = objective_error(targets, reached, equilibria.errors(known))
+    refine(monkeypatch, 1)
+    finer = fm.Simulation(scene, space="plane-stress", order=3, size=2.0, comm=MPI.COMM_SELF)
+    there = np.array([sample.displacement for sample in TargetEquilibria(finer, targets).trace().samples])
+    assert 0.5 < estimate / (value(targets, there) - value(targets, reached)) < 2.0
+
+
+def test_it_is_exact_in_exact_errors():
+    _, push, load = cantilever()
+    targets = [fm.Target(push, load, 4.0, weight=3.0), fm.Target(push, -load, 0.0)]
+    reached, errors = np.array([4.3, 0.1]), np.array([-0.2, 0.05])
+    assert objective_error(targets, reached, errors) == pytest.approx(
+        value(targets, reached + errors) - value(targets, reached), rel=1e-12
+    )
+
+
+def test_designs_carry_the_errors_of_displacements_and_objective():
+    case = truss((0.1, 6.0), (0.4, 9.0))
+    problem = case.problem(size=4.0)
+    result = problem.optimize(minimiser=fm.LevenbergMarquardt(iterations=2))
+    forces = [target.force for target in result.targets]
+    curve = problem.simulation.load_displacement(case.targets[0].force_part, forces=forces)
+    errors = [target.finer_elements_add for target in result.targets]
+    assert errors == pytest.approx(problem.simulation.error_estimates(curve), rel=1e-5)
+    reached = np.array([target.reached for target in result.targets])
+    assert result.objective_error == pytest.approx(objective_error(case.targets, reached, np.array(errors)))
