@@ -27,6 +27,8 @@ class Curve:
         leads: whether this process writes files.
         others: constant magnitudes of other forces.
         goal: what the samples leave open: displacements, or forces where displacements were prescribed.
+        corrections: what ``displacements``, or ``forces`` where they are the goal, have more than the frames: estimates
+            of what finer elements and space would add. Only where the fidelity was chosen by an accuracy, else empty.
     """
 
     force_part: Force
@@ -37,16 +39,22 @@ class Curve:
     leads: bool
     others: tuple[tuple[Force, float], ...] = ()
     goal: Goal = Goal.DISPLACEMENT
+    corrections: tuple[float, ...] = ()
 
     @property
     def forces(self) -> np.ndarray:
         """(frames,)."""
-        return np.array([frame.force for frame in self.frames])
+        return self._corrected(Goal.FORCE, [frame.force for frame in self.frames])
 
     @property
     def displacements(self) -> np.ndarray:
         """(frames,)."""
-        return np.array([frame.displacement for frame in self.frames])
+        return self._corrected(Goal.DISPLACEMENT, [frame.displacement for frame in self.frames])
+
+    @property
+    def goals(self) -> np.ndarray:
+        """What the samples leave open, (frames,)."""
+        return self.forces if self.goal is Goal.FORCE else self.displacements
 
     @property
     def stable(self) -> np.ndarray:
@@ -90,7 +98,13 @@ class Curve:
                 f"strain energy [{force} {length}]": np.array([frame.strain_energy for frame in self.frames]),
                 f"max von Mises [{stress}]": np.array([frame.max_stress for frame in self.frames]),
             }
+            unit = force if self.goal is Goal.FORCE else length
+            if self.corrections:
+                columns[f"correction within the {self.goal.value} [{unit}]"] = np.array(self.corrections)
             if errors is not None:
-                unit = force if self.goal is Goal.FORCE else length
                 columns[f"finer elements add to the {self.goal.value} [{unit}]"] = errors
             write_curve_csv(Path(path), columns)
+
+    def _corrected(self, goal: Goal, values: list[float]) -> np.ndarray:
+        corrected = self.corrections and goal is self.goal
+        return np.array(values) + np.array(self.corrections) if corrected else np.array(values)

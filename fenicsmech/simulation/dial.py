@@ -4,6 +4,15 @@ Rungs are climbed from a coarse pilot. Errors of elements and of plane stress ar
 ``depth_error``), and the next rung is the first that these let expect to do, by the gains that rungs of a family have
 over each other. Gains and work of rungs were measured on claw, truss and Klann leg; they only tell where to look: what
 counts is the estimate on the rung itself.
+
+Estimates are signed, and so they are added to the results (``Curve.corrections``). What is asked to be small is what
+they may leave,
+
+    |error| ≤ ½ |elements| + 0.65 |depth|,
+
+which holds as long as what finer elements add is between ½ and 1½ times, and what space adds between a third and 1.65
+times its estimate: on cantilever, arch, truss, claw and Klann leg it is. Source for corrections by adjoints: Pierce &
+Giles (doi:10.1137/S0036144598349423).
 """
 
 from __future__ import annotations
@@ -31,7 +40,9 @@ from fenicsmech.meshing.thickness import typical_thickness
 from fenicsmech.simulation.fidelity import Fidelity, check_scene, fits
 
 _log = logger(__name__)
-_SAFETY = 1.3  # on estimates, which lie within a factor of two of the errors, mostly within 1.3
+_LEFT_OF_ELEMENTS, _LEFT_OF_DEPTH = 0.5, 0.65  # of an estimate, once it is added
+_CAUTION = 1.3  # on what a rung is expected to do
+_FIRST_ORDER = 0.1  # of the largest displacement: larger estimates, as near limit points, mean nothing
 _LEFT_IN_SPACE = 0.55  # of the plane-stress error: what the coarsest rung in space leaves of it
 
 
@@ -119,14 +130,14 @@ class Trial:
 
     @property
     def error(self) -> float:
-        """|elements| + |depth|."""
-        return abs(self.elements) + abs(self.depth)
+        """What may be left once both estimates are added."""
+        return _left(self.elements, self.depth)
 
     def __str__(self) -> str:
         depth = f" + {abs(self.depth):.2%} for contraction that pins block" if self.rung.model is PLANE_STRESS else ""
         return (
             f"{self.rung.name} ({self.unknowns} unknowns, {self.seconds:.2g} s): "
-            f"error of about {abs(self.elements):.2%} for the elements{depth}"
+            f"error of about {abs(self.elements):.2%} for the elements{depth}; at most {self.error:.2%} once corrected"
         )
 
 
@@ -137,7 +148,7 @@ class Choice:
     Attributes:
         accuracy: asked for, relative to the largest displacement of the curve.
         trials: rungs that were tried, the one chosen last.
-        reached: whether its estimated error, with a margin, is below the accuracy.
+        reached: whether what may be left of its error is below the accuracy.
         finer: what ten times the accuracy would take, in words.
     """
 
@@ -160,9 +171,9 @@ class Choice:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a rung gives: the displacement, and the estimates of its errors in the same unit."""
+    """What a rung gives: a displacement or force, and the estimates of its errors in the same unit."""
 
-    displacement: float
+    value: float
     elements: float
     depth: float
     unknowns: int
@@ -216,7 +227,7 @@ class Dial:
         while following is not None:
             self.rung, start = following, perf_counter()
             outcome = run(self.rung)
-            scale = max(abs(outcome.displacement), np.finfo(float).tiny)
+            scale = max(abs(outcome.value), np.finfo(float).tiny)
             elements, depth = outcome.elements / scale, outcome.depth / scale
             trials.append(Trial(self.rung, elements, depth, outcome.unknowns, perf_counter() - start))
             _log.info("%s", trials[-1])
@@ -227,17 +238,20 @@ class Dial:
         return Choice(self._accuracy, tuple(trials), reached, self._tenfold(trials[-1]))
 
     def _does(self, error: float) -> bool:
-        return _SAFETY * error <= self._accuracy
+        return error <= self._accuracy
+
+    def _should_do(self, error: float) -> bool:
+        return _CAUTION * error <= self._accuracy
 
     def _next(self, trial: Trial) -> Rung | None:
         """The first finer rung that should do, the finest if none should; None if no other is needed, or left."""
         finer = [] if self._does(trial.error) else self._finer(trial.rung)
-        return next((rung for rung in finer if expected(trial, rung) <= self._accuracy), finer[-1] if finer else None)
+        return next((rung for rung in finer if self._should_do(expected(trial, rung))), finer[-1] if finer else None)
 
     def _tenfold(self, trial: Trial) -> str:
         """What a tenth of the error would take."""
         for rung in self._finer(trial.rung):
-            if self._does(10.0 * expected(trial, rung)):
+            if self._should_do(10.0 * expected(trial, rung)):
                 leap = _SPACE_WORK if rung.model is not trial.rung.model else 1.0
                 return f"{rung.name}, about {leap * rung.work / trial.rung.work * trial.seconds:.2g} s"
         return "beyond the finest rung; give size=… and order=3, and extrapolate"
@@ -252,8 +266,18 @@ class Dial:
 def expected(trial: Trial, rung: Rung) -> float:
     """The error to be expected of ``rung``, from that of another."""
     if rung.model is trial.rung.model:
-        return abs(trial.elements) * rung.gain / trial.rung.gain + abs(trial.depth)
-    return (_LEFT_IN_SPACE * abs(trial.depth) + abs(trial.elements) / trial.rung.gain) * rung.gain
+        return _left(trial.elements * rung.gain / trial.rung.gain, trial.depth)
+    return _left((_LEFT_IN_SPACE * abs(trial.depth) + abs(trial.elements) / trial.rung.gain) * rung.gain, 0.0)
+
+
+def corrections(errors: np.ndarray, values: np.ndarray) -> tuple[float, ...]:
+    """What to add to the values of a curve, from the estimates of their errors, (frames,) each."""
+    return tuple(np.where(np.abs(errors) > _FIRST_ORDER * np.abs(values).max(), 0.0, errors).tolist())
+
+
+def _left(elements: float, depth: float) -> float:
+    """What estimates may leave of an error once they are added."""
+    return _LEFT_OF_ELEMENTS * abs(elements) + _LEFT_OF_DEPTH * abs(depth)
 
 
 def _fits(scene: Scene, model: ElasticModel) -> bool:

@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from fenicsmech.elasticity import PLANE_STRESS
 from fenicsmech.equilibrium import Iteration
 from fenicsmech.mechanism import Output
 from fenicsmech.simulation.curve import Curve
@@ -47,6 +48,11 @@ class Estimates:
     def elements_and_depth(self, curve: Curve) -> np.ndarray:
         """Both in plane stress, from one adjoint per frame, (frames, 2)."""
         return self._of_frames([self._goal_error, self._depth_error], curve, None)
+
+    def errors(self, curve: Curve) -> np.ndarray:
+        """What finer elements and, in plane stress, space would add together, (frames,)."""
+        planar = self._model.elastic.model is PLANE_STRESS
+        return self.elements_and_depth(curve).sum(axis=1) if planar else self.elements(curve)
 
     def elements_at(self, newton: Iteration, at: Equilibrium) -> float:
         """What finer elements would add to what one equilibrium leaves open, found by ``newton``."""

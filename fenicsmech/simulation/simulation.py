@@ -34,14 +34,13 @@ from fenicsmech.report import Panel, Progress, Silent, Trace, draw_configuration
 from fenicsmech.simulation.buckling import BucklingLoad, SoftMode, buckling_loads, soft_modes
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.curves import Curves
-from fenicsmech.simulation.dial import Choice, Dial, Outcome, Rung, refuse_beside_accuracy
+from fenicsmech.simulation.dial import Choice, Dial, Outcome, Rung, corrections, refuse_beside_accuracy
 from fenicsmech.simulation.estimates import Estimates
 from fenicsmech.simulation.explanation import Explanation, hints, simulated
 from fenicsmech.simulation.export import write_xdmf
 from fenicsmech.simulation.fidelity import Fidelity, read_fidelity
 from fenicsmech.simulation.followed import FollowedCurve, PathEvent
 from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.goal import Goal
 from fenicsmech.simulation.link_meshes import check_links, mesh_mechanism
 from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.picture import panel
@@ -64,8 +63,8 @@ class Simulation:
         size: element size in the plane of the links, or one per flexible link.
         accuracy: instead of all that says how finely: relative error allowed in the largest displacement of every
             curve, or in the largest force where displacements are prescribed. ``load_displacement`` finds the cheapest
-            fidelity whose estimated error is below it, see ``choice``. With links known from files only, ``size``
-            stands for their thickness.
+            fidelity that is good enough with the estimates of its errors added, see ``choice`` and
+            ``Curve.corrections``. With links known from files only, ``size`` stands for their thickness.
         layers: of elements through the depth, or half of it where half is meshed; by default from depth and size.
         segments: of elements around pins, at least; 8 by default.
         quadrature: quadrature degree; the measured optimum by default.
@@ -169,6 +168,7 @@ class Simulation:
                 self._last = self.trace(request, watch=progress.update)
             else:
                 self.choice = self._dial.settle(lambda rung: self._outcome(rung, request, progress.update))
+                self._last = self._corrected(self._last)
         return self._last
 
     def trace(self, request: CurveRequest, *, watch: Callable[[int], None] = lambda done: None) -> Curve:
@@ -431,15 +431,18 @@ class Simulation:
         if fidelity != self.fidelity:
             self._take(fidelity)
         self._last = curve = self.trace(request, watch=watch)
-        values = curve.forces if curve.goal is Goal.FORCE else curve.displacements
-        largest = int(np.argmax(np.abs(values)))
+        largest = int(np.argmax(np.abs(curve.goals)))
         frame = replace(curve, frames=curve.frames[largest : largest + 1])
         if fidelity.model is PLANE_STRESS:
             ((elements, depth),) = self.estimates.elements_and_depth(frame)
         else:
             elements, depth = float(self.estimates.elements(frame)[0]), 0.0
         unknowns = self.model.rigid_dofs + self.model.flexible_dofs + self.model.pressure_dofs
-        return Outcome(float(values[largest]), elements, depth, unknowns)
+        return Outcome(float(curve.goals[largest]), elements, depth, unknowns)
+
+    def _corrected(self, curve: Curve) -> Curve:
+        """A curve with the estimates of its errors added (collective)."""
+        return replace(curve, corrections=corrections(self.estimates.errors(curve), curve.goals))
 
     def _chosen(self, curve: Curve | None) -> Curve:
         chosen = curve or self._last

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import fenicsmech as fm
 from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRESS, SPATIAL, Mixed
-from fenicsmech.simulation.dial import Dial, Outcome, family
+from fenicsmech.report import read_curve_csv
+from fenicsmech.simulation.dial import Dial, Outcome, corrections, family
 
 from .demo_scenes import describe
 from .refined import cantilever
@@ -36,7 +38,7 @@ def test_the_pilot_is_taken_if_its_estimate_will_do():
     choice = dial(0.05).settle(run)
     assert run.rungs == family(PLANE_STRESS)[:1]
     assert choice.reached
-    assert choice.chosen.error == pytest.approx(0.02)
+    assert choice.chosen.error == pytest.approx(0.5 * 0.01 + 0.65 * 0.01)
 
 
 def test_elements_are_refined_in_the_plane_as_long_as_they_are_what_is_wrong():
@@ -87,17 +89,42 @@ def test_choice_tells_what_was_tried_and_what_ten_times_the_accuracy_would_cost(
     assert text.rstrip().endswith(" s")
 
 
-def test_curves_are_as_accurate_as_asked_for():
+def test_curves_are_as_accurate_as_asked_for_with_their_corrections(tmp_path):
     scene, push = describe("truss")[:2]
     forces = [0.2, LOADS["truss"]]
     finest = fm.Simulation(scene, space="3d-symmetric", order=3, size=3.6, layers=2, segments=16)
     reference = finest.load_displacement(push, forces=forces).displacements[-1]
-    for accuracy in (0.05, 0.01):
+    for accuracy, model in ((0.05, PLANE_STRESS), (0.01, PLANE_STRESS), (0.005, MID_PLANE_SYMMETRIC)):
         simulation = fm.Simulation(scene, accuracy=accuracy)
         curve = simulation.load_displacement(push, forces=forces)
         assert simulation.choice.reached
-        assert abs(curve.displacements[-1] / reference - 1.0) < accuracy
-    assert simulation.fidelity.model is MID_PLANE_SYMMETRIC
+        assert simulation.fidelity.model is model
+        error, computed = (abs(value / reference - 1.0) for value in (curve.displacements[-1], _computed(curve)))
+        assert error < accuracy
+        assert error < 0.5 * computed
+    curve.write_csv(tmp_path / "curve.csv")
+    columns = read_curve_csv(tmp_path / "curve.csv")
+    assert columns["correction within the displacement [mm]"] == pytest.approx(curve.corrections)
+
+
+def _computed(curve: fm.Curve) -> float:
+    """The last displacement as computed, which corrections do not touch."""
+    return curve.frames[-1].displacement
+
+
+def test_forces_are_as_accurate_as_asked_for_where_displacements_are_prescribed():
+    scene, push, load = cantilever()
+    finest = fm.Simulation(scene, space="3d-symmetric", order=3, size=3.0, layers=2, segments=16)
+    reference = finest.load_displacement(push, displacements=[5.0, 10.0]).forces[-1]
+    simulation = fm.Simulation(scene, accuracy=0.02)
+    curve = simulation.load_displacement(push, displacements=[5.0, 10.0])
+    assert list(curve.displacements) == pytest.approx([5.0, 10.0])
+    assert abs(curve.forces[-1] / reference - 1.0) < 0.02
+    assert curve.forces[-1] != curve.frames[-1].force
+
+
+def test_estimates_beyond_first_order_are_no_corrections():
+    assert corrections(np.array([0.01, -0.5, 0.02]), np.array([0.1, 0.5, 1.0])) == (0.01, 0.0, 0.02)
 
 
 @pytest.mark.slow
