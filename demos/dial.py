@@ -2,10 +2,10 @@
 
     OPENBLAS_NUM_THREADS=1 python3 demos/dial.py [truss|claw|klann …] [--accuracy A …]
 
-For each mechanism and accuracy: the rung that Simulation(scene, accuracy=A) chose, what its corrected results may be off
-by, what they are off by (against the finest rung with its estimate added), without the correction too; seconds from
-description to curve (rungs that were tried in vain, and estimates, included; forms are compiled before), and the same
-over those of the cheapest rung that brute force finds, whose results are not corrected.
+For each mechanism and accuracy: the rung that Simulation(scene, accuracy=A) chose, what its corrected results may be
+off by, what they are off by (against the finest rung with its estimate added), without the correction too; seconds
+from description to curve (rungs that were tried in vain, and estimates, included; forms are compiled before), and the
+same over those of the cheapest rung that brute force finds, whose results are not corrected.
 """
 
 import argparse
