@@ -8,11 +8,11 @@ counts is the estimate on the rung itself.
 Estimates are signed, and so they are added to the results (``Curve.corrections``). What is asked to be small is what
 they may leave,
 
-    |error| ≤ ½ |elements| + 0.65 |depth|,
+    |error| ≤ l |elements| + 0.6 |depth|,
 
-which holds as long as what finer elements add is between ½ and 1½ times, and what space adds between a third and 1.65
-times its estimate: on cantilever, arch, truss, claw and Klann leg it is. Source for corrections by adjoints: Pierce &
-Giles (doi:10.1137/S0036144598349423).
+with l by rung (``Rung.left``): measured on cantilever, arch, truss, claw and Klann leg, where what space adds is 0.7 to
+1.6 times its estimate, and what finer elements add 0.5 to 1.5 times, but on the coarsest rung up to 2.7 times. Source
+for corrections by adjoints: Pierce & Giles (doi:10.1137/S0036144598349423).
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from fenicsmech.meshing.thickness import typical_thickness
 from fenicsmech.simulation.fidelity import Fidelity, check_scene, fits
 
 _log = logger(__name__)
-_LEFT_OF_ELEMENTS, _LEFT_OF_DEPTH = 0.5, 0.65  # of an estimate, once it is added
+_LEFT_OF_DEPTH = 0.6  # of what space is estimated to add, once it is added
 _CAUTION = 1.3  # on what a rung is expected to do
 _FIRST_ORDER = 0.1  # of the largest displacement: larger estimates, as near limit points, mean nothing
 _LEFT_IN_SPACE = 0.55  # of the plane-stress error: what the coarsest rung in space leaves of it
@@ -71,6 +71,7 @@ class Rung:
         size: element size over the thickness of the links.
         layers: through half the depth, in space.
         segments: around pins.
+        left: what may be left of the error of the elements once its estimate is added, over the estimate.
         gain: error of the elements over that of the family's coarsest rung.
         work: time over that of the family's coarsest rung.
     """
@@ -80,6 +81,7 @@ class Rung:
     size: float
     layers: int
     segments: int
+    left: float
     gain: float
     work: float
 
@@ -93,21 +95,24 @@ class Rung:
 
 
 _SPACE_WORK = 5.0  # time of the coarsest rung in space over that in plane stress
-_PLANAR = ((2, 2.5, 8, 1.0, 1.0), (2, 1.3, 8, 0.55, 1.2), (3, 2.5, 8, 0.15, 2.0), (3, 0.8, 16, 0.03, 5.0))
+_PLANAR = (
+    (2, 2.5, 1, 8, 1.7, 1.0, 1.0),
+    (2, 1.3, 1, 8, 0.6, 0.55, 1.2),
+    (3, 2.5, 1, 8, 0.6, 0.15, 2.0),
+    (3, 0.8, 1, 16, 0.6, 0.03, 5.0),
+)
 _SPATIAL = (
-    (2, 2.5, 1, 8, 1.0, 1.0),
-    (3, 2.5, 1, 8, 0.11, 5.0),
-    (3, 2.5, 1, 16, 0.055, 9.0),
-    (3, 2.5, 2, 16, 0.03, 20.0),
-    (3, 1.2, 2, 24, 0.02, 45.0),
+    (2, 2.5, 1, 8, 0.6, 1.0, 1.0),
+    (3, 2.5, 1, 8, 0.6, 0.11, 5.0),
+    (3, 2.5, 1, 16, 0.6, 0.055, 9.0),
+    (3, 2.5, 2, 16, 0.6, 0.03, 20.0),
+    (3, 1.2, 2, 24, 0.6, 0.02, 45.0),
 )
 
 
 def family(model: ElasticModel) -> list[Rung]:
     """The rungs of a model, from coarse to fine."""
-    if model is PLANE_STRESS:
-        return [Rung(model, order, size, 1, segments, gain, work) for order, size, segments, gain, work in _PLANAR]
-    return [Rung(model, *rest) for rest in _SPATIAL]
+    return [Rung(model, *rest) for rest in (_PLANAR if model is PLANE_STRESS else _SPATIAL)]
 
 
 @dataclass(frozen=True)
@@ -131,7 +136,7 @@ class Trial:
     @property
     def error(self) -> float:
         """What may be left once both estimates are added."""
-        return _left(self.elements, self.depth)
+        return _left(self.rung, self.elements, self.depth)
 
     def __str__(self) -> str:
         depth = f" + {abs(self.depth):.2%} for contraction that pins block" if self.rung.model is PLANE_STRESS else ""
@@ -266,8 +271,8 @@ class Dial:
 def expected(trial: Trial, rung: Rung) -> float:
     """The error to be expected of ``rung``, from that of another."""
     if rung.model is trial.rung.model:
-        return _left(trial.elements * rung.gain / trial.rung.gain, trial.depth)
-    return _left((_LEFT_IN_SPACE * abs(trial.depth) + abs(trial.elements) / trial.rung.gain) * rung.gain, 0.0)
+        return _left(rung, trial.elements * rung.gain / trial.rung.gain, trial.depth)
+    return _left(rung, (_LEFT_IN_SPACE * abs(trial.depth) + abs(trial.elements) / trial.rung.gain) * rung.gain, 0.0)
 
 
 def corrections(errors: np.ndarray, values: np.ndarray) -> tuple[float, ...]:
@@ -275,9 +280,9 @@ def corrections(errors: np.ndarray, values: np.ndarray) -> tuple[float, ...]:
     return tuple(np.where(np.abs(errors) > _FIRST_ORDER * np.abs(values).max(), 0.0, errors).tolist())
 
 
-def _left(elements: float, depth: float) -> float:
-    """What estimates may leave of an error once they are added."""
-    return _LEFT_OF_ELEMENTS * abs(elements) + _LEFT_OF_DEPTH * abs(depth)
+def _left(rung: Rung, elements: float, depth: float) -> float:
+    """What estimates on a rung may leave of its error once they are added."""
+    return rung.left * abs(elements) + _LEFT_OF_DEPTH * abs(depth)
 
 
 def _fits(scene: Scene, model: ElasticModel) -> bool:

@@ -45,14 +45,15 @@ class Estimates:
         """
         return self._of_frames([self._depth_error], curve, output)[:, 0]
 
-    def elements_and_depth(self, curve: Curve) -> np.ndarray:
-        """Both in plane stress, from one adjoint per frame, (frames, 2)."""
-        return self._of_frames([self._goal_error, self._depth_error], curve, None)
+    def elements_and_depth(self, curve: Curve) -> tuple[np.ndarray, np.ndarray]:
+        """What finer elements, and what space would add to plane stress, from one adjoint per frame, (frames,) each.
 
-    def errors(self, curve: Curve) -> np.ndarray:
-        """What finer elements and, in plane stress, space would add together, (frames,)."""
-        planar = self._model.elastic.model is PLANE_STRESS
-        return self.elements_and_depth(curve).sum(axis=1) if planar else self.elements(curve)
+        Other models have no second part: it is zero.
+        """
+        if self._model.elastic.model is not PLANE_STRESS:
+            return self.elements(curve), np.zeros(len(curve.frames))
+        elements, depth = self._of_frames([self._goal_error, self._depth_error], curve, None).T
+        return elements, depth
 
     def elements_at(self, newton: Iteration, at: Equilibrium) -> float:
         """What finer elements would add to what one equilibrium leaves open, found by ``newton``."""

@@ -12,7 +12,6 @@ from mpi4py import MPI
 
 from fenicsmech.clock import Clock
 from fenicsmech.elasticity import (
-    PLANE_STRESS,
     Formulation,
     Mixed,
     Quadrature,
@@ -168,7 +167,6 @@ class Simulation:
                 self._last = self.trace(request, watch=progress.update)
             else:
                 self.choice = self._dial.settle(lambda rung: self._outcome(rung, request, progress.update))
-                self._last = self._corrected(self._last)
         return self._last
 
     def trace(self, request: CurveRequest, *, watch: Callable[[int], None] = lambda done: None) -> Curve:
@@ -430,19 +428,12 @@ class Simulation:
         fidelity = self._dial.fidelity(rung)
         if fidelity != self.fidelity:
             self._take(fidelity)
-        self._last = curve = self.trace(request, watch=watch)
-        largest = int(np.argmax(np.abs(curve.goals)))
-        frame = replace(curve, frames=curve.frames[largest : largest + 1])
-        if fidelity.model is PLANE_STRESS:
-            ((elements, depth),) = self.estimates.elements_and_depth(frame)
-        else:
-            elements, depth = float(self.estimates.elements(frame)[0]), 0.0
+        curve = self.trace(request, watch=watch)
+        elements, depth = self.estimates.elements_and_depth(curve)
+        values, largest = curve.goals, int(np.argmax(np.abs(curve.goals)))
+        self._last = replace(curve, corrections=corrections(elements + depth, values))
         unknowns = self.model.rigid_dofs + self.model.flexible_dofs + self.model.pressure_dofs
-        return Outcome(float(curve.goals[largest]), elements, depth, unknowns)
-
-    def _corrected(self, curve: Curve) -> Curve:
-        """A curve with the estimates of its errors added (collective)."""
-        return replace(curve, corrections=corrections(self.estimates.errors(curve), curve.goals))
+        return Outcome(float(values[largest]), float(elements[largest]), float(depth[largest]), unknowns)
 
     def _chosen(self, curve: Curve | None) -> Curve:
         chosen = curve or self._last
