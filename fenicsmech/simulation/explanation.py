@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from math import hypot, pi
 
@@ -16,7 +16,8 @@ from fenicsmech.effects import Gravity
 from fenicsmech.mechanism import FlexibleLink, Strip, Units
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.influence import influence
+from fenicsmech.simulation.goal import Goal
+from fenicsmech.simulation.influence import Equilibrium, influence
 from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.snapshot import gather
 
@@ -115,8 +116,9 @@ def weight_influence(model: MechanismModel, newton, curve: Curve, frame: Frame) 
     dQ/dw_k = z · ∫ e_k dV, z the adjoint of the displacement
     """
     elastic = model.elastic
-    with influence(model, newton, frame, curve.freedom) as z:
-        z = elastic.split(z)[0]
+    at = replace(Equilibrium.on(curve, frame), goal=Goal.DISPLACEMENT)
+    with influence(model, newton, at) as adjoint:
+        z = elastic.split(adjoint.on(None))[0]
         depths = [elastic.model.multiplier(link.shape.depth) for link in model.mechanism.flexible_links]
         v = ufl.TestFunction(elastic.u.function_space)
         depth = elastic.cellwise(depths) * ufl.det(elastic.rest_gradient)
