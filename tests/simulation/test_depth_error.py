@@ -62,3 +62,17 @@ def test_other_models_are_refused():
     simulation.load_displacement(push, forces=[load])
     with pytest.raises(fm.DescriptionError, match="plane-strain"):
         simulation.modelling_errors()
+
+
+def test_both_kinds_of_error_share_one_factor_per_frame(monkeypatch):
+    scene, push, load = cantilever()
+    simulation = fm.Simulation(scene, space="plane-stress", size=3.0)
+    curve = simulation.load_displacement(push, forces=[0.5 * load, load])
+    apart = simulation.error_estimates(curve), simulation.modelling_errors(curve)
+    newton, factored = type(simulation.newton(push)), []
+    plain = newton.factor
+    monkeypatch.setattr(newton, "factor", lambda *arguments: factored.append(arguments) or plain(*arguments))
+    together = simulation.estimates.elements_and_depth(curve)
+    assert len(factored) == len(curve.frames)
+    for one, other in zip(apart, together, strict=True):
+        assert list(one) == pytest.approx(list(other), rel=1e-10)
