@@ -30,9 +30,8 @@ from functools import cached_property
 import numpy as np
 import ufl
 from dolfinx import fem
-from petsc4py import PETSc
 
-from fenicsmech.compat import compile_form, petsc_vector, tensor_space
+from fenicsmech.compat import compile_form, destroy_garbage, owned_values, tensor_space
 from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.pressure_error import PressureError
 from fenicsmech.simulation.recovery import Recovery
@@ -58,6 +57,7 @@ class GoalError:
         tensors = tensor_space(elastic.mesh, self._degree)
         self._recovered = [fem.Function(tensors, name=name) for name in ("recovered_gradient", "recovered_adjoint")]
         self._sums = fem.Function(tensors)
+        self._sums = fem.Function(tensors)
 
     def of(self, z: np.ndarray) -> float:
         """Q(u) − Q(u_h).
@@ -67,16 +67,17 @@ class GoalError:
         """
         elastic = self._model.elastic
         for field, values in zip(self._adjoint, elastic.split(z), strict=True):
-            vector = petsc_vector(field)
-            vector.array_w[:] = values
-            vector.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
+            owned_values(field)[:] = values
+            field.x.scatter_forward()
         dim = elastic.model.dim
         odd = [(k // dim == 2) != (k % dim == 2) for k in range(dim**2)]
         for field, form in zip(self._recovered, self._gradient_forms, strict=True):
-            self._recovery.project(form, field, odd)
+            self._recovery.project(form, field, self._sums, odd)
         for pressure in self._pressures:
             pressure.update()
-        return float(elastic.mesh.comm.allreduce(fem.assemble_scalar(self._error_form)))
+        error = float(elastic.mesh.comm.allreduce(fem.assemble_scalar(self._error_form)))
+        destroy_garbage(self._model.mesh.comm)
+        return error
 
     @cached_property
     def _gradient_forms(self) -> list:
@@ -115,12 +116,12 @@ class GoalError:
         elastic = self._model.elastic
         if elastic.pressure is None:
             return []
-        recovery = self._recovery if self._degree == 1 else Recovery(elastic, 1)
+        recovery = self._recovery if self._degree == 1 else Recovery(self._model, 1)
         return [PressureError(elastic, field, recovery) for field in (elastic.pressure.p, self._adjoint[1])]
 
     @cached_property
     def _recovery(self) -> Recovery:
-        return Recovery(self._model.elastic, self._degree)
+        return Recovery(self._model, self._degree)
 
     @property
     def _gradients(self) -> list:

@@ -34,6 +34,7 @@ class PressureError:
     def __init__(self, elastic: ElasticBody, field: fem.Function, recovery: Recovery) -> None:
         self._recovery, self._dim = recovery, elastic.model.dim
         self._gradient = fem.Function(vector_space(elastic.mesh, 1), name=f"recovered_gradient_of_{field.name}")
+        self._sums = fem.Function(self._gradient.function_space)
         test = ufl.TestFunction(self._gradient.function_space)
         self._right = compile_form(ufl.inner(ufl.grad(field), test) * elastic.free(2))
         w = field - 0.5 * ufl.dot(self._gradient, ufl.SpatialCoordinate(elastic.mesh))
@@ -44,6 +45,6 @@ class PressureError:
 
     def update(self) -> None:
         """Follows the field (collective)."""
-        self._recovery.project(self._right, self._gradient, [k == 2 for k in range(self._dim)])
+        self._recovery.project(self._right, self._gradient, self._sums, [k == 2 for k in range(self._dim)])
         self._interpolated.interpolate(self._expression)
         self._interpolated.x.scatter_forward()

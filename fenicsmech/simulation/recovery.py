@@ -13,54 +13,49 @@ import ufl
 from dolfinx import fem
 from petsc4py import PETSc
 
-from fenicsmech.compat import compile_form, petsc_vector, scalar_space
-from fenicsmech.elasticity import ElasticBody
+from fenicsmech.compat import assemble_matrix, assemble_vector, compile_form, owned_values, scalar_space
 from fenicsmech.meshing.mid_plane import on_mid_plane
+from fenicsmech.simulation.model import MechanismModel
 
 
 class Recovery:
     """The projection to continuous fields of one degree.
 
     Args:
-        elastic: the links.
+        model: of the simulation.
         degree: of the fields.
     """
 
-    def __init__(self, elastic: ElasticBody, degree: int) -> None:
-        self._elastic, self._degree = elastic, degree
+    def __init__(self, model: MechanismModel, degree: int) -> None:
+        self._elastic, self._comm, self._degree = model.elastic, model.mesh.comm, degree
 
-    def project(self, right_hand_side, field: fem.Function, odd: Sequence[bool]) -> None:
+    def project(self, right_hand_side, field: fem.Function, work: fem.Function, odd: Sequence[bool]) -> None:
         """Makes ``field`` the projection whose compiled right-hand side is given (collective).
 
         Args:
             right_hand_side: a linear form on the field's space.
             field: of the degree of this projection, with any number of components.
+            work: another one on the same space, for sums.
             odd: which components are odd across the mid-plane: they vanish there where only one half is meshed.
         """
-        right = fem.petsc.create_vector(right_hand_side)
-        with right.localForm() as local:
-            local.set(0.0)
-        fem.petsc.assemble_vector(right, right_hand_side)
-        right.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-        values, target = self._mass.createVecRight(), petsc_vector(field)
+        right = assemble_vector(right_hand_side, work)
+        values, part = self._mass.createVecs()
         for k, vanishes in enumerate(odd):
-            part = self._mass.createVecLeft()
-            part.array_w[:] = right.array_r[k :: len(odd)]
+            part.array_w[:] = right[k :: len(odd)]
             solver = self._solver
             if vanishes and self._elastic.model.symmetric:
                 part.array_w[self._mid_plane] = 0.0
                 solver = self._solver_off_mid_plane
             solver.solve(part, values)
-            target.array_w[k :: len(odd)] = values.array_r
-        target.ghostUpdate(addv=PETSc.InsertMode.INSERT, mode=PETSc.ScatterMode.FORWARD)
+            owned_values(field)[k :: len(odd)] = values.array_r
+        field.x.scatter_forward()
 
     @cached_property
     def _mass(self) -> PETSc.Mat:
         """The mass matrix over the cells that can deform."""
         V = scalar_space(self._elastic.mesh, self._degree)
         test, trial = ufl.TestFunction(V), ufl.TrialFunction(V)
-        mass = fem.petsc.assemble_matrix(compile_form(test * trial * self._elastic.free(2 * self._degree)))
-        mass.assemble()
+        mass = assemble_matrix(compile_form(test * trial * self._elastic.free(2 * self._degree)), self._comm)
         diagonal = mass.getDiagonal()
         # vertices inside interfaces, where nothing deforms
         diagonal.array_w[diagonal.array_r == 0.0] = 1.0

@@ -82,7 +82,7 @@ def test_error_of_a_quadratic_pressure_is_recovered():
 
     for exact, left in ((lambda x: 1.0 + x[0] - 2.0 * x[1], 0.0), (lambda x: x[0] ** 2 - x[0] * x[1], 0.05)):
         p.interpolate(exact)
-        pressure = PressureError(elastic, p, Recovery(elastic, 1))
+        pressure = PressureError(elastic, p, Recovery(simulation.model, 1))
         pressure.update()
         assert square(exact(x) - p - pressure.error) <= left * square(exact(x) - p) + 1e-20
 
