@@ -64,6 +64,7 @@ class KktMatrix:
         )
         extras.set_regularisation(self.scale[layout.multipliers], self.scale[layout.force])
         self._map = create_map_matrix(layout, interfaces, joints, self.units, self.scale)
+        self._entries = PETSc.Mat()  # of K̂ one by one
         self._rows = self.hat.createVecLeft()
         self.matrix: PETSc.Mat | None = None
         self._diagonal: PETSc.Vec | None = None
@@ -93,7 +94,8 @@ class KktMatrix:
                     )
             self.hat.assemble()
         with self._clock.phase("project"):
-            self.matrix = self.hat.ptap(self._map, result=self.matrix)
+            self.hat.convert(PETSc.Mat.Type.AIJ, self._entries)
+            self.matrix = self._entries.ptap(self._map, result=self.matrix)
             self._diagonal = self.matrix.getDiagonal()
         return self.matrix
 
