@@ -29,6 +29,9 @@ class LinearSolver(Protocol):
     def solve(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float) -> bool:
         """Solves with the matrix last refactored, to a relative error of ``tolerance``; whether that could be done."""
 
+    def solve_and_count(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float) -> Inertia | None:
+        """``solve`` and ``inertia``, hardly dearer than one of them; None if it could not be solved."""
+
 
 class LinearMethod(ABC):
     """A way to solve linear systems."""
