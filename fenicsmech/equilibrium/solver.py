@@ -117,14 +117,18 @@ class Iteration(ABC):
             raise NotConverged("elements are inverted in the predicted state", 0)
         return state
 
-    def factor(self, state: State, control: Control, balance: Balance, floor: float) -> Inertia:
+    def factor(self, state: State, control: Control, balance: Balance, floor: float) -> None:
         """Factors the KKT matrix of the loaded ``state``, for linear solves with it (collective).
 
         Raises:
             NotConverged: it cannot be factored.
         """
         self._factor_true(state, control, balance, floor, 0)
-        return self._inertia()
+
+    def inertia(self) -> Inertia:
+        """Of the matrix last factored (collective)."""
+        with self.system.clock.phase("inertia"):
+            return self._linear.inertia()
 
     def solve_linear(self, right: PETSc.Vec, *, tolerance: float = _EXACT) -> PETSc.Vec:
         """The solution of KKT x = ``right`` with the matrix last factored (collective).
@@ -201,11 +205,6 @@ class Iteration(ABC):
         """Whether what the last solve saw of the matrix promises that its solution is a direction of descent."""
         inertia = self._linear.known_inertia()
         return inertia.negative <= self.expected and inertia.zero == 0
-
-    def _inertia(self) -> Inertia:
-        """Of the matrix last factored."""
-        with self.system.clock.phase("inertia"):
-            return self._linear.inertia()
 
     @property
     def expected(self) -> int:
