@@ -99,6 +99,8 @@ def test_inertia_and_solutions_are_those_of_the_factor_on_both_sides_of_buckling
         assert solver.solve(right, found, 1e-10)
         assert (found - exact).norm() <= 1e-7 * exact.norm()
         assert solver.known_inertia().negative <= factor.inertia().negative
+        assert solver.solve_and_count(right, found, 1e-10) == factor.inertia()
+        assert (found - exact).norm() <= 1e-7 * exact.norm()
         seen.append(factor.inertia().negative - system.joints.rows - 1)
     assert seen[0] == 0 and seen[-1] >= 3 and 1 in seen
 
