@@ -3,9 +3,9 @@
     OPENBLAS_NUM_THREADS=1 python3 demos/solvers.py [CASE …] [--limit SECONDS]
 
 One table: for each case and solver the KKT systems factored on the way, in brackets the load steps that failed and
-were halved, and the time relative to the default solver (the shorter of two, all solvers taking turns). "fails" where a
-sample was not reached, "stopped" where that was still open at the time limit; "elsewhere" where the solver ended in an
-equilibrium other than the default one's.
+were halved, and the processor's time relative to the default solver (the shorter of two, all solvers taking turns).
+"fails" where a sample was not reached, "stopped" where that was still open at the time limit; "elsewhere" where the
+solver ended in an equilibrium other than the default one's.
 """
 
 import argparse
@@ -13,7 +13,7 @@ from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from math import inf, pi, radians
-from time import perf_counter
+from time import perf_counter, process_time
 
 import claw
 import klann
@@ -274,10 +274,10 @@ def measure(name, prepare, limit):
             if solver in ends:
                 continue
             counted.count.start(limit)
-            start = perf_counter()
+            start = process_time()
             with judged(ends, solver, limit):
                 found[solver] = run()
-                seconds[solver] = min(perf_counter() - start, seconds.get(solver, inf))
+                seconds[solver] = min(process_time() - start, seconds.get(solver, inf))
                 counts[solver] = replace(counted.count)
     cells = [name]
     for solver in SOLVERS:

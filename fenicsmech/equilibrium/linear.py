@@ -43,7 +43,7 @@ class LinearMethod(ABC):
 
 @dataclass(frozen=True)
 class Direct(LinearMethod):
-    """The factor LDLᵀ of the whole matrix: fastest up to some 130,000 unknowns on slender links."""
+    """The factor LDLᵀ of the whole matrix: fastest up to some 65,000 unknowns on slender links."""
 
     def solver(self, system, matrix):
         return Factor(matrix)
@@ -73,15 +73,14 @@ class BySize(LinearMethod):
     """Two levels beyond so many unknowns, in space and where they suit; the factor otherwise.
 
     In the plane a factor costs little at any size. Where two levels do not suit (order 1, pressures of their own, the
-    nodes of a mid-plane) the factor is all there is. In space, on the links of a claw, one linear solve costs as much
-    either way at 60,000 unknowns; an equilibrium with its verdict does, as is estimated, at 130,000. At 240,000 two
-    levels take half the time of a solve and a fifth of the memory (demos/large.py).
+    nodes of a mid-plane) the factor is all there is. In space, whole curves of a claw with their verdicts cost as much
+    either way at 64,000 unknowns, where two levels take a third of the memory (demos/large.py).
 
     Attributes:
         limit: unknowns.
     """
 
-    limit: int = 150_000
+    limit: int = 65_000
 
     def solver(self, system, matrix):
         large = matrix.getSize()[0] > self.limit and system.joints.space.dim == 3 and TwoLevel.suits(system)
