@@ -43,7 +43,7 @@ class LinearMethod(ABC):
 
 @dataclass(frozen=True)
 class Direct(LinearMethod):
-    """The factor LDLᵀ of the whole matrix: fastest up to some 65,000 unknowns on slender links."""
+    """The factor LDLᵀ of the whole matrix: fastest up to some 80,000 unknowns on slender links."""
 
     def solver(self, system, matrix):
         return Factor(matrix)
@@ -74,13 +74,14 @@ class BySize(LinearMethod):
 
     In the plane a factor costs little at any size. Where two levels do not suit (order 1, pressures of their own, the
     nodes of a mid-plane) the factor is all there is. In space, whole curves of a claw with their verdicts cost as much
-    either way at 64,000 unknowns, where two levels take a third of the memory (demos/large.py).
+    either way at 64,000 unknowns of order 2 and 110,000 of order 3; two levels take a third of the memory
+    (demos/large.py).
 
     Attributes:
         limit: unknowns.
     """
 
-    limit: int = 65_000
+    limit: int = 80_000
 
     def solver(self, system, matrix):
         large = matrix.getSize()[0] > self.limit and system.joints.space.dim == 3 and TwoLevel.suits(system)
