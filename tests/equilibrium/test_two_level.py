@@ -113,10 +113,9 @@ def test_stiffness_by_nodes_is_that_block_of_the_matrix():
     control = LoadControl(0.5 * EULER)
     system.load(state)
     matrix = system.kkt(state, control, system.balance(state, control))
-    nodal = None
     for shift in (0.0, 0.3):
         system.shift(shift)
-        nodal = system.nodal_stiffness(nodal)
+        nodal = system.nodal_stiffness()
         x, y = matrix.createVecRight(), nodal.createVecRight()
         count = y.getLocalSize()
         x.array_w[:count] = y.array_w[:] = np.random.default_rng(matrix.comm.rank).standard_normal(count)
