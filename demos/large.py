@@ -1,40 +1,108 @@
 """Larger than one factor can hold: conjugate gradients over linear displacements beside the factor, on finer and finer
 meshes of the claw.
 
-    OPENBLAS_NUM_THREADS=1 python3 demos/large.py [--sizes MM …] [--factor-up-to UNKNOWNS] [--out DIR]
+    OPENBLAS_NUM_THREADS=1 python3 demos/large.py [--sizes MM …] [--factor-up-to UNKNOWNS] [--compare] [--out DIR]
     mpirun -n 2 python3 demos/large.py
 
-One row per mesh, at the equilibrium under 2 N: iterations of a Newton step's solve and of the stability verdict,
-seconds and memory of either solver, taken in turns, and the difference between the two solutions. Leaves table.md.
+One row per mesh, of a whole curve with its verdicts: conjugate gradients in the last solve, Newton iterations, seconds
+of the processor for each of them (assembly and all else included) and gigabytes with either solver, and the largest
+relative difference between the two curves; then the exponents of time by unknowns. With --compare another table, at the
+last equilibrium: one system on two levels beside algebraic multigrid (PETSc's GAMG, hypre's BoomerAMG) on the finite
+elements and the Schur complement on all else, see ``schur``. Leaves table.md.
 """
 
 import argparse
+import gc
+from dataclasses import dataclass, field
+from math import log
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 
 import claw
+import numpy as np
 from common import Demo
 from mpi4py import MPI
+from schur import Multigrid, SchurSolver
 
 import fenicsmech as fm
-from fenicsmech.equilibrium import Direct, LoadControl, PrimalDualNewton, TwoLevel
+from fenicsmech.equilibrium import Direct, LinearMethod, LinearSolver, LoadControl, PrimalDualNewton, TwoLevel
+from fenicsmech.mechanism import Force
 from fenicsmech.report import format_table
 from fenicsmech.report.atomic import atomic_write
+from fenicsmech.simulation import Curve
 
-SIZES = [1.73, 1.15, 0.68]  # mm: 16 000, 60 000 and 260 000 unknowns; 0.53 gives half a million
-FORCE, STEP, EXACT, REPEATS = 2.0, 1e-6, 1e-10, 3
+SIZES = [1.73, 1.15, 0.9, 0.68]  # mm: 16 000 to 240 000 unknowns; 0.53 gives half a million
+FORCES, STEP, EXACT, REPEATS = [1.0, 2.0], 1e-6, 1e-12, 2
+SMALL = 20_000  # unknowns up to which the Schur complement is formed in whole
 HEADERS = (
     "unknowns",
     "iterations",
-    "verdict",
-    "modes",
-    "assembly [s]",
+    "Newton",
     "two levels [s]",
     "factor [s]",
     "two levels [GB]",
     "factor [GB]",
     "difference",
 )
+COMPARED = (
+    "unknowns",
+    "solver",
+    "iterations",
+    "setup [s]",
+    "solve [s]",
+    "solves per system",
+    "system [s]",
+    "difference",
+)
+
+
+@dataclass(frozen=True)
+class Kept(LinearMethod):
+    """Another linear method whose solvers can be asked afterwards."""
+
+    method: LinearMethod
+    solvers: list = field(default_factory=list)
+
+    def solver(self, system, matrix):
+        self.solvers.append(self.method.solver(system, matrix))
+        return self.solvers[-1]
+
+
+@dataclass
+class Run:
+    """A curve: seconds per Newton iteration, the number of these, displacements, and the linear solver."""
+
+    simulation: fm.Simulation
+    force: Force
+    curve: Curve
+    seconds: float
+    iterations: int
+    linear: LinearSolver
+
+    @classmethod
+    def of(cls, size: float, method: LinearMethod) -> "Run":
+        """With elements of ``size``."""
+        scene, grasp = claw.describe()
+        kept = Kept(method)
+        sim = fm.Simulation(scene, space="3d", size=size, solver=PrimalDualNewton(linear=kept))
+        sim.load_displacement(grasp, forces=[0.0])  # compiles, finds patterns
+        start = process_time()
+        curve = sim.load_displacement(grasp, forces=FORCES)
+        spent = MPI.COMM_WORLD.allreduce(process_time() - start, op=MPI.MAX)
+        iterations = sum(frame.iterations for frame in curve.frames)
+        return cls(sim, grasp, curve, spent / iterations, iterations, kept.solvers[-1])
+
+    @property
+    def memory(self) -> float:
+        return 1e-9 * self.linear.memory
+
+    @property
+    def system(self):
+        """The equations at the last equilibrium, and their KKT matrix."""
+        system, state = self.simulation.newton(self.force).system, self.curve.frames[-1].state
+        control = LoadControl(FORCES[-1])
+        system.load(state)
+        return system, system.kkt(state, control, system.balance(state, control)), system.force_rate(state)
 
 
 def parse() -> Demo:
@@ -44,80 +112,100 @@ def parse() -> Demo:
     parser.add_argument(
         "--factor-up-to", type=int, default=300_000, metavar="UNKNOWNS", help="no factor of larger systems"
     )
+    parser.add_argument("--compare", action="store_true", help="algebraic multigrid too (one process)")
     parser.add_argument("--out", type=Path, default=Path("results") / "large", metavar="DIR", help="folder for files")
     return Demo("large", parser.parse_args(), perf_counter())
 
 
 def seconds(action) -> float:
-    """Of one call, on the slowest rank."""
-    MPI.COMM_WORLD.Barrier()
-    start = perf_counter()
+    """Of the processor, for one call."""
+    start = process_time()
     action()
-    return MPI.COMM_WORLD.allreduce(perf_counter() - start, op=MPI.MAX)
+    return process_time() - start
 
 
-def measure(demo: Demo, size: float) -> tuple:
-    """One row of the table."""
-    scene, grasp = claw.describe()
-    sim = fm.Simulation(scene, space="3d", size=size, solver=PrimalDualNewton(linear=TwoLevel()))
-    frame = sim.load_displacement(grasp, forces=[FORCE]).frames[-1]
-    system, control = sim.newton(grasp).system, LoadControl(FORCE)
-    system.load(frame.state)
-    balance = system.balance(frame.state, control)
-    matrix = system.kkt(frame.state, control, balance)
+def measure(demo: Demo, size: float) -> tuple[tuple, list[tuple]]:
+    """A row of the first table, and those of the second."""
+    run = Run.of(size, TwoLevel())
+    system, matrix, _ = run.system
     unknowns = matrix.getSize()[0]
-    methods = {"two levels": TwoLevel().solver(system, matrix)}
-    if unknowns <= demo.options.factor_up_to:
-        methods["factor"] = Direct().solver(system, matrix)
-    right = system.force_rate(frame.state)
-    solutions = {name: right.duplicate() for name in methods}
-
-    def solve(name, tolerance):
-        matrix.stateIncrease()  # marks the values as new, as a Newton iteration does
-        methods[name].refactor()
-        methods[name].solve(right, solutions[name], tolerance)
-
-    taken = {name: [] for name in methods}
-    for repeat in range(REPEATS + 1):
-        for name in methods:
-            spent = seconds(lambda name=name: solve(name, STEP))
-            if repeat:  # the first finds the pattern
-                taken[name].append(spent)
-    assembly = seconds(lambda: system.kkt(frame.state, control, balance))
-    two = methods["two levels"]
-    iterations, modes = two.iterations[-1], two.inertia().negative - system.joints.rows - 1
-    difference = None
-    if "factor" in methods:
-        for name in methods:
-            solve(name, EXACT)
-        error = solutions["two levels"] - solutions["factor"]
-        difference = error.norm() / solutions["factor"].norm()
-        assert modes == methods["factor"].inertia().negative - system.joints.rows - 1
-    best = {name: min(spent) for name, spent in taken.items()}
-    memory = {name: 1e-9 * method.memory for name, method in methods.items()}
+    known = unknowns, run.linear.iterations[-1], run.iterations, run.seconds, run.memory
+    found = np.array(run.curve.displacements)
+    compared = compare(run) if demo.options.compare else []
+    del run, system, matrix
+    gc.collect()
+    factor = Run.of(size, Direct()) if unknowns <= demo.options.factor_up_to else None
+    difference = None if factor is None else float(np.max(np.abs(found / factor.curve.displacements - 1.0)))
     return (
-        unknowns,
-        iterations,
-        two.probes[-1],
-        modes,
-        assembly,
-        best["two levels"],
-        best.get("factor"),
-        memory["two levels"],
-        memory.get("factor"),
+        *known[:4],
+        factor and factor.seconds,
+        known[4],
+        factor and factor.memory,
         difference,
-    )
+    ), compared
+
+
+def compare(run: Run) -> list[tuple]:
+    """The rows of one mesh: two levels, and either multigrid."""
+    system, matrix, right = run.system
+    unknowns, two = matrix.getSize()[0], TwoLevel().solver(system, matrix)
+    two.refactor()
+
+    def again():
+        matrix.stateIncrease()  # marks the values as new, as a Newton iteration does
+        two.refactor()
+
+    expected = right.duplicate()
+    two.solve(right, expected, EXACT)
+    setup = min(seconds(again) for _ in range(REPEATS))
+    solve = min(seconds(lambda: two.solve(right, right.duplicate(), STEP)) for _ in range(REPEATS))
+    rows = [(unknowns, "two levels", two.iterations[-1], setup, solve, 1, setup + solve, None)]
+    for multigrid in Multigrid:
+        schur = SchurSolver(system, matrix, multigrid)
+        setup = seconds(schur.setup)
+        solve = seconds(lambda schur=schur: schur.column(schur.columns[0], STEP))
+        iterations, difference = schur.iterations[-1], None
+        if unknowns <= SMALL:
+            x = right.duplicate()
+            schur.solve(right, x)
+            difference = (x - expected).norm() / expected.norm()
+        count = len(schur.columns) + 2
+        rows.append((unknowns, multigrid.name, iterations, setup, solve, count, setup + count * solve, difference))
+    return rows
+
+
+def exponents(rows: list[tuple]) -> str:
+    """Of time by unknowns, from the first mesh to the last that both solvers did."""
+    both = [row for row in rows if row[4] is not None]
+    if len(both) < 2:
+        return ""
+    first, *_, last = both
+
+    def exponent(of):
+        return log(of(last) / of(first)) / log(last[0] / first[0])
+
+    found = {
+        "two levels": exponent(lambda row: row[3]),
+        "factor": exponent(lambda row: row[4]),
+        "the faster of both": exponent(lambda row: min(row[3], row[4])),
+    }
+    return "exponents of time by unknowns: " + ", ".join(f"{name} {e:.2f}" for name, e in found.items())
 
 
 def main():
     demo = parse()
-    rows = []
+    rows, compared = [], []
     for size in demo.options.sizes:
-        rows.append(measure(demo, size))
-        demo.say(format_table(HEADERS, rows, digits=3) + "\n")
+        row, others = measure(demo, size)
+        rows.append(row)
+        compared += others
+        text = "\n".join([format_table(HEADERS, rows, digits=3), "", exponents(rows)])
+        if compared:
+            text += "\n\n" + format_table(COMPARED, compared, digits=3)
+        demo.say(text + "\n")
     if demo.leads:
         with atomic_write(demo.folder / "table.md") as file:
-            file.write(format_table(HEADERS, rows, digits=3) + "\n")
+            file.write(text + "\n")
 
 
 if __name__ == "__main__":

@@ -1,17 +1,19 @@
 """Solvers on hard cases: the default beside the augmented Lagrangian, plain Newton and PETSc's SNES.
 
-    OPENBLAS_NUM_THREADS=1 python3 demos/solvers.py [CASE …]
+    OPENBLAS_NUM_THREADS=1 python3 demos/solvers.py [CASE …] [--limit SECONDS]
 
 One table: for each case and solver the KKT systems factored on the way, in brackets the load steps that failed and
-were halved, and the time relative to the default solver (the shorter of two, all solvers taking turns). "fails" where a
-sample was not reached; "elsewhere" where the solver ended in an equilibrium other than the default one's.
+were halved, and the processor's time relative to the default solver (the shorter of two, all solvers taking turns).
+"fails" where a sample was not reached, "stopped" where that was still open at the time limit; "elsewhere" where the
+solver ended in an equilibrium other than the default one's.
 """
 
 import argparse
 from collections.abc import Callable
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from math import pi, radians
-from time import perf_counter
+from math import inf, pi, radians
+from time import perf_counter, process_time
 
 import claw
 import klann
@@ -32,14 +34,26 @@ SOLVERS = {
 }
 SAME = 1e-6  # of the largest displacement, or force, on the curve
 ROUNDS = 2
+LIMIT = 60.0  # s, of a run
+COMPILING = 300.0  # s more for the first one
+
+
+class Stopped(Exception):
+    """A run took longer than it may."""
 
 
 @dataclass
 class Count:
-    """What a run took: linear systems, and solves that failed."""
+    """What a run took: linear systems, and solves that failed; and when it has to end."""
 
     iterations: int = 0
     failures: int = 0
+    deadline: float = inf
+
+    def start(self, limit: float) -> None:
+        """Counts anew, for a run of at most ``limit`` seconds."""
+        self.iterations = self.failures = 0
+        self.deadline = perf_counter() + limit
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,6 +68,8 @@ class Counted(EquilibriumSolver):
         solve = iteration.solve
 
         def counted(*arguments, **options) -> Solution:
+            if perf_counter() > self.count.deadline:
+                raise Stopped
             try:
                 solution = solve(*arguments, **options)
             except NotConverged as failure:
@@ -109,11 +125,11 @@ def at_once(scene, force, load, *, size, space="plane-stress", seeds=(None,)):
 
 
 def disturbed(sim, state, load, seed):
-    """``state`` with every body moved by up to 1 mm and 0.03 rad, and random multipliers."""
+    """``state`` with every body moved by up to 0.5 mm and 0.015 rad, and random multipliers."""
     random = np.random.default_rng(seed)
     joints = sim.linkage.joints
     z = joints.unknowns(state.poses)
-    z = z + 0.03 * random.uniform(-1.0, 1.0, len(z)) * np.where(joints.pose_scale == 1.0, 1.0, 30.0)
+    z = z + 0.015 * random.uniform(-1.0, 1.0, len(z)) * np.where(joints.pose_scale == 1.0, 1.0, 30.0)
     multipliers = load * random.uniform(-1.0, 1.0, joints.rows)
     return replace(state, poses=joints.with_unknowns(state.poses, z), multipliers=multipliers)
 
@@ -191,7 +207,7 @@ def balled(made, rigid, flexible, at):
 
 
 def arch():
-    """A shallow arch between pins, pushed through at its crown by a slide."""
+    """A shallow arch between pins, its crown pushed past the limit of the load; its path turns back at 5.37 mm."""
     span, rise, thickness = 60.0, 3.0, 1.0
     points = [(x, 4.0 * rise * x / span * (1.0 - x / span)) for x in np.linspace(0.0, span, 9)]
     made = fm.Mechanism("arch")
@@ -200,7 +216,7 @@ def arch():
     made.revolute(base, bow, at=points[0], radius=0.5 * thickness)
     made.revolute(base, bow, at=points[-1], radius=0.5 * thickness)
     push = made.force(on=bow, at=(0.5 * span, rise), direction=(0, -1))
-    return fm.Scene(made), push, np.linspace(0.0, 2.0 * rise, 5)[1:]
+    return fm.Scene(made), push, [1.3, 2.6, 3.9, 5.2]
 
 
 def rubber_band():
@@ -245,37 +261,46 @@ def cases():
     }
 
 
-def measure(name, prepare):
-    """One row of the table."""
-    runs, seconds, counts, found = {}, {}, {}, {}
+def measure(name, prepare, limit):
+    """One row of the table; no run takes longer than ``limit`` seconds."""
+    runs, seconds, counts, found, ends = {}, {}, {}, {}, {}
     for solver, options in SOLVERS.items():
         counted = Counted(solver=options)
-        try:
+        counted.count.start(COMPILING + limit)
+        with judged(ends, solver, limit):
             runs[solver] = counted, prepare(counted)
-        except (fm.EquilibriumError, NotConverged):
-            pass
     for _ in range(ROUNDS):
-        for solver, (counted, run) in list(runs.items()):
-            counted.count.iterations = counted.count.failures = 0
-            start = perf_counter()
-            try:
-                found[solver] = run()
-            except (fm.EquilibriumError, NotConverged):
-                del runs[solver]
+        for solver, (counted, run) in runs.items():
+            if solver in ends:
                 continue
-            seconds[solver] = min(perf_counter() - start, seconds.get(solver, np.inf))
-            counts[solver] = replace(counted.count)
+            counted.count.start(limit)
+            start = process_time()
+            with judged(ends, solver, limit):
+                found[solver] = run()
+                seconds[solver] = min(process_time() - start, seconds.get(solver, inf))
+                counts[solver] = replace(counted.count)
     cells = [name]
     for solver in SOLVERS:
-        if solver not in runs:
-            cells.append("fails")
-        elif "default" in runs and np.ptp([found[solver], found["default"]], axis=0).max() > SAME * largest(found):
+        if solver in ends:
+            cells.append(ends[solver])
+        elif "default" in found and np.ptp([found[solver], found["default"]], axis=0).max() > SAME * largest(found):
             cells.append("elsewhere")
         else:
             count = counts[solver]
             halved = f" ({count.failures})" if count.failures else ""
             cells.append(f"{count.iterations}{halved} · {seconds[solver] / seconds.get('default', np.nan):.1f}")
     return cells
+
+
+@contextmanager
+def judged(ends, solver, limit):
+    """Notes how a run of ``solver`` ended, unless it reached all samples."""
+    try:
+        yield
+    except (fm.EquilibriumError, NotConverged):
+        ends[solver] = "fails"
+    except Stopped:
+        ends[solver] = f"stopped after {limit:.0f} s"
 
 
 def largest(found):
@@ -287,8 +312,12 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     made = cases()
     parser.add_argument("case", nargs="*", help=f"of {', '.join(made)}; all by default")
-    chosen = parser.parse_args().case or made
-    print(format_table(("case", *SOLVERS), [measure(name, made[name]) for name in chosen]))
+    parser.add_argument("--limit", type=float, default=LIMIT, metavar="SECONDS", help="of every run")
+    options = parser.parse_args()
+    rows = []
+    for name in options.case or made:
+        rows.append(measure(name, made[name], options.limit))
+        print(format_table(("case", *SOLVERS), rows) + "\n", flush=True)
 
 
 if __name__ == "__main__":

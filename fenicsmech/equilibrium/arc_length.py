@@ -364,7 +364,8 @@ class ArcLength:
     ) -> PathPoint:
         """Stability and tangent at the loaded equilibrium."""
         system, newton = self.system, self.newton
-        excess = newton.factor(state, control, balance, self.floor).negative - newton.expected
+        newton.factor(state, control, balance, self.floor)
+        excess = newton.inertia().negative - newton.expected
         rate = self._rate(state, control)
         x = newton.solve_linear(system.control_row() if control.constrained else system.force_rate(state))
         if control.constrained:

@@ -96,3 +96,8 @@ class Factor:
         """Solves with the last factor, always to roundoff (collective)."""
         self._solver.solve(right, solution)
         return True
+
+    def solve_and_count(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float = 0.0) -> Inertia:
+        """``solve``, and the ``inertia`` that the factor knows (collective)."""
+        self.solve(right, solution, tolerance)
+        return self.inertia()

@@ -64,9 +64,11 @@ class KktMatrix:
         )
         extras.set_regularisation(self.scale[layout.multipliers], self.scale[layout.force])
         self._map = create_map_matrix(layout, interfaces, joints, self.units, self.scale)
+        self._entries = PETSc.Mat()  # of K̂ one by one
         self._rows = self.hat.createVecLeft()
         self.matrix: PETSc.Mat | None = None
         self._diagonal: PETSc.Vec | None = None
+        self._shift = 0.0
 
     def turn(self, poses: np.ndarray) -> None:
         """Brings G to ``poses``."""
@@ -93,13 +95,24 @@ class KktMatrix:
                     )
             self.hat.assemble()
         with self._clock.phase("project"):
-            self.matrix = self.hat.ptap(self._map, result=self.matrix)
-            self._diagonal = self.matrix.getDiagonal()
+            self.hat.convert(PETSc.Mat.Type.AIJ, self._entries)
+            self.matrix = self._entries.ptap(self._map, result=self.matrix)
+            self._diagonal, self._shift = self.matrix.getDiagonal(), 0.0
         return self.matrix
+
+    def nodal_stiffness(self) -> PETSc.Mat:
+        """A new matrix of its rows and columns of free displacements, by blocks of nodes."""
+        dim, free = self._layout.per_node, self._layout.free
+        nodes = ((self._layout.first_row + free[::dim]) // dim).astype(PETSc.IntType)
+        rows = PETSc.IS().createBlock(dim, nodes, comm=self._layout.comm)
+        stiffness = self.hat.createSubMatrix(rows, rows)
+        stiffness.scale(self.unit_u**2)
+        stiffness.shift(self._shift)
+        return stiffness
 
     def shift(self, shift: float) -> None:
         """Makes the matrix hold ``shift`` · I more than it was assembled with, in the block of s."""
-        shifted, layout = self._diagonal.copy(), self._layout
+        shifted, layout, self._shift = self._diagonal.copy(), self._layout, shift
         shifted.array_w[: layout.free_displacements] += shift
         if layout.last:
             shifted.array_w[len(layout.free) :][layout.z] += shift

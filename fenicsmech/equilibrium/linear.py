@@ -29,6 +29,9 @@ class LinearSolver(Protocol):
     def solve(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float) -> bool:
         """Solves with the matrix last refactored, to a relative error of ``tolerance``; whether that could be done."""
 
+    def solve_and_count(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float) -> Inertia | None:
+        """``solve`` and ``inertia``, hardly dearer than one of them; None if it could not be solved."""
+
 
 class LinearMethod(ABC):
     """A way to solve linear systems."""
@@ -40,7 +43,7 @@ class LinearMethod(ABC):
 
 @dataclass(frozen=True)
 class Direct(LinearMethod):
-    """The factor LDLᵀ of the whole matrix: fastest up to some 130,000 unknowns on slender links."""
+    """The factor LDLᵀ of the whole matrix: fastest up to some 80,000 unknowns on slender links."""
 
     def solver(self, system, matrix):
         return Factor(matrix)
@@ -70,15 +73,15 @@ class BySize(LinearMethod):
     """Two levels beyond so many unknowns, in space and where they suit; the factor otherwise.
 
     In the plane a factor costs little at any size. Where two levels do not suit (order 1, pressures of their own, the
-    nodes of a mid-plane) the factor is all there is. In space, on the links of a claw, one linear solve costs as much
-    either way at 60,000 unknowns; an equilibrium with its verdict does, as is estimated, at 130,000. At 240,000 two
-    levels take half the time of a solve and a fifth of the memory (demos/large.py).
+    nodes of a mid-plane) the factor is all there is. In space, whole curves of a claw with their verdicts cost as much
+    either way at 64,000 unknowns of order 2 and 110,000 of order 3; two levels take a third of the memory
+    (demos/large.py).
 
     Attributes:
         limit: unknowns.
     """
 
-    limit: int = 150_000
+    limit: int = 80_000
 
     def solver(self, system, matrix):
         large = matrix.getSize()[0] > self.limit and system.joints.space.dim == 3 and TwoLevel.suits(system)

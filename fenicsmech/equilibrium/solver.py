@@ -22,6 +22,7 @@ from fenicsmech.mechanism.checks import positive
 
 _STEP = 1e-6  # relative error of steps and tangents that iterative solvers may leave to the next iteration
 _ROUGH = 1e-3  # far from the equilibrium
+_SPARE = 1e-3  # of the tolerance, what linear solves may leave when a step reaches it
 _EXACT = 1e-10  # the same of other solutions
 _LEAST_MOTION = 1e-9  # of the mechanism's length: what is smaller counts as no displacement
 _FALLING = 0.25  # of the residual before: soft springs and modes feel what is left below rounding of stiff links
@@ -116,14 +117,18 @@ class Iteration(ABC):
             raise NotConverged("elements are inverted in the predicted state", 0)
         return state
 
-    def factor(self, state: State, control: Control, balance: Balance, floor: float) -> Inertia:
+    def factor(self, state: State, control: Control, balance: Balance, floor: float) -> None:
         """Factors the KKT matrix of the loaded ``state``, for linear solves with it (collective).
 
         Raises:
             NotConverged: it cannot be factored.
         """
         self._factor_true(state, control, balance, floor, 0)
-        return self._inertia()
+
+    def inertia(self) -> Inertia:
+        """Of the matrix last factored (collective)."""
+        with self.system.clock.phase("inertia"):
+            return self._linear.inertia()
 
     def solve_linear(self, right: PETSc.Vec, *, tolerance: float = _EXACT) -> PETSc.Vec:
         """The solution of KKT x = ``right`` with the matrix last factored (collective).
@@ -187,18 +192,19 @@ class Iteration(ABC):
             return x if self._linear.solve(right, x, tolerance) else None
 
     def _accuracy(self, balance: Balance) -> float:
-        """Relative error of a step from there that does no harm: a tenth of what the step leaves anyway."""
-        return min(max(0.1 * self.relative(balance), _STEP), _ROUGH)
+        """Relative error of a step from there that does no harm.
+
+        A tenth of what the step leaves anyway, or what takes the residual well below the tolerance: an error of stiff
+        modes counts for hundreds of times more in the residual than in the energy.
+        """
+        relative = self.relative(balance)
+        enough = _SPARE * self.options.tolerance / max(relative, self.options.tolerance)
+        return min(max(0.1 * relative, enough, _STEP), _ROUGH)
 
     def _descends(self) -> bool:
         """Whether what the last solve saw of the matrix promises that its solution is a direction of descent."""
         inertia = self._linear.known_inertia()
         return inertia.negative <= self.expected and inertia.zero == 0
-
-    def _inertia(self) -> Inertia:
-        """Of the matrix last factored."""
-        with self.system.clock.phase("inertia"):
-            return self._linear.inertia()
 
     @property
     def expected(self) -> int:
@@ -233,8 +239,13 @@ class Iteration(ABC):
         """Stability and tangent at the equilibrium, from the matrix last factored, the true one."""
         system = self.system
         destroy_garbage(system.layout.comm)
-        x = self.solve_linear(control.rate(system, state), tolerance=_STEP)
-        under_control = self._inertia().negative - self.expected
+        right = control.rate(system, state)
+        x = right.duplicate()
+        with system.clock.phase("solve"):
+            inertia = self._linear.solve_and_count(right, x, _STEP)
+        if inertia is None:
+            raise NotConverged("the linear solver stalled", iteration)
+        under_control = inertia.negative - self.expected
         unstable = under_control
         if control.constrained:
             row = system.control_row()

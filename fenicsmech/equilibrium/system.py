@@ -251,6 +251,10 @@ class EquilibriumSystem:
     def _assembled(self, state: State, control: Control, moments: dict[int, np.ndarray]) -> PETSc.Mat:
         return self._kkt.assembled(self._extras.entries(state, control, self._loads.acting(state), moments))
 
+    def nodal_stiffness(self) -> PETSc.Mat:
+        """A new matrix of the KKT matrix's rows and columns of free displacements, by blocks of nodes (collective)."""
+        return self._kkt.nodal_stiffness()
+
     def shift(self, shift: float) -> None:
         """Makes the KKT matrix hold ``shift`` · I more than it was assembled with, in the block of s (collective)."""
         self._kkt.shift(shift)

@@ -19,12 +19,12 @@ Sources: Tang, Nabben, Vuik & Erlangga on the preconditioner, A-DEF2 (doi:10.100
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from petsc4py import PETSc
-from scipy.sparse import csr_matrix
 
 from fenicsmech.equilibrium.coarse import CoarseLevel
 from fenicsmech.equilibrium.factor import Inertia
@@ -64,10 +64,9 @@ class TwoLevelSolver:
         self._smoother = Chebyshev(degree=_DEGREE, ratio=_RATIO)
         layout = system.layout
         self._free = PETSc.IS().createStride(len(layout.free), layout.first_unknown, 1, comm=matrix.comm)
-        self._free.setBlockSize(system.joints.space.dim)
         extras = layout.extras if layout.last else 0
         self._extra = PETSc.IS().createStride(extras, layout.first_extra, 1, comm=matrix.comm)
-        self._links: PETSc.Mat | None = None
+        self._system, self._stiffness = system, None
         self._border: PETSc.Mat | None = None
         self._corner: PETSc.Mat | None = None
         # petsc4py destroys what it creates late: nothing is created per iteration
@@ -79,20 +78,20 @@ class TwoLevelSolver:
 
     def refactor(self) -> bool:
         """Takes the matrix's current values; whether that could be done."""
-        links = self._matrix.createSubMatrix(self._free, self._free)
-        self._links = _blocked(links, self._links)
-        links.destroy()
+        if self._stiffness is not None:
+            self._stiffness.destroy()
+        self._stiffness = self._system.nodal_stiffness()
         self._border = self._matrix.createSubMatrix(self._extra, self._free, self._border)
         self._corner = self._matrix.createSubMatrix(self._extra, self._extra, self._corner)
         if self._nodal is None:
-            self._nodal, self._bordering = self._links.createVecs(), self._corner.createVecs()
-        return self._smoother.update(self._links) and self._coarse.update()
+            self._nodal, self._bordering = self._stiffness.createVecs(), self._corner.createVecs()
+        return self._smoother.update(self._stiffness) and self._coarse.update()
 
     @property
     def memory(self) -> float:
         """Bytes of the factor of KKT₁ and of the blocked stiffness, on all ranks."""
-        blocks = self._links.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"]
-        size = self._links.getBlockSize() ** 2
+        blocks = self._stiffness.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"]
+        size = self._stiffness.getBlockSize() ** 2
         return self._coarse.memory + blocks * (8.0 + 4.0 / size)
 
     def solve(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float) -> bool:
@@ -103,12 +102,36 @@ class TwoLevelSolver:
             solution: where the solution goes.
             tolerance: of the energy norm of the error, relative to that of the error after one coarse correction.
         """
+        self._start(right, solution)
+        return self._iterate(solution, tolerance)
+
+    def solve_and_count(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float) -> Inertia | None:
+        """``solve`` and ``inertia`` in one: a solve that starts from a random guess is a probe; None if not solved."""
+        self._start(right, solution)
+        self._precondition(self._residual, ())
+        error = abs(self._residual.dot(self._z))
+        self._randomise(self._work)
+        self._precondition(self._work, ())
+        curvature = self._z.dot(self._image)
+        if curvature > 0.0:
+            # as much of it as of the error there is, in energy
+            share = math.sqrt(error / curvature)
+            solution.axpy(share, self._z)
+            self._residual.axpy(-share, self._image)
+        if not self._iterate(solution, min(tolerance, _SEEN)):
+            return None
+        return self.inertia() if self._met or curvature <= 0.0 else self._coarse.inertia()
+
+    def _start(self, right: PETSc.Vec, solution: PETSc.Vec) -> None:
+        """P KKT₁⁻¹ Pᵀ b and its residual."""
         self._coarse.correction(right, solution)
-        floor, first, self._met = _ROUNDOFF * solution.norm(), 0.0, 0
         self._multiply(solution, self._residual)
         self._residual.aypx(-1.0, right)
-        steps = self._conjugate(self._residual)
-        for iteration, (energy, direction) in zip(range(_MOST), steps, strict=False):
+
+    def _iterate(self, solution: PETSc.Vec, tolerance: float) -> bool:
+        """Conjugate gradients from a ``solution`` with its residual; whether they reach the ``tolerance``."""
+        floor, first, self._met = _ROUNDOFF * solution.norm(), 0.0, 0
+        for iteration, (energy, direction) in zip(range(_MOST), self._conjugate(self._residual), strict=False):
             first = first or abs(energy)
             if abs(energy) <= max(tolerance**2 * first, floor**2):
                 self.iterations.append(iteration)
@@ -194,7 +217,7 @@ class TwoLevelSolver:
         extras, sums = self._bordering
         count = nodes.getLocalSize()
         nodes.array_w[:], extras.array_w[:] = x.array_r[:count], x.array_r[count:]
-        self._links.mult(nodes, rows)
+        self._stiffness.mult(nodes, rows)
         self._border.multTransposeAdd(extras, rows, rows)
         self._corner.mult(extras, sums)
         self._border.multAdd(nodes, sums, sums)
@@ -205,19 +228,3 @@ class TwoLevelSolver:
         count = self._nodal[0].getLocalSize()
         r.array_w[:count] = np.random.default_rng(self._matrix.comm.rank).standard_normal(count)
         r.array_w[count:] = 0.0
-
-
-def _blocked(matrix: PETSc.Mat, before: PETSc.Mat | None) -> PETSc.Mat:
-    """``matrix`` stored by blocks, with which products take half the time; ``before`` is reused.
-
-    PETSc's own conversion takes minutes for half a million rows.
-    """
-    block, (rows, columns) = matrix.getBlockSize(), matrix.getSizes()
-    starts, indices, values = matrix.getValuesCSR()
-    blocks = csr_matrix((values, indices, starts), shape=(rows[0], columns[1])).tobsr((block, block))
-    csr = (blocks.indptr.astype(PETSc.IntType), blocks.indices.astype(PETSc.IntType), blocks.data)
-    if before is None:
-        return PETSc.Mat().createBAIJ((rows, columns), block, csr=csr, comm=matrix.comm)
-    before.setValuesBlockedCSR(*csr)
-    before.assemble()
-    return before

@@ -99,8 +99,28 @@ def test_inertia_and_solutions_are_those_of_the_factor_on_both_sides_of_buckling
         assert solver.solve(right, found, 1e-10)
         assert (found - exact).norm() <= 1e-7 * exact.norm()
         assert solver.known_inertia().negative <= factor.inertia().negative
+        assert solver.solve_and_count(right, found, 1e-10) == factor.inertia()
+        assert (found - exact).norm() <= 1e-7 * exact.norm()
         seen.append(factor.inertia().negative - system.joints.rows - 1)
     assert seen[0] == 0 and seen[-1] >= 3 and 1 in seen
+
+
+@pytest.mark.parallel
+def test_stiffness_by_nodes_is_that_block_of_the_matrix():
+    simulation, push = column()
+    system = simulation.newton(push).system
+    state = simulation.load_displacement(push, forces=[0.5 * EULER]).frames[0].state
+    control = LoadControl(0.5 * EULER)
+    system.load(state)
+    matrix = system.kkt(state, control, system.balance(state, control))
+    for shift in (0.0, 0.3):
+        system.shift(shift)
+        nodal = system.nodal_stiffness()
+        x, y = matrix.createVecRight(), nodal.createVecRight()
+        count = y.getLocalSize()
+        x.array_w[:count] = y.array_w[:] = np.random.default_rng(matrix.comm.rank).standard_normal(count)
+        error = (matrix * x).array_r[:count] - (nodal * y).array_r
+        assert np.abs(error).max() <= 1e-12 * (nodal * y).norm()
 
 
 def test_interfaces_of_another_rest_shape_are_followed():
