@@ -21,10 +21,14 @@ instead of the one its displacements led to (``elasticity.mixed_stress``): itera
 long converge.
 
 The last corrections cost next to nothing: once a step has come close, those that follow are solved with its factor,
+
     y ← y − K(y₁)⁻¹ r(y),
-as long as they shrink by a thousand and more (simplified Newton method, Deuflhard, doi:10.1007/978-3-642-23899-4,
-section 2.1.2). Where they do not, as next to a limit point, K is factored anew. Sources: Nocedal & Wright, Numerical Optimization (doi:10.1007/978-0-387-40065-5),
-chapters 17–19; Chamberlain et al. on the watchdog (Mathematical Programming Studies 16, 1982).
+
+as long as they shrink by a thousand and more. Where they do not, as next to a limit point, K is factored anew.
+
+Sources: Nocedal & Wright, Numerical Optimization (doi:10.1007/978-0-387-40065-5), chapters 17–19; Chamberlain et al. on
+the watchdog (Mathematical Programming Studies 16, 1982); Deuflhard on the simplified Newton method
+(doi:10.1007/978-3-642-23899-4, section 2.1).
 """
 
 from __future__ import annotations
