@@ -26,7 +26,7 @@ from fenicsmech.equilibrium import IDLE_STIFFNESS, Iteration, LoadControl, NotCo
 from fenicsmech.errors import EquilibriumError
 from fenicsmech.linkage import assemble
 from fenicsmech.mechanism import FlexibleLink
-from fenicsmech.simulation import Simulation
+from fenicsmech.simulation import Curve, Simulation
 from fenicsmech.simulation.request import CurveRequest
 
 _HALVINGS = 2  # of a change of design whose equilibrium is not found, or lies elsewhere
@@ -73,6 +73,7 @@ class TargetEquilibria:
         self._adjoints = {part: Adjoint(self._model, newton) for part, newton in self._newtons.items()}
         self._floor: dict[Target, float] = {}
         self._fixed_origin: dict[Target, float] = {}
+        self._curves: dict[Target, Curve] = {}  # of one frame: where the target was on the path last traced
 
     def trace(self) -> Known:
         """From zero load to every target, at the present design.
@@ -110,6 +111,15 @@ class TargetEquilibria:
         fields = [self._gradient(*pair) for pair in zip(self.targets, known.samples, strict=True)]
         return np.array(fields).reshape(len(fields), -1)
 
+    def errors(self, known: Known) -> np.ndarray:
+        """What finer elements would add to the displacements, (targets,)."""
+        estimates = []
+        for target, sample in zip(self.targets, known.samples, strict=True):
+            curve = self._curves[target]
+            frame = replace(curve.frames[0], state=sample.state, design=known.design, displacement=sample.displacement)
+            estimates.append(self._simulation.error_estimates(replace(curve, frames=(frame,)))[0])
+        return np.array(estimates)
+
     def _gradient(self, target: Target, sample: Sample) -> np.ndarray:
         adjoint, floor = self._adjoints[target.force_part], self._floor[target]
         outputs = [self._newtons[target.force_part].system.controlled]
@@ -141,6 +151,7 @@ class TargetEquilibria:
                 raise Infeasible(_folded(target, "the mechanism snaps on the way there from zero load"))
             self._floor[target] = IDLE_STIFFNESS if curve.freedom.mobility else 0.0
             self._fixed_origin[target] = self._travel(target, frame.state) - frame.displacement
+            self._curves[target] = replace(curve, frames=(frame,))
             origin = self._unloaded(target, curve.frames[0].state) if moving else None
             samples[target] = Sample(frame.state, origin, frame.displacement)
         return samples
