@@ -69,7 +69,7 @@ class LevenbergMarquardt(Minimiser):
         memory = _Memory(self.damping, 0) if start.memory is None else _Memory.of(start.memory)
         last = _iterate(start.number, start.evaluations + 1, here, memory, metric)
         watch(last)
-        resolution = Resolution()
+        resolution = Resolution(last)
         while last.reason is None:
             undecided = self.tolerance is None and last.promise > self.least_promise
             if undecided and resolution.reached(last, partial(_undamped, last.evaluation, metric)):

@@ -17,15 +17,14 @@ import numpy as np
 from fenicsmech.design.optimisers.problem import Evaluation, Iterate, exact
 
 _SHARE = 0.5  # φ
-_FIRST = 0.5  # promise from which errors are worth an estimate
-_AGAIN = 0.25  # times the promise at the last estimate: by then the design has changed, and errors with it
+_AGAIN = 0.1  # of what was left to gain when errors were estimated last: the design has changed, and errors with it
 
 
 class Resolution:
-    """The errors of one minimisation, estimated a few times on its way."""
+    """The errors of one minimisation, estimated a few times on its way from ``start``."""
 
-    def __init__(self) -> None:
-        self._errors, self._estimated, self._below = exact(), None, _FIRST
+    def __init__(self, start: Iterate) -> None:
+        self._errors, self._estimated, self._below = exact(), None, _AGAIN * _gain(start)
 
     def reached(self, last: Iterate, ahead: Callable[[], np.ndarray]) -> bool:
         """Whether the minimum is as near as can be told.
@@ -35,7 +34,7 @@ class Resolution:
             ahead: finds s there, (n,).
         """
         here = last.evaluation
-        if last.promise < self._below:
+        if _gain(last) < self._below:
             self._estimate(last)
         if self._hidden(last, ahead) and self._estimated is not here:
             self._estimate(last)
@@ -43,13 +42,18 @@ class Resolution:
 
     def _estimate(self, last: Iterate) -> None:
         self._errors, self._estimated = last.evaluation.errors(), last.evaluation
-        self._below = _AGAIN * last.promise
+        self._below = _AGAIN * _gain(last)
 
     def _hidden(self, last: Iterate, ahead: Callable[[], np.ndarray]) -> bool:
-        return last.promise * last.evaluation.value <= self._doubt(last.evaluation) and bool(
+        return _gain(last) <= self._doubt(last.evaluation) and bool(
             np.all(np.abs(last.evaluation.jacobian @ ahead()) <= _SHARE * self._errors)
         )
 
     def _doubt(self, here: Evaluation) -> float:
         """What the errors do to O."""
         return float(np.sum(np.abs(here.residuals) * self._errors + 0.5 * self._errors**2))
+
+
+def _gain(last: Iterate) -> float:
+    """O(p) − min O, as promised."""
+    return last.promise * last.evaluation.value
