@@ -1,9 +1,9 @@
 """When to stop: what is left to gain cannot be told from the errors that the finite elements leave.
 
 Residuals have errors e_k. With s the step to the minimum of the objective with its residuals made linear, it is enough
-if s would change no residual by more than half its error, and O by no more than the errors do:
+if s would change no residual by more than a tenth of its error, and O by no more than the errors do:
 
-    |J s|_k ≤ φ e_k  for all k,     O(p) − min O ≤ Σ (|r_k| e_k + ½ e_k²),     φ = ½.
+    |J s|_k ≤ φ e_k  for all k,     O(p) − min O ≤ Σ (|r_k| e_k + ½ e_k²),     φ = 0.1.
 
 So results move by less than their errors when the minimisation goes on, regularisers included: they are part of O.
 """
@@ -16,7 +16,7 @@ import numpy as np
 
 from fenicsmech.design.optimisers.problem import Evaluation, Iterate, exact
 
-_SHARE = 0.5  # φ
+_SHARE = 0.1  # φ
 _AGAIN = 0.1  # of what was left to gain when errors were estimated last: the design has changed, and errors with it
 
 

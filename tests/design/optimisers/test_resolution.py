@@ -87,7 +87,7 @@ def test_errors_are_estimated_a_few_times_and_at_the_end():
 
 
 def test_an_old_estimate_alone_does_not_end_it():
-    errors = iter([np.array([0.1]), np.array([0.01]), np.array([0.1])])
+    errors = iter([np.array([0.5]), np.array([0.05]), np.array([0.5])])
 
     def at(residual: float) -> Iterate:
         r = np.array([residual])
@@ -97,7 +97,7 @@ def test_an_old_estimate_alone_does_not_end_it():
     resolution = Resolution(at(0.2))
     for residual, reached in (
         (0.11, False),  # no estimate yet
-        (0.06, False),  # more than half an error
+        (0.06, False),  # more than a tenth of an error
         (0.04, False),  # hidden by the old estimate, not by the one of this design
         (0.02, False),
         (0.01, True),  # by a new one, since far less is to gain than when errors were estimated last
