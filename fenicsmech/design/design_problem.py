@@ -19,7 +19,7 @@ from fenicsmech.design.link_files import draw_links, outline, rest_meshes, write
 from fenicsmech.design.link_shape import LinkShape, shape_links
 from fenicsmech.design.objective import Objective, target_errors
 from fenicsmech.design.objective_error import objective_error
-from fenicsmech.design.optimisers import Infeasible, Iterate, LevenbergMarquardt, Minimiser, Reason, Start
+from fenicsmech.design.optimisers import Infeasible, Iterate, LevenbergMarquardt, Minimiser, Start
 from fenicsmech.design.problem_checks import check_designs, check_effects, check_targets
 from fenicsmech.design.progress import DesignProgress
 from fenicsmech.design.regularisers import MeshQuality, Regulariser, ShapeBounds, StayClose
@@ -157,7 +157,7 @@ class DesignProblem:
             links=link_designs(self._rest, placement),
             targets=target_results(self.targets, outcome.started, found),
             reason=outcome.reason.value,
-            converged=outcome.reason is Reason.CONVERGED,
+            converged=outcome.reason.converged,
             verified=found.same,
             active=objective.active(outcome.parameters),
             objective=(initial, final),

@@ -55,7 +55,7 @@ class Objective:
         targets: all of them.
         regulariser: R.
         group: this process's group.
-        clock: where time is counted: handles, regularisers, equilibria, gradients.
+        clock: where time is counted: handles, regularisers, equilibria, gradients, estimates.
 
     Attributes:
         lengths: changes of the parameters that count alike, (parameters,).
@@ -117,7 +117,14 @@ class Objective:
             residuals=self._residuals(reached),
             jacobian=jacobian,
             regulariser=model,
+            errors=self.errors,
         )
+
+    def errors(self) -> np.ndarray:
+        """Estimated errors |e| of the residuals of the best design so far, those of the finite elements, (targets,)."""
+        with self._clock.phase("estimates"):
+            estimates = self._equilibria.errors(self._base.known)
+        return np.abs(self._gathered(estimates[:, None])[:, 0]) / self._scale
 
     def traced(self, parameters: np.ndarray) -> float:
         """O, its handles placed near the drawn ones and its equilibria found from zero load.

@@ -21,7 +21,7 @@ class DesignProgress:
     limit of iterations leaves.
 
     Args:
-        minimiser: its tolerance and limit.
+        minimiser: says when it ends.
         leads: whether this process shows anything.
     """
 
@@ -50,5 +50,5 @@ class DesignProgress:
         (start, first), (now, last) = self._recent[0], self._recent[-1]
         each = (now - start) / (len(self._recent) - 1)
         falling = (log(first) - log(last)) / (len(self._recent) - 1)
-        wanted = log(last / self._minimiser.tolerance) / falling if falling > 0.0 else inf
+        wanted = log(last / self._minimiser.least_promise) / falling if falling > 0.0 else inf
         return each * max(1.0, min(wanted, self._minimiser.iterations - iterate.number))

@@ -6,7 +6,7 @@ Decisions that hang on the last bit of a number can then not differ between proc
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from mpi4py import MPI
@@ -31,6 +31,25 @@ class Outcome:
     started: np.ndarray
 
 
+@dataclass(frozen=True, eq=False)
+class _Evaluate:
+    """A request to evaluate the objective."""
+
+    parameters: np.ndarray
+    below: float
+
+    def answer(self, objective: Objective) -> Evaluation:
+        return objective.evaluate(self.parameters, self.below)
+
+
+@dataclass(frozen=True)
+class _Estimate:
+    """A request for the errors of the residuals at the best design so far."""
+
+    def answer(self, objective: Objective) -> np.ndarray:
+        return objective.errors()
+
+
 class _Leader:
     """The objective as the first process sees it: the others are told what to evaluate."""
 
@@ -38,8 +57,11 @@ class _Leader:
         self._comm, self._objective, self.lengths = comm, objective, objective.lengths
 
     def evaluate(self, parameters: np.ndarray, below: float = np.inf) -> Evaluation:
-        self._comm.bcast((parameters, below), root=0)
-        return self._objective.evaluate(parameters, below)
+        return replace(self._ask(_Evaluate(parameters, below)), errors=lambda: self._ask(_Estimate()))
+
+    def _ask(self, request: _Evaluate | _Estimate):
+        self._comm.bcast(request, root=0)
+        return request.answer(self._objective)
 
 
 def minimise_together(
@@ -76,6 +98,6 @@ def minimise_together(
 def _follow(comm: MPI.Comm, objective: Objective) -> None:
     while (request := comm.bcast(None, root=0)) is not None:
         try:
-            objective.evaluate(*request)
+            request.answer(objective)
         except Infeasible:
             pass  # the first process has seen it too, and decides

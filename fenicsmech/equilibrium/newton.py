@@ -18,8 +18,17 @@ Slender links bend at far smaller forces than they stretch, so a good step may r
 iterations: steps are taken in full while an allowance lasts, then the iteration returns to its best state and
 searches the line. For the same reason ∇²L holds, far from equilibrium, the stress that the last step solved for
 instead of the one its displacements led to (``elasticity.mixed_stress``): iterations halve, and steps ten times as
-long converge. Sources: Nocedal & Wright, Numerical Optimization (doi:10.1007/978-0-387-40065-5),
-chapters 17–19; Chamberlain et al. on the watchdog (Mathematical Programming Studies 16, 1982).
+long converge.
+
+The last corrections cost next to nothing: once a step has come close, those that follow are solved with its factor,
+
+    y ← y − K(y₁)⁻¹ r(y),
+
+as long as they shrink by a thousand and more. Where they do not, as next to a limit point, K is factored anew.
+
+Sources: Nocedal & Wright, Numerical Optimization (doi:10.1007/978-0-387-40065-5), chapters 17–19; Chamberlain et al. on
+the watchdog (Mathematical Programming Studies 16, 1982); Deuflhard on the simplified Newton method
+(doi:10.1007/978-3-642-23899-4, section 2.1).
 """
 
 from __future__ import annotations
@@ -53,9 +62,11 @@ class PrimalDualNewton(EquilibriumSolver):
         mixed_stress: whether tangents, as long as the residual is large, hold the stress that the last step solved
             for instead of the one it led to.
         largest_turn: largest rotation (rad), or displacement over the mechanism's length, of one step.
+        stale: relative error of the last factor, told by how fast corrections with it shrink, up to which it serves
+            for them, for stability and for the tangent of the path; above, and always with 0, factors are made anew.
 
     Raises:
-        DescriptionError: a limit is not a positive number.
+        DescriptionError: a limit is not a positive number, or ``stale`` is negative.
     """
 
     near: float = 1e-2
@@ -63,11 +74,14 @@ class PrimalDualNewton(EquilibriumSolver):
     allowance: int = 12
     mixed_stress: bool = True
     largest_turn: float = 0.5
+    stale: float = 1e-3
 
     def __post_init__(self) -> None:
         super().__post_init__()
         for limit in ("near", "largest_turn"):
             positive(f"Newton's {limit}", getattr(self, limit))
+        if self.stale != 0.0:
+            positive("Newton's stale", self.stale)
 
     def on(self, system: EquilibriumSystem) -> Newton:
         return Newton(system, self)
@@ -114,6 +128,8 @@ class Newton(Iteration):
                 state, trusted, careful, passed = before, False, True, None
                 system.load(state)
                 balance = system.balance(state, control)
+            elif near and shift == floor and length == 1.0:
+                state, balance, norm = self._finish(state, control, balance, norm, step)
             if balance.norm < best[1].norm:
                 best, spent = (state, balance), 0
             else:
@@ -141,6 +157,40 @@ class Newton(Iteration):
             raise NotConverged("no shift of the tangent gives a direction of descent", 0)
         x.scale(-1.0)
         return x, shift
+
+    def _finish(
+        self, state: State, control: Control, balance: Balance, before: float, step: Step
+    ) -> tuple[State, Balance, float]:
+        """Corrections with the factor that ``step`` to ``state`` was solved with, as long as it is current.
+
+        Their lengths fall by the factor's relative error: |K⁻¹ r(y₁)| / |K⁻¹ r(y₀)| ≈ |K⁻¹ (K(y) − K)| as y₁ → y.
+
+        Args:
+            state, balance: where the step led.
+            control: what is asked for.
+            before: residual norm before the step.
+            step: the step.
+
+        Returns:
+            State and balance after the corrections, and the residual norm before the last one.
+        """
+        system, size = self.system, self.system.size(step)
+        while not self.converged(balance, before):
+            x = self._solution(balance.vector, self._accuracy(balance))
+            if x is None:
+                break
+            x.scale(-1.0)
+            correction = system.step(x)
+            length = system.size(correction)
+            if not length <= self.options.stale * size:
+                break
+            following = system.moved(state, correction)
+            found = system.balance(following, control)
+            if not (found.norm < balance.norm or self.converged(found, balance.norm)):
+                system.load(state)
+                return state, system.balance(state, control), before
+            state, balance, before, size = following, found, balance.norm, length
+        return state, balance, before
 
     def _full_step(
         self, state: State, control: Control, step: Step, balance: Balance, iteration: int

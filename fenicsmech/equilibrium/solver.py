@@ -72,7 +72,7 @@ class EquilibriumSolver(ABC):
         DescriptionError: a limit is not a positive number.
     """
 
-    tolerance: float = 1e-10
+    tolerance: float = 1e-9
     roundoff: float = 1e-14
     linear: LinearMethod = field(default_factory=BySize)
 

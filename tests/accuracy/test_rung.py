@@ -2,6 +2,7 @@ import pytest
 
 import fenicsmech as fm
 from fenicsmech.accuracy import RIGID, Displacement, Rung, ladder
+from fenicsmech.accuracy.rung import TOLERANCE
 from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRAIN, PLANE_STRESS, SPATIAL
 from fenicsmech.errors import DescriptionError
 
@@ -22,8 +23,8 @@ def test_every_rung_has_its_own_name_and_families_run_from_coarse_to_fine():
 
 def test_quadrature_and_tolerance_are_varied_one_at_a_time():
     variants = [rung for rung in ladder(cantilever().scene) if rung.is_variant]
-    assert all((rung.quadrature is None) != (rung.tolerance == 1e-10) for rung in variants)
-    assert {rung.tolerance for rung in variants} == {1e-4, 1e-6, 1e-8, 1e-10}
+    assert all((rung.quadrature is None) != (rung.tolerance == TOLERANCE) for rung in variants)
+    assert {rung.tolerance for rung in variants} == {1e-4, 1e-6, 1e-8, TOLERANCE}
     assert {rung.quadrature for rung in variants if rung.model is SPATIAL} == {None, 2, 4, 5, 6}
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -19,6 +21,9 @@ class Valley:
 
     def __init__(self) -> None:
         self.lengths, self.reached, self.asked = np.ones(2), np.zeros(2), 0
+
+    def errors(self) -> np.ndarray:
+        return np.zeros(2)
 
     def evaluate(self, parameters: np.ndarray, below: float = np.inf) -> Evaluation:
         self.asked += 1
@@ -47,6 +52,27 @@ def test_all_processes_have_the_outcome_and_evaluate_alike():
     assert COMM.allgather(outcome.parameters.tolist()) == [outcome.parameters.tolist()] * COMM.size
     assert COMM.allgather((outcome.number, outcome.evaluations)) == [(outcome.number, outcome.evaluations)] * COMM.size
     assert bool(seen) == (COMM.rank == 0)
+
+
+class Blurred(Valley):
+    """The same with residuals that are wrong by 0.1, as all processes together find out."""
+
+    def errors(self) -> np.ndarray:
+        return np.full(2, COMM.allreduce(0.1 / COMM.size))
+
+    def evaluate(self, parameters: np.ndarray, below: float = np.inf) -> Evaluation:
+        return replace(super().evaluate(parameters, below), errors=self.errors)
+
+
+def test_all_processes_estimate_errors_together():
+    plain, blurred = (
+        minimise_together(COMM, valley, minimiser, Start(np.array([-1.2, 1.0])), watch=lambda iterate: None)
+        for valley, minimiser in ((Valley(), LevenbergMarquardt(tolerance=1e-10)), (Blurred(), LevenbergMarquardt()))
+    )
+    assert blurred.reason is Reason.RESOLVED
+    assert blurred.evaluations < plain.evaluations
+    assert blurred.parameters == pytest.approx(plain.parameters, abs=0.1)
+    assert COMM.allgather(blurred.parameters.tolist()) == [blurred.parameters.tolist()] * COMM.size
 
 
 def test_a_start_without_a_value_is_refused_on_all_processes():

@@ -28,6 +28,7 @@ def column(
     space: str = "plane-stress",
     size: float = THICKNESS,
     comm: MPI.Comm = MPI.COMM_SELF,
+    **options,
 ) -> Column:
     """The column, by default in plane stress; every slide beyond the first is redundant."""
     mechanism = fm.Mechanism("column")
@@ -39,7 +40,7 @@ def column(
     for k in range(slides):
         mechanism.prismatic(base, head, at=(LENGTH + 5.0 * k, 3.0 * k), axis=(1, 0))
     push = mechanism.force(on=head, at=(LENGTH, 0), direction=(-1, 0))
-    return Column(fm.Simulation(fm.Scene(mechanism), space=space, size=size, comm=comm), push)
+    return Column(fm.Simulation(fm.Scene(mechanism), space=space, size=size, comm=comm, **options), push)
 
 
 def critical_load(arm: float) -> float:

@@ -1,6 +1,7 @@
 """Minimisers of a regularised least-squares objective O(p) = ½ |r(p)|² + R(p).
 
 - ``problem``: what is minimised, and the history of a minimisation
+- ``resolution``: the end of it where finite elements cannot tell any more
 - ``levenberg_marquardt``: uses the structure; the default
 - ``bfgs``: quasi-Newton with backtracking, as in the paper this package follows
 """

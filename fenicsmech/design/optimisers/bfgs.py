@@ -44,6 +44,10 @@ class Bfgs(Minimiser):
     def __post_init__(self) -> None:
         positive("tolerance of BFGS", self.tolerance)
 
+    @property
+    def least_promise(self) -> float:
+        return self.tolerance
+
     def minimise(self, problem: LeastSquaresProblem, start: Start, *, watch: Callable[[Iterate], None]) -> Iterate:
         here, size = problem.evaluate(start.parameters), len(start.parameters)
         inverse = np.diag(problem.lengths**2) if start.memory is None else start.memory.reshape(size, size)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from fenicsmech.design.optimisers.problem import (
     Start,
     TooHigh,
 )
+from fenicsmech.design.optimisers.resolution import Resolution
 from fenicsmech.mechanism.checks import positive
 
 _POOR, _GOOD = 0.1, 0.75  # actual over promised reduction: below, the step is refused; above, damping falls
@@ -33,38 +35,54 @@ _REFUSALS = 20
 _STALLS = 3
 _LEAST = 1e-9  # μ, so that parameters without influence stay where they are
 _INNER = 50
+_TOLERANCE = 5e-3
 
 
 @dataclass(frozen=True)
 class LevenbergMarquardt(Minimiser):
     """Ends when the undamped step promises less than ``tolerance`` of O, or three steps in a row gained less.
 
+    Attributes:
+        iterations: most of them.
+        tolerance: least reduction worth a step, over O. By default 0.005, or earlier where the finite elements cannot
+            tell, see ``resolution``.
+        damping: μ at the start.
+
     Raises:
         DescriptionError: tolerance or damping is not a positive number.
     """
 
     iterations: int = 60
-    tolerance: float = 5e-3
+    tolerance: float | None = None
     damping: float = 1e-2
 
     def __post_init__(self) -> None:
-        positive("tolerance of Levenberg–Marquardt", self.tolerance)
+        positive("tolerance of Levenberg–Marquardt", self.least_promise)
         positive("damping of Levenberg–Marquardt", self.damping)
+
+    @property
+    def least_promise(self) -> float:
+        return _TOLERANCE if self.tolerance is None else self.tolerance
 
     def minimise(self, problem: LeastSquaresProblem, start: Start, *, watch: Callable[[Iterate], None]) -> Iterate:
         here, metric = problem.evaluate(start.parameters), 1.0 / problem.lengths**2
         memory = _Memory(self.damping, 0) if start.memory is None else _Memory.of(start.memory)
         last = _iterate(start.number, start.evaluations + 1, here, memory, metric)
         watch(last)
+        resolution = Resolution(last)
         while last.reason is None:
-            last = self._advance(problem, last, metric)
+            undecided = self.tolerance is None and last.promise > self.least_promise
+            if undecided and resolution.reached(last, partial(_undamped, last.evaluation, metric)):
+                last = replace(last, reason=Reason.RESOLVED)
+            else:
+                last = self._advance(problem, last, metric)
             watch(last)
         return last
 
     def _advance(self, problem: LeastSquaresProblem, last: Iterate, metric: np.ndarray) -> Iterate:
         here, memory, evaluations = last.evaluation, _Memory.of(last.memory), last.evaluations
         damping = memory.damping
-        if last.promise <= self.tolerance or memory.stalls >= _STALLS:
+        if last.promise <= self.least_promise or memory.stalls >= _STALLS:
             return replace(last, reason=Reason.CONVERGED)
         for _ in range(_REFUSALS):
             there, promised = _step(here, damping, metric)
@@ -82,7 +100,7 @@ class LevenbergMarquardt(Minimiser):
             gain, number = here.value - new.value, last.number + 1
             if gain > _GOOD * promised:
                 damping = max(damping / 5.0, _LEAST)
-            stalls = memory.stalls + 1 if gain < self.tolerance * here.value else 0
+            stalls = memory.stalls + 1 if gain < self.least_promise * here.value else 0
             reason = Reason.ITERATIONS if number >= self.iterations else None
             return _iterate(number, evaluations, new, _Memory(damping, stalls), metric, reason)
         return replace(last, evaluations=evaluations, reason=Reason.NO_DESCENT)
@@ -126,6 +144,11 @@ def _step(here: Evaluation, damping: float, metric: np.ndarray) -> tuple[np.ndar
         else:
             break
     return p, here.value - here.model(p).value
+
+
+def _undamped(here: Evaluation, metric: np.ndarray) -> np.ndarray:
+    """s without damping."""
+    return _step(here, _LEAST, metric)[0] - here.parameters
 
 
 def _iterate(

@@ -40,6 +40,11 @@ class Quadratic:
         return Quadratic(0.0, np.zeros(size), np.zeros((size, size)))
 
 
+def exact() -> np.ndarray:
+    """The errors of residuals that have none."""
+    return np.zeros(())
+
+
 @dataclass(frozen=True, eq=False)
 class Evaluation:
     """O(p) = ½ |r|² + R and its derivatives at one point.
@@ -49,12 +54,14 @@ class Evaluation:
         residuals: r, (m,).
         jacobian: ∂r/∂p, (m, n).
         regulariser: R near p, which costs little to evaluate.
+        errors: estimates the errors |e| of the residuals, (m,); to be asked at the best point so far only.
     """
 
     parameters: np.ndarray
     residuals: np.ndarray
     jacobian: np.ndarray
     regulariser: Callable[[np.ndarray], Quadratic]
+    errors: Callable[[], np.ndarray] = exact
 
     @cached_property
     def penalty(self) -> Quadratic:
@@ -104,8 +111,14 @@ class Reason(Enum):
     """Why a minimisation ended; the value is what to tell the user."""
 
     CONVERGED = "the gradient vanishes or the objective no longer falls: a minimum was found"
+    RESOLVED = "what is left to gain is small beside the error of the elements: refine them, or give a tolerance"
     ITERATIONS = "the number of iterations ran out: allow more to get closer to the minimum"
     NO_DESCENT = "no step lowers the objective although the gradient does not vanish: check bounds and mesh quality"
+
+    @property
+    def converged(self) -> bool:
+        """Whether a minimum was found, as far as it can be told."""
+        return self in (Reason.CONVERGED, Reason.RESOLVED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,11 +163,14 @@ class Minimiser(ABC):
 
     Attributes:
         iterations: most iterations.
-        tolerance: promised reduction over the objective at which it ends.
+        least_promise: promised reduction over the objective at which it ends at the latest.
     """
 
     iterations: int
-    tolerance: float
+
+    @property
+    @abstractmethod
+    def least_promise(self) -> float: ...
 
     @abstractmethod
     def minimise(self, problem: LeastSquaresProblem, start: Start, *, watch: Callable[[Iterate], None]) -> Iterate:
