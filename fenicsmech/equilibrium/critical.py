@@ -15,8 +15,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from fenicsmech.equilibrium.arc_length import ArcLength, PathPoint
 from fenicsmech.equilibrium.lead import Heading
+from fenicsmech.equilibrium.path_points import PathPoint, PathPoints
 from fenicsmech.equilibrium.solver import NotConverged
 from fenicsmech.log import logger
 
@@ -60,21 +60,27 @@ class CriticalPoint:
     course: Heading
 
 
-def locate(arc: ArcLength, before: PathPoint, after: PathPoint) -> list[CriticalPoint]:
-    """All critical points between two neighbouring points of a path, in its order (collective)."""
-    if not _changes(arc, before, after):
+def locate(points: PathPoints, before: PathPoint, after: PathPoint, *, tolerance: float) -> list[CriticalPoint]:
+    """All critical points between two neighbouring points of a path, in its order (collective).
+
+    Args:
+        points: the path.
+        before, after: two of its points.
+        tolerance: how closely they are located, as a part of the distance between the two.
+    """
+    if not _changes(points, before, after):
         return []
-    width = arc.along(before, after)
-    course = arc.metric.unit(arc.difference(after.state, before.state))
-    piece = _Piece(arc, before, after, course)
-    return _search(piece, (0.0, before), (width, after), arc.steps.tolerance * width)
+    width = points.along(before, after)
+    course = points.metric.unit(points.difference(after.state, before.state))
+    piece = _Piece(points, before, after, course)
+    return _search(piece, (0.0, before), (width, after), tolerance * width)
 
 
 @dataclass(frozen=True)
 class _Piece:
     """A step of the path."""
 
-    arc: ArcLength
+    points: PathPoints
     before: PathPoint
     after: PathPoint
     course: Heading
@@ -85,8 +91,8 @@ class _Piece:
         Meshes without a column's symmetry turn its bifurcation into two paths that pass each other closely; what turns
         off from one to the other there is none of this path's points.
         """
-        point = self.arc.between(self.before, self.after, distance)
-        metric, chord = self.arc.metric, self.arc.difference(point.state, self.before.state)
+        point = self.points.between(self.before, self.after, distance)
+        metric, chord = self.points.metric, self.points.difference(point.state, self.before.state)
         off = chord + self.course.scaled(-metric.dot(chord, self.course))
         if metric.norm(off) > _STRAYED * metric.dot(chord, self.course):
             raise NotConverged("it strays off the path", point.iterations)
@@ -99,7 +105,7 @@ def _search(
     """The critical points between two distances along ``piece``."""
     turn, failures = 0, 0
     while high[0] - low[0] > tolerance and failures < len(_ELSEWHERE):
-        distance = _guess(piece.arc, low, high, tolerance, halve=turn % 3 == 2)
+        distance = _guess(piece.points, low, high, tolerance, halve=turn % 3 == 2)
         if failures:
             distance = low[0] + _ELSEWHERE[failures] * (high[0] - low[0])
         turn += 1
@@ -109,7 +115,7 @@ def _search(
             _log.debug("no equilibrium on the way to a critical point: %s", failure)
             failures += 1
             continue
-        left, right = _changes(piece.arc, low[1], middle[1]), _changes(piece.arc, middle[1], high[1])
+        left, right = _changes(piece.points, low[1], middle[1]), _changes(piece.points, middle[1], high[1])
         if left and right:
             return _search(piece, low, middle, tolerance) + _search(piece, middle, high, tolerance)
         low, high = (low, middle) if left else (middle, high)
@@ -117,15 +123,15 @@ def _search(
 
 
 def _guess(
-    arc: ArcLength, low: tuple[float, PathPoint], high: tuple[float, PathPoint], tolerance: float, *, halve: bool
+    points: PathPoints, low: tuple[float, PathPoint], high: tuple[float, PathPoint], tolerance: float, *, halve: bool
 ) -> float:
     """Where to look next: where a rate that changes sign vanishes on the line, a little to its farther side."""
     (a, before), (b, after) = low, high
     middle = 0.5 * (a + b)
     if halve:
         return middle
-    for rate in (_parameter_rate, _travel_rate):
-        first, second = rate(arc, before), rate(arc, after)
+    for rate in (_parameter_rate, _conjugate_rate):
+        first, second = rate(points, before), rate(points, after)
         if first * second < 0.0:
             root = a + (b - a) * first / (first - second)
             root += 0.4 * tolerance if root < middle else -0.4 * tolerance
@@ -133,35 +139,39 @@ def _guess(
     return middle
 
 
-def _parameter_rate(arc: ArcLength, point: PathPoint) -> float:
-    rate = point.tangent.parameter / arc.metric.parameter
+def _parameter_rate(points: PathPoints, point: PathPoint) -> float:
+    rate = point.tangent.parameter / points.metric.parameter
     return rate if abs(rate) > _NO_RATE else 0.0
 
 
-def _travel_rate(arc: ArcLength, point: PathPoint) -> float:
-    rate = point.travel / arc.metric.travel
+def _conjugate_rate(points: PathPoints, point: PathPoint) -> float:
+    """Of a displacement; what motors exert may have any number of extrema without harm."""
+    if points.lead.displaces:
+        return 0.0
+    rate = point.conjugate / points.metric.conjugate
     return rate if abs(rate) > _NO_RATE else 0.0
 
 
-def _changes(arc: ArcLength, a: PathPoint, b: PathPoint) -> bool:
+def _changes(points: PathPoints, a: PathPoint, b: PathPoint) -> bool:
     return (
         a.unstable_modes != b.unstable_modes
-        or _parameter_rate(arc, a) * _parameter_rate(arc, b) < 0.0
-        or _travel_rate(arc, a) * _travel_rate(arc, b) < 0.0
+        or _parameter_rate(points, a) * _parameter_rate(points, b) < 0.0
+        or _conjugate_rate(points, a) * _conjugate_rate(points, b) < 0.0
     )
 
 
 def _classified(piece: _Piece, a: PathPoint, b: PathPoint) -> list[CriticalPoint]:
     """What lies between two points that are as good as one."""
-    arc, course = piece.arc, piece.course
+    points, course = piece.points, piece.course
     found, modes = [], abs(b.unstable_modes - a.unstable_modes)
-    if _parameter_rate(arc, a) * _parameter_rate(arc, b) < 0.0:
+    if _parameter_rate(points, a) * _parameter_rate(points, b) < 0.0:
         nearer = min(a, b, key=lambda point: abs(point.tangent.parameter))
-        found.append(CriticalPoint(Critical.LIMIT, nearer, 1, course))
+        kind = Critical.TURNING if points.lead.displaces else Critical.LIMIT
+        found.append(CriticalPoint(kind, nearer, 1, course))
         modes = abs(modes - 1)
     if modes:
         found.append(CriticalPoint(Critical.BIFURCATION, b, modes, course))
-    if _travel_rate(arc, a) * _travel_rate(arc, b) < 0.0:
-        nearer = min(a, b, key=lambda point: abs(point.travel))
+    if _conjugate_rate(points, a) * _conjugate_rate(points, b) < 0.0:
+        nearer = min(a, b, key=lambda point: abs(point.conjugate))
         found.append(CriticalPoint(Critical.TURNING, nearer, 0, course))
     return found

@@ -1,4 +1,4 @@
-"""A load–displacement curve: the frames of one configuration under one changing force."""
+"""A load–displacement curve: the frames of one configuration under one changing force, or one moving motor."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from fenicsmech.errors import DescriptionError
 from fenicsmech.linkage import Freedom
-from fenicsmech.mechanism import Configuration, Force, Units
+from fenicsmech.mechanism import Configuration, Force, Motor, Units
 from fenicsmech.report import CurveSeries, plot_curve, write_curve_csv
 from fenicsmech.simulation.frame import Frame
+from fenicsmech.simulation.leading import Axis, leading
 
 
 @dataclass(frozen=True)
@@ -18,7 +20,7 @@ class Curve:
     """Frames of one configuration.
 
     Attributes:
-        force_part: the force that changes.
+        part: the force that changes, or the motor that moves.
         configuration: motor positions.
         freedom: mobility and redundancy of the assembled configuration.
         frames: one per sample, in the order asked for.
@@ -27,13 +29,31 @@ class Curve:
         others: constant magnitudes of other forces.
     """
 
-    force_part: Force
+    part: Force | Motor
     configuration: Configuration
     freedom: Freedom
     frames: tuple[Frame, ...]
     units: Units
     leads: bool
     others: tuple[tuple[Force, float], ...] = ()
+
+    @property
+    def force_part(self) -> Force:
+        """The force that changes.
+
+        Raises:
+            DescriptionError: a motor leads the curve.
+        """
+        if isinstance(self.part, Motor):
+            raise DescriptionError(
+                f"curve of motor {self.part.name!r}", "no force leads it", "Ask this of a curve under a changing force"
+            )
+        return self.part
+
+    @property
+    def axes(self) -> tuple[Axis, Axis]:
+        """What lies across and up on plots."""
+        return leading(self.part).axes(self.units)
 
     @property
     def forces(self) -> np.ndarray:
@@ -62,12 +82,13 @@ class Curve:
     def plot(self, path: str | Path) -> None:
         """Draws the curve as a PNG (rank 0)."""
         if self.leads:
+            across, up = self.axes
             plot_curve(
                 Path(path),
                 [self.series()],
-                xlabel=f"displacement [{self.units.length}]",
-                ylabel=f"force [{self.units.force}]",
-                title=f"{self.force_part.name}, {self.configuration.name}",
+                xlabel=across.label,
+                ylabel=up.label,
+                title=f"{self.part.name}, {self.configuration.name}",
             )
 
     def write_csv(self, path: str | Path, *, errors: np.ndarray | None = None) -> None:
@@ -79,10 +100,12 @@ class Curve:
         """
         length, force, stress = self.units.length, self.units.force, self.units.stress
         if self.leads:
+            across, up = self.axes
             columns = {
-                f"displacement [{length}]": self.displacements,
-                f"force [{force}]": self.forces,
-                "stable": self.stable.astype(float),
+                across.label: self.displacements,
+                up.label: self.forces,
+                "stable": self.stable,
+                "jumped": self.jumped,
                 f"strain energy [{force} {length}]": np.array([frame.strain_energy for frame in self.frames]),
                 f"max von Mises [{stress}]": np.array([frame.max_stress for frame in self.frames]),
             }

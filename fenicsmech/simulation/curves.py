@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from fenicsmech.equilibrium import ArcSteps, EquilibriumSolver, Iteration, LoadControl, Predictor, Sense
+from fenicsmech.equilibrium import ArcSteps, EquilibriumSolver, Iteration, Predictor, Sense
 from fenicsmech.errors import DescriptionError
 from fenicsmech.linkage import Freedom, assemble, count_freedom
-from fenicsmech.mechanism import Force, Units
+from fenicsmech.mechanism import Force, Motor, Units
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.followed import FollowedCurve, PathEvent
 from fenicsmech.simulation.follower import Follower
 from fenicsmech.simulation.frame import Frame
+from fenicsmech.simulation.leading import leading
 from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.request import CurveRequest
 from fenicsmech.simulation.tracer import Tracer
@@ -32,12 +33,12 @@ class Curves:
         self._model, self._solver, self._predictor, self._units = model, solver, predictor, units
         self._newtons: dict[tuple, Iteration] = {}
 
-    def newton(self, force: Force, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
-        """The solver for one controlled and some fixed forces, kept for all configurations."""
-        key, model = (force, others), self._model
+    def newton(self, part: Force | Motor, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
+        """The solver for what leads and some fixed forces, kept for all configurations."""
+        key, model = (part, others), self._model
         if key not in self._newtons:
             loads = tuple((model.point_load(other), float(magnitude)) for other, magnitude in others)
-            self._newtons[key] = self._solver.on(model.system(model.point_load(force), loads))
+            self._newtons[key] = self._solver.on(model.system(leading(part).load(model), loads))
         return self._newtons[key]
 
     def trace(self, request: CurveRequest, watch: Callable[[int], None]) -> Curve:
@@ -53,7 +54,7 @@ class Curves:
             frames.append(tracer.frame(control, frames))
             watch(len(frames))
         return Curve(
-            request.force,
+            request.part,
             request.configuration,
             freedom,
             tuple(frames),
@@ -65,7 +66,7 @@ class Curves:
     def follow(
         self, request: CurveRequest, until: Until, steps: ArcSteps | None, watch: Callable[[int], None]
     ) -> FollowedCurve:
-        """The curve from the configuration without the force that changes, as ``Simulation.follow``."""
+        """The curve from the configuration without the force that leads, as ``Simulation.follow``."""
         follower, freedom = self._follower(request, until, steps)
         follower.from_rest(watch)
         return self._followed(request, freedom, follower)
@@ -84,7 +85,7 @@ class Curves:
                 f"{event.modes} modes become unstable at once",
                 "Break the symmetry a little, or follow the curve with a smaller tolerance in ArcSteps",
             )
-        request = CurveRequest(curve.force_part, (LoadControl(0.0),), curve.configuration, curve.others)
+        request = CurveRequest(curve.part, (), curve.configuration, curve.others)
         found = []
         with self._model.shaped(event.frame.design):
             for sense in Sense:
@@ -99,7 +100,7 @@ class Curves:
         assembly = assemble(linkage, request.configuration)
         rigid = linkage.rigid
         freedom = count_freedom(rigid, assembly.poses, rigid.motor_values(request.configuration.position))
-        newton = self.newton(request.force, request.others)
+        newton = self.newton(request.part, request.others)
         tracer = Tracer(self._model, newton, request, assembly=assembly, freedom=freedom, predictor=self._predictor)
         return tracer, newton, freedom
 
@@ -110,7 +111,7 @@ class Curves:
 
     def _followed(self, request: CurveRequest, freedom: Freedom, follower: Follower) -> FollowedCurve:
         return FollowedCurve(
-            request.force,
+            request.part,
             request.configuration,
             freedom,
             tuple(follower.frames),

@@ -27,7 +27,7 @@ from fenicsmech.equilibrium import (
 )
 from fenicsmech.errors import DescriptionError
 from fenicsmech.linkage import build_linkage
-from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Mechanism, Output, Scene
+from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Mechanism, Motor, Output, Scene
 from fenicsmech.mechanism.checks import positive
 from fenicsmech.meshing import radius_ratios
 from fenicsmech.meshing.sizing import LEAST_SEGMENTS
@@ -45,7 +45,7 @@ from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.link_meshes import check_links, mesh_mechanism
 from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.picture import panel
-from fenicsmech.simulation.request import CurveRequest, read_request
+from fenicsmech.simulation.request import CurveRequest, read_path, read_request
 from fenicsmech.simulation.snapshot import gather, rest_vertices
 from fenicsmech.simulation.unloaded import unloaded_positions
 from fenicsmech.simulation.until import Until, check_until
@@ -180,21 +180,22 @@ class Simulation:
 
     def follow(
         self,
-        force: Force,
+        part: Force | Motor,
         *,
         until: Until,
         configuration: Configuration = DRAWN,
         others: Mapping[Force, float] | None = None,
         steps: ArcSteps | None = None,
     ) -> FollowedCurve:
-        """The whole curve under a changing force, past limit points and where it turns back (collective).
+        """The whole curve under a changing force or a moving motor, past limit points and folds (collective).
 
-        Starts without the force and goes towards the first displacement, or else the first force, of ``until``.
+        Starts in the configuration, without the force that leads, and goes towards the first displacement or position,
+        or else the first force, of ``until``. Across the curve of a motor lies its position, up its torque or force.
 
         Args:
-            force: the force that changes.
+            part: the force that changes, or the motor that moves.
             until: where the curve ends.
-            configuration: motor positions.
+            configuration: motor positions; where the motor that moves starts from.
             others: constant magnitudes of other forces.
             steps: how finely it is followed.
 
@@ -204,10 +205,8 @@ class Simulation:
             EquilibriumError: the curve ends early; carries the frames before that.
         """
         self._check_description()
-        check_until(until)
-        request = read_request(
-            self.scene.mechanism, force, forces=[0.0], displacements=None, configuration=configuration, others=others
-        )
+        request = read_path(self.scene.mechanism, part, configuration=configuration, others=others)
+        check_until(until, part)
         with Progress(until.frames, configuration.name) if self.comm.rank == 0 else Silent() as progress:
             self._last = self._curves.follow(request, until, steps, progress.update)
         return self._last
@@ -228,7 +227,7 @@ class Simulation:
             EquilibriumError: the curve is not found, or ends early; carries the frames before that.
         """
         self._check_description()
-        check_until(until)
+        check_until(until, curve.part)
         return self._curves.branches(curve, event, until, steps)
 
     def buckling_loads(
@@ -258,7 +257,7 @@ class Simulation:
         Arguments and errors as those of ``buckling_loads``.
         """
         chosen = self._chosen(curve)
-        newton = self.newton(chosen.force_part, chosen.others)
+        newton = self.newton(chosen.part, chosen.others)
         return soft_modes(self.model, newton, chosen, frame or chosen.frames[-1], count)
 
     def on(self, comm: MPI.Comm) -> Simulation:
@@ -321,9 +320,9 @@ class Simulation:
         )
         return Explanation(simulated(self.model, fidelity.model.name, fidelity.order), tuple(left_out))
 
-    def newton(self, force: Force, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
-        """The solver for one controlled and some fixed forces, kept for all configurations (collective)."""
-        return self._curves.newton(force, others)
+    def newton(self, part: Force | Motor, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
+        """The solver for what leads and some fixed forces, kept for all configurations (collective)."""
+        return self._curves.newton(part, others)
 
     def von_mises(self, frame: Frame) -> np.ndarray | None:
         """Von Mises stress at the midpoints of all cells, on rank 0; None elsewhere (collective).
