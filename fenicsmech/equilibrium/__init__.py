@@ -15,7 +15,7 @@
 - ``lead``: what leads a path that may turn back: a force, or motors
 - ``arc_metric``, ``path_points``: the equilibria of such a path
 - ``arc_length``, ``continuation``: steps along it, and where it ends
-- ``critical``, ``branching``: their limit points and bifurcations, and the paths that cross there
+- ``critical``, ``soft_mode``, ``branching``: their limit points and bifurcations, and the paths that cross there
 - ``eigen``: the softest modes of a tangent, and buckling loads
 - ``reactions``: what joints and motors exert
 """

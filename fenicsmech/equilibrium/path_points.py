@@ -87,6 +87,11 @@ class PathPoints:
         point = self._point(state, balance, control, (self.newton.relative(balance),), 0)
         return point if point.tangent.parameter > 0.0 else point.reversed()
 
+    def factor(self, point: PathPoint, near: PathPoint) -> None:
+        """Factors the tangent at ``point``, held by what is held for corrections near ``near``."""
+        control = self._control(point.state, near)
+        self.newton.factor(point.state, control, self._balance(point.state, control), self.floor)
+
     def correct(self, guess: State, normal: Heading, near: PathPoint) -> PathPoint:
         """The equilibrium in the plane through ``guess`` across ``normal``, its tangent not against that.
 
@@ -99,11 +104,9 @@ class PathPoints:
             NotConverged: there is none near.
         """
         newton, metric = self.newton, self.metric
-        turned = abs(near.conjugate) / metric.conjugate > abs(near.tangent.parameter) / metric.parameter
         state, residuals, before = guess, [], math.inf
         for iteration in range(_MOST_ITERATIONS + 1):
-            control = self.lead.holding_conjugate(self.system, state) if turned else None
-            control = control or self.lead.holding(state)
+            control = self._control(state, near)
             balance = self._balance(state, control)
             residuals.append(newton.relative(balance))
             if iteration > 0 and newton.converged(balance, before):
@@ -153,6 +156,13 @@ class PathPoints:
         return self.correct(guess, start.tangent, start)
 
     # -- linear algebra ------------------------------------------------------------------------------------
+
+    def _control(self, state: State, near: PathPoint) -> Control:
+        """What is held at ``state``: whichever changes more along the path at ``near``."""
+        metric, control = self.metric, None
+        if abs(near.conjugate) / metric.conjugate > abs(near.tangent.parameter) / metric.parameter:
+            control = self.lead.holding_conjugate(self.system, state)
+        return control or self.lead.holding(state)
 
     def _balance(self, state: State, control: Control) -> Balance:
         self.system.load(state)

@@ -30,6 +30,11 @@ class PathEvent:
     critical: CriticalPoint
 
     @property
+    def value(self) -> float:
+        """Of what leads, where the tangent is singular; the frame is the nearest equilibrium that was found."""
+        return self.critical.value
+
+    @property
     def modes(self) -> int:
         """By how many the unstable modes change there."""
         return self.critical.modes

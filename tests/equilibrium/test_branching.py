@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
 import fenicsmech as fm
+from fenicsmech.equilibrium import PathPoints
 
 from .column import EULER, LENGTH, THICKNESS, YOUNG, Column, column, critical_load
 
@@ -62,6 +63,28 @@ def test_second_branch_is_found_where_it_crosses():
     branch, _ = case.simulation.branches(curve, curve.bifurcations[1], until=fm.Until(displacement=1.0))
     assert branch.forces[-1] == pytest.approx(4.0 * CRITICAL, rel=2e-2)
     assert branch.frames[-1].unstable_modes == 1
+
+
+@pytest.mark.parametrize("size, most", [(THICKNESS, 3), (0.7 * THICKNESS, 10)])
+def test_bifurcation_is_located_by_few_equilibria_to_the_accuracy_of_the_eigenvalue(size, most, monkeypatch):
+    # the finer mesh is not symmetric: it turns the bifurcation into two paths that pass each other
+    solved, between = [], PathPoints.between
+
+    def counted(*arguments):
+        solved.append(1)
+        return between(*arguments)
+
+    case = column(size=size)
+    near = case.simulation.load_displacement(case.push, forces=[0.9 * CRITICAL])
+    loads = [load.force for load in case.simulation.buckling_loads(near, count=1)]
+    monkeypatch.setattr(PathPoints, "between", counted)
+    steps = fm.ArcSteps(largest=0.2)
+    curve = case.simulation.follow(case.push, until=fm.Until(force=1.1 * EULER, frames=50), steps=steps)
+    (event,) = curve.bifurcations
+    ending = 3  # equilibria on the way to the force at the end
+    assert len(solved) <= most + ending
+    assert event.value == pytest.approx(loads[0], rel=1e-6)
+    assert event.frame.force == pytest.approx(loads[0], rel=1e-3)
 
 
 def test_what_is_no_bifurcation_of_the_curve_is_refused():
