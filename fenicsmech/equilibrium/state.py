@@ -42,5 +42,31 @@ class Step:
         """``factor`` times this step."""
         return Step(factor * self.u, factor * self.z, factor * self.multipliers, factor * self.force)
 
+    def slower(self, other: Step) -> Step:
+        """For every coordinate the smaller change of the two."""
+
+        def smaller(one: np.ndarray, two: np.ndarray) -> np.ndarray:
+            return np.where(np.abs(one) < np.abs(two), one, two)
+
+        return Step(
+            smaller(self.u, other.u),
+            smaller(self.z, other.z),
+            smaller(self.multipliers, other.multipliers),
+            float(smaller(self.force, other.force)),
+        )
+
+    def beyond(self, a: Step, b: Step) -> Step:
+        """How far every coordinate lies outside what is between those of ``a`` and ``b``."""
+
+        def outside(value: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+            return value - np.clip(value, np.minimum(one, other), np.maximum(one, other))
+
+        return Step(
+            outside(self.u, a.u, b.u),
+            outside(self.z, a.z, b.z),
+            outside(self.multipliers, a.multipliers, b.multipliers),
+            float(outside(self.force, a.force, b.force)),
+        )
+
     def __add__(self, other: Step) -> Step:
         return Step(self.u + other.u, self.z + other.z, self.multipliers + other.multipliers, self.force + other.force)

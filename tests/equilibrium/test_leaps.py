@@ -7,7 +7,10 @@ import pytest
 
 import fenicsmech as fm
 
+from . import toggle
 from .arch import RISE, arch
+from .bow import bow
+from .column import EULER, column
 from .finger import finger
 
 
@@ -45,3 +48,31 @@ def test_jump_is_logged(snapping, caplog):
 def test_finger_that_bends_far_in_one_step_has_not_jumped(space):
     simulation, push = finger(space)
     assert not simulation.load_displacement(push, forces=[8.0]).jumped.any()
+
+
+def test_toggle_that_a_motor_drives_beyond_its_fold_has_jumped():
+    # the motor pushes the toggle through a soft bar; its position turns back at 5.69 mm
+    case = toggle.toggle(stilt_modulus=0.075)
+    mechanism = case.simulation.scene.mechanism
+    (guide,) = (joint for joint in mechanism.joints if joint.b.name == "head" and joint.kind.sliding)
+    motor = mechanism.motor(guide)
+    simulation = fm.Simulation(case.simulation.scene, space="plane-stress", order=1, size=6.0)
+    for position, jumped in ((-5.6, False), (-5.8, True), (-16.0, True), (3.0, False)):
+        driven = simulation.scene.configuration("driven", {motor: position})
+        curve = simulation.load_displacement(case.push, forces=[0.0, -0.1], configuration=driven)
+        assert curve.jumped.tolist() == [jumped, False]
+
+
+def test_snap_is_seen_among_motors_that_turn_much_farther():
+    # both clamps of a shallow bow turn, by far more than it snaps: the fold is at 0.490 rad
+    simulation, crown, motors = bow()
+    for angle, jumped in ((0.48, False), (0.5, True), (0.8, True), (1.2, True)):
+        turned = simulation.scene.configuration("turned", dict(zip(motors, (-angle, angle), strict=True)))
+        curve = simulation.load_displacement(crown, forces=[0.0], configuration=turned)
+        assert curve.jumped.tolist() == [jumped], angle
+
+
+def test_column_that_buckles_has_not_jumped():
+    case = column(space="3d", size=1.5)  # a mesh without symmetry, on which the straight path bends off
+    curve = case.simulation.load_displacement(case.push, forces=[0.98 * EULER, 1.02 * EULER])
+    assert not curve.jumped.any()
