@@ -13,6 +13,7 @@ from fenicsmech.simulation.followed import FollowedCurve, PathEvent
 from fenicsmech.simulation.follower import Follower
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.leading import leading
+from fenicsmech.simulation.mode_shape import ModeShape
 from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.request import CurveRequest
 from fenicsmech.simulation.tracer import Tracer
@@ -72,25 +73,27 @@ class Curves:
         return self._followed(request, freedom, follower)
 
     def branches(
-        self, curve: FollowedCurve, event: PathEvent, until: Until, steps: ArcSteps | None
+        self, curve: FollowedCurve, event: PathEvent, until: Until, steps: ArcSteps | None, mode: ModeShape | None
     ) -> tuple[FollowedCurve, FollowedCurve]:
         """The curve that crosses another one, in both senses, as ``Simulation.branches``."""
         if event not in curve.bifurcations:
             raise DescriptionError(
                 "branches", "the event is no bifurcation of the curve", "Choose from its bifurcations"
             )
-        if event.modes != 1:
+        if mode is None and event.modes != 1:
             raise DescriptionError(
                 "branches",
-                f"{event.modes} modes become unstable at once",
-                "Break the symmetry a little, or follow the curve with a smaller tolerance in ArcSteps",
+                f"{event.modes} modes become unstable at once: {', '.join(shape.link for shape in event.null_space)}",
+                "Say which with mode=event.null_space[…], or break the symmetry a little",
             )
+        if mode is not None and mode not in event.null_space:
+            raise DescriptionError("branches", "the mode is none of the event's", "Choose from its null_space")
         request = CurveRequest(curve.part, (), curve.configuration, curve.others)
         found = []
         with self._model.shaped(event.frame.design):
             for sense in Sense:
                 follower, freedom = self._follower(request, until, steps)
-                follower.from_bifurcation(event, sense, lambda done: None)
+                follower.from_bifurcation(event, mode or event.mode, sense, lambda done: None)
                 found.append(self._followed(request, freedom, follower))
         return found[0], found[1]
 

@@ -30,7 +30,7 @@ from fenicsmech.errors import EquilibriumError
 from fenicsmech.simulation.followed import PathEvent
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.leading import leading
-from fenicsmech.simulation.mode_shape import mode_shape
+from fenicsmech.simulation.mode_shape import ModeShape, mode_shape
 from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.request import CurveRequest
 from fenicsmech.simulation.tracer import Tracer
@@ -87,8 +87,8 @@ class Follower:
             start = start.reversed()
         self._walk(arc, start, goals, watch)
 
-    def from_bifurcation(self, event: PathEvent, sense: Sense, watch: Callable[[int], None]) -> None:
-        """Follows the path that crosses another one at ``event``.
+    def from_bifurcation(self, event: PathEvent, mode: ModeShape, sense: Sense, watch: Callable[[int], None]) -> None:
+        """Follows the path that crosses another one at ``event`` along ``mode``.
 
         Raises:
             EquilibriumError: the path is not found, or ends early; carries the frames before that.
@@ -97,7 +97,7 @@ class Follower:
         rest = self._tracer.frame(LoadControl(0.0), ())  # the tangent at the bifurcation tells no scale
         try:
             arc = self._arc(rest.state)
-            first = crossing(arc, event.critical, event.mode.step, sense)
+            first = crossing(arc, event.critical, mode.step, sense)
         except NotConverged as failure:
             raise self._ended(failure) from failure
         self.frames.append(self._tracer.record(first.solution()))
@@ -122,13 +122,13 @@ class Follower:
 
     def _record_event(self, arc: ArcLength, critical: CriticalPoint) -> None:
         if critical.kind is Critical.BIFURCATION:
-            step = null_space(arc.points, critical)[0]
+            steps = null_space(arc.points, critical)
         else:
             step = critical.point.tangent.step
-            step = step.scaled(1.0 / arc.points.system.size(step))
+            steps = [step.scaled(1.0 / arc.points.system.size(step))]
         frame = self._tracer.record(critical.point.solution())
-        mode = mode_shape(self._model, step)
-        self.events.append(PathEvent(critical.kind, frame, len(self.frames), mode, critical))
+        modes = tuple(mode_shape(self._model, step) for step in steps)
+        self.events.append(PathEvent(critical.kind, frame, len(self.frames), modes, critical))
         self.frames.append(frame)
 
     def _arc(self, state: State) -> ArcLength:

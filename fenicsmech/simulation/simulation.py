@@ -43,6 +43,7 @@ from fenicsmech.simulation.fidelity import Fidelity, read_fidelity
 from fenicsmech.simulation.followed import FollowedCurve, PathEvent
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.link_meshes import check_links, mesh_mechanism
+from fenicsmech.simulation.mode_shape import ModeShape
 from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.picture import panel
 from fenicsmech.simulation.request import CurveRequest, read_path, read_request
@@ -212,23 +213,31 @@ class Simulation:
         return self._last
 
     def branches(
-        self, curve: FollowedCurve, event: PathEvent, *, until: Until, steps: ArcSteps | None = None
+        self,
+        curve: FollowedCurve,
+        event: PathEvent,
+        *,
+        until: Until,
+        steps: ArcSteps | None = None,
+        mode: ModeShape | None = None,
     ) -> tuple[FollowedCurve, FollowedCurve]:
-        """The curve that crosses ``curve`` at a simple bifurcation, from there in both senses (collective).
+        """The curve that crosses ``curve`` at a bifurcation, from there in both senses (collective).
 
         Args:
             curve: a followed curve.
             event: one of its bifurcations.
             until: where each of the two ends.
             steps: how finely they are followed.
+            mode: one of the event's ``null_space``, if several modes become unstable at once; the curve that is nearest
+                to it where it has left ``curve`` is found.
 
         Raises:
-            DescriptionError: the event is no bifurcation of the curve, or not a simple one.
+            DescriptionError: the event is no bifurcation of the curve, or the mode is missing or none of its.
             EquilibriumError: the curve is not found, or ends early; carries the frames before that.
         """
         self._check_description()
         check_until(until, curve.part)
-        return self._curves.branches(curve, event, until, steps)
+        return self._curves.branches(curve, event, until, steps, mode)
 
     def buckling_loads(
         self, curve: Curve | None = None, *, frame: Frame | None = None, count: int = 3
