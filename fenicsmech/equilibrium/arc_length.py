@@ -18,7 +18,7 @@ from fenicsmech.mechanism.checks import positive
 _log = logger(__name__)
 _TURN = 0.25  # rad between the tangents at both ends of a step that is as long as it should be
 _LARGEST_TURN = 0.9  # rad; more is a jump to another branch, or a bend that was cut off
-_ITERATIONS = 4  # of a step as long as it should be
+_ITERATIONS = 5  # of a step as long as it should be; the last one only judges the stability
 
 
 @dataclass(frozen=True)

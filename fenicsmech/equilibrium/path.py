@@ -21,8 +21,8 @@ _STRIDE = 0.2  # of the mechanism's length, or rad: how far a step may move anyt
 _SINGULAR = 1e-6  # of the distance asked for: a tangent that wants steps this small has no meaning
 _RUNAWAY = 5.0 * _STRIDE  # a prediction that moves anything this far is none
 _BEYOND = 0.2  # of the largest rate: what moves farther off its tangents may have leapt; kinks never do
-_CERTAIN = 1.2  # the same where steps are not halved any more; off a bifurcation it is 1, however short the step
-_LEAST_MOTION = 1e-6  # of the mechanism's length, or rad: what is no leap in any case
+_BENT = 2.2  # times the rate at its end: how far a step off a bifurcation may go
+_LEAST_MOTION = 1e-4  # of the mechanism's length, or rad: what is no leap in any case, as past a bifurcation
 _SMALLEST_LEAP = 1.0 / 64.0  # of the distance asked for: a step that is not halved any more because it leaps
 IDLE_STIFFNESS = 1e-10
 """What is lent to idle freedoms, in units of the mean stiffness."""
@@ -90,9 +90,8 @@ class Path:
                 if abs(step) <= _SMALLEST * abs(distance):
                     raise PathFailed(self._last, self._value, failure.reason, tuple(tried)) from failure
                 continue
-            short = abs(value - self._value) <= _SMALLEST_LEAP * abs(distance)
-            if self._leapt(value, solution, allowed=_CERTAIN if short else _BEYOND):
-                if not short:
+            if self._leapt(value, solution):
+                if abs(value - self._value) > _SMALLEST_LEAP * abs(distance):
                     step = 0.5 * (value - self._value)
                     continue
                 self.leaps += 1
@@ -145,25 +144,27 @@ class Path:
         shortened = step * min(1.0, _STRIDE / max(motion, _STRIDE))
         return shortened if abs(shortened) > least else step
 
-    def _leapt(self, value: float, solution: Solution, *, allowed: float) -> bool:
+    def _leapt(self, value: float, solution: Solution) -> bool:
         """Whether a step to ``value`` leads where the tangents at its ends do not (collective).
 
         The rate of every coordinate over the step should lie between those at its ends, whatever moves elsewhere:
 
-            r = (y₁ − y₀) / (v₁ − v₀),    |r − [y₀′, y₁′]| > allowed · max(|y₀′|, |y₁′|)
+            r = (y₁ − y₀) / (v₁ − v₀),    |r − [y₀′, y₁′]| > 0.2 max(|y₀′|, |y₁′|)
 
-        Close to a fold y₀′ tells nothing, as it grows beyond all bounds; the rate of the step before does. A step over
-        which the difference of the two would go far is too long to tell.
+        A path that bends off at a bifurcation moves as √v and r = 2 y₁′, however short the step; the span reaches that
+        far. Close to a fold y₀′ tells nothing, as it grows beyond all bounds; the rate of the step before does. A step
+        over which the difference of the two would go far is too long to tell.
         """
         if not self._anchors or value == self._value:
             return False
         system, last, distance = self._newton.system, self._anchors[-1], value - self._value
         before = last.tangent if self._rate is None else last.tangent.slower(self._rate)
         rate = system.difference(solution.state, last.state).scaled(1.0 / distance)
-        beyond = system.size(system.independent(rate.beyond(before, solution.tangent)))
+        span = (before, solution.tangent, solution.tangent.scaled(_BENT))
+        beyond = system.size(system.independent(rate.beyond(span)))
         largest = max(system.size(before), system.size(solution.tangent))
         grown = system.size(last.tangent + before.scaled(-1.0))
-        if beyond > max(allowed * largest, _LEAST_MOTION / abs(distance)) or grown * abs(distance) > allowed * _STRIDE:
+        if beyond > max(_BEYOND * largest, _LEAST_MOTION / abs(distance)) or grown * abs(distance) > _BEYOND * _STRIDE:
             return True
         self._rate = rate
         return False

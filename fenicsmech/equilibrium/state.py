@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,17 +56,17 @@ class Step:
             float(smaller(self.force, other.force)),
         )
 
-    def beyond(self, a: Step, b: Step) -> Step:
-        """How far every coordinate lies outside what is between those of ``a`` and ``b``."""
+    def beyond(self, steps: Sequence[Step]) -> Step:
+        """How far every coordinate lies outside the span of those of ``steps``."""
 
-        def outside(value: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
-            return value - np.clip(value, np.minimum(one, other), np.maximum(one, other))
+        def outside(value: np.ndarray, others: list[np.ndarray]) -> np.ndarray:
+            return value - np.clip(value, np.minimum.reduce(others), np.maximum.reduce(others))
 
         return Step(
-            outside(self.u, a.u, b.u),
-            outside(self.z, a.z, b.z),
-            outside(self.multipliers, a.multipliers, b.multipliers),
-            float(outside(self.force, a.force, b.force)),
+            outside(self.u, [step.u for step in steps]),
+            outside(self.z, [step.z for step in steps]),
+            outside(self.multipliers, [step.multipliers for step in steps]),
+            float(outside(self.force, [step.force for step in steps])),
         )
 
     def __add__(self, other: Step) -> Step:

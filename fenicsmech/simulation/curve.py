@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -77,7 +78,31 @@ class Curve:
 
     def series(self, label: str = "", *, colour: str | None = None, faint: bool = False) -> CurveSeries:
         """The curve as a plot draws it, arguments as those of ``CurveSeries``."""
-        return CurveSeries(self.displacements, self.forces, label=label, stable=self.stable, colour=colour, faint=faint)
+        return CurveSeries(
+            self.displacements,
+            self.forces,
+            label=label,
+            stable=self.stable,
+            colour=colour,
+            faint=faint,
+            jumped=self.jumped,
+        )
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Where the mechanism snapped and which equilibria are unstable, a sentence each."""
+        (across, up), name, said = self.axes, self.configuration.name, []
+        for before, after in pairwise((None, *self.frames)):
+            if after.jumped:
+                since = "on the way there" if before is None else f"after {up.quantity} {up(before.force)}"
+                said.append(
+                    f"{name}: snaps {since}, to {across.quantity} {across(after.displacement)} at {up.quantity} "
+                    f"{up(after.force)}, which is one of perhaps several equilibria beyond the fold"
+                )
+        unstable = int(np.sum(~self.stable))
+        if unstable:
+            said.append(f"{name}: {unstable} of {len(self.frames)} equilibria are unstable under dead loads")
+        return tuple(said)
 
     def plot(self, path: str | Path) -> None:
         """Draws the curve as a PNG (rank 0)."""
