@@ -7,6 +7,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
+from fenicsmech.report import read_curve_csv
 
 from ..hard.buckling import LENGTH, euler
 from ..hard.buckling import column as hard_column
@@ -40,6 +41,18 @@ def test_arch_below_its_limit_load_or_led_by_its_displacement_has_not_jumped(sna
     assert not simulation.load_displacement(push, displacements=[2.4 * RISE]).jumped.any()
 
 
+def test_jump_is_told_in_words_and_in_the_table(snapping, tmp_path):
+    simulation, push, limit = snapping
+    curve = simulation.load_displacement(push, forces=np.array([0.5, 1.05, 1.1]) * limit.force)
+    (remark,) = curve.remarks
+    assert remark.startswith(f"as drawn: snaps after force {curve.forces[0]:.3g} N, to displacement 1.8 mm")
+    curve.write_csv(tmp_path / "curve.csv")
+    assert read_curve_csv(tmp_path / "curve.csv")["jumped"].tolist() == [0.0, 1.0, 0.0]
+    assert curve.series().jumped.tolist() == [False, True, False]
+    middle = simulation.load_displacement(push, displacements=[RISE])
+    assert middle.remarks == ("as drawn: 1 of 1 equilibria are unstable under dead loads",)
+
+
 def test_jump_is_logged(snapping, caplog):
     simulation, push, limit = snapping
     simulation.load_displacement(push, forces=[1.05 * limit.force])
@@ -66,7 +79,7 @@ def test_toggle_that_a_motor_drives_beyond_its_fold_has_jumped():
 
 
 def test_snap_is_seen_among_motors_that_turn_much_farther():
-    # both clamps of a shallow bow turn, by far more than it snaps: the fold is at 0.490 rad
+    # both clamps of a shallow bow turn, by far more than it snaps; the fold is between the first two angles
     simulation, crown, motors = bow()
     for angle, jumped in ((0.48, False), (0.5, True), (0.8, True), (1.2, True)):
         turned = simulation.scene.configuration("turned", dict(zip(motors, (-angle, angle), strict=True)))
