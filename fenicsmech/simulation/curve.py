@@ -10,7 +10,7 @@ import numpy as np
 
 from fenicsmech.errors import DescriptionError
 from fenicsmech.linkage import Freedom
-from fenicsmech.mechanism import Configuration, Force, Motor, Units
+from fenicsmech.mechanism import Configuration, Force, Leader, Units
 from fenicsmech.report import CurveSeries, plot_curve, write_curve_csv
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.leading import Axis, leading
@@ -21,7 +21,7 @@ class Curve:
     """Frames of one configuration.
 
     Attributes:
-        part: the force that changes, or the motor that moves.
+        part: the force that changes, or the motors that move.
         configuration: motor positions.
         freedom: mobility and redundancy of the assembled configuration.
         frames: one per sample, in the order asked for.
@@ -30,7 +30,7 @@ class Curve:
         others: constant magnitudes of other forces.
     """
 
-    part: Force | Motor
+    part: Leader
     configuration: Configuration
     freedom: Freedom
     frames: tuple[Frame, ...]
@@ -45,9 +45,9 @@ class Curve:
         Raises:
             DescriptionError: a motor leads the curve.
         """
-        if isinstance(self.part, Motor):
+        if not isinstance(self.part, Force):
             raise DescriptionError(
-                f"curve of motor {self.part.name!r}", "no force leads it", "Ask this of a curve under a changing force"
+                f"curve of {self.part.name!r}", "no force leads it", "Ask this of a curve under a changing force"
             )
         return self.part
 

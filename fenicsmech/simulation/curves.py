@@ -7,7 +7,7 @@ from collections.abc import Callable
 from fenicsmech.equilibrium import ArcSteps, EquilibriumSolver, Iteration, Predictor, Sense
 from fenicsmech.errors import DescriptionError
 from fenicsmech.linkage import Freedom, assemble, count_freedom
-from fenicsmech.mechanism import Force, Motor, Units
+from fenicsmech.mechanism import Force, Leader, Units
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.followed import FollowedCurve, PathEvent
 from fenicsmech.simulation.follower import Follower
@@ -34,7 +34,7 @@ class Curves:
         self._model, self._solver, self._predictor, self._units = model, solver, predictor, units
         self._newtons: dict[tuple, Iteration] = {}
 
-    def newton(self, part: Force | Motor, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
+    def newton(self, part: Leader, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
         """The solver for what leads and some fixed forces, kept for all configurations."""
         key, model = (part, others), self._model
         if key not in self._newtons:

@@ -118,7 +118,7 @@ class Follower:
                 self._record_event(arc, critical)
             frame = self._tracer.record(stretch.point.solution())
             self.frames.append(replace(frame, seconds=perf_counter() - began, phases=clock.since(seconds)))
-            watch(len(self.frames))
+            watch(min(len(self.frames), self._until.frames))  # critical points come on top
 
     def _record_event(self, arc: ArcLength, critical: CriticalPoint) -> None:
         if critical.kind is Critical.BIFURCATION:

@@ -1,4 +1,4 @@
-"""What leads a curve, a force or a motor: how its path is parametrised, and what its axes are called."""
+"""What leads a curve, a force or motors: how its path is parametrised, and what its axes are called."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from fenicsmech.bodies import body_point
 from fenicsmech.equilibrium import ForceLead, Lead, MotorLead, PointLoad
 from fenicsmech.linkage import JointSystem
-from fenicsmech.mechanism import Force, Motor, Units
+from fenicsmech.mechanism import Drive, Force, Leader, Motor, Units
 from fenicsmech.simulation.model import MechanismModel
 
 
@@ -72,36 +72,40 @@ class LeadingForce(Leading):
 
 
 @dataclass(frozen=True)
-class LeadingMotor(Leading):
-    """A motor leads."""
+class LeadingDrive(Leading):
+    """Motors lead, one or several that move together."""
 
-    part: Motor
+    part: Drive
 
     def lead(self, joints):
-        return MotorLead(joints.motor_values(lambda motor: float(motor == self.part)))
+        ratios = dict(self.part.ratios)
+        return MotorLead(joints.motor_values(lambda motor: ratios.get(motor, 0.0)))
 
     def load(self, model):
-        """One that does nothing, on the link that the motor moves."""
+        """One that does nothing, on a link that a motor moves."""
         joints, dim = model.linkage.joints, model.linkage.dim
-        (connection,) = (connection for connection in joints.connections if connection.motor == self.part)
+        motor, _ = self.part.ratios[0]
+        (connection,) = (connection for connection in joints.connections if connection.motor == motor)
         body = next(body for body in (connection.b, connection.a) if body in joints.columns)
         centre = np.array(joints.bodies[body].centre)
         return PointLoad("no force", body_point(centre, body, centre, joints.space), np.zeros(dim))
 
     @property
     def across(self):
-        return "position" if self.part.joint.kind.sliding else "angle"
+        return "position" if self.part.sliding else "angle"
 
     @property
     def up(self):
-        return "force" if self.part.joint.kind.sliding else "torque"
+        return "force" if self.part.sliding else "torque"
 
     def axes(self, units):
-        if self.part.joint.kind.sliding:
+        if self.part.sliding:
             return Axis(self.across, units.length), Axis(self.up, units.force)
         return Axis(self.across, "rad"), Axis(self.up, f"{units.force} {units.length}")
 
 
-def leading(part: Force | Motor) -> Leading:
+def leading(part: Leader) -> Leading:
     """The one for a part."""
-    return LeadingMotor(part) if isinstance(part, Motor) else LeadingForce(part)
+    if isinstance(part, Motor):
+        part = Drive(part.name, ((part, 1.0),))
+    return LeadingDrive(part) if isinstance(part, Drive) else LeadingForce(part)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from fenicsmech.equilibrium import Control, DisplacementControl, LoadControl
 from fenicsmech.errors import DescriptionError
-from fenicsmech.mechanism import Configuration, Force, Mechanism, Motor
+from fenicsmech.mechanism import Configuration, Drive, Force, Leader, Mechanism, Motor
 from fenicsmech.mechanism.checks import finite
 
 
@@ -16,14 +16,14 @@ class CurveRequest:
     """A load–displacement curve to be computed.
 
     Attributes:
-        part: the force that changes, or the motor that moves.
+        part: the force that changes, or the motors that move.
         controls: samples of the force, as loads or as displacements counted from the unloaded configuration; none if
             the curve is followed.
-        configuration: motor positions; where the motor that moves starts from.
+        configuration: motor positions; where motors that move start from.
         others: constant magnitudes of other forces.
     """
 
-    part: Force | Motor
+    part: Leader
     controls: tuple[Control, ...]
     configuration: Configuration
     others: tuple[tuple[Force, float], ...]
@@ -59,7 +59,7 @@ def read_request(
 
 
 def read_path(
-    mechanism: Mechanism, part: Force | Motor, *, configuration: Configuration, others: Mapping[Force, float] | None
+    mechanism: Mechanism, part: Leader, *, configuration: Configuration, others: Mapping[Force, float] | None
 ) -> CurveRequest:
     """The request for a curve that is followed, if it makes sense for ``mechanism``.
 
@@ -67,17 +67,20 @@ def read_path(
         DescriptionError: a force or motor of another mechanism, a force both led and constant, or numbers that are not
             finite.
     """
-    if not isinstance(part, Motor):
-        _check_force(mechanism, part)
-    elif part not in mechanism.motors:
-        raise DescriptionError(f"{part.name!r}", f"it is not a motor of {mechanism.name!r}", "Add it with motor()")
+    match part:
+        case Motor():
+            _check_motors(mechanism, part.name, [part])
+        case Drive():
+            _check_motors(mechanism, part.name, [motor for motor, _ in part.ratios])
+        case _:
+            _check_force(mechanism, part)
     constant = _read_others(mechanism, part, others)
     _check_configuration(mechanism, configuration)
     return CurveRequest(part, (), configuration, constant)
 
 
 def _read_others(
-    mechanism: Mechanism, part: Force | Motor, others: Mapping[Force, float] | None
+    mechanism: Mechanism, part: Leader, others: Mapping[Force, float] | None
 ) -> tuple[tuple[Force, float], ...]:
     others = dict(others or {})
     for other in others:
@@ -91,6 +94,14 @@ def _check_force(mechanism: Mechanism, part: object) -> None:
     if part not in mechanism.forces:
         name = part.name if isinstance(part, Force) else part
         raise DescriptionError(f"{name!r}", f"it is not a force of {mechanism.name!r}", "Add it with force()")
+
+
+def _check_motors(mechanism: Mechanism, part: str, motors: list[Motor]) -> None:
+    for motor in motors:
+        if motor not in mechanism.motors:
+            raise DescriptionError(
+                f"{part!r}", f"{motor.name!r} is not a motor of {mechanism.name!r}", "Add it with motor()"
+            )
 
 
 def _check_configuration(mechanism: Mechanism, configuration: Configuration) -> None:

@@ -27,7 +27,7 @@ from fenicsmech.equilibrium import (
 )
 from fenicsmech.errors import DescriptionError
 from fenicsmech.linkage import build_linkage
-from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Mechanism, Motor, Output, Scene
+from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Leader, Mechanism, Output, Scene
 from fenicsmech.mechanism.checks import positive
 from fenicsmech.meshing import radius_ratios
 from fenicsmech.meshing.sizing import LEAST_SEGMENTS
@@ -181,7 +181,7 @@ class Simulation:
 
     def follow(
         self,
-        part: Force | Motor,
+        part: Leader,
         *,
         until: Until,
         configuration: Configuration = DRAWN,
@@ -194,7 +194,7 @@ class Simulation:
         or else the first force, of ``until``. Across the curve of a motor lies its position, up its torque or force.
 
         Args:
-            part: the force that changes, or the motor that moves.
+            part: the force that changes, or the motor that moves, or a ``Drive`` of several.
             until: where the curve ends.
             configuration: motor positions; where the motor that moves starts from.
             others: constant magnitudes of other forces.
@@ -329,7 +329,7 @@ class Simulation:
         )
         return Explanation(simulated(self.model, fidelity.model.name, fidelity.order), tuple(left_out))
 
-    def newton(self, part: Force | Motor, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
+    def newton(self, part: Leader, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
         """The solver for what leads and some fixed forces, kept for all configurations (collective)."""
         return self._curves.newton(part, others)
 

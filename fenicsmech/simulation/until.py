@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from fenicsmech.errors import DescriptionError
-from fenicsmech.mechanism import Force, Motor
+from fenicsmech.mechanism import Force, Leader
 from fenicsmech.mechanism.checks import finite
 
 
@@ -16,8 +16,8 @@ class Until:
 
     Args:
         displacement: of the point of the force that leads, along it, counted as on curves; one value or several.
-        position: of the motor that leads, rad or length, counted from the drawing; one value or several.
-        force: magnitude of the force that leads, or torque or force of the motor; one value or several.
+        position: of the motors that lead, rad or length, counted from the drawing; one value or several.
+        force: magnitude of the force that leads, or torque or force of the motors; one value or several.
         frames: most frames, critical points aside; the path ends there without complaint.
 
     Raises:
@@ -51,20 +51,20 @@ class Until:
         return self.displacement or self.position
 
 
-def check_until(until: object, part: Force | Motor) -> None:
+def check_until(until: object, part: Leader) -> None:
     """Refuses what is no end of a path that ``part`` leads.
 
     Raises:
         DescriptionError: it is none.
     """
-    where = "position" if isinstance(part, Motor) else "displacement"
+    where = "displacement" if isinstance(part, Force) else "position"
     if not isinstance(until, Until):
         raise DescriptionError("end of a path", f"{until!r} does not say where", f"Give until=Until({where}=…)")
-    if until.displacement and isinstance(part, Motor):
+    if until.displacement and not isinstance(part, Force):
         raise DescriptionError(
-            "end of a path", f"motor {part.name!r} leads, which has no displacement", "Give its position=…"
+            "end of a path", f"{part.name!r} leads, which has no displacement", "Give its position=…"
         )
     if until.position and isinstance(part, Force):
         raise DescriptionError(
-            "end of a path", f"force {part.name!r} leads, which has no position", "Give the displacement=… of its point"
+            "end of a path", f"{part.name!r} leads, which has no position", "Give the displacement=… of its point"
         )

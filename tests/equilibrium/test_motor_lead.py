@@ -10,8 +10,10 @@ from scipy.optimize import brentq, minimize_scalar
 import fenicsmech as fm
 from fenicsmech.mechanism import Motor, Output
 
+from ..hard import turned_ends
 from . import column, toggle
 from .bistable import COUPLER, RISE, RUN, forces, four_bar
+from .bow import bow
 
 SOFT = 0.075  # MPa of the toggle's stilt: its head turns back while the toggle snaps
 
@@ -137,6 +139,33 @@ def test_ends_and_questions_that_do_not_fit_a_motor_are_refused():
     with pytest.raises(fm.DescriptionError, match="no force leads it"):
         simulation.error_estimates(curve)
     assert simulation.soft_modes(curve, count=1)[0].stiffness > 0.0
+
+
+def test_clamps_that_turn_together_lead_the_bow_over_the_fold_of_the_beam_and_back():
+    simulation, _, (left, right) = bow()
+    clamps = fm.Drive("clamps", {left: -1.0, right: 1.0})
+    curve = simulation.follow(clamps, until=fm.Until(position=0.8, frames=40))
+    fold = curve.turning_points[0]
+    line = turned_ends.bowed_beam(0.3)
+    assert fold.value == pytest.approx(turned_ends.largest_turn(line, 0.48), rel=2e-3)
+    rising = curve.frames[1 : fold.index : 6]
+    moments = [turned_ends.turned(line, frame.displacement, frame.displacement).end.moment for frame in rising]
+    # both motors do the work of the drive
+    assert [frame.force for frame in rising] == pytest.approx(2.0 * np.array(moments), rel=1e-2)
+    assert curve.stable[: fold.index].all() and not curve.stable[fold.index + 1 :].any()
+    assert curve.displacements[-1] < fold.value - 0.05
+    assert [axis.label for axis in curve.axes] == ["angle [rad]", "torque [N mm]"]
+
+
+def test_drives_that_make_no_sense_are_refused():
+    simulation, _, (left, right) = bow()
+    slide = driven_toggle()[1]
+    for ratios in ({}, {left: 0.0}, {left: float("nan")}, {"left": 1.0}, {left: 1.0, slide: 1.0}):
+        with pytest.raises(fm.DescriptionError, match="drive 'both'"):
+            fm.Drive("both", ratios)
+    with pytest.raises(fm.DescriptionError, match="not a motor"):
+        simulation.follow(fm.Drive("slide", {slide: 1.0}), until=fm.Until(position=1.0))
+    assert fm.Drive("both", ((left, 1), (right, 2))).ratios == ((left, 1.0), (right, 2.0))
 
 
 @pytest.mark.parallel
