@@ -115,6 +115,7 @@ def summarise(outcome: Outcome, errors: Sequence[np.ndarray]) -> dict:
         "objective_error": result and result.objective_error,
         "thickness": result and result.thickness,
         "mesh_ratio_max": sim.mesh_ratio_max,
+        "remarks": [remark for curve in curves for remark in curve.remarks],
         "peak_memory_mb": peak,
     }
     if result is not None:
@@ -148,6 +149,8 @@ def tell(outcome: Outcome, summary: dict) -> None:
     if result is not None:
         _tell_design(outcome, summary)
     dofs = summary["dofs"]
+    for remark in summary["remarks"]:
+        demo.say(remark)
     demo.say(f"DOFs: {dofs['rigid']} rigid + {dofs['flexible']} flexible, {sim.comm.size} process(es)")
     phases = ", ".join(f"{name} {value:.2f}" for name, value in sim.clock.seconds.items())
     demo.say(f"seconds: {phases}; in all {perf_counter() - demo.started:.1f}")
@@ -220,6 +223,7 @@ def _frames(curves: Sequence[fm.Curve]) -> list[dict]:
             "seconds": frame.seconds,
             "iterations": frame.iterations,
             "stable": frame.stable,
+            "jumped": frame.jumped,
             "mobility": curve.freedom.mobility,
             "redundancy": curve.freedom.redundancy,
             "strain_energy": frame.strain_energy,

@@ -1,9 +1,11 @@
-"""A bistable switch snaps: a four-bar with a flexible follower, pushed directly and through a soft spring.
+"""A bistable switch snaps: a four-bar with a flexible follower, pushed directly, through a soft spring, and by a motor.
 
     python3 demos/snap.py [--size MM] [--out DIR]
 
 Both curves are followed past their limit points. Pushed directly the force falls and rises again; behind the spring the
-curve folds back over itself, so that even a held finger feels the switch jump. Leaves curve.png and the pictures.
+curve folds back over itself, so that even a held finger feels the switch jump: load_displacement holds it at one
+position after the other, and tells where. A motor in the crank's hinge turns the switch over without a jump; its torque
+is drawn over its angle. Leaves curve.png, crank.png and the pictures.
 """
 
 import argparse
@@ -15,26 +17,28 @@ from fenicsmech.report import format_table, plot_curve
 PIVOT, KNEE, PIN, ROOT = (0, 0), (25, 8), (50, 0), (50, -40)
 HEAD, BOW = (25, 68), (45, 38)  # the finger's end of the spring, and the middle of its bow
 ONWARD = 2.0  # N: beyond the force at which the switch snaps
+HELD = (9.0, 11.0, 13.0, 15.0)  # mm: where the finger is held, before and after the jump
+OVER = -0.7  # rad: beyond the crank's second rest
 
 
 def describe(sprung):
-    """The scene, and the force of the finger."""
+    """The scene, the force of the finger, and the hinge of the crank."""
     switch = fm.Mechanism("switch behind a spring" if sprung else "switch")
-    base = switch.rigid("base", fixed=True)
+    pivot, wall = switch.rigid("pivot", fixed=True), switch.rigid("wall", fixed=True)
     crank, coupler = switch.rigid("crank"), switch.rigid("coupler")
     follower = switch.flexible("follower", fm.strip([(50, -44), PIN], thickness=4.0, depth=5.0), fm.ONYX)
-    switch.revolute(base, crank, at=PIVOT)
+    hinge = switch.revolute(pivot, crank, at=PIVOT)
     switch.revolute(crank, coupler, at=KNEE)
     switch.revolute(coupler, follower, at=PIN, radius=2.0)
-    switch.weld(base, follower, at=(50, -42), region=fm.Rectangle(6.0, 4.0))
+    switch.weld(wall, follower, at=(50, -42), region=fm.Rectangle(6.0, 4.0))
     if not sprung:
-        return fm.Scene(switch), switch.force(on=crank, at=KNEE, direction=(0, -1), name="finger")
-    finger = switch.rigid("finger")
+        return fm.Scene(switch), switch.force(on=crank, at=KNEE, direction=(0, -1), name="finger"), hinge
+    finger, guide = switch.rigid("finger"), switch.rigid("guide", fixed=True)
     spring = switch.flexible("spring", fm.strip([KNEE, BOW, HEAD], thickness=1.6, depth=5.0), fm.ONYX)
     switch.revolute(crank, spring, at=KNEE, radius=0.8)
     switch.revolute(spring, finger, at=HEAD, radius=0.8)
-    switch.prismatic(base, finger, at=HEAD, axis=(0, 1))
-    return fm.Scene(switch), switch.force(on=finger, at=HEAD, direction=(0, -1), name="finger")
+    switch.prismatic(guide, finger, at=HEAD, axis=(0, 1))
+    return fm.Scene(switch), switch.force(on=finger, at=HEAD, direction=(0, -1), name="finger"), hinge
 
 
 def main():
@@ -45,7 +49,7 @@ def main():
     options.out.mkdir(parents=True, exist_ok=True)
     series, rows = [], []
     for sprung, label in ((False, "pushed directly"), (True, "through a spring")):
-        scene, finger = describe(sprung)
+        scene, finger, _ = describe(sprung)
         sim = fm.Simulation(scene, space="plane-stress", size=options.size)
         curve = sim.follow(finger, until=fm.Until(force=ONWARD))
         series.append(curve.series(label))
@@ -53,8 +57,17 @@ def main():
             frame = event.frame
             rows.append([label, event.kind.value, frame.displacement, frame.force])
         sim.picture(options.out / f"{scene.mechanism.name.replace(' ', '-')}.png", curve)
+    held = sim.load_displacement(finger, displacements=HELD)
+    series.append(held.series("held behind the spring"))
     plot_curve(options.out / "curve.png", series, title="bistable switch")
     print(format_table(["switch", "event", "displacement [mm]", "force [N]"], rows))
+    print(*held.remarks, sep="\n")
+    scene, _, hinge = describe(sprung=False)
+    motor = scene.mechanism.motor(hinge, name="crank")
+    sim = fm.Simulation(scene, space="plane-stress", size=options.size)
+    turned = sim.follow(motor, until=fm.Until(position=OVER))
+    turned.plot(options.out / "crank.png")
+    print(f"the motor in the crank needs up to {abs(turned.forces).max():.3g} N mm, and snaps nowhere")
 
 
 if __name__ == "__main__":

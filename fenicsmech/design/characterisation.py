@@ -79,7 +79,7 @@ class Experiment:
             others=None,
         )
         loads = sorted({control.target for control in request.controls}, key=abs)
-        return CurveRequest(request.force, tuple(map(LoadControl, loads)), request.configuration, request.others)
+        return CurveRequest(request.part, tuple(map(LoadControl, loads)), request.configuration, request.others)
 
 
 @dataclass(frozen=True)
@@ -164,7 +164,7 @@ class _Rig:
 
     def compare(self, modulus: float) -> tuple[Curve, np.ndarray, np.ndarray]:
         """The curve at ``modulus`` E, u − ū (n,) and ∂u/∂ln E (n,)."""
-        simulation, part = self._simulation, self._request.force
+        simulation, part = self._simulation, self._request.part
         model, newton = simulation.model, simulation.newton(part)
         model.set_youngs_modulus(self._links, modulus)
         curve = simulation.trace(self._request)

@@ -12,14 +12,17 @@
 - ``newton``: the default one, the primal–dual iteration
 - ``solvers``: others to choose and to compare
 - ``predictor``, ``path``: first guesses and load steps
-- ``lead``, ``arc_length``, ``continuation``: paths that turn back in load and displacement
-- ``critical``, ``branching``: their limit points and bifurcations, and the paths that cross there
+- ``lead``: what leads a path that may turn back: a force, or motors
+- ``arc_metric``, ``path_points``: the equilibria of such a path
+- ``arc_length``, ``continuation``: steps along it, and where it ends
+- ``critical``, ``soft_mode``, ``branching``: their limit points and bifurcations, and the paths that cross there
 - ``eigen``: the softest modes of a tangent, and buckling loads
 - ``reactions``: what joints and motors exert
 """
 
-from fenicsmech.equilibrium.arc_length import ArcLength, ArcMetric, ArcSteps, PathPoint, metric_at
-from fenicsmech.equilibrium.branching import Sense, crossing, null_vector
+from fenicsmech.equilibrium.arc_length import ArcLength, ArcSteps
+from fenicsmech.equilibrium.arc_metric import ArcMetric, metric_at
+from fenicsmech.equilibrium.branching import Sense, crossing, null_space
 from fenicsmech.equilibrium.continuation import Goal, Stretch, follow
 from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadControl, MotorControl, ShareControl
 from fenicsmech.equilibrium.critical import Critical, CriticalPoint
@@ -29,6 +32,7 @@ from fenicsmech.equilibrium.linear import BySize, Direct, LinearMethod, LinearSo
 from fenicsmech.equilibrium.load import PointLoad
 from fenicsmech.equilibrium.newton import Newton, PrimalDualNewton
 from fenicsmech.equilibrium.path import IDLE_STIFFNESS, Path, PathFailed
+from fenicsmech.equilibrium.path_points import PathPoint, PathPoints
 from fenicsmech.equilibrium.predictor import Constant, Hermite, Predictor, Tangent
 from fenicsmech.equilibrium.reactions import Reaction, joint_reactions, motor_torques
 from fenicsmech.equilibrium.solver import EquilibriumSolver, Iteration, NotConverged, Solution
@@ -71,6 +75,7 @@ __all__ = [
     "Path",
     "PathFailed",
     "PathPoint",
+    "PathPoints",
     "PointLoad",
     "Predictor",
     "PrimalDualNewton",
@@ -90,6 +95,6 @@ __all__ = [
     "joint_reactions",
     "metric_at",
     "motor_torques",
-    "null_vector",
+    "null_space",
     "softest_modes",
 ]

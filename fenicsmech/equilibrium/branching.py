@@ -12,10 +12,11 @@ from __future__ import annotations
 
 from enum import Enum
 
-from fenicsmech.equilibrium.arc_length import ArcLength, PathPoint
+from fenicsmech.equilibrium.arc_length import ArcLength
 from fenicsmech.equilibrium.critical import CriticalPoint
 from fenicsmech.equilibrium.eigen import softest_modes
 from fenicsmech.equilibrium.lead import Heading
+from fenicsmech.equilibrium.path_points import PathPoint, PathPoints
 from fenicsmech.equilibrium.solver import NotConverged
 from fenicsmech.equilibrium.state import Step
 
@@ -38,25 +39,28 @@ def crossing(arc: ArcLength, critical: CriticalPoint, mode: Step, sense: Sense) 
     Raises:
         NotConverged: there is none near.
     """
-    metric, point = arc.metric, critical.point
+    points, metric, point = arc.points, arc.points.metric, critical.point
     course = metric.unit(critical.course)
     across = Heading(mode, 0.0)
     across = across + course.scaled(-metric.dot(across, course))
     across = metric.unit(across).scaled(sense.value)
-    size = _FIRST / arc.system.size(across.step)
+    size = _FIRST / points.system.size(across.step)
     for _ in range(_TRIES):
-        guess = arc.lead.moved(arc.system, point.state, across.scaled(size))
+        guess = points.lead.moved(points.system, point.state, across.scaled(size))
         try:
-            found = arc.correct(guess, across, point)
+            found = points.correct(guess, across, point)
         except NotConverged:
             size *= 0.5
             continue
-        arc.length = metric.norm(arc.difference(found.state, point.state))
+        arc.length = metric.norm(points.difference(found.state, point.state))
         return found
     raise NotConverged("no path was found across the bifurcation", 0)
 
 
-def null_vector(arc: ArcLength, critical: CriticalPoint) -> Step:
-    """The null vector of the tangent at a bifurcation, its largest displacement the mechanism's length (collective)."""
-    (mode,) = softest_modes(arc.newton, arc.lead, critical.point.state, floor=arc.floor, count=1)
-    return mode.step
+def null_space(points: PathPoints, critical: CriticalPoint) -> list[Step]:
+    """A basis of the tangent's null space at a bifurcation, largest displacements the mechanism's length (collective).
+
+    As many vectors as modes change their stability there.
+    """
+    state, count = critical.point.state, critical.modes
+    return [mode.step for mode in softest_modes(points.newton, points.lead, state, floor=points.floor, count=count)]

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from fenicsmech.equilibrium.arc_length import ArcLength, PathPoint
+from fenicsmech.equilibrium.arc_length import ArcLength
 from fenicsmech.equilibrium.critical import CriticalPoint, locate
+from fenicsmech.equilibrium.path_points import PathPoint, PathPoints
 from fenicsmech.equilibrium.solver import NotConverged
 
 _ROOT = 1e-10  # how closely a path ends where it is asked to, in units of its references,
@@ -50,21 +51,21 @@ def follow(arc: ArcLength, start: PathPoint, goals: Sequence[Goal], *, most: int
     Raises:
         NotConverged: the path cannot be followed further.
     """
-    point = start
+    points, point = arc.points, start
     for _ in range(most):
         following = arc.advance(point)
-        ends = [_end(arc, point, following, goal) for goal in goals if goal.passed(point, following)]
+        ends = [_end(points, point, following, goal) for goal in goals if goal.passed(point, following)]
         if ends:
-            following = min(ends, key=lambda end: arc.along(point, end))
-        yield Stretch(following, tuple(locate(arc, point, following)), bool(ends))
+            following = min(ends, key=lambda end: points.along(point, end))
+        yield Stretch(following, tuple(locate(points, point, following, tolerance=arc.steps.tolerance)), bool(ends))
         if ends:
             return
         point = following
 
 
-def _end(arc: ArcLength, before: PathPoint, after: PathPoint, goal: Goal) -> PathPoint:
+def _end(points: PathPoints, before: PathPoint, after: PathPoint, goal: Goal) -> PathPoint:
     """Where the path has the goal's value, by Newton's method within the step."""
-    width = arc.along(before, after)
+    width = points.along(before, after)
     low, high = 0.0, width
     change = goal.value(after) - goal.value(before)
     near, rising = min(_ROOT * goal.scale, _WITHIN * abs(change)), change > 0.0
@@ -74,11 +75,11 @@ def _end(arc: ArcLength, before: PathPoint, after: PathPoint, goal: Goal) -> Pat
         if abs(gap) <= near:
             break
         low, high = (low, distance) if (gap > 0.0) == rising else (distance, high)
-        slope = goal.rate(best) / arc.metric.dot(before.tangent, best.tangent)
+        slope = goal.rate(best) / points.metric.dot(before.tangent, best.tangent)
         wanted = distance - gap / slope if slope else low
         distance = wanted if low < wanted < high else 0.5 * (low + high)
         try:
-            best = arc.between(before, after, distance)
+            best = points.between(before, after, distance)
         except NotConverged:
             break
     return best

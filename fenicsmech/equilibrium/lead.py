@@ -1,6 +1,11 @@
-"""What leads a path that may turn back on itself: a force, or a motor.
+"""What leads a path that may turn back on itself: a force, or motors.
 
-The parameter p of the path is one more unknown beside the state. A heading is a direction (ẏ, ṗ) in both.
+The parameter p of the path is one more unknown beside the state; its conjugate q does work with it. A heading is a
+direction (ẏ, ṗ).
+
+    lead        p                          q
+    force       its magnitude f            the displacement a · u_P of its point along it
+    motors      their position φ = p d     what they exert, Σ d λ
 """
 
 from __future__ import annotations
@@ -9,6 +14,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
 import numpy as np
+from petsc4py import PETSc
 
 from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadControl, MotorControl
 from fenicsmech.equilibrium.state import State, Step
@@ -30,20 +36,47 @@ class Heading:
         return Heading(self.step + other.step, self.parameter + other.parameter)
 
 
+@dataclass(frozen=True)
+class Verdict:
+    """How stable an equilibrium is.
+
+    Attributes:
+        unstable_modes: directions in which the energy has a maximum while p is held.
+        unstable_under_control: the same while q is held, where something can hold it; else while p is.
+    """
+
+    unstable_modes: int
+    unstable_under_control: int
+
+
 class Lead(ABC):
-    """The parameter p of a path."""
+    """The parameter p of a path.
+
+    Attributes:
+        displaces: whether p is a displacement and q a force, or the reverse.
+    """
+
+    displaces: bool
 
     @abstractmethod
     def value(self, state: State) -> float:
         """p."""
 
     @abstractmethod
+    def conjugate(self, system: EquilibriumSystem, state: State) -> float:
+        """q of the loaded state (collective)."""
+
+    @abstractmethod
+    def conjugate_rate(self, system: EquilibriumSystem, state: State, control: Control, x: PETSc.Vec) -> float:
+        """Rate of q with a control's target, x solving the equations of the rate (collective)."""
+
+    @abstractmethod
     def holding(self, state: State) -> Control:
         """The control that keeps p as it is."""
 
     @abstractmethod
-    def holding_travel(self, system: EquilibriumSystem, state: State) -> Control | None:
-        """The control that keeps the point's displacement and frees p; None if p cannot be freed (collective)."""
+    def holding_conjugate(self, system: EquilibriumSystem, state: State) -> Control | None:
+        """The control that keeps q and frees p; None if there is none (collective)."""
 
     @abstractmethod
     def heading(self, step: Step, control: Control) -> Heading:
@@ -53,18 +86,37 @@ class Lead(ABC):
     def moved(self, system: EquilibriumSystem, state: State, heading: Heading) -> State:
         """``state`` after ``heading`` (collective)."""
 
+    @abstractmethod
+    def verdict(self, system: EquilibriumSystem, state: State, control: Control, x: PETSc.Vec, excess: int) -> Verdict:
+        """Stability of an equilibrium (collective).
+
+        Args:
+            system, state: the equilibrium.
+            control: under which the KKT matrix stands.
+            x: solution of the equations of the rate with its target.
+            excess: negative eigenvalues of the matrix beyond those of a stable equilibrium.
+        """
+
 
 @dataclass(frozen=True)
 class ForceLead(Lead):
     """p is the magnitude of the controlled force."""
 
+    displaces = False
+
     def value(self, state):
         return state.force
+
+    def conjugate(self, system, state):
+        return system.load_displacement(state)
+
+    def conjugate_rate(self, system, state, control, x):
+        return 1.0 if control.constrained else system.force_rate(state).dot(x)
 
     def holding(self, state):
         return LoadControl(state.force)
 
-    def holding_travel(self, system, state):
+    def holding_conjugate(self, system, state):
         system.load(state)
         return DisplacementControl(system.load_displacement(state))
 
@@ -75,24 +127,39 @@ class ForceLead(Lead):
     def moved(self, system, state, heading):
         return system.moved(state, heading.step)
 
+    def verdict(self, system, state, control, x, excess):
+        if control.constrained:
+            # x = −K⁻¹ e, and e · K⁻¹ e < 0 exactly if removing the control's row e leaves stability as it is
+            return Verdict(max(excess + int(x.dot(system.control_row()) <= 0.0), 0), max(excess, 0))
+        # a force that falls as its point moves on: holding the point takes one mode away
+        return Verdict(max(excess, 0), max(excess - int(system.force_rate(state).dot(x) < 0.0), 0))
+
 
 @dataclass(frozen=True, eq=False)
 class MotorLead(Lead):
-    """p is the position of a motor; the others stand, and the force keeps its magnitude.
+    """p is the position of motors; the others stand, and the force keeps its magnitude.
 
     Attributes:
-        direction: motor values per unit of p, one for the motor's connection and else zero, (connections,).
+        direction: motor values per unit of p, d: one for the motor's connection and else zero, or those of several
+            motors that move together, (connections,).
     """
 
     direction: np.ndarray
+    displaces = True
 
     def value(self, state):
-        return float(self.direction @ state.motors)
+        return float(self.direction @ state.motors / (self.direction @ self.direction))
+
+    def conjugate(self, system, state):
+        return self._exerted(system, state.multipliers)
+
+    def conjugate_rate(self, system, state, control, x):
+        return self._exerted(system, system.step(x).multipliers)
 
     def holding(self, state):
         return MotorControl(self.value(state), self.direction)
 
-    def holding_travel(self, system, state):
+    def holding_conjugate(self, system, state):
         return None
 
     def heading(self, step, control):
@@ -100,3 +167,12 @@ class MotorLead(Lead):
 
     def moved(self, system, state, heading):
         return system.moved(replace(state, motors=state.motors + heading.parameter * self.direction), heading.step)
+
+    def verdict(self, system, state, control, x, excess):
+        return Verdict(max(excess, 0), max(excess, 0))
+
+    def _exerted(self, system: EquilibriumSystem, multipliers: np.ndarray) -> float:
+        """Σ d λ of the motors' equations."""
+        joints = system.joints
+        driven = [(k, joints.motor_rows[c.motor]) for k, c in enumerate(joints.connections) if c.motor is not None]
+        return float(sum(self.direction[k] * multipliers[row] for k, row in driven))

@@ -96,7 +96,7 @@ class Newton(Iteration):
         system, options = self.system, self.options
         start = self._begin(start, control)
         state, balance = start, system.balance(start, control)
-        best, spent, careful, passed = (state, balance), 0, False, None
+        best, spent, careful, passed, missed = (state, balance), 0, False, None, None
         residuals, shift, trusted, mixed, norm = [], floor, True, False, math.inf
         for iteration in range(options.iterations + 1):
             residuals.append(self.relative(balance))
@@ -124,10 +124,13 @@ class Newton(Iteration):
             # a pressure of its own is a stress that the step solves for already
             passed = (before, length * motion) if options.mixed_stress and not system.layout.pressures else None
             if near and balance.norm > norm and not self.converged(balance, norm):
-                # no contraction: near a limit or bifurcation point, where only descent leads on
-                state, trusted, careful, passed = before, False, True, None
-                system.load(state)
-                balance = system.balance(state, control)
+                if missed is None and self.relative(balance) < options.near:
+                    missed = before  # once may happen: just beyond a bifurcation small residuals hide large motions
+                else:
+                    # no contraction: near a limit or bifurcation point, where only descent leads on
+                    state, trusted, careful, passed = missed or before, False, True, None
+                    system.load(state)
+                    balance = system.balance(state, control)
             elif near and shift == floor and length == 1.0:
                 state, balance, norm = self._finish(state, control, balance, norm, step)
             if balance.norm < best[1].norm:

@@ -1,19 +1,17 @@
 """Load steps: from a known equilibrium to the wanted control value, by predictor and Newton.
 
 Steps halve when Newton fails and double when it was easy, and never go farther than a stride of the tangent;
-equilibria that were reached are never lost. A step that moves much farther than the tangents at both its ends say may
-have leapt over a fold, where the path turns back: it halves too, and where that does not help the leap is kept and
+equilibria that were reached are never lost. A step that moves anything otherwise than the tangents at both its ends say
+may have leapt over a fold, where the path turns back: it halves too, and where that does not help the leap is kept and
 counted.
 """
 
 from __future__ import annotations
 
-import math
-
 from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.predictor import Anchor, Predictor, Tangent
 from fenicsmech.equilibrium.solver import Iteration, NotConverged, Solution
-from fenicsmech.equilibrium.state import State
+from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.log import logger
 
 _log = logger(__name__)
@@ -22,8 +20,9 @@ _EASY = 5  # iterations
 _STRIDE = 0.2  # of the mechanism's length, or rad: how far a step may move anything, by the tangent (measured)
 _SINGULAR = 1e-6  # of the distance asked for: a tangent that wants steps this small has no meaning
 _RUNAWAY = 5.0 * _STRIDE  # a prediction that moves anything this far is none
-_FARTHER = 1.25  # times what the larger tangent says: what moves farther may have leapt; kinks never do
-_LEAST_MOTION = 1e-6  # of the mechanism's length, or rad: what is no leap in any case
+_BEYOND = 0.2  # of the largest rate: what moves farther off its tangents may have leapt; kinks never do
+_BENT = 2.2  # times the rate at its end: how far a step off a bifurcation may go
+_LEAST_MOTION = 1e-4  # of the mechanism's length, or rad: what is no leap in any case, as past a bifurcation
 _SMALLEST_LEAP = 1.0 / 64.0  # of the distance asked for: a step that is not halved any more because it leaps
 IDLE_STIFFNESS = 1e-10
 """What is lent to idle freedoms, in units of the mean stiffness."""
@@ -65,7 +64,7 @@ class Path:
         self._floors = tuple(share * IDLE_STIFFNESS for share in _LESS) if idle else (0.0,)
         self._anchors: list[Anchor] = []
         self._last: Solution | None = None
-        self._rate = math.inf  # at which the last step moved, by the control value
+        self._rate: Step | None = None  # at which the last step moved, by the control value
         self.iterations = self.leaps = 0
 
     def advance(self, control: Control) -> Solution:
@@ -96,7 +95,7 @@ class Path:
                     step = 0.5 * (value - self._value)
                     continue
                 self.leaps += 1
-                self._rate = math.inf
+                self._rate = None
                 _log.warning("between %g and %g the path turns back; what follows is another one", self._value, value)
             self._last = solution
             self._remember(Anchor(value, solution.state, solution.tangent))
@@ -146,21 +145,28 @@ class Path:
         return shortened if abs(shortened) > least else step
 
     def _leapt(self, value: float, solution: Solution) -> bool:
-        """Whether a step to ``value`` moves much farther than the tangents at its ends say (collective).
+        """Whether a step to ``value`` leads where the tangents at its ends do not (collective).
 
-            |y₁ − y₀| > 1.25 max(|y₀′|, |y₁′|) |v₁ − v₀|
+        The rate of every coordinate over the step should lie between those at its ends, whatever moves elsewhere:
 
-        Close to a fold |y₀′| tells nothing, as it grows beyond all bounds; the rate of the step before does.
+            r = (y₁ − y₀) / (v₁ − v₀),    |r − [y₀′, y₁′]| > 0.2 max(|y₀′|, |y₁′|)
+
+        A path that bends off at a bifurcation moves as √v and r = 2 y₁′, however short the step; the span reaches that
+        far. Close to a fold y₀′ tells nothing, as it grows beyond all bounds; the rate of the step before does. A step
+        over which the difference of the two would go far is too long to tell.
         """
         if not self._anchors or value == self._value:
             return False
-        system, last = self._newton.system, self._anchors[-1]
-        distance = abs(value - self._value)
-        motion = system.size(system.difference(solution.state, last.state))
-        rate = max(min(system.size(last.tangent), self._rate), system.size(solution.tangent))
-        if motion > max(_FARTHER * rate * distance, _LEAST_MOTION):
+        system, last, distance = self._newton.system, self._anchors[-1], value - self._value
+        before = last.tangent if self._rate is None else last.tangent.slower(self._rate)
+        rate = system.difference(solution.state, last.state).scaled(1.0 / distance)
+        span = (before, solution.tangent, solution.tangent.scaled(_BENT))
+        beyond = system.size(system.independent(rate.beyond(span)))
+        largest = max(system.size(before), system.size(solution.tangent))
+        grown = system.size(last.tangent + before.scaled(-1.0))
+        if beyond > max(_BEYOND * largest, _LEAST_MOTION / abs(distance)) or grown * abs(distance) > _BEYOND * _STRIDE:
             return True
-        self._rate = motion / distance
+        self._rate = rate
         return False
 
     def _guess(self, value: float) -> State:

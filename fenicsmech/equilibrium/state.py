@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,6 +42,32 @@ class Step:
     def scaled(self, factor: float) -> Step:
         """``factor`` times this step."""
         return Step(factor * self.u, factor * self.z, factor * self.multipliers, factor * self.force)
+
+    def slower(self, other: Step) -> Step:
+        """For every coordinate the smaller change of the two."""
+
+        def smaller(one: np.ndarray, two: np.ndarray) -> np.ndarray:
+            return np.where(np.abs(one) < np.abs(two), one, two)
+
+        return Step(
+            smaller(self.u, other.u),
+            smaller(self.z, other.z),
+            smaller(self.multipliers, other.multipliers),
+            float(smaller(self.force, other.force)),
+        )
+
+    def beyond(self, steps: Sequence[Step]) -> Step:
+        """How far every coordinate lies outside the span of those of ``steps``."""
+
+        def outside(value: np.ndarray, others: list[np.ndarray]) -> np.ndarray:
+            return value - np.clip(value, np.minimum.reduce(others), np.maximum.reduce(others))
+
+        return Step(
+            outside(self.u, [step.u for step in steps]),
+            outside(self.z, [step.z for step in steps]),
+            outside(self.multipliers, [step.multipliers for step in steps]),
+            float(outside(self.force, [step.force for step in steps])),
+        )
 
     def __add__(self, other: Step) -> Step:
         return Step(self.u + other.u, self.z + other.z, self.multipliers + other.multipliers, self.force + other.force)

@@ -166,6 +166,12 @@ class EquilibriumSystem:
             later.force - earlier.force,
         )
 
+    def independent(self, step: Step) -> Step:
+        """``step`` without the displacements of nodes that bodies move."""
+        free, u = self.layout.free, np.zeros_like(step.u)
+        u[free] = step.u[free]
+        return replace(step, u=u)
+
     def size(self, step: Step) -> float:
         """Largest displacement over the mechanism's length, or rotation, in ``step`` (collective)."""
         nodes = float(np.max(np.abs(step.u[: self.layout.displacements]), initial=0.0)) / self.joints.length

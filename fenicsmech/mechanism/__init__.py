@@ -21,7 +21,7 @@ from fenicsmech.mechanism.materials import (
     NeoHookean,
 )
 from fenicsmech.mechanism.mechanism import Mechanism
-from fenicsmech.mechanism.parts import FlexibleLink, Force, Joint, Link, Motor, Output, RigidLink
+from fenicsmech.mechanism.parts import Drive, FlexibleLink, Force, Joint, Leader, Link, Motor, Output, RigidLink
 from fenicsmech.mechanism.scene import DRAWN, Configuration, Scene
 from fenicsmech.mechanism.shapes import (
     Arc,
@@ -63,6 +63,8 @@ __all__ = [
     "Material",
     "Mechanism",
     "MeshPart",
+    "Drive",
+    "Leader",
     "Motor",
     "NeoHookean",
     "Outline",

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+from fenicsmech.errors import DescriptionError
 from fenicsmech.joints import JointKind
+from fenicsmech.mechanism.checks import finite
 from fenicsmech.mechanism.materials import Material
 from fenicsmech.mechanism.shapes import Point, Region, Shape
 
@@ -65,6 +68,37 @@ class Motor:
 
 
 @dataclass(frozen=True)
+class Drive:
+    """Motors that move together, as geared to each other: at its position p each stands at ratio · p.
+
+    Attributes:
+        name: for messages, plots and tables.
+        ratios: (motor, ratio) pairs, or a mapping; motors that all turn or all slide.
+
+    Raises:
+        DescriptionError: there is no motor, a ratio is zero or no number, or some motors turn and others slide.
+    """
+
+    name: str
+    ratios: tuple[tuple[Motor, float], ...]
+
+    def __post_init__(self) -> None:
+        part, given = f"drive {self.name!r}", self.ratios
+        pairs = tuple(given.items()) if isinstance(given, Mapping) else tuple(given)
+        checked = tuple((motor, finite(f"ratio of a motor of {part}", ratio)) for motor, ratio in pairs)
+        if not checked or not all(isinstance(motor, Motor) and ratio for motor, ratio in checked):
+            raise DescriptionError(part, f"its ratios are {given!r}", "Give motors with ratios other than zero")
+        if len({motor.joint.kind.sliding for motor, _ in checked}) > 1:
+            raise DescriptionError(part, "some of its motors turn and others slide", "Let it move one sort")
+        object.__setattr__(self, "ratios", checked)
+
+    @property
+    def sliding(self) -> bool:
+        """Whether its motors slide."""
+        return self.ratios[0][0].joint.kind.sliding
+
+
+@dataclass(frozen=True)
 class Force:
     """A dead force along ``direction`` (unit vector) at the material point ``at`` of link ``on``."""
 
@@ -82,3 +116,7 @@ class Output:
     at: Point
     direction: Point
     name: str
+
+
+Leader = Force | Motor | Drive
+"""What may lead a curve that is followed."""

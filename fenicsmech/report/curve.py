@@ -20,6 +20,8 @@ from fenicsmech.report.atomic import atomic_write
 from fenicsmech.report.canvas import INK, PALETTE, house_style, new_figure, open_frame, save_png
 
 _DASHES = (0, (3.0, 1.6))  # of unstable parts
+_DOTS = (0, (1.0, 1.6))  # of jumps
+_TIP = 0.1  # of a jump is drawn solid, with the head of its arrow
 _FAINT = 0.45  # of the colour remains
 _MIXED = "#777777"  # what curves of several colours share
 _MARKERS = ("s", "^", "X", "P", "v", "*")  # of the kinds of marks, in the order of their names
@@ -43,6 +45,7 @@ class CurveSeries:
         force: (n,) ordinates.
         label: its name in the legend.
         stable: (n,) whether each equilibrium is stable; None: all are.
+        jumped: (n,) whether what is drawn snapped on the way to each sample; None: it never did.
         joined: draw the line through the samples; False for measurements.
         colour: a matplotlib colour; None takes the next of the palette.
         faint: draw it thin and light behind the others, as what was before.
@@ -60,17 +63,21 @@ class CurveSeries:
     colour: str | None = None
     faint: bool = False
     marks: tuple[CurveMark, ...] = ()
+    jumped: NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         part = f"curve '{self.label}'"
         displacement = real_array(f"displacements of {part}", self.displacement, None)
         force = real_array(f"forces of {part}", self.force, len(displacement))
         stable = np.ones(len(force), bool) if self.stable is None else np.array(self.stable, dtype=bool)
-        if stable.shape != force.shape:
-            raise DescriptionError(
-                f"stability of {part}", f"{stable.size} flags for {force.size} samples", "Give one flag per sample"
-            )
-        for name, value in (("displacement", displacement), ("force", force), ("stable", stable)):
+        jumped = np.zeros(len(force), bool) if self.jumped is None else np.array(self.jumped, dtype=bool)
+        for what, flags in (("stability", stable), ("jumps", jumped)):
+            if flags.shape != force.shape:
+                raise DescriptionError(
+                    f"{what} of {part}", f"{flags.size} flags for {force.size} samples", "Give one flag per sample"
+                )
+        checked = {"displacement": displacement, "force": force, "stable": stable, "jumped": jumped}
+        for name, value in checked.items():
             object.__setattr__(self, name, value)
 
 
@@ -97,9 +104,9 @@ def plot_curve(
 ) -> None:
     """Draw load–displacement curves: displacement across, force up, as in the field's papers.
 
-    Stable parts are solid, unstable parts dashed, computed samples are dots, targets open diamonds. For curves before
-    and after a change, give both the same colour and make the first faint; curves that share a label appear once in
-    the legend, in grey if their colours differ.
+    Stable parts are solid, unstable parts dashed, jumps dotted arrows, samples dots, targets open diamonds. For curves
+    before and after a change, give both the same colour and make the first faint; curves that share a label appear once
+    in the legend, in grey if their colours differ.
 
     Args:
         path: the PNG file.
@@ -146,9 +153,9 @@ def _draw_series(axes: Axes, curve: CurveSeries, colour: str) -> None:
     colour, width, size = _pen(colour, faint=curve.faint)
     behind = 1.0 if curve.faint else 0.0
     if curve.joined:
-        # a step is stable when both its ends are
-        solid = stable[:-1] & stable[1:]
-        for part, style in ((solid, "-"), (~solid, _DASHES)):
+        # a step is stable when both its ends are, and no equilibria lie along a jump
+        solid, leap = stable[:-1] & stable[1:], curve.jumped[1:]
+        for part, style in ((solid & ~leap, "-"), (~solid & ~leap, _DASHES)):
             # breaking the line with NaN keeps one artist per style
             runs = [np.array([[np.nan, np.nan]])]
             edges = np.flatnonzero(np.diff(np.concatenate(([0], part.astype(int), [0]))))
@@ -156,6 +163,11 @@ def _draw_series(axes: Axes, curve: CurveSeries, colour: str) -> None:
                 runs += [np.column_stack((x[start : stop + 1], y[start : stop + 1])), runs[0]]
             line = np.concatenate(runs)
             axes.plot(line[:, 0], line[:, 1], ls=style, color=colour, lw=width, zorder=3 - behind)
+        for index in np.flatnonzero(leap):
+            start, end = np.array([x[index], y[index]]), np.array([x[index + 1], y[index + 1]])
+            axes.plot(*np.array([start, end]).T, ls=_DOTS, color=colour, lw=0.7 * width, zorder=3 - behind)
+            tip = {"arrowstyle": "-|>", "shrinkA": 0.0, "shrinkB": 3.0, "color": colour, "lw": 0.7 * width}
+            axes.annotate("", xy=end, xytext=end - _TIP * (end - start), arrowprops=tip, zorder=3 - behind)
     size = size if len(x) <= 40 else 0.55 * size
     for part, face in ((stable, colour), (~stable, "white")):
         axes.plot(x[part], y[part], "o", ms=size, mfc=face, mec=colour, mew=1.0, zorder=4 - 1.5 * behind)
@@ -200,6 +212,8 @@ def _draw_legend(axes: Axes, series: Sequence[CurveSeries], targets: Sequence[Cu
         handles.append(
             Line2D([], [], color=_MIXED, ls=_DASHES, lw=2.0, marker="o", ms=4.5, mfc="white", label="unstable")
         )
+    if any(curve.joined and curve.jumped.any() for curve in series):
+        handles.append(Line2D([], [], color=_MIXED, ls=_DOTS, lw=1.4, marker=">", markevery=(1, 1), ms=5, label="jump"))
     for kind, marker in _markers(series).items():
         handles.append(Line2D([], [], lw=0, marker=marker, ms=8, mfc="white", mec=INK, mew=1.5, label=kind))
     if targets:

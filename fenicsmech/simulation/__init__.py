@@ -5,6 +5,7 @@
 - ``link_meshes``, ``model``: the discretised mechanism behind it
 - ``request``, ``curves``, ``tracer``: what a curve is asked for, and how it is traced
 - ``frame``, ``curve``: what comes out
+- ``leading``: what leads a curve, a force or a motor
 - ``until``, ``follower``, ``followed``: curves that are followed wherever they lead, and their events
 - ``buckling``, ``mode_shape``: buckling loads and soft modes of an equilibrium
 - ``goal``, ``estimates``, ``influence``: how wrong displacements and forces are, by an adjoint: of elements

@@ -1,17 +1,20 @@
-"""A load–displacement curve: the frames of one configuration under one changing force."""
+"""A load–displacement curve: the frames of one configuration under one changing force, or one moving motor."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
+from fenicsmech.errors import DescriptionError
 from fenicsmech.linkage import Freedom
-from fenicsmech.mechanism import Configuration, Force, Units
+from fenicsmech.mechanism import Configuration, Force, Leader, Units
 from fenicsmech.report import CurveSeries, plot_curve, write_curve_csv
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.goal import Goal
+from fenicsmech.simulation.leading import Axis, leading
 
 
 @dataclass(frozen=True)
@@ -19,7 +22,7 @@ class Curve:
     """Frames of one configuration.
 
     Attributes:
-        force_part: the force that changes.
+        part: the force that changes, or the motors that move.
         configuration: motor positions.
         freedom: mobility and redundancy of the assembled configuration.
         frames: one per sample, in the order asked for.
@@ -31,7 +34,7 @@ class Curve:
             of what finer elements and space would add. Only where the fidelity was chosen by an accuracy, else empty.
     """
 
-    force_part: Force
+    part: Leader
     configuration: Configuration
     freedom: Freedom
     frames: tuple[Frame, ...]
@@ -40,6 +43,24 @@ class Curve:
     others: tuple[tuple[Force, float], ...] = ()
     goal: Goal = Goal.DISPLACEMENT
     corrections: tuple[float, ...] = ()
+
+    @property
+    def force_part(self) -> Force:
+        """The force that changes.
+
+        Raises:
+            DescriptionError: a motor leads the curve.
+        """
+        if not isinstance(self.part, Force):
+            raise DescriptionError(
+                f"curve of {self.part.name!r}", "no force leads it", "Ask this of a curve under a changing force"
+            )
+        return self.part
+
+    @property
+    def axes(self) -> tuple[Axis, Axis]:
+        """What lies across and up on plots."""
+        return leading(self.part).axes(self.units)
 
     @property
     def forces(self) -> np.ndarray:
@@ -68,17 +89,42 @@ class Curve:
 
     def series(self, label: str = "", *, colour: str | None = None, faint: bool = False) -> CurveSeries:
         """The curve as a plot draws it, arguments as those of ``CurveSeries``."""
-        return CurveSeries(self.displacements, self.forces, label=label, stable=self.stable, colour=colour, faint=faint)
+        return CurveSeries(
+            self.displacements,
+            self.forces,
+            label=label,
+            stable=self.stable,
+            colour=colour,
+            faint=faint,
+            jumped=self.jumped,
+        )
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Where the mechanism snapped and which equilibria are unstable, a sentence each."""
+        (across, up), name, said = self.axes, self.configuration.name, []
+        for before, after in pairwise((None, *self.frames)):
+            if after.jumped:
+                since = "on the way there" if before is None else f"after {up.quantity} {up(before.force)}"
+                said.append(
+                    f"{name}: snaps {since}, to {across.quantity} {across(after.displacement)} at {up.quantity} "
+                    f"{up(after.force)}, which is one of perhaps several equilibria beyond the fold"
+                )
+        unstable = int(np.sum(~self.stable))
+        if unstable:
+            said.append(f"{name}: {unstable} of {len(self.frames)} equilibria are unstable under dead loads")
+        return tuple(said)
 
     def plot(self, path: str | Path) -> None:
         """Draws the curve as a PNG (rank 0)."""
         if self.leads:
+            across, up = self.axes
             plot_curve(
                 Path(path),
                 [self.series()],
-                xlabel=f"displacement [{self.units.length}]",
-                ylabel=f"force [{self.units.force}]",
-                title=f"{self.force_part.name}, {self.configuration.name}",
+                xlabel=across.label,
+                ylabel=up.label,
+                title=f"{self.part.name}, {self.configuration.name}",
             )
 
     def write_csv(self, path: str | Path, *, errors: np.ndarray | None = None) -> None:
@@ -91,10 +137,12 @@ class Curve:
         """
         length, force, stress = self.units.length, self.units.force, self.units.stress
         if self.leads:
+            across, up = self.axes
             columns = {
-                f"displacement [{length}]": self.displacements,
-                f"force [{force}]": self.forces,
-                "stable": self.stable.astype(float),
+                across.label: self.displacements,
+                up.label: self.forces,
+                "stable": self.stable,
+                "jumped": self.jumped,
                 f"strain energy [{force} {length}]": np.array([frame.strain_energy for frame in self.frames]),
                 f"max von Mises [{stress}]": np.array([frame.max_stress for frame in self.frames]),
             }

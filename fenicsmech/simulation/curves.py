@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from fenicsmech.equilibrium import ArcSteps, EquilibriumSolver, Iteration, LoadControl, Predictor, Sense
+from fenicsmech.equilibrium import ArcSteps, EquilibriumSolver, Iteration, Predictor, Sense
 from fenicsmech.errors import DescriptionError
 from fenicsmech.linkage import Freedom, assemble, count_freedom
-from fenicsmech.mechanism import Force, Units
+from fenicsmech.mechanism import Force, Leader, Units
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.followed import FollowedCurve, PathEvent
 from fenicsmech.simulation.follower import Follower
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.goal import Goal
+from fenicsmech.simulation.leading import leading
+from fenicsmech.simulation.mode_shape import ModeShape
 from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.request import CurveRequest
 from fenicsmech.simulation.tracer import Tracer
@@ -33,12 +35,12 @@ class Curves:
         self._model, self._solver, self._predictor, self._units = model, solver, predictor, units
         self._newtons: dict[tuple, Iteration] = {}
 
-    def newton(self, force: Force, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
-        """The solver for one controlled and some fixed forces, kept for all configurations."""
-        key, model = (force, others), self._model
+    def newton(self, part: Leader, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
+        """The solver for what leads and some fixed forces, kept for all configurations."""
+        key, model = (part, others), self._model
         if key not in self._newtons:
             loads = tuple((model.point_load(other), float(magnitude)) for other, magnitude in others)
-            self._newtons[key] = self._solver.on(model.system(model.point_load(force), loads))
+            self._newtons[key] = self._solver.on(model.system(leading(part).load(model), loads))
         return self._newtons[key]
 
     def trace(self, request: CurveRequest, watch: Callable[[int], None]) -> Curve:
@@ -54,7 +56,7 @@ class Curves:
             frames.append(tracer.frame(control, frames))
             watch(len(frames))
         return Curve(
-            request.force,
+            request.part,
             request.configuration,
             freedom,
             tuple(frames),
@@ -67,31 +69,33 @@ class Curves:
     def follow(
         self, request: CurveRequest, until: Until, steps: ArcSteps | None, watch: Callable[[int], None]
     ) -> FollowedCurve:
-        """The curve from the configuration without the force that changes, as ``Simulation.follow``."""
+        """The curve from the configuration without the force that leads, as ``Simulation.follow``."""
         follower, freedom = self._follower(request, until, steps)
         follower.from_rest(watch)
         return self._followed(request, freedom, follower)
 
     def branches(
-        self, curve: FollowedCurve, event: PathEvent, until: Until, steps: ArcSteps | None
+        self, curve: FollowedCurve, event: PathEvent, until: Until, steps: ArcSteps | None, mode: ModeShape | None
     ) -> tuple[FollowedCurve, FollowedCurve]:
         """The curve that crosses another one, in both senses, as ``Simulation.branches``."""
         if event not in curve.bifurcations:
             raise DescriptionError(
                 "branches", "the event is no bifurcation of the curve", "Choose from its bifurcations"
             )
-        if event.modes != 1:
+        if mode is None and event.modes != 1:
             raise DescriptionError(
                 "branches",
-                f"{event.modes} modes become unstable at once",
-                "Break the symmetry a little, or follow the curve with a smaller tolerance in ArcSteps",
+                f"{event.modes} modes become unstable at once: {', '.join(shape.link for shape in event.null_space)}",
+                "Say which with mode=event.null_space[…], or break the symmetry a little",
             )
-        request = CurveRequest(curve.force_part, (LoadControl(0.0),), curve.configuration, curve.others)
+        if mode is not None and mode not in event.null_space:
+            raise DescriptionError("branches", "the mode is none of the event's", "Choose from its null_space")
+        request = CurveRequest(curve.part, (), curve.configuration, curve.others)
         found = []
         with self._model.shaped(event.frame.design):
             for sense in Sense:
                 follower, freedom = self._follower(request, until, steps)
-                follower.from_bifurcation(event, sense, lambda done: None)
+                follower.from_bifurcation(event, mode or event.mode, sense, lambda done: None)
                 found.append(self._followed(request, freedom, follower))
         return found[0], found[1]
 
@@ -101,7 +105,7 @@ class Curves:
         assembly = assemble(linkage, request.configuration)
         rigid = linkage.rigid
         freedom = count_freedom(rigid, assembly.poses, rigid.motor_values(request.configuration.position))
-        newton = self.newton(request.force, request.others)
+        newton = self.newton(request.part, request.others)
         tracer = Tracer(self._model, newton, request, assembly=assembly, freedom=freedom, predictor=self._predictor)
         return tracer, newton, freedom
 
@@ -112,7 +116,7 @@ class Curves:
 
     def _followed(self, request: CurveRequest, freedom: Freedom, follower: Follower) -> FollowedCurve:
         return FollowedCurve(
-            request.force,
+            request.part,
             request.configuration,
             freedom,
             tuple(follower.frames),

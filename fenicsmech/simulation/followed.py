@@ -16,18 +16,29 @@ class PathEvent:
     """A critical point of a followed curve.
 
     Attributes:
-        kind: limit point of the load, turning point of the displacement, or bifurcation.
+        kind: limit point of the force, turning point of the displacement or of a motor, or bifurcation.
         frame: the equilibrium; also one of the curve's frames.
         index: which.
-        mode: how the mechanism gives way: the null vector of a bifurcation, else the direction of the path.
+        null_space: how the mechanism gives way: at a bifurcation a basis of the tangent's null space, one direction for
+            each of the modes that change, else the direction of the path.
         critical: the point of the path that branches start from.
     """
 
     kind: Critical
     frame: Frame
     index: int
-    mode: ModeShape
+    null_space: tuple[ModeShape, ...]
     critical: CriticalPoint
+
+    @property
+    def mode(self) -> ModeShape:
+        """The first of the null space, which is the only one unless several modes become unstable at once."""
+        return self.null_space[0]
+
+    @property
+    def value(self) -> float:
+        """Of what leads, where the tangent is singular; the frame is the nearest equilibrium that was found."""
+        return self.critical.value
 
     @property
     def modes(self) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from time import perf_counter
@@ -12,23 +13,24 @@ from fenicsmech.equilibrium import (
     ArcSteps,
     Critical,
     CriticalPoint,
-    ForceLead,
     Goal,
     Iteration,
     LoadControl,
     NotConverged,
     PathPoint,
+    PathPoints,
     Sense,
     State,
     crossing,
     follow,
     metric_at,
-    null_vector,
+    null_space,
 )
 from fenicsmech.errors import EquilibriumError
 from fenicsmech.simulation.followed import PathEvent
 from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.mode_shape import mode_shape
+from fenicsmech.simulation.leading import leading
+from fenicsmech.simulation.mode_shape import ModeShape, mode_shape
 from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.request import CurveRequest
 from fenicsmech.simulation.tracer import Tracer
@@ -60,7 +62,7 @@ class Follower:
         idle: bool,
     ) -> None:
         self._model, self._newton, self._request, self._tracer = model, newton, request, tracer
-        self._until, self._steps, self._lead = until, steps, ForceLead()
+        self._until, self._steps, self._lead = until, steps, leading(request.part).lead(model.linkage.joints)
         self._floor = IDLE_STIFFNESS if idle else 0.0
         self.frames: list[Frame] = []
         self.events: list[PathEvent] = []
@@ -75,18 +77,18 @@ class Follower:
         self.frames.append(first)
         try:
             arc = self._arc(first.state)
-            start = arc.start(first.state)
+            start = arc.points.at(first.state)
         except NotConverged as failure:
             raise self._ended(failure) from failure
         goals = self._goals()
-        # towards the first displacement that is wanted, or else the first force
+        # towards the first displacement or position that is wanted, or else the first force
         wanted = [*(goal for goal in goals if goal.target != goal.value(start))][:1]
         if wanted and (wanted[0].target - wanted[0].value(start)) * wanted[0].rate(start) < 0.0:
             start = start.reversed()
         self._walk(arc, start, goals, watch)
 
-    def from_bifurcation(self, event: PathEvent, sense: Sense, watch: Callable[[int], None]) -> None:
-        """Follows the path that crosses another one at ``event``.
+    def from_bifurcation(self, event: PathEvent, mode: ModeShape, sense: Sense, watch: Callable[[int], None]) -> None:
+        """Follows the path that crosses another one at ``event`` along ``mode``.
 
         Raises:
             EquilibriumError: the path is not found, or ends early; carries the frames before that.
@@ -95,7 +97,7 @@ class Follower:
         rest = self._tracer.frame(LoadControl(0.0), ())  # the tangent at the bifurcation tells no scale
         try:
             arc = self._arc(rest.state)
-            first = crossing(arc, event.critical, event.mode.step, sense)
+            first = crossing(arc, event.critical, mode.step, sense)
         except NotConverged as failure:
             raise self._ended(failure) from failure
         self.frames.append(self._tracer.record(first.solution()))
@@ -116,61 +118,53 @@ class Follower:
                 self._record_event(arc, critical)
             frame = self._tracer.record(stretch.point.solution())
             self.frames.append(replace(frame, seconds=perf_counter() - began, phases=clock.since(seconds)))
-            watch(len(self.frames))
+            watch(min(len(self.frames), self._until.frames))  # critical points come on top
 
     def _record_event(self, arc: ArcLength, critical: CriticalPoint) -> None:
         if critical.kind is Critical.BIFURCATION:
-            step = null_vector(arc, critical)
+            steps = null_space(arc.points, critical)
         else:
             step = critical.point.tangent.step
-            step = step.scaled(1.0 / arc.system.size(step))
+            steps = [step.scaled(1.0 / arc.points.system.size(step))]
         frame = self._tracer.record(critical.point.solution())
-        mode = mode_shape(self._model, step)
-        self.events.append(PathEvent(critical.kind, frame, len(self.frames), mode, critical))
+        modes = tuple(mode_shape(self._model, step) for step in steps)
+        self.events.append(PathEvent(critical.kind, frame, len(self.frames), modes, critical))
         self.frames.append(frame)
 
     def _arc(self, state: State) -> ArcLength:
-        """The continuation, in units of what is asked for."""
-        forces = [abs(force) for force in self._until.force if force]
-        travels = [abs(displacement) for displacement in self._until.displacement if displacement]
-        metric = metric_at(
-            self._newton,
-            self._lead,
-            state,
-            floor=self._floor,
-            parameter=max(forces, default=None),
-            travel=max(travels, default=None),
-        )
-        return ArcLength(
-            self._newton,
-            self._lead,
-            metric,
-            steps=self._steps,
-            floor=self._floor,
-            travel_reference=max(travels, default=float("inf")),
-        )
+        """The continuation from ``state``, in units of what is asked for."""
+        until, lead = self._until, self._lead
+        p, q = lead.value(state), self._conjugate(state)
+        (of_value, of_conjugate) = (until.travel, until.force) if lead.displaces else (until.force, until.travel)
+        parameter = max((abs(target - p) for target in of_value), default=0.0)
+        conjugate = max((abs(target - q) for target in of_conjugate), default=0.0)
+        metric = metric_at(self._newton, lead, state, floor=self._floor, parameter=parameter, conjugate=conjugate)
+        points = PathPoints(self._newton, lead, metric, floor=self._floor)
+        return ArcLength(points, steps=self._steps, conjugate_reference=conjugate or math.inf)
 
     def _goals(self) -> list[Goal]:
-        lengths = [abs(displacement) for displacement in self._until.displacement]
-        forces = [abs(force) for force in self._until.force]
+        """Displacements or positions first, then forces."""
+        lead, until = self._lead, self._until
+        value = (lambda point: lead.value(point.state)), (lambda point: point.tangent.parameter)
+        conjugate = (lambda point: self._conjugate(point.state)), (lambda point: point.conjugate)
+        travel, force = (value, conjugate) if lead.displaces else (conjugate, value)
         return [
-            Goal(self._displacement, lambda point: point.travel, target, max(lengths) or 1.0)
-            for target in self._until.displacement
-        ] + [
-            Goal(lambda point: point.state.force, lambda point: point.tangent.parameter, target, max(forces) or 1.0)
-            for target in self._until.force
+            Goal(*quantity, target, max(map(abs, targets)) or 1.0)
+            for quantity, targets in ((travel, until.travel), (force, until.force))
+            for target in targets
         ]
 
-    def _displacement(self, point: PathPoint) -> float:
-        """As on curves: from the unloaded configuration."""
-        self._newton.system.load(point.state)
-        return self._newton.system.load_displacement(point.state) - self._tracer.origin
+    def _conjugate(self, state: State) -> float:
+        """As on curves, displacements from the unloaded configuration."""
+        self._newton.system.load(state)
+        origin = 0.0 if self._lead.displaces else self._tracer.origin
+        return self._lead.conjugate(self._newton.system, state) - origin
 
     def _ended(self, failure: NotConverged) -> EquilibriumError:
-        last = self.frames[-1]
+        last, lead = self.frames[-1], leading(self._request.part)
         return EquilibriumError(
-            f"path of {self._request.force.name!r} in configuration {self._request.configuration.name!r}",
-            f"it cannot be followed beyond displacement {last.displacement:g} at force {last.force:g} ({failure})",
+            f"path of {self._request.part.name!r} in configuration {self._request.configuration.name!r}",
+            f"it cannot be followed beyond {lead.across} {last.displacement:g} at {lead.up} {last.force:g} ({failure})",
             "End it before, allow smaller steps with ArcSteps(smallest=…), or use a finer mesh",
             last=last,
             frames=self.frames,

@@ -16,8 +16,9 @@ class Frame:
     """An equilibrium and what was measured in it.
 
     Attributes:
-        force: magnitude of the controlled force.
-        displacement: of its point along it, from the assembled configuration.
+        force: magnitude of the force that leads, or what the motor that leads exerts.
+        displacement: of the force's point along it, from the assembled configuration, or the motor's position, from
+            the drawing.
         stable: whether small disturbances die out under dead loads.
         jumped: whether the mechanism snapped on the way from the frame before: the path turns back there, and this
             equilibrium lies on another one, perhaps not the one that dynamics would lead to.

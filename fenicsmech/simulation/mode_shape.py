@@ -10,7 +10,7 @@ from fenicsmech.equilibrium import Step
 from fenicsmech.simulation.model import MechanismModel
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ModeShape:
     """A direction in which a mechanism moves.
 

@@ -32,13 +32,15 @@ def panel(model: MechanismModel, curve: Curve, *, stress: bool, traces: Sequence
     if first is None:
         return None
     pen = Draughtsman(model.mechanism, model.linkage, model.mesh)
-    force, units = curve.frames[-1].force, curve.units
+    (across, up), end, arrows = curve.axes, curve.frames[-1], ()
+    if isinstance(curve.part, Force):
+        arrows = (pen.arrow(curve.part, end.force, last, label=f"{end.force:g} {up.unit}"),)
     return Panel(
         pen.shape(first, stress=False),
         (pen.shape(last, stress=stress),),
-        (pen.arrow(curve.force_part, force, last, label=f"{force:g} {units.force}"),),
+        arrows,
         tuple(traces),
-        f"{curve.configuration.name}: {force:.3g} {units.force}, {curve.frames[-1].displacement:.3g} {units.length}",
+        f"{curve.configuration.name}: {up(end.force)}, {across(end.displacement)}",
     )
 
 

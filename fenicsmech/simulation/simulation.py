@@ -26,7 +26,7 @@ from fenicsmech.equilibrium import (
 )
 from fenicsmech.errors import DescriptionError
 from fenicsmech.linkage import build_linkage
-from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Mechanism, Output, Scene
+from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Leader, Mechanism, Output, Scene
 from fenicsmech.mechanism.checks import positive
 from fenicsmech.meshing import radius_ratios
 from fenicsmech.report import Panel, Progress, Silent, Trace, draw_configurations
@@ -41,9 +41,10 @@ from fenicsmech.simulation.fidelity import Fidelity, read_fidelity
 from fenicsmech.simulation.followed import FollowedCurve, PathEvent
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.link_meshes import check_links, mesh_mechanism
+from fenicsmech.simulation.mode_shape import ModeShape
 from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.picture import panel
-from fenicsmech.simulation.request import CurveRequest, read_request
+from fenicsmech.simulation.request import CurveRequest, read_path, read_request
 from fenicsmech.simulation.snapshot import gather, rest_vertices
 from fenicsmech.simulation.unloaded import unloaded_positions
 from fenicsmech.simulation.until import Until, check_until
@@ -180,21 +181,22 @@ class Simulation:
 
     def follow(
         self,
-        force: Force,
+        part: Leader,
         *,
         until: Until,
         configuration: Configuration = DRAWN,
         others: Mapping[Force, float] | None = None,
         steps: ArcSteps | None = None,
     ) -> FollowedCurve:
-        """The whole curve under a changing force, past limit points and where it turns back (collective).
+        """The whole curve under a changing force or a moving motor, past limit points and folds (collective).
 
-        Starts without the force and goes towards the first displacement, or else the first force, of ``until``.
+        Starts in the configuration, without the force that leads, and goes towards the first displacement or position,
+        or else the first force, of ``until``. Across the curve of a motor lies its position, up its torque or force.
 
         Args:
-            force: the force that changes.
+            part: the force that changes, or the motor that moves, or a ``Drive`` of several.
             until: where the curve ends.
-            configuration: motor positions.
+            configuration: motor positions; where the motor that moves starts from.
             others: constant magnitudes of other forces.
             steps: how finely it is followed.
 
@@ -204,32 +206,38 @@ class Simulation:
             EquilibriumError: the curve ends early; carries the frames before that.
         """
         self._check_description()
-        check_until(until)
-        request = read_request(
-            self.scene.mechanism, force, forces=[0.0], displacements=None, configuration=configuration, others=others
-        )
+        request = read_path(self.scene.mechanism, part, configuration=configuration, others=others)
+        check_until(until, part)
         with Progress(until.frames, configuration.name) if self.comm.rank == 0 else Silent() as progress:
             self._last = self._curves.follow(request, until, steps, progress.update)
         return self._last
 
     def branches(
-        self, curve: FollowedCurve, event: PathEvent, *, until: Until, steps: ArcSteps | None = None
+        self,
+        curve: FollowedCurve,
+        event: PathEvent,
+        *,
+        until: Until,
+        steps: ArcSteps | None = None,
+        mode: ModeShape | None = None,
     ) -> tuple[FollowedCurve, FollowedCurve]:
-        """The curve that crosses ``curve`` at a simple bifurcation, from there in both senses (collective).
+        """The curve that crosses ``curve`` at a bifurcation, from there in both senses (collective).
 
         Args:
             curve: a followed curve.
             event: one of its bifurcations.
             until: where each of the two ends.
             steps: how finely they are followed.
+            mode: one of the event's ``null_space``, if several modes become unstable at once; the curve that is nearest
+                to it where it has left ``curve`` is found.
 
         Raises:
-            DescriptionError: the event is no bifurcation of the curve, or not a simple one.
+            DescriptionError: the event is no bifurcation of the curve, or the mode is missing or none of its.
             EquilibriumError: the curve is not found, or ends early; carries the frames before that.
         """
         self._check_description()
-        check_until(until)
-        return self._curves.branches(curve, event, until, steps)
+        check_until(until, curve.part)
+        return self._curves.branches(curve, event, until, steps, mode)
 
     def buckling_loads(
         self, curve: Curve | None = None, *, frame: Frame | None = None, count: int = 3
@@ -258,7 +266,7 @@ class Simulation:
         Arguments and errors as those of ``buckling_loads``.
         """
         chosen = self._chosen(curve)
-        newton = self.newton(chosen.force_part, chosen.others)
+        newton = self.newton(chosen.part, chosen.others)
         return soft_modes(self.model, newton, chosen, frame or chosen.frames[-1], count)
 
     def on(self, comm: MPI.Comm) -> Simulation:
@@ -322,9 +330,9 @@ class Simulation:
         )
         return Explanation(simulated(self.model, fidelity.model.name, fidelity.order), tuple(left_out))
 
-    def newton(self, force: Force, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
-        """The solver for one controlled and some fixed forces, kept for all configurations (collective)."""
-        return self._curves.newton(force, others)
+    def newton(self, part: Leader, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
+        """The solver for what leads and some fixed forces, kept for all configurations (collective)."""
+        return self._curves.newton(part, others)
 
     def von_mises(self, frame: Frame) -> np.ndarray | None:
         """Von Mises stress at the midpoints of all cells, on rank 0; None elsewhere (collective).

@@ -26,6 +26,7 @@ from fenicsmech.equilibrium import (
 from fenicsmech.errors import EquilibriumError
 from fenicsmech.linkage import Assembly, Freedom, is_held
 from fenicsmech.simulation.frame import Frame
+from fenicsmech.simulation.leading import leading
 from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.request import CurveRequest
 
@@ -60,22 +61,25 @@ class Tracer:
         self._model, self._newton, self._request, self._predictor = model, newton, request, predictor
         self._system, self._joints = newton.system, model.linkage.joints
         self._freedom, self._idle = freedom, freedom.mobility > 0
+        self._lead = leading(request.part).lead(self._joints)
         self._origin, self._origins = 0.0, dict.fromkeys(model.mechanism.outputs, 0.0)
         self._leaps = 0  # of the path so far that no frame tells of
         state = self._unloaded(assembly)
         self._system.load(state)
-        self._origin = self._system.load_displacement(state)
+        if not self._lead.displaces:  # motors count from where they were drawn
+            self._origin = self._lead.conjugate(self._system, state)
         self._origins = {output: model.travel(output, state) for output in model.mechanism.outputs}
         if request.others or model.effects:
             state = self._under_constant_loads(state)
             self._system.load(state)
         self._state = state
-        start = self._system.load_displacement(state) if request.controls[0].constrained else 0.0
+        constrained = any(control.constrained for control in request.controls)
+        start = self._system.load_displacement(state) if constrained else 0.0
         self._path = Path(newton, state, start, predictor=predictor, idle=self._idle)
 
     @property
     def origin(self) -> float:
-        """Displacement of the force's point in the unloaded configuration, from where it was drawn."""
+        """What displacements are counted from: that of the force's point in the unloaded configuration."""
         return self._origin
 
     def frame(self, control: Control, before: Sequence[Frame]) -> Frame:
@@ -150,7 +154,7 @@ class Tracer:
     def _unreached(self, control: Control, failure: PathFailed, before: Sequence[Frame]) -> EquilibriumError:
         if control.constrained and self._held():
             return EquilibriumError(
-                f"{self._request.force.name!r} in configuration {self._request.configuration.name!r}",
+                f"{self._request.part.name!r} in configuration {self._request.configuration.name!r}",
                 f"no equilibrium at displacement {control.target - self._origin:g}: joints and motors hold its point, "
                 "which cannot move along its direction",
                 "Choose another point or direction, or load control",
@@ -159,7 +163,7 @@ class Tracer:
             )
         what, origin = ("displacement", self._origin) if control.constrained else ("force", 0.0)
         return EquilibriumError(
-            f"{self._request.force.name!r} in configuration {self._request.configuration.name!r}",
+            f"{self._request.part.name!r} in configuration {self._request.configuration.name!r}",
             f"no equilibrium at {what} {control.target - origin:g}; the last one is at {failure.reached - origin:g} "
             f"({failure.reason}; {len(failure.tried)} smaller steps were tried)",
             self._remedy(),
@@ -188,13 +192,15 @@ class Tracer:
 
     def record(self, solution: Solution) -> Frame:
         """What is measured in an equilibrium; the caller adds what it cost (collective)."""
-        model, state = self._model, solution.state
+        model, state, lead = self._model, solution.state, self._lead
         self._system.load(state)
         with model.clock.phase("measure"):
             stress = float(model.elastic.von_mises().max(initial=0.0))
+            value, conjugate = lead.value(state), lead.conjugate(self._system, state)
+            displacement, force = (value, conjugate) if lead.displaces else (conjugate, value)
             return Frame(
-                force=state.force,
-                displacement=self._system.load_displacement(state) - self._origin,
+                force=force,
+                displacement=displacement - self._origin,
                 stable=solution.unstable_modes == 0,
                 jumped=False,
                 unstable_modes=solution.unstable_modes,

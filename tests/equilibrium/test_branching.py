@@ -9,8 +9,9 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
 import fenicsmech as fm
+from fenicsmech.equilibrium import PathPoints
 
-from .column import EULER, LENGTH, THICKNESS, YOUNG, Column, column, critical_load
+from .column import DEPTH, EULER, LENGTH, THICKNESS, YOUNG, Column, column, critical_load
 
 CRITICAL = critical_load(0.5 * THICKNESS)
 
@@ -64,6 +65,28 @@ def test_second_branch_is_found_where_it_crosses():
     assert branch.frames[-1].unstable_modes == 1
 
 
+@pytest.mark.parametrize("size, most", [(THICKNESS, 3), (0.7 * THICKNESS, 10)])
+def test_bifurcation_is_located_by_few_equilibria_to_the_accuracy_of_the_eigenvalue(size, most, monkeypatch):
+    # the finer mesh is not symmetric: it turns the bifurcation into two paths that pass each other
+    solved, between = [], PathPoints.between
+
+    def counted(*arguments):
+        solved.append(1)
+        return between(*arguments)
+
+    case = column(size=size)
+    near = case.simulation.load_displacement(case.push, forces=[0.9 * CRITICAL])
+    loads = [load.force for load in case.simulation.buckling_loads(near, count=1)]
+    monkeypatch.setattr(PathPoints, "between", counted)
+    steps = fm.ArcSteps(largest=0.2)
+    curve = case.simulation.follow(case.push, until=fm.Until(force=1.1 * EULER, frames=50), steps=steps)
+    (event,) = curve.bifurcations
+    ending = 3  # equilibria on the way to the force at the end
+    assert len(solved) <= most + ending
+    assert event.value == pytest.approx(loads[0], rel=1e-6)
+    assert event.frame.force == pytest.approx(loads[0], rel=1e-3)
+
+
 def test_what_is_no_bifurcation_of_the_curve_is_refused():
     case = column()
     curve = straight(case)
@@ -73,6 +96,37 @@ def test_what_is_no_bifurcation_of_the_curve_is_refused():
         other.simulation.branches(straight(other), event, until=fm.Until(force=1.0))
     with pytest.raises(fm.DescriptionError, match="does not say where"):
         case.simulation.branches(curve, event, until=1.0)
+
+
+def test_two_columns_that_buckle_at_once_each_have_their_branches():
+    mechanism = fm.Mechanism("two columns")
+    base, head = mechanism.rigid("base", fixed=True), mechanism.rigid("head")
+    for y in (0.0, 20.0):
+        shape = fm.strip([(0, y), (LENGTH, y)], thickness=THICKNESS, depth=DEPTH)
+        strut = mechanism.flexible(f"strut at {y:g}", shape, fm.Material("steel", YOUNG, 0.3))
+        mechanism.revolute(base, strut, at=(0, y), radius=0.5 * THICKNESS)
+        mechanism.revolute(strut, head, at=(LENGTH, y), radius=0.5 * THICKNESS)
+    mechanism.prismatic(base, head, at=(LENGTH, 10), axis=(1, 0))
+    push = mechanism.force(on=head, at=(LENGTH, 10), direction=(-1, 0))
+    simulation = fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=THICKNESS, comm=MPI.COMM_SELF)
+    curve = simulation.follow(push, until=fm.Until(force=2.2 * EULER))
+    (event,) = curve.bifurcations
+    assert event.modes == len(event.null_space) == 2
+    assert event.value == pytest.approx(2.0 * CRITICAL, rel=1e-4)
+    until = fm.Until(displacement=0.02)
+    with pytest.raises(fm.DescriptionError, match="2 modes become unstable at once.*mode="):
+        simulation.branches(curve, event, until=until)
+    with pytest.raises(fm.DescriptionError, match="none of the event's"):
+        simulation.branches(curve, event, until=until, mode=curve.frames[0])
+    buckled = set()
+    for mode in event.null_space:
+        for branch in simulation.branches(curve, event, until=until, mode=mode):
+            motion = branch.frames[-1].state.u.reshape(-1, 2)[:, 1]
+            owner = simulation.model.node_link[: len(motion)]
+            sides = [motion[owner == link][np.argmax(np.abs(motion[owner == link]))] for link in (0, 1)]
+            assert max(np.abs(sides)) > 0.5 * THICKNESS
+            buckled.add(tuple(int(np.sign(side)) * (abs(side) > 0.05 * THICKNESS) for side in sides))
+    assert len(buckled) == 4  # each found once
 
 
 @pytest.mark.parallel

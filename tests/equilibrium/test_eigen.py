@@ -40,7 +40,7 @@ def test_buckling_load_hardly_depends_on_the_load_it_is_asked_at():
 
 def test_buckling_load_of_a_toggle_tends_to_its_limit_load():
     case = toggle.toggle(stilt_modulus=200.0)
-    curve = case.simulation.follow(case.push, until=fm.Until(displacement=5.0))
+    curve = case.simulation.follow(case.push, until=fm.Until(displacement=5.0), steps=fm.ArcSteps(largest=0.03))
     limit = curve.limit_points[0]
     errors = []
     for frame in curve.frames[: limit.index : 2]:

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 import fenicsmech as fm
+from fenicsmech.report import read_curve_csv
 
+from ..hard.buckling import LENGTH, euler
+from ..hard.buckling import column as hard_column
+from . import toggle
 from .arch import RISE, arch
+from .bow import bow
 from .finger import finger
 
 
@@ -35,6 +41,18 @@ def test_arch_below_its_limit_load_or_led_by_its_displacement_has_not_jumped(sna
     assert not simulation.load_displacement(push, displacements=[2.4 * RISE]).jumped.any()
 
 
+def test_jump_is_told_in_words_and_in_the_table(snapping, tmp_path):
+    simulation, push, limit = snapping
+    curve = simulation.load_displacement(push, forces=np.array([0.5, 1.05, 1.1]) * limit.force)
+    (remark,) = curve.remarks
+    assert remark.startswith(f"as drawn: snaps after force {curve.forces[0]:.3g} N, to displacement 1.8 mm")
+    curve.write_csv(tmp_path / "curve.csv")
+    assert read_curve_csv(tmp_path / "curve.csv")["jumped"].tolist() == [0.0, 1.0, 0.0]
+    assert curve.series().jumped.tolist() == [False, True, False]
+    middle = simulation.load_displacement(push, displacements=[RISE])
+    assert middle.remarks == ("as drawn: 1 of 1 equilibria are unstable under dead loads",)
+
+
 def test_jump_is_logged(snapping, caplog):
     simulation, push, limit = snapping
     simulation.load_displacement(push, forces=[1.05 * limit.force])
@@ -45,3 +63,36 @@ def test_jump_is_logged(snapping, caplog):
 def test_finger_that_bends_far_in_one_step_has_not_jumped(space):
     simulation, push = finger(space)
     assert not simulation.load_displacement(push, forces=[8.0]).jumped.any()
+
+
+def test_toggle_that_a_motor_drives_beyond_its_fold_has_jumped():
+    # the motor pushes the toggle through a soft bar; its position turns back at 5.69 mm
+    case = toggle.toggle(stilt_modulus=0.075)
+    mechanism = case.simulation.scene.mechanism
+    (guide,) = (joint for joint in mechanism.joints if joint.b.name == "head" and joint.kind.sliding)
+    motor = mechanism.motor(guide)
+    simulation = fm.Simulation(case.simulation.scene, space="plane-stress", order=1, size=6.0)
+    for position, jumped in ((-5.6, False), (-5.8, True), (-16.0, True), (3.0, False)):
+        driven = simulation.scene.configuration("driven", {motor: position})
+        curve = simulation.load_displacement(case.push, forces=[0.0, -0.1], configuration=driven)
+        assert curve.jumped.tolist() == [jumped, False]
+
+
+def test_snap_is_seen_among_motors_that_turn_much_farther():
+    # both clamps of a shallow bow turn, by far more than it snaps; the fold is between the first two angles
+    simulation, crown, motors = bow()
+    for angle, jumped in ((0.48, False), (0.5, True), (0.8, True), (1.2, True)):
+        turned = simulation.scene.configuration("turned", dict(zip(motors, (-angle, angle), strict=True)))
+        curve = simulation.load_displacement(crown, forces=[0.0], configuration=turned)
+        assert curve.jumped.tolist() == [jumped], angle
+
+
+@pytest.mark.parametrize("sag", [LENGTH / 5e3, LENGTH / 5e4])
+def test_column_that_buckles_has_not_jumped(sag):
+    # the smaller the sag, the more suddenly the path bends off, but it does not turn back
+    points = [(0.0, 0.0), (0.5 * LENGTH, sag), (LENGTH, 0.0)]
+    simulation, push = hard_column("plane-stress", MPI.COMM_SELF, points, poisson=0.3)
+    loads = [0.98 * euler("plane-stress"), 1.02 * euler("plane-stress")]
+    straight, buckled = simulation.load_displacement(push, forces=loads).frames
+    assert straight.displacement < 0.001 * LENGTH and buckled.displacement > 0.03 * LENGTH
+    assert buckled.stable and not straight.jumped and not buckled.jumped

@@ -3,6 +3,8 @@
 import pytest
 from mpi4py import MPI
 
+from ..hard.buckling import LENGTH, euler
+from ..hard.buckling import column as hard_column
 from .column import EULER, THICKNESS, Column, column, critical_load
 
 
@@ -21,6 +23,18 @@ def test_column_is_stable_below_the_euler_load_and_has_one_unstable_mode_above_i
     assert (above.unstable_modes, above.stable) == (1, False)
     assert beyond.unstable_modes == 2  # the second mode buckles at four times the load
     assert not above.stable_under_control
+
+
+@pytest.mark.parametrize("size", [0.7, 1.0])
+def test_straight_column_in_space_stays_straight_beyond_its_euler_load_and_says_it_is_unstable(size):
+    # meshes without symmetry push it aside by next to nothing, from which Newton's method must come back
+    simulation, push = hard_column("3d", MPI.COMM_SELF, [(0, 0), (LENGTH, 0)], poisson=0.3, size=size)
+    loads = [0.98 * euler("3d"), 1.02 * euler("3d"), 1.2 * euler("3d")]
+    below, *above = simulation.load_displacement(push, forces=loads).frames
+    assert below.stable and [frame.unstable_modes for frame in above] == [1, 1]
+    softness = [frame.displacement / frame.force for frame in (below, *above)]
+    assert softness == pytest.approx([softness[0]] * 3, rel=1e-2)
+    assert all(frame.iterations < 10 for frame in above)
 
 
 def test_incompressible_column_between_walls_buckles_at_its_euler_load_with_one_unstable_mode():

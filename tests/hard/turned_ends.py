@@ -22,21 +22,21 @@ POINTS = [
 ]
 
 
-def _beam(poisson: float) -> beam.Beam:
+def bowed_beam(poisson: float) -> beam.Beam:
     line = centreline.through(POINTS).trimmed(BLOCK, BLOCK)
     section = beam.Section.rectangle(young=YOUNG, poisson=poisson, thickness=THICKNESS, depth=DEPTH)
     return beam.Beam(line, section, (0.0, 0.0), (SPAN, 0.0))
 
 
-def _turned(line: beam.Beam, left: float, right: float, initial: beam.BeamSolution | None = None) -> beam.BeamSolution:
+def turned(line: beam.Beam, left: float, right: float, initial: beam.BeamSolution | None = None) -> beam.BeamSolution:
     """The beam with its ends turned outwards, downwards."""
     start, end = beam.End(x=0.0, y=0.0, rotation=-left), beam.End(x=0.0, y=0.0, rotation=right)
     return beam.solve(line, start, end, initial=initial)
 
 
-def _largest_turn(line: beam.Beam, below: float) -> float:
+def largest_turn(line: beam.Beam, below: float) -> float:
     """How far the ends can be turned: the angle as a function of the moment at either end, on from ``below``."""
-    solution, angles = _turned(line, below, below), []
+    solution, angles = turned(line, below, below), []
     for moment in solution.end.moment - np.linspace(0.0, 2.0, 81):
         ends = (beam.End(x=0.0, y=0.0, moment=sign * moment) for sign in (-1.0, 1.0))
         solution = beam.solve(line, *ends, initial=solution)
@@ -68,18 +68,18 @@ def _snap(space: str, comm: MPI.Comm) -> Iterator[Check]:
         turned = scene.configuration(f"{angle:.4f} rad", dict(zip(motors, (-angle, angle), strict=True)))
         return simulation.load_displacement(crown, forces=[0.0], configuration=turned).frames[0]
 
-    line = _beam(poisson)
-    largest = _largest_turn(line, 0.48)
+    line = bowed_beam(poisson)
+    largest = largest_turn(line, 0.48)
     before = [share * largest for share in (0.2, 0.6, 0.9, 0.99)]
     frames = [simulated(angle) for angle in before]
-    wanted = [_turned(line, angle, angle).end.moment for angle in before]
+    wanted = [turned(line, angle, angle).end.moment for angle in before]
     found = [(-frame.motors[motors[0]], frame.motors[motors[1]]) for frame in frames]
     yield deviation("both torques up to 0.99 of the fold", found, np.column_stack([wanted, wanted]), 1e-2)
     yield Fact("stable there, nothing jumped", all(frame.stable and not frame.jumped for frame in frames))
     beyond = [1.01 * largest, 1.2 * largest]
-    hanging, wanted = _turned(line, 0.0, 2.0 * largest), []
+    hanging, wanted = turned(line, 0.0, 2.0 * largest), []
     for angle in beyond[::-1]:
-        hanging = _turned(line, angle, angle, hanging)
+        hanging = turned(line, angle, angle, hanging)
         wanted.insert(0, (hanging.end.moment, hanging.position[len(hanging.position) // 2, 1]))
     frames = [simulated(angle) for angle in beyond]
     found = [frame.motors[motors[1]] for frame in frames]

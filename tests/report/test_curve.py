@@ -108,6 +108,19 @@ def test_the_unstable_part_is_dashed(tmp_path):
     assert 0.0 < share_of_colour(tmp_path / "dashed.png", blue) < 0.9 * share_of_colour(tmp_path / "solid.png", blue)
 
 
+def test_a_jump_is_a_dotted_arrow_with_an_entry_of_its_own(tmp_path, drawn):
+    jumped = np.arange(len(X)) == 4
+    for flags in (None, jumped):
+        plot_curve(tmp_path / "a.png", [CurveSeries(X, X, "pushed", jumped=flags)])
+    whole, broken = (figure.axes[0] for figure in drawn)
+    assert [text.get_text() for text in broken.get_legend().get_texts()] == ["pushed", "jump"]
+    assert [text.get_text() for text in whole.get_legend().get_texts()] == ["pushed"]
+    (arrow,) = broken.texts
+    assert arrow.xy == pytest.approx([X[4], X[4]]) and not whole.texts
+    solid = [axes.get_lines()[0].get_xdata() for axes in (whole, broken)]
+    assert [np.isnan(x).sum() for x in solid] == [2, 3]  # one piece, or two
+
+
 def test_a_faint_curve_is_thinner_lighter_and_behind_the_others(tmp_path):
     blue, faint = (33, 102, 172), (155, 186, 218)
     orders = {"strong": ["strong"], "faint": ["faint"], "both": ["faint", "strong"], "turned": ["strong", "faint"]}
@@ -158,7 +171,8 @@ def test_any_number_of_samples_is_drawn(tmp_path, count):
     [
         ({"displacement": X, "force": X[1:]}, "forces of curve 'c'.*shape"),
         ({"displacement": X, "force": np.full(9, np.inf)}, "forces of curve 'c'.*entry"),
-        ({"displacement": X, "force": X, "stable": [True]}, "1 flags for 9 samples"),
+        ({"displacement": X, "force": X, "stable": [True]}, "stability of curve 'c': 1 flags for 9 samples"),
+        ({"displacement": X, "force": X, "jumped": [True]}, "jumps of curve 'c': 1 flags for 9 samples"),
     ],
 )
 def test_a_contradictory_series_is_refused(arguments, message):
