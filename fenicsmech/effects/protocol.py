@@ -82,8 +82,12 @@ class LinkFields:
         return ufl.det(self.body.rest_gradient)
 
     def integral(self, density, *, degree: int) -> ufl.Form:
-        """∫ density dV over the mesh at rest, to be multiplied as ``model`` says; ``degree`` of the quadrature."""
-        return density * self.stretch * self.dx(metadata={"quadrature_degree": degree})
+        """∫ density dV over the mesh at rest, to be multiplied as ``model`` says; ``degree`` of ``density``.
+
+        In curved cells det(∇X) is a polynomial too, of degree dim.
+        """
+        whole = degree if self.body.bulge is None else degree + self.dim
+        return density * self.stretch * self.dx(metadata={"quadrature_degree": whole})
 
     def boundary_integral(self, density, faces: Faces, *, degree: int) -> ufl.Form:
         """∫ density dA over ``faces`` of the mesh at rest, to be multiplied as ``model`` says.

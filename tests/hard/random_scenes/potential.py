@@ -163,9 +163,10 @@ class Potential:
         return sum(self._weight(plan, ones * _unit(plan, self.mesh.dim)) for plan in plans)
 
     def _weight(self, plan: GravityPlan, u: np.ndarray) -> complex:
-        points, weights = self._rule
+        # u of the mesh's order times the volume of a curved cell, of degree dim: exact
+        points, weights = quadrature(self.mesh.dim, self.mesh.order + self.mesh.dim)
         N = shape_functions(points, self.mesh.order)
-        sums = np.einsum("mq,q,qk,mki->mi", self._volumes, weights, N, u[self.mesh.cells])
+        sums = np.einsum("mq,q,qk,mki->mi", self.mesh.volumes(points), weights, N, u[self.mesh.cells])
         g = np.array((*plan.acceleration, 0.0)[: self.mesh.dim])
         depth = np.ones(len(self.mesh.cells))
         if self.mesh.dim == 2:
