@@ -157,6 +157,12 @@ class BodyEffect(Effect):
         """The potentials."""
 
 
+def holding(effects: Sequence[Effect], linkage: Linkage) -> tuple[PosePotential, ...]:
+    """The potentials of ``effects`` that act in full from the start."""
+    found = [effect.potentials(linkage) for effect in effects if isinstance(effect, BodyEffect)]
+    return tuple(potential for potentials in found for potential in potentials if potential.holds)
+
+
 class JointSoftening(Effect):
     """An effect that lets equations of joints give way to their multipliers: C + c λ = 0."""
 

@@ -3,6 +3,7 @@
 - ``bodies``: rigid links and interface bodies
 - ``system``: all joint constraints of a set of bodies: values, gradients, Hessians
 - ``build``: from the described mechanism to bodies and constraints
+- ``holding``: what springs add: potentials of poses that hold freedoms
 - ``assembly``: the rigid assembly of a configuration
 - ``mobility``: free directions left and dependent constraints, by name
 """
@@ -10,6 +11,7 @@
 from fenicsmech.linkage.assembly import Assembly, assemble
 from fenicsmech.linkage.bodies import Body
 from fenicsmech.linkage.build import Linkage, build_linkage
+from fenicsmech.linkage.holding import Holding
 from fenicsmech.linkage.mobility import Freedom, count_freedom, is_held
 from fenicsmech.linkage.system import Connection, JointSystem
 
@@ -18,6 +20,7 @@ __all__ = [
     "Body",
     "Connection",
     "Freedom",
+    "Holding",
     "JointSystem",
     "Linkage",
     "assemble",

@@ -95,17 +95,18 @@ class Curves:
 
     def _tracer(self, request: CurveRequest) -> tuple[Tracer, Iteration, Freedom]:
         """What starts the path of a request, its solver, and the freedom of its configuration."""
-        linkage = self._model.linkage
-        assembly = assemble(linkage, request.configuration)
+        linkage, holding = self._model.linkage, self._model.holding
+        assembly = assemble(linkage, request.configuration, holding)
         rigid = linkage.rigid
-        freedom = count_freedom(rigid, assembly.poses, rigid.motor_values(request.configuration.position))
+        motors = rigid.motor_values(request.configuration.position)
+        freedom = count_freedom(rigid, assembly.poses, motors, holding)
         newton = self.newton(request.force, request.others)
         tracer = Tracer(self._model, newton, request, assembly=assembly, freedom=freedom, predictor=self._predictor)
         return tracer, newton, freedom
 
     def _follower(self, request: CurveRequest, until: Until, steps: ArcSteps | None) -> tuple[Follower, Freedom]:
         tracer, newton, freedom = self._tracer(request)
-        idle, steps = freedom.mobility > 0, steps or ArcSteps()
+        idle, steps = bool(freedom.idle), steps or ArcSteps()
         return Follower(self._model, newton, request, tracer, until=until, steps=steps, idle=idle), freedom
 
     def _followed(self, request: CurveRequest, freedom: Freedom, follower: Follower) -> FollowedCurve:

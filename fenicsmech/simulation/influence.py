@@ -33,6 +33,6 @@ def influence(model: MechanismModel, newton: Iteration, frame: Frame, freedom: F
     with model.shaped(frame.design):
         system.load(frame.state)
         balance = system.balance(frame.state, control)
-        newton.factor(frame.state, control, balance, IDLE_STIFFNESS if freedom.mobility else 0.0)
+        newton.factor(frame.state, control, balance, IDLE_STIFFNESS if freedom.idle else 0.0)
         z, _ = system.expand(newton.solve_linear(system.travel_gradient(system.controlled, frame.state)))
         yield z

@@ -13,7 +13,7 @@ import ufl
 from fenicsmech.bodies import DesignAtNodes, InterfaceMap, MaterialPoint, body_point, link_point
 from fenicsmech.clock import Clock
 from fenicsmech.compat import cell_nodes, original_nodes
-from fenicsmech.effects import BodyEffect, JointSoftening, LinkEffect, LinkFields, RestStretch, find_boundaries
+from fenicsmech.effects import BodyEffect, JointSoftening, LinkEffect, LinkFields, RestStretch, find_boundaries, holding
 from fenicsmech.elasticity import ElasticBody, ElasticModel, Stretch
 from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State
 from fenicsmech.errors import DescriptionError
@@ -37,6 +37,7 @@ class MechanismModel:
         clock: where time goes.
         with_pressure: whether each flexible link has the pressure as an unknown of its own.
         effects: what acts beside links, joints and forces.
+        holding: potentials of springs, which act from the start.
     """
 
     def __init__(
@@ -78,6 +79,7 @@ class MechanismModel:
             if isinstance(effect, BodyEffect)
             for potential in effect.potentials(linkage)
         ]
+        self.holding = holding(effects, linkage)
         self._compliances: dict[int, float] = {}
         for effect in effects:
             if isinstance(effect, JointSoftening):

@@ -59,7 +59,7 @@ class Tracer:
     ) -> None:
         self._model, self._newton, self._request, self._predictor = model, newton, request, predictor
         self._system, self._joints = newton.system, model.linkage.joints
-        self._freedom, self._idle = freedom, freedom.mobility > 0
+        self._freedom, self._idle = freedom, bool(freedom.idle)
         self._origin, self._origins = 0.0, dict.fromkeys(model.mechanism.outputs, 0.0)
         self._leaps = 0  # of the path so far that no frame tells of
         state = self._unloaded(assembly)
@@ -177,8 +177,8 @@ class Tracer:
         return is_held(joints, poses, self._state.motors, rate, self._system.rigid_rows)
 
     def _remedy(self) -> str:
-        if self._freedom.mobility:
-            names = ", ".join(map(repr, self._freedom.mobile))
+        if self._idle:
+            names = ", ".join(map(repr, self._freedom.idle))
             return f"Nothing but the force holds {names}: add a joint or a motor, or check the force's direction"
         return "Try follow() or displacement control past a limit point, other samples, or a finer mesh"
 
