@@ -6,14 +6,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 import fenicsmech as fm
 
-from .blueprint import Blueprint, ForcePlan, GravityPlan, LinkPlan, SpringPlan
+from .blueprint import Blueprint, EffectPlan, ForcePlan, GravityPlan, LinkPlan, SpringPlan
 from .closure import Closure, Place, place
 from .links_mesh import LinksMesh, gather, quadrature, shape_functions
 from .strain_energy import COMPLEX, REAL, energy_density
@@ -139,6 +139,11 @@ class Potential:
             gap = self.closure.gap(self.blueprint.joint(name), places)
             value = value + 0.5 * (gap @ gap) / compliance
         return value
+
+    def alone(self, effect: EffectPlan) -> Potential:
+        """The same scene with no other effect."""
+        blueprint = replace(self.blueprint, effects=(effect,))
+        return replace(self, blueprint=blueprint, closure=replace(self.closure, blueprint=blueprint))
 
     def travel(self, force: ForcePlan, u: np.ndarray, places: Sequence[Place]) -> complex:
         """d · u(P), from the drawn configuration."""

@@ -10,8 +10,8 @@ import fenicsmech as fm
 
 from .blueprint import Blueprint, Built, GravityPlan, SpringPlan
 from .generator import bending_force
+from .motions import body_modes, moved
 from .potential import Potential
-from .residual_check import body_modes, moved
 from .stability_check import eigenvalues
 
 _STEP = 1e-30
