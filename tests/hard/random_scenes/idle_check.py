@@ -8,10 +8,11 @@ of loads, weights, springs and compliant joints alone must vanish, and their rou
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
-from .blueprint import CompliancePlan, SpringPlan
+from .blueprint import CompliancePlan, EffectPlan, ForcePlan, GravityPlan, SpringPlan
 from .closure import Place
 from .motions import STEP, moved, null_motions
 from .potential import Potential
@@ -53,25 +54,40 @@ def idle_motions(potential: Potential, u: np.ndarray, places: list[Place]) -> It
 
 
 def idle_work(potential: Potential, magnitude: float, u: np.ndarray, places: list[Place], floor: float) -> float:
-    """Largest work of all that acts along a motion that deforms no link, over the sum of its parts' sizes.
+    """Largest work of all that acts along a motion that deforms no link, over what it would be along its velocities.
 
-    What rounding does is left out: that of springs' coordinates, and that of the force under displacement control,
-    which takes all that rounding leaves (``floor``).
+    What rounding does is left out: that of motions and springs' coordinates, and that of the force under displacement
+    control, which takes all that rounding leaves (``floor``).
     """
     shares = []
     for du, there in idle_motions(potential, u, places):
-        parts = [-size * np.imag(potential.travel(force, u + du, there)) for force, size in potential.acting(magnitude)]
-        reaction = potential.blueprint.control == "displacements" and magnitude != 0.0
-        grain = floor * abs(parts[0] / magnitude) if reaction else 0.0
+        fastest = float(np.abs(du).max()) / STEP
+        work, size, grain = 0.0, 0.0, 0.0
+        for force, amount in potential.acting(magnitude):
+            work -= amount * float(np.imag(potential.travel(force, u + du, there))) / STEP
+            size += abs(amount) * _speed(potential, force, u + du, there)
+            grain += _GRAIN * abs(amount) * fastest
+        if potential.blueprint.control == "displacements":
+            grain += floor * _speed(potential, potential.blueprint.forces[0], u + du, there)
         for plan in potential.blueprint.effects:
-            parts.append(np.imag(potential.alone(plan).body_potential(u + du, there)))
-            grain += _grain(potential, plan, places, there)
-        missing = max(0.0, float(abs(sum(parts)) - grain) / STEP)
-        shares.append(missing / max(float(sum(map(abs, parts))) / STEP, 1e-300))
+            part = float(np.imag(potential.alone(plan).body_potential(u + du, there))) / STEP
+            work += part
+            size += potential.weight * fastest if isinstance(plan, GravityPlan) else abs(part)
+            grain += _grain(potential, plan, places, there) / STEP
+        shares.append(max(0.0, abs(work) - grain) / max(size, 1e-300))
     return max(shares, default=0.0)
 
 
-def _grain(potential: Potential, plan, places: list[Place], there: list[Place]) -> float:
+def _speed(potential: Potential, force: ForcePlan, u: np.ndarray, there: list[Place]) -> float:
+    """How fast the point of a force moves, in whatever direction."""
+    along = [
+        np.imag(potential.travel(replace(force, direction=tuple(axis)), u, there))
+        for axis in np.eye(potential.mesh.dim)
+    ]
+    return float(np.linalg.norm(np.array(along, dtype=float) / STEP))
+
+
+def _grain(potential: Potential, plan: EffectPlan, places: list[Place], there: list[Place]) -> float:
     """Work of a spring or a compliant joint at the edge of rounding."""
     length = potential.blueprint.length
     match plan:
@@ -79,8 +95,8 @@ def _grain(potential: Potential, plan, places: list[Place], there: list[Place]) 
             joint = potential.blueprint.joint(name)
             unit = length if joint.kind == "prismatic" else 1.0
             turn = abs(potential.closure.coordinate(joint, places).real)
-            return stiffness * abs(potential.closure.coordinate(joint, there).imag) * _GRAIN * (unit + turn)
+            return float(stiffness * abs(potential.closure.coordinate(joint, there).imag) * _GRAIN * (unit + turn))
         case CompliancePlan(joint=name, compliance=compliance):
             rate = potential.closure.gap(potential.blueprint.joint(name), there).imag
-            return np.sqrt(np.sum(rate**2)) * _GRAIN * length / compliance
+            return float(np.sqrt(np.sum(rate**2)) * _GRAIN * length / compliance)
     return 0.0
