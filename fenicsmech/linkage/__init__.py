@@ -5,6 +5,7 @@
 - ``build``: from the described mechanism to bodies and constraints
 - ``holding``: what springs add: potentials of poses that hold freedoms
 - ``assembly``: the rigid assembly of a configuration
+- ``motions``: motions that joints leave to links that bend no further
 - ``mobility``: free directions left and dependent constraints, by name
 """
 
@@ -13,6 +14,7 @@ from fenicsmech.linkage.bodies import Body
 from fenicsmech.linkage.build import Linkage, build_linkage
 from fenicsmech.linkage.holding import Holding
 from fenicsmech.linkage.mobility import Freedom, count_freedom, is_held
+from fenicsmech.linkage.motions import Motion, stiff_motions
 from fenicsmech.linkage.system import Connection, JointSystem
 
 __all__ = [
@@ -23,8 +25,10 @@ __all__ = [
     "Holding",
     "JointSystem",
     "Linkage",
+    "Motion",
     "assemble",
     "build_linkage",
     "count_freedom",
     "is_held",
+    "stiff_motions",
 ]

@@ -37,7 +37,8 @@ class MechanismModel:
         clock: where time goes.
         with_pressure: whether each flexible link has the pressure as an unknown of its own.
         effects: what acts beside links, joints and forces.
-        holding: potentials of springs, which act from the start.
+        potentials: potentials of body poses.
+        holding: those of springs, which act from the start.
     """
 
     def __init__(
@@ -73,7 +74,7 @@ class MechanismModel:
             bulge=bulge_field(mesh) if fidelity.order > 1 else None,
             with_pressure=self.with_pressure,
         )
-        self._potentials = [
+        self.potentials = [
             potential
             for effect in effects
             if isinstance(effect, BodyEffect)
@@ -180,7 +181,7 @@ class MechanismModel:
             self.linkage.joints,
             controlled=controlled,
             loads=loads,
-            potentials=self._potentials,
+            potentials=self.potentials,
             compliances=self._compliances,
             clock=self.clock,
         )

@@ -36,21 +36,13 @@ from fenicsmech.report import Panel, Progress, Silent, Trace, draw_configuration
 from fenicsmech.simulation.buckling import BucklingLoad, SoftMode, buckling_loads, soft_modes
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.curves import Curves
-from fenicsmech.simulation.curves import Curves
-from fenicsmech.simulation.curves import Curves
 from fenicsmech.simulation.dial import Choice, Dial, Outcome, Rung
-from fenicsmech.simulation.estimates import Estimates
-from fenicsmech.simulation.estimates import Estimates
 from fenicsmech.simulation.estimates import Estimates
 from fenicsmech.simulation.explanation import Explanation, hints, simulated
 from fenicsmech.simulation.export import write_xdmf
 from fenicsmech.simulation.fidelity import Fidelity, read_fidelity
 from fenicsmech.simulation.followed import FollowedCurve, PathEvent
-from fenicsmech.simulation.fidelity import Fidelity, read_fidelity
-from fenicsmech.simulation.fidelity import Fidelity, read_fidelity
 from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.link_meshes import check_links, mesh_mechanism
-from fenicsmech.simulation.link_meshes import check_links, mesh_mechanism
 from fenicsmech.simulation.link_meshes import check_links, mesh_mechanism
 from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.picture import panel

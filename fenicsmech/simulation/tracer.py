@@ -26,9 +26,11 @@ from fenicsmech.equilibrium import (
 from fenicsmech.errors import EquilibriumError
 from fenicsmech.linkage import Assembly, Freedom, is_held
 from fenicsmech.simulation.frame import Frame
+from fenicsmech.simulation.idle_balance import idle_imbalance
 from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.request import CurveRequest
 
+_UNBALANCED = 1e-4  # of the loads: what may be left along idle freedoms
 _LARGEST_TURN = 0.25  # rad, or mechanism lengths, of a motor between equilibria
 
 
@@ -93,6 +95,8 @@ class Tracer:
         except PathFailed as failure:
             raise self._unreached(control, failure, before) from failure
         record = self.record(solution)
+        if self._idle and not control.constrained and self._unbalanced(solution, control) > _UNBALANCED:
+            raise self._lost_in_rounding(control, before)
         jumped, self._leaps = self._leaps + path.leaps > leaps, 0
         return replace(
             record,
@@ -100,6 +104,23 @@ class Tracer:
             iterations=path.iterations - iterations,
             seconds=perf_counter() - start,
             phases=clock.since(seconds),
+        )
+
+    def _unbalanced(self, solution: Solution, control: Control) -> float:
+        """Share of the loads that idle freedoms do not balance in a state that is loaded (collective)."""
+        state, share = solution.state, solution.state.share
+        self._system.balance(state, control)
+        loads = [state.force, *(share * magnitude for _, magnitude in self._request.others)]
+        return idle_imbalance(self._model, self._system, state, loads)
+
+    def _lost_in_rounding(self, control: Control, before: Sequence[Frame]) -> EquilibriumError:
+        names = ", ".join(map(repr, self._freedom.idle))
+        return EquilibriumError(
+            f"{self._request.force.name!r} in configuration {self._request.configuration.name!r}",
+            f"at force {control.target:g} where {names} come to rest is lost in the rounding of stiff links",
+            self._remedy(),
+            last=before[-1] if before else None,
+            frames=before,
         )
 
     def _unloaded(self, assembly: Assembly) -> State:

@@ -8,11 +8,10 @@ of loads, weights, springs and compliant joints alone must vanish, and their rou
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
-from .blueprint import CompliancePlan, EffectPlan, ForcePlan, GravityPlan, SpringPlan
+from .blueprint import CompliancePlan, EffectPlan, GravityPlan, SpringPlan
 from .closure import Place
 from .motions import STEP, moved, null_motions
 from .potential import Potential
@@ -54,21 +53,24 @@ def idle_motions(potential: Potential, u: np.ndarray, places: list[Place]) -> It
 
 
 def idle_work(potential: Potential, magnitude: float, u: np.ndarray, places: list[Place], floor: float) -> float:
-    """Largest work of all that acts along a motion that deforms no link, over what it would be along its velocities.
+    """Largest work of all that acts along a motion that deforms no link, over loads and torques times velocities.
 
-    What rounding does is left out: that of motions and springs' coordinates, and that of the force under displacement
-    control, which takes all that rounding leaves (``floor``).
+    Loads count with the velocity of what moves fastest: in a dead centre their own points stand still. What rounding
+    does to springs' coordinates is left out, and what it does to the force under displacement control, which takes all
+    that it leaves (``floor``).
     """
     shares = []
     for du, there in idle_motions(potential, u, places):
-        fastest = float(np.abs(du).max()) / STEP
+        length = potential.blueprint.length
+        speeds = [np.abs(du).max(), *(np.abs(body.shift.imag).max() for body in there)]
+        speeds += [np.abs(body.turn.imag).max() * length for body in there]
+        fastest = float(max(speeds)) / STEP
         work, size, grain = 0.0, 0.0, 0.0
         for force, amount in potential.acting(magnitude):
             work -= amount * float(np.imag(potential.travel(force, u + du, there))) / STEP
-            size += abs(amount) * _speed(potential, force, u + du, there)
-            grain += _GRAIN * abs(amount) * fastest
+            size += abs(amount) * fastest
         if potential.blueprint.control == "displacements":
-            grain += floor * _speed(potential, potential.blueprint.forces[0], u + du, there)
+            grain += floor * fastest
         for plan in potential.blueprint.effects:
             part = float(np.imag(potential.alone(plan).body_potential(u + du, there))) / STEP
             work += part
@@ -76,15 +78,6 @@ def idle_work(potential: Potential, magnitude: float, u: np.ndarray, places: lis
             grain += _grain(potential, plan, places, there) / STEP
         shares.append(max(0.0, abs(work) - grain) / max(size, 1e-300))
     return max(shares, default=0.0)
-
-
-def _speed(potential: Potential, force: ForcePlan, u: np.ndarray, there: list[Place]) -> float:
-    """How fast the point of a force moves, in whatever direction."""
-    along = [
-        np.imag(potential.travel(replace(force, direction=tuple(axis)), u, there))
-        for axis in np.eye(potential.mesh.dim)
-    ]
-    return float(np.linalg.norm(np.array(along, dtype=float) / STEP))
 
 
 def _grain(potential: Potential, plan: EffectPlan, places: list[Place], there: list[Place]) -> float:

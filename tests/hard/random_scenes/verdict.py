@@ -23,7 +23,7 @@ from .residual_check import Residual, check
 
 TOLERANCE = 1e-6  # of the largest load or reaction
 ROUNDING = 10.0  # times the rounding of displacements
-BALANCED = 1e-4  # of what works along motions that deform no link
+BALANCED = 1e-5  # of what works along motions that deform no link
 CLOSED = 1e-9  # of the mechanism's length
 INVALID_SHARE = 3  # in ten
 
