@@ -179,12 +179,15 @@ class Tracer:
                 frames=before,
             )
         what, origin = ("displacement", self._origin) if control.constrained else ("force", 0.0)
+        last = self._last(failure)
+        where = f", where the force is {last.force:g}" if control.constrained and last is not None else ""
         return EquilibriumError(
             f"{self._request.force.name!r} in configuration {self._request.configuration.name!r}",
-            f"no equilibrium at {what} {control.target - origin:g}; the last one is at {failure.reached - origin:g} "
+            f"no equilibrium at {what} {control.target - origin:g}; "
+            f"the last one is at {failure.reached - origin:g}{where} "
             f"({failure.reason}; {len(failure.tried)} smaller steps were tried)",
             self._remedy(),
-            last=self._last(failure),
+            last=last,
             frames=before,
         )
 

@@ -16,7 +16,7 @@ from .closure import Place
 from .motions import STEP, moved, null_motions
 from .potential import Potential
 
-_GRAIN = 1e-9  # rad or mechanism lengths: how closely springs must be relaxed
+_GRAIN = 1e-7  # rad or mechanism lengths: how closely springs must be relaxed, as soft as rounding of links or not
 
 
 def idle_motions(potential: Potential, u: np.ndarray, places: list[Place]) -> Iterator[tuple[np.ndarray, list[Place]]]:

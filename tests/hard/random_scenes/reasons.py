@@ -18,6 +18,7 @@ _STEP = 1e-30
 _IMMOBILE = 1e-9
 _SOFT = 0.1
 _HUGE = 10.0
+_UNREACHED = 1e3
 
 
 def true_reason(blueprint: Blueprint, built: Built | None, failure: fm.FenicsmechError) -> str:
@@ -26,6 +27,9 @@ def true_reason(blueprint: Blueprint, built: Built | None, failure: fm.Fenicsmec
         return ""
     if blueprint.control == "displacements" and failure.last is not None and immobile(blueprint, built, failure.last):
         return "the point cannot move that way"
+    if blueprint.control == "displacements" and failure.last is not None:
+        if abs(failure.last.force) > _UNREACHED * min(map(bending_force, blueprint.flexible)):
+            return "links stretched straight: a thousand times and more what bends the softest"
     if adrift(blueprint):
         return "nothing but the force holds the mechanism"
     if blueprint.control == "forces" and max(map(abs, blueprint.samples)) > _HUGE * min(
