@@ -9,7 +9,7 @@
 - ``mobility``: free directions left and dependent constraints, by name
 """
 
-from fenicsmech.linkage.assembly import Assembly, assemble
+from fenicsmech.linkage.assembly import Assembly, assemble, assemble_before_strain
 from fenicsmech.linkage.bodies import Body
 from fenicsmech.linkage.build import Linkage, build_linkage
 from fenicsmech.linkage.holding import Holding
@@ -27,6 +27,7 @@ __all__ = [
     "Linkage",
     "Motion",
     "assemble",
+    "assemble_before_strain",
     "build_linkage",
     "count_freedom",
     "is_held",

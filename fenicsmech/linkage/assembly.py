@@ -28,6 +28,7 @@ _SMALLEST_STEP = 1e-4
 _RELAXED = 1e-14  # rad, or mechanism lengths: steps towards the rest of springs that are this short end there
 _LARGEST_TURN = 0.3  # of such a step
 _CURVED = 1e-9  # of the curvature along the stiffest free motion: along others springs want nothing
+_SHORT = 0.98  # of the way to where links start to strain
 _STRAY = 0.2  # of the motion in a step: how far it may end from its extrapolation
 
 
@@ -70,6 +71,22 @@ def assemble(linkage: Linkage, configuration: Configuration, holding: Sequence[H
                 f"the motors get {math.floor(1e3 * closing) / 10:.1f}% of the way",  # never 100% of what fails
                 "Check motor positions and link lengths",
             )
+    return Assembly(poses, fraction)
+
+
+def assemble_before_strain(linkage: Linkage, configuration: Configuration, holding: Sequence[Holding] = ()) -> Assembly:
+    """As ``assemble``, but a little before the last position free of strain where motors strain the links.
+
+    That one is a dead centre as a rule, where no tangent tells which way to go on and freedoms count twice.
+
+    Raises:
+        AssemblyError: as ``assemble``.
+    """
+    assembly = assemble(linkage, configuration, holding)
+    if assembly.fraction == 1.0:
+        return assembly
+    fraction = _SHORT * assembly.fraction
+    poses, _, _ = _follow(linkage.rigid, fraction * linkage.rigid.motor_values(configuration.position), holding)
     return Assembly(poses, fraction)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from fenicsmech.equilibrium import ArcSteps, EquilibriumSolver, Iteration, LoadControl, Predictor, Sense
 from fenicsmech.errors import DescriptionError
-from fenicsmech.linkage import Freedom, assemble, count_freedom
+from fenicsmech.linkage import Freedom, assemble_before_strain, count_freedom
 from fenicsmech.mechanism import Force, Units
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.followed import FollowedCurve, PathEvent
@@ -96,9 +96,9 @@ class Curves:
     def _tracer(self, request: CurveRequest) -> tuple[Tracer, Iteration, Freedom]:
         """What starts the path of a request, its solver, and the freedom of its configuration."""
         linkage, holding = self._model.linkage, self._model.holding
-        assembly = assemble(linkage, request.configuration, holding)
+        assembly = assemble_before_strain(linkage, request.configuration, holding)
         rigid = linkage.rigid
-        motors = rigid.motor_values(request.configuration.position)
+        motors = assembly.fraction * rigid.motor_values(request.configuration.position)
         freedom = count_freedom(rigid, assembly.poses, motors, holding)
         newton = self.newton(request.force, request.others)
         tracer = Tracer(self._model, newton, request, assembly=assembly, freedom=freedom, predictor=self._predictor)

@@ -95,7 +95,7 @@ class Tracer:
         except PathFailed as failure:
             raise self._unreached(control, failure, before) from failure
         record = self.record(solution)
-        if self._idle and not control.constrained and self._unbalanced(solution, control) > _UNBALANCED:
+        if self._freedom.mobility and not control.constrained and self._unbalanced(solution, control) > _UNBALANCED:
             raise self._lost_in_rounding(control, before)
         jumped, self._leaps = self._leaps + path.leaps > leaps, 0
         return replace(
@@ -114,7 +114,7 @@ class Tracer:
         return idle_imbalance(self._model, self._system, state, loads)
 
     def _lost_in_rounding(self, control: Control, before: Sequence[Frame]) -> EquilibriumError:
-        names = ", ".join(map(repr, self._freedom.idle))
+        names = ", ".join(map(repr, self._freedom.mobile))
         return EquilibriumError(
             f"{self._request.force.name!r} in configuration {self._request.configuration.name!r}",
             f"at force {control.target:g} where {names} come to rest is lost in the rounding of stiff links",
