@@ -12,7 +12,7 @@
 from fenicsmech.linkage.assembly import Assembly, assemble, assemble_before_strain
 from fenicsmech.linkage.bodies import Body
 from fenicsmech.linkage.build import Linkage, build_linkage
-from fenicsmech.linkage.holding import Holding
+from fenicsmech.linkage.holding import Holding, free_motions
 from fenicsmech.linkage.mobility import Freedom, count_freedom, is_held
 from fenicsmech.linkage.motions import Motion, stiff_motions
 from fenicsmech.linkage.system import Connection, JointSystem
@@ -30,6 +30,7 @@ __all__ = [
     "assemble_before_strain",
     "build_linkage",
     "count_freedom",
+    "free_motions",
     "is_held",
     "stiff_motions",
 ]
