@@ -168,7 +168,7 @@ class _Rig:
         model, newton = simulation.model, simulation.newton(part)
         model.set_youngs_modulus(self._links, modulus)
         curve = simulation.trace(self._request)
-        adjoint, floor = Adjoint(model, newton), IDLE_STIFFNESS if curve.freedom.mobility else 0.0
+        adjoint, floor = Adjoint(model, newton), IDLE_STIFFNESS if curve.freedom.idle else 0.0
         slopes, travels = {}, {}
         for frame in curve.frames:
             (gradient,) = adjoint.gradients(frame.state, [newton.system.controlled], floor=floor)

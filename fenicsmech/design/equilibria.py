@@ -153,7 +153,7 @@ class TargetEquilibria:
                 raise Infeasible(_unstable(target))
             if any(before.jumped for before in curve.frames if abs(before.force) <= abs(frame.force)):
                 raise Infeasible(_folded(target, "the mechanism snaps on the way there from zero load"))
-            self._floor[target] = IDLE_STIFFNESS if curve.freedom.mobility else 0.0
+            self._floor[target] = IDLE_STIFFNESS if curve.freedom.idle else 0.0
             self._fixed_origin[target] = self._travel(target, frame.state) - frame.displacement
             origin = self._unloaded(target, curve.frames[0].state) if moving else None
             samples[target] = Sample(frame.state, origin, frame.displacement)

@@ -21,7 +21,15 @@ from fenicsmech.effects.joint_spring import JointSpring
 from fenicsmech.effects.obstacles import Cylinder, HalfPlane, Obstacle
 from fenicsmech.effects.pressure import Pressure
 from fenicsmech.effects.prestrain import Prestrain
-from fenicsmech.effects.protocol import BodyEffect, JointSoftening, LinkEffect, LinkFields, PosePotential, RestStretch
+from fenicsmech.effects.protocol import (
+    BodyEffect,
+    JointSoftening,
+    LinkEffect,
+    LinkFields,
+    PosePotential,
+    RestStretch,
+    holding,
+)
 
 __all__ = [
     "BodyEffect",
@@ -43,4 +51,5 @@ __all__ = [
     "Prestrain",
     "RestStretch",
     "find_boundaries",
+    "holding",
 ]

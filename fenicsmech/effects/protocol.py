@@ -82,8 +82,12 @@ class LinkFields:
         return ufl.det(self.body.rest_gradient)
 
     def integral(self, density, *, degree: int) -> ufl.Form:
-        """∫ density dV over the mesh at rest, to be multiplied as ``model`` says; ``degree`` of the quadrature."""
-        return density * self.stretch * self.dx(metadata={"quadrature_degree": degree})
+        """∫ density dV over the mesh at rest, to be multiplied as ``model`` says; ``degree`` of ``density``.
+
+        In curved cells det(∇X) is a polynomial too, of degree dim.
+        """
+        whole = degree if self.body.bulge is None else degree + self.dim
+        return density * self.stretch * self.dx(metadata={"quadrature_degree": whole})
 
     def boundary_integral(self, density, faces: Faces, *, degree: int) -> ufl.Form:
         """∫ density dA over ``faces`` of the mesh at rest, to be multiplied as ``model`` says.
@@ -151,6 +155,12 @@ class BodyEffect(Effect):
     @abstractmethod
     def potentials(self, linkage: Linkage) -> Sequence[PosePotential]:
         """The potentials."""
+
+
+def holding(effects: Sequence[Effect], linkage: Linkage) -> tuple[PosePotential, ...]:
+    """The potentials of ``effects`` that act in full from the start."""
+    found = [effect.potentials(linkage) for effect in effects if isinstance(effect, BodyEffect)]
+    return tuple(potential for potentials in found for potential in potentials if potential.holds)
 
 
 class JointSoftening(Effect):

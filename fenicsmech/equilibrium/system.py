@@ -313,6 +313,19 @@ class EquilibriumSystem:
         """∂E/∂u minus the loads on links of the last ``balance``, (owned displacements,)."""
         return self._unbalanced.copy()
 
+    def work(self, nodal: np.ndarray, z: np.ndarray) -> float:
+        """What all forces of the last ``balance`` lack along velocities of owned nodes and of poses (collective).
+
+        Args:
+            nodal: (owned displacements,); those of interface nodes are their bodies'.
+            z: of the pose unknowns, (size,); keeps joints closed.
+        """
+        rows, layout = self._rows.array_r, self.layout
+        local = float(rows[: layout.displacements] @ nodal)
+        if layout.last:
+            local += float(rows[layout.owned : layout.owned + self.joints.size] @ z)
+        return layout.comm.allreduce(local)
+
     def control_row(self) -> PETSc.Vec:
         """The unit vector of the unknown f (collective)."""
         vector = self._kkt.zeros()

@@ -3,18 +3,21 @@
     mobility = unknowns − rank A,     redundancy = rows − rank A,
 
 motors locked, flexible links taken as rigid. Idle freedoms (a two-ball link spinning about itself) count as
-mobility, dependent equations (a planar loop of spatial hinges) as redundancy.
+mobility, dependent equations (a planar loop of spatial hinges) as redundancy. Springs hold what they curve the
+potential along, however soft they are.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from fenicsmech.linkage.holding import RANK, FreeMotions, Holding, free_motions
 from fenicsmech.linkage.system import JointSystem
 
-_RANK = 1e-9  # singular values below this are zero: rows and unknowns are scaled to one
+_CURVED = 1e-12  # of the curvature along the stiffest free motion: what is less counts as none
 _PART = 1e-6  # share in a null vector from which a part is named
 
 
@@ -25,27 +28,33 @@ class Freedom:
     Attributes:
         mobility: number of free directions left.
         mobile: names of the links that can move.
+        idle: names of the links that can move without winding up any spring; empty if springs hold all.
         redundancy: number of dependent constraint equations.
         redundant: names of the joints whose equations depend on each other.
     """
 
     mobility: int
     mobile: tuple[str, ...]
+    idle: tuple[str, ...]
     redundancy: int
     redundant: tuple[str, ...]
 
 
-def count_freedom(system: JointSystem, poses: np.ndarray, motors: np.ndarray) -> Freedom:
-    """Mobility and redundancy of ``system`` at ``poses`` (bodies, pose_size) and motor values (connections,)."""
+def count_freedom(
+    system: JointSystem, poses: np.ndarray, motors: np.ndarray, holding: Sequence[Holding] = ()
+) -> Freedom:
+    """Mobility and redundancy of ``system``.
+
+    Args:
+        system: the constraints.
+        poses: (bodies, pose_size).
+        motors: motor values, (connections,).
+        holding: potentials that hold freedoms.
+    """
     scaled = system.row_scale[:, None] * system.gradient(poses, motors) * system.pose_scale
     left, values, right = np.linalg.svd(scaled, full_matrices=True)
-    rank = int(np.sum(values > _RANK))
+    rank = int(np.sum(values > RANK))
     free, dependent = right[rank:], left[:, rank:]
-    mobile = [
-        system.bodies[body].link.name
-        for body in system.free_bodies
-        if np.max(np.abs(free[:, system.columns[body]]), initial=0.0) > _PART
-    ]
     redundant = [
         name
         for name, weight in zip(system.row_names, np.max(np.abs(dependent), axis=1, initial=0.0), strict=True)
@@ -53,10 +62,27 @@ def count_freedom(system: JointSystem, poses: np.ndarray, motors: np.ndarray) ->
     ]
     return Freedom(
         mobility=system.size - rank,
-        mobile=tuple(dict.fromkeys(mobile)),
+        mobile=_moving(system, free),
+        idle=_moving(system, _unheld(free_motions(system, poses, motors, holding))),
         redundancy=system.rows - rank,
         redundant=tuple(dict.fromkeys(redundant)),
     )
+
+
+def _moving(system: JointSystem, motions: np.ndarray) -> tuple[str, ...]:
+    """Names of the links that move in any of ``motions`` (n, size)."""
+    names = [
+        system.bodies[body].link.name
+        for body in system.free_bodies
+        if np.max(np.abs(motions[:, system.columns[body]]), initial=0.0) > _PART
+    ]
+    return tuple(dict.fromkeys(names))
+
+
+def _unheld(free: FreeMotions) -> np.ndarray:
+    """The motions along which potentials are not curved, (m, size)."""
+    values, vectors = np.linalg.eigh(free.curvature)
+    return vectors[:, np.abs(values) <= _CURVED * np.max(np.abs(values), initial=0.0)].T @ free.motions
 
 
 def is_held(system: JointSystem, poses: np.ndarray, motors: np.ndarray, rate: np.ndarray, rows: np.ndarray) -> bool:
@@ -71,5 +97,5 @@ def is_held(system: JointSystem, poses: np.ndarray, motors: np.ndarray, rate: np
     """
     scaled = (system.row_scale[:, None] * system.gradient(poses, motors) * system.pose_scale)[rows]
     wanted = rate * system.pose_scale
-    left = wanted - scaled.T @ np.linalg.lstsq(scaled.T, wanted, rcond=_RANK)[0]
-    return bool(np.linalg.norm(left) <= _RANK * np.linalg.norm(wanted))
+    left = wanted - scaled.T @ np.linalg.lstsq(scaled.T, wanted, rcond=RANK)[0]
+    return bool(np.linalg.norm(left) <= RANK * np.linalg.norm(wanted))

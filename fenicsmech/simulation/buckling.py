@@ -45,6 +45,6 @@ def soft_modes(
 
 
 def _at(model: MechanismModel, newton: Iteration, curve: Curve, frame: Frame, count: int, modes) -> Iterable[Mode]:
-    floor = IDLE_STIFFNESS if curve.freedom.mobility else 0.0
+    floor = IDLE_STIFFNESS if curve.freedom.idle else 0.0
     with model.shaped(frame.design):
         return modes(newton, ForceLead(), frame.state, floor=floor, count=count)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from fenicsmech.equilibrium import ArcSteps, EquilibriumSolver, Iteration, Predictor, Sense
 from fenicsmech.errors import DescriptionError
-from fenicsmech.linkage import Freedom, assemble, count_freedom
+from fenicsmech.linkage import Freedom, assemble_before_strain, count_freedom
 from fenicsmech.mechanism import Force, Leader, Units
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.followed import FollowedCurve, PathEvent
@@ -101,17 +101,18 @@ class Curves:
 
     def _tracer(self, request: CurveRequest) -> tuple[Tracer, Iteration, Freedom]:
         """What starts the path of a request, its solver, and the freedom of its configuration."""
-        linkage = self._model.linkage
-        assembly = assemble(linkage, request.configuration)
+        linkage, holding = self._model.linkage, self._model.holding
+        assembly = assemble_before_strain(linkage, request.configuration, holding)
         rigid = linkage.rigid
-        freedom = count_freedom(rigid, assembly.poses, rigid.motor_values(request.configuration.position))
+        motors = assembly.fraction * rigid.motor_values(request.configuration.position)
+        freedom = count_freedom(rigid, assembly.poses, motors, holding)
         newton = self.newton(request.part, request.others)
         tracer = Tracer(self._model, newton, request, assembly=assembly, freedom=freedom, predictor=self._predictor)
         return tracer, newton, freedom
 
     def _follower(self, request: CurveRequest, until: Until, steps: ArcSteps | None) -> tuple[Follower, Freedom]:
         tracer, newton, freedom = self._tracer(request)
-        idle, steps = freedom.mobility > 0, steps or ArcSteps()
+        idle, steps = bool(freedom.idle), steps or ArcSteps()
         return Follower(self._model, newton, request, tracer, until=until, steps=steps, idle=idle), freedom
 
     def _followed(self, request: CurveRequest, freedom: Freedom, follower: Follower) -> FollowedCurve:

@@ -34,7 +34,7 @@ class Equilibrium:
     @staticmethod
     def on(curve: Curve, frame: Frame) -> Equilibrium:
         """That of a frame, under what the curve prescribes."""
-        return Equilibrium(frame.state, frame.design, curve.goal, IDLE_STIFFNESS if curve.freedom.mobility else 0.0)
+        return Equilibrium(frame.state, frame.design, curve.goal, IDLE_STIFFNESS if curve.freedom.idle else 0.0)
 
 
 class Influence:

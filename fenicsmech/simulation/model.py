@@ -13,7 +13,7 @@ import ufl
 from fenicsmech.bodies import DesignAtNodes, InterfaceMap, MaterialPoint, body_point, link_point
 from fenicsmech.clock import Clock
 from fenicsmech.compat import cell_nodes, original_nodes
-from fenicsmech.effects import BodyEffect, JointSoftening, LinkEffect, LinkFields, RestStretch, find_boundaries
+from fenicsmech.effects import BodyEffect, JointSoftening, LinkEffect, LinkFields, RestStretch, find_boundaries, holding
 from fenicsmech.elasticity import ElasticBody, ElasticModel, Stretch
 from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State
 from fenicsmech.errors import DescriptionError
@@ -37,6 +37,8 @@ class MechanismModel:
         clock: where time goes.
         with_pressure: whether each flexible link has the pressure as an unknown of its own.
         effects: what acts beside links, joints and forces.
+        potentials: potentials of body poses.
+        holding: those of springs, which act from the start.
     """
 
     def __init__(
@@ -72,12 +74,13 @@ class MechanismModel:
             bulge=bulge_field(mesh) if fidelity.order > 1 else None,
             with_pressure=self.with_pressure,
         )
-        self._potentials = [
+        self.potentials = [
             potential
             for effect in effects
             if isinstance(effect, BodyEffect)
             for potential in effect.potentials(linkage)
         ]
+        self.holding = holding(effects, linkage)
         self._compliances: dict[int, float] = {}
         for effect in effects:
             if isinstance(effect, JointSoftening):
@@ -178,7 +181,7 @@ class MechanismModel:
             self.linkage.joints,
             controlled=controlled,
             loads=loads,
-            potentials=self._potentials,
+            potentials=self.potentials,
             compliances=self._compliances,
             clock=self.clock,
             comm=self.mesh.comm,

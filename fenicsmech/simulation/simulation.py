@@ -11,6 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenicsmech.clock import Clock
+from fenicsmech.effects import holding
 from fenicsmech.elasticity import (
     Formulation,
     Mixed,
@@ -390,7 +391,7 @@ class Simulation:
         Raises:
             AssemblyError: one of the configurations does not assemble, or its motors strain the links.
         """
-        return unloaded_positions(self.linkage, part, configurations)
+        return unloaded_positions(self.linkage, part, configurations, holding(self.scene.effects, self.linkage))
 
     @property
     def setup_seconds(self) -> float:

@@ -24,12 +24,16 @@ from fenicsmech.equilibrium import (
     motor_torques,
 )
 from fenicsmech.errors import EquilibriumError
-from fenicsmech.linkage import Assembly, Freedom, is_held
+from fenicsmech.linkage import Assembly, Freedom, free_motions, is_held
 from fenicsmech.simulation.frame import Frame
+from fenicsmech.simulation.idle_balance import idle_imbalance
 from fenicsmech.simulation.leading import leading
 from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.request import CurveRequest
 
+_UNBALANCED = 1e-4  # of the loads: what may be left along idle freedoms
+_DROWNED = 1e-15  # of the links' stiffness: springs this soft are beside its rounding
+_OTHERWISE = "Try follow() or displacement control past a limit point, other samples, or a finer mesh"
 _LARGEST_TURN = 0.25  # rad, or mechanism lengths, of a motor between equilibria
 
 
@@ -60,7 +64,8 @@ class Tracer:
     ) -> None:
         self._model, self._newton, self._request, self._predictor = model, newton, request, predictor
         self._system, self._joints = newton.system, model.linkage.joints
-        self._freedom, self._idle = freedom, freedom.mobility > 0
+        self._poses = assembly.poses
+        self._freedom, self._idle = freedom, bool(freedom.idle)
         self._lead = leading(request.part).lead(self._joints)
         self._origin, self._origins = 0.0, dict.fromkeys(model.mechanism.outputs, 0.0)
         self._leaps = 0  # of the path so far that no frame tells of
@@ -97,6 +102,8 @@ class Tracer:
         except PathFailed as failure:
             raise self._unreached(control, failure, before) from failure
         record = self.record(solution)
+        if self._freedom.mobility and not control.constrained and self._unbalanced(solution, control) > _UNBALANCED:
+            raise self._lost_in_rounding(control, before)
         jumped, self._leaps = self._leaps + path.leaps > leaps, 0
         return replace(
             record,
@@ -104,6 +111,23 @@ class Tracer:
             iterations=path.iterations - iterations,
             seconds=perf_counter() - start,
             phases=clock.since(seconds),
+        )
+
+    def _unbalanced(self, solution: Solution, control: Control) -> float:
+        """Share of the loads that idle freedoms do not balance in a state that is loaded (collective)."""
+        state, share = solution.state, solution.state.share
+        self._system.balance(state, control)
+        loads = [state.force, *(share * magnitude for _, magnitude in self._request.others)]
+        return idle_imbalance(self._model, self._system, state, loads)
+
+    def _lost_in_rounding(self, control: Control, before: Sequence[Frame]) -> EquilibriumError:
+        names = ", ".join(map(repr, self._freedom.mobile))
+        return EquilibriumError(
+            f"{self._request.part.name!r} in configuration {self._request.configuration.name!r}",
+            f"at force {control.target:g} where {names} come to rest is lost in the rounding of stiff links",
+            self._remedy(),
+            last=before[-1] if before else None,
+            frames=before,
         )
 
     def _unloaded(self, assembly: Assembly) -> State:
@@ -146,7 +170,7 @@ class Tracer:
             raise EquilibriumError(
                 f"constant loads ({names}) in configuration {self._request.configuration.name!r}",
                 f"no equilibrium beyond {failure.reached:.1%} of them ({failure.reason})",
-                "Choose smaller ones",
+                self._remedy("Choose smaller ones"),
                 last=self._last(failure),
             ) from failure
         return state
@@ -162,12 +186,15 @@ class Tracer:
                 frames=before,
             )
         what, origin = ("displacement", self._origin) if control.constrained else ("force", 0.0)
+        last = self._last(failure)
+        where = f", where the force is {last.force:g}" if control.constrained and last is not None else ""
         return EquilibriumError(
             f"{self._request.part.name!r} in configuration {self._request.configuration.name!r}",
-            f"no equilibrium at {what} {control.target - origin:g}; the last one is at {failure.reached - origin:g} "
+            f"no equilibrium at {what} {control.target - origin:g}; "
+            f"the last one is at {failure.reached - origin:g}{where} "
             f"({failure.reason}; {len(failure.tried)} smaller steps were tried)",
             self._remedy(),
-            last=self._last(failure),
+            last=last,
             frames=before,
         )
 
@@ -180,11 +207,24 @@ class Tracer:
         rate[joints.columns[load.point.body]] = load.direction @ load.point.gradient(poses)
         return is_held(joints, poses, self._state.motors, rate, self._system.rigid_rows)
 
-    def _remedy(self) -> str:
-        if self._freedom.mobility:
-            names = ", ".join(map(repr, self._freedom.mobile))
+    def _remedy(self, otherwise: str = _OTHERWISE) -> str:
+        if self._drowned():
+            return (
+                "The springs are softer than the rounding of the stiffest links: "
+                "make links rigid that hardly bend, or springs stiffer"
+            )
+        if self._idle:
+            names = ", ".join(map(repr, self._freedom.idle))
             return f"Nothing but the force holds {names}: add a joint or a motor, or check the force's direction"
-        return "Try follow() or displacement control past a limit point, other samples, or a finer mesh"
+        return otherwise
+
+    def _drowned(self) -> bool:
+        """Whether some freedom is held by springs that rounding of the links' stiffness outweighs."""
+        rigid, motors = self._model.linkage.rigid, self._joints.motor_values(self._request.configuration.position)
+        motors = np.concatenate([motors, np.zeros(len(rigid.connections) - len(motors))])  # welds of links
+        free = free_motions(rigid, self._poses, motors, self._model.holding)
+        held = np.abs(np.linalg.eigvalsh(free.curvature)) if self._model.holding else np.zeros(0)
+        return bool(np.min(held[held > 0.0], initial=np.inf) < _DROWNED * self._system.unit**2)
 
     def _last(self, failure: PathFailed) -> Frame | None:
         """The last equilibrium reached, on the way to a sample too."""

@@ -7,12 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from fenicsmech.errors import AssemblyError
-from fenicsmech.linkage import Linkage, assemble
+from fenicsmech.linkage import Holding, Linkage, assemble
 from fenicsmech.mechanism import Configuration, Force, Output
 from fenicsmech.mechanism.places import in_dimension
 
 
-def unloaded_positions(linkage: Linkage, part: Force | Output, configurations: Sequence[Configuration]) -> np.ndarray:
+def unloaded_positions(
+    linkage: Linkage, part: Force | Output, configurations: Sequence[Configuration], holding: Sequence[Holding]
+) -> np.ndarray:
     """Positions of the point of a force or output in each configuration, (configurations, dim).
 
     Raises:
@@ -23,7 +25,7 @@ def unloaded_positions(linkage: Linkage, part: Force | Output, configurations: S
     drawn = np.array(in_dimension(part.at, linkage.dim))
     positions = []
     for configuration in configurations:
-        assembly = assemble(linkage, configuration)
+        assembly = assemble(linkage, configuration, holding)
         if assembly.fraction < 1.0:
             raise AssemblyError(
                 f"configuration {configuration.name!r}",

@@ -23,7 +23,7 @@ def lever(stiffness: float) -> tuple[fm.Simulation, object]:
     return fm.Simulation(scene, space="plane-stress", size=2.0, comm=MPI.COMM_SELF), push
 
 
-@pytest.mark.parametrize("stiffness", [10.0, 0.1])
+@pytest.mark.parametrize("stiffness", [10.0, 0.1, 0.01])
 def test_spring_softer_than_what_is_lent_to_idle_freedoms(stiffness):
     simulation, push = lever(stiffness)
     force = 1e-3 * stiffness  # turns the arm by f r / k = 0.01
@@ -37,3 +37,20 @@ def test_displacement_is_proportional_to_small_forces(force):
     (frame,) = simulation.load_displacement(push, forces=[force]).frames
     assert frame.displacement == pytest.approx(force * 10.0**2 / 1e3, rel=1e-6)
     assert frame.residuals[-1] < 1e-3
+
+
+def test_displacements_count_from_where_springs_hold_what_motors_leave():
+    mechanism = fm.Mechanism("finger")
+    base, arm = mechanism.rigid("base", fixed=True), mechanism.rigid("arm")
+    blade = mechanism.flexible(
+        "blade", fm.strip([(20, 0), (50, 0)], thickness=2.0, depth=4.0), fm.Material("nylon", 2e3, 0.4)
+    )
+    hinge = mechanism.revolute(base, arm, at=(0, 0))
+    motor = mechanism.motor(mechanism.revolute(arm, blade, at=(20, 0), radius=1.0))
+    push = mechanism.force(on=blade, at=(50, 0), direction=(0, 1))
+    scene = fm.Scene(mechanism, effects=[fm.JointSpring(hinge, 1e5)])
+    simulation = fm.Simulation(scene, space="plane-stress", size=2.0, comm=MPI.COMM_SELF)
+    bent = scene.configuration("bent", {motor: 0.7})
+    (frame,) = simulation.load_displacement(push, displacements=[0.0], configuration=bent).frames
+    assert abs(frame.force) < 1e-9
+    assert frame.state.poses[1] == pytest.approx(0.0, abs=1e-12)

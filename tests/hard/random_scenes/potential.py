@@ -6,14 +6,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 import fenicsmech as fm
 
-from .blueprint import Blueprint, ForcePlan, GravityPlan, LinkPlan, SpringPlan
+from .blueprint import Blueprint, EffectPlan, ForcePlan, GravityPlan, LinkPlan, SpringPlan
 from .closure import Closure, Place, place
 from .links_mesh import LinksMesh, gather, quadrature, shape_functions
 from .strain_energy import COMPLEX, REAL, energy_density
@@ -140,6 +140,11 @@ class Potential:
             value = value + 0.5 * (gap @ gap) / compliance
         return value
 
+    def alone(self, effect: EffectPlan) -> Potential:
+        """The same scene with no other effect."""
+        blueprint = replace(self.blueprint, effects=(effect,))
+        return replace(self, blueprint=blueprint, closure=replace(self.closure, blueprint=blueprint))
+
     def travel(self, force: ForcePlan, u: np.ndarray, places: Sequence[Place]) -> complex:
         """d · u(P), from the drawn configuration."""
         at, direction = (np.array((*v, 0.0)[: self.mesh.dim]) for v in (force.at, force.direction))
@@ -163,9 +168,10 @@ class Potential:
         return sum(self._weight(plan, ones * _unit(plan, self.mesh.dim)) for plan in plans)
 
     def _weight(self, plan: GravityPlan, u: np.ndarray) -> complex:
-        points, weights = self._rule
+        # u of the mesh's order times the volume of a curved cell, of degree dim: exact
+        points, weights = quadrature(self.mesh.dim, self.mesh.order + self.mesh.dim)
         N = shape_functions(points, self.mesh.order)
-        sums = np.einsum("mq,q,qk,mki->mi", self._volumes, weights, N, u[self.mesh.cells])
+        sums = np.einsum("mq,q,qk,mki->mi", self.mesh.volumes(points), weights, N, u[self.mesh.cells])
         g = np.array((*plan.acceleration, 0.0)[: self.mesh.dim])
         depth = np.ones(len(self.mesh.cells))
         if self.mesh.dim == 2:

@@ -10,14 +10,16 @@ import fenicsmech as fm
 
 from .blueprint import Blueprint, Built, GravityPlan, SpringPlan
 from .generator import bending_force
+from .motions import body_modes, moved
 from .potential import Potential
-from .residual_check import body_modes, moved
 from .stability_check import eigenvalues
 
 _STEP = 1e-30
 _IMMOBILE = 1e-9
 _SOFT = 0.1
 _HUGE = 10.0
+_UNREACHED = 1e3
+_ROUNDED = 1e-14
 
 
 def true_reason(blueprint: Blueprint, built: Built | None, failure: fm.FenicsmechError) -> str:
@@ -26,6 +28,11 @@ def true_reason(blueprint: Blueprint, built: Built | None, failure: fm.Fenicsmec
         return ""
     if blueprint.control == "displacements" and failure.last is not None and immobile(blueprint, built, failure.last):
         return "the point cannot move that way"
+    if blueprint.control == "displacements" and failure.last is not None:
+        if abs(failure.last.force) > _UNREACHED * min(map(bending_force, blueprint.flexible)):
+            return "links stretched straight: a thousand times and more what bends the softest"
+    if drowned(blueprint):
+        return "springs softer than the rounding of stiff links"
     if adrift(blueprint):
         return "nothing but the force holds the mechanism"
     if blueprint.control == "forces" and max(map(abs, blueprint.samples)) > _HUGE * min(
@@ -43,6 +50,21 @@ def adrift(blueprint: Blueprint) -> bool:
         return False
     held = any(joint.kind == "weld" for joint in blueprint.joints)
     return not held and not any(isinstance(plan, SpringPlan) for plan in blueprint.effects)
+
+
+def drowned(blueprint: Blueprint) -> bool:
+    """Whether a spring is softer than the rounding of what the stiffest link does to its joint.
+
+    A link of width b and modulus E, in elements about as long as thick, has nodal stiffnesses of E b, each rounded to
+    1e-16 of itself; a joint feels those of some thousand nodes at arms of the mechanism's length ℓ: k < 1e-14 E b ℓ².
+    """
+    stiffest = max(link.young * link.depth for link in blueprint.flexible)
+    for plan in blueprint.effects:
+        if isinstance(plan, SpringPlan):
+            arm = 1.0 if blueprint.joint(plan.joint).kind == "prismatic" else blueprint.length
+            if plan.stiffness < _ROUNDED * stiffest * arm**2:
+                return True
+    return False
 
 
 def immobile(blueprint: Blueprint, built: Built, frame: fm.Frame) -> bool:

@@ -14,7 +14,10 @@ import numpy as np
 import fenicsmech as fm
 
 from .closure import Place
+from .idle_check import idle_work
+from .motions import body_modes, moved
 from .potential import Potential
+from .strain_energy import REAL
 
 _STEP = 1e-30
 _RANDOM = 8
@@ -31,6 +34,7 @@ class Residual:
         floor: residual force from rounding of displacements alone.
         travel_error: how far the controlled displacement is off, relative to the length.
         energy_error: strain energy against the frame's, relative to it.
+        idle_work: work along motions that deform no link, over the sum of its parts' sizes; 0 if there are none.
     """
 
     gap: float
@@ -39,6 +43,7 @@ class Residual:
     floor: float
     travel_error: float
     energy_error: float
+    idle_work: float
 
     @property
     def relative(self) -> float:
@@ -72,6 +77,7 @@ def check(potential: Potential, frame: fm.Frame, origin: float, seed: int = 0) -
     squares = [slope(1j * _STEP * rng.standard_normal(u.shape) * free, places) ** 2 for _ in range(_RANDOM)]
     along = [slope(np.zeros(u.shape), moved(places, 1j * _STEP * mode)) for mode in modes]
     force = float(np.sqrt(np.mean(squares) + np.sum(np.square(along))))
+    floor = _floor(potential, u)
     first = potential.blueprint.forces[0]
     travel = float(np.real(potential.travel(first, followed, places))) - origin
     energy = float(potential.strain_energy(followed))
@@ -79,34 +85,11 @@ def check(potential: Potential, frame: fm.Frame, origin: float, seed: int = 0) -
         gap=float(max(gaps.max(initial=0.0), strayed)),
         force=force,
         scale=_scale(potential, frame, u, places),
-        floor=_floor(potential, u),
+        floor=floor,
         travel_error=abs(travel - frame.displacement) / length,
         energy_error=abs(energy - frame.strain_energy) / max(abs(frame.strain_energy), _energy_digits(potential)),
+        idle_work=idle_work(potential, frame.force, followed, places, floor),
     )
-
-
-def body_modes(potential: Potential, places: list[Place]) -> np.ndarray:
-    """Velocities of all bodies that keep joints closed, angles times length: (modes, bodies, 3 or 6)."""
-    count, size, length = len(places), (3 if potential.mesh.dim == 2 else 6), potential.blueprint.length
-    scale = np.array([1.0] * potential.mesh.dim + [1.0 / length] * (size - potential.mesh.dim))
-    columns, names = [], [i for i in range(count) if not potential.fixed[i]]
-    for body in names:
-        for k in range(size):
-            velocity = np.zeros((count, size), dtype=complex)
-            velocity[body, k] = 1j * _STEP * scale[k]
-            rates = potential.closure.residual(moved(places, velocity)).imag / _STEP * length
-            columns.append(rates.astype(float))
-    jacobian = np.array(columns).T.reshape(-1, len(columns))
-    _, values, right = np.linalg.svd(jacobian, full_matrices=True)
-    null = right[int(np.sum(values > 1e-9 * max(values.max(initial=0.0), 1.0))) :]
-    modes = np.zeros((len(null), count, size))
-    modes[:, names] = null.reshape(len(null), len(names), size) * scale
-    return modes
-
-
-def moved(places: list[Place], velocities: np.ndarray) -> list[Place]:
-    """All places after infinitesimal motions (bodies, 3 or 6)."""
-    return [body.moved(velocity) for body, velocity in zip(places, velocities, strict=True)]
 
 
 def _scale(potential: Potential, frame: fm.Frame, u: np.ndarray, places: list[Place]) -> float:
@@ -126,14 +109,27 @@ def _scale(potential: Potential, frame: fm.Frame, u: np.ndarray, places: list[Pl
 
 def _stiffness(potential: Potential) -> float:
     """Largest stiffness of a node: E times depth (plane) or cell size (space)."""
-    plans = potential.blueprint.flexible
-    widths = [link.depth if potential.mesh.dim == 2 else link.size for link in plans]
-    return max(link.young * width / (1 - 2 * link.poisson) for link, width in zip(plans, widths, strict=True))
+    return max(_stiffnesses(potential).values())
+
+
+def _stiffnesses(potential: Potential) -> dict[str, float]:
+    plans, flat = potential.blueprint.flexible, potential.mesh.dim == 2
+    return {link.name: link.young * (link.depth if flat else link.size) / (1 - 2 * link.poisson) for link in plans}
 
 
 def _floor(potential: Potential, u: np.ndarray) -> float:
-    """Displacements are rounded to 1e-16 of the largest one, all nodes independently."""
-    return 1e-16 * _stiffness(potential) * np.abs(u).max() * np.sqrt(potential.mesh.nodes.size)
+    """Residual from rounding alone, of what is checked and of the check.
+
+    Displacements are rounded to 1e-16 of the largest one, all nodes independently. Here F = 1 + ∇u is rounded to half
+    the ε of ``REAL`` whatever ∇u is, stresses by that much of the modulus, and nodal forces by stress times cell size.
+    """
+    mesh, stiffnesses = potential.mesh, _stiffnesses(potential)
+    displacements = 1e-16 * _stiffness(potential) * np.abs(u).max() * np.sqrt(mesh.nodes.size)
+    squares = 0.0
+    for link in potential.blueprint.flexible:
+        count = len(np.unique(mesh.cells[mesh.link == potential.rows[link.name]])) * mesh.dim
+        squares += count * (0.5 * np.finfo(REAL).eps * stiffnesses[link.name] * link.size) ** 2
+    return float(displacements + np.sqrt(squares))
 
 
 def _energy_digits(potential: Potential) -> float:

@@ -15,8 +15,8 @@ from scipy.sparse.linalg import eigsh
 import fenicsmech as fm
 
 from .closure import Place
+from .motions import moved
 from .potential import Potential
-from .residual_check import moved
 
 _IMAGINARY, _REAL = 1e-30, 1e-5
 _DIGITS = 1e-10  # of the largest eigenvalue, after scaling: smaller ones have no sign

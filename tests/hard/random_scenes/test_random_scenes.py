@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from .blueprint import build
+from .blueprint import SpringPlan, build
 from .generator import random_scene
+from .idle_check import idle_motions
+from .motions import STEP
 from .potential import Potential
 from .residual_check import check
 from .stability_check import unstable_directions
-from .verdict import TOLERANCE, judge
+from .verdict import BALANCED, TOLERANCE, judge
 
 SOUND = st.integers(0, 10**6).map(lambda n: 10 * n + 5)
 SPOILED = st.integers(0, 10**6).map(lambda n: 10 * n + 1)
@@ -92,3 +94,30 @@ def test_order_of_links_and_joints_does_not_matter(solved):
 def test_stability_agrees_with_second_differences(solved):
     potential, frame = solved
     assert unstable_directions(potential, frame) == frame.unstable_modes
+
+
+@pytest.fixture(scope="module")
+def sprung():
+    """A six-bar whose freedom a spring holds under a load a millionth of what rounding is worth to its links."""
+    scene = random_scene(16)
+    assert [type(effect) for effect in scene.effects] == [SpringPlan]
+    built = build(scene)
+    return Potential.of(scene, built.simulation), built.curve(scene).frames[-1]
+
+
+def test_motions_that_deform_no_link_leave_the_strain_energy_as_it_is(sprung):
+    potential, frame = sprung
+    places = potential.places(frame.state.poses)
+    u = potential.nodal(np.array(frame.state.u).reshape(potential.mesh.nodes.shape), places)
+    motions = list(idle_motions(potential, u, places))
+    assert len(motions) == 1
+    for du, _ in motions:
+        slope = potential.strain_energy(u + du).imag / STEP
+        speed = np.abs(du).max() / STEP
+        assert abs(slope) < 1e-12 * abs(frame.force) * speed
+
+
+def test_loads_and_springs_balance_however_stiff_the_links(sprung):
+    potential, frame = sprung
+    assert check(potential, frame, 0.0).idle_work < 1e-6
+    assert check(potential, replace(frame, force=1.01 * frame.force), 0.0).idle_work > 10.0 * BALANCED

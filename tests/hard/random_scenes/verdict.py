@@ -23,6 +23,7 @@ from .residual_check import Residual, check
 
 TOLERANCE = 1e-6  # of the largest load or reaction
 ROUNDING = 10.0  # times the rounding of displacements
+BALANCED = 1e-5  # of what works along motions that deform no link
 CLOSED = 1e-9  # of the mechanism's length
 INVALID_SHARE = 3  # in ten
 
@@ -140,6 +141,8 @@ def _error(blueprint: Blueprint, frame: fm.Frame, sample: float, found: Residual
         return "joints apart"
     if found.force > max(TOLERANCE * found.scale, ROUNDING * found.floor):
         return "no equilibrium"
+    if found.idle_work > BALANCED:
+        return "idle freedoms out of balance"
     if not math.isnan(found.travel_error) and found.travel_error > 1e-9:
         return "displacement"
     if found.energy_error > 1e-6:

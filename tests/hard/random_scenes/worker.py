@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import io
+import logging
 import multiprocessing
+from contextlib import redirect_stderr
 from multiprocessing.connection import Connection
 
 from .verdict import Verdict, judge
@@ -50,9 +53,11 @@ class Worker:
 
 
 def _serve(pipe: Connection) -> None:
+    logging.getLogger("fenicsmech").setLevel(logging.ERROR)
     while True:
         try:
             seed = pipe.recv()
         except EOFError:
             return
-        pipe.send(judge(seed))
+        with redirect_stderr(io.StringIO()):  # progress of curves
+            pipe.send(judge(seed))

@@ -1,0 +1,65 @@
+"""Whether what acts balances along motions that deform no link.
+
+Stiff links round their nodal forces by more than small loads exert, so that a residual as small as rounding says
+nothing about where an idle freedom comes to rest. The forces inside an element cancel along motions that deform no
+link, and so do their errors: the work along these is precise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from mpi4py import MPI
+
+from fenicsmech.equilibrium import EquilibriumSystem, State
+from fenicsmech.linkage import Motion, stiff_motions
+from fenicsmech.simulation.model import MechanismModel
+
+
+def idle_imbalance(model: MechanismModel, system: EquilibriumSystem, state: State, loads: Sequence[float]) -> float:
+    """Largest work along a motion that deforms no link, over loads times the velocity of what moves fastest.
+
+    Args:
+        model: the discretised mechanism.
+        system: its equations; the last ``balance`` was that of ``state``, which is loaded.
+        state: an equilibrium.
+        loads: magnitudes of all forces.
+
+    Returns:
+        0 where nothing acts, or nothing moves (collective).
+    """
+    size = sum(map(abs, loads)) + _weights(model, state)
+    works = [
+        abs(system.work(_nodal(model, state, motion), motion.z)) / motion.fastest(model.linkage.length)
+        for motion in stiff_motions(model.linkage, state.poses, state.motors)
+    ]
+    return max(works, default=0.0) / size if size > 0.0 else 0.0
+
+
+def _nodal(model: MechanismModel, state: State, motion: Motion) -> np.ndarray:
+    """Velocities of owned nodes, (owned displacements,)."""
+    linkage, owned = model.linkage, model.interfaces.owned
+    u = state.u[: owned * model.interfaces.block].reshape(owned, -1)
+    velocity = np.zeros(u.shape)
+    for number, link in enumerate(model.mechanism.flexible_links):
+        body = linkage.interfaces[link][0]
+        nodes = np.flatnonzero(model.node_link[:owned] == number)
+        centre = np.array(linkage.bodies[body].centre) + state.poses[body, : linkage.dim]
+        offsets = (model.elastic.drawn_nodes[nodes] + u[nodes])[:, : linkage.dim] - centre
+        velocity[nodes, : linkage.dim] = motion.at(body, offsets)
+    return velocity.ravel()
+
+
+def _weights(model: MechanismModel, state: State) -> float:
+    """Sum of the sizes of all forces of effects that grow with the share (collective)."""
+    total = 0.0
+    if model.elastic.shares:
+        local = float(np.abs(model.elastic.share_residuals()).sum())
+        total += model.mesh.mesh.comm.allreduce(local, op=MPI.SUM)
+    for potential in model.potentials:
+        if not potential.holds:
+            slope = potential.gradient(state.poses).reshape(len(potential.bodies), -1)
+            total += float(np.abs(slope[:, : model.linkage.dim]).sum())
+            total += float(np.abs(slope[:, model.linkage.dim :]).sum()) / model.linkage.length
+    return total

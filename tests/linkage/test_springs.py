@@ -1,0 +1,66 @@
+"""Freedoms that motors leave go where springs want them; what no spring holds stays idle."""
+
+import numpy as np
+import pytest
+
+from fenicsmech.effects import JointSpring, holding
+from fenicsmech.linkage import assemble, build_linkage, count_freedom
+from fenicsmech.mechanism import Joint, Mechanism, Scene
+
+FIRST, SECOND, LENGTH, DRIVEN = 0.3, 0.02, 30.0, 0.7
+
+
+def arm() -> tuple[Mechanism, list[Joint]]:
+    """Three links of equal length on a line, hinged to the ground and to each other."""
+    mechanism = Mechanism("arm")
+    links = [mechanism.rigid("ground", fixed=True), *(mechanism.rigid(name) for name in ("upper", "fore", "hand"))]
+    pairs = zip(links, links[1:], strict=False)
+    joints = [mechanism.revolute(a, b, at=(LENGTH * k, 0.0)) for k, (a, b) in enumerate(pairs)]
+    return mechanism, joints
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_spring_keeps_its_joint_while_a_motor_turns_the_next_one(dim):
+    mechanism, (shoulder, elbow, _) = arm()
+    motor = mechanism.motor(elbow)
+    scene = Scene(mechanism, effects=[spring := JointSpring(shoulder, 1e-3)])
+    linkage, configuration = build_linkage(mechanism, dim), scene.configuration("bent", {motor: DRIVEN})
+    springs = holding([spring], linkage)
+    poses = assemble(linkage, configuration, springs).poses
+    upper, fore = (poses[[body.name for body in linkage.bodies].index(name)] for name in ("upper", "fore"))
+    assert upper[:dim] == pytest.approx(0.0, abs=1e-12)
+    turned = fore[2] if dim == 2 else 2.0 * np.arctan2(fore[6], fore[3])
+    assert turned == pytest.approx(DRIVEN, abs=1e-12)
+
+
+def test_springs_share_a_turn_as_their_stiffness_says():
+    # two springs in a row pull on the freedom that the motor leaves, ½ k₁ x₁² + ½ k₂ x₂² is least
+    mechanism = Mechanism("slides")
+    ground, slide, crank = mechanism.rigid("ground", fixed=True), mechanism.rigid("slide"), mechanism.rigid("crank")
+    first = mechanism.prismatic(ground, slide, at=(0.0, 0.0), axis=(1.0, 0.0))
+    second = mechanism.prismatic(slide, crank, at=(0.0, 0.0), axis=(1.0, 0.0))
+    third = mechanism.prismatic(ground, crank, at=(0.0, 0.0), axis=(1.0, 0.0))
+    motor = mechanism.motor(third)
+    scene = Scene(mechanism, effects=[JointSpring(first, FIRST), JointSpring(second, SECOND)])
+    linkage = build_linkage(mechanism, 2)
+    springs = holding(scene.effects, linkage)
+    poses = assemble(linkage, scene.configuration("apart", {motor: 5.0}), springs).poses
+    # k₁ x₁ = k₂ x₂, x₁ + x₂ = 5
+    assert poses[1, 0] == pytest.approx(5.0 * SECOND / (FIRST + SECOND), rel=1e-10)
+
+
+@pytest.mark.parametrize("stiffness", [1e3, 1e-12])
+def test_what_springs_hold_is_not_idle_however_soft_they_are(stiffness):
+    mechanism, (shoulder, elbow, wrist) = arm()
+    linkage = build_linkage(mechanism, 2)
+    still, drawn = np.zeros(3), linkage.rigid.drawn
+
+    def idle(*joints: Joint) -> tuple[int, tuple[str, ...]]:
+        springs = holding([JointSpring(joint, stiffness) for joint in joints], linkage)
+        freedom = count_freedom(linkage.rigid, drawn, still, springs)
+        return freedom.mobility, freedom.idle
+
+    assert idle() == (3, ("upper", "fore", "hand"))
+    assert idle(shoulder) == (3, ("fore", "hand"))
+    assert idle(shoulder, elbow) == (3, ("hand",))
+    assert idle(shoulder, elbow, wrist) == (3, ())
