@@ -5,7 +5,7 @@ complement on bodies, joints and forces.
 
 K is solved with by conjugate gradients, preconditioned by one cycle that knows the rigid motions as near-null space.
 S is formed column by column: it holds what is left of stiff links when they are free to move with their pins, four to
-six orders of magnitude less than either term, so that no cheap approximation of K⁻¹ will do in it.
+six orders of magnitude less than either term.
 """
 
 from __future__ import annotations
