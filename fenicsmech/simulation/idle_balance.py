@@ -16,6 +16,8 @@ from fenicsmech.equilibrium import EquilibriumSystem, State
 from fenicsmech.linkage import Motion, stiff_motions
 from fenicsmech.simulation.model import MechanismModel
 
+_ROUNDED = 1e-12  # of the work of each reaction: what is left of their sum, which vanishes
+
 
 def idle_imbalance(model: MechanismModel, system: EquilibriumSystem, state: State, loads: Sequence[float]) -> float:
     """Largest work along a motion that deforms no link, over loads times the velocity of what moves fastest.
@@ -29,12 +31,13 @@ def idle_imbalance(model: MechanismModel, system: EquilibriumSystem, state: Stat
     Returns:
         0 where nothing acts, or nothing moves (collective).
     """
-    size = sum(map(abs, loads)) + _weights(model, state)
-    works = [
-        abs(system.work(_nodal(model, state, motion), motion.z)) / motion.fastest(model.linkage.length)
-        for motion in stiff_motions(model.linkage, state.poses, state.motors)
-    ]
-    return max(works, default=0.0) / size if size > 0.0 else 0.0
+    size, worst, joints = sum(map(abs, loads)) + _weights(model, state), 0.0, model.linkage.joints
+    parts = np.abs(state.multipliers) @ np.abs(joints.gradient(state.poses, state.motors))
+    for motion in stiff_motions(model.linkage, state.poses, state.motors):
+        work = abs(system.work(_nodal(model, state, motion), motion.z))
+        rounding = _ROUNDED * float(parts @ np.abs(motion.z))
+        worst = max(worst, (work - rounding) / motion.fastest(model.linkage.length))
+    return worst / size if size > 0.0 else 0.0
 
 
 def _nodal(model: MechanismModel, state: State, motion: Motion) -> np.ndarray:

@@ -28,3 +28,17 @@ def test_a_load_that_is_not_felt_is_refused():
     simulation, push = pendulum(2e11)
     with pytest.raises(fm.EquilibriumError, match="Nothing but the force holds 'blade'"):
         simulation.load_displacement(push, forces=[1e-12])
+
+
+def test_springs_softer_than_rounding_are_named():
+    mechanism = fm.Mechanism("lever")
+    base = mechanism.rigid("base", fixed=True)
+    blade = mechanism.flexible(
+        "blade", fm.strip([(0, 0), (30, 0)], thickness=2.0, depth=4.0), fm.Material("steel", 2e5, 0.3)
+    )
+    hinge = mechanism.revolute(base, blade, at=(0, 0), radius=1.0)
+    push = mechanism.force(on=blade, at=(30, 0), direction=(0, 1))
+    scene = fm.Scene(mechanism, effects=[fm.JointSpring(hinge, 1e-10, rest=0.2)])
+    simulation = fm.Simulation(scene, space="plane-stress", size=2.0, comm=MPI.COMM_SELF)
+    with pytest.raises(fm.EquilibriumError, match="The springs are softer than the rounding"):
+        simulation.load_displacement(push, forces=[1e-13])

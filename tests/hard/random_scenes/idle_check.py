@@ -18,9 +18,17 @@ from .potential import Potential
 
 _GRAIN = 1e-7  # rad or mechanism lengths: how closely springs must be relaxed, as soft as rounding of links or not
 
+_ROUNDED = 1e-14  # of velocities
 
-def idle_motions(potential: Potential, u: np.ndarray, places: list[Place]) -> Iterator[tuple[np.ndarray, list[Place]]]:
-    """Imaginary steps along motions that deform no link: of free nodes, δu (n, dim), and where bodies are then.
+
+def idle_motions(
+    potential: Potential, u: np.ndarray, places: list[Place]
+) -> Iterator[tuple[np.ndarray, list[Place], float]]:
+    """Imaginary steps along motions that deform no link.
+
+    Yields:
+        The change of nodal displacements (n, dim), where bodies are then, and how fast joints open all the same:
+        motions are those of singular values that are all but zero.
 
     Args:
         potential: of the scene.
@@ -49,23 +57,26 @@ def idle_motions(potential: Potential, u: np.ndarray, places: list[Place]) -> It
             spin = there[first].turn.imag @ places[first].turn.T
             carried = (mesh.nodes + u)[nodes] - (places[first].centre + places[first].shift)
             du[nodes] = 1j * (there[first].shift.imag + carried @ spin.T)
-        yield du, there
+        opening = float(np.abs(stiff(there).imag).max()) / STEP * potential.blueprint.length
+        yield du, there, opening
 
 
-def idle_work(potential: Potential, magnitude: float, u: np.ndarray, places: list[Place], floor: float) -> float:
+def idle_work(
+    potential: Potential, magnitude: float, u: np.ndarray, places: list[Place], *, floor: float, reaction: float
+) -> float:
     """Largest work of all that acts along a motion that deforms no link, over loads and torques times velocities.
 
     Loads count with the velocity of what moves fastest: in a dead centre their own points stand still. What rounding
-    does to springs' coordinates is left out, and what it does to the force under displacement control, which takes all
-    that it leaves (``floor``).
+    does to springs' coordinates is left out, what it does to the force under displacement control, which takes all that
+    it leaves (``floor``), and the work of the largest ``reaction`` where joints open by rounding.
     """
     shares = []
-    for du, there in idle_motions(potential, u, places):
+    for du, there, opening in idle_motions(potential, u, places):
         length = potential.blueprint.length
         speeds = [np.abs(du).max(), *(np.abs(body.shift.imag).max() for body in there)]
         speeds += [np.abs(body.turn.imag).max() * length for body in there]
         fastest = float(max(speeds)) / STEP
-        work, size, grain = 0.0, 0.0, 0.0
+        work, size, grain = 0.0, 0.0, reaction * (10.0 * opening + _ROUNDED * fastest)
         for force, amount in potential.acting(magnitude):
             work -= amount * float(np.imag(potential.travel(force, u + du, there))) / STEP
             size += abs(amount) * fastest

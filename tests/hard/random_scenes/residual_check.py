@@ -77,18 +77,18 @@ def check(potential: Potential, frame: fm.Frame, origin: float, seed: int = 0) -
     squares = [slope(1j * _STEP * rng.standard_normal(u.shape) * free, places) ** 2 for _ in range(_RANDOM)]
     along = [slope(np.zeros(u.shape), moved(places, 1j * _STEP * mode)) for mode in modes]
     force = float(np.sqrt(np.mean(squares) + np.sum(np.square(along))))
-    floor = _floor(potential, u)
+    floor, scale = _floor(potential, u), _scale(potential, frame, u, places)
     first = potential.blueprint.forces[0]
     travel = float(np.real(potential.travel(first, followed, places))) - origin
     energy = float(potential.strain_energy(followed))
     return Residual(
         gap=float(max(gaps.max(initial=0.0), strayed)),
         force=force,
-        scale=_scale(potential, frame, u, places),
+        scale=scale,
         floor=floor,
         travel_error=abs(travel - frame.displacement) / length,
         energy_error=abs(energy - frame.strain_energy) / max(abs(frame.strain_energy), _energy_digits(potential)),
-        idle_work=idle_work(potential, frame.force, followed, places, floor),
+        idle_work=idle_work(potential, frame.force, followed, places, floor=floor, reaction=scale),
     )
 
 

@@ -111,7 +111,7 @@ def test_motions_that_deform_no_link_leave_the_strain_energy_as_it_is(sprung):
     u = potential.nodal(np.array(frame.state.u).reshape(potential.mesh.nodes.shape), places)
     motions = list(idle_motions(potential, u, places))
     assert len(motions) == 1
-    for du, _ in motions:
+    for du, _, _ in motions:
         slope = potential.strain_energy(u + du).imag / STEP
         speed = np.abs(du).max() / STEP
         assert abs(slope) < 1e-12 * abs(frame.force) * speed

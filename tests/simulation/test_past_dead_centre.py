@@ -1,0 +1,33 @@
+"""A motor goes on where links must strain, past the dead centre in which their slack ends."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import fenicsmech as fm
+from fenicsmech.linkage import assemble, assemble_before_strain
+
+
+def test_a_rocker_is_pulled_beyond_the_reach_of_its_coupler():
+    mechanism = fm.Mechanism("four-bar")
+    base, crank, rocker = (mechanism.rigid(name, fixed=name == "base") for name in ("base", "crank", "rocker"))
+    rubber = fm.Material("rubber", 1.0, 0.4)
+    coupler = mechanism.flexible("coupler", fm.strip([(0, 30), (50, 20)], thickness=4.0, depth=4.0), rubber)
+    motor = mechanism.motor(mechanism.revolute(base, rocker, at=(60, 0)))
+    mechanism.revolute(base, crank, at=(0, 0))
+    pin = mechanism.revolute(crank, coupler, at=(0, 30), radius=2.0)
+    mechanism.revolute(coupler, rocker, at=(50, 20), radius=2.0)
+    push = mechanism.force(on=rocker, at=(50, 20), direction=(1, 0))
+    scene = fm.Scene(mechanism)
+    simulation = fm.Simulation(scene, space="plane-stress", size=3.0, comm=MPI.COMM_SELF)
+    beyond = scene.configuration("beyond", {motor: -2.2})
+    slack = assemble(simulation.linkage, beyond).fraction
+    assert 0.9 * slack < assemble_before_strain(simulation.linkage, beyond).fraction < slack < 0.99
+    (frame,) = simulation.load_displacement(push, forces=[0.0], configuration=beyond).frames
+    assert frame.stable
+    # the crank carries no moment: the pull goes through both of its pivots
+    angle = frame.state.poses[[body.name for body in simulation.linkage.bodies].index("crank"), 2]
+    along = np.array([-np.sin(angle), np.cos(angle)])
+    pull = np.array(frame.reactions[pin.name].force)[:2]
+    assert abs(pull @ along) == pytest.approx(np.linalg.norm(pull), rel=1e-8)
+    assert np.linalg.norm(pull) > 0.01
