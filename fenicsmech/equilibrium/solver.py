@@ -26,6 +26,9 @@ _SPARE = 1e-3  # of the tolerance, what linear solves may leave when a step reac
 _EXACT = 1e-10  # the same of other solutions
 _LEAST_MOTION = 1e-9  # of the mechanism's length: what is smaller counts as no displacement
 _FALLING = 0.25  # of the residual before: soft springs and modes feel what is left below rounding of stiff links
+_CLOSED = (
+    1e-10  # of the mechanism's length, or rad: joints that are open farther hide behind reactions out of all bounds
+)
 _BEARABLE = 1e-4  # of the forces, where the tangent is all but singular
 
 
@@ -150,13 +153,13 @@ class Iteration(ABC):
         return balance.norm / max(balance.forces, self._rounding(balance))
 
     def converged(self, balance: Balance, before: float = 0.0) -> bool:
-        """Whether the residual is small beside the forces, or rounding that does not fall any more.
+        """Whether the residual is small beside the forces and joints are closed, or it is rounding that falls no more.
 
         Args:
             balance: with the residual.
             before: norm of the residual one iteration ago; 0 if no other iteration can follow.
         """
-        if balance.norm <= self.options.tolerance * balance.forces < math.inf:
+        if balance.norm <= self.options.tolerance * balance.forces < math.inf and balance.gap <= _CLOSED:
             return True
         return _FALLING * before < balance.norm <= self._rounding(balance) < math.inf
 

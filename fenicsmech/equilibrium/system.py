@@ -47,6 +47,7 @@ class Balance:
         vector: Gᵀ ∇L, dimensionless.
         norm: its norm.
         forces: norm of the loads and reactions that should cancel in it.
+        gap: how far joints are from closed, over the mechanism's length, or rad.
         motion: largest displacement from the drawn configuration over the mechanism's length, or rotation.
         moments: Σ r_i ⊗ (X_i − c) of each interface body.
     """
@@ -54,6 +55,7 @@ class Balance:
     vector: PETSc.Vec
     norm: float
     forces: float
+    gap: float
     motion: float
     moments: dict[int, np.ndarray]
 
@@ -109,6 +111,7 @@ class EquilibriumSystem:
         self.unit, self.unit_u = self._kkt.unit, self._kkt.unit_u
         self.units, self.scale = self._kkt.units, self._kkt.scale
         self._unbalanced = np.zeros(self.layout.displacements)
+        self._unbalanced_poses = np.zeros(joints.size)
 
     @cached_property
     def _mixed(self) -> MixedStress:
@@ -224,11 +227,14 @@ class EquilibriumSystem:
             moments = layout.comm.allreduce(self.interfaces.moments(nodal), op=_add_moments)
             extras = -g
             extras[layout.z] += self._potentials.gradient(state) - reactions
-            extras[layout.multipliers] = -self.constraints(state, state.multipliers)
+            self._unbalanced_poses = extras[layout.z].copy()
+            violation = self.constraints(state, state.multipliers)
+            extras[layout.multipliers] = -violation
+            gap = float(np.max(np.abs(self.joints.row_scale * violation), initial=0.0))
             if control.constrained:
                 extras[layout.force] = -(self.load_displacement(state) - control.target)
             vector = self._kkt.pull(r, extras)
-            return Balance(vector, vector.norm(), float(np.sqrt(forces)), self._motion(state), moments)
+            return Balance(vector, vector.norm(), float(np.sqrt(forces)), gap, self._motion(state), moments)
 
     # -- derivatives at the loaded state -------------------------------------------------------------------
 
@@ -320,11 +326,7 @@ class EquilibriumSystem:
             nodal: (owned displacements,); those of interface nodes are their bodies'.
             z: of the pose unknowns, (size,); keeps joints closed.
         """
-        rows, layout = self._rows.array_r, self.layout
-        local = float(rows[: layout.displacements] @ nodal)
-        if layout.last:
-            local += float(rows[layout.owned : layout.owned + self.joints.size] @ z)
-        return layout.comm.allreduce(local)
+        return self.layout.comm.allreduce(float(self._unbalanced @ nodal)) + float(self._unbalanced_poses @ z)
 
     def control_row(self) -> PETSc.Vec:
         """The unit vector of the unknown f (collective)."""
