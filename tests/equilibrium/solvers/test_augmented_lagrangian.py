@@ -48,3 +48,26 @@ def test_gradient_and_matrix_are_derivatives_of_the_value(space, kind):
     full.array[states:] = -product.array[states:] / matrix.getDiagonal().array[states:]
     matrix.mult(full, product)
     assert product.dot(way) == pytest.approx(curvature, rel=1e-4)
+
+
+def test_rounding_of_redundant_hinges_ends_iterations():
+    made = fm.Mechanism("four-bar")
+    base, left, right = made.rigid("base", fixed=True), made.rigid("left"), made.rigid("right")
+    plastic = fm.Material("plastic", 1000.0, 0.35)
+    coupler = made.flexible("coupler", fm.strip([(0, 40), (50, 45)], thickness=4.0, depth=6.0), plastic)
+    strut = made.flexible("strut", fm.strip([(0, 0), (22, 16), (50, 45)], thickness=3.0, depth=6.0), plastic)
+    made.revolute(base, left, at=(0, 0))
+    made.revolute(base, right, at=(55, 0))
+    made.revolute(left, coupler, at=(0, 40), radius=3.0)
+    made.revolute(coupler, right, at=(50, 45), radius=3.0)
+    made.revolute(base, strut, at=(0, 0), radius=3.0)
+    made.revolute(strut, right, at=(50, 45), radius=3.0)
+    push = made.force(on=left, at=(0, 40), direction=(1, 0))
+    found = []
+    for solver in (fm.PrimalDualNewton(), fm.AugmentedLagrangian()):
+        simulation = fm.Simulation(fm.Scene(made), space="3d", order=1, size=4.0, solver=solver)
+        curve = simulation.load_displacement(push, forces=[2.0])
+        assert curve.freedom.redundancy > 0
+        assert curve.frames[0].iterations < 15
+        found.append(curve.displacements[0])
+    assert found[1] == pytest.approx(found[0], rel=1e-8)
