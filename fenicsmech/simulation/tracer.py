@@ -187,7 +187,7 @@ class Tracer:
             )
         what, origin = ("displacement", self._origin) if control.constrained else ("force", 0.0)
         last = self._last(failure)
-        where = f", where the force is {last.force:g}" if control.constrained and last is not None else ""
+        where = f" with a force of {last.force:g}" if control.constrained and last is not None else ""
         return EquilibriumError(
             f"{self._request.part.name!r} in configuration {self._request.configuration.name!r}",
             f"no equilibrium at {what} {control.target - origin:g}; "
