@@ -26,9 +26,7 @@ _SPARE = 1e-3  # of the tolerance, what linear solves may leave when a step reac
 _EXACT = 1e-10  # the same of other solutions
 _LEAST_MOTION = 1e-9  # of the mechanism's length: what is smaller counts as no displacement
 _FALLING = 0.25  # of the residual before: soft springs and modes feel what is left below rounding of stiff links
-_CLOSED = (
-    1e-10  # of the mechanism's length, or rad: joints that are open farther hide behind reactions out of all bounds
-)
+_CLOSED = 1e-10  # of the mechanism's length, or rad: joints open farther hide behind reactions without bounds
 _BEARABLE = 1e-4  # of the forces, where the tangent is all but singular
 
 
