@@ -12,6 +12,7 @@
 - ``newton``: the default one, the primal–dual iteration
 - ``solvers``: others to choose and to compare
 - ``predictor``, ``path``: first guesses and load steps
+- ``dead_centre``: those of motors past the end of their slack
 - ``lead``: what leads a path that may turn back: a force, or motors
 - ``arc_metric``, ``path_points``: the equilibria of such a path
 - ``arc_length``, ``continuation``: steps along it, and where it ends
@@ -26,6 +27,7 @@ from fenicsmech.equilibrium.branching import Sense, crossing, null_space
 from fenicsmech.equilibrium.continuation import Goal, Stretch, follow
 from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadControl, MotorControl, ShareControl
 from fenicsmech.equilibrium.critical import Critical, CriticalPoint
+from fenicsmech.equilibrium.dead_centre import MotorPath
 from fenicsmech.equilibrium.eigen import Mode, critical_changes, softest_modes
 from fenicsmech.equilibrium.lead import ForceLead, Heading, Lead, MotorLead
 from fenicsmech.equilibrium.linear import BySize, Direct, LinearMethod, LinearSolver, TwoLevel
@@ -70,6 +72,7 @@ __all__ = [
     "Mode",
     "MotorControl",
     "MotorLead",
+    "MotorPath",
     "Newton",
     "NotConverged",
     "Path",

@@ -15,12 +15,15 @@ from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.log import logger
 
 _log = logger(__name__)
-_SMALLEST = 1.0 / 1024.0  # of the distance asked for
+SMALLEST = 1.0 / 1024.0
+"""Smallest step, of the distance asked for."""
+STRIDE = 0.2
+"""How far a step may move anything by the tangent, of the mechanism's length, or rad (measured)."""
+BEYOND = 0.2
+"""Of the largest rate: what moves farther off its tangents may have leapt; kinks never do."""
 _EASY = 5  # iterations
-_STRIDE = 0.2  # of the mechanism's length, or rad: how far a step may move anything, by the tangent (measured)
 _SINGULAR = 1e-6  # of the distance asked for: a tangent that wants steps this small has no meaning
-_RUNAWAY = 5.0 * _STRIDE  # a prediction that moves anything this far is none
-_BEYOND = 0.2  # of the largest rate: what moves farther off its tangents may have leapt; kinks never do
+_RUNAWAY = 5.0 * STRIDE  # a prediction that moves anything this far is none
 _BENT = 2.2  # times the rate at its end: how far a step off a bifurcation may go
 _LEAST_MOTION = 1e-4  # of the mechanism's length, or rad: what is no leap in any case, as past a bifurcation
 _SMALLEST_LEAP = 1.0 / 64.0  # of the distance asked for: a step that is not halved any more because it leaps
@@ -87,7 +90,7 @@ class Path:
             except NotConverged as failure:
                 tried.append(value)
                 step = 0.5 * (value - self._value)
-                if abs(step) <= _SMALLEST * abs(distance):
+                if abs(step) <= SMALLEST * abs(distance):
                     raise PathFailed(self._last, self._value, failure.reason, tuple(tried)) from failure
                 continue
             if self._leapt(value, solution):
@@ -141,7 +144,7 @@ class Path:
         if not self._anchors:
             return step
         motion = self._newton.system.size(self._anchors[-1].tangent) * abs(step)
-        shortened = step * min(1.0, _STRIDE / max(motion, _STRIDE))
+        shortened = step * min(1.0, STRIDE / max(motion, STRIDE))
         return shortened if abs(shortened) > least else step
 
     def _leapt(self, value: float, solution: Solution) -> bool:
@@ -164,7 +167,7 @@ class Path:
         beyond = system.size(system.independent(rate.beyond(span)))
         largest = max(system.size(before), system.size(solution.tangent))
         grown = system.size(last.tangent + before.scaled(-1.0))
-        if beyond > max(_BEYOND * largest, _LEAST_MOTION / abs(distance)) or grown * abs(distance) > _BEYOND * _STRIDE:
+        if beyond > max(BEYOND * largest, _LEAST_MOTION / abs(distance)) or grown * abs(distance) > BEYOND * STRIDE:
             return True
         self._rate = rate
         return False

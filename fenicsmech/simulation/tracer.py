@@ -14,6 +14,7 @@ from fenicsmech.equilibrium import (
     Control,
     Iteration,
     MotorControl,
+    MotorPath,
     Path,
     PathFailed,
     Predictor,
@@ -139,7 +140,7 @@ class Tracer:
         if assembly.fraction == 1.0:
             return state
         state = replace(state, motors=assembly.fraction * motors)
-        path = Path(self._newton, state, assembly.fraction, predictor=self._predictor, idle=self._idle)
+        path = MotorPath(self._newton, state, assembly.fraction, predictor=self._predictor, idle=self._idle)
         # in space a motor's equation is periodic: steps must stay well below a half turn
         steps = int(np.ceil((1.0 - assembly.fraction) * self._joints.travel(motors) / _LARGEST_TURN))
         try:
