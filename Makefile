@@ -86,10 +86,11 @@ random-scenes: install-test ## N random scenes from SEED on (1000, 0), each chec
 
 # What can differ between versions of dolfinx, PETSc, gmsh and Python, in a few minutes; FULL13=yes runs the rest as well.
 FULL13 :=
-CORE13 := tests/bodies tests/elasticity tests/joints tests/kinematics tests/linkage tests/mechanism tests/meshing
-OTHERS13 := tests/design/test_sensitivity.py tests/design/test_weights.py tests/effects/test_contact_derivatives.py \
-    tests/equilibrium tests/simulation/test_files.py tests/simulation/test_memory.py tests/simulation/test_ranks.py \
-    tests/simulation/test_units.py
+CORE13 := tests/bodies tests/elasticity tests/joints tests/kinematics tests/linkage tests/mechanism
+OTHERS13 := tests/meshing tests/design/test_sensitivity.py tests/design/test_weights.py \
+    tests/effects/test_contact_derivatives.py \
+    $(patsubst %,tests/equilibrium/test_%.py,eigen factor lagrangian mixed_lagrangian newton path two_level) \
+    $(patsubst %,tests/simulation/test_%.py,files memory ranks units)
 
 test-debian13: install-test ## the core tests in a Debian 13 root (built once, about two minutes)
 	$(call heading,tests in Debian 13)
