@@ -50,39 +50,38 @@ class TwoLevelSolver:
     """Solves with the KKT matrix of ``system`` and tells its inertia; all methods are collective.
 
     Args:
-        system: with displacements of order 2 or more.
-        matrix: its KKT matrix; refactor after changing its values.
+        system: with displacements of order 2 or more; refactor after changing its KKT matrix.
 
     Attributes:
         iterations: of each solve so far.
         probes: iterations spent on each inertia so far.
     """
 
-    def __init__(self, system: EquilibriumSystem, matrix: PETSc.Mat) -> None:
-        self._matrix = matrix
-        self._coarse = CoarseLevel(system, matrix)
+    def __init__(self, system: EquilibriumSystem) -> None:
+        self._coarse = CoarseLevel(system)
         self._smoother = Chebyshev(degree=_DEGREE, ratio=_RATIO)
         layout = system.layout
-        self._free = PETSc.IS().createStride(len(layout.free), layout.first_unknown, 1, comm=matrix.comm)
+        self._free = PETSc.IS().createStride(len(layout.free), layout.first_unknown, 1, comm=layout.comm)
         extras = layout.extras if layout.last else 0
-        self._extra = PETSc.IS().createStride(extras, layout.first_extra, 1, comm=matrix.comm)
+        self._extra = PETSc.IS().createStride(extras, layout.first_extra, 1, comm=layout.comm)
         self._system, self._stiffness = system, None
         self._border: PETSc.Mat | None = None
         self._corner: PETSc.Mat | None = None
         # petsc4py destroys what it creates late: nothing is created per iteration
-        self._work, self._residual, self._z, self._image, self._p, self._q = (matrix.createVecLeft() for _ in range(6))
+        self._work, self._residual, self._z, self._image, self._p, self._q = (system.zeros() for _ in range(6))
         self._nodal: tuple[PETSc.Vec, PETSc.Vec] | None = None
         self._met = 0
         self.iterations: list[int] = []
         self.probes: list[int] = []
 
     def refactor(self) -> bool:
-        """Takes the matrix's current values; whether that could be done."""
+        """Takes the KKT matrix's current values; whether that could be done."""
         if self._stiffness is not None:
             self._stiffness.destroy()
         self._stiffness = self._system.nodal_stiffness()
-        self._border = self._matrix.createSubMatrix(self._extra, self._free, self._border)
-        self._corner = self._matrix.createSubMatrix(self._extra, self._extra, self._corner)
+        columns = self._system.extra_columns()
+        self._border = columns.createSubMatrix(self._free, None, self._border)
+        self._corner = columns.createSubMatrix(self._extra, None, self._corner)
         if self._nodal is None:
             self._nodal, self._bordering = self._stiffness.createVecs(), self._corner.createVecs()
         return self._smoother.update(self._stiffness) and self._coarse.update()
@@ -212,19 +211,19 @@ class TwoLevelSolver:
             image.axpy(share, known.image)
 
     def _multiply(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """y = KKT x by its blocks, of which that of the free nodes costs half as much as in the whole matrix."""
+        """y = KKT x by its blocks."""
         nodes, rows = self._nodal
         extras, sums = self._bordering
         count = nodes.getLocalSize()
         nodes.array_w[:], extras.array_w[:] = x.array_r[:count], x.array_r[count:]
         self._stiffness.mult(nodes, rows)
-        self._border.multTransposeAdd(extras, rows, rows)
+        self._border.multAdd(extras, rows, rows)
         self._corner.mult(extras, sums)
-        self._border.multAdd(nodes, sums, sums)
+        self._border.multTransposeAdd(nodes, sums, sums)
         y.array_w[:count], y.array_w[count:] = rows.array_r, sums.array_r
 
     def _randomise(self, r: PETSc.Vec) -> None:
         """Makes r random forces on free nodes."""
         count = self._nodal[0].getLocalSize()
-        r.array_w[:count] = np.random.default_rng(self._matrix.comm.rank).standard_normal(count)
+        r.array_w[:count] = np.random.default_rng(self._system.layout.comm.rank).standard_normal(count)
         r.array_w[count:] = 0.0

@@ -89,7 +89,7 @@ def test_inertia_and_solutions_are_those_of_the_factor_on_both_sides_of_buckling
         state = system.moved(first, compression.scaled((load - 0.5) * EULER))
         control = LoadControl(load * EULER)
         matrix = system.kkt(state, control, system.balance(state, control))
-        solver = solver or TwoLevelSolver(system, matrix)
+        solver = solver or TwoLevelSolver(system)
         factor = Factor(matrix)
         assert factor.refactor() and solver.refactor()
         assert solver.inertia() == factor.inertia()
@@ -145,7 +145,8 @@ def test_iterations_do_not_grow_with_the_mesh():
         state = simulation.load_displacement(push, forces=[0.5 * EULER]).frames[0].state
         control = LoadControl(0.5 * EULER)
         system.load(state)
-        solver = TwoLevelSolver(system, system.kkt(state, control, system.balance(state, control)))
+        system.linearise(state, control, system.balance(state, control))
+        solver = TwoLevelSolver(system)
         assert solver.refactor()
         right = system.force_rate(state)
         assert solver.solve(right, right.duplicate(), 1e-8)
@@ -158,11 +159,10 @@ def test_size_decides_unless_said_otherwise():
     system = simulation.newton(push).system
     state = simulation.load_displacement(push, forces=[0.0]).frames[0].state
     control = LoadControl(0.0)
-    matrix = system.kkt(state, control, system.balance(state, control))
-    unknowns = matrix.getSize()[0]
-    assert isinstance(BySize(limit=unknowns).solver(system, matrix), Factor)
-    assert isinstance(BySize(limit=unknowns - 1).solver(system, matrix), TwoLevelSolver)
-    assert isinstance(BySize().solver(system, matrix), Factor)
+    unknowns = system.kkt(state, control, system.balance(state, control)).getSize()[0]
+    assert isinstance(BySize(limit=unknowns).solver(system), Factor)
+    assert isinstance(BySize(limit=unknowns - 1).solver(system), TwoLevelSolver)
+    assert isinstance(BySize().solver(system), Factor)
 
 
 def test_linear_displacements_have_no_level_below_them():
