@@ -202,13 +202,18 @@ class KktMatrix:
             self._entries_diagonal, self._converted, self._entries_plain = self._entries.getDiagonal(), True, True
         if plain and self._entries_plain:
             return self._entries
-        diagonal, added, layout = self._entries_diagonal.copy(), self._added.array_r, self._layout
+        # where G holds one entry per row; rows of nodes inside interfaces have no diagonal
+        layout, units = self._layout, self.units
+        rows = layout.free
+        if layout.last:
+            rows = np.concatenate([rows, layout.owned + np.arange(layout.extras)])
+            units = np.concatenate([units, self.scale])
+        diagonal = self._entries_diagonal.array_r[rows]
         if not plain:
-            # these rows of G hold one entry each
-            free = len(layout.free)
-            diagonal.array_w[layout.free] += added[:free] / self.units**2
-            if layout.last:
-                diagonal.array_w[layout.owned : layout.owned + layout.extras] += added[free:] / self.scale**2
-        self._entries.setDiagonal(diagonal)
+            diagonal = diagonal + self._added.array_r / units**2
+        places = (layout.first_row + rows).astype(PETSc.IntType)
+        starts = np.arange(len(rows) + 1, dtype=PETSc.IntType)
+        self._entries.setValuesIJV(starts, places, diagonal, rowmap=places)
+        self._entries.assemble()
         self._entries_plain = plain
         return self._entries

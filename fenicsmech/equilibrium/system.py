@@ -9,7 +9,7 @@
 
 Where links have a pressure p of their own, u stands for (u, p) in all of this; E is a saddle then, stationary in p.
 B is the curvature of the rigid coordinates, c the compliance of joints, 0 unless an effect softens them. One sparse
-triple product forms the whole matrix; D makes x dimensionless.
+triple product forms the whole matrix for those who ask for it; D makes x dimensionless.
 """
 
 from __future__ import annotations

@@ -64,7 +64,8 @@ class TwoLevelSolver:
         self._free = PETSc.IS().createStride(len(layout.free), layout.first_unknown, 1, comm=layout.comm)
         extras = layout.extras if layout.last else 0
         self._extra = PETSc.IS().createStride(extras, layout.first_extra, 1, comm=layout.comm)
-        self._system, self._stiffness = system, None
+        self._system = system
+        self._stiffness: PETSc.Mat | None = None
         self._border: PETSc.Mat | None = None
         self._corner: PETSc.Mat | None = None
         # petsc4py destroys what it creates late: nothing is created per iteration
@@ -107,10 +108,10 @@ class TwoLevelSolver:
     def solve_and_count(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float) -> Inertia | None:
         """``solve`` and ``inertia`` in one: a solve that starts from a random guess is a probe; None if not solved."""
         self._start(right, solution)
-        self._precondition(self._residual, ())
-        error = abs(self._residual.dot(self._z))
+        error = abs(self._smooth(self._residual))
         self._randomise(self._work)
-        self._precondition(self._work, ())
+        self._smooth(self._work)
+        self._project(())
         curvature = self._z.dot(self._image)
         if curvature > 0.0:
             # as much of it as of the error there is, in energy
@@ -129,16 +130,16 @@ class TwoLevelSolver:
 
     def _iterate(self, solution: PETSc.Vec, tolerance: float) -> bool:
         """Conjugate gradients from a ``solution`` with its residual; whether they reach the ``tolerance``."""
-        floor, first, self._met = _ROUNDOFF * solution.norm(), 0.0, 0
-        for iteration, (energy, direction) in zip(range(_MOST), self._conjugate(self._residual), strict=False):
-            first = first or abs(energy)
-            if abs(energy) <= max(tolerance**2 * first, floor**2):
-                self.iterations.append(iteration)
-                return True
+        floor, iterations, self._met = _ROUNDOFF * solution.norm(), 0, 0
+        for energy, direction in self._conjugate(self._residual, tolerance, floor=floor):
+            if iterations == _MOST:
+                return False
+            iterations += 1
             solution.axpy(energy / direction.curvature, direction.p)
             # later ones may be copies of the first: long recurrences forget what they were conjugate to
             self._met = max(self._met, int(direction.curvature < 0.0))
-        return False
+        self.iterations.append(iterations)
+        return True
 
     def known_inertia(self) -> Inertia:
         """What is certain after the last solve: the coarse level's, and one more if it met a negative curvature."""
@@ -159,48 +160,54 @@ class TwoLevelSolver:
 
     def _probe(self, found: list[Direction]) -> tuple[Direction | None, int]:
         """A direction of negative curvature conjugate to those ``found``, None if there seems to be none."""
-        r, first = self._residual, 0.0
+        r, iterations = self._residual, 0
         self._randomise(r)
         self._coarse.correction(r, self._work)
         self._multiply(self._work, self._image)
         r.axpy(-1.0, self._image)
         for known in found:
             r.axpy(-known.p.dot(r) / known.curvature, known.image)
-        for iteration, (energy, direction) in zip(range(_MOST), self._conjugate(r, found), strict=False):
-            first = first or abs(energy)
-            if abs(energy) <= _SEEN**2 * first:
-                break
+        for iterations, (_, direction) in zip(range(_MOST), self._conjugate(r, _SEEN, found), strict=False):
             if direction.curvature < 0.0:
-                return Direction(direction.p.copy(), direction.image.copy(), direction.curvature), iteration
-        return None, iteration
+                return Direction(direction.p.copy(), direction.image.copy(), direction.curvature), iterations
+        return None, iterations
 
-    def _conjugate(self, r: PETSc.Vec, found: Sequence[Direction] = ()) -> Iterator[tuple[float, Direction]]:
+    def _conjugate(
+        self, r: PETSc.Vec, tolerance: float, found: Sequence[Direction] = (), *, floor: float = 0.0
+    ) -> Iterator[tuple[float, Direction]]:
         """Conjugate directions for a residual r with Pᵀ r = 0: its energy rᵀ z, and where to go on.
 
-        A direction is good until the next one is asked for.
+        They end when the energy is ``floor``² or has fallen by ``tolerance``². One is good until the next is asked for.
         """
         z, image, p, q = self._z, self._image, self._p, self._q
-        self._precondition(r, found)
-        energy = r.dot(z)
-        z.copy(p)
-        image.copy(q)
-        while True:
+        energy = self._smooth(r)
+        least = max(tolerance**2 * abs(energy), floor**2)
+        p.set(0.0)
+        q.set(0.0)
+        share = 0.0
+        while not abs(energy) <= least:  # nor where it is no number
+            self._project(found)
+            p.aypx(share, z)
+            q.aypx(share, image)
             curvature = p.dot(q)
             yield energy, Direction(p, q, curvature)
             r.axpy(-energy / curvature, q)
-            self._precondition(r, found)
-            energy, before = r.dot(z), energy
-            p.aypx(energy / before, z)
-            q.aypx(energy / before, image)
+            energy, before = self._smooth(r), energy
+            share = energy / before
 
-    def _precondition(self, r: PETSc.Vec, found: Sequence[Direction]) -> None:
-        """z = S r made conjugate to P and to the directions ``found``, and its image KKT z."""
-        z, image = self._z, self._image
+    def _smooth(self, r: PETSc.Vec) -> float:
+        """z = S r, and rᵀ z, which stays if z is made conjugate to P: Pᵀ r = 0."""
+        z = self._z
         rough, smooth = self._nodal
         count = rough.getLocalSize()
         rough.array_w[:] = r.array_r[:count]
         self._smoother.apply(rough, smooth)
         z.array_w[:count], z.array_w[count:] = smooth.array_r, 0.0
+        return r.dot(z)
+
+    def _project(self, found: Sequence[Direction]) -> None:
+        """Makes z conjugate to P and to the directions ``found``, and its image KKT z."""
+        z, image = self._z, self._image
         self._multiply(z, image)
         self._coarse.correction(image, self._work)
         z.axpy(-1.0, self._work)
