@@ -180,23 +180,26 @@ class TwoLevelSolver:
         They end when the energy is ``floor``² or has fallen by ``tolerance``². One is good until the next is asked for.
         """
         z, image, p, q = self._z, self._image, self._p, self._q
-        energy = self._smooth(r)
-        least = max(tolerance**2 * abs(energy), floor**2)
         p.set(0.0)
         q.set(0.0)
-        share = 0.0
-        while not abs(energy) <= least:  # nor where it is no number
+        before, least = math.inf, floor**2
+        # rᵀ S r is the same but for what rounding leaves in Pᵀ r: if that ends here, no projection is needed
+        while not abs(self._smooth(r)) <= least:
             self._project(found)
-            p.aypx(share, z)
-            q.aypx(share, image)
+            energy = r.dot(z)
+            if before == math.inf:
+                least = max(tolerance**2 * abs(energy), least)
+            if abs(energy) <= least:
+                break
+            p.aypx(energy / before, z)
+            q.aypx(energy / before, image)
             curvature = p.dot(q)
             yield energy, Direction(p, q, curvature)
             r.axpy(-energy / curvature, q)
-            energy, before = self._smooth(r), energy
-            share = energy / before
+            before = energy
 
     def _smooth(self, r: PETSc.Vec) -> float:
-        """z = S r, and rᵀ z, which stays if z is made conjugate to P: Pᵀ r = 0."""
+        """z = S r, and rᵀ z."""
         z = self._z
         rough, smooth = self._nodal
         count = rough.getLocalSize()
