@@ -193,15 +193,18 @@ class KktMatrix:
 
     def _raise_diagonal(self) -> None:
         """Makes the whole matrix hold what was assembled and what is added to its diagonal."""
-        self._matrix.setDiagonal(self._diagonal + self._added)
+        if not self._plain:
+            self._matrix.setDiagonal(self._diagonal + self._added)
 
     def _by_entries(self, *, plain: bool) -> PETSc.Mat:
         """K̂ by entries: ``plain``, or with what gives the KKT matrix the addition to its diagonal."""
         if not self._converted:
             self.hat.convert(PETSc.Mat.Type.AIJ, self._entries)
-            self._entries_diagonal, self._converted, self._entries_plain = self._entries.getDiagonal(), True, True
+            self._converted = self._entries_plain = True
         if plain and self._entries_plain:
             return self._entries
+        if self._entries_plain:
+            self._entries_diagonal = self._entries.getDiagonal()
         # where G holds one entry per row; rows of nodes inside interfaces have no diagonal
         layout, units = self._layout, self.units
         rows = layout.free
