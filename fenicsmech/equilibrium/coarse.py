@@ -26,11 +26,10 @@ class CoarseLevel:
 
     Args:
         system: whose KKT matrix it is.
-        matrix: that matrix, at whatever values.
     """
 
-    def __init__(self, system: EquilibriumSystem, matrix: PETSc.Mat) -> None:
-        self._system, self._fine = system, matrix
+    def __init__(self, system: EquilibriumSystem) -> None:
+        self._system = system
         linear = fem.Function(system.elastic.d.function_space)
         self._interfaces = system.interfaces.on(linear)
         self._layout = Layout(system.layout.comm, self._interfaces, system.joints)
@@ -38,6 +37,7 @@ class CoarseLevel:
         self._map = create_map_matrix(self._layout, self._interfaces, system.joints, units, system.scale)
         self._values = _values_at_nodes(system, self._layout)
         self._prolongation: PETSc.Mat | None = None
+        self._mapped: PETSc.Mat | None = None
         self._matrix: PETSc.Mat | None = None
         self._factor: Factor | None = None
 
@@ -47,7 +47,8 @@ class CoarseLevel:
         self._interfaces.reshape(system.elastic.d.x.array.reshape(-1, system.joints.space.dim))
         update_map_matrix(self._map, self._layout, self._interfaces, system.joints, system.poses, system.scale)
         self._prolongation = self._values.matMult(self._map, result=self._prolongation)
-        self._matrix = self._fine.ptap(self._prolongation, result=self._matrix)
+        self._mapped = system.mapped(self._prolongation, self._mapped)
+        self._matrix = system.restricted(self._mapped, self._matrix)
         if self._factor is None:
             self._factor = Factor(self._matrix)
             self._right, self._solution = self._matrix.createVecs()

@@ -1,4 +1,8 @@
-"""The KKT matrix Gᵀ K̂ G in scaled unknowns, and the map G between these and the change of state they stand for."""
+"""The KKT matrix Gᵀ K̂ G in scaled unknowns, and the map G between these and the change of state they stand for.
+
+The product over all unknowns is formed for those who ask for it. Others need no more than its stiffness by blocks of
+nodes, its columns of poses, multipliers and force, and Pᵀ KKT P = (G P)ᵀ K̂ (G P) for a narrow P.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +22,9 @@ from fenicsmech.linkage import JointSystem
 
 
 class KktMatrix:
-    """K̂, G and their product, whose patterns never change; all methods are collective.
+    """K̂, G and their products, whose patterns never change; all methods are collective.
+
+    Products are of the K̂ last linearised, with G at ``poses``: take them before either changes.
 
     Args:
         elastic: the flexible links, at rest.
@@ -32,8 +38,7 @@ class KktMatrix:
         unit: a residual of this norm is a displacement of the mechanism's length against the mean stiffness.
         unit_u, units, scale: what a unit of each scaled unknown stands for: displacements; all free finite-element
             DOFs; (z, λ, f).
-        hat: K̂, to which elastic stiffness may be added between ``tangent`` and ``assembled``.
-        matrix: the KKT matrix last assembled, the same object every time.
+        hat: K̂, to which elastic stiffness may be added between ``tangent`` and ``linearise``.
         poses: those that G is at.
     """
 
@@ -64,11 +69,17 @@ class KktMatrix:
         )
         extras.set_regularisation(self.scale[layout.multipliers], self.scale[layout.force])
         self._map = create_map_matrix(layout, interfaces, joints, self.units, self.scale)
-        self._entries = PETSc.Mat()  # of K̂ one by one
         self._rows = self.hat.createVecLeft()
-        self.matrix: PETSc.Mat | None = None
+        # what shift and soften add to the diagonal
+        self._added, self._shift, self._plain = self.zeros(), 0.0, True
+        self._entries = PETSc.Mat()  # of K̂ one by one
+        self._entries_diagonal: PETSc.Vec | None = None
+        self._matrix: PETSc.Mat | None = None
         self._diagonal: PETSc.Vec | None = None
-        self._shift = 0.0
+        self._extra_map: PETSc.Mat | None = None
+        self._images: PETSc.Mat | None = None
+        self._extra_columns: PETSc.Mat | None = None
+        self._converted = self._entries_plain = self._formed = False
 
     def turn(self, poses: np.ndarray) -> None:
         """Brings G to ``poses``."""
@@ -80,8 +91,8 @@ class KktMatrix:
         self.hat.zeroEntries()
         self._elastic.tangent(self.hat)
 
-    def assembled(self, entries: Iterable[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> PETSc.Mat:
-        """The KKT matrix from the tangent that K̂ holds and the ``entries`` of its extras."""
+    def linearise(self, entries: Iterable[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> None:
+        """Takes the tangent that K̂ holds and the ``entries`` of its extras, without shift and softness."""
         with self._clock.phase("assemble"):
             self.hat.assemble()
             if self._layout.last:
@@ -94,14 +105,42 @@ class KktMatrix:
                         addv=PETSc.InsertMode.ADD,
                     )
             self.hat.assemble()
+        self._converted = self._formed = False
+        self._added.set(0.0)
+        self._shift, self._plain = 0.0, True
+
+    def matrix(self) -> PETSc.Mat:
+        """The KKT matrix, the same object every time."""
+        if not self._formed:
+            with self._clock.phase("project"):
+                self._matrix = self._by_entries(plain=True).ptap(self._map, result=self._matrix)
+                self._diagonal, self._formed = self._matrix.getDiagonal(), True
+                self._raise_diagonal()
+        return self._matrix
+
+    def mapped(self, columns: PETSc.Mat, result: PETSc.Mat | None = None) -> PETSc.Mat:
+        """G P for the ``columns`` P of unknowns; into an earlier ``result``, if there is one."""
+        return self._map.matMult(columns, result=result)
+
+    def restricted(self, mapped: PETSc.Mat, result: PETSc.Mat | None = None) -> PETSc.Mat:
+        """Pᵀ KKT P for G P, ``mapped``; into an earlier ``result``, if there is one."""
         with self._clock.phase("project"):
-            self.hat.convert(PETSc.Mat.Type.AIJ, self._entries)
-            self.matrix = self._entries.ptap(self._map, result=self.matrix)
-            self._diagonal, self._shift = self.matrix.getDiagonal(), 0.0
-        return self.matrix
+            return self._by_entries(plain=self._plain).ptap(mapped, result=result)
+
+    def extra_columns(self) -> PETSc.Mat:
+        """The columns of (z, λ, f), (unknowns, extras), the same object every time."""
+        layout = self._layout
+        with self._clock.phase("project"):
+            rows = PETSc.IS().createStride(layout.local_rows, layout.first_row, 1, comm=layout.comm)
+            extras = layout.extras if layout.last else 0
+            columns = PETSc.IS().createStride(extras, layout.first_extra, 1, comm=layout.comm)
+            self._extra_map = self._map.createSubMatrix(rows, columns, self._extra_map)
+            self._images = self._by_entries(plain=self._plain).matMult(self._extra_map, result=self._images)
+            self._extra_columns = self._map.transposeMatMult(self._images, result=self._extra_columns)
+        return self._extra_columns
 
     def nodal_stiffness(self) -> PETSc.Mat:
-        """A new matrix of its rows and columns of free displacements, by blocks of nodes."""
+        """A new matrix of the KKT matrix's rows and columns of free displacements, by blocks of nodes."""
         dim, free = self._layout.per_node, self._layout.free
         nodes = ((self._layout.first_row + free[::dim]) // dim).astype(PETSc.IntType)
         rows = PETSc.IS().createBlock(dim, nodes, comm=self._layout.comm)
@@ -112,22 +151,25 @@ class KktMatrix:
 
     def shift(self, shift: float) -> None:
         """Makes the matrix hold ``shift`` · I more than it was assembled with, in the block of s."""
-        shifted, layout, self._shift = self._diagonal.copy(), self._layout, shift
-        shifted.array_w[: layout.free_displacements] += shift
+        layout, self._shift, self._plain = self._layout, shift, self._plain and shift == 0.0
+        added = self._added.array_w
+        added[: layout.free_displacements] = shift
         if layout.last:
-            shifted.array_w[len(layout.free) :][layout.z] += shift
-        self.matrix.setDiagonal(shifted)
+            added[len(layout.free) :][layout.z] = shift
+        if self._formed:
+            self._raise_diagonal()
 
     def soften(self, softness: float, control: Control) -> None:
         """Makes the matrix hold −``softness`` · I instead of −ε · I in the block of multipliers.
 
         The force is one of them under a ``control`` that constrains. Before ``shift``, which makes it take effect.
         """
+        self._plain = False
         if self._layout.last:
-            extras = self._diagonal.array_w[len(self._layout.free) :]
-            extras[self._layout.multipliers] += REGULARISATION - softness
+            extras = self._added.array_w[len(self._layout.free) :]
+            extras[self._layout.multipliers] = REGULARISATION - softness
             if control.constrained:
-                extras[self._layout.force] -= softness
+                extras[self._layout.force] = -softness
 
     def zeros(self) -> PETSc.Vec:
         """A vector of scaled unknowns."""
@@ -148,3 +190,33 @@ class KktMatrix:
         rows = self.hat.createVecLeft()
         self._map.mult(x, rows)
         return rows.array_r[: self._layout.owned].copy()
+
+    def _raise_diagonal(self) -> None:
+        """Makes the whole matrix hold what was assembled and what is added to its diagonal."""
+        if not self._plain:
+            self._matrix.setDiagonal(self._diagonal + self._added)
+
+    def _by_entries(self, *, plain: bool) -> PETSc.Mat:
+        """K̂ by entries: ``plain``, or with what gives the KKT matrix the addition to its diagonal."""
+        if not self._converted:
+            self.hat.convert(PETSc.Mat.Type.AIJ, self._entries)
+            self._converted = self._entries_plain = True
+        if plain and self._entries_plain:
+            return self._entries
+        if self._entries_plain:
+            self._entries_diagonal = self._entries.getDiagonal()
+        # where G holds one entry per row; rows of nodes inside interfaces have no diagonal
+        layout, units = self._layout, self.units
+        rows = layout.free
+        if layout.last:
+            rows = np.concatenate([rows, layout.owned + np.arange(layout.extras)])
+            units = np.concatenate([units, self.scale])
+        diagonal = self._entries_diagonal.array_r[rows]
+        if not plain:
+            diagonal = diagonal + self._added.array_r / units**2
+        places = (layout.first_row + rows).astype(PETSc.IntType)
+        starts = np.arange(len(rows) + 1, dtype=PETSc.IntType)
+        self._entries.setValuesIJV(starts, places, diagonal, rowmap=places)
+        self._entries.assemble()
+        self._entries_plain = plain
+        return self._entries

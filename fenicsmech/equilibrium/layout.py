@@ -30,6 +30,7 @@ class Layout:
         block: rows come in blocks of this size.
         whole_nodes: whether all components of every node with an unknown are unknowns, on all ranks.
         local_rows, local_unknowns: sizes on this rank.
+        unknowns: on all ranks.
         first_extra_row, first_extra: global numbers of the first extra row and unknown.
         z, multipliers, force: slices of the extras.
         extras: number of extras.
@@ -67,6 +68,7 @@ class Layout:
         self.owned = owned
         self.local_rows = owned + (padded if self.last else 0)
         self.local_unknowns = len(self.free) + (self.extras if self.last else 0)
+        self.unknowns = comm.allreduce(self.local_unknowns)
         self.first_row = comm.exscan(self.local_rows) or 0
         self.first_unknown = comm.exscan(self.local_unknowns) or 0
         self.first_extra_row = comm.allreduce(owned)

@@ -15,10 +15,10 @@ from fenicsmech.errors import DescriptionError
 
 
 class LinearSolver(Protocol):
-    """Solves with one matrix whose values change and whose pattern does not; all methods are collective."""
+    """Solves with a system's KKT matrix, whose values change and whose pattern does not; all methods are collective."""
 
     def refactor(self) -> bool:
-        """Takes the matrix's current values; whether that could be done."""
+        """Takes the matrix as last linearised, shifted and softened; whether that could be done."""
 
     def inertia(self) -> Inertia:
         """Of the matrix last refactored."""
@@ -37,16 +37,28 @@ class LinearMethod(ABC):
     """A way to solve linear systems."""
 
     @abstractmethod
-    def solver(self, system: EquilibriumSystem, matrix: PETSc.Mat) -> LinearSolver:
-        """The solver for the KKT ``matrix`` of ``system`` (collective)."""
+    def solver(self, system: EquilibriumSystem) -> LinearSolver:
+        """The solver for the KKT matrix of ``system``, linearised once at least (collective)."""
+
+
+class WholeFactor(Factor):
+    """The factor of the whole KKT matrix of ``system``."""
+
+    def __init__(self, system: EquilibriumSystem) -> None:
+        self._system = system
+        super().__init__(system.matrix())
+
+    def refactor(self):
+        self._system.matrix()  # formed only where it is asked for
+        return super().refactor()
 
 
 @dataclass(frozen=True)
 class Direct(LinearMethod):
     """The factor LDLᵀ of the whole matrix: fastest up to some 80,000 unknowns on slender links."""
 
-    def solver(self, system, matrix):
-        return Factor(matrix)
+    def solver(self, system):
+        return WholeFactor(system)
 
 
 @dataclass(frozen=True)
@@ -58,14 +70,14 @@ class TwoLevel(LinearMethod):
         """Whether displacements have a level below them, all components of free nodes are unknown, pressures none."""
         return system.elastic.order > 1 and system.layout.whole_nodes
 
-    def solver(self, system, matrix):
+    def solver(self, system):
         if not self.suits(system):
             raise DescriptionError(
                 "linear solver TwoLevel",
                 "it needs displacements of order 2 or 3, all components of a node unknown, and no pressures",
                 "Use order=2, or Direct()",
             )
-        return TwoLevelSolver(system, matrix)
+        return TwoLevelSolver(system)
 
 
 @dataclass(frozen=True)
@@ -83,6 +95,6 @@ class BySize(LinearMethod):
 
     limit: int = 80_000
 
-    def solver(self, system, matrix):
-        large = matrix.getSize()[0] > self.limit and system.joints.space.dim == 3 and TwoLevel.suits(system)
-        return (TwoLevel() if large else Direct()).solver(system, matrix)
+    def solver(self, system):
+        large = system.layout.unknowns > self.limit and system.joints.space.dim == 3 and TwoLevel.suits(system)
+        return (TwoLevel() if large else Direct()).solver(system)

@@ -109,10 +109,10 @@ class Newton(Iteration):
             near = trusted and residuals[-1] < options.near
             mixed = not near and passed is not None
             if mixed:
-                matrix = system.mixed_kkt(state, control, balance, *passed)
+                system.linearise_mixed(state, control, balance, *passed)
             else:
-                matrix = system.kkt(state, control, balance)
-            x, shift = self._direction(matrix, balance, floor, last=shift, any_inertia=near)
+                system.linearise(state, control, balance)
+            x, shift = self._direction(balance, floor, last=shift, any_inertia=near)
             step, motion = system.step(x), system.expand(x)[0]
             _log.debug("iteration %d: residual %.2e, shift %.1e", iteration, residuals[-1], shift)
             before, norm = state, balance.norm
@@ -143,16 +143,14 @@ class Newton(Iteration):
                 balance = system.balance(state, control)
         return self._bear(*best, control, floor, residuals, self._spent(residuals, options.iterations))
 
-    def _direction(
-        self, matrix: PETSc.Mat, balance: Balance, floor: float, *, last: float, any_inertia: bool
-    ) -> tuple[PETSc.Vec, float]:
+    def _direction(self, balance: Balance, floor: float, *, last: float, any_inertia: bool) -> tuple[PETSc.Vec, float]:
         """The Newton step; unless ``any_inertia`` will do, raises δ until the inertia promises descent.
 
         δ = ``floor`` is tried first; then a third of the ``last`` one that served, and eight times that, …
         """
         shift, following = floor, max(_LEAST_SHIFT, last / 3.0)
         for _ in range(20):
-            x = self._solution(balance.vector, self._accuracy(balance)) if self._refactor(matrix, shift) else None
+            x = self._solution(balance.vector, self._accuracy(balance)) if self._refactor(shift) else None
             if x is not None and (any_inertia or self._descends()):
                 break
             shift, following = following, 8.0 * following

@@ -170,11 +170,12 @@ class Iteration(ABC):
         """Rounding of displacements and rotations, which are counted from the drawn configuration."""
         return self.options.roundoff * self.system.unit * max(balance.motion, _LEAST_MOTION)
 
-    def _refactor(self, matrix: PETSc.Mat, shift: float) -> bool:
+    def _refactor(self, shift: float) -> bool:
+        """Takes the KKT matrix last linearised with a ``shift``; whether that could be done."""
         with self.system.clock.phase("factor"):
             self.system.shift(shift)
             if self._linear is None:
-                self._linear = self.options.linear.solver(self.system, matrix)
+                self._linear = self.options.linear.solver(self.system)
             return self._linear.refactor()
 
     def _factor_true(self, state: State, control: Control, balance: Balance, floor: float, iterations: int) -> None:
@@ -183,7 +184,8 @@ class Iteration(ABC):
         Raises:
             NotConverged: it cannot be factored.
         """
-        if not self._refactor(self.system.kkt(state, control, balance), floor):
+        self.system.linearise(state, control, balance)
+        if not self._refactor(floor):
             raise NotConverged("the tangent at the equilibrium cannot be factored", iterations)
 
     def _solution(self, right: PETSc.Vec, tolerance: float) -> PETSc.Vec | None:

@@ -9,7 +9,7 @@
 
 Where links have a pressure p of their own, u stands for (u, p) in all of this; E is a saddle then, stationary in p.
 B is the curvature of the rigid coordinates, c the compliance of joints, 0 unless an effect softens them. One sparse
-triple product forms the whole matrix; D makes x dimensionless.
+triple product forms the whole matrix for those who ask for it; D makes x dimensionless.
 """
 
 from __future__ import annotations
@@ -238,17 +238,19 @@ class EquilibriumSystem:
 
     # -- derivatives at the loaded state -------------------------------------------------------------------
 
-    def kkt(self, state: State, control: Control, balance: Balance) -> PETSc.Mat:
-        """The KKT matrix (collective); the same object at every call."""
+    def linearise(self, state: State, control: Control, balance: Balance) -> None:
+        """Brings the KKT matrix to the loaded ``state``, for all methods after this (collective)."""
         with self.clock.phase("assemble"):
             self._kkt.tangent()
-        return self._assembled(state, control, balance.moments)
+        self._linearise(state, control, balance.moments)
 
-    def mixed_kkt(self, state: State, control: Control, balance: Balance, before: State, motion: np.ndarray):
-        """The KKT matrix with the stress that the step δu = ``motion`` from ``before`` promised (collective).
+    def linearise_mixed(
+        self, state: State, control: Control, balance: Balance, before: State, motion: np.ndarray
+    ) -> None:
+        """``linearise``, with the stress that the step δu = ``motion`` from ``before`` promised (collective).
 
         Args:
-            state, control, balance: as in ``kkt``, which returns the same object.
+            state, control, balance: as in ``linearise``.
             before: the state before the step.
             motion: δu of owned nodes, linear in the step on interface nodes too, (owned dofs,).
         """
@@ -258,10 +260,35 @@ class EquilibriumSystem:
             self._mixed.tangent(self._kkt.hat)
             promised = self.interfaces.moments(self._mixed.forces().reshape(-1, self.layout.per_node))
             moments = _add_moments(balance.moments, self.layout.comm.allreduce(promised, op=_add_moments))
-        return self._assembled(state, control, moments)
+        self._linearise(state, control, moments)
 
-    def _assembled(self, state: State, control: Control, moments: dict[int, np.ndarray]) -> PETSc.Mat:
-        return self._kkt.assembled(self._extras.entries(state, control, self._loads.acting(state), moments))
+    def _linearise(self, state: State, control: Control, moments: dict[int, np.ndarray]) -> None:
+        self._kkt.linearise(self._extras.entries(state, control, self._loads.acting(state), moments))
+
+    def kkt(self, state: State, control: Control, balance: Balance) -> PETSc.Mat:
+        """``linearise``, and ``matrix`` (collective)."""
+        self.linearise(state, control, balance)
+        return self.matrix()
+
+    def matrix(self) -> PETSc.Mat:
+        """The KKT matrix last linearised, before another ``balance`` (collective); the same object at every call."""
+        return self._kkt.matrix()
+
+    def mapped(self, columns: PETSc.Mat, result: PETSc.Mat | None = None) -> PETSc.Mat:
+        """G P for the ``columns`` P of unknowns; into an earlier ``result``, if there is one (collective)."""
+        return self._kkt.mapped(columns, result)
+
+    def restricted(self, mapped: PETSc.Mat, result: PETSc.Mat | None = None) -> PETSc.Mat:
+        """Pᵀ KKT P for G P, ``mapped``; into an earlier ``result``, if there is one (collective)."""
+        return self._kkt.restricted(mapped, result)
+
+    def extra_columns(self) -> PETSc.Mat:
+        """The KKT matrix's columns of (z, λ, f), (unknowns, extras); the same object at every call (collective)."""
+        return self._kkt.extra_columns()
+
+    def zeros(self) -> PETSc.Vec:
+        """A vector of scaled unknowns (collective)."""
+        return self._kkt.zeros()
 
     def nodal_stiffness(self) -> PETSc.Mat:
         """A new matrix of the KKT matrix's rows and columns of free displacements, by blocks of nodes (collective)."""

@@ -50,39 +50,39 @@ class TwoLevelSolver:
     """Solves with the KKT matrix of ``system`` and tells its inertia; all methods are collective.
 
     Args:
-        system: with displacements of order 2 or more.
-        matrix: its KKT matrix; refactor after changing its values.
+        system: with displacements of order 2 or more; refactor after changing its KKT matrix.
 
     Attributes:
         iterations: of each solve so far.
         probes: iterations spent on each inertia so far.
     """
 
-    def __init__(self, system: EquilibriumSystem, matrix: PETSc.Mat) -> None:
-        self._matrix = matrix
-        self._coarse = CoarseLevel(system, matrix)
+    def __init__(self, system: EquilibriumSystem) -> None:
+        self._coarse = CoarseLevel(system)
         self._smoother = Chebyshev(degree=_DEGREE, ratio=_RATIO)
         layout = system.layout
-        self._free = PETSc.IS().createStride(len(layout.free), layout.first_unknown, 1, comm=matrix.comm)
+        self._free = PETSc.IS().createStride(len(layout.free), layout.first_unknown, 1, comm=layout.comm)
         extras = layout.extras if layout.last else 0
-        self._extra = PETSc.IS().createStride(extras, layout.first_extra, 1, comm=matrix.comm)
-        self._system, self._stiffness = system, None
+        self._extra = PETSc.IS().createStride(extras, layout.first_extra, 1, comm=layout.comm)
+        self._system = system
+        self._stiffness: PETSc.Mat | None = None
         self._border: PETSc.Mat | None = None
         self._corner: PETSc.Mat | None = None
         # petsc4py destroys what it creates late: nothing is created per iteration
-        self._work, self._residual, self._z, self._image, self._p, self._q = (matrix.createVecLeft() for _ in range(6))
+        self._work, self._residual, self._z, self._image, self._p, self._q = (system.zeros() for _ in range(6))
         self._nodal: tuple[PETSc.Vec, PETSc.Vec] | None = None
         self._met = 0
         self.iterations: list[int] = []
         self.probes: list[int] = []
 
     def refactor(self) -> bool:
-        """Takes the matrix's current values; whether that could be done."""
+        """Takes the KKT matrix's current values; whether that could be done."""
         if self._stiffness is not None:
             self._stiffness.destroy()
         self._stiffness = self._system.nodal_stiffness()
-        self._border = self._matrix.createSubMatrix(self._extra, self._free, self._border)
-        self._corner = self._matrix.createSubMatrix(self._extra, self._extra, self._corner)
+        columns = self._system.extra_columns()
+        self._border = columns.createSubMatrix(self._free, None, self._border)
+        self._corner = columns.createSubMatrix(self._extra, None, self._corner)
         if self._nodal is None:
             self._nodal, self._bordering = self._stiffness.createVecs(), self._corner.createVecs()
         return self._smoother.update(self._stiffness) and self._coarse.update()
@@ -108,10 +108,10 @@ class TwoLevelSolver:
     def solve_and_count(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float) -> Inertia | None:
         """``solve`` and ``inertia`` in one: a solve that starts from a random guess is a probe; None if not solved."""
         self._start(right, solution)
-        self._precondition(self._residual, ())
-        error = abs(self._residual.dot(self._z))
+        error = abs(self._smooth(self._residual))
         self._randomise(self._work)
-        self._precondition(self._work, ())
+        self._smooth(self._work)
+        self._project(())
         curvature = self._z.dot(self._image)
         if curvature > 0.0:
             # as much of it as of the error there is, in energy
@@ -130,16 +130,16 @@ class TwoLevelSolver:
 
     def _iterate(self, solution: PETSc.Vec, tolerance: float) -> bool:
         """Conjugate gradients from a ``solution`` with its residual; whether they reach the ``tolerance``."""
-        floor, first, self._met = _ROUNDOFF * solution.norm(), 0.0, 0
-        for iteration, (energy, direction) in zip(range(_MOST), self._conjugate(self._residual), strict=False):
-            first = first or abs(energy)
-            if abs(energy) <= max(tolerance**2 * first, floor**2):
-                self.iterations.append(iteration)
-                return True
+        floor, iterations, self._met = _ROUNDOFF * solution.norm(), 0, 0
+        for energy, direction in self._conjugate(self._residual, tolerance, floor=floor):
+            if iterations == _MOST:
+                return False
+            iterations += 1
             solution.axpy(energy / direction.curvature, direction.p)
             # later ones may be copies of the first: long recurrences forget what they were conjugate to
             self._met = max(self._met, int(direction.curvature < 0.0))
-        return False
+        self.iterations.append(iterations)
+        return True
 
     def known_inertia(self) -> Inertia:
         """What is certain after the last solve: the coarse level's, and one more if it met a negative curvature."""
@@ -160,48 +160,57 @@ class TwoLevelSolver:
 
     def _probe(self, found: list[Direction]) -> tuple[Direction | None, int]:
         """A direction of negative curvature conjugate to those ``found``, None if there seems to be none."""
-        r, first = self._residual, 0.0
+        r, iterations = self._residual, 0
         self._randomise(r)
         self._coarse.correction(r, self._work)
         self._multiply(self._work, self._image)
         r.axpy(-1.0, self._image)
         for known in found:
             r.axpy(-known.p.dot(r) / known.curvature, known.image)
-        for iteration, (energy, direction) in zip(range(_MOST), self._conjugate(r, found), strict=False):
-            first = first or abs(energy)
-            if abs(energy) <= _SEEN**2 * first:
-                break
+        for iterations, (_, direction) in zip(range(_MOST), self._conjugate(r, _SEEN, found), strict=False):
             if direction.curvature < 0.0:
-                return Direction(direction.p.copy(), direction.image.copy(), direction.curvature), iteration
-        return None, iteration
+                return Direction(direction.p.copy(), direction.image.copy(), direction.curvature), iterations
+        return None, iterations
 
-    def _conjugate(self, r: PETSc.Vec, found: Sequence[Direction] = ()) -> Iterator[tuple[float, Direction]]:
+    def _conjugate(
+        self, r: PETSc.Vec, tolerance: float, found: Sequence[Direction] = (), *, floor: float = 0.0
+    ) -> Iterator[tuple[float, Direction]]:
         """Conjugate directions for a residual r with Pᵀ r = 0: its energy rᵀ z, and where to go on.
 
-        A direction is good until the next one is asked for.
+        They end when the energy is ``floor``² or has fallen by ``tolerance``². One is good until the next is asked for.
         """
         z, image, p, q = self._z, self._image, self._p, self._q
-        self._precondition(r, found)
-        energy = r.dot(z)
-        z.copy(p)
-        image.copy(q)
-        while True:
+        p.set(0.0)
+        q.set(0.0)
+        before, least = math.inf, floor**2
+        # rᵀ S r is the same but for what rounding leaves in Pᵀ r: if that ends here, no projection is needed
+        while not abs(self._smooth(r)) <= least:
+            self._project(found)
+            energy = r.dot(z)
+            if before == math.inf:
+                least = max(tolerance**2 * abs(energy), least)
+            if abs(energy) <= least:
+                break
+            p.aypx(energy / before, z)
+            q.aypx(energy / before, image)
             curvature = p.dot(q)
             yield energy, Direction(p, q, curvature)
             r.axpy(-energy / curvature, q)
-            self._precondition(r, found)
-            energy, before = r.dot(z), energy
-            p.aypx(energy / before, z)
-            q.aypx(energy / before, image)
+            before = energy
 
-    def _precondition(self, r: PETSc.Vec, found: Sequence[Direction]) -> None:
-        """z = S r made conjugate to P and to the directions ``found``, and its image KKT z."""
-        z, image = self._z, self._image
+    def _smooth(self, r: PETSc.Vec) -> float:
+        """z = S r, and rᵀ z."""
+        z = self._z
         rough, smooth = self._nodal
         count = rough.getLocalSize()
         rough.array_w[:] = r.array_r[:count]
         self._smoother.apply(rough, smooth)
         z.array_w[:count], z.array_w[count:] = smooth.array_r, 0.0
+        return r.dot(z)
+
+    def _project(self, found: Sequence[Direction]) -> None:
+        """Makes z conjugate to P and to the directions ``found``, and its image KKT z."""
+        z, image = self._z, self._image
         self._multiply(z, image)
         self._coarse.correction(image, self._work)
         z.axpy(-1.0, self._work)
@@ -212,19 +221,19 @@ class TwoLevelSolver:
             image.axpy(share, known.image)
 
     def _multiply(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """y = KKT x by its blocks, of which that of the free nodes costs half as much as in the whole matrix."""
+        """y = KKT x by its blocks."""
         nodes, rows = self._nodal
         extras, sums = self._bordering
         count = nodes.getLocalSize()
         nodes.array_w[:], extras.array_w[:] = x.array_r[:count], x.array_r[count:]
         self._stiffness.mult(nodes, rows)
-        self._border.multTransposeAdd(extras, rows, rows)
+        self._border.multAdd(extras, rows, rows)
         self._corner.mult(extras, sums)
-        self._border.multAdd(nodes, sums, sums)
+        self._border.multTransposeAdd(nodes, sums, sums)
         y.array_w[:count], y.array_w[count:] = rows.array_r, sums.array_r
 
     def _randomise(self, r: PETSc.Vec) -> None:
         """Makes r random forces on free nodes."""
         count = self._nodal[0].getLocalSize()
-        r.array_w[:count] = np.random.default_rng(self._matrix.comm.rank).standard_normal(count)
+        r.array_w[:count] = np.random.default_rng(self._system.layout.comm.rank).standard_normal(count)
         r.array_w[count:] = 0.0

@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 from mpi4py import MPI
+from petsc4py import PETSc
 
 import fenicsmech as fm
 from fenicsmech.equilibrium import (
     AugmentedLagrangian,
     BySize,
     Direct,
+    DisplacementControl,
     KktNewton,
     LoadControl,
     PrimalDualNewton,
@@ -16,6 +18,7 @@ from fenicsmech.equilibrium import (
     TwoLevel,
 )
 from fenicsmech.equilibrium.factor import Factor
+from fenicsmech.equilibrium.system import EquilibriumSystem
 from fenicsmech.equilibrium.two_level import TwoLevelSolver
 
 from .finger import RUBBER, finger
@@ -89,7 +92,7 @@ def test_inertia_and_solutions_are_those_of_the_factor_on_both_sides_of_buckling
         state = system.moved(first, compression.scaled((load - 0.5) * EULER))
         control = LoadControl(load * EULER)
         matrix = system.kkt(state, control, system.balance(state, control))
-        solver = solver or TwoLevelSolver(system, matrix)
+        solver = solver or TwoLevelSolver(system)
         factor = Factor(matrix)
         assert factor.refactor() and solver.refactor()
         assert solver.inertia() == factor.inertia()
@@ -123,6 +126,58 @@ def test_stiffness_by_nodes_is_that_block_of_the_matrix():
         assert np.abs(error).max() <= 1e-12 * (nodal * y).norm()
 
 
+@pytest.mark.parallel
+def test_columns_and_restrictions_are_those_of_the_matrix_shifted_and_softened():
+    simulation, push = finger("3d", size=6.0, comm=MPI.COMM_WORLD)
+    system = simulation.newton(push).system
+    state = simulation.load_displacement(push, forces=[0.5]).frames[0].state
+    control, layout = DisplacementControl(0.2), system.layout
+    system.load(state)
+    random = np.random.default_rng(system.layout.comm.rank)
+    mapped = restricted = None
+    for softness, shift in ((None, 0.0), (None, 0.3), (0.02, 0.0), (0.02, 0.3), (None, 0.0)):
+        system.linearise(state, control, system.balance(state, control))
+        if softness is not None:
+            system.soften(softness, control)
+        system.shift(shift)
+        narrow = groups(system)
+        mapped = system.mapped(narrow, mapped)
+        restricted = system.restricted(mapped, restricted)
+        columns = system.extra_columns()
+        matrix = system.matrix()  # last, so that it is not what the others take
+        x, coarse = columns.createVecRight(), restricted.createVecRight()
+        x.array_w[:], coarse.array_w[:] = (random.standard_normal(len(v.array)) for v in (x, coarse))
+        whole = system.zeros()
+        if layout.last:
+            whole.array_w[len(layout.free) :] = x.array_r
+        assert (columns * x - matrix * whole).norm() <= 1e-12 * (columns * x).norm()
+        expected = coarse.duplicate()
+        narrow.multTranspose(matrix * (narrow * coarse), expected)
+        assert (restricted * coarse - expected).norm() <= 1e-11 * expected.norm()
+
+
+def groups(system):
+    """P with one entry in each row: sums of ten unknowns."""
+    local = system.zeros().getLocalSize()
+    owned = -(-local // 10)
+    first = (system.layout.comm.exscan(owned) or 0) + np.arange(local) // 10
+    total = system.layout.comm.allreduce(owned)
+    starts = np.arange(local + 1, dtype=PETSc.IntType)
+    size = [(local, system.layout.unknowns), (owned, total)]
+    return PETSc.Mat().createAIJ(
+        size, csr=(starts, first.astype(PETSc.IntType), np.ones(local)), comm=system.layout.comm
+    )
+
+
+def test_the_matrix_over_all_unknowns_is_never_formed(monkeypatch):
+    def formed(self):
+        raise AssertionError("the KKT matrix was formed")
+
+    monkeypatch.setattr(EquilibriumSystem, "matrix", formed)
+    simulation, push = finger("3d", size=6.0, solver=PrimalDualNewton(linear=TwoLevel()))
+    assert simulation.load_displacement(push, forces=[1.0]).frames[0].stable
+
+
 def test_interfaces_of_another_rest_shape_are_followed():
     curves = []
     for linear in (TwoLevel(), Direct()):
@@ -145,7 +200,8 @@ def test_iterations_do_not_grow_with_the_mesh():
         state = simulation.load_displacement(push, forces=[0.5 * EULER]).frames[0].state
         control = LoadControl(0.5 * EULER)
         system.load(state)
-        solver = TwoLevelSolver(system, system.kkt(state, control, system.balance(state, control)))
+        system.linearise(state, control, system.balance(state, control))
+        solver = TwoLevelSolver(system)
         assert solver.refactor()
         right = system.force_rate(state)
         assert solver.solve(right, right.duplicate(), 1e-8)
@@ -158,11 +214,10 @@ def test_size_decides_unless_said_otherwise():
     system = simulation.newton(push).system
     state = simulation.load_displacement(push, forces=[0.0]).frames[0].state
     control = LoadControl(0.0)
-    matrix = system.kkt(state, control, system.balance(state, control))
-    unknowns = matrix.getSize()[0]
-    assert isinstance(BySize(limit=unknowns).solver(system, matrix), Factor)
-    assert isinstance(BySize(limit=unknowns - 1).solver(system, matrix), TwoLevelSolver)
-    assert isinstance(BySize().solver(system, matrix), Factor)
+    unknowns = system.kkt(state, control, system.balance(state, control)).getSize()[0]
+    assert isinstance(BySize(limit=unknowns).solver(system), Factor)
+    assert isinstance(BySize(limit=unknowns - 1).solver(system), TwoLevelSolver)
+    assert isinstance(BySize().solver(system), Factor)
 
 
 def test_linear_displacements_have_no_level_below_them():

@@ -157,14 +157,14 @@ class AugmentedLagrangianIteration(Iteration):
     ) -> tuple[Step, float, float]:
         """The Newton step of s, with δ grown until it descends; the slope of L_A along it; δ."""
         system, layout = self.system, self.system.layout
-        matrix = system.kkt(current, control, balance)
+        system.linearise(current, control, balance)
         system.soften(softness, control)
         right = balance.vector.copy()
         if layout.last:
             right.array_w[len(layout.free) + system.joints.size :] = 0.0
         shift, following = floor, max(_LEAST_SHIFT, last / 3.0)
         for _ in range(20):
-            x = self._solution(right, self._accuracy(balance)) if self._refactor(matrix, shift) else None
+            x = self._solution(right, self._accuracy(balance)) if self._refactor(shift) else None
             if x is not None and self._descends():
                 break
             shift, following = following, 8.0 * following

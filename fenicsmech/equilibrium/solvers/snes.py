@@ -153,7 +153,7 @@ class _Equations:
         return PETSc.SNES.ConvergedReason.ITERATING
 
     def setUp(self, pc: PETSc.PC) -> None:
-        self.factored = self._iteration._refactor(self.matrix, self._floor)
+        self.factored = self._iteration._refactor(self._floor)
 
     def apply(self, pc: PETSc.PC, right: PETSc.Vec, x: PETSc.Vec) -> None:
         accuracy = self._iteration._accuracy(self.balance)
