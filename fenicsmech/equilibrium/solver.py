@@ -150,16 +150,17 @@ class Iteration(ABC):
         """The residual over the forces that balance in it."""
         return balance.norm / max(balance.forces, self._rounding(balance))
 
-    def converged(self, balance: Balance, before: float = 0.0) -> bool:
+    def converged(self, balance: Balance, before: float = 0.0, *, noise: float = 0.0) -> bool:
         """Whether the residual is small beside the forces and joints are closed, or it is rounding that falls no more.
 
         Args:
             balance: with the residual.
             before: norm of the residual one iteration ago; 0 if no other iteration can follow.
+            noise: what else rounds the residual, as a norm of it.
         """
         if balance.norm <= self.options.tolerance * balance.forces < math.inf and balance.gap <= _CLOSED:
             return True
-        return _FALLING * before < balance.norm <= self._rounding(balance) < math.inf
+        return _FALLING * before < balance.norm <= max(self._rounding(balance), noise) < math.inf
 
     def bearable(self, balance: Balance) -> bool:
         """Whether a state will do where nothing better is found, as at a bifurcation."""

@@ -11,20 +11,9 @@ from fenicsmech.design.equilibria import TargetEquilibria
 from fenicsmech.design.objective import target_errors
 from fenicsmech.design.objective_error import objective_error
 
-from ..simulation.demo_scenes import describe
-from ..simulation.refined import arch, cantilever, refine
+from ..simulation.five_problems import case
+from ..simulation.refined import cantilever, refine
 from .mechanisms import truss
-
-LOADS = {"truss": 0.4, "claw": 10.0, "klann": 5.0}
-
-
-def case(name: str):
-    """Scene, force and load of a problem."""
-    made = {"cantilever": cantilever, "arch": arch}
-    if name in made:
-        return made[name]()
-    scene, push = describe(name)[:2]
-    return scene, push, LOADS[name]
 
 
 def value(targets, reached) -> float:

@@ -13,18 +13,8 @@ from fenicsmech.equilibrium import Iteration
 from fenicsmech.report import read_curve_csv
 
 from .demo_scenes import describe
+from .five_problems import case
 from .refined import arch, cantilever, refine
-
-LOADS = {"truss": 0.4, "claw": 10.0, "klann": 5.0}
-
-
-def case(name: str):
-    """Scene, force and load of a problem."""
-    made = {"cantilever": cantilever, "arch": arch}
-    if name in made:
-        return made[name]()
-    scene, push = describe(name)[:2]
-    return scene, push, LOADS[name]
 
 
 def estimated(

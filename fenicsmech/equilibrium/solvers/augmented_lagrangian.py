@@ -38,7 +38,6 @@ _LARGEST_PENALTY = 1e8
 _DECREASE = 1e-4
 _HALVINGS = 30
 _ROUNDING = 1e-10  # of L_A: a change below this says nothing
-_FALLING = 0.25  # of the residual before: else it is rounding
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,7 +81,9 @@ class AugmentedLagrangianIteration(Iteration):
             current = self._updated(state, control, 1.0 / penalty)
             balance = system.balance(current, control)
             residuals.append(self.relative(balance))
-            if self._settled(balance, before, penalty) and iteration > 0:
+            # λ⁺ = λ − μ C(s) holds the rounding of C, μ times
+            noise = penalty * options.roundoff * system.unit
+            if self.converged(balance, before, noise=noise) and iteration > 0:
                 self._factor_true(current, control, balance, floor, iteration)
                 return self._accept(self._normalised(current), control, residuals, iteration)
             if best is None or balance.norm < best[1].norm:
@@ -108,11 +109,6 @@ class AugmentedLagrangianIteration(Iteration):
                 return self._bear(self._normalised(best[0]), best[1], control, floor, residuals, failure)
         failure = self._spent(residuals, options.iterations)
         return self._bear(self._normalised(best[0]), best[1], control, floor, residuals, failure)
-
-    def _settled(self, balance: Balance, before: float, penalty: float) -> bool:
-        """Whether iterations end: λ⁺ = λ − μ C(s) holds the rounding of C, μ times."""
-        noise = penalty * self.options.roundoff * self.system.unit
-        return self.converged(balance, before) or _FALLING * before < balance.norm <= noise < math.inf
 
     def _normalised(self, state: State) -> State:
         """``state`` with quaternions of unit length."""
