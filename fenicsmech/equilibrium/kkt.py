@@ -15,6 +15,7 @@ from fenicsmech.bodies import InterfaceMap
 from fenicsmech.clock import Clock
 from fenicsmech.elasticity import ElasticBody
 from fenicsmech.equilibrium.control import Control
+from fenicsmech.equilibrium.entry_copy import EntryCopy
 from fenicsmech.equilibrium.extras import REGULARISATION, ExtraEntries
 from fenicsmech.equilibrium.layout import Layout
 from fenicsmech.equilibrium.matrices import create_extended_matrix, create_map_matrix, update_map_matrix
@@ -72,7 +73,7 @@ class KktMatrix:
         self._rows = self.hat.createVecLeft()
         # what shift and soften add to the diagonal
         self._added, self._shift, self._plain = self.zeros(), 0.0, True
-        self._entries = PETSc.Mat()  # of K̂ one by one
+        self._entries: EntryCopy | None = None
         self._entries_diagonal: PETSc.Vec | None = None
         self._matrix: PETSc.Mat | None = None
         self._diagonal: PETSc.Vec | None = None
@@ -198,13 +199,16 @@ class KktMatrix:
 
     def _by_entries(self, *, plain: bool) -> PETSc.Mat:
         """K̂ by entries: ``plain``, or with what gives the KKT matrix the addition to its diagonal."""
+        if self._entries is None:
+            self._entries = EntryCopy(self.hat)
+        entries = self._entries.matrix
         if not self._converted:
-            self.hat.convert(PETSc.Mat.Type.AIJ, self._entries)
+            self._entries.update()
             self._converted = self._entries_plain = True
         if plain and self._entries_plain:
-            return self._entries
+            return entries
         if self._entries_plain:
-            self._entries_diagonal = self._entries.getDiagonal()
+            self._entries_diagonal = entries.getDiagonal()
         # where G holds one entry per row; rows of nodes inside interfaces have no diagonal
         layout, units = self._layout, self.units
         rows = layout.free
@@ -216,7 +220,7 @@ class KktMatrix:
             diagonal = diagonal + self._added.array_r / units**2
         places = (layout.first_row + rows).astype(PETSc.IntType)
         starts = np.arange(len(rows) + 1, dtype=PETSc.IntType)
-        self._entries.setValuesIJV(starts, places, diagonal, rowmap=places)
-        self._entries.assemble()
+        entries.setValuesIJV(starts, places, diagonal, rowmap=places)
+        entries.assemble()
         self._entries_plain = plain
-        return self._entries
+        return entries
