@@ -102,7 +102,8 @@ class Run:
         system, state = self.simulation.newton(self.force).system, self.curve.frames[-1].state
         control = LoadControl(FORCES[-1])
         system.load(state)
-        return system, system.kkt(state, control, system.balance(state, control)), system.force_rate(state)
+        system.linearise(state, control, system.balance(state, control))
+        return system, system.kkt.matrix(), system.force_rate(state)
 
 
 def parse() -> Demo:

@@ -214,7 +214,7 @@ class TargetEquilibria:
         model.load(back)
         x = newton.solve_linear(system.balance(back, control).vector)
         x.scale(-1.0)
-        step = system.step(x)
+        step = system.unknowns.step(x)
         miss = system.size(system.difference(start, system.moved(back, step)))
         model.reshape(after)
         return miss > max(_ASTRAY * system.size(step), _LEAST_MISS)

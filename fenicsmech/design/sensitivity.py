@@ -65,7 +65,7 @@ class Adjoint:
         system = self._system
         right = system.travel_gradient(output, state)
         x = self._newton.solve_linear(right)
-        u, z = system.expand(x)
+        u, z = system.unknowns.push(x), system.unknowns.step(x).z
         for field, values in zip(self._weights, self._model.elastic.split(u), strict=True):
             owned_values(field)[:] = values
             field.x.scatter_forward()

@@ -3,7 +3,8 @@
 - ``state``: displacements, poses, multipliers
 - ``load``, ``loads``: point loads
 - ``control``: what is led along a path: a force, a displacement, motors
-- ``layout``, ``matrices``, ``extras``, ``kkt``: the distributed KKT matrix
+- ``layout``, ``unknowns``: where each unknown stands, and the change of state it stands for
+- ``extras``, ``matrices``, ``entry_copy``, ``kkt``: the distributed KKT matrix
 - ``system``: energy, balance and KKT matrix at a state
 - ``factor``: LDLᵀ with inertia
 - ``coarse``, ``smoother``, ``two_level``: conjugate gradients where the factor is too large

@@ -64,7 +64,7 @@ def metric_at(
     system.load(state)
     newton.factor(state, control, system.balance(state, control), floor)
     x = newton.solve_linear(control.rate(system, state))
-    rate = lead.heading(system.step(x), control)
+    rate = lead.heading(system.unknowns.step(x), control)
     speed = abs(lead.conjugate_rate(system, state, control, x))
     motion = math.sqrt(mean_product(system, rate, rate))
     if not motion > 0.0 or not (lead.displaces or parameter or speed > 0.0):

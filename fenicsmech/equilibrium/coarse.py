@@ -33,8 +33,8 @@ class CoarseLevel:
         linear = fem.Function(system.elastic.d.function_space)
         self._interfaces = system.interfaces.on(linear)
         self._layout = Layout(system.layout.comm, self._interfaces, system.joints)
-        units = np.full(len(self._layout.free), system.unit_u)
-        self._map = create_map_matrix(self._layout, self._interfaces, system.joints, units, system.scale)
+        units, scale = np.full(len(self._layout.free), system.unknowns.unit_u), system.unknowns.scale
+        self._map = create_map_matrix(self._layout, self._interfaces, system.joints, units, scale)
         self._values = _values_at_nodes(system, self._layout)
         self._prolongation: PETSc.Mat | None = None
         self._mapped: PETSc.Mat | None = None
@@ -43,12 +43,12 @@ class CoarseLevel:
 
     def update(self) -> bool:
         """Takes the values of the KKT matrix; whether KKT₁ could be factored (collective)."""
-        system = self._system
+        system, unknowns = self._system, self._system.unknowns
         self._interfaces.reshape(system.elastic.d.x.array.reshape(-1, system.joints.space.dim))
-        update_map_matrix(self._map, self._layout, self._interfaces, system.joints, system.poses, system.scale)
+        update_map_matrix(self._map, self._layout, self._interfaces, system.joints, unknowns.poses, unknowns.scale)
         self._prolongation = self._values.matMult(self._map, result=self._prolongation)
-        self._mapped = system.mapped(self._prolongation, self._mapped)
-        self._matrix = system.restricted(self._mapped, self._matrix)
+        self._mapped = unknowns.map.matMult(self._prolongation, result=self._mapped)
+        self._matrix = system.kkt.restricted(self._mapped, self._matrix)
         if self._factor is None:
             self._factor = Factor(self._matrix)
             self._right, self._solution = self._matrix.createVecs()
@@ -80,12 +80,12 @@ def _values_at_nodes(system: EquilibriumSystem, coarse: Layout) -> PETSc.Mat:
     entries = weights.tocoo()
     rows = [(dim * entries.row[:, None] + np.arange(dim)).ravel()]
     columns = [(dim * vertices[entries.col][:, None] + np.arange(dim)).ravel()]
-    values = [np.repeat(entries.data / system.unit_u, dim)]
+    values = [np.repeat(entries.data / system.unknowns.unit_u, dim)]
     if fine.last:
         extras = np.arange(fine.extras)
         rows.append(len(fine.free) + extras)
         columns.append(coarse.first_extra_row + extras)
-        values.append(1.0 / system.scale)
+        values.append(1.0 / system.unknowns.scale)
     total_rows, total_columns = fine.comm.allreduce(fine.local_unknowns), fine.comm.allreduce(coarse.local_rows)
     local = csr_matrix(
         (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))),

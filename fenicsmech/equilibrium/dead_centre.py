@@ -76,11 +76,11 @@ class MotorPath(Path):
         newton.factor(last.state, control, system.balance(last.state, control), self._floors[0])
         rate = newton.solve_linear(control.rate(system, last.state))
         motion = rate.duplicate()
-        motion.pointwiseMult(system.coordinates_mask(), rate)
+        motion.pointwiseMult(system.unknowns.coordinates_mask(), rate)
         motion.normalize()
         strain = newton.solve_linear(motion)
         compliance = motion.dot(strain)
         if not compliance > 0.0:
             raise NotConverged("nothing resists the motion towards a dead centre", 0)
         rate.axpy(-motion.dot(rate) / compliance, strain)
-        return system.step(rate)
+        return system.unknowns.step(rate)

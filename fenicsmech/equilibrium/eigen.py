@@ -50,7 +50,7 @@ def softest_modes(newton: Iteration, lead: Lead, state: State, *, floor: float, 
     Stiffnesses are in units of the mean stiffness of the links; negative ones are unstable.
     """
     _factor(newton, lead, state, floor)
-    mask = newton.system.coordinates_mask()
+    mask = newton.system.unknowns.coordinates_mask()
     own = len(mask.array_r)
 
     def apply(x: np.ndarray, y: np.ndarray) -> None:
@@ -73,7 +73,7 @@ def critical_changes(newton: Iteration, lead: Lead, state: State, *, floor: floa
     control = lead.holding(state)
     _factor(newton, lead, state, floor)
     x = newton.solve_linear(control.rate(system, state))
-    rate = lead.heading(system.step(x), control)
+    rate = lead.heading(system.unknowns.step(x), control)
     size = system.size(rate.step)
     if not size > 0.0:
         raise NotConverged("it moves nothing", 0)
@@ -84,7 +84,7 @@ def critical_changes(newton: Iteration, lead: Lead, state: State, *, floor: floa
     bend = x.duplicate()
     first.mult(x, bend)
     bend.scale(-1.0 / unit)
-    bend = Heading(system.step(newton.solve_linear(bend)), 0.0)
+    bend = Heading(system.unknowns.step(newton.solve_linear(bend)), 0.0)
     amount = _SECOND / size
     later, here, earlier = (
         _tangent(newton, lead, state, rate.scaled(t) + bend.scaled(0.5 * t * t)) for t in (amount, 0.0, -amount)
@@ -101,7 +101,7 @@ def critical_changes(newton: Iteration, lead: Lead, state: State, *, floor: floa
         right.scale(-1.0)
         y[:own], y[own:] = newton.solve_linear(right).array_r, v.array_r
 
-    template = system.control_row()
+    template = system.unknowns.control_row()
     values = _largest(system, 2 * own, lambda x: x[own:], apply, count)
     return [Mode(unit * mode.value, mode.step) for mode in values]
 
@@ -116,7 +116,8 @@ def _tangent(newton: Iteration, lead: Lead, state: State, change: Heading) -> PE
     """A copy of K after a change of state."""
     moved = lead.moved(newton.system, state, change)
     control = lead.holding(moved)
-    return newton.system.kkt(moved, control, newton.system.balance(moved, control)).copy()
+    newton.system.linearise(moved, control, newton.system.balance(moved, control))
+    return newton.system.kkt.matrix().copy()
 
 
 def _combined(terms: Sequence[tuple[float, PETSc.Mat]]) -> PETSc.Mat:
@@ -165,12 +166,12 @@ def _largest(
     solver.setDimensions(nev=wanted, ncv=min(total, 2 * wanted + 20))
     solver.setTolerances(tol=_TOLERANCE, max_it=200)
     solver.solve()
-    modes, vector, shape = [], operator.createVecRight(), system.control_row()
+    modes, vector, shape = [], operator.createVecRight(), system.unknowns.control_row()
     for index in range(solver.getConverged()):
         theta = solver.getEigenpair(index, vector)
         if theta != 0.0 and abs(theta.imag) <= _REAL * abs(theta):
             shape.array_w[:] = part(vector.array_r)
-            step = system.step(shape)
+            step = system.unknowns.step(shape)
             largest = system.size(step)
             if largest > 0.0:
                 modes.append(Mode(1.0 / theta.real, step.scaled(1.0 / largest)))

@@ -1,4 +1,4 @@
-"""The KKT matrix Gᵀ K̂ G in scaled unknowns, and the map G between these and the change of state they stand for.
+"""The KKT matrix Gᵀ K̂ G in scaled unknowns.
 
 The product over all unknowns is formed for those who ask for it. Others need no more than its stiffness by blocks of
 nodes, its columns of poses, multipliers and force, and Pᵀ KKT P = (G P)ᵀ K̂ (G P) for a narrow P.
@@ -11,68 +11,38 @@ from collections.abc import Iterable
 import numpy as np
 from petsc4py import PETSc
 
-from fenicsmech.bodies import InterfaceMap
 from fenicsmech.clock import Clock
 from fenicsmech.elasticity import ElasticBody
 from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.entry_copy import EntryCopy
-from fenicsmech.equilibrium.extras import REGULARISATION, ExtraEntries
+from fenicsmech.equilibrium.extras import REGULARISATION
 from fenicsmech.equilibrium.layout import Layout
-from fenicsmech.equilibrium.matrices import create_extended_matrix, create_map_matrix, update_map_matrix
-from fenicsmech.linkage import JointSystem
+from fenicsmech.equilibrium.unknowns import ScaledUnknowns
 
 
 class KktMatrix:
-    """K̂, G and their products, whose patterns never change; all methods are collective.
+    """K̂ and its products with G, whose patterns never change; all methods are collective.
 
-    Products are of the K̂ last linearised, with G at ``poses``: take them before either changes.
+    Products are of the K̂ last linearised, with the G of ``unknowns``: take them before either changes.
 
     Args:
-        elastic: the flexible links, at rest.
+        elastic: the flexible links.
         layout: numbering of rows and unknowns.
-        interfaces: interface nodes as functions of poses.
-        joints: the constraints.
-        extras: entries of K̂ beside those of the links; takes the scales of its rows from here.
+        unknowns: what rows and columns stand for.
+        hat: K̂, with the pattern of all its entries.
         clock: where time is counted.
 
     Attributes:
-        unit: a residual of this norm is a displacement of the mechanism's length against the mean stiffness.
-        unit_u, units, scale: what a unit of each scaled unknown stands for: displacements; all free finite-element
-            DOFs; (z, λ, f).
         hat: K̂, to which elastic stiffness may be added between ``tangent`` and ``linearise``.
-        poses: those that G is at.
     """
 
     def __init__(
-        self,
-        elastic: ElasticBody,
-        layout: Layout,
-        interfaces: InterfaceMap,
-        joints: JointSystem,
-        extras: ExtraEntries,
-        *,
-        clock: Clock,
+        self, elastic: ElasticBody, layout: Layout, unknowns: ScaledUnknowns, hat: PETSc.Mat, *, clock: Clock
     ) -> None:
-        self._elastic, self._layout, self._interfaces, self._joints = elastic, layout, interfaces, joints
-        self._clock, self.poses = clock, joints.drawn
-        self.hat = create_extended_matrix(elastic, layout, extras.pattern())
-        # mean diagonal of the stiffness k: D = (ℓ, 1, …) / (ℓ √k) makes the KKT matrix dimensionless
-        free = layout.free_displacements
-        diagonal = self.hat.getDiagonal().array_r[layout.free[:free]]
-        mean = layout.comm.allreduce(float(diagonal.sum())) / layout.comm.allreduce(free)
-        self.unit = float(np.sqrt(mean)) * joints.length
-        self.unit_u = joints.length / self.unit
-        self.units = np.full(len(layout.free), self.unit_u)
-        if elastic.pressure is not None:
-            self.units[free:] = elastic.pressure_unit
-        self.scale = np.concatenate(
-            [joints.pose_scale / self.unit, joints.row_scale * self.unit, [self.unit / joints.length]]
-        )
-        extras.set_regularisation(self.scale[layout.multipliers], self.scale[layout.force])
-        self._map = create_map_matrix(layout, interfaces, joints, self.units, self.scale)
-        self._rows = self.hat.createVecLeft()
+        self._elastic, self._layout, self._unknowns = elastic, layout, unknowns
+        self.hat, self._clock = hat, clock
         # what shift and soften add to the diagonal
-        self._added, self._shift, self._plain = self.zeros(), 0.0, True
+        self._added, self._shift, self._plain = unknowns.zeros(), 0.0, True
         self._entries: EntryCopy | None = None
         self._entries_diagonal: PETSc.Vec | None = None
         self._matrix: PETSc.Mat | None = None
@@ -82,15 +52,11 @@ class KktMatrix:
         self._extra_columns: PETSc.Mat | None = None
         self._converted = self._entries_plain = self._formed = False
 
-    def turn(self, poses: np.ndarray) -> None:
-        """Brings G to ``poses``."""
-        update_map_matrix(self._map, self._layout, self._interfaces, self._joints, poses, self.scale)
-        self.poses = poses
-
     def tangent(self) -> None:
         """Makes K̂ hold ∂²E/∂u² of the present fields, and nothing else."""
-        self.hat.zeroEntries()
-        self._elastic.tangent(self.hat)
+        with self._clock.phase("assemble"):
+            self.hat.zeroEntries()
+            self._elastic.tangent(self.hat)
 
     def linearise(self, entries: Iterable[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> None:
         """Takes the tangent that K̂ holds and the ``entries`` of its extras, without shift and softness."""
@@ -114,14 +80,10 @@ class KktMatrix:
         """The KKT matrix, the same object every time."""
         if not self._formed:
             with self._clock.phase("project"):
-                self._matrix = self._by_entries(plain=True).ptap(self._map, result=self._matrix)
+                self._matrix = self._by_entries(plain=True).ptap(self._unknowns.map, result=self._matrix)
                 self._diagonal, self._formed = self._matrix.getDiagonal(), True
                 self._raise_diagonal()
         return self._matrix
-
-    def mapped(self, columns: PETSc.Mat, result: PETSc.Mat | None = None) -> PETSc.Mat:
-        """G P for the ``columns`` P of unknowns; into an earlier ``result``, if there is one."""
-        return self._map.matMult(columns, result=result)
 
     def restricted(self, mapped: PETSc.Mat, result: PETSc.Mat | None = None) -> PETSc.Mat:
         """Pᵀ KKT P for G P, ``mapped``; into an earlier ``result``, if there is one."""
@@ -135,9 +97,9 @@ class KktMatrix:
             rows = PETSc.IS().createStride(layout.local_rows, layout.first_row, 1, comm=layout.comm)
             extras = layout.extras if layout.last else 0
             columns = PETSc.IS().createStride(extras, layout.first_extra, 1, comm=layout.comm)
-            self._extra_map = self._map.createSubMatrix(rows, columns, self._extra_map)
+            self._extra_map = self._unknowns.map.createSubMatrix(rows, columns, self._extra_map)
             self._images = self._by_entries(plain=self._plain).matMult(self._extra_map, result=self._images)
-            self._extra_columns = self._map.transposeMatMult(self._images, result=self._extra_columns)
+            self._extra_columns = self._unknowns.map.transposeMatMult(self._images, result=self._extra_columns)
         return self._extra_columns
 
     def nodal_stiffness(self) -> PETSc.Mat:
@@ -146,7 +108,7 @@ class KktMatrix:
         nodes = ((self._layout.first_row + free[::dim]) // dim).astype(PETSc.IntType)
         rows = PETSc.IS().createBlock(dim, nodes, comm=self._layout.comm)
         stiffness = self.hat.createSubMatrix(rows, rows)
-        stiffness.scale(self.unit_u**2)
+        stiffness.scale(self._unknowns.unit_u**2)
         stiffness.shift(self._shift)
         return stiffness
 
@@ -172,26 +134,6 @@ class KktMatrix:
             if control.constrained:
                 extras[self._layout.force] = -softness
 
-    def zeros(self) -> PETSc.Vec:
-        """A vector of scaled unknowns."""
-        return self._map.createVecRight()
-
-    def pull(self, nodal: np.ndarray, extras: np.ndarray) -> PETSc.Vec:
-        """Gᵀ of a gradient by u, (owned dofs,), and by (z, λ, f), (extras,), the latter of the last rank."""
-        rows, owned = self._rows.array_w, self._layout.owned
-        rows[:owned] = nodal
-        if self._layout.last:
-            rows[owned : owned + self._layout.extras] = extras
-        vector = self.zeros()
-        self._map.multTranspose(self._rows, vector)
-        return vector
-
-    def push(self, x: PETSc.Vec) -> np.ndarray:
-        """The part u of G x, interface nodes too, (owned dofs,)."""
-        rows = self.hat.createVecLeft()
-        self._map.mult(x, rows)
-        return rows.array_r[: self._layout.owned].copy()
-
     def _raise_diagonal(self) -> None:
         """Makes the whole matrix hold what was assembled and what is added to its diagonal."""
         if not self._plain:
@@ -210,11 +152,11 @@ class KktMatrix:
         if self._entries_plain:
             self._entries_diagonal = entries.getDiagonal()
         # where G holds one entry per row; rows of nodes inside interfaces have no diagonal
-        layout, units = self._layout, self.units
+        layout, units = self._layout, self._unknowns.units
         rows = layout.free
         if layout.last:
             rows = np.concatenate([rows, layout.owned + np.arange(layout.extras)])
-            units = np.concatenate([units, self.scale])
+            units = np.concatenate([units, self._unknowns.scale])
         diagonal = self._entries_diagonal.array_r[rows]
         if not plain:
             diagonal = diagonal + self._added.array_r / units**2

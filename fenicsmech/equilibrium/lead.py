@@ -130,7 +130,7 @@ class ForceLead(Lead):
     def verdict(self, system, state, control, x, excess):
         if control.constrained:
             # x = −K⁻¹ e, and e · K⁻¹ e < 0 exactly if removing the control's row e leaves stability as it is
-            return Verdict(max(excess + int(x.dot(system.control_row()) <= 0.0), 0), max(excess, 0))
+            return Verdict(max(excess + int(x.dot(system.unknowns.control_row()) <= 0.0), 0), max(excess, 0))
         # a force that falls as its point moves on: holding the point takes one mode away
         return Verdict(max(excess, 0), max(excess - int(system.force_rate(state).dot(x) < 0.0), 0))
 
@@ -154,7 +154,7 @@ class MotorLead(Lead):
         return self._exerted(system, state.multipliers)
 
     def conjugate_rate(self, system, state, control, x):
-        return self._exerted(system, system.step(x).multipliers)
+        return self._exerted(system, system.unknowns.step(x).multipliers)
 
     def holding(self, state):
         return MotorControl(self.value(state), self.direction)

@@ -9,6 +9,7 @@ from typing import Protocol
 from petsc4py import PETSc
 
 from fenicsmech.equilibrium.factor import Factor, Inertia
+from fenicsmech.equilibrium.kkt import KktMatrix
 from fenicsmech.equilibrium.system import EquilibriumSystem
 from fenicsmech.equilibrium.two_level import TwoLevelSolver
 from fenicsmech.errors import DescriptionError
@@ -42,14 +43,14 @@ class LinearMethod(ABC):
 
 
 class WholeFactor(Factor):
-    """The factor of the whole KKT matrix of ``system``."""
+    """The factor of the whole KKT matrix."""
 
-    def __init__(self, system: EquilibriumSystem) -> None:
-        self._system = system
-        super().__init__(system.matrix())
+    def __init__(self, kkt: KktMatrix) -> None:
+        self._kkt = kkt
+        super().__init__(kkt.matrix())
 
     def refactor(self):
-        self._system.matrix()  # formed only where it is asked for
+        self._kkt.matrix()  # formed only where it is asked for
         return super().refactor()
 
 
@@ -58,7 +59,7 @@ class Direct(LinearMethod):
     """The factor LDLᵀ of the whole matrix: fastest up to some 80,000 unknowns on slender links."""
 
     def solver(self, system):
-        return WholeFactor(system)
+        return WholeFactor(system.kkt)
 
 
 @dataclass(frozen=True)

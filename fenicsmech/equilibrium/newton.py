@@ -113,7 +113,7 @@ class Newton(Iteration):
             else:
                 system.linearise(state, control, balance)
             x, shift = self._direction(balance, floor, last=shift, any_inertia=near)
-            step, motion = system.step(x), system.expand(x)[0]
+            step, motion = system.unknowns.step(x), system.unknowns.push(x)
             _log.debug("iteration %d: residual %.2e, shift %.1e", iteration, residuals[-1], shift)
             before, norm = state, balance.norm
             advance = self._search if careful else self._full_step
@@ -181,7 +181,7 @@ class Newton(Iteration):
             if x is None:
                 break
             x.scale(-1.0)
-            correction = system.step(x)
+            correction = system.unknowns.step(x)
             length = system.size(correction)
             if not length <= self.options.stale * size:
                 break
@@ -228,7 +228,7 @@ class Newton(Iteration):
 
     def _merit(self, state: State, control: Control, multipliers: np.ndarray, force: float) -> float:
         """Φ of the loaded state, with the multipliers the step leads to."""
-        system, stiffness = self.system, 10.0 * self.system.unit**2
+        system, stiffness = self.system, 10.0 * self.system.unknowns.unit**2
         violation = system.joints.row_scale * system.constraints(state, multipliers)
         value = system.potential(state, force) - multipliers @ system.joints.value(state.poses, state.motors)
         value += 0.5 * stiffness * float(violation @ violation) + 5.0 * system.volume_violation() ** 2

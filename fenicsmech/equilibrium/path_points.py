@@ -172,12 +172,12 @@ class PathPoints:
         """x₀."""
         x = self.newton.solve_linear(balance.vector)
         x.scale(-1.0)
-        return Heading(self.system.step(x), 0.0)
+        return Heading(self.system.unknowns.step(x), 0.0)
 
     def _rate(self, state: State, control: Control) -> Heading:
         """x₁."""
         x = self.newton.solve_linear(control.rate(self.system, state))
-        return self.lead.heading(self.system.step(x), control)
+        return self.lead.heading(self.system.unknowns.step(x), control)
 
     def _point(
         self, state: State, balance: Balance, control: Control, residuals: tuple[float, ...], iterations: int
@@ -188,7 +188,7 @@ class PathPoints:
         excess = newton.inertia().negative - newton.expected
         x = newton.solve_linear(control.rate(system, state))
         verdict = lead.verdict(system, state, control, x, excess)
-        rate = lead.heading(system.step(x), control)
+        rate = lead.heading(system.unknowns.step(x), control)
         scale = 1.0 / self.metric.norm(rate)
         return PathPoint(
             state,

@@ -26,7 +26,7 @@ class SoftMode:
     """
 
     def __init__(self, newton: Iteration) -> None:
-        self._newton, self._mask = newton, newton.system.coordinates_mask()
+        self._newton, self._mask = newton, newton.system.unknowns.coordinates_mask()
         self._mode = self._mask.duplicate()
         # of no symmetry, lest it has nothing of the mode in it
         rank = newton.system.layout.comm.rank

@@ -164,17 +164,17 @@ class Iteration(ABC):
 
     def bearable(self, balance: Balance) -> bool:
         """Whether a state will do where nothing better is found, as at a bifurcation."""
-        limit = min(_BEARABLE * balance.forces, self.options.roundoff * self.system.unit)
+        limit = min(_BEARABLE * balance.forces, self.options.roundoff * self.system.unknowns.unit)
         return balance.norm <= limit < math.inf
 
     def _rounding(self, balance: Balance) -> float:
         """Rounding of displacements and rotations, which are counted from the drawn configuration."""
-        return self.options.roundoff * self.system.unit * max(balance.motion, _LEAST_MOTION)
+        return self.options.roundoff * self.system.unknowns.unit * max(balance.motion, _LEAST_MOTION)
 
     def _refactor(self, shift: float) -> bool:
         """Takes the KKT matrix last linearised with a ``shift``; whether that could be done."""
         with self.system.clock.phase("factor"):
-            self.system.shift(shift)
+            self.system.kkt.shift(shift)
             if self._linear is None:
                 self._linear = self.options.linear.solver(self.system)
             return self._linear.refactor()
@@ -252,7 +252,9 @@ class Iteration(ABC):
         under_control = inertia.negative - self.expected
         unstable = under_control
         if control.constrained:
-            row = system.control_row()
+            row = system.unknowns.control_row()
             # Schur complement of the control row: negative exactly if removing the row leaves stability as it is
             unstable += 1 - int(self.solve_linear(row, tolerance=_STEP).dot(row) < 0.0)
-        return Solution(state, tuple(residuals), iteration, max(unstable, 0), max(under_control, 0), system.step(x))
+        return Solution(
+            state, tuple(residuals), iteration, max(unstable, 0), max(under_control, 0), system.unknowns.step(x)
+        )

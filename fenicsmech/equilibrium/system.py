@@ -8,8 +8,7 @@
          [−a_uᵀ   , −a_zᵀ, 0  , 0   ]]
 
 Where links have a pressure p of their own, u stands for (u, p) in all of this; E is a saddle then, stationary in p.
-B is the curvature of the rigid coordinates, c the compliance of joints, 0 unless an effect softens them. One sparse
-triple product forms the whole matrix for those who ask for it; D makes x dimensionless.
+B is the curvature of the rigid coordinates, c the compliance of joints, 0 unless an effect softens them.
 """
 
 from __future__ import annotations
@@ -34,8 +33,10 @@ from fenicsmech.equilibrium.kkt import KktMatrix
 from fenicsmech.equilibrium.layout import Layout
 from fenicsmech.equilibrium.load import PointLoad
 from fenicsmech.equilibrium.loads import Loads
+from fenicsmech.equilibrium.matrices import create_extended_matrix
 from fenicsmech.equilibrium.potentials import BodyPotentials
 from fenicsmech.equilibrium.state import State, Step
+from fenicsmech.equilibrium.unknowns import ScaledUnknowns
 from fenicsmech.linkage import JointSystem
 
 
@@ -75,10 +76,10 @@ class EquilibriumSystem:
         comm: the processes that share the links.
 
     Attributes:
-        unit: a residual of this norm is a displacement of the mechanism's length against the mean stiffness.
+        layout: numbering of rows and unknowns.
+        unknowns: x and G, at the poses of the last ``balance``.
+        kkt: the KKT matrix last linearised; take it before another ``balance``.
         compliances: c, (rows,).
-        unit_u, units, scale: what a unit of each scaled unknown stands for: displacements; all free finite-element
-            DOFs; (z, λ, f).
     """
 
     def __init__(
@@ -107,20 +108,17 @@ class EquilibriumSystem:
         with clock.phase("setup"):
             elastic.take(np.zeros(self.layout.owned))
             elastic.update()
-            self._kkt = KktMatrix(elastic, self.layout, interfaces, joints, self._extras, clock=clock)
-        self.unit, self.unit_u = self._kkt.unit, self._kkt.unit_u
-        self.units, self.scale = self._kkt.units, self._kkt.scale
+            hat = create_extended_matrix(elastic, self.layout, self._extras.pattern())
+            self.unknowns = ScaledUnknowns(elastic, self.layout, interfaces, joints, hat.getDiagonal().array_r)
+            scale = self.unknowns.scale
+            self._extras.set_regularisation(scale[self.layout.multipliers], scale[self.layout.force])
+            self.kkt = KktMatrix(elastic, self.layout, self.unknowns, hat, clock=clock)
         self._unbalanced = np.zeros(self.layout.displacements)
         self._unbalanced_poses = np.zeros(joints.size)
 
     @cached_property
     def _mixed(self) -> MixedStress:
         return MixedStress(self.elastic)
-
-    @property
-    def poses(self) -> np.ndarray:
-        """Those of the last ``balance``, which the KKT matrix is at."""
-        return self._kkt.poses
 
     @property
     def rigid_rows(self) -> np.ndarray:
@@ -131,8 +129,7 @@ class EquilibriumSystem:
 
     def moved(self, state: State, step: Step) -> State:
         """``state`` after ``step``: rotations back on their manifold, interface nodes on their bodies (collective)."""
-        z = self.joints.unknowns(state.poses) + step.z
-        poses = self.joints.with_unknowns(state.poses, z)
+        poses = self.joints.with_unknowns(state.poses, self.joints.unknowns(state.poses) + step.z)
         moved = replace(
             state,
             u=state.u + step.u,
@@ -201,7 +198,7 @@ class EquilibriumSystem:
         if self.elastic.pressure is None:
             return 0.0
         layout = self.layout
-        missed = (self.elastic.residuals()[layout.free] * self.units)[layout.free_displacements :]
+        missed = (self.elastic.residuals()[layout.free] * self.unknowns.units)[layout.free_displacements :]
         return float(np.sqrt(layout.comm.allreduce(float(missed @ missed))))
 
     def constraints(self, state: State, multipliers: np.ndarray) -> np.ndarray:
@@ -211,8 +208,8 @@ class EquilibriumSystem:
     def balance(self, state: State, control: Control) -> Balance:
         """Gᵀ ∇L (collective). Brings G to the poses of ``state``."""
         with self.clock.phase("residual"):
-            self._kkt.turn(state.poses)
-            layout = self.layout
+            self.unknowns.turn(state.poses)
+            layout, scale = self.layout, self.unknowns.scale
             r = self.elastic.residuals()
             loads = np.zeros_like(r)
             g = np.zeros(layout.extras)
@@ -220,8 +217,8 @@ class EquilibriumSystem:
                 self._loads.add(load, magnitude, state, loads, g)
             r -= loads
             reactions = self.joints.gradient(state.poses, state.motors).T @ state.multipliers
-            forces = np.linalg.norm(g * self.scale) ** 2 + np.linalg.norm(reactions * self.scale[layout.z]) ** 2
-            forces += layout.comm.allreduce(float(np.linalg.norm(loads * self.unit_u) ** 2))
+            forces = np.linalg.norm(g * scale) ** 2 + np.linalg.norm(reactions * scale[layout.z]) ** 2
+            forces += layout.comm.allreduce(float(np.linalg.norm(loads * self.unknowns.unit_u) ** 2))
             self._unbalanced = r[: layout.displacements]
             nodal = self._unbalanced.reshape(-1, layout.per_node)
             moments = layout.comm.allreduce(self.interfaces.moments(nodal), op=_add_moments)
@@ -233,15 +230,14 @@ class EquilibriumSystem:
             gap = float(np.max(np.abs(self.joints.row_scale * violation), initial=0.0))
             if control.constrained:
                 extras[layout.force] = -(self.load_displacement(state) - control.target)
-            vector = self._kkt.pull(r, extras)
+            vector = self.unknowns.pull(r, extras)
             return Balance(vector, vector.norm(), float(np.sqrt(forces)), gap, self._motion(state), moments)
 
     # -- derivatives at the loaded state -------------------------------------------------------------------
 
     def linearise(self, state: State, control: Control, balance: Balance) -> None:
-        """Brings the KKT matrix to the loaded ``state``, for all methods after this (collective)."""
-        with self.clock.phase("assemble"):
-            self._kkt.tangent()
+        """Brings ``kkt`` to the loaded ``state`` (collective)."""
+        self.kkt.tangent()
         self._linearise(state, control, balance.moments)
 
     def linearise_mixed(
@@ -256,54 +252,14 @@ class EquilibriumSystem:
         """
         with self.clock.phase("assemble"):
             self._mixed.follow(before.u, motion)
-            self._kkt.tangent()
-            self._mixed.tangent(self._kkt.hat)
+            self.kkt.tangent()
+            self._mixed.tangent(self.kkt.hat)
             promised = self.interfaces.moments(self._mixed.forces().reshape(-1, self.layout.per_node))
             moments = _add_moments(balance.moments, self.layout.comm.allreduce(promised, op=_add_moments))
         self._linearise(state, control, moments)
 
     def _linearise(self, state: State, control: Control, moments: dict[int, np.ndarray]) -> None:
-        self._kkt.linearise(self._extras.entries(state, control, self._loads.acting(state), moments))
-
-    def kkt(self, state: State, control: Control, balance: Balance) -> PETSc.Mat:
-        """``linearise``, and ``matrix`` (collective)."""
-        self.linearise(state, control, balance)
-        return self.matrix()
-
-    def matrix(self) -> PETSc.Mat:
-        """The KKT matrix last linearised, before another ``balance`` (collective); the same object at every call."""
-        return self._kkt.matrix()
-
-    def mapped(self, columns: PETSc.Mat, result: PETSc.Mat | None = None) -> PETSc.Mat:
-        """G P for the ``columns`` P of unknowns; into an earlier ``result``, if there is one (collective)."""
-        return self._kkt.mapped(columns, result)
-
-    def restricted(self, mapped: PETSc.Mat, result: PETSc.Mat | None = None) -> PETSc.Mat:
-        """Pᵀ KKT P for G P, ``mapped``; into an earlier ``result``, if there is one (collective)."""
-        return self._kkt.restricted(mapped, result)
-
-    def extra_columns(self) -> PETSc.Mat:
-        """The KKT matrix's columns of (z, λ, f), (unknowns, extras); the same object at every call (collective)."""
-        return self._kkt.extra_columns()
-
-    def zeros(self) -> PETSc.Vec:
-        """A vector of scaled unknowns (collective)."""
-        return self._kkt.zeros()
-
-    def nodal_stiffness(self) -> PETSc.Mat:
-        """A new matrix of the KKT matrix's rows and columns of free displacements, by blocks of nodes (collective)."""
-        return self._kkt.nodal_stiffness()
-
-    def shift(self, shift: float) -> None:
-        """Makes the KKT matrix hold ``shift`` · I more than it was assembled with, in the block of s (collective)."""
-        self._kkt.shift(shift)
-
-    def soften(self, softness: float, control: Control) -> None:
-        """Makes the KKT matrix hold −``softness`` · I instead of −ε · I in the block of multipliers (collective).
-
-        The force is one of them under a ``control`` that constrains. Before ``shift``, which makes it take effect.
-        """
-        self._kkt.soften(softness, control)
+        self.kkt.linearise(self._extras.entries(state, control, self._loads.acting(state), moments))
 
     def force_rate(self, state: State) -> PETSc.Vec:
         """Right-hand side whose KKT solution is the rate of x with the controlled force (collective)."""
@@ -313,7 +269,7 @@ class EquilibriumSystem:
         """Gᵀ ∂(a · u_P), of a load's travel with respect to the scaled unknowns x (collective)."""
         nodal, extras = np.zeros(self.layout.owned), np.zeros(self.layout.extras)
         self._loads.add(load, 1.0, state, nodal, extras)
-        return self._kkt.pull(nodal, extras)
+        return self.unknowns.pull(nodal, extras)
 
     def share_rate(self, state: State) -> PETSc.Vec:
         """Right-hand side whose KKT solution is the rate of x with the share of the constant loads (collective)."""
@@ -323,24 +279,20 @@ class EquilibriumSystem:
         extras[self.layout.z] -= self._potentials.rate(state)
         if self.elastic.shares:
             nodal -= self.elastic.share_residuals()
-        return self._kkt.pull(nodal, extras)
+        return self.unknowns.pull(nodal, extras)
 
     def target_rate(self) -> PETSc.Vec:
         """Right-hand side whose KKT solution is the rate of x with the controlled displacement (collective)."""
         extras = np.zeros(self.layout.extras)
         extras[self.layout.force] = -1.0
-        return self._kkt.pull(np.zeros(self.layout.owned), extras)
+        return self.unknowns.pull(np.zeros(self.layout.owned), extras)
 
     def motor_rate(self, state: State, direction: np.ndarray) -> PETSc.Vec:
         """Right-hand side whose KKT solution is the rate of x with motor values along ``direction`` (collective)."""
         extras = np.zeros(self.layout.extras)
         rate, twist = self.joints.motor_rate(state.poses, state.motors, state.multipliers, direction)
         extras[self.layout.multipliers], extras[self.layout.z] = rate, twist
-        return self._kkt.pull(np.zeros(self.layout.owned), extras)
-
-    def expand(self, x: PETSc.Vec) -> tuple[np.ndarray, np.ndarray]:
-        """∂u/∂x · x as in ``State.u``, interface nodes too, (owned dofs,), and the poses' part z (collective)."""
-        return self._kkt.push(x), self.step(x).z
+        return self.unknowns.pull(np.zeros(self.layout.owned), extras)
 
     def nodal_forces(self) -> np.ndarray:
         """∂E/∂u minus the loads on links of the last ``balance``, (owned displacements,)."""
@@ -354,31 +306,6 @@ class EquilibriumSystem:
             z: of the pose unknowns, (size,); keeps joints closed.
         """
         return self.layout.comm.allreduce(float(self._unbalanced @ nodal)) + float(self._unbalanced_poses @ z)
-
-    def control_row(self) -> PETSc.Vec:
-        """The unit vector of the unknown f (collective)."""
-        vector = self._kkt.zeros()
-        if self.layout.last:
-            vector.array_w[-1] = 1.0
-        return vector
-
-    def coordinates_mask(self) -> PETSc.Vec:
-        """One for each of the coordinates s, zero for multipliers and the controlled force (collective)."""
-        vector, layout = self._kkt.zeros(), self.layout
-        vector.array_w[: layout.free_displacements] = 1.0
-        if layout.last:
-            vector.array_w[len(layout.free) :][layout.z] = 1.0
-        return vector
-
-    def step(self, x: PETSc.Vec) -> Step:
-        """The change of state that the scaled unknowns ``x`` stand for (collective)."""
-        local, layout = x.array_r, self.layout
-        free = len(layout.free)
-        u = np.zeros(layout.owned)
-        u[layout.free] = self.units * local[:free]
-        extras = self.scale * local[free:] if layout.last else None
-        extras = layout.comm.bcast(extras, root=layout.comm.size - 1)
-        return Step(u, extras[layout.z], extras[layout.multipliers], float(extras[layout.force]))
 
     # -- pieces --------------------------------------------------------------------------------------------
 

@@ -69,7 +69,7 @@ class TwoLevelSolver:
         self._border: PETSc.Mat | None = None
         self._corner: PETSc.Mat | None = None
         # petsc4py destroys what it creates late: nothing is created per iteration
-        self._work, self._residual, self._z, self._image, self._p, self._q = (system.zeros() for _ in range(6))
+        self._work, self._residual, self._z, self._image, self._p, self._q = (system.unknowns.zeros() for _ in range(6))
         self._nodal: tuple[PETSc.Vec, PETSc.Vec] | None = None
         self._met = 0
         self.iterations: list[int] = []
@@ -79,8 +79,8 @@ class TwoLevelSolver:
         """Takes the KKT matrix's current values; whether that could be done."""
         if self._stiffness is not None:
             self._stiffness.destroy()
-        self._stiffness = self._system.nodal_stiffness()
-        columns = self._system.extra_columns()
+        self._stiffness = self._system.kkt.nodal_stiffness()
+        columns = self._system.kkt.extra_columns()
         self._border = columns.createSubMatrix(self._free, None, self._border)
         self._corner = columns.createSubMatrix(self._extra, None, self._corner)
         if self._nodal is None:

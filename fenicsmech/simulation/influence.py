@@ -59,9 +59,9 @@ class Influence:
         system, state = self._newton.system, self._at.state
         if output is None and self._at.goal is Goal.FORCE:
             # ∂f/∂y is the right-hand side of the rate with the displacement, but for its sign
-            return -system.expand(self._newton.solve_linear(system.target_rate()))[0]
+            return -system.unknowns.push(self._newton.solve_linear(system.target_rate()))
         right = system.travel_gradient(output or system.controlled, state)
-        return system.expand(self._newton.solve_linear(right))[0]
+        return system.unknowns.push(self._newton.solve_linear(right))
 
 
 @contextmanager

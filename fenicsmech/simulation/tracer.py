@@ -225,7 +225,7 @@ class Tracer:
         motors = np.concatenate([motors, np.zeros(len(rigid.connections) - len(motors))])  # welds of links
         free = free_motions(rigid, self._poses, motors, self._model.holding)
         held = np.abs(np.linalg.eigvalsh(free.curvature)) if self._model.holding else np.zeros(0)
-        return bool(np.min(held[held > 0.0], initial=np.inf) < _DROWNED * self._system.unit**2)
+        return bool(np.min(held[held > 0.0], initial=np.inf) < _DROWNED * self._system.unknowns.unit**2)
 
     def _last(self, failure: PathFailed) -> Frame | None:
         """The last equilibrium reached, on the way to a sample too."""

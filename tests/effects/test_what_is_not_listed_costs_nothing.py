@@ -42,7 +42,7 @@ def counts(monkeypatch, space: str, effects=()) -> Counts:
     simulation = fm.Simulation(scene, space=space, order=1, size=4.0)
     simulation.load_displacement(push, forces=[0.0, 0.1 * load])
     energy, model = simulation.model.elastic.energy_ufl, simulation.model
-    matrix = simulation.newton(push).system._kkt.matrix()
+    matrix = simulation.newton(push).system.kkt.matrix()
     monkeypatch.undo()
     return Counts(
         len(compiled),

@@ -23,9 +23,9 @@ SPACES = ["plane-stress", "3d-symmetric", "3d"]
 
 def shifted(system: EquilibriumSystem, state: State, x: np.ndarray) -> State:
     """``state`` moved in a straight line by the scaled unknowns ``x`` of this rank, and loaded (collective)."""
-    vector = system.control_row()
+    vector = system.unknowns.control_row()
     vector.array[:] = x
-    step, joints = system.step(vector), system.joints
+    step, joints = system.unknowns.step(vector), system.joints
     poses = state.poses.copy()
     poses[joints.free_bodies] += step.z.reshape(-1, joints.space.pose_size)
     moved = State(state.u + step.u, poses, state.multipliers + step.multipliers, state.force + step.force, state.motors)
@@ -36,9 +36,9 @@ def shifted(system: EquilibriumSystem, state: State, x: np.ndarray) -> State:
 def largest_steps(system: EquilibriumSystem) -> np.ndarray:
     """How far each scaled unknown may go in finite differences: a small part of a cell, some degrees."""
     layout, joints = system.layout, system.joints
-    poses = np.where(joints.pose_scale == 1.0, 0.03, 0.03 * SIZE) / system.scale[layout.z]
+    poses = np.where(joints.pose_scale == 1.0, 0.03, 0.03 * SIZE) / system.unknowns.scale[layout.z]
     rest = np.ones(joints.rows + 1)
-    return np.concatenate([np.full(len(layout.free), 0.03 * SIZE / system.unit_u), poses, rest])
+    return np.concatenate([np.full(len(layout.free), 0.03 * SIZE / system.unknowns.unit_u), poses, rest])
 
 
 def sample(system: EquilibriumSystem, control: Control) -> np.ndarray:
@@ -106,7 +106,8 @@ def test_kkt_matrix_is_the_derivative_of_the_balance(space, where, kind):
     expected[:, columns] = dense.jacobian(balance, np.zeros(len(columns)), step=largest_steps(system)[columns])
     expected[parts["λ"], parts["λ"]] -= REGULARISATION
     system.load(state)
-    matrix = system.kkt(state, control, system.balance(state, control))
+    system.linearise(state, control, system.balance(state, control))
+    matrix = system.kkt.matrix()
     matrix = matrix.getValues(range(matrix.size[0]), range(matrix.size[1]))
     for row, rows in parts.items():
         for column, all_columns in parts.items():
@@ -124,7 +125,8 @@ def test_kkt_matrix_is_symmetric(space, kind):
     system = system_of(case, controlled=case.on_flexible)
     state, control = random_state(case, system), control_of(kind)
     system.load(state)
-    matrix = system.kkt(state, control, system.balance(state, control))
+    system.linearise(state, control, system.balance(state, control))
+    matrix = system.kkt.matrix()
     matrix = matrix.getValues(range(matrix.size[0]), range(matrix.size[1]))
     assert np.abs(matrix - matrix.T).max() <= 1e-12 * np.abs(matrix).max()
 
@@ -135,11 +137,12 @@ def test_shift_raises_the_curvature_of_displacements_and_poses_alone(space):
     system = system_of(case, controlled=case.on_rigid)
     state, control = random_state(case, system), control_of(LoadControl)
     system.load(state)
-    matrix = system.kkt(state, control, system.balance(state, control))
+    system.linearise(state, control, system.balance(state, control))
+    matrix = system.kkt.matrix()
     plain = matrix.getDiagonal().array.copy()
     parts = blocks(system)
     for amount in (0.25, 2.0, 0.0):
-        system.shift(amount)  # from what was assembled, not on top of the last one
+        system.kkt.shift(amount)  # from what was assembled, not on top of the last one
         change = matrix.getDiagonal().array - plain
         assert change[[*parts["u"], *parts["z"]]] == pytest.approx(amount, abs=1e-14)
         assert not np.any(change[[*parts["λ"], *parts["f"]]])
@@ -168,7 +171,8 @@ def test_kkt_matrix_times_a_direction_is_the_change_of_the_balance_on_any_number
     finer = [(4.0 * b - a) / 3.0 for a, b in zip(slopes[:-1], slopes[1:], strict=True)]
     expected = (16.0 * finer[1] - finer[0]) / 15.0
     system.load(state)
-    matrix = system.kkt(state, control, system.balance(state, control))
+    system.linearise(state, control, system.balance(state, control))
+    matrix = system.kkt.matrix()
     vector = matrix.createVecRight()
     vector.array[:] = direction
     assert (matrix * vector - expected).norm() <= 1e-7 * expected.norm()

@@ -42,7 +42,7 @@ def test_rates_at_the_equilibria_are_as_good_as_those_of_a_new_factor(space):
         state = solution.state
         system.load(state)
         newton.factor(state, control, system.balance(state, control), 0.0)
-        rate = system.step(newton.solve_linear(control.rate(system, state)))
+        rate = system.unknowns.step(newton.solve_linear(control.rate(system, state)))
         off = system.size(rate + solution.tangent.scaled(-1.0)) / system.size(rate)
         assert off < newton.options.stale
         corrected += 0.0 < off
@@ -54,7 +54,7 @@ def solution_rate(newton, state):
     control = LoadControl(state.force)
     newton.system.load(state)
     newton.factor(state, control, newton.system.balance(state, control), 0.0)
-    return newton.system.step(newton.solve_linear(control.rate(newton.system, state)))
+    return newton.system.unknowns.step(newton.solve_linear(control.rate(newton.system, state)))
 
 
 @pytest.mark.parametrize("nearness", [1e-2, 1e-3, 1e-4])

@@ -28,11 +28,11 @@ def unknowns(system, state, seed: int) -> np.ndarray:
     """Small scaled unknowns of this rank, each block of a size its kind bears."""
     random = np.random.default_rng(seed + system.layout.comm.rank)
     layout = system.layout
-    displacements = 0.01 / system.unit_u * random.uniform(-1.0, 1.0, layout.free_displacements)
+    displacements = 0.01 / system.unknowns.unit_u * random.uniform(-1.0, 1.0, layout.free_displacements)
     pressures = 0.3 / system.elastic.pressure_unit
     pressures = pressures * random.uniform(-1.0, 1.0, len(layout.free) - layout.free_displacements)
     extras = random.uniform(-1.0, 1.0, layout.extras)
-    extras[layout.z] *= 0.01 / system.unit_u
+    extras[layout.z] *= 0.01 / system.unknowns.unit_u
     return np.concatenate([displacements, pressures, *([extras] if layout.last else [])])
 
 
@@ -61,7 +61,8 @@ def test_balance_and_kkt_matrix_are_derivatives_of_the_lagrangian(dim, comm):
     system.load(state)
     at = system.balance(state, control)
     slope = comm.allreduce(at.vector.array @ direction)
-    matrix = system.kkt(state, control, at)
+    system.linearise(state, control, at)
+    matrix = system.kkt.matrix()
     vector = matrix.createVecRight()
     vector.array[:] = direction
     curvature = comm.allreduce(weights @ (matrix * vector).array)
@@ -78,9 +79,10 @@ def test_balance_and_kkt_matrix_are_derivatives_of_the_lagrangian(dim, comm):
 def test_shift_leaves_pressures_alone(dim):
     system, state, control = case_of(dim, MPI.COMM_WORLD)
     system.load(state)
-    matrix = system.kkt(state, control, system.balance(state, control))
+    system.linearise(state, control, system.balance(state, control))
+    matrix = system.kkt.matrix()
     plain = matrix.getDiagonal().array.copy()
-    system.shift(0.25)
+    system.kkt.shift(0.25)
     change, layout = matrix.getDiagonal().array - plain, system.layout
     assert change[: layout.free_displacements] == pytest.approx(0.25, abs=1e-12)
     assert not np.any(change[layout.free_displacements : len(layout.free)])
@@ -100,7 +102,8 @@ def test_balance_is_the_same_on_any_number_of_ranks(dim):
 def test_pressures_are_about_as_large_as_displacements_in_scaled_units():
     system, state, control = case_of(2, MPI.COMM_WORLD)
     system.load(state)
-    matrix = system.kkt(state, control, system.balance(state, control))
+    system.linearise(state, control, system.balance(state, control))
+    matrix = system.kkt.matrix()
     comm, layout = system.layout.comm, system.layout
     # how much of the pressures' rows lies at displacements: their coupling, about one per unit
     probe, rows = matrix.createVecRight(), []

@@ -18,7 +18,7 @@ from fenicsmech.equilibrium import (
     TwoLevel,
 )
 from fenicsmech.equilibrium.factor import Factor
-from fenicsmech.equilibrium.system import EquilibriumSystem
+from fenicsmech.equilibrium.kkt import KktMatrix
 from fenicsmech.equilibrium.two_level import TwoLevelSolver
 
 from .finger import RUBBER, finger
@@ -91,7 +91,8 @@ def test_inertia_and_solutions_are_those_of_the_factor_on_both_sides_of_buckling
     for load in (0.9, 0.99, 1.03, 1.3, 5.5, 10.0):
         state = system.moved(first, compression.scaled((load - 0.5) * EULER))
         control = LoadControl(load * EULER)
-        matrix = system.kkt(state, control, system.balance(state, control))
+        system.linearise(state, control, system.balance(state, control))
+        matrix = system.kkt.matrix()
         solver = solver or TwoLevelSolver(system)
         factor = Factor(matrix)
         assert factor.refactor() and solver.refactor()
@@ -115,10 +116,11 @@ def test_stiffness_by_nodes_is_that_block_of_the_matrix():
     state = simulation.load_displacement(push, forces=[0.5 * EULER]).frames[0].state
     control = LoadControl(0.5 * EULER)
     system.load(state)
-    matrix = system.kkt(state, control, system.balance(state, control))
+    system.linearise(state, control, system.balance(state, control))
+    matrix = system.kkt.matrix()
     for shift in (0.0, 0.3):
-        system.shift(shift)
-        nodal = system.nodal_stiffness()
+        system.kkt.shift(shift)
+        nodal = system.kkt.nodal_stiffness()
         x, y = matrix.createVecRight(), nodal.createVecRight()
         count = y.getLocalSize()
         x.array_w[:count] = y.array_w[:] = np.random.default_rng(matrix.comm.rank).standard_normal(count)
@@ -138,16 +140,16 @@ def test_columns_and_restrictions_are_those_of_the_matrix_shifted_and_softened()
     for softness, shift in ((None, 0.0), (None, 0.3), (0.02, 0.0), (0.02, 0.3), (None, 0.0)):
         system.linearise(state, control, system.balance(state, control))
         if softness is not None:
-            system.soften(softness, control)
-        system.shift(shift)
+            system.kkt.soften(softness, control)
+        system.kkt.shift(shift)
         narrow = groups(system)
-        mapped = system.mapped(narrow, mapped)
-        restricted = system.restricted(mapped, restricted)
-        columns = system.extra_columns()
-        matrix = system.matrix()  # last, so that it is not what the others take
+        mapped = system.unknowns.map.matMult(narrow, result=mapped)
+        restricted = system.kkt.restricted(mapped, restricted)
+        columns = system.kkt.extra_columns()
+        matrix = system.kkt.matrix()  # last, so that it is not what the others take
         x, coarse = columns.createVecRight(), restricted.createVecRight()
         x.array_w[:], coarse.array_w[:] = (random.standard_normal(len(v.array)) for v in (x, coarse))
-        whole = system.zeros()
+        whole = system.unknowns.zeros()
         if layout.last:
             whole.array_w[len(layout.free) :] = x.array_r
         assert (columns * x - matrix * whole).norm() <= 1e-12 * (columns * x).norm()
@@ -158,7 +160,7 @@ def test_columns_and_restrictions_are_those_of_the_matrix_shifted_and_softened()
 
 def groups(system):
     """P with one entry in each row: sums of ten unknowns."""
-    local = system.zeros().getLocalSize()
+    local = system.unknowns.zeros().getLocalSize()
     owned = -(-local // 10)
     first = (system.layout.comm.exscan(owned) or 0) + np.arange(local) // 10
     total = system.layout.comm.allreduce(owned)
@@ -173,7 +175,7 @@ def test_the_matrix_over_all_unknowns_is_never_formed(monkeypatch):
     def formed(self):
         raise AssertionError("the KKT matrix was formed")
 
-    monkeypatch.setattr(EquilibriumSystem, "matrix", formed)
+    monkeypatch.setattr(KktMatrix, "matrix", formed)
     simulation, push = finger("3d", size=6.0, solver=PrimalDualNewton(linear=TwoLevel()))
     assert simulation.load_displacement(push, forces=[1.0]).frames[0].stable
 
@@ -214,7 +216,8 @@ def test_size_decides_unless_said_otherwise():
     system = simulation.newton(push).system
     state = simulation.load_displacement(push, forces=[0.0]).frames[0].state
     control = LoadControl(0.0)
-    unknowns = system.kkt(state, control, system.balance(state, control)).getSize()[0]
+    system.linearise(state, control, system.balance(state, control))
+    unknowns = system.kkt.matrix().getSize()[0]
     assert isinstance(BySize(limit=unknowns).solver(system), Factor)
     assert isinstance(BySize(limit=unknowns - 1).solver(system), TwoLevelSolver)
     assert isinstance(BySize().solver(system), Factor)

@@ -82,7 +82,7 @@ class AugmentedLagrangianIteration(Iteration):
             balance = system.balance(current, control)
             residuals.append(self.relative(balance))
             # λ⁺ = λ − μ C(s) holds the rounding of C, μ times
-            noise = penalty * options.roundoff * system.unit
+            noise = penalty * options.roundoff * system.unknowns.unit
             if self.converged(balance, before, noise=noise) and iteration > 0:
                 self._factor_true(current, control, balance, floor, iteration)
                 return self._accept(self._normalised(current), control, residuals, iteration)
@@ -117,7 +117,7 @@ class AugmentedLagrangianIteration(Iteration):
     def _updated(self, state: State, control: Control, softness: float) -> State:
         """``state``, whose multipliers are λ, with λ⁺ instead; softness is 1/μ."""
         system, layout = self.system, self.system.layout
-        weight = softness / system.scale[layout.multipliers] ** 2
+        weight = softness / system.unknowns.scale[layout.multipliers] ** 2
         violation = system.constraints(state, np.zeros(system.joints.rows))
         multipliers = (weight * state.multipliers - violation) / (weight + system.compliances)
         force = state.force
@@ -130,7 +130,7 @@ class AugmentedLagrangianIteration(Iteration):
         system = self.system
         new = self._updated(state, control, softness)
         multipliers, change = new.multipliers, new.multipliers - state.multipliers
-        weight = softness / system.scale[system.layout.multipliers] ** 2
+        weight = softness / system.unknowns.scale[system.layout.multipliers] ** 2
         value = system.potential(state, new.force) - multipliers @ system.constraints(state, 0.5 * multipliers)
         value -= 0.5 * change @ (weight * change)
         if control.constrained:
@@ -138,7 +138,7 @@ class AugmentedLagrangianIteration(Iteration):
         return value
 
     def _force_weight(self, softness: float) -> float:
-        return softness / self.system.scale[self.system.layout.force] ** 2
+        return softness / self.system.unknowns.scale[self.system.layout.force] ** 2
 
     def _parts(self, balance: Balance) -> tuple[float, float]:
         """|∇L_A|, and |C| over the mechanism's length, of a balance at λ⁺."""
@@ -146,7 +146,7 @@ class AugmentedLagrangianIteration(Iteration):
         states = len(layout.free) + (self.system.joints.size if layout.last else 0)
         squares = [float(part @ part) for part in (local[:states], local[states:])]
         gradient, violation = (math.sqrt(layout.comm.allreduce(square)) for square in squares)
-        return gradient, violation / self.system.unit
+        return gradient, violation / self.system.unknowns.unit
 
     def _direction(
         self, current: State, control: Control, balance: Balance, softness: float, floor: float, *, last: float
@@ -154,7 +154,7 @@ class AugmentedLagrangianIteration(Iteration):
         """The Newton step of s, with δ grown until it descends; the slope of L_A along it; δ."""
         system, layout = self.system, self.system.layout
         system.linearise(current, control, balance)
-        system.soften(softness, control)
+        system.kkt.soften(softness, control)
         right = balance.vector.copy()
         if layout.last:
             right.array_w[len(layout.free) + system.joints.size :] = 0.0
@@ -167,7 +167,7 @@ class AugmentedLagrangianIteration(Iteration):
         else:
             raise NotConverged("no shift of the tangent gives a direction of descent", 0)
         x.scale(-1.0)
-        return system.step(x), x.dot(right), shift
+        return system.unknowns.step(x), x.dot(right), shift
 
     def _moved(self, state: State, step: Step, length: float) -> State:
         """``state`` after ``length`` of ``step`` in s; the unit length of quaternions is a constraint like others."""

@@ -60,7 +60,7 @@ class KktIteration(Iteration):
             x.scale(-1.0)
             before = balance.norm
             try:
-                state, balance = self._advance(state, control, system.step(x), balance, iteration)
+                state, balance = self._advance(state, control, system.unknowns.step(x), balance, iteration)
             except NotConverged as failure:
                 return self._bear(*best, control, floor, residuals, failure)
             if balance.norm < best[1].norm:

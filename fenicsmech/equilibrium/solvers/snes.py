@@ -81,7 +81,7 @@ class SnesIteration(Iteration):
         snes = PETSc.SNES().create(system.layout.comm)
         options = PETSc.Options(_PREFIX)
         options["snes_linesearch_type"] = "basic" if chosen is Globalisation.TRUST_REGION else chosen.value
-        options["snes_tr_delta0"] = _FIRST_RADIUS * system.unit * math.sqrt(equations.balance.vector.size)
+        options["snes_tr_delta0"] = _FIRST_RADIUS * system.unknowns.unit * math.sqrt(equations.balance.vector.size)
         snes.setOptionsPrefix(_PREFIX)
         snes.setType("newtontr" if chosen is Globalisation.TRUST_REGION else "newtonls")
         snes.setFunction(equations.residual, equations.balance.vector.duplicate())
@@ -112,14 +112,15 @@ class _Equations:
         self._iteration, self._system, self._base = iteration, iteration.system, base
         self._control, self._floor = control, floor
         self.state, self.balance = base, self._system.balance(base, control)
-        self.matrix = self._system.kkt(base, control, self.balance)
+        self._system.linearise(base, control, self.balance)
+        self.matrix = self._system.kkt.matrix()
         self.factored = False
         self.residuals: list[float] = []
         self.norm = math.inf
 
     def evaluate(self, x: PETSc.Vec) -> bool:
         """Brings ``state`` and ``balance`` to x; False, with the balance as it was, if elements are inverted there."""
-        self.state = self._system.moved(self._base, self._system.step(x))
+        self.state = self._system.moved(self._base, self._system.unknowns.step(x))
         if not math.isfinite(self._system.elastic_energy()):
             return False
         self.balance = self._system.balance(self.state, self._control)
@@ -133,7 +134,8 @@ class _Equations:
 
     def jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, matrix: PETSc.Mat, preconditioner: PETSc.Mat) -> None:
         self.evaluate(x)
-        self._system.kkt(self.state, self._control, self.balance)
+        self._system.linearise(self.state, self._control, self.balance)
+        self._system.kkt.matrix()  # the same object, with its new values
 
     def rebase(self, snes: PETSc.SNES, iteration: int) -> None:
         """Counts x from the present iterate."""

@@ -21,11 +21,11 @@ def test_gradient_and_matrix_are_derivatives_of_the_value(space, kind):
     state = control.prepare(random_state(case, system))
     states = len(system.layout.free) + system.joints.size
 
-    way = system.control_row()
+    way = system.unknowns.control_row()
     way.array[:] = np.random.default_rng(2).standard_normal(len(way.array))
     way.array[states:] = 0.0
-    way.scale(1e-2 / system.size(system.step(way)))
-    step = system.step(way)
+    way.scale(1e-2 / system.size(system.unknowns.step(way)))
+    step = system.unknowns.step(way)
 
     def value(length):
         return iteration._value(iteration._moved(state, step, length), control, SOFTNESS)
@@ -39,9 +39,10 @@ def test_gradient_and_matrix_are_derivatives_of_the_value(space, kind):
     balance = system.balance(current, control)
     assert balance.vector.dot(way) == pytest.approx(slope, rel=1e-6)
 
-    matrix = system.kkt(current, control, balance)
-    system.soften(SOFTNESS, control)
-    system.shift(0.0)
+    system.linearise(current, control, balance)
+    matrix = system.kkt.matrix()
+    system.kkt.soften(SOFTNESS, control)
+    system.kkt.shift(0.0)
     # the multipliers eliminated: their rows of K (s, λ) are zero
     full, product = way.copy(), way.duplicate()
     matrix.mult(way, product)
