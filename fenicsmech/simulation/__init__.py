@@ -1,8 +1,9 @@
 """What users run: a scene at some fidelity, and the curves it gives.
 
-- ``simulation``: the entry point
+- ``simulation``: the entry point, which computes curves
+- ``postprocessing``: what it tells of them
 - ``fidelity``, ``dial``: how finely it is computed, as given or as found by the accuracy asked for
-- ``link_meshes``, ``model``: the discretised mechanism behind it
+- ``discretisation``: a scene at one fidelity, with the discretised mechanism behind it (``link_meshes``, ``model``)
 - ``request``, ``curves``, ``tracer``: what a curve is asked for, and how it is traced
 - ``frame``, ``curve``: what comes out
 - ``leading``: what leads a curve, a force or a motor

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
-from pathlib import Path as FilePath
 
 import numpy as np
 from mpi4py import MPI
@@ -21,37 +19,26 @@ from fenicsmech.equilibrium import (
     ArcSteps,
     EquilibriumSolver,
     Hermite,
-    Iteration,
     Predictor,
     PrimalDualNewton,
 )
 from fenicsmech.errors import DescriptionError
-from fenicsmech.linkage import build_linkage
 from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Leader, Mechanism, Output, Scene
 from fenicsmech.mechanism.checks import positive
-from fenicsmech.meshing import radius_ratios
-from fenicsmech.report import Panel, Progress, Silent, Trace, draw_configurations
-from fenicsmech.simulation.buckling import BucklingLoad, SoftMode, buckling_loads, soft_modes
+from fenicsmech.report import Progress, Silent
 from fenicsmech.simulation.curve import Curve
-from fenicsmech.simulation.curves import Curves
 from fenicsmech.simulation.dial import Choice, Dial, Outcome, Rung, corrections, refuse_beside_accuracy
-from fenicsmech.simulation.estimates import Estimates
-from fenicsmech.simulation.explanation import Explanation, hints, simulated
-from fenicsmech.simulation.export import write_xdmf
-from fenicsmech.simulation.fidelity import Fidelity, read_fidelity
+from fenicsmech.simulation.discretisation import Discretisation
+from fenicsmech.simulation.fidelity import read_fidelity
 from fenicsmech.simulation.followed import FollowedCurve, PathEvent
-from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.link_meshes import check_links, mesh_mechanism
 from fenicsmech.simulation.mode_shape import ModeShape
-from fenicsmech.simulation.model import MechanismModel
-from fenicsmech.simulation.picture import panel
+from fenicsmech.simulation.postprocessing import Postprocessing
 from fenicsmech.simulation.request import CurveRequest, read_path, read_request
-from fenicsmech.simulation.snapshot import gather, rest_vertices
 from fenicsmech.simulation.unloaded import unloaded_positions
 from fenicsmech.simulation.until import Until, check_until
 
 
-class Simulation:
+class Simulation(Postprocessing):
     """Equilibria of a scene at one fidelity: the one given, or the cheapest that is accurate enough.
 
     Nothing is meshed or compiled until the first curve; the description is checked at once.
@@ -97,20 +84,11 @@ class Simulation:
     ) -> None:
         if formulation is not None and not isinstance(formulation, Formulation):
             raise DescriptionError("formulation", f"it is {formulation!r}", "Give Mixed() or Displacement()")
-        self.scene, self.comm, self.clock = scene, comm, Clock()
-        self._described = _description(scene.mechanism)
-        self._solver, self._predictor = solver or PrimalDualNewton(), predictor or Hermite()
-        self._last: Curve | None = None
+        formulation = formulation or Mixed()
         self.choice: Choice | None = None
         self._dial: Dial | None = None
-        formulation = formulation or Mixed()
-        if accuracy is not None:
-            refuse_beside_accuracy(space=space, order=order, layers=layers, segments=segments, quadrature=quadrature)
-            self._dial = Dial(scene, positive("accuracy", accuracy), size, formulation)
-            self._take(self._dial.fidelity(self._dial.rung))
-            return
-        self._take(
-            read_fidelity(
+        if accuracy is None:
+            fidelity = read_fidelity(
                 scene,
                 space=space,
                 order=order,
@@ -120,17 +98,13 @@ class Simulation:
                 layers=layers,
                 segments=segments,
             )
-        )
-
-    @cached_property
-    def model(self) -> MechanismModel:
-        """The meshed mechanism (collective)."""
-        with self.clock.phase("mesh"):
-            mesh = mesh_mechanism(self.comm, self.scene.mechanism, self.linkage, self.fidelity)
-        with self.clock.phase("setup"):
-            return MechanismModel(
-                self.scene.mechanism, self.linkage, mesh, self.fidelity, self.clock, self.scene.effects
-            )
+        else:
+            refuse_beside_accuracy(space=space, order=order, layers=layers, segments=segments, quadrature=quadrature)
+            self._dial = Dial(scene, positive("accuracy", accuracy), size, formulation)
+            fidelity = self._dial.fidelity(self._dial.rung)
+        solver, predictor = solver or PrimalDualNewton(), predictor or Hermite()
+        super().__init__(Discretisation(scene, fidelity, solver=solver, predictor=predictor, clock=Clock(), comm=comm))
+        self._described = _description(scene.mechanism)
 
     def load_displacement(
         self,
@@ -178,7 +152,7 @@ class Simulation:
             request: what is asked for.
             watch: called with the number of frames so far.
         """
-        return self._curves.trace(request, watch)
+        return self._discretisation.curves.trace(request, watch)
 
     def follow(
         self,
@@ -210,7 +184,7 @@ class Simulation:
         request = read_path(self.scene.mechanism, part, configuration=configuration, others=others)
         check_until(until, part)
         with Progress(until.frames, configuration.name) if self.comm.rank == 0 else Silent() as progress:
-            self._last = self._curves.follow(request, until, steps, progress.update)
+            self._last = self._discretisation.curves.follow(request, until, steps, progress.update)
         return self._last
 
     def branches(
@@ -238,37 +212,7 @@ class Simulation:
         """
         self._check_description()
         check_until(until, curve.part)
-        return self._curves.branches(curve, event, until, steps, mode)
-
-    def buckling_loads(
-        self, curve: Curve | None = None, *, frame: Frame | None = None, count: int = 3
-    ) -> tuple[BucklingLoad, ...]:
-        """Forces at which the equilibrium would stop being unique, from the tangent and its rate (collective).
-
-        Exact for columns and others that hardly move before they buckle; else the better the nearer the frame is.
-
-        Args:
-            curve: the last curve computed by default.
-            frame: the equilibrium; the last one of the curve by default.
-            count: how many, those nearest to the force of the frame, in both senses, nearest first.
-
-        Raises:
-            DescriptionError: no curve was computed yet.
-        """
-        chosen = self._chosen(curve)
-        newton = self.newton(chosen.force_part, chosen.others)
-        return buckling_loads(self.model, newton, chosen, frame or chosen.frames[-1], count)
-
-    def soft_modes(
-        self, curve: Curve | None = None, *, frame: Frame | None = None, count: int = 3
-    ) -> tuple[SoftMode, ...]:
-        """The directions in which an equilibrium is softest under dead loads, softest first (collective).
-
-        Arguments and errors as those of ``buckling_loads``.
-        """
-        chosen = self._chosen(curve)
-        newton = self.newton(chosen.part, chosen.others)
-        return soft_modes(self.model, newton, chosen, frame or chosen.frames[-1], count)
+        return self._discretisation.curves.branches(curve, event, until, steps, mode)
 
     def on(self, comm: MPI.Comm) -> Simulation:
         """The same scene at the same fidelity for other processes, as drawn."""
@@ -281,109 +225,10 @@ class Simulation:
             layers=self.fidelity.layers,
             segments=self.fidelity.segments,
             formulation=self.fidelity.formulation,
-            solver=self._solver,
-            predictor=self._predictor,
+            solver=self._discretisation.solver,
+            predictor=self._discretisation.predictor,
             comm=comm,
         )
-
-    def error_estimates(self, curve: Curve | None = None, *, output: Output | None = None) -> np.ndarray:
-        """What finer elements would add to what each frame leaves open, (frames,) (collective).
-
-        That is the displacement where forces were prescribed, the force where displacements were, or where the curve
-        was followed: ``curve.goal``.
-
-        Args:
-            curve: the last curve computed by default.
-            output: whose displacement is asked for instead, while what was prescribed stays as it is.
-
-        Raises:
-            DescriptionError: no curve was computed yet.
-        """
-        return self.estimates.elements(self._chosen(curve), output)
-
-    def modelling_errors(self, curve: Curve | None = None, *, output: Output | None = None) -> np.ndarray:
-        """What a simulation in space would add to plane stress, arguments and result as of ``error_estimates``.
-
-        Raises:
-            DescriptionError: no curve was computed yet, or this is not plane stress.
-        """
-        return self.estimates.depth(self._chosen(curve), output)
-
-    def explain(self, curve: Curve | None = None, *, tolerance: float = 0.01) -> Explanation:
-        """What is simulated and what is left out, with figures where that may matter (collective).
-
-        Args:
-            curve: whose last frame the figures are of; the last curve computed by default.
-            tolerance: relative change of the displacement from which something matters.
-
-        Raises:
-            DescriptionError: no curve was computed yet, or the tolerance is not a positive number.
-        """
-        positive("tolerance of an explanation", tolerance)
-        chosen, fidelity = self._chosen(curve), self.fidelity
-        left_out = hints(
-            self.model,
-            self.newton(chosen.force_part),
-            chosen,
-            order=fidelity.order,
-            tolerance=tolerance,
-            units=self.scene.units,
-        )
-        return Explanation(simulated(self.model, fidelity.model.name, fidelity.order), tuple(left_out))
-
-    def newton(self, part: Leader, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
-        """The solver for what leads and some fixed forces, kept for all configurations (collective)."""
-        return self._curves.newton(part, others)
-
-    def von_mises(self, frame: Frame) -> np.ndarray | None:
-        """Von Mises stress at the midpoints of all cells, on rank 0; None elsewhere (collective).
-
-        Cells are numbered as in ``model.mesh.cells``, (cells,).
-        """
-        snapshot = gather(self.model, frame)
-        return None if snapshot is None else snapshot.von_mises
-
-    def write(self, path: str | FilePath, curve: Curve | None = None) -> None:
-        """Writes the frames of ``curve`` (the last one computed) as XDMF for ParaView (collective).
-
-        Raises:
-            DescriptionError: no curve was computed yet, or the path does not end in .xdmf.
-        """
-        write_xdmf(path, self.model, self._chosen(curve).frames)
-
-    def picture(
-        self,
-        path: str | FilePath,
-        curve: Curve | None = None,
-        *,
-        stress: bool = True,
-        traces: Sequence[Trace] = (),
-    ) -> None:
-        """Draws the first and the last frame of ``curve`` as a PNG (collective).
-
-        Args:
-            path: the file.
-            curve: the last curve computed by default.
-            stress: colour links by von Mises stress.
-            traces: paths of points to draw along.
-
-        Raises:
-            DescriptionError: no curve was computed yet.
-        """
-        panel = self.panel(self._chosen(curve), stress=stress, traces=traces)
-        if panel is not None:
-            units = self.scene.units
-            draw_configurations(
-                path,
-                [panel],
-                title=self.scene.mechanism.name,
-                colour_label=f"von Mises stress [{units.stress}]" if stress else "",
-                unit=units.length,
-            )
-
-    def panel(self, curve: Curve, *, stress: bool = True, traces: Sequence[Trace] = ()) -> Panel | None:
-        """The picture of a curve's first and last frame, on rank 0; None elsewhere (collective)."""
-        return panel(self.model, curve, stress=stress, traces=traces)
 
     def path(self, part: Force | Output, configurations: Sequence[Configuration]) -> np.ndarray:
         """Where the unloaded point of a force or output is in each configuration, (configurations, dim).
@@ -392,28 +237,6 @@ class Simulation:
             AssemblyError: one of the configurations does not assemble, or its motors strain the links.
         """
         return unloaded_positions(self.linkage, part, configurations, holding(self.scene.effects, self.linkage))
-
-    @property
-    def setup_seconds(self) -> float:
-        """Seconds spent before the first frame: mesh, compiled forms, matrix patterns."""
-        return sum(self.clock.seconds.get(phase, 0.0) for phase in ("mesh", "setup", "compile"))
-
-    @property
-    def mesh_ratio_max(self) -> float:
-        """Largest ratio of circumradius to inradius among the cells of the rest shape (collective)."""
-        rest, ratio = rest_vertices(self.model), None
-        if rest is not None:
-            ratio = self.fidelity.model.dim / float(radius_ratios(rest, self.model.mesh.cells).min())
-        return self.comm.bcast(ratio, root=0)
-
-    @cached_property
-    def _curves(self) -> Curves:
-        return Curves(self.model, self._solver, self._predictor, self.scene.units)
-
-    @cached_property
-    def estimates(self) -> Estimates:
-        """Error estimates at equilibria of the present fidelity (collective)."""
-        return Estimates(self.model, self._curves.newton)
 
     def _check_description(self) -> None:
         """Refuses a mechanism that is not the one this simulation was made for."""
@@ -424,31 +247,18 @@ class Simulation:
                 "Make a new Simulation",
             )
 
-    def _take(self, fidelity: Fidelity) -> None:
-        """Goes on at ``fidelity``; what was computed at another one stays with its curves."""
-        linkage = build_linkage(self.scene.mechanism, fidelity.model.mechanism_dim)
-        check_links(self.scene.mechanism, linkage, fidelity)
-        self.fidelity, self.linkage = fidelity, linkage
-        for derived in ("model", "_curves", "estimates"):
-            self.__dict__.pop(derived, None)
-
     def _outcome(self, rung: Rung, request: CurveRequest, watch: Callable[[int], None]) -> Outcome:
         """What a rung of the dial gives for a curve, and how wrong it may be (collective)."""
         fidelity = self._dial.fidelity(rung)
         if fidelity != self.fidelity:
-            self._take(fidelity)
+            # what was computed at another one stays with its curves
+            self._discretisation = self._discretisation.at(fidelity)
         curve = self.trace(request, watch=watch)
         elements, depth = self.estimates.elements_and_depth(curve)
         values, largest = curve.goals, int(np.argmax(np.abs(curve.goals)))
         self._last = replace(curve, corrections=corrections(elements + depth, values))
         unknowns = self.model.rigid_dofs + self.model.flexible_dofs + self.model.pressure_dofs
         return Outcome(float(values[largest]), float(elements[largest]), float(depth[largest]), unknowns)
-
-    def _chosen(self, curve: Curve | None) -> Curve:
-        chosen = curve or self._last
-        if chosen is None:
-            raise DescriptionError("simulation", "no curve was computed yet", "Call load_displacement first")
-        return chosen
 
 
 def _description(mechanism: Mechanism) -> tuple[tuple, ...]:
