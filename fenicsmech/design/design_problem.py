@@ -11,7 +11,7 @@ import numpy as np
 
 from fenicsmech.clock import Clock
 from fenicsmech.design.checkpoint import Checkpoint, fingerprint
-from fenicsmech.design.conclusion import link_designs, target_results, verify
+from fenicsmech.design.conclusion import Verification, link_designs, target_results, verify
 from fenicsmech.design.equilibria import TargetEquilibria
 from fenicsmech.design.groups import Group, group_count, split
 from fenicsmech.design.handle_optimum import Placement
@@ -26,7 +26,7 @@ from fenicsmech.design.regularisers import MeshQuality, Regulariser, ShapeBounds
 from fenicsmech.design.rest_shape import RestShape
 from fenicsmech.design.result import DesignResult
 from fenicsmech.design.spline_design import SplineDesign, Target, bounds_of, shape_request
-from fenicsmech.design.team import minimise_together
+from fenicsmech.design.team import Outcome, minimise_together
 from fenicsmech.errors import DescriptionError, EquilibriumError, FenicsmechError
 from fenicsmech.simulation import Simulation
 
@@ -112,66 +112,21 @@ class DesignProblem:
                 the point of a target.
             EquilibriumError: the initial design does not carry its loads.
         """
-        began = perf_counter()
-        minimiser = minimiser or LevenbergMarquardt()
-        clock = dict(self._clock.seconds)
+        began, clock = perf_counter(), dict(self._clock.seconds)
+        minimiser, comm = minimiser or LevenbergMarquardt(), self.simulation.comm
         _, objective = self._team
-        begin, near = Start(self.initial), None
-        if start is not None:
-            begin, near = Start(self._parameters(start)), self._placement(start)
         saved = None
         if checkpoint is not None:
             problem = fingerprint(self.simulation, self._rest, self.targets, self._regulariser, minimiser)
             saved = Checkpoint(Path(checkpoint), problem)
-        if resume and saved is not None and (found := saved.load_together(self.simulation.comm)) is not None:
-            begin, near = found.start, self._rest.known(found.start.parameters, found.handles)
-        with DesignProgress(minimiser, leads=self.simulation.comm.rank == 0) as progress:
-
-            def watch(iterate: Iterate) -> None:
-                if iterate.number == begin.number:
-                    effects = objective.effects(iterate.evaluation)
-                    errors = target_errors(self.targets, objective.reached)
-                    check_effects(self.targets, self.designs, effects=effects, errors=errors)
-                if saved is not None:
-                    saved.save(iterate, objective.placement.theta)
-                progress.update(iterate, target_errors(self.targets, objective.reached))
-
-            try:
-                objective.begin(None)
-                initial = objective.traced(self.initial)
-                objective.begin(near)
-                outcome = minimise_together(self.simulation.comm, objective, minimiser, begin, watch=watch)
-                final = objective.evaluate(outcome.parameters).value
-            except Infeasible as failure:
-                raise EquilibriumError(
-                    f"design of {self.simulation.scene.mechanism.name!r}",
-                    f"the design to start from has no value: {failure}",
-                    "Draw links that carry the targets' loads, or start with smaller loads",
-                ) from failure
-        comm, placement = self.simulation.comm, self.simulation.comm.bcast(objective.placement, root=0)
+        begin, near = self._beginning(start, saved if resume else None)
+        values, outcome = self._minimise(minimiser, begin, near, saved)
+        placement = comm.bcast(objective.placement, root=0)
         with self._clock.phase("verification"):
             self._rest.place(outcome.parameters, placement)
             found = verify(self.simulation, self.targets, objective.reached)
-        result = DesignResult(
-            mechanism=self.simulation.scene.mechanism.name,
-            links=link_designs(self._rest, placement),
-            targets=target_results(self.targets, outcome.started, found),
-            reason=outcome.reason.value,
-            converged=outcome.reason.converged,
-            verified=found.same,
-            active=objective.active(outcome.parameters),
-            objective=(initial, final),
-            objective_error=None
-            if found.errors is None
-            else objective_error(self.targets, found.displacements, found.errors),
-            iterations=outcome.number,
-            evaluations=outcome.evaluations,
-            mesh_ratio_max=self.simulation.mesh_ratio_max,
-            seconds=perf_counter() - began,
-            phases=self._clock.since(clock),
-            processes=comm.size,
-            groups=group_count(comm.size, len(self.targets)),
-        )
+        spent, phases = perf_counter() - began, self._clock.since(clock)
+        result = self._result(outcome, placement, found, values, seconds=spent, phases=phases)
         return comm.bcast(result, root=0)  # processes differ in times and in the last bits
 
     def picture(self, path: str | Path, design: DesignResult) -> None:
@@ -215,6 +170,79 @@ class DesignProblem:
         failure = self.simulation.comm.bcast(failure, root=0)
         if failure is not None:
             raise failure
+
+    # -- steps of ``optimize`` -------------------------------------------------------------------------------
+
+    def _beginning(self, start: DesignResult | None, saved: Checkpoint | None) -> tuple[Start, Placement | None]:
+        """Where to start, and the handles there if they are known: from ``saved`` if its file exists (collective)."""
+        begin, near = Start(self.initial), None
+        if start is not None:
+            begin, near = Start(self._parameters(start)), self._placement(start)
+        if saved is not None and (found := saved.load_together(self.simulation.comm)) is not None:
+            begin, near = found.start, self._rest.known(found.start.parameters, found.handles)
+        return begin, near
+
+    def _minimise(
+        self, minimiser: Minimiser, begin: Start, near: Placement | None, saved: Checkpoint | None
+    ) -> tuple[tuple[float, float], Outcome]:
+        """The objective of the drawn and of the best design, and how the minimisation ended (collective)."""
+        _, objective = self._team
+
+        def watch(iterate: Iterate) -> None:
+            if iterate.number == begin.number:
+                effects = objective.effects(iterate.evaluation)
+                errors = target_errors(self.targets, objective.reached)
+                check_effects(self.targets, self.designs, effects=effects, errors=errors)
+            if saved is not None:
+                saved.save(iterate, objective.placement.theta)
+            progress.update(iterate, target_errors(self.targets, objective.reached))
+
+        with DesignProgress(minimiser, leads=self.simulation.comm.rank == 0) as progress:
+            try:
+                objective.begin(None)
+                initial = objective.traced(self.initial)
+                objective.begin(near)
+                outcome = minimise_together(self.simulation.comm, objective, minimiser, begin, watch=watch)
+                return (initial, objective.evaluate(outcome.parameters).value), outcome
+            except Infeasible as failure:
+                raise EquilibriumError(
+                    f"design of {self.simulation.scene.mechanism.name!r}",
+                    f"the design to start from has no value: {failure}",
+                    "Draw links that carry the targets' loads, or start with smaller loads",
+                ) from failure
+
+    def _result(
+        self,
+        outcome: Outcome,
+        placement: Placement,
+        found: Verification,
+        values: tuple[float, float],
+        *,
+        seconds: float,
+        phases: dict[str, float],
+    ) -> DesignResult:
+        """The verified optimum, which the simulation has, as plain data (collective)."""
+        (_, objective), comm, error = self._team, self.simulation.comm, None
+        if found.errors is not None:
+            error = objective_error(self.targets, found.displacements, found.errors)
+        return DesignResult(
+            mechanism=self.simulation.scene.mechanism.name,
+            links=link_designs(self._rest, placement),
+            targets=target_results(self.targets, outcome.started, found),
+            reason=outcome.reason.value,
+            converged=outcome.reason.converged,
+            verified=found.same,
+            active=objective.active(outcome.parameters),
+            objective=values,
+            objective_error=error,
+            iterations=outcome.number,
+            evaluations=outcome.evaluations,
+            mesh_ratio_max=self.simulation.mesh_ratio_max,
+            seconds=seconds,
+            phases=phases,
+            processes=comm.size,
+            groups=group_count(comm.size, len(self.targets)),
+        )
 
     # -- parts ---------------------------------------------------------------------------------------------
 
