@@ -10,17 +10,16 @@ from scipy.optimize import brentq
 
 import fenicsmech as fm
 from fenicsmech.compat import compile_form
-from fenicsmech.design.sensitivity import Adjoint
 from fenicsmech.effects import Pressure
 from fenicsmech.elasticity import PLANE_STRAIN, SPATIAL
 from fenicsmech.mechanism import Arc
 
-from ..design.in_plane import design_field
 from ..design.refusal import refused
 from ..elasticity.dirichlet_newton import solve
 from ..elasticity.single_link import components, distorted, interpolate, nodes, wave
 from ..oracles.dense import taylor_rates
 from ..report.grids import box, rectangle
+from .design_slope import assert_design_gradient
 from .pressed import POISSON, YOUNG, PressedBody
 
 STEPS = 10.0 ** -np.arange(1.5, 3.6, 0.5)
@@ -164,20 +163,7 @@ def test_a_clamped_beam_bends_under_pressure_from_above(space):
 @pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
 def test_displacements_under_pressure_are_differentiated_by_the_design_field(space):
     simulation, push = beam(space, 0.02, bow=6.0)
-    model, dim = simulation.model, simulation.linkage.dim
-    places = model.elastic.d.function_space.tabulate_dof_coordinates()[:, :dim]
-    direction = design_field(model, np.sin(places @ np.diag([0.2, 0.1, 0.3][:dim])))
-
-    def solve_at(step: float) -> float:
-        model.reshape(step * direction)
-        frame = simulation.load_displacement(push, forces=[0.05]).frames[-1]
-        model.load(frame.state)
-        return frame, model.travel(push, frame.state)
-
-    slope = (solve_at(1e-3)[1] - solve_at(-1e-3)[1]) / 2e-3
-    frame, _ = solve_at(0.0)
-    (gradient,) = Adjoint(model, simulation.newton(push)).gradients(frame.state, [model.point_load(push)])
-    assert gradient.design @ direction[: len(gradient.design)] == pytest.approx(slope, rel=1e-5)
+    assert_design_gradient(simulation, push, 0.05)
 
 
 def test_pressure_without_sense_is_refused():
