@@ -12,6 +12,8 @@ import argparse
 import importlib
 from time import perf_counter
 
+from task import scene_and_task
+
 import fenicsmech as fm
 from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRESS
 from fenicsmech.report import format_table
@@ -26,9 +28,8 @@ class Case:
 
     def __init__(self, name):
         module = importlib.import_module(name)
-        described = module.describe()
-        task = module.task(*described)
-        self.scene, self.force = described[0], task.force
+        self.scene, task = scene_and_task(module)
+        self.force = task.force
         self.configuration = task.configurations[len(task.configurations) // 2]
         self.forces = [share * task.loads[-1] for share in (0.2, 0.4, 0.6, 0.8, 1.0)]
 

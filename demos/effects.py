@@ -14,6 +14,16 @@ import claw
 import fenicsmech as fm
 from fenicsmech.report import format_table
 
+HEADERS = (
+    "effect",
+    "energy terms",
+    "unknowns",
+    "iterations",
+    "s/iteration",
+    "relative",
+    "moves the finger by [mm]",
+)
+
 
 def scenes():
     """The claw without effects, with each of them, with all, and without again: name → scene and force."""
@@ -62,16 +72,7 @@ def main():
         terms = len(sim.model.elastic.energy_ufl.integrals())
         moved = curve.displacements[-1] - bare[1]
         rows.append((name, terms, sim.model.flexible_dofs, iterations, seconds, seconds / bare[0], moved))
-    headers = (
-        "effect",
-        "energy terms",
-        "unknowns",
-        "iterations",
-        "s/iteration",
-        "relative",
-        "moves the finger by [mm]",
-    )
-    print(format_table(headers, rows))
+    print(format_table(HEADERS, rows))
 
 
 if __name__ == "__main__":

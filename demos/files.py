@@ -79,9 +79,6 @@ def summarise(outcome: Outcome, errors: Sequence[np.ndarray]) -> dict:
     """The summary of a run, with the error estimates of its curves (collective)."""
     demo, sim, curves, result = outcome.demo, outcome.sim, outcome.curves, outcome.result
     peak = sim.comm.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, op=MPI.MAX) / 1024.0
-    reached = [(None, None)] * len(outcome.targets)
-    if result is not None:
-        reached = [(target.reached, target.finer_elements_add) for target in result.targets]
     summary = {
         "demo": demo.name,
         "space": demo.options.space,
@@ -89,26 +86,12 @@ def summarise(outcome: Outcome, errors: Sequence[np.ndarray]) -> dict:
         "ranks": sim.comm.size,
         "dofs": {"rigid": sim.model.rigid_dofs, "flexible": sim.model.flexible_dofs},
         "parameters": result and result.parameters,
-        "targets": [
-            {
-                "configuration": t.configuration.name,
-                "force": t.force,
-                "wanted": t.displacement,
-                "reached": there,
-                "reached_error": error,
-            }
-            for t, (there, error) in zip(outcome.targets, reached, strict=True)
-        ],
+        "targets": _targets(outcome),
         "frames": [
             frame | {"displacement_error": float(error)}  # the forces are prescribed
             for frame, error in zip(_frames(curves), np.concatenate(errors), strict=True)
         ],
-        "seconds": {
-            "setup": sim.setup_seconds,
-            "frame_median": median(frame.seconds for frame in _loaded(curves)),
-            "optimize": result and result.seconds + (outcome.coarse.seconds if outcome.coarse else 0.0),
-            "phases": sim.clock.seconds,
-        },
+        "seconds": _seconds(outcome),
         "iterations": sum(frame.iterations for frame in _loaded(curves)) if result is None else result.iterations,
         "evaluations": result and result.evaluations,
         "objective": dict(zip(("initial", "final"), result.objective if result else (None, None), strict=True)),
@@ -119,24 +102,63 @@ def summarise(outcome: Outcome, errors: Sequence[np.ndarray]) -> dict:
         "peak_memory_mb": peak,
     }
     if result is not None:
-        summary |= {
-            "worst_error": result.worst_error,
-            "verified": result.verified,
-            "curvature_ratio_max": max(link.bend for link in result.links),
-            "active_bounds": result.active,
-            "ended": result.reason,
-            "optimize_phases": result.phases,
-            "initial_frames": _frames(outcome.before),
-        }
+        summary |= _design(outcome)
     if outcome.coarse is not None:
-        summary["plane_stress"] = {
-            "seconds": outcome.coarse.seconds,
-            "iterations": outcome.coarse.iterations,
-            "evaluations": outcome.coarse.evaluations,
-            "reached": [target.reached for target in outcome.coarse.targets],
-            "reached_in_3d": [target.started for target in result.targets],
-        }
+        summary["plane_stress"] = _plane_stress(outcome)
     return summary
+
+
+def _targets(outcome: Outcome) -> list[dict]:
+    """What is wanted, beside what was reached if there was an optimisation."""
+    reached = [(None, None)] * len(outcome.targets)
+    if outcome.result is not None:
+        reached = [(target.reached, target.finer_elements_add) for target in outcome.result.targets]
+    return [
+        {
+            "configuration": t.configuration.name,
+            "force": t.force,
+            "wanted": t.displacement,
+            "reached": there,
+            "reached_error": error,
+        }
+        for t, (there, error) in zip(outcome.targets, reached, strict=True)
+    ]
+
+
+def _seconds(outcome: Outcome) -> dict:
+    sim, result, coarse = outcome.sim, outcome.result, outcome.coarse
+    return {
+        "setup": sim.setup_seconds,
+        "frame_median": median(frame.seconds for frame in _loaded(outcome.curves)),
+        "optimize": result and result.seconds + (coarse.seconds if coarse else 0.0),
+        "phases": sim.clock.seconds,
+    }
+
+
+def _design(outcome: Outcome) -> dict:
+    """What the summary of an optimisation has beside that of a simulation."""
+    result = outcome.result
+    return {
+        "worst_error": result.worst_error,
+        "verified": result.verified,
+        "curvature_ratio_max": max(link.bend for link in result.links),
+        "active_bounds": result.active,
+        "ended": result.reason,
+        "optimize_phases": result.phases,
+        "initial_frames": _frames(outcome.before),
+    }
+
+
+def _plane_stress(outcome: Outcome) -> dict:
+    """The optimisation in plane stress that the one in space started from."""
+    coarse = outcome.coarse
+    return {
+        "seconds": coarse.seconds,
+        "iterations": coarse.iterations,
+        "evaluations": coarse.evaluations,
+        "reached": [target.reached for target in coarse.targets],
+        "reached_in_3d": [target.started for target in outcome.result.targets],
+    }
 
 
 def tell(outcome: Outcome, summary: dict) -> None:

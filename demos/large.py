@@ -166,7 +166,7 @@ def compare(run: Run) -> list[tuple]:
             schur.solve(right, x)
             difference = (x - expected).norm() / expected.norm()
         count = len(schur.columns) + 2
-        rows.append((unknowns, multigrid.name, iterations, setup, solve, count, setup + count * solve, difference))
+        rows.append((unknowns, multigrid.title, iterations, setup, solve, count, setup + count * solve, difference))
     return rows
 
 

@@ -10,6 +10,7 @@ import argparse
 import claw
 import klann
 import truss
+from task import scene_and_task
 
 import fenicsmech as fm
 from fenicsmech.report import format_table
@@ -25,8 +26,7 @@ def main():
     rows = []
     for name, demo in MECHANISMS.items():
         for minimiser in (fm.LevenbergMarquardt(iterations=options.limit), fm.Bfgs(iterations=options.limit)):
-            scene, *parts = demo.describe()
-            task = demo.task(scene, *parts)
+            scene, task = scene_and_task(demo)
             sim = fm.Simulation(scene, space="plane-stress", size=options.size or demo.SIZE)
             result = fm.DesignProblem(sim, task.designs, targets=task.targets).optimize(minimiser=minimiser)
             rows.append(

@@ -21,17 +21,23 @@ EXACT, MOST = 1e-10, 1000  # of the energy norm of the error; iterations
 
 
 class Multigrid(Enum):
-    """The preconditioner, with its best options of those tried."""
+    """The preconditioner, by the name its authors gave it, with its best options of those tried."""
 
-    GAMG = {"pc_type": "gamg"}
-    BOOMERAMG = {
-        "pc_type": "hypre",
-        "pc_hypre_type": "boomeramg",
-        "pc_hypre_boomeramg_strong_threshold": 0.7,
-        "pc_hypre_boomeramg_coarsen_type": "HMIS",
-        "pc_hypre_boomeramg_interp_type": "ext+i",
-        "pc_hypre_boomeramg_P_max": 4,
-    }
+    GAMG = "GAMG", {"pc_type": "gamg"}
+    BOOMERAMG = (
+        "BoomerAMG",
+        {
+            "pc_type": "hypre",
+            "pc_hypre_type": "boomeramg",
+            "pc_hypre_boomeramg_strong_threshold": 0.7,
+            "pc_hypre_boomeramg_coarsen_type": "HMIS",
+            "pc_hypre_boomeramg_interp_type": "ext+i",
+            "pc_hypre_boomeramg_P_max": 4,
+        },
+    )
+
+    def __init__(self, title: str, options: dict[str, object]) -> None:
+        self.title, self.options = title, options
 
 
 class SchurSolver:
@@ -61,7 +67,7 @@ class SchurSolver:
     def _solver(self, k: PETSc.Mat, multigrid: Multigrid) -> PETSc.KSP:
         prefix = f"schur_{multigrid.name.lower()}_"
         options = PETSc.Options(prefix)
-        for name, value in multigrid.value.items():
+        for name, value in multigrid.options.items():
             options[name] = value
         ksp = PETSc.KSP().create(k.comm)
         ksp.setOptionsPrefix(prefix)

@@ -16,6 +16,7 @@ import claw
 import klann
 import numpy as np
 import truss
+from task import curves, scene_and_task
 
 import fenicsmech as fm
 from fenicsmech.report import format_table
@@ -30,51 +31,55 @@ WAYS = {
     "1e-4, the same": {"tolerance": 1e-4},
 }
 TOLERANCE = 5e-3  # of an optimisation
+OF_EQUILIBRIA = ("mechanism", "residual over forces", "factors", "time", "moves, over the error of elements")
+OF_DESIGNS = (
+    "mechanism",
+    "tolerance",
+    "iterations",
+    "evaluations",
+    "time",
+    "worst target [%]",
+    "error of elements [%]",
+    "moves, over that",
+)
 
 
 def equilibria(name, space, size, repeats):
     """Rows of the first table."""
     demo = MECHANISMS[name]
-    scene, *parts = demo.describe()
-    task = demo.task(scene, *parts)
+    scene, task = scene_and_task(demo)
     sims = {
         way: fm.Simulation(scene, space=space, size=size or demo.SIZE, solver=fm.PrimalDualNewton(**options))
         for way, options in WAYS.items()
     }
     seconds = {way: [] for way in WAYS}
     for turn in range(repeats + 1):  # the first one compiles
-        curves, spent = {}, {}
+        found, spent = {}, {}
         for way, sim in sims.items():
             start = process_time()
-            curves[way] = [curve_of(sim, task, configuration) for configuration in task.configurations]
+            found[way] = curves(sim, task)
             spent[way] = process_time() - start
         if turn:
             for way in WAYS:
                 seconds[way].append(spent[way] / spent[STRICT])
-    estimates = np.concatenate([sims[STRICT].error_estimates(curve) for curve in curves[STRICT]])
-    exact = displacements(curves[STRICT])
+    estimates = np.concatenate([sims[STRICT].error_estimates(curve) for curve in found[STRICT]])
+    exact = displacements(found[STRICT])
     loaded = exact != 0.0
     for way in WAYS:
-        moved = np.abs(displacements(curves[way]) - exact)[loaded] / np.abs(estimates[loaded])
-        factors = sum(frame.iterations for curve in curves[way] for frame in curve.frames)
+        moved = np.abs(displacements(found[way]) - exact)[loaded] / np.abs(estimates[loaded])
+        factors = sum(frame.iterations for curve in found[way] for frame in curve.frames)
         yield name, way, factors, median(seconds[way]), f"{moved.max():.0e}"
 
 
-def curve_of(sim, task, configuration):
-    """The curve of a task in one configuration."""
-    return sim.load_displacement(task.force, forces=task.loads, configuration=configuration)
-
-
-def displacements(curves):
-    """Of all frames."""
-    return np.concatenate([curve.displacements for curve in curves])
+def displacements(found):
+    """Of all frames of curves."""
+    return np.concatenate([curve.displacements for curve in found])
 
 
 def designs(name, space, size):
     """Rows of the second table."""
     demo = MECHANISMS[name]
-    scene, *parts = demo.describe()
-    task = demo.task(scene, *parts)
+    scene, task = scene_and_task(demo)
 
     def optimum(space, start, minimiser):
         sim = fm.Simulation(scene, space=space, size=size or demo.SIZE)
@@ -110,20 +115,9 @@ def main():
     parser.add_argument("--repeats", type=int, default=3, help="turns that each way takes (default 3)")
     options = parser.parse_args()
     rows = [r for name in options.mechanisms for r in equilibria(name, options.space, options.size, options.repeats)]
-    headers = ("mechanism", "residual over forces", "factors", "time", "moves, over the error of elements")
-    print(format_table(headers, rows), flush=True)
+    print(format_table(OF_EQUILIBRIA, rows), flush=True)
     rows = [row for name in options.mechanisms for row in designs(name, options.space, options.size)]
-    headers = (
-        "mechanism",
-        "tolerance",
-        "iterations",
-        "evaluations",
-        "time",
-        "worst target [%]",
-        "error of elements [%]",
-        "moves, over that",
-    )
-    print(format_table(headers, rows))
+    print(format_table(OF_DESIGNS, rows))
 
 
 if __name__ == "__main__":

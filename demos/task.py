@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from types import ModuleType
 
 from common import Demo, simulation
 from files import Outcome, leave
@@ -30,6 +31,12 @@ class Task:
     designs: Sequence[fm.SplineDesign]
     targets: Sequence[fm.Target]
     pin: float
+
+
+def scene_and_task(mechanism: ModuleType) -> tuple[fm.Scene, Task]:
+    """What the module of a mechanism describes: truss, claw or klann."""
+    scene, *parts = mechanism.describe()
+    return scene, mechanism.task(scene, *parts)
 
 
 def run(demo: Demo, scene: fm.Scene, task: Task) -> Outcome:

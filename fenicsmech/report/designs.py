@@ -59,9 +59,7 @@ def draw_designs(
         raise DescriptionError(f"picture '{path}'", "there is nothing to draw", "Give at least one link")
     thicknesses = [_thickness_line(design, unit) for design in designs]
     with house_style():
-        handles = _handles(designs)
-        single = designs[0].name if len(designs) == 1 else ""
-        subtitle = f"{single}: {thicknesses[0]}" if single and thicknesses[0] else single
+        handles, subtitle = _handles(designs), _subtitle(designs, thicknesses)
         frame = lay_out_designs(
             designs,
             captions=[
@@ -72,27 +70,45 @@ def draw_designs(
             legend=sum(text_size(label, fontsize=9.0)[0] + 0.6 for label in handles),
             subtitle=text_size(subtitle, fontsize=10.5, fontweight="bold")[0],
         )
-        for shape in rigid:
-            frame.place.add_patch(Polygon(shape.outline, closed=True, fc=_RIGID, ec=_RIGID_RIM, lw=0.8, zorder=1.5))
-        for design in designs:
-            _draw_link(frame.place, design, IN_PLACE, frame.place_scale, detailed=frame.details is None)
-        frame.place.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]")
-        frame.place.set_title(subtitle, loc="left")
-        frame.place.grid(True, color="#ededed")
+        _draw_in_place(frame, designs, rigid, unit, subtitle)
         if frame.details is None:
-            labels = Labels(frame.place, _shapes(designs[0], IN_PLACE))
-            _draw_dimensions(labels, frame.place, designs[0], IN_PLACE, frame.place_scale)
+            _draw_dimensions_in_place(frame, designs[0])
         else:
             _draw_names(frame, designs)
             _draw_details(frame, designs, thicknesses, unit)
-        if title:
-            left = frame.place.get_position().x0
-            frame.figure.text(left, 1.0 - 0.35 * frame.line, title, va="top", **_HEADING)
-        frame.figure.legend(
-            list(handles.values()), list(handles),
-            loc="lower center", bbox_to_anchor=(0.5, 0.0), ncol=len(handles), frameon=False,
-        )  # fmt: skip
+        _draw_heading_and_legend(frame, title, handles)
         save_png(frame.figure, path)
+
+
+def _subtitle(designs: Sequence[DesignShape], thicknesses: Sequence[str]) -> str:
+    """Name and thickness of a link that is alone; several have them beside their details."""
+    if len(designs) > 1:
+        return ""
+    name, line = designs[0].name, thicknesses[0]
+    return f"{name}: {line}" if name and line else name
+
+
+def _draw_in_place(
+    frame: DesignFrame, designs: Sequence[DesignShape], rigid: Sequence[RigidShape], unit: str, subtitle: str
+) -> None:
+    """All links where they are in the mechanism, the rigid ones behind."""
+    for shape in rigid:
+        frame.place.add_patch(Polygon(shape.outline, closed=True, fc=_RIGID, ec=_RIGID_RIM, lw=0.8, zorder=1.5))
+    for design in designs:
+        _draw_link(frame.place, design, IN_PLACE, frame.place_scale, detailed=frame.details is None)
+    frame.place.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]")
+    frame.place.set_title(subtitle, loc="left")
+    frame.place.grid(True, color="#ededed")
+
+
+def _draw_heading_and_legend(frame: DesignFrame, title: str, handles: dict[str, object]) -> None:
+    if title:
+        left = frame.place.get_position().x0
+        frame.figure.text(left, 1.0 - 0.35 * frame.line, title, va="top", **_HEADING)
+    frame.figure.legend(
+        list(handles.values()), list(handles),
+        loc="lower center", bbox_to_anchor=(0.5, 0.0), ncol=len(handles), frameon=False,
+    )  # fmt: skip
 
 
 def _draw_link(axes: Axes, design: DesignShape, view: View, scale: float, *, detailed: bool) -> None:
@@ -119,6 +135,11 @@ def _path(outline: LinkOutline, view: View) -> Outline:
         points = points if counter_clockwise == (index == 0) else points[::-1]
         paths.append(Outline(np.vstack((points, points[:1])), closed=True))
     return Outline.make_compound_path(*paths)
+
+
+def _draw_dimensions_in_place(frame: DesignFrame, design: DesignShape) -> None:
+    labels = Labels(frame.place, _shapes(design, IN_PLACE))
+    _draw_dimensions(labels, frame.place, design, IN_PLACE, frame.place_scale)
 
 
 def _draw_names(frame: DesignFrame, designs: Sequence[DesignShape]) -> None:

@@ -10,20 +10,18 @@ from scipy.optimize import brentq
 
 import fenicsmech as fm
 from fenicsmech.compat import compile_form
-from fenicsmech.design.sensitivity import Adjoint
 from fenicsmech.effects import Pressure
 from fenicsmech.elasticity import PLANE_STRAIN, SPATIAL
 from fenicsmech.mechanism import Arc
 
-from ..design.in_plane import design_field
 from ..design.refusal import refused
 from ..elasticity.dirichlet_newton import solve
 from ..elasticity.single_link import components, distorted, interpolate, nodes, wave
-from ..oracles.dense import taylor_rates
 from ..report.grids import box, rectangle
+from .design_slope import assert_design_gradient
+from .form_derivative import form_derivative
 from .pressed import POISSON, YOUNG, PressedBody
 
-STEPS = 10.0 ** -np.arange(1.5, 3.6, 0.5)
 MODELS = {2: PLANE_STRAIN, 3: SPATIAL}
 
 
@@ -50,19 +48,8 @@ def test_energy_and_its_gradient_are_differentiated_by_state_and_design(dim, whe
         interpolate(field, wave(dim, size, seed=seed))
     energy = pressed.effect.energy(fields)
     for form in (energy, ufl.derivative(energy, fields.u, work)):
-        compiled = compile_form(form)
         for field in (fields.u, fields.body.d):
-            slope = fem.assemble_vector(compile_form(ufl.derivative(form, field))).array
-            start = field.x.array.copy()
-            direction = np.random.default_rng(4).uniform(-0.1, 0.1, len(start))
-
-            def value(values, field=field, compiled=compiled):
-                field.x.array[:] = values
-                return fem.assemble_scalar(compiled)
-
-            rates = taylor_rates(value, start, direction, slope, STEPS)
-            field.x.array[:] = start
-            assert rates.without[-1] > 0.95
+            rates = form_derivative(form, field, size=0.1, seed=4).rates
             # areas in the plane are quadratic, so their gradient is linear
             assert rates.with_gradient.min() > 1.95 or rates.remainder.max() < 1e-12
 
@@ -164,20 +151,7 @@ def test_a_clamped_beam_bends_under_pressure_from_above(space):
 @pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
 def test_displacements_under_pressure_are_differentiated_by_the_design_field(space):
     simulation, push = beam(space, 0.02, bow=6.0)
-    model, dim = simulation.model, simulation.linkage.dim
-    places = model.elastic.d.function_space.tabulate_dof_coordinates()[:, :dim]
-    direction = design_field(model, np.sin(places @ np.diag([0.2, 0.1, 0.3][:dim])))
-
-    def solve_at(step: float) -> float:
-        model.reshape(step * direction)
-        frame = simulation.load_displacement(push, forces=[0.05]).frames[-1]
-        model.load(frame.state)
-        return frame, model.travel(push, frame.state)
-
-    slope = (solve_at(1e-3)[1] - solve_at(-1e-3)[1]) / 2e-3
-    frame, _ = solve_at(0.0)
-    (gradient,) = Adjoint(model, simulation.newton(push)).gradients(frame.state, [model.point_load(push)])
-    assert gradient.design @ direction[: len(gradient.design)] == pytest.approx(slope, rel=1e-5)
+    assert_design_gradient(simulation, push, 0.05)
 
 
 def test_pressure_without_sense_is_refused():

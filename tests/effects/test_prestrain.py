@@ -9,14 +9,14 @@ from dolfinx import fem
 
 import fenicsmech as fm
 from fenicsmech.compat import compile_form
-from fenicsmech.design.sensitivity import Adjoint
 from fenicsmech.effects import Prestrain
 from fenicsmech.elasticity import PLANE_STRAIN
 
-from ..design.in_plane import design_field
 from ..design.refusal import refused
 from ..elasticity.single_link import interpolate, wave
 from ..oracles.dense import taylor_rates
+from .design_slope import assert_design_gradient
+from .form_derivative import form_derivative
 
 SPACES = ["plane-stress", "plane-strain", "3d"]
 LENGTH, THICKNESS, DEPTH, BLOCK = 40.0, 2.0, 3.0, 2.0
@@ -121,22 +121,11 @@ def test_energy_and_its_gradient_are_differentiated(space, along):
     body.share.value = 0.8
     residual = ufl.derivative(body.energy_ufl, body.u, work)
     for form in (body.energy_ufl, residual):
-        compiled = compile_form(form)
         for field in (body.u, body.d):
-            slope = fem.assemble_vector(compile_form(ufl.derivative(form, field))).array
-            start = field.x.array.copy()
-            direction = np.random.default_rng(5).uniform(-0.05, 0.05, len(start))
-
-            def value(values, field=field, compiled=compiled):
-                field.x.array[:] = values
-                return fem.assemble_scalar(compiled)
-
-            rates = taylor_rates(value, start, direction, slope, 10.0 ** -np.arange(1.5, 3.6, 0.5))
-            field.x.array[:] = start
-            assert rates.without[-1] > 0.95
-            assert rates.with_gradient[-1] > 1.95
+            assert form_derivative(form, field, size=0.05, seed=5).rates.with_gradient[-1] > 1.95
 
     # what the path of growing effects needs: the derivative of the residual by the share
+    compiled = compile_form(residual)
     vector = work.x.array.copy()
     rate = body.share_residuals()[: len(vector)] @ vector
 
@@ -151,20 +140,7 @@ def test_energy_and_its_gradient_are_differentiated(space, along):
 @pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
 def test_displacements_are_differentiated_by_the_design_field(space):
     simulation, push = bar(space, 1.1, held=True, bow=4.0)
-    model, dim = simulation.model, simulation.linkage.dim
-    places = model.elastic.d.function_space.tabulate_dof_coordinates()[:, :dim]
-    direction = design_field(model, np.sin(places @ np.diag([0.2, 0.1, 0.3][:dim])))
-
-    def solve_at(step: float):
-        model.reshape(step * direction)
-        frame = simulation.load_displacement(push, forces=[1.0]).frames[-1]
-        model.load(frame.state)
-        return frame, model.travel(push, frame.state)
-
-    slope = (solve_at(1e-3)[1] - solve_at(-1e-3)[1]) / 2e-3
-    frame, _ = solve_at(0.0)
-    (gradient,) = Adjoint(model, simulation.newton(push)).gradients(frame.state, [model.point_load(push)])
-    assert gradient.design @ direction[: len(gradient.design)] == pytest.approx(slope, rel=1e-5)
+    assert_design_gradient(simulation, push, 1.0)
 
 
 def test_without_prestrain_the_energy_has_no_field_for_it():

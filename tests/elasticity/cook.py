@@ -24,15 +24,19 @@ SHEAR_MODULUS, POISSON = 0.4225, 0.3
 LENGTH, EDGE = 48.0, 16.0
 
 
+def panel(count: int, dim: int) -> tuple[np.ndarray, np.ndarray]:
+    """Points and cells: ``count`` squares, each cut in two, or cubes, in six, along each side."""
+    square, cells = rectangle(count, count, 1.0, 1.0) if dim == 2 else box(count, count, 1, (1.0, 1.0, 0.5))
+    x, y, *z = square.T
+    return np.column_stack([LENGTH * x, 44.0 * x + y * (44.0 - 28.0 * x), *z]), cells
+
+
 def upward_displacement(
     model: ElasticModel, at: tuple[float, float], *, count: int, order: int, quadrature: Quadrature | None = None
 ) -> float:
-    """u_y at a vertex of the mesh that has ``count`` squares, each cut in two, or cubes, in six, along each side."""
-    square, cells = rectangle(count, count, 1.0, 1.0) if model.dim == 2 else box(count, count, 1, (1.0, 1.0, 0.5))
-    x, y, *z = square.T
+    """u_y at a vertex of the panel."""
     body = single_link(
-        np.column_stack([LENGTH * x, 44.0 * x + y * (44.0 - 28.0 * x), *z]),
-        cells,
+        *panel(count, model.dim),
         model=model,
         law=IsochoricSimoNeoHookean(),
         order=order,

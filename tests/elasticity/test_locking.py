@@ -12,8 +12,7 @@ from fenicsmech.elasticity import PLANE_STRAIN
 from fenicsmech.elasticity.formulation import LOCKING
 from fenicsmech.mechanism import NeoHookean
 
-from ..report.grids import rectangle
-from .cook import EDGE, LENGTH, MIDDLE, SHEAR_MODULUS
+from .cook import EDGE, LENGTH, MIDDLE, SHEAR_MODULUS, panel
 from .end_load import end_load
 from .mixed_newton import solve
 from .single_link import components, nodes, single_link
@@ -21,10 +20,8 @@ from .single_link import components, nodes, single_link
 
 @cache
 def upward_displacement(poisson: float, *, count: int, with_pressure: bool, order: int = 2) -> float:
-    x, y = rectangle(count, count, 1.0, 1.0)[0].T
     body = single_link(
-        np.column_stack([LENGTH * x, 44.0 * x + y * (44.0 - 28.0 * x)]),
-        rectangle(count, count, 1.0, 1.0)[1],
+        *panel(count, 2),
         model=PLANE_STRAIN,
         law=NeoHookean(),
         order=order,

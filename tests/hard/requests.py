@@ -9,6 +9,7 @@ from mpi4py import MPI
 
 import fenicsmech as fm
 
+from ..mechanism.truss_finger import truss_finger
 from .case import Check, Deviation, Fact, HardCase, deviation
 
 SOFT = fm.Material("silicone", 1.9, 0.45)
@@ -16,19 +17,9 @@ SOFT = fm.Material("silicone", 1.9, 0.45)
 
 def truss(space: str, comm: MPI.Comm) -> tuple[fm.Simulation, fm.mechanism.Force]:
     """Silicone diagonal in a rigid parallelogram: soft while it unbends, stiff once it is straight."""
-    mechanism = fm.Mechanism("truss finger")
-    base = mechanism.rigid("base", fixed=True)
-    left, right, tip = (mechanism.rigid(name) for name in ("left", "right", "tip"))
-    shape = fm.strip([(0, 0), (18, 34), (40, 60)], thickness=6.0, depth=20.0)
-    diagonal = mechanism.flexible("diagonal", shape, SOFT)
-    mechanism.revolute(base, left, at=(0, 0))
-    mechanism.revolute(base, right, at=(40, 0))
-    mechanism.revolute(left, tip, at=(0, 60))
-    mechanism.revolute(right, tip, at=(40, 60))
-    mechanism.revolute(base, diagonal, at=(0, 0), radius=3.0)
-    mechanism.revolute(diagonal, tip, at=(40, 60), radius=3.0)
-    push = mechanism.force(on=tip, at=(20, 70), direction=(1, 0))
-    return fm.Simulation(fm.Scene(mechanism), space=space, order=1, size=5.0, comm=comm), push
+    made = truss_finger(fm.strip([(0, 0), (18, 34), (40, 60)], thickness=6.0, depth=20.0), SOFT)
+    push = made.push()
+    return fm.Simulation(fm.Scene(made.mechanism), space=space, order=1, size=5.0, comm=comm), push
 
 
 def _at_once(space: str, comm: MPI.Comm) -> Iterator[Check]:

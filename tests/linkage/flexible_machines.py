@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from fenicsmech.mechanism import ONYX, SMOOTH_SIL_950, Link, Mechanism, Strip, strip
 
+from ..mechanism.truss_finger import FOOT, HEAD, truss_finger
 from .machine import Machine
 from .planar_machines import CRANK_ROCKER
 
@@ -16,19 +17,10 @@ def bent_strip(start: Sequence[float], end: Sequence[float]) -> Strip:
     return strip([tuple(start), middle, tuple(end)], thickness=2.0, depth=10.0)
 
 
-def truss_finger(*, driven: bool = True) -> Machine:
+def finger(*, driven: bool = True) -> Machine:
     """A flexible diagonal in a rigid parallelogram, whose motor can only turn while the diagonal stretches."""
-    m = Mechanism("truss finger")
-    base = m.rigid("base", fixed=True)
-    left, right, tip = (m.rigid(name) for name in ("left", "right", "tip"))
-    diagonal = m.flexible("diagonal", bent_strip((0.0, 0.0), (40.0, 60.0)), SMOOTH_SIL_950)
-    hinge = m.revolute(base, left, at=(0.0, 0.0))
-    m.revolute(base, right, at=(40.0, 0.0))
-    m.revolute(left, tip, at=(0.0, 60.0))
-    m.revolute(right, tip, at=(40.0, 60.0))
-    m.revolute(base, diagonal, at=(0.0, 0.0), radius=3.0)
-    m.revolute(diagonal, tip, at=(40.0, 60.0), radius=3.0)
-    return Machine(m, m.motor(hinge) if driven else None, {})
+    made = truss_finger(bent_strip(FOOT, HEAD), SMOOTH_SIL_950)
+    return Machine(made.mechanism, made.mechanism.motor(made.hinge) if driven else None, {})
 
 
 def flexible_four_bar(angle: float, *, driven: bool = True) -> Machine:

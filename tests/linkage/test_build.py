@@ -7,7 +7,7 @@ from fenicsmech.joints import PRISMATIC, REVOLUTE
 from fenicsmech.linkage import build_linkage
 from fenicsmech.mechanism import ONYX, Disc, Mechanism, Rectangle
 
-from .flexible_machines import bent_strip, flexible_four_bar, links_by_name, truss_finger
+from .flexible_machines import bent_strip, finger, flexible_four_bar, links_by_name
 from .planar_machines import klann
 
 EVERY_DIMENSION = pytest.mark.parametrize("dim", [2, 3])
@@ -15,7 +15,7 @@ EVERY_DIMENSION = pytest.mark.parametrize("dim", [2, 3])
 
 @EVERY_DIMENSION
 def test_truss_finger_has_four_rigid_bodies_and_two_interfaces(dim):
-    machine = truss_finger()
+    machine = finger()
     linkage = machine.linkage(dim)
     assert [body.name for body in linkage.bodies[:4]] == ["base", "left", "right", "tip"]
     assert [body.region is not None for body in linkage.bodies] == [False] * 4 + [True] * 2
@@ -28,7 +28,7 @@ def test_truss_finger_has_four_rigid_bodies_and_two_interfaces(dim):
 
 @EVERY_DIMENSION
 def test_unknowns_are_those_of_the_bodies_that_are_not_fixed(dim):
-    linkage = truss_finger().linkage(dim)
+    linkage = finger().linkage(dim)
     assert linkage.joints.size == linkage.rigid.size == 5 * {2: 3, 3: 7}[dim]
     assert sorted(linkage.joints.columns) == [1, 2, 3, 4, 5]
 
@@ -54,7 +54,7 @@ def test_welds_of_flexible_links_are_in_the_rigid_system_only():
 
 
 def test_body_of_a_link_is_itself_or_its_first_interface():
-    machine = truss_finger()
+    machine = finger()
     linkage, links = machine.linkage(2), links_by_name(machine)
     assert linkage.body_of(links["tip"]) == 3
     assert linkage.body_of(links["diagonal"]) == 4

@@ -6,7 +6,7 @@ import pytest
 from fenicsmech.errors import AssemblyError
 from fenicsmech.mechanism import ONYX, Mechanism, Rectangle
 
-from .flexible_machines import bent_strip, flexible_four_bar, links_by_name, truss_finger
+from .flexible_machines import bent_strip, finger, flexible_four_bar, links_by_name
 from .machine import Machine, point_of
 from .planar_machines import CRANK_ROCKER, DRAWN_ANGLE
 
@@ -42,7 +42,7 @@ def test_both_ends_of_a_carried_link_move_as_one(dim):
 @EVERY_DIMENSION
 @pytest.mark.parametrize("position", [0.3, -1.0, 1e-3])
 def test_motor_that_strains_a_link_stops_the_assembly_without_error(position, dim):
-    machine = truss_finger()
+    machine = finger()
     linkage = machine.linkage(dim)
     assembly = machine.drive(linkage, position)
     assert assembly.fraction < 1e-3
@@ -73,7 +73,7 @@ def test_motor_stops_where_slack_ends(dim):
 
 @EVERY_DIMENSION
 def test_loop_of_rigid_links_that_does_not_close_is_an_error_whatever_bends_elsewhere(dim):
-    machine = truss_finger()
+    machine = finger()
     m = machine.mechanism
     base = m.links[0]
     wall = m.rigid("wall")

@@ -6,7 +6,7 @@ import pytest
 from fenicsmech.linkage import count_freedom
 from fenicsmech.mechanism import Mechanism
 
-from .flexible_machines import flexible_four_bar, truss_finger
+from .flexible_machines import finger, flexible_four_bar
 from .machine import Machine, freedom_as_drawn
 from .planar_machines import CRANK_ROCKER, DRAWN_ANGLE, collinear_parallelogram, four_bar, klann, parallelogram
 from .spatial_machines import Bennett, two_ball_rod
@@ -135,7 +135,7 @@ def test_flexible_links_count_as_rigid(dim, redundancy):
 
 
 def test_diagonal_locks_the_truss_finger_until_it_bends():
-    machine = truss_finger(driven=False)
+    machine = finger(driven=False)
     assert freedom_as_drawn(machine, 2).mobility == 0
     linkage = machine.linkage(2)
     # taken apart from each other, its two ends leave the parallelogram free and turn on their pins

@@ -9,6 +9,7 @@ from mpi4py import MPI
 import fenicsmech as fm
 from fenicsmech.equilibrium import DisplacementControl, EquilibriumSolver, LoadControl, NotConverged
 
+from ...mechanism.truss_finger import truss_finger
 from ..finger import RUBBER, finger
 
 SOLVERS = {
@@ -97,15 +98,6 @@ def test_failure_of_a_curve_is_an_error_with_the_frames_before(solver):
 
 
 def truss_of_soft_joints():
-    mechanism = fm.Mechanism("finger")
-    base = mechanism.rigid("base", fixed=True)
-    left, right, tip = (mechanism.rigid(name) for name in ("left", "right", "tip"))
-    diagonal = mechanism.flexible("diagonal", fm.strip([(0, 0), (14, 36), (40, 60)], thickness=6.0, depth=20.0), RUBBER)
-    soft = mechanism.revolute(base, left, at=(0, 0))
-    mechanism.revolute(base, right, at=(40, 0))
-    mechanism.revolute(left, tip, at=(0, 60))
-    mechanism.revolute(right, tip, at=(40, 60))
-    mechanism.revolute(base, diagonal, at=(0, 0), radius=3.0)
-    mechanism.revolute(diagonal, tip, at=(40, 60), radius=3.0)
-    push = mechanism.force(on=tip, at=(20, 70), direction=(1, 0))
-    return fm.Scene(mechanism, effects=[fm.JointCompliance(soft, 0.5)]), push
+    made = truss_finger(fm.strip([(0, 0), (14, 36), (40, 60)], thickness=6.0, depth=20.0), RUBBER)
+    push = made.push()
+    return fm.Scene(made.mechanism, effects=[fm.JointCompliance(made.hinge, 0.5)]), push

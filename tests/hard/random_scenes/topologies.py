@@ -49,6 +49,17 @@ def _loop(rng: Random) -> dict[str, Point]:
     }
 
 
+def _six_bar(rng: Random, *, link: tuple[str, str], lean: tuple[float, float]) -> dict[str, Point]:
+    """A four-bar, E beyond the end of its ``link``, and a dyad E–F–G to the ground, E–F within angles ``lean``."""
+    points = _loop(rng)
+    start, end = (points[name] for name in link)
+    angle = math.degrees(math.atan2(end[1] - start[1], end[0] - start[0])) + rng.uniform(-25, 25)
+    points["E"] = _off(end, angle, rng.uniform(0.3, 0.5))
+    points["F"] = _off(points["E"], rng.uniform(*lean), rng.uniform(0.5, 0.8))
+    points["G"] = _off(points["F"], rng.uniform(-110, -60), rng.uniform(0.5, 0.9))
+    return points
+
+
 def four_bar(rng: Random) -> Skeleton:
     """Crank AB, coupler BC, rocker CD."""
     links = {"base": ("A", "D"), "crank": ("A", "B"), "coupler": ("B", "C"), "rocker": ("D", "C")}
@@ -57,12 +68,7 @@ def four_bar(rng: Random) -> Skeleton:
 
 def watt(rng: Random) -> Skeleton:
     """A four-bar whose rocker DCE drives a second one: E–F, F–G."""
-    points = _loop(rng)
-    c, d = points["C"], points["D"]
-    angle = math.degrees(math.atan2(c[1] - d[1], c[0] - d[0])) + rng.uniform(-25, 25)
-    points["E"] = _off(c, angle, rng.uniform(0.3, 0.5))
-    points["F"] = _off(points["E"], rng.uniform(-20, 30), rng.uniform(0.5, 0.8))
-    points["G"] = _off(points["F"], rng.uniform(-110, -60), rng.uniform(0.5, 0.9))
+    points = _six_bar(rng, link=("D", "C"), lean=(-20, 30))
     links = {
         "base": ("A", "D", "G"),
         "crank": ("A", "B"),
@@ -76,12 +82,7 @@ def watt(rng: Random) -> Skeleton:
 
 def stephenson(rng: Random) -> Skeleton:
     """A four-bar whose coupler BCE drives a rocker: E–F, F–G."""
-    points = _loop(rng)
-    b, c = points["B"], points["C"]
-    angle = math.degrees(math.atan2(c[1] - b[1], c[0] - b[0])) + rng.uniform(-25, 25)
-    points["E"] = _off(c, angle, rng.uniform(0.3, 0.5))
-    points["F"] = _off(points["E"], rng.uniform(-60, 20), rng.uniform(0.5, 0.8))
-    points["G"] = _off(points["F"], rng.uniform(-110, -60), rng.uniform(0.5, 0.9))
+    points = _six_bar(rng, link=("B", "C"), lean=(-60, 20))
     links = {
         "base": ("A", "D", "G"),
         "crank": ("A", "B"),
