@@ -1,9 +1,10 @@
 """Load steps: from a known equilibrium to the wanted control value, by predictor and Newton.
 
 Steps halve when Newton fails and double when it was easy, and never go farther than a stride of the tangent;
-equilibria that were reached are never lost. A step that moves anything otherwise than the tangents at both its ends say
-may have leapt over a fold, where the path turns back: it halves too, and where that does not help the leap is kept and
-counted.
+equilibria that were reached are never lost. They end where they are small beside the way gone, however far the target:
+the softest stiffness falls as √(1 − p / p*) towards a limit load p*, and the last equilibrium, at p* − 2 p* / 1024 or
+nearer, keeps 5 % of it at most. A step that moves anything otherwise than the tangents at both its ends say may have
+leapt over a fold, where the path turns back: it halves too, and where that does not help the leap is kept and counted.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from fenicsmech.log import logger
 
 _log = logger(__name__)
 SMALLEST = 1.0 / 1024.0
-"""Smallest step, of the distance asked for."""
+"""Smallest step, of the distance asked for, or of the way that lies behind if that is less."""
 STRIDE = 0.2
 """How far a step may move anything by the tangent, of the mechanism's length, or rad (measured)."""
 BEYOND = 0.2
@@ -64,6 +65,7 @@ class Path:
 
     def __init__(self, newton: Iteration, start: State, value: float, *, predictor: Predictor, idle: bool) -> None:
         self._newton, self._start, self._value, self._predictor = newton, start, value, predictor
+        self._origin, self._way = value, 0.0  # farthest from there so far
         self._floors = tuple(share * IDLE_STIFFNESS for share in _LESS) if idle else (0.0,)
         self._anchors: list[Anchor] = []
         self._last: Solution | None = None
@@ -90,7 +92,7 @@ class Path:
             except NotConverged as failure:
                 tried.append(value)
                 step = 0.5 * (value - self._value)
-                if abs(step) <= SMALLEST * abs(distance):
+                if abs(step) <= self._smallest(distance):
                     raise PathFailed(self._last, self._value, failure.reason, tuple(tried)) from failure
                 continue
             if self._leapt(value, solution):
@@ -147,6 +149,15 @@ class Path:
         shortened = step * min(1.0, STRIDE / max(motion, STRIDE))
         return shortened if abs(shortened) > least else step
 
+    def _smallest(self, distance: float) -> float:
+        """The step at which Newton has failed in earnest.
+
+        Small beside the way gone so far, or the first stride if there is none: loads far beyond a limit load are told
+        as closely as those just beyond it.
+        """
+        way = self._way or abs(self._strided(distance, least=_SINGULAR * abs(distance)))
+        return SMALLEST * min(abs(distance), way)
+
     def _leapt(self, value: float, solution: Solution) -> bool:
         """Whether a step to ``value`` leads where the tangents at its ends do not (collective).
 
@@ -187,3 +198,4 @@ class Path:
         """Keeps the last two equilibria at different values."""
         self._anchors = [*(a for a in self._anchors[-1:] if a.value != anchor.value), anchor]
         self._value = anchor.value
+        self._way = max(self._way, abs(anchor.value - self._origin))
