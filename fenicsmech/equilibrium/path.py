@@ -27,7 +27,7 @@ _SINGULAR = 1e-6  # of the distance asked for: a tangent that wants steps this s
 _RUNAWAY = 5.0 * STRIDE  # a prediction that moves anything this far is none
 _BENT = 2.2  # times the rate at its end: how far a step off a bifurcation may go
 _LEAST_MOTION = 1e-4  # of the mechanism's length, or rad: what is no leap in any case, as past a bifurcation
-_SMALLEST_LEAP = 1.0 / 64.0  # of the distance asked for: a step that is not halved any more because it leaps
+_SMALLEST_LEAP = 1.0 / 64.0  # likewise: a step that is not halved any more because it leaps
 IDLE_STIFFNESS = 1e-10
 """What is lent to idle freedoms, in units of the mean stiffness."""
 _LESS = (1.0, 1e-3, 0.0)  # shares of it that are tried: soft springs, or forces, may hold what is idle with less yet
@@ -92,11 +92,11 @@ class Path:
             except NotConverged as failure:
                 tried.append(value)
                 step = 0.5 * (value - self._value)
-                if abs(step) <= self._smallest(distance):
+                if abs(step) <= SMALLEST * self._scale(distance):
                     raise PathFailed(self._last, self._value, failure.reason, tuple(tried)) from failure
                 continue
             if self._leapt(value, solution):
-                if abs(value - self._value) > _SMALLEST_LEAP * abs(distance):
+                if abs(value - self._value) > _SMALLEST_LEAP * self._scale(distance):
                     step = 0.5 * (value - self._value)
                     continue
                 self.leaps += 1
@@ -149,14 +149,13 @@ class Path:
         shortened = step * min(1.0, STRIDE / max(motion, STRIDE))
         return shortened if abs(shortened) > least else step
 
-    def _smallest(self, distance: float) -> float:
-        """The step at which Newton has failed in earnest.
+    def _scale(self, distance: float) -> float:
+        """What steps are small beside: the way gone so far, or the first stride if there is none, whatever the target.
 
-        Small beside the way gone so far, or the first stride if there is none: loads far beyond a limit load are told
-        as closely as those just beyond it.
+        A limit load is told as closely by a load a thousand times as large as by one just beyond it.
         """
         way = self._way or abs(self._strided(distance, least=_SINGULAR * abs(distance)))
-        return SMALLEST * min(abs(distance), way)
+        return min(abs(distance), way)
 
     def _leapt(self, value: float, solution: Solution) -> bool:
         """Whether a step to ``value`` leads where the tangents at its ends do not (collective).
