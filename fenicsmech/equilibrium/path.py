@@ -1,9 +1,10 @@
 """Load steps: from a known equilibrium to the wanted control value, by predictor and Newton.
 
 Steps halve when Newton fails and double when it was easy, and never go farther than a stride of the tangent;
-equilibria that were reached are never lost. A step that moves anything otherwise than the tangents at both its ends say
-may have leapt over a fold, where the path turns back: it halves too, and where that does not help the leap is kept and
-counted.
+equilibria that were reached are never lost. They end where they are small beside the way gone, however far the target:
+the softest stiffness falls as √(1 − p / p*) towards a limit load p*, and the last equilibrium, at p* − 2 p* / 1024 or
+nearer, keeps 5 % of it at most. A step that moves anything otherwise than the tangents at both its ends say may have
+leapt over a fold, where the path turns back: it halves too, and where that does not help the leap is kept and counted.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from fenicsmech.log import logger
 
 _log = logger(__name__)
 SMALLEST = 1.0 / 1024.0
-"""Smallest step, of the distance asked for."""
+"""Smallest step, of the distance asked for, or of the way that lies behind if that is less."""
 STRIDE = 0.2
 """How far a step may move anything by the tangent, of the mechanism's length, or rad (measured)."""
 BEYOND = 0.2
@@ -26,7 +27,7 @@ _SINGULAR = 1e-6  # of the distance asked for: a tangent that wants steps this s
 _RUNAWAY = 5.0 * STRIDE  # a prediction that moves anything this far is none
 _BENT = 2.2  # times the rate at its end: how far a step off a bifurcation may go
 _LEAST_MOTION = 1e-4  # of the mechanism's length, or rad: what is no leap in any case, as past a bifurcation
-_SMALLEST_LEAP = 1.0 / 64.0  # of the distance asked for: a step that is not halved any more because it leaps
+_SMALLEST_LEAP = 1.0 / 64.0  # likewise: a step that is not halved any more because it leaps
 IDLE_STIFFNESS = 1e-10
 """What is lent to idle freedoms, in units of the mean stiffness."""
 _LESS = (1.0, 1e-3, 0.0)  # shares of it that are tried: soft springs, or forces, may hold what is idle with less yet
@@ -64,6 +65,7 @@ class Path:
 
     def __init__(self, newton: Iteration, start: State, value: float, *, predictor: Predictor, idle: bool) -> None:
         self._newton, self._start, self._value, self._predictor = newton, start, value, predictor
+        self._origin, self._way = value, 0.0  # farthest from there so far
         self._floors = tuple(share * IDLE_STIFFNESS for share in _LESS) if idle else (0.0,)
         self._anchors: list[Anchor] = []
         self._last: Solution | None = None
@@ -90,11 +92,11 @@ class Path:
             except NotConverged as failure:
                 tried.append(value)
                 step = 0.5 * (value - self._value)
-                if abs(step) <= SMALLEST * abs(distance):
+                if abs(step) <= SMALLEST * self._scale(distance):
                     raise PathFailed(self._last, self._value, failure.reason, tuple(tried)) from failure
                 continue
             if self._leapt(value, solution):
-                if abs(value - self._value) > _SMALLEST_LEAP * abs(distance):
+                if abs(value - self._value) > _SMALLEST_LEAP * self._scale(distance):
                     step = 0.5 * (value - self._value)
                     continue
                 self.leaps += 1
@@ -147,6 +149,14 @@ class Path:
         shortened = step * min(1.0, STRIDE / max(motion, STRIDE))
         return shortened if abs(shortened) > least else step
 
+    def _scale(self, distance: float) -> float:
+        """What steps are small beside: the way gone so far, or the first stride if there is none, whatever the target.
+
+        A limit load is told as closely by a load a thousand times as large as by one just beyond it.
+        """
+        way = self._way or abs(self._strided(distance, least=_SINGULAR * abs(distance)))
+        return min(abs(distance), way)
+
     def _leapt(self, value: float, solution: Solution) -> bool:
         """Whether a step to ``value`` leads where the tangents at its ends do not (collective).
 
@@ -187,3 +197,4 @@ class Path:
         """Keeps the last two equilibria at different values."""
         self._anchors = [*(a for a in self._anchors[-1:] if a.value != anchor.value), anchor]
         self._value = anchor.value
+        self._way = max(self._way, abs(anchor.value - self._origin))

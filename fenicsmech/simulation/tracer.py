@@ -170,7 +170,7 @@ class Tracer:
             )
             raise EquilibriumError(
                 f"constant loads ({names}) in configuration {self._request.configuration.name!r}",
-                f"no equilibrium beyond {failure.reached:.1%} of them ({failure.reason})",
+                f"no equilibrium beyond {100.0 * failure.reached:.3g}% of them ({failure.reason})",
                 self._remedy("Choose smaller ones"),
                 last=self._last(failure),
             ) from failure

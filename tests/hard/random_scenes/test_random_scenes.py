@@ -129,3 +129,10 @@ def test_joints_are_not_opened_for_a_displacement_out_of_reach(seed):
     verdict = judge(seed)
     assert not verdict.wrong, verdict
     assert verdict.outcome.startswith("true")
+
+
+@pytest.mark.parametrize("seed", [1097, pytest.param(3003, marks=pytest.mark.slow)])
+def test_a_limit_point_at_a_hundredth_of_the_load_is_told_where_it_is(seed):
+    # of a led force, and of a constant one
+    verdict = judge(seed)
+    assert verdict.outcome == "true: EquilibriumError, at a limit point", verdict

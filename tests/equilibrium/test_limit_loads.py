@@ -1,0 +1,109 @@
+"""A load beyond a limit load is told as closely, and costs hardly more, however far beyond it lies."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+import pytest
+
+import fenicsmech as fm
+from fenicsmech.equilibrium import Hermite, NotConverged, Path, PathFailed, Solution, State
+from fenicsmech.equilibrium.control import LoadControl
+from fenicsmech.equilibrium.state import Step
+
+from . import toggle
+from .finger import finger
+
+BEYOND = [1.01, 3.0, 100.0, 1e4, 1e5]  # times the limit load
+RESOLUTION = 2.0 / 1024.0  # of it
+
+
+class OneFreedom:
+    """A path with a limit load of one, p = 1 − (1 − y)², in closed form: what solvers and systems do for ``Path``."""
+
+    def __init__(self) -> None:
+        self.system, self.solved, self.softest = self, 0, 1.0
+
+    def solve(self, start: State, control: LoadControl, *, floor: float) -> Solution:
+        self.solved += 1
+        if control.target > 1.0:
+            raise NotConverged("no equilibrium", 25)
+        stiffness = math.sqrt(1.0 - control.target)
+        self.softest = min(self.softest, stiffness)
+        rate = math.inf if stiffness == 0.0 else 0.5 / stiffness
+        tangent = Step(np.array([rate]), np.zeros(0), np.zeros(0), 1.0)
+        state = State(np.array([1.0 - stiffness]), np.zeros((0, 1)), np.zeros(0), control.target, np.zeros(0))
+        return Solution(state, (0.0,), 4, 0, 0, tangent)
+
+    def size(self, step: Step) -> float:
+        return float(np.abs(step.u).max())
+
+    def difference(self, later: State, earlier: State) -> Step:
+        return Step(later.u - earlier.u, np.zeros(0), np.zeros(0), later.force - earlier.force)
+
+    def independent(self, step: Step) -> Step:
+        return step
+
+    def moved(self, state: State, step: Step) -> State:
+        return State(state.u + step.u, state.poses, state.multipliers, state.force + step.force, state.motors)
+
+
+def start() -> State:
+    return State(np.zeros(1), np.zeros((0, 1)), np.zeros(0), 0.0, np.zeros(0))
+
+
+@pytest.mark.parametrize("beyond", BEYOND)
+def test_last_equilibrium_is_next_to_the_limit_load_and_has_lost_its_stiffness(beyond):
+    freedom = OneFreedom()
+    path = Path(freedom, start(), 0.0, predictor=Hermite(), idle=False)
+    with pytest.raises(PathFailed) as failure:
+        path.advance(LoadControl(beyond))
+    assert 1.0 - RESOLUTION < failure.value.reached <= 1.0
+    assert freedom.softest < math.sqrt(RESOLUTION)
+    assert freedom.solved < 80
+
+
+@pytest.mark.parametrize("beyond", BEYOND)
+def test_load_steps_after_the_first_tell_it_as_closely_and_a_load_on_the_way_back_is_reached(beyond):
+    path = Path(OneFreedom(), start(), 0.0, predictor=Hermite(), idle=False)
+    path.advance(LoadControl(0.5))
+    with pytest.raises(PathFailed) as failure:
+        path.advance(LoadControl(beyond))
+    assert 1.0 - RESOLUTION < failure.value.reached <= 1.0
+    assert path.advance(LoadControl(-0.5)).state.force == -0.5
+
+
+@pytest.fixture(scope="module")
+def pulled():
+    """The finger with two forces in the same place; its links find no equilibrium under 60 N."""
+    simulation, push = finger("plane-stress")
+    mechanism = simulation.scene.mechanism
+    other = mechanism.force(on=push.on, at=push.at, direction=push.direction, name="other")
+    return fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=8.0), push, other
+
+
+def test_steps_of_a_led_force_and_of_constant_loads_do_not_depend_on_what_is_out_of_reach(pulled, caplog):
+    simulation, push, other = pulled
+    reached = []
+    for load in (80.0, 8e4):
+        with pytest.raises(fm.EquilibriumError) as led:
+            simulation.load_displacement(push, forces=[load])
+        with pytest.raises(fm.EquilibriumError, match="constant loads") as constant:
+            simulation.load_displacement(push, forces=[0.0], others={other: load})
+        share = constant.value.last.state.share
+        assert f"beyond {100.0 * share:.3g}% of them" in str(constant.value)
+        reached += [led.value.last.force, share * load]
+    assert reached == pytest.approx([reached[0]] * 4, rel=1e-6)
+    assert "turns back" not in caplog.text  # as links bend on the way there, however far the load
+
+
+@pytest.mark.parametrize("beyond", [3.0, 1e3, 1e5])
+def test_leap_is_told_next_to_the_limit_load(caplog, beyond):
+    case = toggle.toggle(stilt_modulus=100.0)
+    limit = toggle.force(np.linspace(0.0, toggle.RISE, 100001)).max()
+    assert case.simulation.load_displacement(case.push, forces=[beyond * limit]).jumped.all()
+    ((before, after),) = re.findall(r"between (\S+) and (\S+) the path turns back", caplog.text)
+    assert float(before) <= limit <= float(after) * (1.0 + 1e-6)
+    assert float(after) - float(before) < limit / 32.0
