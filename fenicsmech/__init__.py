@@ -67,6 +67,7 @@ from fenicsmech.mechanism import (
 )
 from fenicsmech.simulation import (
     BucklingLoad,
+    BucklingPosition,
     Curve,
     FollowedCurve,
     Frame,
@@ -144,6 +145,7 @@ __all__ = [
     "friction_band",
     "ArcSteps",
     "BucklingLoad",
+    "BucklingPosition",
     "Critical",
     "FollowedCurve",
     "ModeShape",

@@ -8,7 +8,7 @@
 - ``frame``, ``curve``: what comes out
 - ``leading``: what leads a curve, a force or a motor
 - ``until``, ``follower``, ``followed``: curves that are followed wherever they lead, and their events
-- ``buckling``, ``mode_shape``: buckling loads and soft modes of an equilibrium
+- ``buckling``, ``mode_shape``: buckling loads, buckling positions and soft modes of an equilibrium
 - ``goal``, ``estimates``, ``influence``: how wrong displacements and forces are, by an adjoint: of elements
   (``goal_error`` by ``recovery``, ``pressure_error``), of plane stress (``depth_error``)
 - ``explanation``: what is simulated and left out, in words
@@ -17,7 +17,7 @@
 - ``snapshot``, ``picture``, ``export``: a state gathered, drawn, written
 """
 
-from fenicsmech.simulation.buckling import BucklingLoad, SoftMode
+from fenicsmech.simulation.buckling import BucklingLoad, BucklingPosition, SoftMode
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.fidelity import SPACES
 from fenicsmech.simulation.followed import FollowedCurve, PathEvent
@@ -30,6 +30,7 @@ from fenicsmech.simulation.until import Until
 __all__ = [
     "SPACES",
     "BucklingLoad",
+    "BucklingPosition",
     "Curve",
     "FollowedCurve",
     "Frame",

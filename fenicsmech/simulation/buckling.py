@@ -1,13 +1,14 @@
-"""Loads at which an equilibrium stops being the only one near, and the modes in which it then gives way."""
+"""Loads and motor positions at which an equilibrium stops being the only one near, and the modes it gives way in."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 
-from fenicsmech.equilibrium import IDLE_STIFFNESS, ForceLead, Iteration, Mode, critical_changes, softest_modes
+from fenicsmech.equilibrium import IDLE_STIFFNESS, ForceLead, Iteration, Lead, Mode, critical_changes, softest_modes
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.frame import Frame
+from fenicsmech.simulation.leading import leading
 from fenicsmech.simulation.mode_shape import ModeShape, mode_shape
 from fenicsmech.simulation.model import MechanismModel
 
@@ -17,6 +18,14 @@ class BucklingLoad:
     """A magnitude of the controlled force at which the tangent is singular, and the mode."""
 
     force: float
+    mode: ModeShape
+
+
+@dataclass(frozen=True)
+class BucklingPosition:
+    """A position of the motors that lead at which the tangent is singular while they are held there, and the mode."""
+
+    position: float
     mode: ModeShape
 
 
@@ -32,19 +41,36 @@ def buckling_loads(
     model: MechanismModel, newton: Iteration, curve: Curve, frame: Frame, count: int
 ) -> tuple[BucklingLoad, ...]:
     """The ``count`` nearest buckling loads of ``frame`` (collective)."""
-    modes = _at(model, newton, curve, frame, count, critical_changes)
+    modes = _at(model, newton, curve, frame, count, ForceLead(), critical_changes)
     return tuple(BucklingLoad(frame.force + mode.value, mode_shape(model, mode.step)) for mode in modes)
+
+
+def buckling_positions(
+    model: MechanismModel, newton: Iteration, curve: Curve, frame: Frame, count: int
+) -> tuple[BucklingPosition, ...]:
+    """The ``count`` nearest buckling positions of ``frame``, which motors led to (collective)."""
+    lead = leading(curve.part).lead(model.linkage.joints)
+    modes = _at(model, newton, curve, frame, count, lead, critical_changes)
+    return tuple(BucklingPosition(frame.displacement + mode.value, mode_shape(model, mode.step)) for mode in modes)
 
 
 def soft_modes(
     model: MechanismModel, newton: Iteration, curve: Curve, frame: Frame, count: int
 ) -> tuple[SoftMode, ...]:
     """The ``count`` softest modes of ``frame`` under dead loads (collective)."""
-    modes = _at(model, newton, curve, frame, count, softest_modes)
+    modes = _at(model, newton, curve, frame, count, ForceLead(), softest_modes)
     return tuple(SoftMode(mode.value, mode_shape(model, mode.step)) for mode in modes)
 
 
-def _at(model: MechanismModel, newton: Iteration, curve: Curve, frame: Frame, count: int, modes) -> Iterable[Mode]:
+def _at(
+    model: MechanismModel,
+    newton: Iteration,
+    curve: Curve,
+    frame: Frame,
+    count: int,
+    lead: Lead,
+    modes: Callable[..., list[Mode]],
+) -> list[Mode]:
     floor = IDLE_STIFFNESS if curve.freedom.idle else 0.0
     with model.shaped(frame.design):
-        return modes(newton, ForceLead(), frame.state, floor=floor, count=count)
+        return modes(newton, lead, frame.state, floor=floor, count=count)

@@ -10,7 +10,7 @@ import numpy as np
 
 from fenicsmech.errors import DescriptionError
 from fenicsmech.linkage import Freedom
-from fenicsmech.mechanism import Configuration, Force, Leader, Units
+from fenicsmech.mechanism import Configuration, Drive, Force, Leader, Motor, Units
 from fenicsmech.report import CurveSeries, plot_curve, write_curve_csv
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.goal import Goal
@@ -54,6 +54,19 @@ class Curve:
         if not isinstance(self.part, Force):
             raise DescriptionError(
                 f"curve of {self.part.name!r}", "no force leads it", "Ask this of a curve under a changing force"
+            )
+        return self.part
+
+    @property
+    def motor_part(self) -> Motor | Drive:
+        """The motor, or motors that move together, whose position changes.
+
+        Raises:
+            DescriptionError: a force leads the curve.
+        """
+        if isinstance(self.part, Force):
+            raise DescriptionError(
+                f"curve of {self.part.name!r}", "no motor leads it", "Ask this of a curve that follows a motor"
             )
         return self.part
 

@@ -14,7 +14,14 @@ from fenicsmech.mechanism import Force, Leader, Output
 from fenicsmech.mechanism.checks import positive
 from fenicsmech.meshing import radius_ratios
 from fenicsmech.report import Panel, Trace, draw_configurations
-from fenicsmech.simulation.buckling import BucklingLoad, SoftMode, buckling_loads, soft_modes
+from fenicsmech.simulation.buckling import (
+    BucklingLoad,
+    BucklingPosition,
+    SoftMode,
+    buckling_loads,
+    buckling_positions,
+    soft_modes,
+)
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.estimates import Estimates
@@ -87,11 +94,25 @@ class Postprocessing:
             count: how many, those nearest to the force of the frame, in both senses, nearest first.
 
         Raises:
-            DescriptionError: no curve was computed yet.
+            DescriptionError: no curve was computed yet, or motors lead it.
         """
         chosen = self._chosen(curve)
         newton = self.newton(chosen.force_part, chosen.others)
         return buckling_loads(self.model, newton, chosen, frame or chosen.frames[-1], count)
+
+    def buckling_positions(
+        self, curve: Curve | None = None, *, frame: Frame | None = None, count: int = 3
+    ) -> tuple[BucklingPosition, ...]:
+        """Positions of the motors that led a curve at which the equilibrium would stop being unique (collective).
+
+        How well they are told, and the arguments, as of ``buckling_loads``.
+
+        Raises:
+            DescriptionError: no curve was computed yet, or a force leads it.
+        """
+        chosen = self._chosen(curve)
+        newton = self.newton(chosen.motor_part, chosen.others)
+        return buckling_positions(self.model, newton, chosen, frame or chosen.frames[-1], count)
 
     def soft_modes(
         self, curve: Curve | None = None, *, frame: Frame | None = None, count: int = 3

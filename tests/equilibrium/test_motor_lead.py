@@ -96,6 +96,17 @@ def test_torque_of_the_crank_of_a_bistable_four_bar_is_that_of_beam_theory():
     assert rest == pytest.approx(-2.0 * level, rel=1e-2)  # the mirror image is free of strain
 
 
+def test_position_at_which_a_motor_turns_back_is_told_the_better_the_nearer():
+    simulation, motor, _ = driven_toggle()
+    curve = simulation.follow(motor, until=fm.Until(position=-16.0))
+    turning = curve.turning_points[0]
+    missed = []
+    for index in (0, turning.index // 2, turning.index - 1):
+        found = simulation.buckling_positions(curve, frame=curve.frames[index], count=1)
+        missed += [abs(point.position / turning.frame.displacement - 1.0) for point in found]
+    assert len(missed) == 3 and missed[0] > missed[1] > missed[2] and missed[2] < 1e-2
+
+
 def test_column_that_a_slide_shortens_buckles_at_its_euler_load():
     case = column.column()
     mechanism = case.simulation.scene.mechanism
@@ -106,6 +117,9 @@ def test_column_that_a_slide_shortens_buckles_at_its_euler_load():
     curve = simulation.follow(motor, until=fm.Until(position=-2.0 * shortening))
     (event,) = curve.bifurcations
     assert event.frame.force == pytest.approx(-critical, rel=1e-2)
+    # from rest, without a path: Euler's, and four times as far the next one
+    told = [point.position for point in simulation.buckling_positions(curve, frame=curve.frames[0], count=2)]
+    assert told == pytest.approx([event.frame.displacement, 4.0 * event.frame.displacement], rel=1e-2)
     for branch in simulation.branches(curve, event, until=fm.Until(position=-1.0)):
         assert branch.displacements[-1] == pytest.approx(-1.0) and branch.stable[1:].all()
         assert branch.forces[-1] == pytest.approx(-critical, rel=1e-2)
@@ -136,8 +150,11 @@ def test_ends_and_questions_that_do_not_fit_a_motor_are_refused():
     with pytest.raises(fm.DescriptionError, match="not a motor"):
         simulation.follow(Motor(motor.joint, "another"), until=fm.Until(position=1.0))
     curve = simulation.follow(motor, until=fm.Until(position=-0.5))
-    with pytest.raises(fm.DescriptionError, match="no force leads it"):
-        simulation.error_estimates(curve)
+    for question in (simulation.error_estimates, simulation.buckling_loads):
+        with pytest.raises(fm.DescriptionError, match="no force leads it"):
+            question(curve)
+    with pytest.raises(fm.DescriptionError, match="no motor leads it"):
+        simulation.buckling_positions(simulation.load_displacement(push, forces=[0.0]))
     assert simulation.soft_modes(curve, count=1)[0].stiffness > 0.0
 
 
