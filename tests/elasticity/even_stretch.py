@@ -27,8 +27,9 @@ def free_stretch(others: tuple[float, ...], count: int, *, young: float, poisson
 
 
 def stretch(body: ElasticBody, ratio: float, *, pulled: int) -> None:
-    """Pulls a unit square or cube to ``ratio`` along its first ``pulled`` axes; its sides slide on walls; serial."""
-    dim, X = body.model.dim, nodes(body.u)
+    """Pulls a unit square or cube to ``ratio`` along its first ``pulled`` axes; its sides slide on walls."""
+    owned = body.u.function_space.dofmap.index_map.size_local
+    dim, X = body.model.dim, nodes(body.u)[:owned]
     fixed, values = [], []
     for axis in range(dim):
         for side, change in ((0.0, 0.0), (1.0, ratio - 1.0)):

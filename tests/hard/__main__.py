@@ -22,7 +22,7 @@ def main() -> int:
     """The number of cases in which something known was not found."""
     rows, failed = [], 0
     for case in CASES:
-        if all(part in case.name for part in sys.argv[1:]) and (case.parallel or COMM.size == 1):
+        if all(part in case.name for part in sys.argv[1:]):
             start = perf_counter()
             checks = [check for space in case.spaces for check in _run(case, space)]
             seconds = perf_counter() - start

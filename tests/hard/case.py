@@ -74,7 +74,6 @@ class HardCase:
         run: what is found out in one of ``spaces`` on a communicator (collective).
         spaces: elastic models it makes sense in.
         slow: takes more than ten seconds.
-        parallel: runs on two ranks as well.
     """
 
     name: str
@@ -82,4 +81,3 @@ class HardCase:
     run: Callable[[str, MPI.Comm], Iterator[Check]]
     spaces: tuple[str, ...] = BOTH
     slow: bool = False
-    parallel: bool = True

@@ -136,7 +136,6 @@ CASES = (
         "ν = 0.45 to 0.4999, stretched by half in a few distorted cells, against the closed form",
         _stretched_block,
         (STRAIN, SPACE),
-        parallel=False,
     ),
     HardCase(
         "bent strip of rubber",

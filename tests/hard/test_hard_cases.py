@@ -15,10 +15,10 @@ README = Path(__file__).parents[2] / "README.md"
 
 
 def _parameter(case: HardCase, space: str):
-    marks = [pytest.mark.parallel] * case.parallel + [pytest.mark.slow] * case.slow
-    return pytest.param(case, space, id=f"{case.name}, {space}", marks=marks)
+    return pytest.param(case, space, id=f"{case.name}, {space}", marks=[pytest.mark.slow] * case.slow)
 
 
+@pytest.mark.parallel
 @pytest.mark.parametrize("case, space", [_parameter(case, space) for case in CASES for space in case.spaces])
 def test_hard_case(case, space):
     checks = list(case.run(space, MPI.COMM_WORLD))
