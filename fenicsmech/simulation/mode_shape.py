@@ -27,8 +27,10 @@ class ModeShape:
 
 def mode_shape(model: MechanismModel, step: Step) -> ModeShape:
     """What stands out in the direction ``step`` (collective)."""
-    comm, dim, links = model.mesh.mesh.comm, model.linkage.dim, model.mechanism.flexible_links
-    squares = step.u.reshape(-1, dim) ** 2
+    comm, links = model.mesh.mesh.comm, model.mechanism.flexible_links
+    # where half is meshed, nodes move in space and bodies in the plane; pressures come behind
+    dim = model.interfaces.block
+    squares = model.elastic.split(step.u)[0].reshape(-1, dim) ** 2
     owners = model.node_link[: len(squares)]
     sums = comm.allreduce(np.array([squares[owners == index].sum(axis=0) for index in range(len(links))]))
     whole = float(sums.sum())
