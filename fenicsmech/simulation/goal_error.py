@@ -57,7 +57,6 @@ class GoalError:
         tensors = tensor_space(elastic.mesh, self._degree)
         self._recovered = [fem.Function(tensors, name=name) for name in ("recovered_gradient", "recovered_adjoint")]
         self._sums = fem.Function(tensors)
-        self._sums = fem.Function(tensors)
 
     def of(self, z: np.ndarray) -> float:
         """Q(u) − Q(u_h).
