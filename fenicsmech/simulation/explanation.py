@@ -78,7 +78,7 @@ def hints(model: MechanismModel, newton, curve: Curve, *, order: int, tolerance:
     """Hints from the last frame of ``curve`` (collective).
 
     Args:
-        model, newton: of the simulation, for the curve's force.
+        model, newton: of the simulation, for the curve's forces.
         curve: of this simulation.
         order: degree of the displacement field.
         tolerance: relative change of the displacement from which something matters.

@@ -162,7 +162,7 @@ class Postprocessing:
         chosen, fidelity = self._chosen(curve), self.fidelity
         left_out = hints(
             self.model,
-            self.newton(chosen.force_part),
+            self.newton(chosen.force_part, chosen.others),
             chosen,
             order=fidelity.order,
             tolerance=tolerance,

@@ -39,6 +39,24 @@ def test_weight_matters_to_the_soft_finger_and_not_to_the_stiff_claw():
         assert hint(simulation.explain(), "weight").matters is matters
 
 
+def test_hint_on_weight_knows_all_forces_that_act():
+    rig = fm.Mechanism("arm")
+    wall, hand = rig.rigid("wall", fixed=True), rig.rigid("hand")
+    link = rig.flexible("link", fm.strip([(-3, 0), (63, 0)], thickness=2.0, depth=6.0), fm.Material("soft", 100.0, 0.3))
+    for a, b, x in ((wall, link, -1.5), (link, hand, 61.5)):
+        rig.weld(a, b, at=(x, 0), region=fm.Rectangle(3, 4))
+    push = rig.force(on=hand, at=(60, 0), direction=(0, 1))
+    # far from the link, where its turning counts
+    pull = rig.force(on=hand, at=(110, 0), direction=(-1, 0), name="pull")
+    simulation = fm.Simulation(fm.Scene(rig), space="plane-stress", size=2.0)
+    curve = simulation.load_displacement(push, forces=[0.01], others={pull: 0.3})
+    weighed = fm.Scene(rig, effects=[fm.Gravity((0, -1e-3 * 9810.0), {link.material: 1.2e-9})])
+    heavy = fm.Simulation(weighed, space="plane-stress", size=2.0)
+    sunk = heavy.load_displacement(push, forces=[0.01], others={pull: 0.3}).displacements[0] - curve.displacements[0]
+    told = float(hint(simulation.explain(), "weight").text.split("at most ")[1].split()[0])
+    assert told == pytest.approx(abs(1e3 * sunk), rel=0.1)
+
+
 def test_effects_that_are_listed_are_named_and_not_hinted_at():
     scene, push = describe("truss")
     gravity = fm.Gravity((0, -9810), {fm.SMOOTH_SIL_950: 1.2e-9})
