@@ -5,7 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from fenicsmech.equilibrium import IDLE_STIFFNESS, ForceLead, Iteration, Lead, Mode, critical_changes, softest_modes
+from fenicsmech.equilibrium import (
+    IDLE_STIFFNESS,
+    ForceLead,
+    Iteration,
+    Lead,
+    Mode,
+    NotConverged,
+    critical_changes,
+    softest_modes,
+)
+from fenicsmech.errors import EquilibriumError
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.leading import leading
@@ -73,4 +83,12 @@ def _at(
 ) -> list[Mode]:
     floor = IDLE_STIFFNESS if curve.freedom.idle else 0.0
     with model.shaped(frame.design):
-        return modes(newton, lead, frame.state, floor=floor, count=count)
+        try:
+            return modes(newton, lead, frame.state, floor=floor, count=count)
+        except NotConverged as failure:
+            raise EquilibriumError(
+                f"modes of {curve.part.name!r} in configuration {curve.configuration.name!r}",
+                f"they cannot be told at {leading(curve.part).up} {frame.force:g} ({failure.reason})",
+                "Choose another frame, or another part to lead",
+                last=frame,
+            ) from failure

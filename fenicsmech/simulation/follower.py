@@ -110,12 +110,12 @@ class Follower:
             began, seconds = perf_counter(), dict(clock.seconds)
             try:
                 stretch = next(path, None)
+                if stretch is None:
+                    return
+                for critical in stretch.critical:
+                    self._record_event(arc, critical)
             except NotConverged as failure:
                 raise self._ended(failure) from failure
-            if stretch is None:
-                return
-            for critical in stretch.critical:
-                self._record_event(arc, critical)
             frame = self._tracer.record(stretch.point.solution())
             self.frames.append(replace(frame, seconds=perf_counter() - began, phases=clock.since(seconds)))
             watch(min(len(self.frames), self._until.frames))  # critical points come on top

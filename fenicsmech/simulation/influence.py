@@ -8,7 +8,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenicsmech.equilibrium import IDLE_STIFFNESS, DisplacementControl, Iteration, LoadControl, PointLoad, State
+from fenicsmech.equilibrium import (
+    IDLE_STIFFNESS,
+    DisplacementControl,
+    Iteration,
+    LoadControl,
+    NotConverged,
+    PointLoad,
+    State,
+)
+from fenicsmech.errors import EquilibriumError
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.goal import Goal
@@ -71,11 +80,21 @@ def influence(model: MechanismModel, newton: Iteration, at: Equilibrium) -> Iter
     Args:
         model, newton: of a simulation.
         at: one of its equilibria.
+
+    Raises:
+        EquilibriumError: its tangent is singular.
     """
     system = newton.system
     with model.shaped(at.design):
         system.load(at.state)
         held = at.goal is Goal.FORCE
         control = DisplacementControl(system.load_displacement(at.state)) if held else LoadControl(at.state.force)
-        newton.factor(at.state, control, system.balance(at.state, control), at.floor)
-        yield Influence(newton, at)
+        try:
+            newton.factor(at.state, control, system.balance(at.state, control), at.floor)
+            yield Influence(newton, at)
+        except NotConverged as failure:
+            raise EquilibriumError(
+                f"equilibrium under {system.controlled.name!r}",
+                f"its sensitivity cannot be told at force {at.state.force:g} ({failure.reason})",
+                "Choose another equilibrium, or prescribe the displacement",
+            ) from failure

@@ -95,6 +95,7 @@ class Postprocessing:
 
         Raises:
             DescriptionError: no curve was computed yet, or motors lead it.
+            EquilibriumError: the force moves nothing, or the tangent is singular.
         """
         chosen = self._chosen(curve)
         newton = self.newton(chosen.force_part, chosen.others)
@@ -109,6 +110,7 @@ class Postprocessing:
 
         Raises:
             DescriptionError: no curve was computed yet, or a force leads it.
+            EquilibriumError: the motors move nothing, or the tangent is singular.
         """
         chosen = self._chosen(curve)
         newton = self.newton(chosen.motor_part, chosen.others)
@@ -136,7 +138,8 @@ class Postprocessing:
             output: whose displacement is asked for instead, while what was prescribed stays as it is.
 
         Raises:
-            DescriptionError: no curve was computed yet.
+            DescriptionError: no curve was computed yet, or motors lead it.
+            EquilibriumError: the tangent of a frame is singular.
         """
         return self.estimates.elements(self._chosen(curve), output)
 
@@ -144,7 +147,8 @@ class Postprocessing:
         """What a simulation in space would add to plane stress, arguments and result as of ``error_estimates``.
 
         Raises:
-            DescriptionError: no curve was computed yet, or this is not plane stress.
+            DescriptionError: no curve was computed yet, motors lead it, or this is not plane stress.
+            EquilibriumError: the tangent of a frame is singular.
         """
         return self.estimates.depth(self._chosen(curve), output)
 
@@ -156,7 +160,8 @@ class Postprocessing:
             tolerance: relative change of the displacement from which something matters.
 
         Raises:
-            DescriptionError: no curve was computed yet, or the tolerance is not a positive number.
+            DescriptionError: no curve was computed yet, motors lead it, or the tolerance is not a positive number.
+            EquilibriumError: the tangent of the frame is singular.
         """
         positive("tolerance of an explanation", tolerance)
         chosen, fidelity = self._chosen(curve), self.fidelity

@@ -1,0 +1,43 @@
+"""Where a tangent cannot be solved with, users are told in words, and keep the frames they have."""
+
+from __future__ import annotations
+
+import pytest
+
+import fenicsmech as fm
+from fenicsmech.equilibrium import Newton, NotConverged
+from fenicsmech.simulation import follower
+
+from ..equilibrium.column import EULER, column
+
+ASKED = {
+    "buckling loads": lambda simulation: simulation.buckling_loads(),
+    "soft modes": lambda simulation: simulation.soft_modes(),
+    "error estimates": lambda simulation: simulation.error_estimates(),
+    "explanation": lambda simulation: simulation.explain(),
+}
+
+
+def failing(*arguments, **options):
+    """What a singular tangent does to all that needs it."""
+    raise NotConverged("the tangent cannot be factored", 0)
+
+
+@pytest.mark.parametrize("ask", ASKED.values(), ids=ASKED)
+def test_questions_about_a_singular_equilibrium_are_answered_in_words(ask, monkeypatch):
+    case = column()
+    case.simulation.load_displacement(case.push, forces=[0.1 * EULER])
+    design = case.simulation.model.elastic.d.x.array.copy()
+    monkeypatch.setattr(Newton, "factor", failing)
+    with pytest.raises(fm.EquilibriumError, match="cannot be factored"):
+        ask(case.simulation)
+    assert (case.simulation.model.elastic.d.x.array == design).all()
+
+
+def test_curve_ends_with_its_frames_where_the_modes_of_a_bifurcation_are_not_found(monkeypatch):
+    case = column()
+    monkeypatch.setattr(follower, "null_space", failing)
+    with pytest.raises(fm.EquilibriumError, match="cannot be followed beyond") as caught:
+        case.simulation.follow(case.push, until=fm.Until(force=1.1 * EULER))
+    assert 0.5 * EULER < caught.value.last.force < 1.1 * EULER
+    assert caught.value.last is caught.value.frames[-1]
