@@ -101,7 +101,7 @@ class Newton(Iteration):
         for iteration in range(options.iterations + 1):
             residuals.append(self.relative(balance))
             if self.converged(balance, norm) and iteration > 0:
-                if mixed or shift > floor:  # stability is of the true matrix
+                if mixed or shift > floor or options.stale == 0.0:  # stability is of the true matrix
                     self._factor_true(state, control, balance, floor, iteration)
                 return self._accept(state, control, residuals, iteration)
             if iteration == options.iterations:

@@ -49,6 +49,16 @@ def test_rates_at_the_equilibria_are_as_good_as_those_of_a_new_factor(space):
     assert corrected  # a tangent of the equilibrium itself would have no error at all
 
 
+def test_rates_without_stale_factors_are_those_of_a_new_one():
+    simulation, push = finger("plane-stress", solver=ALWAYS_ANEW)
+    newton = simulation.newton(push)
+    start = simulation.load_displacement(push, forces=[1.0]).frames[0].state
+    for load in (1.01, 1.1, 1.3):
+        solution = newton.solve(start, LoadControl(load))
+        rate = solution_rate(newton, solution.state)
+        assert newton.system.size(rate + solution.tangent.scaled(-1.0)) < 1e-9 * newton.system.size(rate)
+
+
 def solution_rate(newton, state):
     """The rate of a loaded equilibrium with the force, by a factor of its own."""
     control = LoadControl(state.force)
