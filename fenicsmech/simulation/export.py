@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from dolfinx import fem
 from dolfinx import mesh as dmesh
+from mpi4py import MPI
 
 from fenicsmech.compat import cell_nodes, cellwise_space, scalar_space, vector_space, write_series
 from fenicsmech.errors import DescriptionError
@@ -27,6 +28,7 @@ def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame])
 
     Raises:
         DescriptionError: the path does not end in .xdmf.
+        OSError: nothing can be written there.
     """
     path = Path(path)
     if path.suffix != ".xdmf":
@@ -51,11 +53,7 @@ def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame])
             von_mises = model.elastic.von_mises()
             stress.x.array[: len(von_mises)] = von_mises
 
-    folder = None
-    if comm.rank == 0:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        folder = tempfile.mkdtemp(dir=path.parent, prefix=f".{path.stem}-")
-    folder = Path(comm.bcast(folder, root=0))
+    folder = _folder_beside(path, comm)
     forces = np.array([frame.force for frame in frames])
     with _mesh_of(model, frames[0].design) as mesh:
         write_series(folder / path.name, mesh, fields, forces, update, comm)
@@ -65,6 +63,21 @@ def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame])
         for suffix in (".h5", ".xdmf"):
             os.replace(folder / path.with_suffix(suffix).name, path.with_suffix(suffix))
         folder.rmdir()
+
+
+def _folder_beside(path: Path, comm: MPI.Comm) -> Path:
+    """A new folder next to ``path``; where there can be none, all ranks raise the error of rank 0 (collective)."""
+    folder = failure = None
+    if comm.rank == 0:
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            folder = tempfile.mkdtemp(dir=path.parent, prefix=f".{path.stem}-")
+        except OSError as error:
+            failure = error
+    folder, failure = comm.bcast((folder, failure), root=0)
+    if failure is not None:
+        raise failure
+    return Path(folder)
 
 
 @contextmanager

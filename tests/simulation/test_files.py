@@ -68,6 +68,14 @@ def test_fields_are_written_as_a_time_series_over_the_force(space, shared_tmp_pa
         assert np.nanmin(distance) <= 1e-12 * abs(largest)
 
 
+def test_where_nothing_can_be_written_all_ranks_say_so(shared_tmp_path):
+    simulation, _ = claw("plane-stress")
+    if COMM.rank == 0:
+        (shared_tmp_path / "no folder").touch()
+    with pytest.raises(OSError, match="no folder"):
+        simulation.write(shared_tmp_path / "no folder" / "claw.xdmf")
+
+
 def test_files_of_an_earlier_run_are_replaced(shared_tmp_path):
     simulation, curve = claw("plane-stress")
     other = simulation.load_displacement(curve.force_part, forces=[1.0])
