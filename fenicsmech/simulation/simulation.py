@@ -52,7 +52,8 @@ class Simulation(Postprocessing):
         accuracy: instead of all that says how finely: relative error allowed in the largest displacement of every
             curve, or in the largest force where displacements are prescribed. ``load_displacement`` finds the cheapest
             fidelity that is good enough with the estimates of its errors added, see ``choice`` and
-            ``Curve.corrections``. With links known from files only, ``size`` stands for their thickness.
+            ``Curve.corrections``; ``follow`` and ``branches`` compute at the one chosen last, and at the coarsest
+            before. With links known from files only, ``size`` stands for their thickness.
         layers: of elements through the depth, or half of it where half is meshed; by default from depth and size.
         segments: of elements around pins, at least; 8 by default.
         quadrature: quadrature degree; the measured optimum by default.
@@ -251,8 +252,9 @@ class Simulation(Postprocessing):
         """What a rung of the dial gives for a curve, and how wrong it may be (collective)."""
         fidelity = self._dial.fidelity(rung)
         if fidelity != self.fidelity:
-            # what was computed at another one stays with its curves
+            # what was computed at another one stays with its curves, and is no answer at this one
             self._discretisation = self._discretisation.at(fidelity)
+            self._last = self.choice = None
         curve = self.trace(request, watch=watch)
         elements, depth = self.estimates.elements_and_depth(curve)
         values, largest = curve.goals, int(np.argmax(np.abs(curve.goals)))

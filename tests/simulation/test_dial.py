@@ -107,6 +107,24 @@ def test_curves_are_as_accurate_as_asked_for_with_their_corrections(tmp_path):
     assert columns["correction within the displacement [mm]"] == pytest.approx(curve.corrections)
 
 
+def test_curve_that_fails_on_a_finer_rung_leaves_no_answers_of_a_coarser_one(monkeypatch):
+    scene, push = describe("claw")
+    simulation, trace, traced = fm.Simulation(scene, accuracy=1e-4), fm.Simulation.trace, []
+
+    def once(*arguments, **options):
+        if traced:
+            raise fm.EquilibriumError("the second rung", "it fails", "Do not ask for it")
+        traced.append(trace(*arguments, **options))
+        return traced[0]
+
+    monkeypatch.setattr(fm.Simulation, "trace", once)
+    with pytest.raises(fm.EquilibriumError, match="second rung"):
+        simulation.load_displacement(push, forces=[1.0])
+    assert traced and simulation.choice is None
+    with pytest.raises(fm.DescriptionError, match="no curve was computed"):
+        simulation.error_estimates()
+
+
 def _computed(curve: fm.Curve) -> float:
     """The last displacement as computed, which corrections do not touch."""
     return curve.frames[-1].displacement
