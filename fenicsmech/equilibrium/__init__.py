@@ -1,7 +1,7 @@
 """Equilibria of a mechanism: elements and joints meet here.
 
 - ``state``: displacements, poses, multipliers
-- ``load``, ``loads``: point loads
+- ``load``, ``loads``, ``potentials``: point loads, and what depends on poses of bodies
 - ``control``: what is led along a path: a force, a displacement, motors
 - ``layout``, ``unknowns``: where each unknown stands, and the change of state it stands for
 - ``extras``, ``matrices``, ``entry_copy``, ``kkt``: the distributed KKT matrix
@@ -58,14 +58,13 @@ __all__ = [
     "DisplacementControl",
     "EquilibriumSolver",
     "EquilibriumSystem",
-    "Globalisation",
-    "Hermite",
-    "Iteration",
-    "KktNewton",
     "ForceLead",
+    "Globalisation",
     "Goal",
     "Heading",
     "Hermite",
+    "Iteration",
+    "KktNewton",
     "Lead",
     "LinearMethod",
     "LinearSolver",

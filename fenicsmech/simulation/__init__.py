@@ -5,6 +5,7 @@
 - ``fidelity``, ``dial``: how finely it is computed, as given or as found by the accuracy asked for
 - ``discretisation``: a scene at one fidelity, with the discretised mechanism behind it (``link_meshes``, ``model``)
 - ``request``, ``curves``, ``tracer``: what a curve is asked for, and how it is traced
+- ``idle_balance``: whether loads balance along motions that deform no link
 - ``frame``, ``curve``: what comes out
 - ``leading``: what leads a curve, a force or a motor
 - ``until``, ``follower``, ``followed``: curves that are followed wherever they lead, and their events
