@@ -4,8 +4,8 @@ Blocked contraction stores the energy
 
     V = ½ ∫ w E (F₃₃ − 1)² dV,     w = exp(−r / (c b)),
 
-r the distance from the nearest interface, b the depth of the link. With w = 1 and small strain it is what lies between
-plane stress and plane strain. By it a displacement changes, to first order with its adjoint z, by
+r the distance from the nearest interface as drawn, b the depth of the link. With w = 1 and small strain it is what lies
+between plane stress and plane strain. By it a displacement changes, to first order with its adjoint z, by
 
     Q(space) − Q(plane stress) ≈ −∂V/∂u · z.
 
