@@ -67,7 +67,7 @@ def metric_at(
     rate = lead.heading(system.unknowns.step(x), control)
     speed = abs(lead.conjugate_rate(system, state, control, x))
     motion = math.sqrt(mean_product(system, rate, rate))
-    if not motion > 0.0 or not (lead.displaces or parameter or speed > 0.0):
+    if not lead.moves(system, rate) or not (lead.displaces or parameter or speed > 0.0):
         raise NotConverged("it moves nothing", 0)
     reach = min(
         abs(parameter) if parameter else math.inf,

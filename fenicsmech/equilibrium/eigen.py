@@ -74,9 +74,9 @@ def critical_changes(newton: Iteration, lead: Lead, state: State, *, floor: floa
     _factor(newton, lead, state, floor)
     x = newton.solve_linear(control.rate(system, state))
     rate = lead.heading(system.unknowns.step(x), control)
-    size = system.size(rate.step)
-    if not size > 0.0:
+    if not lead.moves(system, rate):
         raise NotConverged("it moves nothing", 0)
+    size = system.size(rate.step)
     unit = _UNIT / size
     later, earlier = (_tangent(newton, lead, state, rate.scaled(sign * _FIRST / size)) for sign in (1.0, -1.0))
     first = _combined([(0.5 * unit * size / _FIRST, later), (-0.5 * unit * size / _FIRST, earlier)])

@@ -20,6 +20,8 @@ from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadCon
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem
 
+_NO_COMPLIANCE = 1e-6  # of the mean: ideal joints have 1e-8, which keeps redundant ones regular
+
 
 @dataclass(frozen=True)
 class Heading:
@@ -83,6 +85,10 @@ class Lead(ABC):
         """The heading of a ``step`` that solves the equations of the rate with a control's target."""
 
     @abstractmethod
+    def moves(self, system: EquilibriumSystem, rate: Heading) -> bool:
+        """Whether anything moves at a ``rate`` of the state with p (collective)."""
+
+    @abstractmethod
     def moved(self, system: EquilibriumSystem, state: State, heading: Heading) -> State:
         """``state`` after ``heading`` (collective)."""
 
@@ -124,6 +130,9 @@ class ForceLead(Lead):
         whole = step if control.constrained else replace(step, force=1.0)
         return Heading(whole, whole.force)
 
+    def moves(self, system, rate):
+        return system.size(rate.step) > _NO_COMPLIANCE * system.joints.length / system.unknowns.unit**2
+
     def moved(self, system, state, heading):
         return system.moved(state, heading.step)
 
@@ -164,6 +173,9 @@ class MotorLead(Lead):
 
     def heading(self, step, control):
         return Heading(step, 1.0)
+
+    def moves(self, system, rate):
+        return system.size(rate.step) > 0.0
 
     def moved(self, system, state, heading):
         return system.moved(replace(state, motors=state.motors + heading.parameter * self.direction), heading.step)

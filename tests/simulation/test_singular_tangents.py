@@ -41,3 +41,14 @@ def test_curve_ends_with_its_frames_where_the_modes_of_a_bifurcation_are_not_fou
         case.simulation.follow(case.push, until=fm.Until(force=1.1 * EULER))
     assert 0.5 * EULER < caught.value.last.force < 1.1 * EULER
     assert caught.value.last is caught.value.frames[-1]
+
+
+def test_force_that_joints_hold_has_no_buckling_load_and_no_path():
+    case = column()
+    mechanism = case.simulation.scene.mechanism
+    across = mechanism.force(on=case.push.on, at=case.push.at, direction=(0, 1), name="across")
+    case.simulation.load_displacement(across, forces=[EULER])
+    with pytest.raises(fm.EquilibriumError, match="moves nothing"):
+        case.simulation.buckling_loads()
+    with pytest.raises(fm.EquilibriumError, match="moves nothing"):
+        case.simulation.follow(across, until=fm.Until(force=EULER))
