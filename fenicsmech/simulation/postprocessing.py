@@ -7,6 +7,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
+from fenicsmech.compat import owned_values
 from fenicsmech.equilibrium import Iteration
 from fenicsmech.errors import DescriptionError
 from fenicsmech.linkage import Linkage
@@ -230,7 +231,20 @@ class Postprocessing:
         return panel(self.model, curve, stress=stress, traces=traces)
 
     def _chosen(self, curve: Curve | None) -> Curve:
+        """The one that is asked about (collective).
+
+        Raises:
+            DescriptionError: no curve was computed yet, or this one at another fidelity.
+        """
         chosen = curve or self._last
         if chosen is None:
             raise DescriptionError("simulation", "no curve was computed yet", "Call load_displacement first")
+        elastic, frame = self.model.elastic, chosen.frames[-1]
+        own = len(elastic.d.x.array), sum(len(owned_values(field)) for field in elastic.fields)
+        if self.comm.allreduce(int((len(frame.design), len(frame.state.u)) != own)):
+            raise DescriptionError(
+                f"curve of {chosen.part.name!r}",
+                "it was computed at another fidelity than this simulation has now",
+                "Ask the simulation that computed it, before an accuracy makes it go on to a finer mesh",
+            )
         return chosen

@@ -213,7 +213,7 @@ class Simulation(Postprocessing):
         """
         self._check_description()
         check_until(until, curve.part)
-        return self._discretisation.curves.branches(curve, event, until, steps, mode)
+        return self._discretisation.curves.branches(self._chosen(curve), event, until, steps, mode)
 
     def on(self, comm: MPI.Comm) -> Simulation:
         """The same scene at the same fidelity for other processes, as drawn."""

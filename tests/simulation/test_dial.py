@@ -125,6 +125,16 @@ def test_curve_that_fails_on_a_finer_rung_leaves_no_answers_of_a_coarser_one(mon
         simulation.error_estimates()
 
 
+@pytest.mark.parallel
+def test_curves_of_another_fidelity_are_refused():
+    scene, push = describe("claw")
+    coarse, fine = (fm.Simulation(scene, space="plane-stress", size=size) for size in (6.0, 4.0))
+    curve = coarse.load_displacement(push, forces=[1.0])
+    for ask in (fine.error_estimates, fine.soft_modes, fine.explain):
+        with pytest.raises(fm.DescriptionError, match="another fidelity"):
+            ask(curve)
+
+
 def _computed(curve: fm.Curve) -> float:
     """The last displacement as computed, which corrections do not touch."""
     return curve.frames[-1].displacement
