@@ -9,9 +9,12 @@ from fenicsmech.equilibrium.arc_length import ArcLength
 from fenicsmech.equilibrium.critical import CriticalPoint, locate
 from fenicsmech.equilibrium.path_points import PathPoint, PathPoints
 from fenicsmech.equilibrium.solver import NotConverged
+from fenicsmech.log import logger
 
+_log = logger(__name__)
 _ROOT = 1e-10  # how closely a path ends where it is asked to, in units of its references,
 _WITHIN = 1e-8  # and of the change over the step it ends in
+_MISSED = 1e-6  # likewise: ends farther off than that are told
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,7 @@ def follow(arc: ArcLength, start: PathPoint, goals: Sequence[Goal], *, most: int
 
 
 def _end(points: PathPoints, before: PathPoint, after: PathPoint, goal: Goal) -> PathPoint:
-    """Where the path has the goal's value, by Newton's method within the step."""
+    """Where the path has the goal's value, by Newton's method within the step; as near as can be got to it."""
     width = points.along(before, after)
     low, high = 0.0, width
     change = goal.value(after) - goal.value(before)
@@ -82,4 +85,6 @@ def _end(points: PathPoints, before: PathPoint, after: PathPoint, goal: Goal) ->
             best = points.between(before, after, distance)
         except NotConverged:
             break
+    if abs(goal.value(best) - goal.target) > _MISSED * abs(change):
+        _log.warning("the path ends at %g, not at %g: no equilibrium was found there", goal.value(best), goal.target)
     return best

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.equilibrium import Newton, NotConverged
+from fenicsmech.equilibrium import Newton, NotConverged, PathPoints
 from fenicsmech.simulation import follower
 
 from ..equilibrium.column import EULER, column
@@ -52,3 +52,13 @@ def test_force_that_joints_hold_has_no_buckling_load_and_no_path():
         case.simulation.buckling_loads()
     with pytest.raises(fm.EquilibriumError, match="moves nothing"):
         case.simulation.follow(across, until=fm.Until(force=EULER))
+
+
+@pytest.mark.parametrize("found", [True, False])
+def test_curve_that_does_not_end_where_it_should_says_so(found, monkeypatch, caplog):
+    case = column()
+    if not found:
+        monkeypatch.setattr(PathPoints, "between", failing)
+    curve = case.simulation.follow(case.push, until=fm.Until(force=0.333 * EULER))
+    assert (abs(curve.forces[-1] / (0.333 * EULER) - 1.0) < 1e-9) == found
+    assert ("the path ends at" in caplog.text) != found
