@@ -1,9 +1,8 @@
 """The entries of K̂ that belong to poses, multipliers and the controlled force.
 
 B = Σ_i r_i · ∂²u_i/∂z² of interface nodes − f a · ∂²u_P/∂z² of loaded points + ∂²V/∂z² of potentials
-− Σ λ_k ∂²C_k/∂z², the constraint
-gradients −A, the control's row −a, and −ε − c on the multipliers: ε = 1/ρ is the proximal term of the augmented
-Lagrangian that keeps redundant constraints regular, c the compliance of joints.
+− Σ λ_k ∂²C_k/∂z², the constraint gradients −A, the control's row −a, and −ε − c on the multipliers: ε = 1/ρ is the
+proximal term of the augmented Lagrangian that keeps redundant constraints regular, c the compliance of joints.
 """
 
 from __future__ import annotations

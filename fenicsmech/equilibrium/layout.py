@@ -21,6 +21,7 @@ class Layout:
     """Numbering of rows and unknowns.
 
     Attributes:
+        comm: the processes that share them.
         last: whether this rank holds the extras.
         per_node: displacements per node.
         displacements, owned: number of owned displacements; of all owned finite-element DOFs.
@@ -31,6 +32,7 @@ class Layout:
         whole_nodes: whether all components of every node with an unknown are unknowns, on all ranks.
         local_rows, local_unknowns: sizes on this rank.
         unknowns: on all ranks.
+        first_node, first_row, first_unknown: global numbers of this rank's first ones.
         first_extra_row, first_extra: global numbers of the first extra row and unknown.
         z, multipliers, force: slices of the extras.
         extras: number of extras.

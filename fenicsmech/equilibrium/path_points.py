@@ -56,7 +56,7 @@ class PathPoint:
         return replace(self, tangent=self.tangent.scaled(-1.0), conjugate=-self.conjugate)
 
     def solution(self) -> Solution:
-        """The same as an equilibrium that was asked for."""
+        """The same as an equilibrium that was asked for, its tangent that of the path."""
         return Solution(
             self.state,
             self.residuals,

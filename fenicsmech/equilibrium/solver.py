@@ -1,7 +1,8 @@
 """What every equilibrium solver is: a description with its limits, and the iteration it makes for one system.
 
 An iteration finds equilibria its own way; what follows an equilibrium (its stability, its rate along the path,
-sensitivities) is the same for all: linear solves with the true KKT matrix there, and its inertia.
+sensitivities) is the same for all: linear solves with the true KKT matrix there, or where the last step came
+from, and its inertia.
 """
 
 from __future__ import annotations
@@ -240,7 +241,7 @@ class Iteration(ABC):
         )
 
     def _accept(self, state: State, control: Control, residuals: list[float], iteration: int) -> Solution:
-        """Stability and tangent at the equilibrium, from the matrix last factored, the true one."""
+        """Stability and tangent at the equilibrium, from the matrix last factored, without what mends steps."""
         system = self.system
         destroy_garbage(system.layout.comm)
         right = control.rate(system, state)

@@ -29,6 +29,7 @@ class MechanismModel:
     """A mechanism at one fidelity, ready for equilibria.
 
     Attributes:
+        mechanism, linkage: what is simulated, and its bodies.
         mesh: the reference mesh of all flexible links.
         elastic: their elastic energy.
         interfaces: interface nodes as functions of body poses.
