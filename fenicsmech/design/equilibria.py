@@ -162,7 +162,10 @@ class TargetEquilibria:
     def _unloaded(self, target: Target, state: State) -> State:
         """The equilibrium without force and without effects, from one without force."""
         newton = self._newtons[target.force_part]
-        return newton.solve(replace(state, share=0.0), LoadControl(0.0), floor=self._floor[target]).state
+        try:
+            return newton.solve(replace(state, share=0.0), LoadControl(0.0), floor=self._floor[target]).state
+        except NotConverged as failure:
+            raise Infeasible(f"no equilibrium without loads ({failure.reason})") from failure
 
     def _followed(self, target: Target, sample: Sample, before: np.ndarray, after: np.ndarray) -> Sample:
         state = self._moved(target, sample.state, LoadControl(target.force), before, after, _HALVINGS)

@@ -29,7 +29,7 @@ _DIVERGED = 1e3  # growth of the residual
 _LARGEST_CHANGE = 0.5  # of the mechanism's length, or rad: of one iteration
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PathPoint:
     """An equilibrium on a path.
 

@@ -31,7 +31,7 @@ _CLOSED = 1e-10  # of the mechanism's length, or rad: joints open farther hide b
 _BEARABLE = 1e-4  # of the forces, where the tangent is all but singular
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Solution:
     """A converged equilibrium.
 

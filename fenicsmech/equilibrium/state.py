@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class State:
     """A point (s, λ, f) of the equilibrium equations.
 
@@ -30,7 +30,7 @@ class State:
     share: float = 1.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Step:
     """A change of state; ``z`` are the poses of the free bodies, flat."""
 

@@ -17,7 +17,7 @@ from fenicsmech.simulation.goal import Goal
 from fenicsmech.simulation.leading import Axis, leading
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Curve:
     """Frames of one configuration.
 

@@ -46,7 +46,7 @@ class PathEvent:
         return self.critical.modes
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class FollowedCurve(Curve):
     """Frames in the order of the path, however often it turns back.
 

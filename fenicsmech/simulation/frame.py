@@ -11,7 +11,7 @@ from fenicsmech.equilibrium import Reaction, State
 from fenicsmech.mechanism import Motor, Output
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Frame:
     """An equilibrium and what was measured in it.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from mpi4py import MPI
 
-from fenicsmech.errors import FenicsmechError
 from fenicsmech.linkage import Linkage
 from fenicsmech.mechanism import FlexibleLink, Mechanism
 from fenicsmech.meshing import InterfaceSite, LinkMesh, check_link, mesh_link
@@ -56,7 +55,7 @@ def mesh_mechanism(comm: MPI.Comm, mechanism: Mechanism, linkage: Linkage, fidel
     if comm.rank == 0:
         try:
             meshes = mesh_links(mechanism, linkage, fidelity)
-        except FenicsmechError as error:
+        except Exception as error:  # of whatever kind: the other ranks wait
             failure = error
     failure = comm.bcast(failure, root=0)
     if failure is not None:

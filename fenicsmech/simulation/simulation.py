@@ -52,8 +52,8 @@ class Simulation(Postprocessing):
         accuracy: instead of all that says how finely: relative error allowed in the largest displacement of every
             curve, or in the largest force where displacements are prescribed. ``load_displacement`` finds the cheapest
             fidelity that is good enough with the estimates of its errors added, see ``choice`` and
-            ``Curve.corrections``; ``follow`` and ``branches`` compute at the one chosen last, and at the coarsest
-            before. With links known from files only, ``size`` stands for their thickness.
+            ``Curve.corrections``; ``follow`` and ``branches`` compute at the one chosen last, and refuse before. With
+            links known from files only, ``size`` stands for their thickness.
         layers: of elements through the depth, or half of it where half is meshed; by default from depth and size.
         segments: of elements around pins, at least; 8 by default.
         quadrature: quadrature degree; the measured optimum by default.
@@ -177,11 +177,12 @@ class Simulation(Postprocessing):
             steps: how finely it is followed.
 
         Raises:
-            DescriptionError: the request makes no sense.
+            DescriptionError: the request makes no sense, or an accuracy was asked for and no fidelity chosen yet.
             AssemblyError: the configuration does not assemble.
             EquilibriumError: the curve ends early; carries the frames before that.
         """
         self._check_description()
+        self._check_rung(part)
         request = read_path(self.scene.mechanism, part, configuration=configuration, others=others)
         check_until(until, part)
         with Progress(until.frames, configuration.name) if self.comm.rank == 0 else Silent() as progress:
@@ -246,6 +247,15 @@ class Simulation(Postprocessing):
                 f"mechanism {self.scene.mechanism.name!r}",
                 "links, joints or motors were added after the simulation was made",
                 "Make a new Simulation",
+            )
+
+    def _check_rung(self, part: Leader) -> None:
+        """Refuses to follow anything as long as the accuracy asked for has chosen nothing."""
+        if self._dial is not None and self.choice is None:
+            raise DescriptionError(
+                f"curve of {part.name!r}",
+                "the accuracy asked for is settled by load_displacement, which was not called yet",
+                "Call it first, with forces of the size in question, or give space, order and size instead of accuracy",
             )
 
     def _outcome(self, rung: Rung, request: CurveRequest, watch: Callable[[int], None]) -> Outcome:

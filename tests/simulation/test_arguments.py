@@ -52,6 +52,12 @@ def test_accuracy_and_what_it_is_to_choose(beside):
     refused(f"accuracy and {name}", lambda: fm.Simulation(scene, accuracy=0.01, comm=MPI.COMM_SELF, **beside))
 
 
+def test_following_before_the_accuracy_has_chosen_anything():
+    scene, push = describe("truss")
+    simulation = fm.Simulation(scene, accuracy=0.01, comm=MPI.COMM_SELF)
+    refused("curve of", lambda: simulation.follow(push, until=fm.Until(force=1.0)), simulation=simulation)
+
+
 @pytest.mark.parametrize("formulation", ["mixed", 0.49, fm.Mixed])
 def test_formulation_that_is_none(formulation):
     scene, _ = describe("truss")
