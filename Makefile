@@ -57,7 +57,8 @@ lint: install-test ## style and layering: seconds
 CORE := tests/bodies tests/design tests/effects tests/elasticity tests/joints tests/kinematics tests/linkage \
     tests/mechanism tests/meshing
 OTHERS := tests/equilibrium tests/simulation
-AROUND := tests/demos tests/accuracy tests/hard tests/oracles tests/report tests/test_log.py tests/test_readme.py
+AROUND := tests/demos tests/accuracy tests/hard tests/oracles tests/report \
+    $(filter-out tests/test_layering.py,$(wildcard tests/test_*.py))
 PYTEST = OPENBLAS_NUM_THREADS=1 $(PYTHON) -m pytest -p no:cacheprovider --durations=5 --durations-min=5 -m "$(SELECT)"
 
 test-serial: install-test ## the tests on one process each

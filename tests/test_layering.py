@@ -19,6 +19,7 @@ LAYERS = (
     "log",
     "clock",
     "compat",
+    "collective",
     "report",
     "kinematics",
     "joints",

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
+from fenicsmech.collective import from_one
 from fenicsmech.design.optimisers import Iterate, Minimiser, Start
 from fenicsmech.design.regularisers import Regulariser
 from fenicsmech.design.rest_shape import RestShape
@@ -86,16 +87,7 @@ class Checkpoint:
 
     def load_together(self, comm: MPI.Comm) -> Saved | None:
         """The same on all processes, errors too; None if there is no file yet (collective)."""
-        saved, failure = None, None
-        if comm.rank == 0 and self.path.exists():
-            try:
-                saved = self.load()
-            except DescriptionError as error:
-                failure = error
-        saved, failure = comm.bcast((saved, failure), root=0)
-        if failure is not None:
-            raise failure
-        return saved
+        return from_one(comm, lambda: self.load() if self.path.exists() else None)
 
 
 def fingerprint(

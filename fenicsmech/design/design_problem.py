@@ -10,6 +10,7 @@ from time import perf_counter
 import numpy as np
 
 from fenicsmech.clock import Clock
+from fenicsmech.collective import on_one
 from fenicsmech.design.checkpoint import Checkpoint, fingerprint
 from fenicsmech.design.conclusion import Verification, link_designs, target_results, verify
 from fenicsmech.design.equilibria import TargetEquilibria
@@ -27,7 +28,7 @@ from fenicsmech.design.rest_shape import RestShape
 from fenicsmech.design.result import DesignResult
 from fenicsmech.design.spline_design import SplineDesign, Target, bounds_of, shape_request
 from fenicsmech.design.team import Outcome, minimise_together
-from fenicsmech.errors import DescriptionError, EquilibriumError, FenicsmechError
+from fenicsmech.errors import DescriptionError, EquilibriumError
 from fenicsmech.simulation import Simulation
 
 DEFAULT_REGULARISER = MeshQuality() + ShapeBounds() + 1e-4 * StayClose()
@@ -147,8 +148,7 @@ class DesignProblem:
                         for link, mesh in zip(self._rest.links, meshes, strict=False)
                     ]
                 )
-        if self.simulation.comm.rank == 0:
-            draw_links(path, self.simulation, links, *outlines)
+        on_one(self.simulation.comm, lambda: draw_links(path, self.simulation, links, *outlines))
 
     def export(self, folder: str | Path, *, pin: float | None = None) -> None:
         """Writes ``NAME.step`` and ``NAME.stl`` of every link that may change, in its present shape (collective).
@@ -160,16 +160,9 @@ class DesignProblem:
         Raises:
             MeshingError: no solid can be made of a link.
         """
-        links, failure = [design.link for design in self.designs], None
+        links = [design.link for design in self.designs]
         meshes = rest_meshes(self.simulation, links)
-        if meshes is not None:
-            try:
-                write_solids(folder, self.simulation.linkage, links, meshes, pin)
-            except FenicsmechError as error:
-                failure = error
-        failure = self.simulation.comm.bcast(failure, root=0)
-        if failure is not None:
-            raise failure
+        on_one(self.simulation.comm, lambda: write_solids(folder, self.simulation.linkage, links, meshes, pin))
 
     # -- steps of ``optimize`` -------------------------------------------------------------------------------
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenicsmech.collective import from_one
 from fenicsmech.compat import original_cells
 from fenicsmech.design.handle_placement import place_handles
 from fenicsmech.design.handles import LinkHandles
 from fenicsmech.design.spline_fit import fit_spline
 from fenicsmech.design.weights import handle_weights
-from fenicsmech.errors import FenicsmechError
 from fenicsmech.meshing import FREE, Centreline, LinkMesh, cell_measures
 from fenicsmech.meshing.distribute import MechanismMesh
 from fenicsmech.meshing.plan import plan_of
@@ -82,16 +82,7 @@ def shape_links(mesh: MechanismMesh, requests: Sequence[ShapeRequest], *, root: 
     """The shapes of some links, computed on ``root`` and the same on all ranks; errors too (collective)."""
     comm = mesh.mesh.comm
     links = gather_links(mesh)
-    shapes, failure = None, None
-    if comm.rank == root:
-        try:
-            shapes = [shape_link(links[request.link], request) for request in requests]
-        except FenicsmechError as error:
-            failure = error
-    failure = comm.bcast(failure, root=root)
-    if failure is not None:
-        raise failure
-    return comm.bcast(shapes, root=root)
+    return from_one(comm, lambda: [shape_link(links[request.link], request) for request in requests], root=root)
 
 
 def gather_links(mesh: MechanismMesh, vertices: np.ndarray | None = None) -> list[LinkMesh]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from mpi4py import MPI
 
+from fenicsmech.collective import from_one
 from fenicsmech.design.objective import Objective
 from fenicsmech.design.optimisers import Evaluation, Infeasible, Iterate, Minimiser, Reason, Start
 
@@ -73,8 +74,8 @@ def minimise_together(
         Infeasible: at the start.
         Exception: whatever ``watch`` raises, on all processes.
     """
-    outcome, failure = None, None
-    if comm.rank == 0:
+
+    def lead() -> Outcome:
         started = []
 
         def watch_first(iterate: Iterate) -> None:
@@ -83,21 +84,25 @@ def minimise_together(
 
         try:
             last = minimiser.minimise(_Leader(comm, objective), start, watch=watch_first)
-            outcome = Outcome(last.number, last.evaluations, last.evaluation.parameters, last.reason, started[0])
-        except Exception as error:
-            failure = error
-        comm.bcast(None, root=0)
-    else:
-        _follow(comm, objective)
-    outcome, failure = comm.bcast((outcome, failure), root=0)
+        finally:
+            comm.bcast(None, root=0)
+        return Outcome(last.number, last.evaluations, last.evaluation.parameters, last.reason, started[0])
+
+    failure = _follow(comm, objective) if comm.rank > 0 else None
+    outcome = from_one(comm, lead)
     if failure is not None:
         raise failure
     return outcome
 
 
-def _follow(comm: MPI.Comm, objective: Objective) -> None:
+def _follow(comm: MPI.Comm, objective: Objective) -> Exception | None:
+    """Takes part until the first process is done; the first error that it may not have seen."""
+    failure = None
     while (request := comm.bcast(None, root=0)) is not None:
         try:
             request.answer(objective)
         except Infeasible:
             pass  # the first process has seen it too, and decides
+        except Exception as error:  # as a rule it has seen this as well, and ends; until then it needs answers
+            failure = failure or error
+    return failure

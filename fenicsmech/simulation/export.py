@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from dolfinx import fem
 from dolfinx import mesh as dmesh
-from mpi4py import MPI
 
+from fenicsmech.collective import from_one, on_one
 from fenicsmech.compat import cell_nodes, cellwise_space, scalar_space, vector_space, write_series
 from fenicsmech.errors import DescriptionError
 from fenicsmech.simulation.frame import Frame
@@ -53,31 +53,25 @@ def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame])
             von_mises = model.elastic.von_mises()
             stress.x.array[: len(von_mises)] = von_mises
 
-    folder = _folder_beside(path, comm)
+    folder = from_one(comm, lambda: _folder_beside(path))
     forces = np.array([frame.force for frame in frames])
     with _mesh_of(model, frames[0].design) as mesh:
         write_series(folder / path.name, mesh, fields, forces, update, comm)
-    comm.barrier()
-    if comm.rank == 0:
-        # the heavy data first: the light file that names it must never point at nothing
-        for suffix in (".h5", ".xdmf"):
-            os.replace(folder / path.with_suffix(suffix).name, path.with_suffix(suffix))
-        folder.rmdir()
+    comm.barrier()  # all have closed the file
+    on_one(comm, lambda: _move_up(folder, path))
 
 
-def _folder_beside(path: Path, comm: MPI.Comm) -> Path:
-    """A new folder next to ``path``; where there can be none, all ranks raise the error of rank 0 (collective)."""
-    folder = failure = None
-    if comm.rank == 0:
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            folder = tempfile.mkdtemp(dir=path.parent, prefix=f".{path.stem}-")
-        except OSError as error:
-            failure = error
-    folder, failure = comm.bcast((folder, failure), root=0)
-    if failure is not None:
-        raise failure
-    return Path(folder)
+def _folder_beside(path: Path) -> Path:
+    """A new folder next to ``path``."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.stem}-"))
+
+
+def _move_up(folder: Path, path: Path) -> None:
+    """Both files out of ``folder``, the heavy data first: the light file that names it must never point at nothing."""
+    for suffix in (".h5", ".xdmf"):
+        os.replace(folder / path.with_suffix(suffix).name, path.with_suffix(suffix))
+    folder.rmdir()
 
 
 @contextmanager

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mpi4py import MPI
 
+from fenicsmech.collective import on_one
 from fenicsmech.linkage import Linkage
 from fenicsmech.mechanism import FlexibleLink, Mechanism
 from fenicsmech.meshing import InterfaceSite, LinkMesh, check_link, mesh_link
@@ -51,13 +52,4 @@ def interface_sites(linkage: Linkage, link: FlexibleLink) -> list[InterfaceSite]
 
 def mesh_mechanism(comm: MPI.Comm, mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> MechanismMesh:
     """Meshes on rank 0 and distributes; an error there is raised on all ranks (collective)."""
-    meshes, failure = None, None
-    if comm.rank == 0:
-        try:
-            meshes = mesh_links(mechanism, linkage, fidelity)
-        except Exception as error:  # of whatever kind: the other ranks wait
-            failure = error
-    failure = comm.bcast(failure, root=0)
-    if failure is not None:
-        raise failure
-    return distribute(comm, meshes)
+    return distribute(comm, on_one(comm, lambda: mesh_links(mechanism, linkage, fidelity)))

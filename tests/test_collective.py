@@ -1,0 +1,58 @@
+"""What one process does is done for all: they wait for it, and get its result or its error."""
+
+import threading
+import time
+
+import pytest
+from mpi4py import MPI
+
+from fenicsmech.collective import from_one, on_one
+
+pytestmark = pytest.mark.parallel
+
+COMM = MPI.COMM_WORLD
+
+
+class OddError(Exception):
+    """Cannot be made anew from its arguments, as unpickling does."""
+
+    def __init__(self, part, shown):
+        super().__init__(f"{part}: {shown}")
+
+
+def fail(error: Exception) -> None:
+    raise error
+
+
+def test_only_the_chosen_process_works():
+    root = COMM.size - 1
+    assert on_one(COMM, lambda: COMM.rank, root=root) == (root if COMM.rank == root else None)
+    assert from_one(COMM, lambda: COMM.rank, root=root) == root
+
+
+def test_no_process_goes_on_before_it_is_done(shared_tmp_path):
+    def write() -> None:
+        time.sleep(0.05)
+        (shared_tmp_path / "done").touch()
+
+    on_one(COMM, write)
+    assert (shared_tmp_path / "done").exists()
+
+
+@pytest.mark.parametrize("call", [on_one, from_one])
+def test_its_error_is_raised_on_all(call):
+    with pytest.raises(FileNotFoundError, match="nowhere"):
+        call(COMM, lambda: open("/nowhere"))
+
+
+@pytest.mark.parametrize("error", [OddError("link", 3), OSError("link", threading.Lock())], ids=["odd", "locked"])
+def test_an_error_that_cannot_be_sent_is_told_in_words(error):
+    with pytest.raises(type(error) if COMM.rank == 0 else RuntimeError, match="link"):
+        on_one(COMM, lambda: fail(error))
+    assert COMM.allreduce(1) == COMM.size
+
+
+def test_the_next_call_is_not_disturbed_by_an_error():
+    with pytest.raises(ValueError):
+        from_one(COMM, lambda: fail(ValueError("no")))
+    assert from_one(COMM, lambda: "yes") == "yes"
