@@ -46,6 +46,11 @@ _JIT = {
 if not _LEGACY:
     import basix.ufl
 
+# Communicators whose duplicate is in the list, for as long as the process lives: MPI frees an attribute's value too late
+# for PETSc to free a duplicate then.
+_KEPT = MPI.Comm.Create_keyval()
+_DUPLICATES: list[PETSc.Comm] = []
+
 _ADD = (dolfinx.la.ScatterMode if _LEGACY else dolfinx.la.InsertMode).add
 
 
@@ -180,7 +185,15 @@ def destroy_garbage(comm: MPI.Comm) -> None:
     petsc4py only queues them, in 3.18 on one process too, as processes may let go of them in different orders. Meshes
     have communicators of their own, and what is queued there when a mesh dies is lost: matrices, vectors and solvers
     belong on the communicator that the mesh was made with.
+
+    Call it before the first such object is made. PETSc works on a duplicate of ``comm`` that it makes, collectively,
+    when there is none, and frees with the last object on it. Which object that is may differ between processes for a
+    while: they forget objects at different times, for ever where an error's traceback held an object and a view of its
+    values. One process would then make a duplicate while another does not; so the first one is kept.
     """
+    if comm.Get_attr(_KEPT) is None:
+        comm.Set_attr(_KEPT, True)
+        _DUPLICATES.append(PETSc.Comm(comm).duplicate())
     PETSc.garbage_cleanup(comm)
 
 
