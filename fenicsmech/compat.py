@@ -46,8 +46,8 @@ _JIT = {
 if not _LEGACY:
     import basix.ufl
 
-# Communicators whose duplicate is in the list, for as long as the process lives: MPI frees an attribute's value too late
-# for PETSc to free a duplicate then.
+# Marks communicators whose duplicate is in the list, for as long as the process lives: an attribute's value is let go of
+# too late for PETSc to free a duplicate then.
 _KEPT = MPI.Comm.Create_keyval()
 _DUPLICATES: list[PETSc.Comm] = []
 
