@@ -46,7 +46,7 @@ _JIT = {
 if not _LEGACY:
     import basix.ufl
 
-# Marks communicators whose duplicate is in the list, for as long as the process lives: an attribute's value is let go of
+# Marks communicators whose duplicate is in the list for as long as the process lives: an attribute's value is let go of
 # too late for PETSc to free a duplicate then.
 _KEPT = MPI.Comm.Create_keyval()
 _DUPLICATES: list[PETSc.Comm] = []
