@@ -1,27 +1,48 @@
 """Phases inside phases are counted once."""
 
-from time import sleep
-
 import pytest
 
+from fenicsmech import clock as module
 from fenicsmech.clock import Clock
 
 
-def test_a_phase_does_not_count_those_inside_it():
+@pytest.fixture
+def wait(monkeypatch):
+    """Lets time pass, and nothing else does."""
+    now = [0]
+    monkeypatch.setattr(module, "perf_counter", lambda: now[0])
+
+    def wait(seconds: int) -> None:
+        now[0] += seconds
+
+    return wait
+
+
+def test_a_phase_does_not_count_those_inside_it(wait):
     clock = Clock()
     with clock.phase("outer"):
+        wait(1)
         with clock.phase("inner"):
-            sleep(0.05)
+            wait(10)
         with clock.phase("inner"), clock.phase("innermost"):
-            sleep(0.03)
-    assert clock.seconds["inner"] >= 0.05 and clock.seconds["innermost"] >= 0.03
-    assert clock.seconds["outer"] < 0.03
+            wait(100)
+    assert clock.seconds == {"outer": 1, "inner": 10, "innermost": 100}
 
 
-def test_what_follows_a_phase_inside_another_counts_for_the_outer_one():
+def test_what_follows_a_phase_inside_another_counts_for_the_outer_one(wait):
     clock = Clock()
     with clock.phase("outer"):
         with pytest.raises(ValueError), clock.phase("inner"):
             raise ValueError
-        sleep(0.03)
-    assert clock.seconds["outer"] >= 0.03 > clock.seconds["inner"]
+        wait(3)
+    assert clock.seconds == {"outer": 3, "inner": 0}
+
+
+def test_seconds_since_an_earlier_moment(wait):
+    clock = Clock()
+    with clock.phase("before"):
+        wait(1)
+    then = dict(clock.seconds)
+    with clock.phase("after"):
+        wait(2)
+    assert clock.since(then) == {"before": 0, "after": 2}
