@@ -1,6 +1,6 @@
 """Equilibria of a mechanism: elements and joints meet here.
 
-- ``state``: displacements, poses, multipliers
+- ``state``, ``fields``: displacements, poses, multipliers; the finite-element fields that hold them
 - ``load``, ``loads``, ``potentials``: point loads, and what depends on poses of bodies
 - ``control``: what is led along a path: a force, a displacement, motors
 - ``layout``, ``unknowns``: where each unknown stands, and the change of state it stands for
@@ -25,11 +25,12 @@
 from fenicsmech.equilibrium.arc_length import ArcLength, ArcSteps
 from fenicsmech.equilibrium.arc_metric import ArcMetric, metric_at
 from fenicsmech.equilibrium.branching import Sense, crossing, null_space
-from fenicsmech.equilibrium.continuation import Goal, Stretch, follow
+from fenicsmech.equilibrium.continuation import Finish, Stretch, follow
 from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadControl, MotorControl, ShareControl
 from fenicsmech.equilibrium.critical import Critical, CriticalPoint
 from fenicsmech.equilibrium.dead_centre import MotorPath
 from fenicsmech.equilibrium.eigen import Mode, critical_changes, softest_modes
+from fenicsmech.equilibrium.fields import load_fields
 from fenicsmech.equilibrium.lead import ForceLead, Heading, Lead, MotorLead
 from fenicsmech.equilibrium.linear import BySize, Direct, LinearMethod, LinearSolver, TwoLevel
 from fenicsmech.equilibrium.load import PointLoad
@@ -58,9 +59,9 @@ __all__ = [
     "DisplacementControl",
     "EquilibriumSolver",
     "EquilibriumSystem",
+    "Finish",
     "ForceLead",
     "Globalisation",
-    "Goal",
     "Heading",
     "Hermite",
     "Iteration",
@@ -96,6 +97,7 @@ __all__ = [
     "crossing",
     "follow",
     "joint_reactions",
+    "load_fields",
     "metric_at",
     "motor_torques",
     "null_space",

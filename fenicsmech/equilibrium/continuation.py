@@ -18,8 +18,8 @@ _MISSED = 1e-6  # likewise: ends farther off than that are told
 
 
 @dataclass(frozen=True)
-class Goal:
-    """A value some quantity of the path ends at.
+class Finish:
+    """A value of some quantity at which a path ends.
 
     Attributes:
         value: of the quantity at a point (collective).
@@ -48,8 +48,8 @@ class Stretch:
     last: bool
 
 
-def follow(arc: ArcLength, start: PathPoint, goals: Sequence[Goal], *, most: int) -> Iterator[Stretch]:
-    """Steps along the path from ``start`` until a goal is passed, or ``most`` of them (collective).
+def follow(arc: ArcLength, start: PathPoint, finishes: Sequence[Finish], *, most: int) -> Iterator[Stretch]:
+    """Steps along the path from ``start`` until a finish is passed, or ``most`` of them (collective).
 
     Raises:
         NotConverged: the path cannot be followed further.
@@ -57,7 +57,7 @@ def follow(arc: ArcLength, start: PathPoint, goals: Sequence[Goal], *, most: int
     points, point = arc.points, start
     for _ in range(most):
         following = arc.advance(point)
-        ends = [_end(points, point, following, goal) for goal in goals if goal.passed(point, following)]
+        ends = [_end(points, point, following, finish) for finish in finishes if finish.passed(point, following)]
         if ends:
             following = min(ends, key=lambda end: points.along(point, end))
         yield Stretch(following, tuple(locate(points, point, following, tolerance=arc.steps.tolerance)), bool(ends))
@@ -66,25 +66,26 @@ def follow(arc: ArcLength, start: PathPoint, goals: Sequence[Goal], *, most: int
         point = following
 
 
-def _end(points: PathPoints, before: PathPoint, after: PathPoint, goal: Goal) -> PathPoint:
-    """Where the path has the goal's value, by Newton's method within the step; as near as can be got to it."""
+def _end(points: PathPoints, before: PathPoint, after: PathPoint, finish: Finish) -> PathPoint:
+    """Where the path has the finish's value, by Newton's method within the step; as near as can be got to it."""
     width = points.along(before, after)
     low, high = 0.0, width
-    change = goal.value(after) - goal.value(before)
-    near, rising = min(_ROOT * goal.scale, _WITHIN * abs(change)), change > 0.0
+    change = finish.value(after) - finish.value(before)
+    near, rising = min(_ROOT * finish.scale, _WITHIN * abs(change)), change > 0.0
     distance, best = width, after
     for _ in range(30):
-        gap = goal.value(best) - goal.target
+        gap = finish.value(best) - finish.target
         if abs(gap) <= near:
             break
         low, high = (low, distance) if (gap > 0.0) == rising else (distance, high)
-        slope = goal.rate(best) / points.metric.dot(before.tangent, best.tangent)
+        slope = finish.rate(best) / points.metric.dot(before.tangent, best.tangent)
         wanted = distance - gap / slope if slope else low
         distance = wanted if low < wanted < high else 0.5 * (low + high)
         try:
             best = points.between(before, after, distance)
         except NotConverged:
             break
-    if abs(goal.value(best) - goal.target) > _MISSED * abs(change):
-        _log.warning("the path ends at %g, not at %g: no equilibrium was found there", goal.value(best), goal.target)
+    reached = finish.value(best)
+    if abs(reached - finish.target) > _MISSED * abs(change):
+        _log.warning("the path ends at %g, not at %g: no equilibrium was found there", reached, finish.target)
     return best

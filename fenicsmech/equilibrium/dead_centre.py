@@ -43,7 +43,7 @@ class MotorPath(Path):
         except NotConverged:
             return False
         step = distance * min(1.0, STRIDE / max(system.size(rate) * abs(distance), STRIDE))
-        while abs(step) > SMALLEST * abs(distance):
+        while abs(step) > SMALLEST * self._scale(distance):
             value = self._value + step
             try:
                 solution = self._solve(system.moved(last.state, rate.scaled(step)), control.at(value))

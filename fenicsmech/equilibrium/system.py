@@ -29,6 +29,7 @@ from fenicsmech.effects import PosePotential
 from fenicsmech.elasticity import ElasticBody, MixedStress
 from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.extras import ExtraEntries
+from fenicsmech.equilibrium.fields import load_fields
 from fenicsmech.equilibrium.kkt import KktMatrix
 from fenicsmech.equilibrium.layout import Layout
 from fenicsmech.equilibrium.load import PointLoad
@@ -152,10 +153,7 @@ class EquilibriumSystem:
 
     def load(self, state: State) -> None:
         """Makes the finite-element fields hold ``state`` (collective)."""
-        self.elastic.take(state.u)
-        self.elastic.share.value = state.share
-        self.elastic.update()
-        self.interfaces.place(state.poses)
+        load_fields(self.elastic, self.interfaces, state)
 
     def difference(self, later: State, earlier: State) -> Step:
         """``later`` − ``earlier``."""

@@ -13,7 +13,7 @@ from fenicsmech.equilibrium import (
     ArcSteps,
     Critical,
     CriticalPoint,
-    Goal,
+    Finish,
     Iteration,
     LoadControl,
     NotConverged,
@@ -80,12 +80,12 @@ class Follower:
             start = arc.points.at(first.state)
         except NotConverged as failure:
             raise self._ended(failure) from failure
-        goals = self._goals()
+        finishes = self._finishes()
         # towards the first displacement or position that is wanted, or else the first force
-        wanted = [*(goal for goal in goals if goal.target != goal.value(start))][:1]
+        wanted = [*(finish for finish in finishes if finish.target != finish.value(start))][:1]
         if wanted and (wanted[0].target - wanted[0].value(start)) * wanted[0].rate(start) < 0.0:
             start = start.reversed()
-        self._walk(arc, start, goals, watch)
+        self._walk(arc, start, finishes, watch)
 
     def from_bifurcation(self, event: PathEvent, mode: ModeShape, sense: Sense, watch: Callable[[int], None]) -> None:
         """Follows the path that crosses another one at ``event`` along ``mode``.
@@ -101,11 +101,11 @@ class Follower:
         except NotConverged as failure:
             raise self._ended(failure) from failure
         self.frames.append(self._tracer.record(first.solution()))
-        self._walk(arc, first, self._goals(), watch)
+        self._walk(arc, first, self._finishes(), watch)
 
-    def _walk(self, arc: ArcLength, start: PathPoint, goals: list[Goal], watch: Callable[[int], None]) -> None:
+    def _walk(self, arc: ArcLength, start: PathPoint, finishes: list[Finish], watch: Callable[[int], None]) -> None:
         clock = self._model.clock
-        path = follow(arc, start, goals, most=self._until.frames - len(self.frames))
+        path = follow(arc, start, finishes, most=self._until.frames - len(self.frames))
         while True:
             began, seconds = perf_counter(), dict(clock.seconds)
             try:
@@ -142,14 +142,14 @@ class Follower:
         points = PathPoints(self._newton, lead, metric, floor=self._floor)
         return ArcLength(points, steps=self._steps, conjugate_reference=conjugate or math.inf)
 
-    def _goals(self) -> list[Goal]:
+    def _finishes(self) -> list[Finish]:
         """Displacements or positions first, then forces."""
         lead, until = self._lead, self._until
         value = (lambda point: lead.value(point.state)), (lambda point: point.tangent.parameter)
         conjugate = (lambda point: self._conjugate(point.state)), (lambda point: point.conjugate)
         travel, force = (value, conjugate) if lead.displaces else (conjugate, value)
         return [
-            Goal(*quantity, target, max(map(abs, targets)) or 1.0)
+            Finish(*quantity, target, max(map(abs, targets)) or 1.0)
             for quantity, targets in ((travel, until.travel), (force, until.force))
             for target in targets
         ]

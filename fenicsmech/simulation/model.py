@@ -15,7 +15,7 @@ from fenicsmech.clock import Clock
 from fenicsmech.compat import cell_nodes, original_nodes
 from fenicsmech.effects import BodyEffect, JointSoftening, LinkEffect, LinkFields, RestStretch, find_boundaries, holding
 from fenicsmech.elasticity import ElasticBody, ElasticModel, Stretch
-from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State
+from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State, load_fields
 from fenicsmech.errors import DescriptionError
 from fenicsmech.linkage import Linkage
 from fenicsmech.mechanism import Effect, FlexibleLink, Force, Mechanism, Output
@@ -141,10 +141,7 @@ class MechanismModel:
 
     def load(self, state: State) -> None:
         """Makes the finite-element fields hold ``state`` (collective)."""
-        self.elastic.take(state.u)
-        self.elastic.share.value = state.share
-        self.elastic.update()
-        self.interfaces.place(state.poses)
+        load_fields(self.elastic, self.interfaces, state)
 
     def point(self, part: Force | Output) -> MaterialPoint:
         """The material point of a force or output (collective)."""

@@ -1,0 +1,15 @@
+"""A state in the finite-element fields, where energies and their derivatives are assembled from."""
+
+from __future__ import annotations
+
+from fenicsmech.bodies import InterfaceMap
+from fenicsmech.elasticity import ElasticBody
+from fenicsmech.equilibrium.state import State
+
+
+def load_fields(elastic: ElasticBody, interfaces: InterfaceMap, state: State) -> None:
+    """Makes the fields of ``elastic`` hold ``state``, with interface nodes on their bodies (collective)."""
+    elastic.take(state.u)
+    elastic.share.value = state.share
+    elastic.update()
+    interfaces.place(state.poses)
