@@ -87,3 +87,37 @@ def test_what_the_watcher_raises_ends_all_processes():
 
     with pytest.raises(OSError, match="no space"):
         minimise_together(COMM, Valley(), LevenbergMarquardt(), Start(np.array([-1.2, 1.0])), watch=full)
+
+
+class Broken(Valley):
+    """Fails at its third evaluation on some ranks, once all have taken part."""
+
+    def __init__(self, ranks: set[int]) -> None:
+        super().__init__()
+        self._ranks = ranks
+
+    def evaluate(self, parameters: np.ndarray, below: float = np.inf) -> Evaluation:
+        evaluation = super().evaluate(parameters, below)
+        if self.asked == 3 and COMM.rank in self._ranks:
+            raise ZeroDivisionError("broken")
+        return evaluation
+
+
+def test_an_error_while_evaluating_ends_the_minimisation_on_all_processes():
+    with pytest.raises(ZeroDivisionError, match="broken"):
+        minimise_together(
+            COMM, Broken({*range(COMM.size)}), LevenbergMarquardt(), Start(np.array([0.5, 0.0])), watch=lambda i: None
+        )
+    assert COMM.bcast(COMM.rank) == 0  # no message of before is left
+
+
+def test_an_error_of_one_that_follows_does_not_leave_the_others_waiting():
+    last = COMM.size - 1
+    valley, start = Broken({last} - {0}), Start(np.array([0.5, 0.0]))
+    if COMM.rank == last > 0:
+        with pytest.raises(ZeroDivisionError, match="broken"):
+            minimise_together(COMM, valley, LevenbergMarquardt(), start, watch=lambda i: None)
+    else:
+        outcome = minimise_together(COMM, valley, LevenbergMarquardt(), start, watch=lambda i: None)
+        assert outcome.parameters == pytest.approx([1.0, 1.0], abs=0.1)
+    assert COMM.bcast(COMM.rank) == 0
