@@ -12,6 +12,7 @@ import argparse
 import importlib
 from time import perf_counter
 
+from mpi4py import MPI
 from task import scene_and_task
 
 import fenicsmech as fm
@@ -84,6 +85,8 @@ def main():
     parser.add_argument("--accuracy", type=float, nargs="+", default=ACCURACIES, help="default: 0.05 0.01 0.002")
     parser.add_argument("--repeats", type=int, default=3, help="runs of which the fastest count (default: 3)")
     options = parser.parse_args()
+    if MPI.COMM_WORLD.size > 1:
+        parser.error("it goes by the time of one process; run it without mpirun")
     rows, reports = [], []
     for name in options.mechanisms:
         case = Case(name)

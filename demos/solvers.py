@@ -19,6 +19,7 @@ import claw
 import klann
 import numpy as np
 import truss
+from mpi4py import MPI
 
 import fenicsmech as fm
 from fenicsmech.equilibrium import EquilibriumSolver, Iteration, LoadControl, NotConverged, Solution
@@ -314,6 +315,8 @@ def main():
     parser.add_argument("case", nargs="*", help=f"of {', '.join(made)}; all by default")
     parser.add_argument("--limit", type=float, default=LIMIT, metavar="SECONDS", help="of every run")
     options = parser.parse_args()
+    if MPI.COMM_WORLD.size > 1:
+        parser.error("it goes by the time of one process; run it without mpirun")
     rows = []
     for name in options.case or made:
         rows.append(measure(name, made[name], options.limit))

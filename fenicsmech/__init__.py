@@ -5,6 +5,7 @@ Describe a mechanism (``Mechanism``), say what acts on it (``Scene``) and how fi
 (``DesignProblem``), and ask for their shapes.
 """
 
+from fenicsmech.collective import end_together
 from fenicsmech.design import (
     Bfgs,
     DesignProblem,
@@ -153,3 +154,5 @@ __all__ = [
     "SoftMode",
     "Until",
 ]
+
+end_together()

@@ -1,14 +1,17 @@
-"""Work that one process does on behalf of all: no process goes on before it is done, and all see its errors."""
+"""What processes do for each other: work that one does for all, and errors that all see, so that none waits in vain."""
 
 from __future__ import annotations
 
 import pickle
+import sys
+import time
 from collections.abc import Callable
 from typing import TypeVar
 
 from mpi4py import MPI
 
 T = TypeVar("T")
+_GRACE = 3.0  # seconds for all processes to fail
 
 
 def on_one(comm: MPI.Comm, work: Callable[[], T], *, root: int = 0) -> T | None:
@@ -39,7 +42,55 @@ def on_one(comm: MPI.Comm, work: Callable[[], T], *, root: int = 0) -> T | None:
 
 def from_one(comm: MPI.Comm, work: Callable[[], T], *, root: int = 0) -> T:
     """The same, and all processes get what ``work`` returned."""
-    return comm.bcast(on_one(comm, work, root=root), root=root)
+    return pickle.loads(comm.bcast(on_one(comm, lambda: pickle.dumps(work()), root=root), root=root))
+
+
+def on_all(comm: MPI.Comm, work: Callable[[], T]) -> T:
+    """Calls ``work`` on every process, and fails on all if it fails on one (collective).
+
+    Args:
+        comm: the processes.
+        work: takes part in nothing collective on ``comm``, so that no process waits for one that has failed.
+
+    Raises:
+        Exception: what ``work`` raised on the lowest rank where it did.
+    """
+    done, failure = None, None
+    try:
+        done = work()
+    except Exception as error:
+        failure = error
+    raise_on_all(comm, failure)
+    return done
+
+
+def raise_on_all(comm: MPI.Comm, failure: Exception | None) -> None:
+    """Raises the ``failure`` of the lowest rank that has one (collective)."""
+    told = comm.allgather(_sendable(failure))
+    first = next((rank for rank, other in enumerate(told) if other is not None), None)
+    if first is not None:
+        raise failure if first == comm.rank else told[first]
+
+
+def end_together() -> None:
+    """Makes an error of one process that nobody catches end all: MPI would let the others wait for it for ever.
+
+    Where all fail, as they do in most cases, each comes to its end as usual.
+    """
+    show, world = sys.excepthook, MPI.COMM_WORLD
+
+    def show_and_end(kind, error, trace) -> None:
+        show(kind, error, trace)
+        sys.stdout.flush()
+        sys.stderr.flush()
+        arrival, deadline = world.Ibarrier(), time.monotonic() + _GRACE
+        while not arrival.Test():
+            if time.monotonic() > deadline:
+                world.Abort(1)
+            time.sleep(0.01)
+
+    if world.size > 1:
+        sys.excepthook = show_and_end
 
 
 def _sendable(failure: Exception | None) -> Exception | None:

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
 import logging
 import math
-import os
-import platform
 from collections.abc import Mapping
 from contextlib import contextmanager
-from pathlib import Path
 
 import dolfinx
 import dolfinx.fem.petsc
@@ -20,28 +16,10 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from fenicsmech.kernel_cache import compiling, options
+
 _LEGACY = tuple(int(part) for part in dolfinx.__version__.split(".")[:2]) < (0, 6)
 
-
-def _processor() -> str:
-    """A short name for the instruction set of this processor: compiled kernels are only good for their own."""
-    try:
-        text = Path("/proc/cpuinfo").read_text()
-    except OSError:
-        text = platform.processor()
-    flags = next((line for line in text.splitlines() if line.startswith(("flags", "Features"))), text)
-    return hashlib.sha256(flags.encode()).hexdigest()[:12]
-
-
-# Strict IEEE arithmetic (no -ffast-math): energies rely on cancellation-free forms and on NaN where J ≤ 0.
-# Without -fno-schedule-insns2 some versions of gcc take half a minute for the tangent of solids; the code is as fast.
-_FLAGS = "-O3 -march=native -fno-math-errno -fno-trapping-math -fno-schedule-insns2 -g0"
-_CACHE = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "fenicsmech" / "kernels"
-_JIT = {
-    "cffi_extra_compile_args": _FLAGS.split(),
-    "cache_dir": _CACHE / _processor(),
-    "timeout": 300,
-}
 
 if not _LEGACY:
     import basix.ufl
@@ -55,11 +33,12 @@ _ADD = (dolfinx.la.ScatterMode if _LEGACY else dolfinx.la.InsertMode).add
 
 
 @contextmanager
-def _quiet_compiler():
-    """The build tools under the form compiler log every command on the root logger."""
+def _compiling():
+    """Around what may compile forms: the build tools under the form compiler log every command on the root logger."""
     logging.disable(logging.INFO)
     try:
-        yield
+        with compiling():
+            yield
     finally:
         logging.disable(logging.NOTSET)
 
@@ -89,52 +68,52 @@ def original_nodes(mesh: dmesh.Mesh) -> np.ndarray:
 def cell_nodes(mesh: dmesh.Mesh) -> np.ndarray:
     """Local geometry nodes of every cell on this rank, (cells, vertices)."""
     dofmap = mesh.geometry.dofmap
-    return dofmap.array.reshape(dofmap.num_nodes, -1) if _LEGACY else np.asarray(dofmap)
+    return dofmap.array.reshape(-1, mesh.topology.dim + 1) if _LEGACY else np.asarray(dofmap)
 
 
 def vector_space(mesh: dmesh.Mesh, degree: int) -> fem.FunctionSpace:
     """Continuous vector fields of ``degree``."""
-    with _quiet_compiler():
-        if _LEGACY:
-            return fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
-        return fem.functionspace(mesh, ("Lagrange", degree, (mesh.geometry.dim,)))
+    if _LEGACY:
+        return _space(mesh, ufl.VectorElement("Lagrange", mesh.ufl_cell(), degree))
+    return _space(mesh, ("Lagrange", degree, (mesh.geometry.dim,)))
 
 
 def scalar_space(mesh: dmesh.Mesh, degree: int) -> fem.FunctionSpace:
     """Continuous scalar fields of ``degree``."""
-    with _quiet_compiler():
-        return (
-            fem.FunctionSpace(mesh, ("Lagrange", degree)) if _LEGACY else fem.functionspace(mesh, ("Lagrange", degree))
-        )
+    return _space(mesh, ("Lagrange", degree))
 
 
 def tensor_space(mesh: dmesh.Mesh, degree: int) -> fem.FunctionSpace:
     """Continuous fields of square tensors, of ``degree``."""
-    dim = mesh.geometry.dim
-    with _quiet_compiler():
-        if _LEGACY:
-            return fem.TensorFunctionSpace(mesh, ("Lagrange", degree))
-        return fem.functionspace(mesh, ("Lagrange", degree, (dim, dim)))
+    if _LEGACY:
+        return _space(mesh, ufl.TensorElement("Lagrange", mesh.ufl_cell(), degree))
+    return _space(mesh, ("Lagrange", degree, (mesh.geometry.dim, mesh.geometry.dim)))
 
 
 def cellwise_space(mesh: dmesh.Mesh) -> fem.FunctionSpace:
     """Scalars, one per cell."""
-    with _quiet_compiler():
-        return fem.FunctionSpace(mesh, ("DG", 0)) if _LEGACY else fem.functionspace(mesh, ("DG", 0))
+    return _space(mesh, ("DG", 0))
+
+
+def _space(mesh: dmesh.Mesh, element) -> fem.FunctionSpace:
+    with _compiling():
+        if _LEGACY:
+            return fem.FunctionSpace(mesh, element, jit_params=options())
+        return fem.functionspace(mesh, element, jit_options=options())
 
 
 def compile_form(form: ufl.Form):
     """``form`` compiled to machine code (cached on disk)."""
-    with _quiet_compiler():
-        return fem.form(form, jit_params=dict(_JIT)) if _LEGACY else fem.form(form, jit_options=dict(_JIT))
+    with _compiling():
+        return fem.form(form, jit_params=options()) if _LEGACY else fem.form(form, jit_options=options())
 
 
 def compile_expression(expression, points: np.ndarray, comm: MPI.Comm) -> fem.Expression:
     """``expression`` compiled for evaluation at ``points`` of the reference cell."""
-    with _quiet_compiler():
+    with _compiling():
         if _LEGACY:
-            return fem.Expression(expression, points, jit_params=dict(_JIT))
-        return fem.Expression(expression, points, comm=comm, jit_options=dict(_JIT))
+            return fem.Expression(expression, points, jit_params=options())
+        return fem.Expression(expression, points, comm=comm, jit_options=options())
 
 
 def evaluate_expression(expression: fem.Expression, mesh: dmesh.Mesh, cells: np.ndarray) -> np.ndarray:

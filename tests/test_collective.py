@@ -6,7 +6,7 @@ import time
 import pytest
 from mpi4py import MPI
 
-from fenicsmech.collective import from_one, on_one
+from fenicsmech.collective import from_one, on_all, on_one, raise_on_all
 
 pytestmark = pytest.mark.parallel
 
@@ -56,3 +56,19 @@ def test_the_next_call_is_not_disturbed_by_an_error():
     with pytest.raises(ValueError):
         from_one(COMM, lambda: fail(ValueError("no")))
     assert from_one(COMM, lambda: "yes") == "yes"
+
+
+def test_a_result_that_cannot_be_sent_is_an_error_on_all():
+    with pytest.raises((TypeError, RuntimeError), match="pickle"):
+        from_one(COMM, threading.Lock)
+    assert COMM.allreduce(1) == COMM.size
+
+
+def test_work_of_all_fails_on_all_with_the_error_of_the_lowest_rank():
+    assert on_all(COMM, lambda: COMM.rank) == COMM.rank
+    with pytest.raises(ValueError, match="first"):
+        on_all(COMM, lambda: fail(ValueError("first") if COMM.rank == 0 else OSError("second")))
+    last = COMM.size - 1
+    with pytest.raises(OSError, match="last"):
+        raise_on_all(COMM, OSError("last") if COMM.rank == last else None)
+    raise_on_all(COMM, None)

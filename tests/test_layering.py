@@ -18,6 +18,7 @@ LAYERS = (
     "errors",
     "log",
     "clock",
+    "kernel_cache",
     "compat",
     "collective",
     "report",

@@ -137,18 +137,20 @@ class DesignProblem:
             DescriptionError: the design is one of other links.
         """
         links, model = [design.link for design in self.designs], self.simulation.model
-        outlines = []
+        shapes = []
         with model.shaped(model.elastic.d.x.array.copy()):
             for parameters, near in ((self.initial, None), (self._parameters(design), self._placement(design))):
                 self._rest.place(parameters, near)
-                meshes = rest_meshes(self.simulation, links) or []
-                outlines.append(
-                    [
-                        outline(link, mesh, parameters[link.place])
-                        for link, mesh in zip(self._rest.links, meshes, strict=False)
-                    ]
-                )
-        on_one(self.simulation.comm, lambda: draw_links(path, self.simulation, links, *outlines))
+                shapes.append((parameters, rest_meshes(self.simulation, links)))
+
+        def draw() -> None:
+            before, after = (
+                [outline(link, mesh, p[link.place]) for link, mesh in zip(self._rest.links, meshes, strict=True)]
+                for p, meshes in shapes
+            )
+            draw_links(path, self.simulation, links, before, after)
+
+        on_one(self.simulation.comm, draw)
 
     def export(self, folder: str | Path, *, pin: float | None = None) -> None:
         """Writes ``NAME.step`` and ``NAME.stl`` of every link that may change, in its present shape (collective).

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fenicsmech.collective import on_one
 from fenicsmech.design.link_shape import gather_links
 from fenicsmech.design.rest_shape import DesignedLink
 from fenicsmech.linkage import Linkage, assemble
@@ -24,13 +25,10 @@ def rest_meshes(simulation: Simulation, links: Sequence[FlexibleLink]) -> list[L
 
     Links of which one half is meshed are given by their plan.
     """
-    rest = rest_vertices(simulation.model)
-    meshes = gather_links(simulation.model.mesh, rest)
-    everyone = simulation.scene.mechanism.flexible_links
-    if rest is None:
-        return None
+    meshes = gather_links(simulation.model.mesh, rest_vertices(simulation.model))
+    everyone, halves = simulation.scene.mechanism.flexible_links, simulation.fidelity.model.symmetric
     chosen = [meshes[everyone.index(link)] for link in links]
-    return [plan_of(mesh).mesh for mesh in chosen] if simulation.fidelity.model.symmetric else chosen
+    return on_one(simulation.comm, lambda: [plan_of(mesh).mesh for mesh in chosen] if halves else chosen)
 
 
 def outline(link: DesignedLink, mesh: LinkMesh, p: np.ndarray) -> LinkOutline:

@@ -9,12 +9,14 @@ their adjoint sensitivities back to p. Groups of processes share the targets.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from fenicsmech.clock import Clock
+from fenicsmech.collective import on_all
 from fenicsmech.design.equilibria import Known, TargetEquilibria
 from fenicsmech.design.groups import Group
 from fenicsmech.design.handle_optimum import Placement, ShapeError
@@ -23,6 +25,7 @@ from fenicsmech.design.regularisers import Model, Regulariser
 from fenicsmech.design.rest_shape import RestShape
 from fenicsmech.design.spline_design import Target
 
+T = TypeVar("T")
 _SMALL = 0.1  # targets below this share of the largest one are measured by it
 
 
@@ -107,8 +110,8 @@ class Objective:
         if value > below:
             raise TooHigh(f"the objective is {value:.3g}")
         with self._clock.phase("gradients"):
-            nodal = self._equilibria.gradients(known)
-            jacobian = self._gathered(self._rest.gradient(placement, nodal)) / self._scale[:, None]
+            rows = self._together(lambda: self._rest.gradient(placement, self._equilibria.gradients(known)))
+            jacobian = self._gathered(rows) / self._scale[:, None]
         if self._base is None or value < self._base.value:
             self._base = _Base(value, placement, known)
         self.reached = reached
@@ -123,7 +126,7 @@ class Objective:
     def errors(self) -> np.ndarray:
         """Estimated errors |e| of the residuals of the best design so far, those of the finite elements, (targets,)."""
         with self._clock.phase("estimates"):
-            estimates = self._equilibria.errors(self._base.known)
+            estimates = self._together(lambda: self._equilibria.errors(self._base.known))
         return np.abs(self._gathered(estimates[:, None])[:, 0]) / self._scale
 
     def traced(self, parameters: np.ndarray) -> float:
@@ -141,7 +144,7 @@ class Objective:
 
     def active(self, parameters: np.ndarray) -> tuple[str, ...]:
         """The bounds that hold the design ``parameters`` back, in words."""
-        placement = self._rest.place(parameters, self.placement)
+        placement = self._together(lambda: self._rest.place(parameters, self.placement))
         return self._group.everyone.bcast(self._regulariser.active(self._rest, placement), root=0)
 
     def _residuals(self, reached: np.ndarray) -> np.ndarray:
@@ -168,21 +171,9 @@ class Objective:
             known = self._equilibria.follow(base.known) if base else self._equilibria.trace()
         return placement, model, known
 
-    def _together(self, work):
-        """The result of ``work``, if no group failed.
-
-        Raises:
-            Infeasible: on all groups, if it is raised in one.
-        """
-        everyone, failure, result = self._group.everyone, None, None
-        try:
-            result = work()
-        except Infeasible as error:
-            failure = str(error)
-        failures = [reason for reason in everyone.allgather(failure) if reason is not None]
-        if failures:
-            raise Infeasible(failures[0])
-        return result
+    def _together(self, work: Callable[[], T]) -> T:
+        """What each group's ``work`` returns; what it raises in one is raised in all."""
+        return on_all(self._group.everyone, work)
 
     def _gathered(self, rows: np.ndarray) -> np.ndarray:
         """One row per target from the rows of each group's targets, (targets, n)."""

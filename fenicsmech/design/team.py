@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from mpi4py import MPI
 
-from fenicsmech.collective import from_one
+from fenicsmech.collective import from_one, raise_on_all
 from fenicsmech.design.objective import Objective
 from fenicsmech.design.optimisers import Evaluation, Infeasible, Iterate, Minimiser, Reason, Start
 
@@ -90,8 +90,7 @@ def minimise_together(
 
     failure = _follow(comm, objective) if comm.rank > 0 else None
     outcome = from_one(comm, lead)
-    if failure is not None:
-        raise failure
+    raise_on_all(comm, failure)
     return outcome
 
 

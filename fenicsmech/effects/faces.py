@@ -28,8 +28,8 @@ class Faces:
 
     Attributes:
         link: the link.
-        where: tells positions of the drawn link, (n, dim), that lie on the part from others, (n,); a facet belongs to
-            the part if all its corners do. None for the whole boundary.
+        where: is given positions on the boundary of the drawn link, (n, dim), all at once, and tells those on the part
+            from others, (n,); a facet belongs to the part if all its corners do. None for the whole boundary.
     """
 
     link: FlexibleLink
@@ -95,10 +95,11 @@ def find_boundaries(
         joined = on_mid_plane(places, mesh.comm).reshape(joined.shape)
     within = np.zeros((len(facets), len(faces)), dtype=bool)
     for k, part in enumerate(faces):
-        within[:, k] = (owner == links.index(part.link)) & ~joined.all(axis=1)
+        of_link = owner == links.index(part.link)
+        within[:, k] = of_link & ~joined.all(axis=1)
         if part.where is not None:
-            inside = np.asarray(part.where(places), dtype=bool)
-            within[:, k] &= inside.reshape(len(facets), dim).all(axis=1)
+            inside = _asked_together(mesh.comm, part.where, places[np.repeat(of_link, dim)])
+            within[of_link, k] &= inside.reshape(-1, dim).all(axis=1)
     kinds = sorted(set().union(*mesh.comm.allgather({tuple(row) for row in within.tolist() if any(row)})))
     tag = {kind: number for number, kind in enumerate(kinds, start=1)}
     tags = np.array([tag.get(tuple(row), 0) for row in within.tolist()], dtype=np.int32)
@@ -117,6 +118,13 @@ def find_boundaries(
         mine = within[:, k]
         boundaries[part] = Boundary(facets[mine], numbers[mine], joined[mine], measures)
     return boundaries
+
+
+def _asked_together(comm: MPI.Comm, where: Callable[[np.ndarray], np.ndarray], places: np.ndarray) -> np.ndarray:
+    """``where`` at this rank's ``places``; it sees those of all ranks, as it may compare them (collective)."""
+    everywhere = comm.allgather(places)
+    before = sum(len(others) for others in everywhere[: comm.rank])
+    return np.asarray(where(np.concatenate(everywhere)), dtype=bool)[before : before + len(places)]
 
 
 def cofactor(A):

@@ -38,8 +38,8 @@ class Pressure(LinkEffect):
     Attributes:
         link: the link.
         pressure: into the link; negative for suction.
-        where: tells positions of the drawn link, (n, dim), that are pressed on from others, (n,): facets whose corners
-            all are. None: the whole boundary.
+        where: is given positions on the boundary of the drawn link, (n, dim), all at once, and tells those that are
+            pressed on from others, (n,): facets whose corners all are. None: the whole boundary.
         about: x₀; to be given for an open part, and a promise that its rim is held or moves as said above. In space
             two coordinates are an axis along z, which suits holes through extruded links, and their sides.
 

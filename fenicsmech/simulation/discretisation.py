@@ -7,6 +7,7 @@ from functools import cached_property
 from mpi4py import MPI
 
 from fenicsmech.clock import Clock
+from fenicsmech.collective import on_one
 from fenicsmech.equilibrium import EquilibriumSolver, Predictor
 from fenicsmech.linkage import build_linkage
 from fenicsmech.mechanism import Scene
@@ -48,7 +49,7 @@ class Discretisation:
         self.scene, self.fidelity, self.clock, self.comm = scene, fidelity, clock, comm
         self.solver, self.predictor = solver, predictor
         self.linkage = build_linkage(scene.mechanism, fidelity.model.mechanism_dim)
-        check_links(scene.mechanism, self.linkage, fidelity)
+        on_one(comm, lambda: check_links(scene.mechanism, self.linkage, fidelity))
 
     def at(self, fidelity: Fidelity) -> Discretisation:
         """The same scene at another fidelity, with nothing meshed yet."""

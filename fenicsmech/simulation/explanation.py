@@ -11,6 +11,7 @@ import ufl
 from dolfinx import fem
 from scipy.spatial import cKDTree
 
+from fenicsmech.collective import from_one
 from fenicsmech.compat import compile_form
 from fenicsmech.effects import Gravity
 from fenicsmech.mechanism import FlexibleLink, Strip, Units
@@ -160,18 +161,22 @@ def _touching_hint(model: MechanismModel, frame: Frame) -> Hint:
 
 
 def _close_pairs(model: MechanismModel, frame: Frame) -> list[tuple[str, str]]:
+    """Names of links that come closer than half an element to each other and share no joint (collective)."""
     snapshot = gather(model, frame)
-    pairs = []
-    if snapshot is not None:
-        mesh, links = model.mesh, model.mechanism.flexible_links
+    mesh, links = model.mesh, model.mechanism.flexible_links
+
+    def search() -> list[tuple[str, str]]:
         places = (snapshot.rest + snapshot.displacement)[:, :2]
         trees = [cKDTree(places[np.unique(mesh.cells[mesh.link_of_cell == k])]) for k in range(len(links))]
         edge = np.linalg.norm(np.diff(places[mesh.cells[:, :2]], axis=1)[:, 0], axis=1).mean()
+        pairs = []
         for i, j in combinations(range(len(links)), 2):
             joined = any({links[i], links[j]} == {joint.a, joint.b} for joint in model.mechanism.joints)
             if not joined and trees[i].count_neighbors(trees[j], 0.5 * edge):
                 pairs.append((links[i].name, links[j].name))
-    return model.mesh.mesh.comm.bcast(pairs, root=0)
+        return pairs
+
+    return from_one(mesh.comm, search)
 
 
 def _buckling_hint(model: MechanismModel, frame: Frame) -> Hint | None:

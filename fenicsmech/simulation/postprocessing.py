@@ -7,6 +7,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
+from fenicsmech.collective import from_one, on_one
 from fenicsmech.compat import owned_values
 from fenicsmech.equilibrium import Iteration
 from fenicsmech.errors import DescriptionError
@@ -77,10 +78,8 @@ class Postprocessing:
     @property
     def mesh_ratio_max(self) -> float:
         """Largest ratio of circumradius to inradius among the cells of the rest shape (collective)."""
-        rest, ratio = rest_vertices(self.model), None
-        if rest is not None:
-            ratio = self.fidelity.model.dim / float(radius_ratios(rest, self.model.mesh.cells).min())
-        return self.comm.bcast(ratio, root=0)
+        rest, dim = rest_vertices(self.model), self.fidelity.model.dim
+        return from_one(self.comm, lambda: dim / float(radius_ratios(rest, self.model.mesh.cells).min()))
 
     def buckling_loads(
         self, curve: Curve | None = None, *, frame: Frame | None = None, count: int = 3
@@ -215,16 +214,13 @@ class Postprocessing:
         Raises:
             DescriptionError: no curve was computed yet.
         """
-        panel = self.panel(self._chosen(curve), stress=stress, traces=traces)
-        if panel is not None:
-            units = self.scene.units
-            draw_configurations(
-                path,
-                [panel],
-                title=self.scene.mechanism.name,
-                colour_label=f"von Mises stress [{units.stress}]" if stress else "",
-                unit=units.length,
-            )
+        panel, units = self.panel(self._chosen(curve), stress=stress, traces=traces), self.scene.units
+        label = f"von Mises stress [{units.stress}]" if stress else ""
+        title = self.scene.mechanism.name
+        on_one(
+            self.comm,
+            lambda: draw_configurations(path, [panel], title=title, colour_label=label, unit=units.length),
+        )
 
     def panel(self, curve: Curve, *, stress: bool = True, traces: Sequence[Trace] = ()) -> Panel | None:
         """The picture of a curve's first and last frame, on rank 0; None elsewhere (collective)."""

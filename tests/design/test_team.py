@@ -111,13 +111,8 @@ def test_an_error_while_evaluating_ends_the_minimisation_on_all_processes():
     assert COMM.bcast(COMM.rank) == 0  # no message of before is left
 
 
-def test_an_error_of_one_that_follows_does_not_leave_the_others_waiting():
-    last = COMM.size - 1
-    valley, start = Broken({last} - {0}), Start(np.array([0.5, 0.0]))
-    if COMM.rank == last > 0:
-        with pytest.raises(ZeroDivisionError, match="broken"):
-            minimise_together(COMM, valley, LevenbergMarquardt(), start, watch=lambda i: None)
-    else:
-        outcome = minimise_together(COMM, valley, LevenbergMarquardt(), start, watch=lambda i: None)
-        assert outcome.parameters == pytest.approx([1.0, 1.0], abs=0.1)
+def test_an_error_of_one_process_is_raised_on_all():
+    valley, start = Broken({COMM.size - 1}), Start(np.array([0.5, 0.0]))
+    with pytest.raises(ZeroDivisionError, match="broken"):
+        minimise_together(COMM, valley, LevenbergMarquardt(), start, watch=lambda i: None)
     assert COMM.bcast(COMM.rank) == 0

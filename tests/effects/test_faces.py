@@ -84,6 +84,13 @@ def test_areas_are_those_of_the_rest_shape(bars):
     assert bars.area(fields, flank) == pytest.approx(1.5 * LENGTH * DEPTH, rel=1e-12)
 
 
+def test_predicates_may_compare_the_places_of_their_link(bars):
+    lower, upper = bars.bars
+    for link in (lower, upper):
+        highest = Faces(link, lambda x: x[:, 1] > x[:, 1].max() - 1e-9)
+        assert bars.area(bars.fields(highest), highest) == pytest.approx(LENGTH * DEPTH, rel=1e-12)
+
+
 def test_a_part_without_a_facet_is_refused(bars):
     nowhere = Faces(bars.bars[0], lambda x: x[:, 0] > 1e3)
     refused(lambda: bars.fields(nowhere), part="'lower'", problem="no facet", remedy="Widen")

@@ -156,8 +156,7 @@ class AugmentedLagrangianIteration(Iteration):
         system.linearise(current, control, balance)
         system.kkt.soften(softness, control)
         right = balance.vector.copy()
-        if layout.last:
-            right.array_w[len(layout.free) + system.joints.size :] = 0.0
+        right.array_w[len(layout.free) + (system.joints.size if layout.last else 0) :] = 0.0
         shift, following = floor, max(_LEAST_SHIFT, last / 3.0)
         for _ in range(20):
             x = self._solution(right, self._accuracy(balance)) if self._refactor(shift) else None

@@ -1,0 +1,75 @@
+"""Where compiled forms are kept, and with what options they are compiled.
+
+FFCx marks a form as being compiled by its C file: whoever finds one that is not finished waits for it. A process that
+is killed at that leaves such a file behind, and all later ones would wait for nothing. So whoever compiles holds a lock
+on the folder that others may share; who can have it alone knows that nobody is at work, and removes what is unfinished.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import os
+import platform
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import TextIO
+
+from fenicsmech.log import logger
+
+_log = logger(__name__)
+
+# Strict IEEE arithmetic (no -ffast-math): energies rely on cancellation-free forms and on NaN where J ≤ 0.
+# Without -fno-schedule-insns2 some versions of gcc take half a minute for the tangent of solids; the code is as fast.
+_FLAGS = "-O3 -march=native -fno-math-errno -fno-trapping-math -fno-schedule-insns2 -g0"
+
+
+def _processor() -> str:
+    """A short name for the instruction set of this processor: compiled kernels are only good for their own."""
+    try:
+        text = Path("/proc/cpuinfo").read_text()
+    except OSError:
+        text = platform.processor()
+    flags = next((line for line in text.splitlines() if line.startswith(("flags", "Features"))), text)
+    return hashlib.sha256(flags.encode()).hexdigest()[:12]
+
+
+FOLDER = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "fenicsmech" / "kernels" / _processor()
+
+
+def options() -> dict:
+    """FFCx's options, of which it keeps none."""
+    return {"cffi_extra_compile_args": _FLAGS.split(), "cache_dir": FOLDER, "timeout": 300}
+
+
+@contextmanager
+def compiling(folder: Path = FOLDER) -> Iterator[None]:
+    """Around everything that may compile into ``folder``."""
+    _remove_unfinished(folder)
+    with open(folder / "lock", "w") as lock:
+        _locked(lock, fcntl.LOCK_SH)
+        yield
+
+
+def _locked(lock: TextIO, how: int) -> bool:
+    """Whether the lock could be had; some network file systems have none to give."""
+    try:
+        fcntl.flock(lock, how)
+    except OSError:
+        return False
+    return True
+
+
+@cache
+def _remove_unfinished(folder: Path) -> None:
+    """Once per process, unless another one is at work."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with open(folder / "lock", "w") as lock:
+        if not _locked(lock, fcntl.LOCK_EX | fcntl.LOCK_NB):
+            return
+        for source in folder.glob("libffcx_*.c"):
+            if not source.with_suffix(".c.cached").exists():
+                _log.warning("%s was left unfinished by a process that was stopped; it is compiled anew", source.name)
+                source.unlink(missing_ok=True)

@@ -1,0 +1,54 @@
+"""What a killed process leaves unfinished in the folder of compiled forms does not hold up those after it."""
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+from fenicsmech.kernel_cache import compiling
+
+# compiles for ever
+BUSY = """
+import sys, time
+from pathlib import Path
+from fenicsmech.kernel_cache import compiling
+folder = Path(sys.argv[1])
+with compiling(folder):
+    (folder / "libffcx_forms_busy.c").touch()
+    print("compiling", flush=True)
+    time.sleep(600)
+"""
+
+
+def test_unfinished_forms_are_removed_and_finished_ones_kept(tmp_path):
+    for name in ("libffcx_forms_done.c", "libffcx_forms_done.c.cached", "libffcx_forms_half.c", "other.c"):
+        (tmp_path / name).touch()
+    with compiling(tmp_path):
+        left = {path.name for path in tmp_path.iterdir()}
+    assert left == {"libffcx_forms_done.c", "libffcx_forms_done.c.cached", "other.c", "lock"}
+
+
+def test_a_form_is_left_to_the_process_that_compiles_it_until_that_is_killed(tmp_path):
+    busy = subprocess.Popen([sys.executable, "-c", BUSY, tmp_path], stdout=subprocess.PIPE, text=True)
+    try:
+        assert busy.stdout.readline() == "compiling\n"
+        assert visit(tmp_path) == ["libffcx_forms_busy.c"]
+    finally:
+        busy.send_signal(signal.SIGKILL)
+        busy.communicate()
+    assert visit(tmp_path) == []
+
+
+def visit(folder: Path) -> list[str]:
+    """The sources that another process finds as it begins to compile."""
+    code = (
+        "import sys; from pathlib import Path; from fenicsmech.kernel_cache import compiling\n"
+        "with compiling(Path(sys.argv[1])): print(*sorted(path.name for path in Path(sys.argv[1]).glob('*.c')))"
+    )
+    found = subprocess.run([sys.executable, "-c", code, folder], capture_output=True, text=True, check=True)
+    return found.stdout.split()
+
+
+def test_a_folder_that_is_not_there_yet_is_made(tmp_path):
+    with compiling(tmp_path / "new" / "folder"):
+        assert (tmp_path / "new" / "folder").is_dir()
