@@ -35,8 +35,11 @@ def on_one(comm: MPI.Comm, work: Callable[[], T], *, root: int = 0) -> T | None:
         except Exception as error:  # of whatever kind: the other processes wait
             failure = error
     told = comm.bcast(_sendable(failure), root=root)
-    if told is not None:
-        raise failure or told
+    try:
+        if told is not None:
+            raise failure or told
+    finally:
+        failure = told = None  # see raise_on_all
     return done
 
 
@@ -60,7 +63,10 @@ def on_all(comm: MPI.Comm, work: Callable[[], T]) -> T:
         done = work()
     except Exception as error:
         failure = error
-    raise_on_all(comm, failure)
+    try:
+        raise_on_all(comm, failure)
+    finally:
+        failure = None  # see there
     return done
 
 
@@ -68,8 +74,12 @@ def raise_on_all(comm: MPI.Comm, failure: Exception | None) -> None:
     """Raises the ``failure`` of the lowest rank that has one (collective)."""
     told = comm.allgather(_sendable(failure))
     first = next((rank for rank, other in enumerate(told) if other is not None), None)
-    if first is not None:
-        raise failure if first == comm.rank else told[first]
+    try:
+        if first is not None:
+            raise failure if first == comm.rank else told[first]
+    finally:
+        # an error that its own traceback refers to would keep all that is in there until Python looks for cycles
+        failure = told = None
 
 
 def end_together() -> None:

@@ -1,7 +1,9 @@
 """What one process does is done for all: they wait for it, and get its result or its error."""
 
+import gc
 import threading
 import time
+import weakref
 
 import pytest
 from mpi4py import MPI
@@ -72,3 +74,27 @@ def test_work_of_all_fails_on_all_with_the_error_of_the_lowest_rank():
     with pytest.raises(OSError, match="last"):
         raise_on_all(COMM, OSError("last") if COMM.rank == last else None)
     raise_on_all(COMM, None)
+
+
+class Large:
+    """Something that is in use when an error is raised."""
+
+
+@pytest.mark.parametrize("call", [on_one, from_one, on_all])
+def test_what_was_in_use_when_work_failed_is_let_go_of_with_the_error(call):
+    used = []
+
+    def work() -> None:
+        large = Large()
+        used.append(weakref.ref(large))
+        raise ValueError(f"with {type(large).__name__}")
+
+    gc.disable()
+    try:
+        try:
+            call(COMM, work)
+        except ValueError as error:
+            assert "Large" in str(error)
+        assert [reference() for reference in used] == [None] * len(used)
+    finally:
+        gc.enable()
