@@ -53,7 +53,7 @@ def on_all(comm: MPI.Comm, work: Callable[[], T]) -> T:
 
     Args:
         comm: the processes.
-        work: takes part in nothing collective on ``comm``, so that no process waits for one that has failed.
+        work: what in it is collective on ``comm`` must fail on all processes or on none; all else may fail on some.
 
     Raises:
         Exception: what ``work`` raised on the lowest rank where it did.
