@@ -89,6 +89,7 @@ random-scenes: install-test ## N random scenes from SEED on (1000, 0), each chec
 FULL13 :=
 CORE13 := tests/bodies tests/elasticity tests/joints tests/kinematics tests/linkage tests/mechanism
 OTHERS13 := tests/meshing tests/design/test_sensitivity.py tests/design/test_weights.py \
+    $(patsubst %,tests/test_%.py,collective compat kernel_cache uncaught_errors) \
     tests/effects/test_contact_derivatives.py \
     $(patsubst %,tests/equilibrium/test_%.py,eigen factor lagrangian mixed_lagrangian newton path two_level) \
     $(patsubst %,tests/simulation/test_%.py,files memory ranks units)
