@@ -12,10 +12,9 @@ import hashlib
 import os
 import platform
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import cache
 from pathlib import Path
-from typing import TextIO
 
 from fenicsmech.log import logger
 
@@ -48,28 +47,28 @@ def options() -> dict:
 def compiling(folder: Path = FOLDER) -> Iterator[None]:
     """Around everything that may compile into ``folder``."""
     _remove_unfinished(folder)
-    with open(folder / "lock", "w") as lock:
-        _locked(lock, fcntl.LOCK_SH)
+    with _lock(folder, fcntl.LOCK_SH):
         yield
 
 
-def _locked(lock: TextIO, how: int) -> bool:
-    """Whether the lock could be had; some network file systems have none to give."""
-    try:
-        fcntl.flock(lock, how)
-    except OSError:
-        return False
-    return True
+@contextmanager
+def _lock(folder: Path, how: int) -> Iterator[bool]:
+    """Whether the lock could be had; read-only folders and some network file systems have none to give."""
+    with ExitStack() as stack:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            fcntl.flock(stack.enter_context(open(folder / "lock", "w")), how)
+            locked = True
+        except OSError:
+            locked = False
+        yield locked
 
 
 @cache
 def _remove_unfinished(folder: Path) -> None:
     """Once per process, unless another one is at work."""
-    folder.mkdir(parents=True, exist_ok=True)
-    with open(folder / "lock", "w") as lock:
-        if not _locked(lock, fcntl.LOCK_EX | fcntl.LOCK_NB):
-            return
-        for source in folder.glob("libffcx_*.c"):
+    with _lock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB) as alone:
+        for source in folder.glob("libffcx_*.c") if alone else ():
             if not source.with_suffix(".c.cached").exists():
                 _log.warning("%s was left unfinished by a process that was stopped; it is compiled anew", source.name)
                 source.unlink(missing_ok=True)
