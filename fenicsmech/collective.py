@@ -28,19 +28,7 @@ def on_one(comm: MPI.Comm, work: Callable[[], T], *, root: int = 0) -> T | None:
     Raises:
         Exception: what ``work`` raised, on all processes.
     """
-    done, failure = None, None
-    if comm.rank == root:
-        try:
-            done = work()
-        except Exception as error:  # of whatever kind: the other processes wait
-            failure = error
-    told = comm.bcast(_sendable(failure), root=root)
-    try:
-        if told is not None:
-            raise failure or told
-    finally:
-        failure = told = None  # see raise_on_all
-    return done
+    return on_all(comm, lambda: work() if comm.rank == root else None)
 
 
 def from_one(comm: MPI.Comm, work: Callable[[], T], *, root: int = 0) -> T:
@@ -63,15 +51,6 @@ def on_all(comm: MPI.Comm, work: Callable[[], T]) -> T:
         done = work()
     except Exception as error:
         failure = error
-    try:
-        raise_on_all(comm, failure)
-    finally:
-        failure = None  # see there
-    return done
-
-
-def raise_on_all(comm: MPI.Comm, failure: Exception | None) -> None:
-    """Raises the ``failure`` of the lowest rank that has one (collective)."""
     told = comm.allgather(_sendable(failure))
     first = next((rank for rank, other in enumerate(told) if other is not None), None)
     try:
@@ -80,6 +59,7 @@ def raise_on_all(comm: MPI.Comm, failure: Exception | None) -> None:
     finally:
         # an error that its own traceback refers to would keep all that is in there until Python looks for cycles
         failure = told = None
+    return done
 
 
 def end_together() -> None:

@@ -39,7 +39,7 @@ FOLDER = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "fenic
 
 
 def options() -> dict:
-    """FFCx's options, of which it keeps none."""
+    """FFCx's options, a dictionary of the caller's own."""
     return {"cffi_extra_compile_args": _FLAGS.split(), "cache_dir": FOLDER, "timeout": 300}
 
 

@@ -93,8 +93,8 @@ def mpirun() -> Callable[..., subprocess.CompletedProcess]:
     def run(ranks: int, *arguments: str | os.PathLike) -> subprocess.CompletedProcess:
         # os.environ, unlike the environment of this process, lacks what MPI_Init put there, which mpirun trips over.
         root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
-        environment = {**root, **os.environ, "OPENBLAS_NUM_THREADS": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1"}
-        environment["MPIEXEC_TIMEOUT"] = str(ALONE)
+        settings = {"OPENBLAS_NUM_THREADS": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1"}
+        environment = {**root, **os.environ, **settings, "MPIEXEC_TIMEOUT": str(ALONE)}
         command = ["mpirun", "-n", str(ranks), sys.executable, *map(os.fspath, arguments)]
         return subprocess.run(command, env=environment, capture_output=True, text=True)
 

@@ -8,7 +8,7 @@ import weakref
 import pytest
 from mpi4py import MPI
 
-from fenicsmech.collective import from_one, on_all, on_one, raise_on_all
+from fenicsmech.collective import from_one, on_all, on_one
 
 pytestmark = pytest.mark.parallel
 
@@ -72,8 +72,7 @@ def test_work_of_all_fails_on_all_with_the_error_of_the_lowest_rank():
         on_all(COMM, lambda: fail(ValueError("first") if COMM.rank == 0 else OSError("second")))
     last = COMM.size - 1
     with pytest.raises(OSError, match="last"):
-        raise_on_all(COMM, OSError("last") if COMM.rank == last else None)
-    raise_on_all(COMM, None)
+        on_all(COMM, lambda: fail(OSError("last")) if COMM.rank == last else None)
 
 
 class Large:

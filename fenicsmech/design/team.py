@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from mpi4py import MPI
 
-from fenicsmech.collective import from_one, raise_on_all
+from fenicsmech.collective import on_all
 from fenicsmech.design.objective import Objective
 from fenicsmech.design.optimisers import Evaluation, Infeasible, Iterate, Minimiser, Reason, Start
 
@@ -88,14 +88,15 @@ def minimise_together(
             comm.bcast(None, root=0)
         return Outcome(last.number, last.evaluations, last.evaluation.parameters, last.reason, started[0])
 
-    failure = _follow(comm, objective) if comm.rank > 0 else None
-    outcome = from_one(comm, lead)
-    raise_on_all(comm, failure)
-    return outcome
+    return comm.bcast(on_all(comm, lambda: lead() if comm.rank == 0 else _follow(comm, objective)), root=0)
 
 
-def _follow(comm: MPI.Comm, objective: Objective) -> Exception | None:
-    """Takes part until the first process is done; the first error that it may not have seen."""
+def _follow(comm: MPI.Comm, objective: Objective) -> None:
+    """Takes part until the first process is done.
+
+    Raises:
+        Exception: the first error met on the way that the first process may not have seen.
+    """
     failure = None
     while (request := comm.bcast(None, root=0)) is not None:
         try:
@@ -104,4 +105,5 @@ def _follow(comm: MPI.Comm, objective: Objective) -> Exception | None:
             pass  # the first process has seen it too, and decides
         except Exception as error:  # as a rule it has seen this as well, and ends; until then it needs answers
             failure = failure or error
-    return failure
+    if failure is not None:
+        raise failure

@@ -41,7 +41,7 @@ from fenicsmech.simulation.until import Until, check_until
 class Simulation(Postprocessing):
     """Equilibria of a scene at one fidelity: the one given, or the cheapest that is accurate enough.
 
-    Nothing is meshed or compiled until the first curve; the description is checked at once.
+    Nothing is meshed or compiled until the first curve; the description is checked at once (collective).
 
     Args:
         scene: the mechanism and what acts on it.

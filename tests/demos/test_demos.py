@@ -114,7 +114,6 @@ def test_two_ranks_give_the_same_curve_and_the_same_optimum(truss_alone, tmp_pat
     alone, _, folder = truss_alone
     done = mpirun(2, ROOT / "demos" / "truss.py", *QUICK, "--out", str(tmp_path))
     assert done.returncode == 0, done.stdout + done.stderr
-    assert done.returncode == 0, done.stderr
     shared = json.loads((tmp_path / "summary.json").read_text())
     assert shared["ranks"] == 2
     for one, two in zip(alone["initial_frames"], shared["initial_frames"], strict=True):
