@@ -54,7 +54,7 @@ lint: install-test ## style and layering: seconds
 
 # The tests on one process in two runs side by side, of about the same length. The demos come first: the peak memory of
 # a program starts from that of the process that calls it.
-CORE := tests/bodies tests/design tests/effects tests/elasticity tests/joints tests/kinematics tests/linkage \
+CORE := tests/design tests/effects tests/elasticity tests/joints tests/multibody \
     tests/mechanism tests/meshing
 OTHERS := tests/equilibrium tests/simulation
 AROUND := tests/demos tests/accuracy tests/hard tests/oracles tests/report \
@@ -87,7 +87,7 @@ random-scenes: install-test ## N random scenes from SEED on (1000, 0), each chec
 
 # What can differ between versions of dolfinx, PETSc, gmsh and Python, in a few minutes; FULL13=yes runs the rest as well.
 FULL13 :=
-CORE13 := tests/bodies tests/elasticity tests/joints tests/kinematics tests/linkage tests/mechanism
+CORE13 := tests/elasticity tests/joints tests/multibody tests/mechanism
 OTHERS13 := tests/meshing tests/design/test_sensitivity.py tests/design/test_weights.py \
     $(patsubst %,tests/test_%.py,collective compat kernel_cache uncaught_errors) \
     tests/effects/test_contact_derivatives.py \

@@ -14,8 +14,7 @@ from time import perf_counter
 
 from common import Demo
 
-from fenicsmech.accuracy import Displacement, Study, ladder, run_study, save_study
-from fenicsmech.accuracy.files import front_of, study_text
+from fenicsmech.accuracy import Displacement, Study, front_of, ladder, run_study, save_study, study_text
 from fenicsmech.report import write_summary
 
 # mm: close to the demos' own sizes; layers through the depth double whenever the size halves

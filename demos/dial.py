@@ -18,7 +18,7 @@ from task import scene_and_task
 import fenicsmech as fm
 from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRESS
 from fenicsmech.report import format_table
-from fenicsmech.simulation.dial import Dial, family
+from fenicsmech.simulation import Dial, family
 
 MECHANISMS = ("truss", "claw", "klann")
 ACCURACIES = (0.05, 0.01, 0.002)

@@ -27,8 +27,7 @@ from schur import Multigrid, SchurSolver
 import fenicsmech as fm
 from fenicsmech.equilibrium import Direct, LinearMethod, LinearSolver, LoadControl, PrimalDualNewton, TwoLevel
 from fenicsmech.mechanism import Force
-from fenicsmech.report import format_table
-from fenicsmech.report.atomic import atomic_write
+from fenicsmech.report import atomic_write, format_table
 from fenicsmech.simulation import Curve
 
 SIZES = [1.73, 1.15, 0.9, 0.68]  # mm: 16 000 to 240 000 unknowns; 0.53 gives half a million

@@ -19,8 +19,7 @@ from petsc4py import PETSc
 
 import fenicsmech as fm
 from fenicsmech.elasticity import Quadrature
-from fenicsmech.equilibrium import Constant, Hermite, LoadControl, Tangent
-from fenicsmech.equilibrium.factor import Factor
+from fenicsmech.equilibrium import Constant, Factor, Hermite, LoadControl, Tangent
 from fenicsmech.report import format_table
 
 REFERENCE_BLAS = [Path("/usr/lib/x86_64-linux-gnu/blas"), Path("/usr/lib/x86_64-linux-gnu/lapack")]

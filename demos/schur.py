@@ -15,7 +15,7 @@ from enum import Enum
 import numpy as np
 from petsc4py import PETSc
 
-from fenicsmech.equilibrium.system import EquilibriumSystem
+from fenicsmech.equilibrium import EquilibriumSystem
 
 EXACT, MOST = 1e-10, 1000  # of the energy norm of the error; iterations
 

@@ -18,9 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fenicsmech.mechanism.shapes import Disc, strip
-from fenicsmech.meshing import InterfaceSite, LinkMesh, mesh_link
-from fenicsmech.meshing.gmsh_session import gmsh, gmsh_session
+from fenicsmech.mechanism import Disc, strip
+from fenicsmech.meshing import InterfaceSite, LinkMesh, gmsh, gmsh_session, mesh_link
 
 SPAN, THICKNESS, DEPTH = 60.0, 3.0, 10.0
 RADIUS = 50.0  # of the curved link's centreline

@@ -16,19 +16,18 @@ PACKAGE = Path(__file__).parents[1] / ROOT
 # Lowest first: a module may import from its own layer and from those before it.
 LAYERS = (
     "errors",
+    "checks",
     "log",
     "clock",
     "kernel_cache",
     "compat",
     "collective",
     "report",
-    "kinematics",
     "joints",
     "mechanism",
-    "linkage",
     "meshing",
+    "multibody",
     "elasticity",
-    "bodies",
     "effects",
     "equilibrium",
     "simulation",
@@ -39,9 +38,9 @@ LAYERS = (
 # Libraries that belong to a few layers only: descriptions and joints know no elements, only one layer makes meshes,
 # only one draws.
 RESTRICTED = {
-    "dolfinx": {"report", "kinematics", "joints", "mechanism"},
-    "ufl": {"report", "kinematics", "joints", "mechanism"},
-    "petsc4py": {"report", "kinematics", "joints", "mechanism"},
+    "dolfinx": {"report", "joints", "mechanism"},
+    "ufl": {"report", "joints", "mechanism"},
+    "petsc4py": {"report", "joints", "mechanism"},
     "gmsh": set(LAYERS) - {"compat", "meshing"},
     "matplotlib": set(LAYERS) - {"report"},
 }
@@ -175,7 +174,7 @@ def test_an_upward_import_is_found_however_it_is_written(source):
         "import numpy",
         "from fenicsmech import errors",
         "from fenicsmech.errors import AssemblyError",
-        "from ..kinematics import planar",
+        "from ..checks import positive",
         "from .kind import JointKind",
         "from . import kind",
     ],

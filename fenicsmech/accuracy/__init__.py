@@ -9,25 +9,29 @@
 - ``files``: table and plot of a study
 """
 
-from fenicsmech.accuracy.error_split import ErrorSplit
+from fenicsmech.accuracy.error_split import ErrorSplit, split_error
 from fenicsmech.accuracy.extrapolation import Limit, extrapolate
-from fenicsmech.accuracy.files import save_study
+from fenicsmech.accuracy.files import front_of, save_study, study_text
 from fenicsmech.accuracy.measurement import Measurement
 from fenicsmech.accuracy.quantity import Displacement, Quantity
-from fenicsmech.accuracy.rung import RIGID, Rung, ladder
+from fenicsmech.accuracy.rung import RIGID, TOLERANCE, Rung, ladder
 from fenicsmech.accuracy.study import Study, run_study
 
 __all__ = [
-    "RIGID",
     "Displacement",
     "ErrorSplit",
     "Limit",
     "Measurement",
     "Quantity",
+    "RIGID",
     "Rung",
     "Study",
+    "TOLERANCE",
     "extrapolate",
+    "front_of",
     "ladder",
     "run_study",
     "save_study",
+    "split_error",
+    "study_text",
 ]

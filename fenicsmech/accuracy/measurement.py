@@ -15,10 +15,9 @@ from fenicsmech.accuracy.rung import RIGID, Rung
 from fenicsmech.elasticity import Quadrature
 from fenicsmech.equilibrium import PrimalDualNewton
 from fenicsmech.errors import FenicsmechError
-from fenicsmech.linkage import assemble, build_linkage
 from fenicsmech.mechanism import FlexibleLink, Scene
-from fenicsmech.simulation import Simulation
-from fenicsmech.simulation.request import CurveRequest, read_request
+from fenicsmech.multibody import assemble, build_linkage
+from fenicsmech.simulation import CurveRequest, Simulation, read_request
 
 _SAMPLES = (0.2, 0.4, 0.6, 0.8, 1.0)  # of the load: evenly, as predictors like it
 _ENOUGH = 5.0  # s: a curve that takes as long is not noise

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+from fenicsmech.checks import finite
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import DRAWN, Configuration, Force, Units
-from fenicsmech.mechanism.checks import finite
 from fenicsmech.simulation import Frame
 
 

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
+from fenicsmech.checks import positive
 from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRAIN, PLANE_STRESS, SPATIAL, ElasticModel, Quadrature
 from fenicsmech.equilibrium import PrimalDualNewton
 from fenicsmech.mechanism import Scene
-from fenicsmech.mechanism.checks import positive
-from fenicsmech.simulation.fidelity import check_scene, fits
+from fenicsmech.simulation import check_scene, fits
 
 TOLERANCE = PrimalDualNewton().tolerance
 """Newton's tolerance unless a rung says otherwise."""

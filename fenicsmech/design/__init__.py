@@ -35,26 +35,110 @@ What a user sees
     ``result``            designs as plain data; ``link_files`` pictures and solids of them
 """
 
+from fenicsmech.design.barrier import Barrier
 from fenicsmech.design.characterisation import Experiment, ModulusFit, fit_modulus
+from fenicsmech.design.checkpoint import Checkpoint
 from fenicsmech.design.design_problem import DesignProblem
-from fenicsmech.design.optimisers import Bfgs, LevenbergMarquardt
-from fenicsmech.design.regularisers import MeshQuality, ShapeBounds, StayClose
+from fenicsmech.design.equilibria import Known, TargetEquilibria
+from fenicsmech.design.groups import group_count, split
+from fenicsmech.design.handle_optimum import HandleOptimum, ShapeError
+from fenicsmech.design.handle_step import LinkDerivatives, choose_sides, follow_spline
+from fenicsmech.design.handles import BETWEEN, LinkHandles
+from fenicsmech.design.insertion import insert, pierced
+from fenicsmech.design.laplacian import lumped_mass, stiffness
+from fenicsmech.design.link_shape import ShapeRequest, shape_link, shape_links
+from fenicsmech.design.objective import Objective, target_errors, target_scales
+from fenicsmech.design.objective_error import objective_error
+from fenicsmech.design.optimisers import (
+    Bfgs,
+    Evaluation,
+    Infeasible,
+    Iterate,
+    LevenbergMarquardt,
+    Minimiser,
+    Quadratic,
+    Reason,
+    Start,
+    TooHigh,
+)
+from fenicsmech.design.optimisers.resolution import Resolution
+from fenicsmech.design.partition import solve_partition
+from fenicsmech.design.progress import DesignProgress
+from fenicsmech.design.quality import QualitySum
+from fenicsmech.design.regularisers import MeshQuality, Model, Regulariser, ShapeBounds, StayClose
+from fenicsmech.design.rest_shape import DesignedLink, RestShape
 from fenicsmech.design.result import DesignResult, LinkDesign, TargetResult
-from fenicsmech.design.spline_design import SplineDesign, Target
+from fenicsmech.design.sensitivity import Adjoint, Gradient
+from fenicsmech.design.shape_map import ShapeMap
+from fenicsmech.design.spline import LinkSpline
+from fenicsmech.design.spline_design import Bounds, SplineDesign, Target, bounds_of, shape_request
+from fenicsmech.design.spline_fit import fit_spline
+from fenicsmech.design.spline_samples import SplineSamples
+from fenicsmech.design.team import minimise_together
 
 __all__ = [
+    "Adjoint",
+    "BETWEEN",
+    "Barrier",
     "Bfgs",
+    "Bounds",
+    "Checkpoint",
     "DesignProblem",
+    "DesignProgress",
     "DesignResult",
+    "DesignedLink",
+    "Evaluation",
     "Experiment",
+    "Gradient",
+    "HandleOptimum",
+    "Infeasible",
+    "Iterate",
+    "Known",
     "LevenbergMarquardt",
+    "LinkDerivatives",
     "LinkDesign",
+    "LinkHandles",
+    "LinkSpline",
     "MeshQuality",
+    "Minimiser",
+    "Model",
     "ModulusFit",
+    "Objective",
+    "Quadratic",
+    "QualitySum",
+    "Reason",
+    "Regulariser",
+    "Resolution",
+    "RestShape",
     "ShapeBounds",
+    "ShapeError",
+    "ShapeMap",
+    "ShapeRequest",
     "SplineDesign",
+    "SplineSamples",
+    "Start",
     "StayClose",
     "Target",
+    "TargetEquilibria",
     "TargetResult",
+    "TooHigh",
+    "bounds_of",
+    "choose_sides",
     "fit_modulus",
+    "fit_spline",
+    "follow_spline",
+    "group_count",
+    "insert",
+    "lumped_mass",
+    "minimise_together",
+    "objective_error",
+    "pierced",
+    "shape_link",
+    "shape_links",
+    "shape_request",
+    "solve_partition",
+    "split",
+    "stiffness",
+    "target_errors",
+    "target_scales",
 ]

@@ -20,13 +20,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
+from fenicsmech.checks import finite
 from fenicsmech.design.sensitivity import Adjoint
 from fenicsmech.equilibrium import IDLE_STIFFNESS, LoadControl
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import DRAWN, Configuration, Force, Material
-from fenicsmech.mechanism.checks import finite
-from fenicsmech.simulation import Curve, Simulation
-from fenicsmech.simulation.request import CurveRequest, read_request
+from fenicsmech.simulation import Curve, CurveRequest, Simulation, read_request
 
 _SETTLED = 1e-6  # change of ln E
 _ITERATIONS = 30

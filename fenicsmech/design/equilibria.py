@@ -24,12 +24,9 @@ from fenicsmech.design.sensitivity import Adjoint
 from fenicsmech.design.spline_design import Target
 from fenicsmech.equilibrium import IDLE_STIFFNESS, Iteration, LoadControl, NotConverged, State
 from fenicsmech.errors import EquilibriumError
-from fenicsmech.linkage import assemble
 from fenicsmech.mechanism import FlexibleLink
-from fenicsmech.simulation import Simulation
-from fenicsmech.simulation.goal import Goal
-from fenicsmech.simulation.influence import Equilibrium
-from fenicsmech.simulation.request import CurveRequest
+from fenicsmech.multibody import assemble
+from fenicsmech.simulation import CurveRequest, Equilibrium, Goal, Simulation
 
 _HALVINGS = 2  # of a change of design whose equilibrium is not found, or lies elsewhere
 _ASTRAY = 2.0  # times δ, how far the prediction may miss: up to 1.7 on one branch, 3.8 and more across folds

@@ -10,8 +10,7 @@ from fenicsmech.design.handles import BETWEEN, LinkHandles
 from fenicsmech.design.insertion import pierced
 from fenicsmech.design.spline_fit import SplineFit
 from fenicsmech.errors import DescriptionError
-from fenicsmech.meshing import FREE, LinkMesh
-from fenicsmech.meshing.plan import plan_of
+from fenicsmech.meshing import FREE, LinkMesh, plan_of
 
 _CLEARANCE = 0.25  # of the spacing, between an intermediary handle and an interface
 _SAMPLES = 1000  # of arc length, per segment

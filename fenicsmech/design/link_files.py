@@ -10,14 +10,11 @@ import numpy as np
 from fenicsmech.collective import on_one
 from fenicsmech.design.link_shape import gather_links
 from fenicsmech.design.rest_shape import DesignedLink
-from fenicsmech.linkage import Linkage, assemble
 from fenicsmech.mechanism import DRAWN, Disc, FlexibleLink
-from fenicsmech.meshing import LinkMesh, PinHole, boundary_loops, write_step, write_stl
-from fenicsmech.meshing.plan import plan_of
+from fenicsmech.meshing import LinkMesh, PinHole, boundary_loops, plan_of, write_step, write_stl
+from fenicsmech.multibody import Linkage, assemble
 from fenicsmech.report import DesignShape, LinkOutline, draw_designs
-from fenicsmech.simulation import Simulation
-from fenicsmech.simulation.picture import Draughtsman
-from fenicsmech.simulation.snapshot import rest_vertices
+from fenicsmech.simulation import Draughtsman, Simulation, rest_vertices
 
 
 def rest_meshes(simulation: Simulation, links: Sequence[FlexibleLink]) -> list[LinkMesh] | None:

@@ -13,9 +13,7 @@ from fenicsmech.design.handle_placement import place_handles
 from fenicsmech.design.handles import LinkHandles
 from fenicsmech.design.spline_fit import fit_spline
 from fenicsmech.design.weights import handle_weights
-from fenicsmech.meshing import FREE, Centreline, LinkMesh, cell_measures
-from fenicsmech.meshing.distribute import MechanismMesh
-from fenicsmech.meshing.plan import plan_of
+from fenicsmech.meshing import FREE, Centreline, LinkMesh, MechanismMesh, cell_measures, plan_of
 
 _SPACING = 1.0  # of handles, in mean widths of the link
 

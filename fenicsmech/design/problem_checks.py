@@ -8,9 +8,8 @@ import numpy as np
 
 from fenicsmech.design.spline_design import SplineDesign, Target
 from fenicsmech.errors import DescriptionError
-from fenicsmech.linkage import assemble
-from fenicsmech.simulation import Simulation
-from fenicsmech.simulation.request import read_request
+from fenicsmech.multibody import assemble
+from fenicsmech.simulation import Simulation, read_request
 
 _NO_EFFECT = 1e-9  # relative change of a displacement when a shape changes as much as shapes do: less is rounding
 

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenicsmech.checks import finite, positive
 from fenicsmech.design.barrier import Barrier
 from fenicsmech.design.handle_optimum import Placement
 from fenicsmech.design.optimisers import Quadratic
 from fenicsmech.design.rest_shape import DesignedLink, RestShape
-from fenicsmech.mechanism.checks import finite, positive
 
 Model = Callable[[np.ndarray], Quadratic]
 

@@ -24,7 +24,7 @@ from mpi4py import MPI
 
 from fenicsmech.compat import assemble_vector, compile_form, destroy_garbage, owned_values
 from fenicsmech.equilibrium import Iteration, LoadControl, PointLoad, State
-from fenicsmech.simulation.model import MechanismModel
+from fenicsmech.simulation import MechanismModel
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from mpi4py import MPI
 
 from fenicsmech.compat import cell_nodes, original_nodes
 from fenicsmech.design.link_shape import LinkShape
-from fenicsmech.meshing.distribute import MechanismMesh
+from fenicsmech.meshing import MechanismMesh
 
 
 class ShapeMap:

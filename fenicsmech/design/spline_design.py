@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenicsmech.checks import finite, positive
 from fenicsmech.design.link_shape import ShapeRequest
 from fenicsmech.errors import DescriptionError
 from fenicsmech.joints import WELD
-from fenicsmech.linkage import Linkage
 from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Mechanism, Strip
-from fenicsmech.mechanism.checks import finite, positive
 from fenicsmech.meshing import Centreline
+from fenicsmech.multibody import Linkage
 
 _RANGE = (1.0 / 3.0, 3.0)  # of thicknesses, in units of the drawn one: 1 … 9 mm for a link of 3 mm
 

@@ -17,8 +17,7 @@ from fenicsmech.design.handles import BETWEEN, LinkHandles
 from fenicsmech.design.insertion import insert, pierced
 from fenicsmech.design.laplacian import lumped_mass, stiffness
 from fenicsmech.design.partition import solve_partition
-from fenicsmech.meshing import LinkMesh
-from fenicsmech.meshing.plan import plan_of
+from fenicsmech.meshing import LinkMesh, plan_of
 
 _OUT_OF_PLANE = 1000.0  # c, per square of the depth
 

@@ -15,14 +15,13 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
+from fenicsmech.checks import points, positive
 from fenicsmech.effects.faces import Faces
 from fenicsmech.effects.obstacles import Obstacle
 from fenicsmech.effects.protocol import BodyEffect, LinkEffect, LinkFields, PosePotential
 from fenicsmech.errors import DescriptionError
-from fenicsmech.kinematics import RigidSpace
-from fenicsmech.mechanism import FlexibleLink, Link, RigidLink
-from fenicsmech.mechanism.checks import points, positive
-from fenicsmech.mechanism.places import in_dimension
+from fenicsmech.joints import RigidSpace
+from fenicsmech.mechanism import FlexibleLink, Link, RigidLink, in_dimension
 
 _STIFFNESS = 0.1  # of the outermost layer of elements; ten times more costs slender links several times the iterations
 

@@ -19,7 +19,7 @@ from mpi4py import MPI
 from fenicsmech.compat import cell_nodes, original_nodes
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import FlexibleLink
-from fenicsmech.meshing.mid_plane import on_mid_plane
+from fenicsmech.meshing import on_mid_plane
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,11 @@ from dataclasses import dataclass, field
 import numpy as np
 import ufl
 
+from fenicsmech.checks import point, positive
 from fenicsmech.effects.protocol import BodyEffect, LinkEffect, PosePotential
 from fenicsmech.errors import DescriptionError
-from fenicsmech.kinematics import RigidSpace
-from fenicsmech.mechanism import Material, RigidLink
-from fenicsmech.mechanism.checks import point, positive
-from fenicsmech.mechanism.places import in_dimension
+from fenicsmech.joints import RigidSpace
+from fenicsmech.mechanism import Material, RigidLink, in_dimension
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from fenicsmech.checks import positive
 from fenicsmech.effects.protocol import JointSoftening
 from fenicsmech.errors import DescriptionError
 from fenicsmech.joints import REVOLUTE, SPHERICAL, UNIVERSAL, WELD
 from fenicsmech.mechanism import Joint
-from fenicsmech.mechanism.checks import positive
 
 _PINNED = (REVOLUTE, SPHERICAL, UNIVERSAL, WELD)  # their first equations are x_b − x_a = 0
 

@@ -13,11 +13,11 @@ from math import pi
 
 import numpy as np
 
+from fenicsmech.checks import finite, positive
 from fenicsmech.effects.protocol import BodyEffect, PosePotential
 from fenicsmech.errors import DescriptionError
-from fenicsmech.linkage.coordinate import JointCoordinate
 from fenicsmech.mechanism import Joint
-from fenicsmech.mechanism.checks import finite, positive
+from fenicsmech.multibody import JointCoordinate
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 
+from fenicsmech.checks import direction, point, positive
 from fenicsmech.errors import DescriptionError
-from fenicsmech.mechanism.checks import direction, point, positive
-from fenicsmech.mechanism.places import in_dimension
+from fenicsmech.mechanism import in_dimension
 
 _CORE = 0.25  # of the radius: what gets deeper into a cylinder might leave it on the other side
 

@@ -23,12 +23,11 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
+from fenicsmech.checks import finite, point
 from fenicsmech.effects.faces import Faces
 from fenicsmech.effects.protocol import LinkEffect
 from fenicsmech.errors import DescriptionError
-from fenicsmech.mechanism import FlexibleLink
-from fenicsmech.mechanism.checks import finite, point
-from fenicsmech.mechanism.places import in_dimension
+from fenicsmech.mechanism import FlexibleLink, in_dimension
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from fenicsmech.checks import direction, positive
 from fenicsmech.effects.protocol import RestStretch
 from fenicsmech.elasticity import PLANE_STRAIN, Stretch
 from fenicsmech.errors import DescriptionError
-from fenicsmech.mechanism import FlexibleLink
-from fenicsmech.mechanism.checks import direction, positive
-from fenicsmech.mechanism.places import in_dimension
+from fenicsmech.mechanism import FlexibleLink, in_dimension
 
 
 @dataclass(frozen=True)

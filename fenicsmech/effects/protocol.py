@@ -18,9 +18,8 @@ from dolfinx import fem
 
 from fenicsmech.effects.faces import Boundary, Faces, cofactor
 from fenicsmech.elasticity import ElasticBody, ElasticModel, Stretch
-from fenicsmech.linkage import Linkage
-from fenicsmech.mechanism import FlexibleLink
-from fenicsmech.mechanism.effect import Effect
+from fenicsmech.mechanism import Effect, FlexibleLink
+from fenicsmech.multibody import Linkage
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,27 +15,40 @@
 
 from fenicsmech.elasticity.body import ElasticBody
 from fenicsmech.elasticity.energies import density
-from fenicsmech.elasticity.formulation import Displacement, Formulation, Mixed
+from fenicsmech.elasticity.formulation import LOCKING, Displacement, Formulation, Mixed
 from fenicsmech.elasticity.growth import Stretch
+from fenicsmech.elasticity.mixed import dilatation, mixed_density, volumetric_modulus
 from fenicsmech.elasticity.mixed_stress import MixedStress
 from fenicsmech.elasticity.models import MID_PLANE_SYMMETRIC, PLANE_STRAIN, PLANE_STRESS, SPATIAL, ElasticModel
+from fenicsmech.elasticity.pressure import PressureField
 from fenicsmech.elasticity.quadrature import Quadrature
-from fenicsmech.elasticity.strain import Moduli, Strain
+from fenicsmech.elasticity.remainders import cube_root_remainder, log_remainder
+from fenicsmech.elasticity.strain import Moduli, Strain, spatial_strain
+from fenicsmech.elasticity.stress import cauchy_stress
 
 __all__ = [
-    "MID_PLANE_SYMMETRIC",
-    "PLANE_STRAIN",
-    "PLANE_STRESS",
-    "SPATIAL",
     "Displacement",
     "ElasticBody",
     "ElasticModel",
     "Formulation",
+    "LOCKING",
+    "MID_PLANE_SYMMETRIC",
     "Mixed",
     "MixedStress",
     "Moduli",
+    "PLANE_STRAIN",
+    "PLANE_STRESS",
+    "PressureField",
     "Quadrature",
+    "SPATIAL",
     "Strain",
     "Stretch",
+    "cauchy_stress",
+    "cube_root_remainder",
     "density",
+    "dilatation",
+    "log_remainder",
+    "mixed_density",
+    "spatial_strain",
+    "volumetric_modulus",
 ]

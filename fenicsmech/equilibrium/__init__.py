@@ -30,7 +30,11 @@ from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadCon
 from fenicsmech.equilibrium.critical import Critical, CriticalPoint
 from fenicsmech.equilibrium.dead_centre import MotorPath
 from fenicsmech.equilibrium.eigen import Mode, critical_changes, softest_modes
+from fenicsmech.equilibrium.entry_copy import EntryCopy
+from fenicsmech.equilibrium.extras import REGULARISATION
+from fenicsmech.equilibrium.factor import Factor
 from fenicsmech.equilibrium.fields import load_fields
+from fenicsmech.equilibrium.kkt import KktMatrix
 from fenicsmech.equilibrium.lead import ForceLead, Heading, Lead, MotorLead
 from fenicsmech.equilibrium.linear import BySize, Direct, LinearMethod, LinearSolver, TwoLevel
 from fenicsmech.equilibrium.load import PointLoad
@@ -43,9 +47,9 @@ from fenicsmech.equilibrium.solver import EquilibriumSolver, Iteration, NotConve
 from fenicsmech.equilibrium.solvers import AugmentedLagrangian, Globalisation, KktNewton, Snes
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem
+from fenicsmech.equilibrium.two_level import TwoLevelSolver
 
 __all__ = [
-    "IDLE_STIFFNESS",
     "ArcLength",
     "ArcMetric",
     "ArcSteps",
@@ -57,14 +61,18 @@ __all__ = [
     "CriticalPoint",
     "Direct",
     "DisplacementControl",
+    "EntryCopy",
     "EquilibriumSolver",
     "EquilibriumSystem",
+    "Factor",
     "Finish",
     "ForceLead",
     "Globalisation",
     "Heading",
     "Hermite",
+    "IDLE_STIFFNESS",
     "Iteration",
+    "KktMatrix",
     "KktNewton",
     "Lead",
     "LinearMethod",
@@ -83,6 +91,7 @@ __all__ = [
     "PointLoad",
     "Predictor",
     "PrimalDualNewton",
+    "REGULARISATION",
     "Reaction",
     "Sense",
     "ShareControl",
@@ -93,6 +102,7 @@ __all__ = [
     "Stretch",
     "Tangent",
     "TwoLevel",
+    "TwoLevelSolver",
     "critical_changes",
     "crossing",
     "follow",

@@ -8,12 +8,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from fenicsmech.checks import positive
 from fenicsmech.equilibrium.path_points import PathPoint, PathPoints
 from fenicsmech.equilibrium.solver import NotConverged
 from fenicsmech.equilibrium.state import State
 from fenicsmech.errors import DescriptionError
 from fenicsmech.log import logger
-from fenicsmech.mechanism.checks import positive
 
 _log = logger(__name__)
 _TURN = 0.25  # rad between the tangents at both ends of a step that is as long as it should be

@@ -14,11 +14,11 @@ from dolfinx import fem
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
-from fenicsmech.bodies import DesignAtNodes
 from fenicsmech.equilibrium.factor import Factor, Inertia
 from fenicsmech.equilibrium.layout import Layout
 from fenicsmech.equilibrium.matrices import create_map_matrix, update_map_matrix
 from fenicsmech.equilibrium.system import EquilibriumSystem
+from fenicsmech.multibody import DesignAtNodes
 
 
 class CoarseLevel:

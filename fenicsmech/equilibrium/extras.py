@@ -11,13 +11,12 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from fenicsmech.bodies import BodyPoint, LinkPoint
 from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.layout import Layout
 from fenicsmech.equilibrium.load import PointLoad
 from fenicsmech.equilibrium.potentials import BodyPotentials
 from fenicsmech.equilibrium.state import State
-from fenicsmech.linkage import JointSystem
+from fenicsmech.multibody import BodyPoint, JointSystem, LinkPoint
 
 REGULARISATION = 1e-8
 """ε in scaled units, in which rows of A have norm one and the stiffness has mean diagonal one."""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from fenicsmech.bodies import InterfaceMap
 from fenicsmech.elasticity import ElasticBody
 from fenicsmech.equilibrium.state import State
+from fenicsmech.multibody import InterfaceMap
 
 
 def load_fields(elastic: ElasticBody, interfaces: InterfaceMap, state: State) -> None:

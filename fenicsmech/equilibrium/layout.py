@@ -12,9 +12,8 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from fenicsmech.bodies import InterfaceMap
-from fenicsmech.elasticity.pressure import PressureField
-from fenicsmech.linkage import JointSystem
+from fenicsmech.elasticity import PressureField
+from fenicsmech.multibody import InterfaceMap, JointSystem
 
 
 class Layout:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenicsmech.bodies import MaterialPoint
+from fenicsmech.multibody import MaterialPoint
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenicsmech.bodies import BodyPoint, LinkPoint
 from fenicsmech.elasticity import ElasticBody
 from fenicsmech.equilibrium.layout import Layout
 from fenicsmech.equilibrium.load import PointLoad
 from fenicsmech.equilibrium.state import State
-from fenicsmech.linkage import JointSystem
+from fenicsmech.multibody import BodyPoint, JointSystem, LinkPoint
 
 
 class Loads:

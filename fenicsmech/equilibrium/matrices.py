@@ -12,10 +12,9 @@ import numpy as np
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
-from fenicsmech.bodies import InterfaceMap
 from fenicsmech.elasticity import ElasticBody
 from fenicsmech.equilibrium.layout import Layout
-from fenicsmech.linkage import JointSystem
+from fenicsmech.multibody import InterfaceMap, JointSystem
 
 
 def create_extended_matrix(

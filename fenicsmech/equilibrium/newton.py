@@ -39,12 +39,12 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
+from fenicsmech.checks import positive
 from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.solver import EquilibriumSolver, Iteration, NotConverged, Solution
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import Balance, EquilibriumSystem
 from fenicsmech.log import logger
-from fenicsmech.mechanism.checks import positive
 
 _log = logger(__name__)
 _LEAST_SHIFT = 1e-9  # in units of the mean stiffness; slender links bend with 1e-6 of it and less

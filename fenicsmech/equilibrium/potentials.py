@@ -11,7 +11,7 @@ import numpy as np
 
 from fenicsmech.effects import PosePotential
 from fenicsmech.equilibrium.state import State
-from fenicsmech.linkage import JointSystem
+from fenicsmech.multibody import JointSystem
 
 
 class BodyPotentials:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenicsmech.equilibrium.state import State
-from fenicsmech.linkage import JointSystem
 from fenicsmech.mechanism import Motor
+from fenicsmech.multibody import JointSystem
 
 
 @dataclass(frozen=True)

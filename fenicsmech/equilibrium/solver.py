@@ -13,13 +13,13 @@ from dataclasses import dataclass, field
 
 from petsc4py import PETSc
 
+from fenicsmech.checks import positive
 from fenicsmech.compat import destroy_garbage
 from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.factor import Inertia
 from fenicsmech.equilibrium.linear import BySize, LinearMethod, LinearSolver
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import Balance, EquilibriumSystem
-from fenicsmech.mechanism.checks import positive
 
 _STEP = 1e-6  # relative error of steps and tangents that iterative solvers may leave to the next iteration
 _ROUGH = 1e-3  # far from the equilibrium

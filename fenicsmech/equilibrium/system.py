@@ -22,7 +22,6 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fenicsmech.bodies import InterfaceMap
 from fenicsmech.clock import Clock
 from fenicsmech.compat import destroy_garbage
 from fenicsmech.effects import PosePotential
@@ -38,7 +37,7 @@ from fenicsmech.equilibrium.matrices import create_extended_matrix
 from fenicsmech.equilibrium.potentials import BodyPotentials
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.unknowns import ScaledUnknowns
-from fenicsmech.linkage import JointSystem
+from fenicsmech.multibody import InterfaceMap, JointSystem
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,11 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
-from fenicsmech.bodies import InterfaceMap
 from fenicsmech.elasticity import ElasticBody
 from fenicsmech.equilibrium.layout import Layout
 from fenicsmech.equilibrium.matrices import create_map_matrix, update_map_matrix
 from fenicsmech.equilibrium.state import Step
-from fenicsmech.linkage import JointSystem
+from fenicsmech.multibody import InterfaceMap, JointSystem
 
 
 class ScaledUnknowns:

@@ -18,7 +18,7 @@ import numpy as np
 import sympy
 
 from fenicsmech.joints.kind import JointKind
-from fenicsmech.kinematics import RIGID_SPACES
+from fenicsmech.joints.spatial_space import RIGID_SPACES
 
 
 @dataclass(frozen=True)

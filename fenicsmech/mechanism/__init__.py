@@ -22,6 +22,7 @@ from fenicsmech.mechanism.materials import (
 )
 from fenicsmech.mechanism.mechanism import Mechanism
 from fenicsmech.mechanism.parts import Drive, FlexibleLink, Force, Joint, Leader, Link, Motor, Output, RigidLink
+from fenicsmech.mechanism.places import in_dimension, mechanism_length, same_place
 from fenicsmech.mechanism.scene import DRAWN, Configuration, Scene
 from fenicsmech.mechanism.shapes import (
     Arc,
@@ -44,12 +45,11 @@ from fenicsmech.mechanism.units import Units
 from fenicsmech.mechanism.validation import validate
 
 __all__ = [
-    "DRAWN",
-    "ONYX",
-    "SMOOTH_SIL_950",
     "Arc",
     "Configuration",
+    "DRAWN",
     "Disc",
+    "Drive",
     "Effect",
     "EnergyLaw",
     "FlexibleLink",
@@ -57,29 +57,33 @@ __all__ = [
     "IsochoricNeoHookean",
     "IsochoricSimoNeoHookean",
     "Joint",
+    "Leader",
     "Line",
     "Link",
     "LogarithmicNeoHookean",
     "Material",
     "Mechanism",
     "MeshPart",
-    "Drive",
-    "Leader",
     "Motor",
     "NeoHookean",
+    "ONYX",
     "Outline",
     "Output",
     "Rectangle",
     "Region",
     "RigidLink",
+    "SMOOTH_SIL_950",
     "Scene",
     "Shape",
     "StepPart",
     "Strip",
     "Units",
     "gmsh_mesh",
+    "in_dimension",
+    "mechanism_length",
     "outline",
     "polygon",
+    "same_place",
     "step",
     "strip",
     "validate",

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from fenicsmech.checks import finite, positive
 from fenicsmech.errors import DescriptionError
-from fenicsmech.mechanism.checks import finite, positive
 
 
 class EnergyLaw:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from fenicsmech.checks import direction as unit
+from fenicsmech.checks import finite, point, positive
 from fenicsmech.errors import DescriptionError
 from fenicsmech.joints import (
     CYLINDRICAL,
@@ -15,8 +17,6 @@ from fenicsmech.joints import (
     WELD,
     JointKind,
 )
-from fenicsmech.mechanism.checks import direction as unit
-from fenicsmech.mechanism.checks import finite, point, positive
 from fenicsmech.mechanism.materials import Material
 from fenicsmech.mechanism.parts import FlexibleLink, Force, Joint, Link, Motor, Output, RigidLink
 from fenicsmech.mechanism.shapes import Disc, Rectangle, Region, Shape

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from fenicsmech.checks import finite
 from fenicsmech.errors import DescriptionError
 from fenicsmech.joints import JointKind
-from fenicsmech.mechanism.checks import finite
 from fenicsmech.mechanism.materials import Material
 from fenicsmech.mechanism.shapes import Point, Region, Shape
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from fenicsmech.checks import finite
 from fenicsmech.errors import DescriptionError
-from fenicsmech.mechanism.checks import finite
 from fenicsmech.mechanism.effect import Effect
 from fenicsmech.mechanism.mechanism import Mechanism
 from fenicsmech.mechanism.parts import Motor

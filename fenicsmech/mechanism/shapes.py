@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from fenicsmech.checks import finite, point, points, positive
 from fenicsmech.errors import DescriptionError
-from fenicsmech.mechanism.checks import finite, point, points, positive
 
 Point = tuple[float, ...]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenicsmech.mechanism.shapes import Disc, Rectangle
+from fenicsmech.mechanism import Disc, Rectangle
 
 
 @dataclass(frozen=True)

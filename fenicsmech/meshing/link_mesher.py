@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from fenicsmech.checks import positive
 from fenicsmech.errors import DescriptionError, MeshingError
-from fenicsmech.mechanism.checks import positive
-from fenicsmech.mechanism.shapes import Shape
+from fenicsmech.mechanism import Shape
 from fenicsmech.meshing.interface_site import InterfaceSite
 from fenicsmech.meshing.link_mesh import LinkMesh
 from fenicsmech.meshing.mesh_checks import check_link_mesh

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fenicsmech.errors import DescriptionError, MeshingError
-from fenicsmech.mechanism.shapes import MeshPart
+from fenicsmech.mechanism import MeshPart
 from fenicsmech.meshing.gmsh_session import gmsh, gmsh_session
 from fenicsmech.meshing.holders import sole_holder
 from fenicsmech.meshing.interface_site import across

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from fenicsmech.errors import MeshingError
-from fenicsmech.mechanism.shapes import Arc, Line, Outline
+from fenicsmech.mechanism import Arc, Line, Outline
 from fenicsmech.meshing.gmsh_session import gmsh
 from fenicsmech.meshing.interface_site import InterfaceSite
 from fenicsmech.meshing.link_mesh import LinkMesh

@@ -8,7 +8,7 @@ from functools import singledispatch
 
 import numpy as np
 
-from fenicsmech.mechanism.shapes import Disc, Rectangle, Region
+from fenicsmech.mechanism import Disc, Rectangle, Region
 from fenicsmech.meshing.gmsh_session import gmsh
 from fenicsmech.meshing.interface_site import InterfaceSite, axis_frame
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import singledispatch
 from typing import TypeVar
 
-from fenicsmech.mechanism.shapes import Arc, Disc, Line, Outline, Rectangle, Strip
+from fenicsmech.mechanism import Arc, Disc, Line, Outline, Rectangle, Strip
 from fenicsmech.meshing.interface_site import InterfaceSite
 
 Described = TypeVar("Described")

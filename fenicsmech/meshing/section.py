@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenicsmech.checks import point, positive
 from fenicsmech.errors import MeshingError
-from fenicsmech.mechanism.checks import point, positive
 from fenicsmech.meshing.boundary import boundary_loops
 from fenicsmech.meshing.link_mesh import LinkMesh, cell_measures
 from fenicsmech.meshing.outline_curves import Curve, sampled

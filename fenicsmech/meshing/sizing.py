@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-from fenicsmech.mechanism.shapes import Disc
+from fenicsmech.mechanism import Disc
 from fenicsmech.meshing.gmsh_session import gmsh
 from fenicsmech.meshing.interface_site import InterfaceSite, axis_frame
 

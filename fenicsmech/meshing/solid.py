@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from scipy.interpolate import BSpline
 
-from fenicsmech.mechanism.checks import positive
+from fenicsmech.checks import positive
 from fenicsmech.meshing.boundary import boundary_loops
 from fenicsmech.meshing.fragments import mesh_fragments
 from fenicsmech.meshing.gmsh_session import gmsh, gmsh_session

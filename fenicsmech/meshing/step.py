@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from fenicsmech.errors import DescriptionError, MeshingError
-from fenicsmech.mechanism.shapes import StepPart
+from fenicsmech.mechanism import StepPart
 from fenicsmech.meshing.fragments import mesh_fragments
 from fenicsmech.meshing.gmsh_session import gmsh, gmsh_session
 from fenicsmech.meshing.link_mesh import LinkMesh

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from fenicsmech.errors import MeshingError
-from fenicsmech.mechanism.shapes import Disc, Strip
+from fenicsmech.mechanism import Disc, Strip
 from fenicsmech.meshing.centreline import Centreline
 from fenicsmech.meshing.gmsh_session import gmsh
 from fenicsmech.meshing.interface_site import InterfaceSite

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenicsmech.mechanism.shapes import Disc
+from fenicsmech.mechanism import Disc
 from fenicsmech.meshing.centreline import Centreline
 from fenicsmech.meshing.interface_site import InterfaceSite
 from fenicsmech.meshing.sizing import circle_segments, gap_refinement

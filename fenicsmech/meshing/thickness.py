@@ -7,7 +7,7 @@ from functools import singledispatch
 import numpy as np
 
 from fenicsmech.errors import DescriptionError
-from fenicsmech.mechanism.shapes import Arc, Outline, Shape, Strip
+from fenicsmech.mechanism import Arc, Outline, Shape, Strip
 
 
 @singledispatch

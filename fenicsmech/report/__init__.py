@@ -24,13 +24,16 @@ Nothing here knows elements, joints or ranks; call it on one rank.
 """
 
 from fenicsmech.report.atomic import atomic_write
-from fenicsmech.report.canvas import PALETTE
+from fenicsmech.report.canvas import FLEXIBLE, INK, PALETTE, new_figure
 from fenicsmech.report.curve import CurveMark, CurveSeries, CurveTarget, plot_curve, read_curve_csv, write_curve_csv
+from fenicsmech.report.design_frame import IN_PLACE, lay_out_designs
 from fenicsmech.report.design_shapes import DesignShape, LinkOutline
 from fenicsmech.report.designs import draw_designs
+from fenicsmech.report.frame import lay_out
+from fenicsmech.report.labels import Labels, Spot, text_size
 from fenicsmech.report.outline import rigid_outline
 from fenicsmech.report.picture import draw_configurations, draw_mechanism
-from fenicsmech.report.plan import PlanView, plan_view
+from fenicsmech.report.plan import PlanView, plan_view, rim
 from fenicsmech.report.progress import Progress, Silent
 from fenicsmech.report.shapes import Arrow, FlexibleShape, MechanismShape, Panel, Pin, RigidShape, Trace
 from fenicsmech.report.summary import check_summary, write_summary
@@ -38,22 +41,27 @@ from fenicsmech.report.table import format_table
 from fenicsmech.report.work_precision import ErrorLevel, WorkSeries, pareto_front, plot_work_precision
 
 __all__ = [
-    "PALETTE",
     "Arrow",
     "CurveMark",
     "CurveSeries",
     "CurveTarget",
     "DesignShape",
     "ErrorLevel",
+    "FLEXIBLE",
     "FlexibleShape",
+    "INK",
+    "IN_PLACE",
+    "Labels",
     "LinkOutline",
     "MechanismShape",
+    "PALETTE",
     "Panel",
     "Pin",
     "PlanView",
     "Progress",
     "RigidShape",
     "Silent",
+    "Spot",
     "Trace",
     "WorkSeries",
     "atomic_write",
@@ -62,12 +70,17 @@ __all__ = [
     "draw_designs",
     "draw_mechanism",
     "format_table",
+    "lay_out",
+    "lay_out_designs",
+    "new_figure",
     "pareto_front",
     "plan_view",
     "plot_curve",
     "plot_work_precision",
     "read_curve_csv",
     "rigid_outline",
+    "rim",
+    "text_size",
     "write_curve_csv",
     "write_summary",
 ]

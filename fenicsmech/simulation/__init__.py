@@ -20,26 +20,56 @@
 
 from fenicsmech.simulation.buckling import BucklingLoad, BucklingPosition, SoftMode
 from fenicsmech.simulation.curve import Curve
-from fenicsmech.simulation.fidelity import SPACES
+from fenicsmech.simulation.dial import Dial, Outcome, Rung, Trial, corrections, family
+from fenicsmech.simulation.explanation import PLASTIC_WEIGHT, weight_influence
+from fenicsmech.simulation.fidelity import SPACES, check_scene, fits
 from fenicsmech.simulation.followed import FollowedCurve, PathEvent
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.friction import PinFriction, friction_band
+from fenicsmech.simulation.goal import Goal
+from fenicsmech.simulation.influence import Equilibrium
 from fenicsmech.simulation.mode_shape import ModeShape
+from fenicsmech.simulation.model import MechanismModel
+from fenicsmech.simulation.picture import Draughtsman
+from fenicsmech.simulation.pressure_error import PressureError
+from fenicsmech.simulation.recovery import Recovery
+from fenicsmech.simulation.request import CurveRequest, read_request
 from fenicsmech.simulation.simulation import Simulation
+from fenicsmech.simulation.snapshot import gather, rest_vertices
 from fenicsmech.simulation.until import Until
 
 __all__ = [
-    "SPACES",
     "BucklingLoad",
     "BucklingPosition",
     "Curve",
+    "CurveRequest",
+    "Dial",
+    "Draughtsman",
+    "Equilibrium",
     "FollowedCurve",
     "Frame",
+    "Goal",
+    "MechanismModel",
     "ModeShape",
+    "Outcome",
+    "PLASTIC_WEIGHT",
     "PathEvent",
     "PinFriction",
+    "PressureError",
+    "Recovery",
+    "Rung",
+    "SPACES",
     "Simulation",
     "SoftMode",
+    "Trial",
     "Until",
+    "check_scene",
+    "corrections",
+    "family",
+    "fits",
     "friction_band",
+    "gather",
+    "read_request",
+    "rest_vertices",
+    "weight_influence",
 ]

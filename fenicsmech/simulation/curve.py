@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from fenicsmech.errors import DescriptionError
-from fenicsmech.linkage import Freedom
 from fenicsmech.mechanism import Configuration, Drive, Force, Leader, Motor, Units
+from fenicsmech.multibody import Freedom
 from fenicsmech.report import CurveSeries, plot_curve, write_curve_csv
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.goal import Goal

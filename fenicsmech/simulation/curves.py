@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 from fenicsmech.equilibrium import ArcSteps, EquilibriumSolver, Iteration, Predictor, Sense
 from fenicsmech.errors import DescriptionError
-from fenicsmech.linkage import Freedom, assemble_before_strain, count_freedom
 from fenicsmech.mechanism import Force, Leader, Units
+from fenicsmech.multibody import Freedom, assemble_before_strain, count_freedom
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.followed import FollowedCurve, PathEvent
 from fenicsmech.simulation.follower import Follower

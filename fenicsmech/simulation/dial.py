@@ -23,6 +23,7 @@ from time import perf_counter
 
 import numpy as np
 
+from fenicsmech.checks import positive
 from fenicsmech.elasticity import (
     MID_PLANE_SYMMETRIC,
     PLANE_STRESS,
@@ -33,10 +34,8 @@ from fenicsmech.elasticity import (
 )
 from fenicsmech.errors import DescriptionError
 from fenicsmech.log import logger
-from fenicsmech.mechanism import FlexibleLink, Scene
-from fenicsmech.mechanism.checks import positive
-from fenicsmech.mechanism.shapes import MeshPart, StepPart
-from fenicsmech.meshing.thickness import typical_thickness
+from fenicsmech.mechanism import FlexibleLink, MeshPart, Scene, StepPart
+from fenicsmech.meshing import typical_thickness
 from fenicsmech.simulation.fidelity import Fidelity, check_scene, fits
 
 _log = logger(__name__)

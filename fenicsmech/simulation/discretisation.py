@@ -9,8 +9,8 @@ from mpi4py import MPI
 from fenicsmech.clock import Clock
 from fenicsmech.collective import on_one
 from fenicsmech.equilibrium import EquilibriumSolver, Predictor
-from fenicsmech.linkage import build_linkage
 from fenicsmech.mechanism import Scene
+from fenicsmech.multibody import build_linkage
 from fenicsmech.simulation.curves import Curves
 from fenicsmech.simulation.estimates import Estimates
 from fenicsmech.simulation.fidelity import Fidelity

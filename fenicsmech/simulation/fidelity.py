@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from fenicsmech.checks import positive
 from fenicsmech.elasticity import (
     MID_PLANE_SYMMETRIC,
     PLANE_STRAIN,
@@ -16,8 +17,7 @@ from fenicsmech.elasticity import (
 )
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import FlexibleLink, Scene, validate
-from fenicsmech.mechanism.checks import positive
-from fenicsmech.meshing.sizing import LEAST_SEGMENTS
+from fenicsmech.meshing import LEAST_SEGMENTS
 
 SPACES = {model.name: model for model in (SPATIAL, MID_PLANE_SYMMETRIC, PLANE_STRESS, PLANE_STRAIN)}
 """Names of the elastic models, as users type them."""

@@ -16,12 +16,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenicsmech.checks import positive
 from fenicsmech.errors import DescriptionError
 from fenicsmech.joints import REVOLUTE
-from fenicsmech.linkage import Linkage
-from fenicsmech.linkage.coordinate import JointCoordinate
 from fenicsmech.mechanism import Joint
-from fenicsmech.mechanism.checks import positive
+from fenicsmech.multibody import JointCoordinate, Linkage
 from fenicsmech.simulation.curve import Curve
 
 _SAME = 1e-8  # of the mechanism's length, or rad: frames closer than that differ by the tolerance of their equilibria

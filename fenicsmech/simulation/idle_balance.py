@@ -13,7 +13,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenicsmech.equilibrium import EquilibriumSystem, State
-from fenicsmech.linkage import Motion, stiff_motions
+from fenicsmech.multibody import Motion, stiff_motions
 from fenicsmech.simulation.model import MechanismModel
 
 _ROUNDED = 1e-12  # of the work of each reaction: what is left of their sum, which vanishes

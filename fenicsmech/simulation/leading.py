@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenicsmech.bodies import body_point
 from fenicsmech.equilibrium import ForceLead, Lead, MotorLead, PointLoad
-from fenicsmech.linkage import JointSystem
 from fenicsmech.mechanism import Drive, Force, Leader, Motor, Units
+from fenicsmech.multibody import JointSystem, body_point
 from fenicsmech.simulation.model import MechanismModel
 
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 from mpi4py import MPI
 
 from fenicsmech.collective import on_one
-from fenicsmech.linkage import Linkage
 from fenicsmech.mechanism import FlexibleLink, Mechanism
-from fenicsmech.meshing import InterfaceSite, LinkMesh, check_link, mesh_link
-from fenicsmech.meshing.distribute import MechanismMesh, distribute
+from fenicsmech.meshing import InterfaceSite, LinkMesh, MechanismMesh, check_link, distribute, mesh_link
+from fenicsmech.multibody import Linkage
 from fenicsmech.simulation.fidelity import Fidelity
 
 

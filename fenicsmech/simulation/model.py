@@ -10,18 +10,15 @@ from functools import partial
 import numpy as np
 import ufl
 
-from fenicsmech.bodies import DesignAtNodes, InterfaceMap, MaterialPoint, body_point, link_point
 from fenicsmech.clock import Clock
 from fenicsmech.compat import cell_nodes, original_nodes
 from fenicsmech.effects import BodyEffect, JointSoftening, LinkEffect, LinkFields, RestStretch, find_boundaries, holding
 from fenicsmech.elasticity import ElasticBody, ElasticModel, Stretch
 from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State, load_fields
 from fenicsmech.errors import DescriptionError
-from fenicsmech.linkage import Linkage
-from fenicsmech.mechanism import Effect, FlexibleLink, Force, Mechanism, Output
-from fenicsmech.mechanism.places import in_dimension
-from fenicsmech.meshing.bulge import bulge_field
-from fenicsmech.meshing.distribute import MechanismMesh
+from fenicsmech.mechanism import Effect, FlexibleLink, Force, Mechanism, Output, in_dimension
+from fenicsmech.meshing import MechanismMesh, bulge_field
+from fenicsmech.multibody import DesignAtNodes, InterfaceMap, Linkage, MaterialPoint, body_point, link_point
 from fenicsmech.simulation.fidelity import Fidelity
 
 

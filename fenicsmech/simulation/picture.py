@@ -6,10 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fenicsmech.linkage import Linkage
-from fenicsmech.mechanism import Force, Link, Mechanism
-from fenicsmech.mechanism.places import in_dimension
-from fenicsmech.meshing.distribute import MechanismMesh
+from fenicsmech.mechanism import Force, Link, Mechanism, in_dimension
+from fenicsmech.meshing import MechanismMesh
+from fenicsmech.multibody import Linkage
 from fenicsmech.report import (
     Arrow,
     FlexibleShape,

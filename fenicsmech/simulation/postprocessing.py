@@ -7,14 +7,14 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
+from fenicsmech.checks import positive
 from fenicsmech.collective import from_one, on_one
 from fenicsmech.compat import owned_values
 from fenicsmech.equilibrium import Iteration
 from fenicsmech.errors import DescriptionError
-from fenicsmech.linkage import Linkage
 from fenicsmech.mechanism import Force, Leader, Output
-from fenicsmech.mechanism.checks import positive
 from fenicsmech.meshing import radius_ratios
+from fenicsmech.multibody import Linkage
 from fenicsmech.report import Panel, Trace, draw_configurations
 from fenicsmech.simulation.buckling import (
     BucklingLoad,

@@ -14,7 +14,7 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from fenicsmech.compat import assemble_matrix, assemble_vector, compile_form, owned_values, scalar_space
-from fenicsmech.meshing.mid_plane import on_mid_plane
+from fenicsmech.meshing import on_mid_plane
 from fenicsmech.simulation.model import MechanismModel
 
 

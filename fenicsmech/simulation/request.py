@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from fenicsmech.checks import finite
 from fenicsmech.equilibrium import Control, DisplacementControl, LoadControl
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import Configuration, Drive, Force, Leader, Mechanism, Motor
-from fenicsmech.mechanism.checks import finite
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
+from fenicsmech.checks import positive
 from fenicsmech.clock import Clock
 from fenicsmech.effects import holding
 from fenicsmech.elasticity import (
@@ -24,7 +25,6 @@ from fenicsmech.equilibrium import (
 )
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Leader, Mechanism, Output, Scene
-from fenicsmech.mechanism.checks import positive
 from fenicsmech.report import Progress, Silent
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.dial import Choice, Dial, Outcome, Rung, corrections, refuse_beside_accuracy

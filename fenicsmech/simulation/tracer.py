@@ -9,7 +9,6 @@ from time import perf_counter
 import numpy as np
 from mpi4py import MPI
 
-from fenicsmech.bodies import BodyPoint
 from fenicsmech.equilibrium import (
     Control,
     Iteration,
@@ -25,7 +24,7 @@ from fenicsmech.equilibrium import (
     motor_torques,
 )
 from fenicsmech.errors import EquilibriumError
-from fenicsmech.linkage import Assembly, Freedom, free_motions, is_held
+from fenicsmech.multibody import Assembly, BodyPoint, Freedom, free_motions, is_held
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.idle_balance import idle_imbalance
 from fenicsmech.simulation.leading import leading

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from fenicsmech.errors import AssemblyError
-from fenicsmech.linkage import Holding, Linkage, assemble
-from fenicsmech.mechanism import Configuration, Force, Output
-from fenicsmech.mechanism.places import in_dimension
+from fenicsmech.mechanism import Configuration, Force, Output, in_dimension
+from fenicsmech.multibody import Holding, Linkage, assemble
 
 
 def unloaded_positions(

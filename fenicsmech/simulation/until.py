@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from fenicsmech.checks import finite
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import Force, Leader
-from fenicsmech.mechanism.checks import finite
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,6 @@
 import pytest
 
-from fenicsmech.accuracy import Limit, Measurement, Rung
-from fenicsmech.accuracy.error_split import split_error
+from fenicsmech.accuracy import Limit, Measurement, Rung, split_error
 from fenicsmech.elasticity import PLANE_STRESS
 
 OWN, REFERENCE = Limit(11.0, 0.1, 2.0, 3), Limit(10.0, 0.1, 2.0, 3)

@@ -1,8 +1,7 @@
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.accuracy import RIGID, Displacement, Rung, ladder
-from fenicsmech.accuracy.rung import TOLERANCE
+from fenicsmech.accuracy import RIGID, TOLERANCE, Displacement, Rung, ladder
 from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRAIN, PLANE_STRESS, SPATIAL
 from fenicsmech.errors import DescriptionError
 

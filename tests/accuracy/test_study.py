@@ -4,8 +4,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.accuracy import RIGID, Rung, Study, ladder, run_study, save_study
-from fenicsmech.accuracy.files import front_of, study_text
+from fenicsmech.accuracy import RIGID, Rung, Study, front_of, ladder, run_study, save_study, study_text
 from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRESS, SPATIAL
 from fenicsmech.errors import DescriptionError
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fenicsmech.simulation.model import MechanismModel
+from fenicsmech.simulation import MechanismModel
 
 
 def design_field(model: MechanismModel, values: np.ndarray) -> np.ndarray:

@@ -9,14 +9,17 @@ import numpy as np
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.design.equilibria import TargetEquilibria
-from fenicsmech.design.groups import split
-from fenicsmech.design.link_shape import shape_links
-from fenicsmech.design.objective import Objective
-from fenicsmech.design.regularisers import Regulariser
-from fenicsmech.design.rest_shape import RestShape
-from fenicsmech.design.spline_design import bounds_of, shape_request
-from fenicsmech.linkage import assemble
+from fenicsmech.design import (
+    Objective,
+    Regulariser,
+    RestShape,
+    TargetEquilibria,
+    bounds_of,
+    shape_links,
+    shape_request,
+    split,
+)
+from fenicsmech.multibody import assemble
 
 from ..simulation.demo_scenes import describe
 from .shapes import ARCH, DEPTH, JOINTS, RADIUS, ROD, THICKNESS

@@ -16,8 +16,7 @@ from pathlib import Path
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.design.optimisers import Quadratic
-from fenicsmech.design.regularisers import Regulariser
+from fenicsmech.design import Quadratic, Regulariser
 
 from .mechanisms import truss
 

@@ -11,12 +11,8 @@ from mpi4py import MPI
 
 import fenicsmech as fm
 from fenicsmech.compat import vector_space
-from fenicsmech.design.handle_optimum import HandleOptimum
-from fenicsmech.design.link_shape import ShapeRequest, shape_links
-from fenicsmech.design.quality import QualitySum
-from fenicsmech.design.shape_map import ShapeMap
-from fenicsmech.meshing import Centreline, InterfaceSite, LinkMesh, mesh_link
-from fenicsmech.meshing.distribute import MechanismMesh, distribute
+from fenicsmech.design import HandleOptimum, QualitySum, ShapeMap, ShapeRequest, shape_links
+from fenicsmech.meshing import Centreline, InterfaceSite, LinkMesh, MechanismMesh, distribute, mesh_link
 
 THICKNESS, DEPTH, RADIUS, SIZE = 3.0, 5.0, 2.5, 2.0
 ARCH = ((0.0, 0.0), (20.0, 9.0), (40.0, 0.0))

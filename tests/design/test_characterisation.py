@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.design.characterisation import Experiment, fit_modulus
+from fenicsmech.design import Experiment, fit_modulus
 from fenicsmech.errors import DescriptionError
 
 TRUE = fm.Material("nylon", 1500.0, 0.4)

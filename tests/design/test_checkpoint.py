@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.design.checkpoint import Checkpoint
-from fenicsmech.design.optimisers import Evaluation, Iterate, Quadratic
+from fenicsmech.design import Checkpoint, Evaluation, Iterate, Quadratic
 
 PROBLEM = {"mechanism": "finger", "sizes": [2.0, 3.0], "targets": [["push", "as drawn", 0.1, 6.0, 1.0]]}
 HANDLES = np.array([0.0, 1.0 / 3.0, 2.0])

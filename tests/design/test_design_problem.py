@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.design.groups import group_count
+from fenicsmech.design import group_count
 
 from .mechanisms import Case, bow, strained, truss
 from .refusal import refused

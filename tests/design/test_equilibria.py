@@ -7,8 +7,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.design.equilibria import Known, TargetEquilibria
-from fenicsmech.design.optimisers import Infeasible
+from fenicsmech.design import Infeasible, Known, TargetEquilibria
 from fenicsmech.equilibrium import Newton, NotConverged
 
 from .mechanisms import Bench, Case, bench, bow, strained, strains, truss, turned_beam

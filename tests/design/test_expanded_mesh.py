@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from fenicsmech.design.insertion import insert, pierced
-from fenicsmech.design.laplacian import lumped_mass, stiffness
-from fenicsmech.meshing import FREE, cell_measures
-from fenicsmech.meshing.plan import plan_of
+from fenicsmech.design import insert, lumped_mass, pierced, stiffness
+from fenicsmech.meshing import FREE, cell_measures, plan_of
 
 from .shapes import DEPTH, strip_mesh
 

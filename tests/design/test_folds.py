@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.design.equilibria import TargetEquilibria
-from fenicsmech.design.optimisers import Infeasible
-from fenicsmech.design.sensitivity import Adjoint
+from fenicsmech.design import Adjoint, Infeasible, TargetEquilibria
 
 from ..equilibrium.arch import RISE, SPAN, arch
 from ..oracles.dense import taylor_rates

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import pytest
 from mpi4py import MPI
 
-from fenicsmech.design.groups import group_count, split
+from fenicsmech.design import group_count, split
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from fenicsmech.design.handle_optimum import HandleOptimum, ShapeError
-from fenicsmech.design.handle_step import LinkDerivatives, choose_sides, follow_spline
-from fenicsmech.design.handles import LinkHandles
+from fenicsmech.design import HandleOptimum, LinkDerivatives, LinkHandles, ShapeError, choose_sides, follow_spline
 
 from ..oracles.dense import taylor_rates
 from .shapes import bench

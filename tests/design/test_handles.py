@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from fenicsmech.design.handles import BETWEEN
-from fenicsmech.design.link_shape import shape_link
+from fenicsmech.design import BETWEEN, shape_link
 
 from ..oracles.dense import jacobian, taylor_rates
 from .shapes import bench, request, strip_mesh

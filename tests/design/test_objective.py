@@ -7,9 +7,18 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.design.objective import target_scales
-from fenicsmech.design.optimisers import Infeasible, LevenbergMarquardt, Quadratic, Start, TooHigh
-from fenicsmech.design.regularisers import MeshQuality, Regulariser, ShapeBounds, StayClose
+from fenicsmech.design import (
+    Infeasible,
+    LevenbergMarquardt,
+    MeshQuality,
+    Quadratic,
+    Regulariser,
+    ShapeBounds,
+    Start,
+    StayClose,
+    TooHigh,
+    target_scales,
+)
 
 from .mechanisms import Case, objective, strained, truss
 

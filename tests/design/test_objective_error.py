@@ -7,9 +7,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.design.equilibria import TargetEquilibria
-from fenicsmech.design.objective import target_errors
-from fenicsmech.design.objective_error import objective_error
+from fenicsmech.design import TargetEquilibria, objective_error, target_errors
 
 from ..simulation.five_problems import case
 from ..simulation.refined import cantilever, refine

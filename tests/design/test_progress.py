@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fenicsmech.design import progress
-from fenicsmech.design.optimisers import Evaluation, Iterate, LevenbergMarquardt, Quadratic, Reason
-from fenicsmech.design.progress import DesignProgress
+from fenicsmech.design import DesignProgress, Evaluation, Iterate, LevenbergMarquardt, Quadratic, Reason, progress
 
 ERRORS = np.array([0.02, -0.25])
 

@@ -6,7 +6,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from fenicsmech.compat import create_mesh, original_cells, vector_space
-from fenicsmech.design.quality import QualitySum
+from fenicsmech.design import QualitySum
 from fenicsmech.meshing import radius_ratios
 
 from ..elasticity.single_link import distorted, interpolate, nodes, wave

@@ -8,13 +8,19 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenicsmech.design.barrier import Barrier
-from fenicsmech.design.handle_optimum import ShapeError
-from fenicsmech.design.regularisers import MeshQuality, Model, Regulariser, ShapeBounds, StayClose
-from fenicsmech.design.rest_shape import DesignedLink
-from fenicsmech.design.spline import LinkSpline
-from fenicsmech.design.spline_design import Bounds
-from fenicsmech.design.spline_samples import SplineSamples
+from fenicsmech.design import (
+    Barrier,
+    Bounds,
+    DesignedLink,
+    LinkSpline,
+    MeshQuality,
+    Model,
+    Regulariser,
+    ShapeBounds,
+    ShapeError,
+    SplineSamples,
+    StayClose,
+)
 
 from ..oracles.dense import hessian, taylor_rates
 from .mechanisms import bench, pinned_links

@@ -5,8 +5,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.design.optimisers import Reason
-from fenicsmech.design.regularisers import ShapeBounds, StayClose
+from fenicsmech.design import Reason, ShapeBounds, StayClose
 
 from .mechanisms import Case, objective, truss
 

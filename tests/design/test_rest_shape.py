@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenicsmech.design.barrier import Barrier
+from fenicsmech.design import Barrier
 from fenicsmech.meshing import radius_ratios
-from fenicsmech.simulation.snapshot import rest_vertices
+from fenicsmech.simulation import rest_vertices
 
 from ..oracles.dense import taylor_rates
 from .mechanisms import bench, bow, pinned_links, strained, truss, turned_beam

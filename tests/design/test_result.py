@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.design.result import DesignResult, LinkDesign, TargetResult
+from fenicsmech.design import DesignResult, LinkDesign, TargetResult
 
 
 def link(name: str, thickness: tuple[float, float]) -> LinkDesign:

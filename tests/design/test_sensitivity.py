@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.design.sensitivity import Adjoint, Gradient
+from fenicsmech.design import Adjoint, Gradient
 from fenicsmech.equilibrium import State
 
 from ..oracles.dense import taylor_rates

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fenicsmech.design.handles import BETWEEN
+from fenicsmech.design import BETWEEN
 from fenicsmech.meshing import FREE
 
 from ..oracles.dense import taylor_rates

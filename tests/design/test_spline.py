@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fenicsmech.design.spline import LinkSpline
+from fenicsmech.design import LinkSpline
 
 from ..oracles.dense import jacobian
 

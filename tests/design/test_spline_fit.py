@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.design.spline_fit import fit_spline
+from fenicsmech.design import fit_spline
 from fenicsmech.meshing import Centreline
 
 from ..simulation.demo_scenes import describe

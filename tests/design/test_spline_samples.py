@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fenicsmech.design.spline import LinkSpline
-from fenicsmech.design.spline_samples import SplineSamples
+from fenicsmech.design import LinkSpline, SplineSamples
 
 from ..oracles.dense import jacobian, taylor_rates
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenicsmech.simulation.snapshot import rest_vertices
+from fenicsmech.simulation import rest_vertices
 
 from .test_sensitivity import Bench, assert_slopes
 

@@ -8,8 +8,16 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenicsmech.design.optimisers import Evaluation, Infeasible, LevenbergMarquardt, Quadratic, Reason, Start, TooHigh
-from fenicsmech.design.team import minimise_together
+from fenicsmech.design import (
+    Evaluation,
+    Infeasible,
+    LevenbergMarquardt,
+    Quadratic,
+    Reason,
+    Start,
+    TooHigh,
+    minimise_together,
+)
 
 pytestmark = pytest.mark.parallel
 

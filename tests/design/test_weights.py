@@ -6,10 +6,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix, diags
 
-from fenicsmech.design.handles import BETWEEN
-from fenicsmech.design.laplacian import lumped_mass, stiffness
-from fenicsmech.design.link_shape import shape_link
-from fenicsmech.design.partition import solve_partition
+from fenicsmech.design import BETWEEN, lumped_mass, shape_link, solve_partition, stiffness
 
 from .shapes import request, strip_mesh
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.design.sensitivity import Adjoint
+from fenicsmech.design import Adjoint
 from fenicsmech.mechanism import Force
 
 from ..design.in_plane import design_field

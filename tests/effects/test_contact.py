@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.design.sensitivity import Adjoint
+from fenicsmech.design import Adjoint
 from fenicsmech.effects import Contact, Cylinder, HalfPlane
 
 from ..design.in_plane import design_field

@@ -10,7 +10,7 @@ from dolfinx import fem
 import fenicsmech as fm
 from fenicsmech.compat import compile_form
 from fenicsmech.effects import Contact, Cylinder, HalfPlane
-from fenicsmech.linkage import build_linkage
+from fenicsmech.multibody import build_linkage
 
 from ..elasticity.single_link import interpolate, wave
 from ..oracles.dense import gradient, jacobian

@@ -9,8 +9,7 @@ from mpi4py import MPI
 
 import fenicsmech as fm
 from fenicsmech.compat import compile_form
-from fenicsmech.effects import Faces, find_boundaries
-from fenicsmech.effects.protocol import LinkFields
+from fenicsmech.effects import Faces, LinkFields, find_boundaries
 
 from ..design.refusal import refused
 

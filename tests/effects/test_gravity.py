@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.design.sensitivity import Adjoint
+from fenicsmech.design import Adjoint
 from fenicsmech.effects import Gravity, Mass
 from fenicsmech.errors import DescriptionError
 

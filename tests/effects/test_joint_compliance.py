@@ -9,10 +9,10 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.design.regularisers import StayClose
+from fenicsmech.design import StayClose
 from fenicsmech.effects import JointCompliance, JointSpring
 from fenicsmech.equilibrium import LoadControl
-from fenicsmech.linkage.coordinate import JointCoordinate
+from fenicsmech.multibody import JointCoordinate
 
 from ..design.mechanisms import objective, truss
 from .levers import ARM, PLASTIC, TILTED, UPRIGHT, lever

@@ -9,14 +9,13 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.design.regularisers import StayClose
+from fenicsmech.design import StayClose
 from fenicsmech.effects import Gravity, JointSpring, Mass
-from fenicsmech.linkage import build_linkage
-from fenicsmech.linkage.coordinate import JointCoordinate
+from fenicsmech.multibody import JointCoordinate, build_linkage
 
 from ..design.mechanisms import objective, truss
-from ..kinematics.poses import pose, random_pose, turn
-from ..kinematics.taylor import assert_derivative
+from ..joints.poses import pose, random_pose, turn
+from ..joints.taylor import assert_derivative
 from ..oracles import dense
 from .levers import ARM, PLASTIC, TILTED, UPRIGHT, lever, sled
 

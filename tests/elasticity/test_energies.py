@@ -5,9 +5,7 @@ import pytest
 import ufl
 from numpy import log
 
-from fenicsmech.elasticity import PLANE_STRAIN, PLANE_STRESS, SPATIAL, Moduli, density
-from fenicsmech.elasticity.strain import spatial_strain
-from fenicsmech.elasticity.stress import cauchy_stress
+from fenicsmech.elasticity import PLANE_STRAIN, PLANE_STRESS, SPATIAL, Moduli, cauchy_stress, density, spatial_strain
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import (
     EnergyLaw,

@@ -8,8 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fenicsmech.elasticity import PLANE_STRAIN
-from fenicsmech.elasticity.formulation import LOCKING
+from fenicsmech.elasticity import LOCKING, PLANE_STRAIN
 from fenicsmech.mechanism import NeoHookean
 
 from .cook import EDGE, LENGTH, MIDDLE, SHEAR_MODULUS, panel

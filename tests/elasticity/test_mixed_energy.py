@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 import ufl
 
-from fenicsmech.elasticity import PLANE_STRAIN, SPATIAL, Moduli
-from fenicsmech.elasticity.mixed import dilatation, mixed_density, volumetric_modulus
+from fenicsmech.elasticity import PLANE_STRAIN, SPATIAL, Moduli, dilatation, mixed_density, volumetric_modulus
 from fenicsmech.mechanism import (
     EnergyLaw,
     IsochoricNeoHookean,

@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fenicsmech.equilibrium.entry_copy import EntryCopy
+from fenicsmech.equilibrium import EntryCopy
 
 BLOCKS = 12
 

@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fenicsmech.equilibrium.factor import Factor
+from fenicsmech.equilibrium import Factor
 
 SIZE = 60
 

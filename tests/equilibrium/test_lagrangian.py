@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenicsmech.equilibrium import Control, DisplacementControl, EquilibriumSystem, LoadControl, State
-from fenicsmech.equilibrium.extras import REGULARISATION
+from fenicsmech.equilibrium import REGULARISATION, Control, DisplacementControl, EquilibriumSystem, LoadControl, State
 
 from ..oracles import dense
 from .crowded import SIZE, control_of, crowded, random_state, system_of

@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.equilibrium import Hermite, NotConverged, Path, PathFailed, Solution, State
-from fenicsmech.equilibrium.control import LoadControl
-from fenicsmech.equilibrium.state import Step
+from fenicsmech.equilibrium import Hermite, LoadControl, NotConverged, Path, PathFailed, Solution, State, Step
 
 from . import toggle
 from .finger import finger

@@ -5,8 +5,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.equilibrium import DisplacementControl
-from fenicsmech.equilibrium.extras import REGULARISATION
+from fenicsmech.equilibrium import REGULARISATION, DisplacementControl
 
 from .crowded import control_of, crowded, random_state, system_of
 from .test_lagrangian import shifted

@@ -11,15 +11,15 @@ from fenicsmech.equilibrium import (
     BySize,
     Direct,
     DisplacementControl,
+    Factor,
+    KktMatrix,
     KktNewton,
     LoadControl,
     PrimalDualNewton,
     Snes,
     TwoLevel,
+    TwoLevelSolver,
 )
-from fenicsmech.equilibrium.factor import Factor
-from fenicsmech.equilibrium.kkt import KktMatrix
-from fenicsmech.equilibrium.two_level import TwoLevelSolver
 
 from .finger import RUBBER, finger
 

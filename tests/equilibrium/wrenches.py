@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import fenicsmech as fm
-from fenicsmech.mechanism import Link
-from fenicsmech.mechanism.places import in_dimension
+from fenicsmech.mechanism import Link, in_dimension
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,12 @@ from mpi4py import MPI
 from scipy.optimize import brentq
 
 import fenicsmech as fm
-from fenicsmech.linkage import assemble, count_freedom
 from fenicsmech.mechanism import Link
+from fenicsmech.multibody import assemble, count_freedom
 
-from ..linkage.machine import point_of
-from ..linkage.spatial_machines import Bennett
-from ..linkage.test_closing_loops import LAST, START, STOPPED
+from ..multibody.machine import point_of
+from ..multibody.spatial_machines import Bennett
+from ..multibody.test_closing_loops import LAST, START, STOPPED
 from .case import PLANE, SPACE, Check, Deviation, Fact, HardCase, deviation, travel
 
 SOFT = fm.Material("soft plastic", 200.0, 0.3)

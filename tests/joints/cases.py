@@ -12,16 +12,17 @@ from fenicsmech.joints import (
     PLANAR_JOINT,
     PRISMATIC,
     REVOLUTE,
+    RIGID_SPACES,
     SPHERICAL,
     UNIVERSAL,
     WELD,
     Constraint,
     JointKind,
+    RigidSpace,
     constraint,
 )
-from fenicsmech.kinematics import RIGID_SPACES, RigidSpace
 
-from ..kinematics.poses import matrix, pose, random_rotation, turn
+from .poses import matrix, pose, random_rotation, turn
 
 # Motions of b relative to a: "t1" slides along the joint's first unit vector, "r3" turns about its third. In the
 # plane the vectors are axis, normal; "r3" turns in it.

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from ..kinematics.poses import random_pose
-from ..kinematics.taylor import assert_derivative
 from .cases import CASES, DRIVEN, compiled, draw
+from .poses import random_pose
+from .taylor import assert_derivative
 
 EVERY_JOINT = pytest.mark.parametrize(
     ("case", "driven"),

@@ -5,8 +5,8 @@ import pytest
 
 from fenicsmech.joints import UNIVERSAL
 
-from ..kinematics.poses import random_pose
 from .cases import CASES, DRIVEN, MOTIONS, compiled, draw
+from .poses import random_pose
 
 EVERY_JOINT = pytest.mark.parametrize("case", CASES, ids=str)
 EVERY_MOTOR = pytest.mark.parametrize("case", DRIVEN, ids=str)

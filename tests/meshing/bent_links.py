@@ -8,7 +8,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicSpline
 
-from fenicsmech.mechanism.shapes import Disc, strip
+from fenicsmech.mechanism import Disc, strip
 from fenicsmech.meshing import InterfaceSite, LinkMesh, mesh_link
 
 LENGTH, THICKNESS, DEPTH, RADIUS, ANGLE = 40.0, 3.0, 5.0, 2.5, 1.1

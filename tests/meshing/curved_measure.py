@@ -8,10 +8,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from fenicsmech.compat import compile_form
-from fenicsmech.meshing import LinkMesh
-from fenicsmech.meshing.bulge import bulge_field
-from fenicsmech.meshing.curved_edges import CurvedEdges
-from fenicsmech.meshing.distribute import distribute
+from fenicsmech.meshing import CurvedEdges, LinkMesh, bulge_field, distribute
 
 
 def measure(mesh: LinkMesh, comm: MPI.Comm = MPI.COMM_SELF) -> float:

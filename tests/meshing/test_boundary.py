@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fenicsmech.errors import MeshingError
-from fenicsmech.mechanism.shapes import step
+from fenicsmech.mechanism import step
 from fenicsmech.meshing import LinkMesh, boundary_loops, cell_measures, mesh_link
 
 from .bent_links import link

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenicsmech.mechanism.shapes import Arc, Disc, Line, outline, strip
-from fenicsmech.meshing import InterfaceSite, LinkMesh, cell_measures, mesh_link
-from fenicsmech.meshing.curved_edges import CurvedEdges
-from fenicsmech.meshing.extrude import extrude, extrude_half
+from fenicsmech.mechanism import Arc, Disc, Line, outline, strip
+from fenicsmech.meshing import CurvedEdges, InterfaceSite, LinkMesh, cell_measures, extrude, extrude_half, mesh_link
 
 from ..report.grids import box, rectangle
 from .curved_measure import least_jacobian, measure

@@ -5,9 +5,8 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from fenicsmech.mechanism.shapes import Disc, strip
-from fenicsmech.meshing import InterfaceSite, cell_measures, mesh_link
-from fenicsmech.meshing.extrude import extrude, extrude_half, layer_count
+from fenicsmech.mechanism import Disc, strip
+from fenicsmech.meshing import InterfaceSite, cell_measures, extrude, extrude_half, layer_count, mesh_link
 
 BOW = strip([(0.0, 0.0), (10.0, 4.0), (22.0, 3.0)], thickness=2.0, depth=7.0)
 SITES = [InterfaceSite((0.0, 0.0), Disc(2.0), name="pin")]

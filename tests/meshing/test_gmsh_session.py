@@ -8,9 +8,8 @@ import sys
 import pytest
 
 from fenicsmech.errors import MeshingError
-from fenicsmech.mechanism.shapes import strip
-from fenicsmech.meshing import mesh_link
-from fenicsmech.meshing.gmsh_session import gmsh, gmsh_session
+from fenicsmech.mechanism import strip
+from fenicsmech.meshing import gmsh, gmsh_session, mesh_link
 
 
 def assert_gmsh_works():

@@ -7,10 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fenicsmech.mechanism.shapes import Disc, polygon, step, strip
-from fenicsmech.meshing import InterfaceSite, cell_measures, mesh_link
-from fenicsmech.meshing.interface_site import across
-from fenicsmech.meshing.sizing import circle_segments
+from fenicsmech.mechanism import Disc, polygon, step, strip
+from fenicsmech.meshing import InterfaceSite, across, cell_measures, circle_segments, mesh_link
 
 MESHES = Path(__file__).parents[2] / "meshes"
 BOW = strip([(0.0, 0.0), (18.0, 34.0), (40.0, 60.0)], thickness=3.0, depth=8.0)

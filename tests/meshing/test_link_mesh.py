@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from fenicsmech.meshing import LinkMesh, cell_measures, radius_ratios
-from fenicsmech.meshing.mesh_checks import count_pieces
+from fenicsmech.meshing import LinkMesh, cell_measures, count_pieces, radius_ratios
 
 TRIANGLE = np.array([(0.0, 0.0), (1.0, 0.0), (0.5, np.sqrt(0.75))])
 TETRAHEDRON = np.array([(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)])

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fenicsmech.mechanism.shapes import Disc, gmsh_mesh, strip
+from fenicsmech.mechanism import Disc, gmsh_mesh, strip
 from fenicsmech.meshing import InterfaceSite, LinkMesh, cell_measures, mesh_link
 
 MESHES = Path(__file__).parents[2] / "meshes"

@@ -5,9 +5,8 @@ from pathlib import Path
 import pytest
 
 from fenicsmech.errors import DescriptionError, MeshingError
-from fenicsmech.mechanism.shapes import Arc, Disc, Line, Rectangle, gmsh_mesh, outline, polygon, step, strip
-from fenicsmech.meshing import InterfaceSite, check_link, mesh_link
-from fenicsmech.meshing.gmsh_session import gmsh, gmsh_session
+from fenicsmech.mechanism import Arc, Disc, Line, Rectangle, gmsh_mesh, outline, polygon, step, strip
+from fenicsmech.meshing import InterfaceSite, check_link, gmsh, gmsh_session, mesh_link
 
 MESHES = Path(__file__).parents[2] / "meshes"
 BAR = strip([(0, 0), (60, 0)], thickness=3, depth=10)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from fenicsmech.mechanism.shapes import Arc, Line, outline, polygon
+from fenicsmech.mechanism import Arc, Line, outline, polygon
 from fenicsmech.meshing import cell_measures, mesh_link
 
 

@@ -5,11 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from fenicsmech.meshing import boundary_loops
-from fenicsmech.meshing.corners import corners_of
-from fenicsmech.meshing.outline_curves import CircleArc, sampled, start_of
-from fenicsmech.meshing.planform import distance
-from fenicsmech.meshing.smooth_outline import smooth_outline
+from fenicsmech.meshing import CircleArc, boundary_loops, corners_of, distance, sampled, smooth_outline, start_of
 
 from .bent_links import CURVED, STRAIGHT, THICKNESS, bent, link
 

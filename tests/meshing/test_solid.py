@@ -8,9 +8,17 @@ import numpy as np
 import pytest
 
 from fenicsmech.errors import DescriptionError, MeshingError
-from fenicsmech.mechanism.shapes import step
-from fenicsmech.meshing import PinHole, boundary_loops, cell_measures, mesh_link, write_step, write_stl
-from fenicsmech.meshing.gmsh_session import gmsh, gmsh_session
+from fenicsmech.mechanism import step
+from fenicsmech.meshing import (
+    PinHole,
+    boundary_loops,
+    cell_measures,
+    gmsh,
+    gmsh_session,
+    mesh_link,
+    write_step,
+    write_stl,
+)
 
 from .bent_links import CURVED, DEPTH, LENGTH, RADIUS, STRAIGHT, bent, bent_point, link
 

@@ -8,9 +8,8 @@ import pytest
 from scipy.integrate import quad
 
 from fenicsmech.errors import DescriptionError
-from fenicsmech.mechanism.shapes import Disc, step
-from fenicsmech.meshing import InterfaceSite, cell_measures, mesh_link, radius_ratios
-from fenicsmech.meshing.gmsh_session import gmsh, gmsh_session
+from fenicsmech.mechanism import Disc, step
+from fenicsmech.meshing import InterfaceSite, cell_measures, gmsh, gmsh_session, mesh_link, radius_ratios
 
 PART = Path(__file__).parents[2] / "meshes" / "curved_link.step"
 SITES = [InterfaceSite(at, Disc(3.0), name=f"pin at {at}") for at in ((0.0, 0.0), (60.0, 0.0))]

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from fenicsmech.mechanism.shapes import Disc, Rectangle, strip
+from fenicsmech.mechanism import Disc, Rectangle, strip
 from fenicsmech.meshing import FREE, Centreline, InterfaceSite, cell_measures, mesh_link, radius_ratios
 
 STRAIGHT = [(0.0, 0.0), (40.0, 0.0)]

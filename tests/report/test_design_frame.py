@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from fenicsmech.report.design_frame import IN_PLACE, lay_out_designs
+from fenicsmech.report import IN_PLACE, lay_out_designs
 
 from .strips import design, four_bar
 

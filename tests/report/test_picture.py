@@ -18,10 +18,10 @@ from fenicsmech.report import (
     Trace,
     draw_configurations,
     draw_mechanism,
+    lay_out,
     plan_view,
     rigid_outline,
 )
-from fenicsmech.report.frame import lay_out
 
 from .grids import box, rectangle
 from .png import png_size, share_of_colour

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 from fenicsmech.errors import DescriptionError
-from fenicsmech.report import plan_view
-from fenicsmech.report.plan import rim
+from fenicsmech.report import plan_view, rim
 
 from .grids import box, rectangle
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import fenicsmech as fm
-from fenicsmech.meshing import LinkMesh
-from fenicsmech.meshing.curved_edges import CurvedEdges
+from fenicsmech.meshing import CurvedEdges, LinkMesh
 from fenicsmech.simulation import link_meshes
 
 

@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 
 import fenicsmech as fm
 from fenicsmech.mechanism import Force, Output
-from fenicsmech.meshing.distribute import MechanismMesh
-from fenicsmech.simulation.model import MechanismModel
+from fenicsmech.meshing import MechanismMesh
+from fenicsmech.simulation import MechanismModel
 
 INNER, OUTER, DEPTH = 12.0, 16.0, 6.0
 MIDDLE = 0.5 * (INNER + OUTER)

@@ -8,7 +8,7 @@ import pytest
 import fenicsmech as fm
 from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRESS, SPATIAL, Mixed
 from fenicsmech.report import read_curve_csv
-from fenicsmech.simulation.dial import Dial, Outcome, Rung, Trial, corrections, family
+from fenicsmech.simulation import Dial, Outcome, Rung, Trial, corrections, family
 
 from .demo_scenes import describe
 from .refined import arch, cantilever

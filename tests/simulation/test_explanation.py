@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.simulation.explanation import PLASTIC_WEIGHT, weight_influence
+from fenicsmech.simulation import PLASTIC_WEIGHT, weight_influence
 
 from .demo_scenes import describe
 

@@ -7,8 +7,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.meshing import PinHole, write_step
-from fenicsmech.meshing.gmsh_session import gmsh, gmsh_session
+from fenicsmech.meshing import PinHole, gmsh, gmsh_session, write_step
 
 from ..meshing.bent_links import CURVED, DEPTH, LENGTH, RADIUS, STRAIGHT, THICKNESS, bent, bent_point, link
 

@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 import fenicsmech as fm
 from fenicsmech.report import Trace, read_curve_csv
-from fenicsmech.simulation.snapshot import gather
+from fenicsmech.simulation import gather
 
 from ..report.png import png_size, share_of_colour
 from .demo_scenes import describe

@@ -9,8 +9,7 @@ from mpi4py import MPI
 
 import fenicsmech as fm
 from fenicsmech.compat import compile_form
-from fenicsmech.simulation.pressure_error import PressureError
-from fenicsmech.simulation.recovery import Recovery
+from fenicsmech.simulation import PressureError, Recovery
 
 from .refined import refine
 

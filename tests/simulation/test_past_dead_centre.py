@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.linkage import assemble, assemble_before_strain
+from fenicsmech.multibody import assemble, assemble_before_strain
 
 
 def test_a_rocker_is_pulled_beyond_the_reach_of_its_coupler():

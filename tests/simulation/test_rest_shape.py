@@ -7,8 +7,8 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.linkage import assemble
-from fenicsmech.simulation.snapshot import gather, rest_vertices
+from fenicsmech.multibody import assemble
+from fenicsmech.simulation import gather, rest_vertices
 
 PLASTIC = fm.Material("plastic", 2000.0, 0.35)
 

@@ -11,7 +11,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.linkage import assemble
+from fenicsmech.multibody import assemble
 
 B, C, D = (38.6, 97.8), (56.8, 95.1), (112.0, -24.6)
 E, F, G = (106.8, 101.0), (213.4, 60.8), (179.7, -73.1)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenicsmech.checks import positive
 from fenicsmech.design.optimisers.problem import (
     Evaluation,
     Infeasible,
@@ -22,7 +23,6 @@ from fenicsmech.design.optimisers.problem import (
     Reason,
     Start,
 )
-from fenicsmech.mechanism.checks import positive
 
 _ARMIJO = 1e-4
 _HALVINGS = 30

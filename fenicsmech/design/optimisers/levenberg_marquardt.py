@@ -17,6 +17,7 @@ from functools import partial
 
 import numpy as np
 
+from fenicsmech.checks import positive
 from fenicsmech.design.optimisers.problem import (
     Evaluation,
     Infeasible,
@@ -28,7 +29,6 @@ from fenicsmech.design.optimisers.problem import (
     TooHigh,
 )
 from fenicsmech.design.optimisers.resolution import Resolution
-from fenicsmech.mechanism.checks import positive
 
 _POOR, _GOOD = 0.1, 0.75  # actual over promised reduction: below, the step is refused; above, damping falls
 _REFUSALS = 20

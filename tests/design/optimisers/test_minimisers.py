@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from fenicsmech.design.barrier import Barrier
-from fenicsmech.design.optimisers import (
+from fenicsmech.design import (
+    Barrier,
     Bfgs,
     Evaluation,
     Infeasible,

@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from fenicsmech.design.optimisers import Evaluation, Iterate, LevenbergMarquardt, Quadratic, Reason, Start, TooHigh
-from fenicsmech.design.optimisers.resolution import Resolution
+from fenicsmech.design import Evaluation, Iterate, LevenbergMarquardt, Quadratic, Reason, Resolution, Start, TooHigh
 
 EXACT = LevenbergMarquardt(iterations=500, tolerance=1e-12)
 ERRORS = [1e-2, 3e-2, 1e-1]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import sympy
 
-from fenicsmech.kinematics import PLANAR, RIGID_SPACES, SPATIAL
+from fenicsmech.joints import PLANAR, RIGID_SPACES, SPATIAL
 
 from .poses import SPACES, matrix, pose, random_pose, rotation_of, turn
 from .taylor import assert_derivative

@@ -10,8 +10,8 @@ import numpy as np
 from dolfinx import fem
 
 from fenicsmech.compat import add_ghosts
-from fenicsmech.kinematics import RigidSpace
-from fenicsmech.meshing.mid_plane import on_mid_plane
+from fenicsmech.joints import RigidSpace
+from fenicsmech.meshing import on_mid_plane
 
 
 class InterfaceMap:

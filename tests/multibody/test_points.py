@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenicsmech.bodies import body_point, link_point
 from fenicsmech.errors import DescriptionError
-from fenicsmech.kinematics import PLANAR, SPATIAL
+from fenicsmech.joints import PLANAR, SPATIAL
+from fenicsmech.multibody import body_point, link_point
 
 from ..oracles.dense import jacobian
 from .shared_mesh import shared_mesh

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fenicsmech.linkage import assemble
 from fenicsmech.mechanism import DRAWN
+from fenicsmech.multibody import assemble
 
 from ..oracles.fourbar import RIGHT, FourBar
 from .planar_machines import CRANK_ROCKER, DRAWN_ANGLE, four_bar, slider_crank, slider_position

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import sympy
 
-from fenicsmech.kinematics.space import RigidSpace
+from fenicsmech.joints.space import RigidSpace
 
 _QUARTER_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 

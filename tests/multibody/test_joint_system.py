@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from fenicsmech.joints import CYLINDRICAL, PLANAR_JOINT, PRISMATIC, REVOLUTE, SPHERICAL, UNIVERSAL, WELD
-from fenicsmech.linkage import JointSystem, build_linkage
 from fenicsmech.mechanism import Mechanism
+from fenicsmech.multibody import JointSystem, build_linkage
 
-from ..kinematics.poses import random_pose
+from ..joints.poses import random_pose
 from ..oracles import dense
 
 EVERY_DIMENSION = pytest.mark.parametrize("dim", [2, 3])

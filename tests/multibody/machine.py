@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fenicsmech.linkage import Assembly, Freedom, Linkage, assemble, build_linkage, count_freedom
 from fenicsmech.mechanism import Configuration, Link, Mechanism, Motor, validate
+from fenicsmech.multibody import Assembly, Freedom, Linkage, assemble, build_linkage, count_freedom
 
 
 @dataclass

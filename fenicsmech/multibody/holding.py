@@ -13,7 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
-from fenicsmech.linkage.system import JointSystem
+from fenicsmech.multibody.system import JointSystem
 
 RANK = 1e-9
 """Singular values of A below this are zero: rows and unknowns are scaled to one."""

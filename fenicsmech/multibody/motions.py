@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenicsmech.linkage.build import Linkage
-from fenicsmech.linkage.holding import RANK
+from fenicsmech.multibody.build import Linkage
+from fenicsmech.multibody.holding import RANK
 
 
 @dataclass(frozen=True)

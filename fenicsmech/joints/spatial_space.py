@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import sympy
 
-from fenicsmech.kinematics.space import RigidSpace
+from fenicsmech.joints.planar_space import PLANAR
+from fenicsmech.joints.space import RigidSpace
 
 
 def _cross_matrices() -> np.ndarray:
@@ -86,3 +87,6 @@ class Spatial(RigidSpace):
 
 
 SPATIAL = Spatial()
+
+
+RIGID_SPACES = {2: PLANAR, 3: SPATIAL}

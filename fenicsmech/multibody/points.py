@@ -14,7 +14,7 @@ import numpy as np
 from dolfinx import fem
 
 from fenicsmech.errors import DescriptionError
-from fenicsmech.kinematics import RigidSpace
+from fenicsmech.joints import RigidSpace
 
 _CORRECTIONS = 60  # of a point's place in curved cells; each halves its error at least
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fenicsmech.joints import PRISMATIC, REVOLUTE
-from fenicsmech.linkage import build_linkage
 from fenicsmech.mechanism import ONYX, Disc, Mechanism, Rectangle
+from fenicsmech.multibody import build_linkage
 
 from .flexible_machines import bent_strip, finger, flexible_four_bar, links_by_name
 from .planar_machines import klann

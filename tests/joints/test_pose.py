@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fenicsmech.kinematics import PLANAR, SPATIAL
+from fenicsmech.joints import PLANAR, SPATIAL
 
 from .poses import SPACES, matrix, pose, random_pose, random_rotation, rotation_of, turn
 from .taylor import STEPS, assert_derivative

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenicsmech.linkage.holding import RANK, FreeMotions, Holding, free_motions
-from fenicsmech.linkage.system import JointSystem
+from fenicsmech.multibody.holding import RANK, FreeMotions, Holding, free_motions
+from fenicsmech.multibody.system import JointSystem
 
 _CURVED = 1e-12  # of the curvature along the stiffest free motion: what is less counts as none
 _PART = 1e-6  # share in a null vector from which a part is named

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fenicsmech.kinematics import PLANAR, SPATIAL, RigidSpace
+from fenicsmech.joints import PLANAR, SPATIAL, RigidSpace
 
 SPACES = (PLANAR, SPATIAL)
 

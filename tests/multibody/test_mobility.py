@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fenicsmech.linkage import count_freedom
 from fenicsmech.mechanism import Mechanism
+from fenicsmech.multibody import count_freedom
 
 from .flexible_machines import finger, flexible_four_bar
 from .machine import Machine, freedom_as_drawn

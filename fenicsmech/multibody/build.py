@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenicsmech.joints import WELD
-from fenicsmech.linkage.bodies import Body, rigid_body
-from fenicsmech.linkage.system import Connection, JointSystem
-from fenicsmech.mechanism import FlexibleLink, Joint, Link, Mechanism
-from fenicsmech.mechanism.places import in_dimension, mechanism_length, same_place
+from fenicsmech.mechanism import FlexibleLink, Joint, Link, Mechanism, in_dimension, mechanism_length, same_place
+from fenicsmech.multibody.body import Body, rigid_body
+from fenicsmech.multibody.system import Connection, JointSystem
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.linkage import assemble, build_linkage, stiff_motions
+from fenicsmech.multibody import assemble, build_linkage, stiff_motions
 
 
 def slider_crank() -> tuple[fm.Mechanism, object]:

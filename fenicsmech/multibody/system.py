@@ -11,10 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenicsmech.joints import JointKind, constraint
-from fenicsmech.kinematics import RIGID_SPACES
-from fenicsmech.linkage.bodies import Body
+from fenicsmech.joints import RIGID_SPACES, JointKind, constraint
 from fenicsmech.mechanism import Motor
+from fenicsmech.multibody.body import Body
 
 _ROUNDING = 4.0 * np.finfo(float).eps
 

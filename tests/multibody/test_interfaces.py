@@ -5,8 +5,8 @@ import pytest
 from mpi4py import MPI
 from scipy.spatial.transform import Rotation
 
-from fenicsmech.bodies import InterfaceMap
-from fenicsmech.kinematics import PLANAR, SPATIAL
+from fenicsmech.joints import PLANAR, SPATIAL
+from fenicsmech.multibody import InterfaceMap
 
 from ..oracles.dense import jacobian
 from .shared_mesh import barycentric, shared_mesh

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fenicsmech.effects import JointSpring, holding
-from fenicsmech.linkage import assemble, build_linkage, count_freedom
 from fenicsmech.mechanism import Joint, Mechanism, Scene
+from fenicsmech.multibody import assemble, build_linkage, count_freedom
 
 FIRST, SECOND, LENGTH, DRIVEN = 0.3, 0.02, 30.0, 0.7
 

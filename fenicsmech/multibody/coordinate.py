@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenicsmech.joints.coordinate import free_coordinate
-from fenicsmech.linkage.build import Linkage
+from fenicsmech.joints import free_coordinate
 from fenicsmech.mechanism import Joint
+from fenicsmech.multibody.build import Linkage
 
 
 class JointCoordinate:

@@ -17,10 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenicsmech.errors import AssemblyError
-from fenicsmech.linkage.build import Linkage
-from fenicsmech.linkage.holding import Holding, free_motions
-from fenicsmech.linkage.system import JointSystem
 from fenicsmech.mechanism import Configuration
+from fenicsmech.multibody.build import Linkage
+from fenicsmech.multibody.holding import Holding, free_motions
+from fenicsmech.multibody.system import JointSystem
 
 _CLOSED = 1e-13  # scaled constraint residual of a closed assembly
 _LARGEST_STEP = 0.1  # rad, or mechanism lengths, of motor motion at once
