@@ -24,7 +24,7 @@ def idle_imbalance(model: MechanismModel, system: EquilibriumSystem, state: Stat
 
     Args:
         model: the discretised mechanism.
-        system: its equations; the last ``balance`` was that of ``state``, which is loaded.
+        system: its equations; the last ``residual`` was that of ``state``, which is loaded.
         state: an equilibrium.
         loads: magnitudes of all forces.
 

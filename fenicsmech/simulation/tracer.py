@@ -116,7 +116,7 @@ class Tracer:
     def _unbalanced(self, solution: Solution, control: Control) -> float:
         """Share of the loads that idle freedoms do not balance in a state that is loaded (collective)."""
         state, share = solution.state, solution.state.share
-        self._system.balance(state, control)
+        self._system.residual(state, control)
         loads = [state.force, *(share * magnitude for _, magnitude in self._request.others)]
         return idle_imbalance(self._model, self._system, state, loads)
 
