@@ -18,10 +18,12 @@
 - ``arc_metric``, ``path_points``: the equilibria of such a path
 - ``arc_length``, ``continuation``: steps along it, and where it ends
 - ``critical``, ``soft_mode``, ``branching``: their limit points and bifurcations, and the paths that cross there
+- ``adjoint``: of displacements and forces
 - ``eigen``: the softest modes of a tangent, and buckling loads
 - ``reactions``: what joints and motors exert
 """
 
+from fenicsmech.equilibrium.adjoint import Adjoint, Quantity
 from fenicsmech.equilibrium.arc_length import ArcLength, ArcSteps
 from fenicsmech.equilibrium.arc_metric import ArcMetric, metric_at
 from fenicsmech.equilibrium.branching import Sense, crossing, null_space
@@ -50,6 +52,7 @@ from fenicsmech.equilibrium.system import EquilibriumSystem
 from fenicsmech.equilibrium.two_level import TwoLevelSolver
 
 __all__ = [
+    "Adjoint",
     "ArcLength",
     "ArcMetric",
     "ArcSteps",
@@ -91,6 +94,7 @@ __all__ = [
     "PointLoad",
     "Predictor",
     "PrimalDualNewton",
+    "Quantity",
     "REGULARISATION",
     "Reaction",
     "Sense",
