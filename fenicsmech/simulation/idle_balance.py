@@ -13,8 +13,8 @@ import numpy as np
 from mpi4py import MPI
 
 from fenicsmech.equilibrium import Residual, State
+from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import Motion, stiff_motions
-from fenicsmech.simulation.model import MechanismModel
 
 _ROUNDED = 1e-12  # of the work of each reaction: what is left of their sum, which vanishes
 

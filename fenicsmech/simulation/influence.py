@@ -19,10 +19,10 @@ from fenicsmech.equilibrium import (
     State,
 )
 from fenicsmech.errors import EquilibriumError
+from fenicsmech.model import MechanismModel
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.goal import Goal
-from fenicsmech.simulation.model import MechanismModel
 
 
 @dataclass(frozen=True, eq=False)

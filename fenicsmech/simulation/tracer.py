@@ -25,11 +25,11 @@ from fenicsmech.equilibrium import (
     motor_torques,
 )
 from fenicsmech.errors import EquilibriumError
+from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import Assembly, BodyPoint, Freedom, free_motions, is_held
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.idle_balance import idle_imbalance
 from fenicsmech.simulation.leading import leading
-from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.request import CurveRequest
 
 _UNBALANCED = 1e-4  # of the loads: what may be left along idle freedoms
