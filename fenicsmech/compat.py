@@ -71,8 +71,9 @@ def original_nodes(mesh: dmesh.Mesh) -> np.ndarray:
 
 def cell_nodes(mesh: dmesh.Mesh) -> np.ndarray:
     """Local geometry nodes of every cell on this rank, (cells, vertices)."""
-    dofmap = mesh.geometry.dofmap
-    return dofmap.array.reshape(-1, mesh.topology.dim + 1) if _LEGACY else np.asarray(dofmap)
+    if _LEGACY:
+        return mesh.geometry.dofmap.array.reshape(-1, mesh.topology.dim + 1)
+    return np.asarray(mesh.geometry.dofmap if _VERSION < (0, 10) else mesh.geometry.dofmaps[0])
 
 
 def cell_dofs(space: fem.FunctionSpace) -> np.ndarray:
