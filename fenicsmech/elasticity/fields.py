@@ -160,6 +160,4 @@ class BodyFields:
     def _carrying(self) -> fem.Expression:
         """H δ at the nodes of u."""
         V = self.u.function_space
-        return compile_expression(
-            ufl.dot(self.gradient(self.u), self._change), interpolation_points(V), self.mesh.comm
-        )
+        return compile_expression(ufl.dot(self.gradient(self.u), self._change), interpolation_points(V), self.mesh.comm)
