@@ -10,11 +10,12 @@ import numpy as np
 from fenicsmech.collective import on_one
 from fenicsmech.design.link_shape import gather_links
 from fenicsmech.design.rest_shape import DesignedLink
+from fenicsmech.export import PinHole, write_step, write_stl
 from fenicsmech.mechanism import DRAWN, Disc, FlexibleLink
-from fenicsmech.meshing import LinkMesh, PinHole, boundary_loops, plan_of, write_step, write_stl
+from fenicsmech.meshing import LinkMesh, boundary_loops, plan_of
 from fenicsmech.multibody import Linkage, assemble
 from fenicsmech.report import DesignShape, LinkOutline, draw_designs
-from fenicsmech.simulation import Draughtsman, Simulation, rest_vertices
+from fenicsmech.simulation import MechanismPlotter, Simulation, rest_vertices
 
 
 def rest_meshes(simulation: Simulation, links: Sequence[FlexibleLink]) -> list[LinkMesh] | None:
@@ -49,7 +50,7 @@ def draw_links(
 ) -> None:
     """Draws links before and after a change (call it on the first process)."""
     scene, linkage = simulation.scene, simulation.linkage
-    pen = Draughtsman(scene.mechanism, linkage, simulation.model.mesh)
+    pen = MechanismPlotter(scene.mechanism, linkage, simulation.model.mesh)
     shapes = [
         DesignShape(link.name, old, new, np.array(_joints(linkage, link)))
         for link, old, new in zip(links, before, after, strict=True)

@@ -20,7 +20,7 @@ from fenicsmech.design.shape_map import ShapeMap
 from fenicsmech.design.spline import LinkSpline
 from fenicsmech.design.spline_design import Bounds
 from fenicsmech.design.spline_samples import SplineSamples
-from fenicsmech.simulation import MechanismModel
+from fenicsmech.model import MechanismModel
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,8 +4,8 @@ The equilibrium y solves F(y, p) = Gᵀ ∇L = 0. With its symmetric KKT matrix 
 
     KKT x = ∂Q/∂y,     dQ/dp = −xᵀ ∂F/∂p
 
-for any parameter p. Q is the travel a · u_P of a material point, or the controlled force f, which is one of the unknowns
-y; what is prescribed stays as it is.
+for any parameter p. Q is the travel a · u_P of a material point, or the controlled force f, which is one of the
+unknowns y; what is prescribed stays as it is.
 """
 
 from __future__ import annotations
@@ -17,8 +17,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from fenicsmech.equilibrium.load import PointLoad
-from fenicsmech.equilibrium.solver import Iteration
-from fenicsmech.equilibrium.state import State
+from fenicsmech.equilibrium.solver import Linearisation
 
 
 class Quantity(Enum):
@@ -44,19 +43,18 @@ class Adjoint:
     poses: np.ndarray
 
     @staticmethod
-    def of_travel(newton: Iteration, state: State, load: PointLoad) -> Adjoint:
-        """Of the travel of a load's point at ``state``, whose KKT matrix ``newton`` has factored last."""
-        return Adjoint._solve(newton, newton.system.travel_gradient(load, state))
+    def of_travel(at: Linearisation, load: PointLoad) -> Adjoint:
+        """Of the travel of a load's point."""
+        return Adjoint._of(at, at.solve(at.travel_gradient(load)))
 
     @staticmethod
-    def of_force(newton: Iteration) -> Adjoint:
-        """Of the controlled force under displacement control, whose KKT matrix ``newton`` has factored last."""
+    def of_force(at: Linearisation) -> Adjoint:
+        """Of the controlled force under displacement control."""
         # ∂f/∂y is the right-hand side of the rate with the prescribed displacement, but for its sign
-        right = newton.system.target_rate()
-        right.scale(-1.0)
-        return Adjoint._solve(newton, right)
+        x = at.rate()
+        x.scale(-1.0)
+        return Adjoint._of(at, x)
 
     @staticmethod
-    def _solve(newton: Iteration, right: PETSc.Vec) -> Adjoint:
-        x, unknowns = newton.solve_linear(right), newton.system.unknowns
-        return Adjoint(x, unknowns.apply(x), unknowns.step(x).z)
+    def _of(at: Linearisation, x: PETSc.Vec) -> Adjoint:
+        return Adjoint(x, at.displacements(x), at.step(x).z)

@@ -2,8 +2,8 @@
 
 Fidelity levels are climbed from a coarse pilot. Errors of elements and of plane stress are estimated after each
 (``element_error``, ``plane_stress_error``), and the next level is the first that these let expect to do, by the gains
-that the levels of a model have over each other. Gains and work of levels were measured on claw, truss and Klann leg; they
-only say where to look: what counts is the estimate on the level itself.
+that the levels of a model have over each other. Gains and work of levels were measured on claw, truss and Klann leg;
+they only say where to look: what counts is the estimate on the level itself.
 
 Estimates are signed, and so they are added to the results (``Curve.corrected``). What is asked to be small is what they
 may leave,
@@ -11,8 +11,8 @@ may leave,
     |error| ≤ l |elements| + l_s |plane stress|,
 
 with l by level (``FidelityLevel.left``) and l_s = ``AccuracyOptions.plane_stress_left``: measured on cantilever, arch,
-truss, claw and Klann leg, where what space adds is 0.7 to 1.6 times its estimate, and what finer elements add 0.5 to 1.5
-times, but on the coarsest level up to 2.7 times. Source for corrections by adjoints: Pierce & Giles
+truss, claw and Klann leg, where what space adds is 0.7 to 1.6 times its estimate, and what finer elements add 0.5 to
+1.5 times, but on the coarsest level up to 2.7 times. Source for corrections by adjoints: Pierce & Giles
 (doi:10.1137/S0036144598349423).
 """
 
@@ -33,7 +33,6 @@ from fenicsmech.elasticity import (
     Formulation,
     Quadrature,
 )
-from fenicsmech.errors import DescriptionError
 from fenicsmech.log import logger
 from fenicsmech.mechanism import FlexibleLink, MeshPart, Scene, StepPart
 from fenicsmech.meshing import typical_thickness

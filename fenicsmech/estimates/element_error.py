@@ -18,8 +18,8 @@ errors e_p of p and e_q of its adjoint q (``recovery``):
 c² was measured once per order, see ``Calibration``. Sources: Zienkiewicz & Zhu (doi:10.1002/nme.1620240206) for the
 recovery, Oden & Prudhomme (doi:10.1016/S0898-1221(00)00317-5) for goal-oriented estimates.
 
-Not included: the difference between models in the plane and in space, see ``plane_stress_error``; and, with elements of order
-1, that polygons stand for curved outlines.
+Not included: the difference between models in the plane and in space, see ``plane_stress_error``; and, with elements of
+order 1, that polygons stand for curved outlines.
 """
 
 from __future__ import annotations

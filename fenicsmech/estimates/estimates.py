@@ -57,13 +57,11 @@ class Equilibrium:
         state: the equilibrium.
         design: the rest shape it belongs to, this rank's values of the design field, flat.
         quantity: the displacement under a prescribed force, or the force at a prescribed displacement.
-        floor: least shift of its tangent.
     """
 
     state: State
     design: np.ndarray
     quantity: Quantity
-    floor: float
 
 
 class Estimates:
@@ -125,10 +123,8 @@ def adjoint_at(newton: Iteration, equilibrium: Equilibrium, output: PointLoad | 
     system.load(state)
     control = DisplacementControl(system.load_displacement(state)) if force else LoadControl(state.force)
     try:
-        newton.factor(state, control, system.residual(state, control), equilibrium.floor)
-        if force and output is None:
-            return Adjoint.of_force(newton)
-        return Adjoint.of_travel(newton, state, output or system.controlled)
+        at = newton.linearise(state, control)
+        return Adjoint.of_force(at) if force and output is None else Adjoint.of_travel(at, output or system.controlled)
     except NotConverged as failure:
         raise EquilibriumError(
             f"equilibrium under {system.controlled.name!r}",

@@ -9,9 +9,9 @@ between plane stress and plane strain. By it a displacement changes, to first or
 
     Q(space) − Q(plane stress) ≈ −∂V/∂u · z.
 
-c was measured once, see ``Calibration``. Source for estimates of what a model leaves out by an adjoint: Oden & Vemaganti
-(doi:10.1006/jcph.2000.6585). Not included: wide links that bend so sharply that they cannot bulge across their depth
-(b² times the curvature over the thickness far above 1), and motion out of the plane.
+c was measured once, see ``Calibration``. Source for estimates of what a model leaves out by an adjoint: Oden &
+Vemaganti (doi:10.1006/jcph.2000.6585). Not included: wide links that bend so sharply that they cannot bulge across
+their depth (b² times the curvature over the thickness far above 1), and motion out of the plane.
 """
 
 from __future__ import annotations
@@ -28,7 +28,6 @@ from fenicsmech.elasticity import PLANE_STRESS
 from fenicsmech.equilibrium import Adjoint
 from fenicsmech.errors import DescriptionError
 from fenicsmech.model import MechanismModel
-
 
 
 class PlaneStressError:

@@ -1,7 +1,8 @@
-"""Recovery by averaging: discontinuous gradients as continuous fields, by L² projection over cells that can deform.
+"""Recovery by averaging: discontinuous gradients as continuous fields, by L² projection over deformable cells.
 
-The gradient of a linear pressure p, recovered as a continuous linear field G and integrated along the edges of each cell
-from its vertices, where p is best, gives a quadratic p*. With w = p − ½ G · X and I w its interpolation at the vertices,
+The gradient of a linear pressure p, recovered as a continuous linear field G and integrated along the edges of each
+cell from its vertices, where p is best, gives a quadratic p*. With w = p − ½ G · X and I w its interpolation at
+the vertices,
 
     e_p ≈ p* − p = I w − w,
 
@@ -25,6 +26,7 @@ from fenicsmech.compat import (
     assemble_vector,
     compile_expression,
     compile_form,
+    interpolation_points,
     owned_values,
     scalar_space,
     vector_space,
@@ -91,7 +93,14 @@ class Recovery:
         return np.flatnonzero(on_mid_plane(V.tabulate_dof_coordinates()[:owned], V.mesh.comm)).astype(PETSc.IntType)
 
     @cached_property
-    class PressureError:
+    def _solver_off_mid_plane(self) -> PETSc.KSP:
+        """For components that vanish on the mid-plane."""
+        mass = self._mass.copy()
+        mass.zeroRowsColumns(mass.getOwnershipRange()[0] + self._mid_plane)
+        return _solver_of(mass)
+
+
+class PressureError:
     """e_p of one field of pressures.
 
     Args:
@@ -112,7 +121,7 @@ class Recovery:
         w = field - 0.5 * ufl.dot(self._gradient, ufl.SpatialCoordinate(elastic.mesh))
         V = scalar_space(elastic.mesh, 1)
         self._interpolated = fem.Function(V, name=f"interpolated_{field.name}")
-        self._expression = compile_expression(w, V.element.interpolation_points(), elastic.mesh.comm)
+        self._expression = compile_expression(w, interpolation_points(V), elastic.mesh.comm)
         self.error = self._interpolated - w
 
     def update(self) -> None:
@@ -120,13 +129,6 @@ class Recovery:
         self._recovery.project(self._right, self._gradient, self._sums, [k == 2 for k in range(self._dim)])
         self._interpolated.interpolate(self._expression)
         self._interpolated.x.scatter_forward()
-
-
-def _solver_off_mid_plane(self) -> PETSc.KSP:
-        """For components that vanish on the mid-plane."""
-        mass = self._mass.copy()
-        mass.zeroRowsColumns(mass.getOwnershipRange()[0] + self._mid_plane)
-        return _solver_of(mass)
 
 
 def _solver_of(mass: PETSc.Mat) -> PETSc.KSP:

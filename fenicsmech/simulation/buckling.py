@@ -75,7 +75,6 @@ def modes_at(
     frame: Frame,
     modes: Callable[..., list[Mode]],
     *,
-    floor: float,
     count: int,
     where: str,
 ) -> list[tuple[float, ModeShape]]:
@@ -87,7 +86,6 @@ def modes_at(
         lead: what changes.
         frame: an equilibrium of the model.
         modes: ``critical_changes`` or ``softest_modes``.
-        floor: least shift of the tangent.
         count: how many.
         where: the curve and the frame, in words.
 
@@ -96,7 +94,7 @@ def modes_at(
     """
     with model.shaped(frame.design):
         try:
-            found = modes(newton, lead, frame.state, floor=floor, count=count)
+            found = modes(newton, lead, frame.state, count=count)
             return [(mode.value, mode_shape(model, mode.step)) for mode in found]
         except NotConverged as failure:
             raise EquilibriumError(

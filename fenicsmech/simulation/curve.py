@@ -1,4 +1,4 @@
-"""A load–displacement curve: the frames of one configuration under one changing force or moving motor, and their study."""
+"""A load–displacement curve: the frames of one configuration under a changing force or moving motor."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ import numpy as np
 from fenicsmech.collective import on_one
 from fenicsmech.elasticity import PLANE_STRESS
 from fenicsmech.equilibrium import (
-    IDLE_STIFFNESS,
     ForceLead,
     Iteration,
     Lead,
@@ -147,7 +146,7 @@ class Curve:
         return self._estimated([ErrorKind.PLANE_STRESS], output)[0].copy()
 
     def errors_by_kind(self) -> tuple[np.ndarray, np.ndarray]:
-        """``error_estimates`` and ``modelling_errors``, from one adjoint per frame; the latter 0 but in plane stress."""
+        """``error_estimates`` and ``modelling_errors``, from one adjoint per frame; the latter 0 in other models."""
         if self.discretisation.fidelity.model is not PLANE_STRESS:
             return self.error_estimates(), np.zeros(len(self.frames))
         elements, plane_stress = self._estimated(list(ErrorKind), None)
@@ -224,7 +223,7 @@ class Curve:
             The lower and the upper bound, (frames,) each; infinite where the force's point does not move but pins turn.
 
         Raises:
-            DescriptionError: the curve has one frame only or a frame twice, or a joint is not revolute or does not move.
+            DescriptionError: the curve has one frame only or a frame twice, or a joint is not a hinge that turns.
         """
         return friction_band(self.frames, pins, self.discretisation.linkage)
 
@@ -355,7 +354,7 @@ class Curve:
 
     def equilibrium(self, frame: Frame) -> Equilibrium:
         """That of one of the frames, under what was prescribed. Local."""
-        return Equilibrium(frame.state, frame.design, self.quantity, self._floor)
+        return Equilibrium(frame.state, frame.design, self.quantity)
 
     @property
     def _writes(self) -> bool:
@@ -366,14 +365,12 @@ class Curve:
     def _newton(self) -> Iteration:
         return self.discretisation.newton(self.part, self.others)
 
-    @property
-    def _floor(self) -> float:
-        return IDLE_STIFFNESS if self.freedom.idle else 0.0
-
     def _need_force(self) -> None:
         if not isinstance(self.part, Force):
             raise DescriptionError(
-                f"curve of {self.part.name!r}", "no force changes along it", "Ask this of a curve under a changing force"
+                f"curve of {self.part.name!r}",
+                "no force changes along it",
+                "Ask this of a curve under a changing force",
             )
 
     def _chosen(self, frame: Frame | None) -> Frame:
@@ -388,7 +385,7 @@ class Curve:
     ) -> list[tuple[float, ModeShape]]:
         where = f"{self.part.name!r} in configuration {self.configuration.name!r} at {self.axes[1](frame.force)}"
         model = self.discretisation.model
-        return modes_at(model, self._newton, lead, frame, modes, floor=self._floor, count=count, where=where)
+        return modes_at(model, self._newton, lead, frame, modes, count=count, where=where)
 
     def _estimated(self, kinds: Sequence[ErrorKind], output: Output | None) -> list[np.ndarray]:
         """Estimates of errors of each kind, (frames,) each; those not known yet from one adjoint per frame."""

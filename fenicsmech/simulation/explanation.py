@@ -24,7 +24,6 @@ from fenicsmech.simulation.fields import gather
 from fenicsmech.simulation.frame import Frame
 
 
-
 @dataclass(frozen=True)
 class ExplanationOptions:
     """From where on something that is left out matters.

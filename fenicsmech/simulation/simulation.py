@@ -16,7 +16,7 @@ from fenicsmech.effects import holding
 from fenicsmech.elasticity import Formulation, Mixed, Quadrature
 from fenicsmech.equilibrium import ArcSteps, EquilibriumSolver, Hermite, Iteration, Predictor, PrimalDualNewton
 from fenicsmech.errors import DescriptionError
-from fenicsmech.estimates import AccuracyControl, Choice, Estimates, FidelityLevel, LevelErrors
+from fenicsmech.estimates import AccuracyControl, Estimates, FidelityLevel, LevelErrors
 from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Leader, Mechanism, Output, Scene
 from fenicsmech.meshing import radius_ratios
 from fenicsmech.model import Fidelity, MechanismModel, read_fidelity
@@ -333,7 +333,7 @@ class Simulation:
     def _errors(
         self, level: FidelityLevel, request: CurveRequest, watch: Callable[[int], None], curves: list[Curve]
     ) -> LevelErrors:
-        """Makes the curve of a fidelity level the only one of ``curves``; its largest value, and how wrong that may be."""
+        """Makes the curve of a fidelity level the only one of ``curves``; returns its largest value and errors."""
         fidelity = self._control.fidelity(level)
         if fidelity != self.fidelity:
             # curves keep what they were computed with
