@@ -22,6 +22,7 @@ LAYERS = (
     "kernel_cache",
     "compat",
     "collective",
+    "files",
     "report",
     "joints",
     "mechanism",
@@ -32,7 +33,6 @@ LAYERS = (
     "equilibrium",
     "simulation",
     "design",
-    "accuracy",
 )
 
 # Libraries that belong to a few layers only: descriptions and joints know no elements, only one layer makes meshes,

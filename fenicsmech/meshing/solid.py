@@ -17,6 +17,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from fenicsmech.checks import positive
+from fenicsmech.files import atomic_write
 from fenicsmech.meshing.boundary import boundary_loops
 from fenicsmech.meshing.fragments import mesh_fragments
 from fenicsmech.meshing.gmsh_session import gmsh, gmsh_session
@@ -26,7 +27,6 @@ from fenicsmech.meshing.muting import muted_output
 from fenicsmech.meshing.outline_curves import CircleArc, Curve, sampled, start_of
 from fenicsmech.meshing.regions import DimTag
 from fenicsmech.meshing.section import PinHole, Section, section_of
-from fenicsmech.report import atomic_write
 
 _WIDEST_ARC = 0.75 * math.pi  # arcs are drawn in pieces below a half turn, whose ends tell on which side they run
 
