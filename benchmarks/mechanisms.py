@@ -50,7 +50,7 @@ class Case:
 
     def optimise(self, simulation: fm.Simulation, **options) -> fm.DesignResult:
         """The optimum of the demo's design problem."""
-        return fm.DesignProblem(simulation, self.designs, targets=self.targets).optimize(**options)
+        return fm.DesignProblem(simulation, self.designs, targets=self.targets).optimise(**options)
 
 
 def mechanism(name: str) -> Case:

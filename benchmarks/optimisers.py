@@ -31,15 +31,15 @@ def main():
     options = parser.parse_args()
     rows = []
     for name in options.mechanisms:
-        for minimiser in (fm.LevenbergMarquardt(iterations=options.limit), fm.Bfgs(iterations=options.limit)):
+        for optimiser in (fm.LevenbergMarquardt(iterations=options.limit), fm.BFGS(iterations=options.limit)):
             case = mechanism(name)
             sim = fm.Simulation(case.scene, space="plane-stress", size=options.size or case.size)
-            result = case.optimise(sim, minimiser=minimiser)
+            result = case.optimise(sim, optimiser=optimiser)
             rows.append(
                 (
                     name,
                     result.parameters,
-                    type(minimiser).__name__,
+                    type(optimiser).__name__,
                     result.iterations,
                     result.evaluations,
                     round(result.seconds, 1),

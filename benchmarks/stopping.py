@@ -75,9 +75,9 @@ def designs(name, space, size):
     """Rows of the second table."""
     case = mechanism(name)
 
-    def optimum(space, start, minimiser):
+    def optimum(space, start, optimiser):
         sim = fm.Simulation(case.scene, space=space, size=size or case.size)
-        return sim, case.optimise(sim, start=start, minimiser=minimiser)
+        return sim, case.optimise(sim, start=start, optimiser=optimiser)
 
     start = None if space == "plane-stress" else optimum("plane-stress", None, None)[1]
     exact = optimum(space, start, fm.LevenbergMarquardt(tolerance=TOLERANCE))[1]

@@ -23,6 +23,6 @@ def prepare():
         return sim.load_displacement(push, forces=[0.1, 0.2])
 
     def design():
-        return problem.optimize(minimiser=fm.LevenbergMarquardt(iterations=2))
+        return problem.optimise(optimiser=fm.LevenbergMarquardt(iterations=2))
 
     return curve, design

@@ -7,7 +7,7 @@ Describe a mechanism (``Mechanism``), say what acts on it (``Scene``) and how fi
 
 from fenicsmech.collective import end_together
 from fenicsmech.design import (
-    Bfgs,
+    BFGS,
     DesignProblem,
     DesignResult,
     Experiment,
@@ -85,7 +85,7 @@ __all__ = [
     "SMOOTH_SIL_950",
     "Arc",
     "AssemblyError",
-    "Bfgs",
+    "BFGS",
     "Configuration",
     "Curve",
     "DescriptionError",

@@ -5,7 +5,7 @@
 - ``control``: what is led along a path: a force, a displacement, motors
 - ``layout``, ``unknowns``: where each unknown stands, and the change of state it stands for
 - ``extras``, ``matrices``, ``entry_copy``, ``kkt``: the distributed KKT matrix
-- ``system``: energy, balance and KKT matrix at a state
+- ``system``: energy, residual and KKT matrix at a state
 - ``factor``: LDLᵀ with inertia
 - ``coarse``, ``smoother``, ``two_level``: conjugate gradients where the factor is too large
 - ``linear``: which of the two solves, and by what rule
@@ -44,14 +44,13 @@ from fenicsmech.equilibrium.predictor import Constant, Hermite, Predictor, Tange
 from fenicsmech.equilibrium.reactions import Reaction, joint_reactions, motor_torques
 from fenicsmech.equilibrium.solver import EquilibriumSolver, Iteration, NotConverged, Solution
 from fenicsmech.equilibrium.state import State, Step
-from fenicsmech.equilibrium.system import Balance, EquilibriumSystem
+from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 from fenicsmech.equilibrium.two_level import TwoLevelSolver
 
 __all__ = [
     "ArcLength",
     "ArcMetric",
     "ArcSteps",
-    "Balance",
     "BySize",
     "Constant",
     "Control",
@@ -89,6 +88,7 @@ __all__ = [
     "PrimalDualNewton",
     "REGULARISATION",
     "Reaction",
+    "Residual",
     "Sense",
     "ShareControl",
     "Solution",

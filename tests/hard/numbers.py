@@ -60,7 +60,7 @@ def _fidelity(scene: fm.Scene, space: str, comm: MPI.Comm) -> dict[str, Callable
         "Newton's largest turn": lambda x: simulated(solver=PrimalDualNewton(largest_turn=x)),
         "Levenberg–Marquardt's tolerance": lambda x: fm.LevenbergMarquardt(tolerance=x),
         "Levenberg–Marquardt's damping": lambda x: fm.LevenbergMarquardt(damping=x),
-        "BFGS's tolerance": lambda x: fm.Bfgs(tolerance=x),
+        "BFGS's tolerance": lambda x: fm.BFGS(tolerance=x),
     }
 
 
