@@ -77,8 +77,8 @@ class AugmentedLagrangianIteration(Iteration):
 
     options: AugmentedLagrangian
 
-    def solve(self, start: State, control: Control, *, floor: float = 0.0) -> Solution:
-        system, options = self.system, self.options
+    def solve(self, start: State, control: Control) -> Solution:
+        system, options, floor = self.system, self.options, start.minimum_shift
         state = self._begin(start, control)
         penalty = options.penalty
         omega, eta = 1.0 / penalty, penalty**-0.1
@@ -91,8 +91,8 @@ class AugmentedLagrangianIteration(Iteration):
             # λ⁺ = λ − μ C(s) holds the rounding of C, μ times
             noise = penalty * options.roundoff * system.unknowns.unit
             if self.converged(residual, before, noise=noise) and iteration > 0:
-                self._factor_true(current, control, residual, floor, iteration)
-                return self._accept(self._normalised(current), control, residuals, iteration)
+                self._factor_true(current, control, residual, iteration)
+                return self._accept(self._normalised(current), control, residual, residuals, iteration)
             if best is None or residual.norm < best[1].norm:
                 best = current, residual
             if iteration == options.iterations:
@@ -113,9 +113,9 @@ class AugmentedLagrangianIteration(Iteration):
             try:
                 state = self._search(state, control, step, descent, gradient, 1.0 / penalty, iteration)
             except NotConverged as failure:
-                return self._bear(self._normalised(best[0]), best[1], control, floor, residuals, failure)
+                return self._bear(self._normalised(best[0]), best[1], control, residuals, failure)
         failure = self._spent(residuals, options.iterations)
-        return self._bear(self._normalised(best[0]), best[1], control, floor, residuals, failure)
+        return self._bear(self._normalised(best[0]), best[1], control, residuals, failure)
 
     def _normalised(self, state: State) -> State:
         """``state`` with quaternions of unit length."""

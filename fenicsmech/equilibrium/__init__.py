@@ -38,11 +38,11 @@ from fenicsmech.equilibrium.lead import ForceLead, Heading, Lead, MotorLead
 from fenicsmech.equilibrium.linear import BySize, Direct, LinearMethod, LinearSolver, TwoLevel
 from fenicsmech.equilibrium.load import PointLoad
 from fenicsmech.equilibrium.newton import Newton, PrimalDualNewton
-from fenicsmech.equilibrium.path import IDLE_STIFFNESS, Path, PathFailed
+from fenicsmech.equilibrium.path import ZERO_ENERGY_SHIFT, Path, PathFailed
 from fenicsmech.equilibrium.path_points import PathPoint, PathPoints
 from fenicsmech.equilibrium.predictor import Constant, Hermite, Predictor, Tangent
 from fenicsmech.equilibrium.reactions import Reaction, joint_reactions, motor_torques
-from fenicsmech.equilibrium.solver import EquilibriumSolver, Iteration, NotConverged, Solution
+from fenicsmech.equilibrium.solver import EquilibriumSolver, Iteration, Linearisation, NotConverged, Solution
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 from fenicsmech.equilibrium.two_level import TwoLevelSolver
@@ -66,11 +66,11 @@ __all__ = [
     "ForceLead",
     "Heading",
     "Hermite",
-    "IDLE_STIFFNESS",
     "Iteration",
     "KktMatrix",
     "Lead",
     "LinearMethod",
+    "Linearisation",
     "LinearSolver",
     "LoadControl",
     "Mode",
@@ -98,6 +98,7 @@ __all__ = [
     "Tangent",
     "TwoLevel",
     "TwoLevelSolver",
+    "ZERO_ENERGY_SHIFT",
     "critical_changes",
     "crossing",
     "follow",

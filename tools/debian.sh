@@ -1,28 +1,30 @@
 #!/bin/bash
-# Run a command on the current tree in a Debian 13 root built with debootstrap.
+# Run a command on the current tree in a root of another Debian suite, built with debootstrap.
 #
-#   tools/debian13.sh COMMAND...
+#   tools/debian.sh SUITE COMMAND...        SUITE: trixie (Debian 13) or sid (the newest)
 #
 # The root is built when it is missing or when what it is made of has changed, and kept in
-# ${XDG_CACHE_HOME:-$HOME/.cache}/fenicsmech/debian13 (FENICSMECH_DEBIAN13 overrides this). Each run starts from a
-# fresh copy of the tree in /fenicsmech; nothing is written back. Needs root, or sudo.
+# ${XDG_CACHE_HOME:-$HOME/.cache}/fenicsmech/SUITE (FENICSMECH_ROOTS overrides the folder above SUITE). That of sid, which
+# moves by itself, is brought up to date before each run. Each run starts from a fresh copy of the tree in
+# /fenicsmech; nothing is written back. Needs root, or sudo.
 set -euo pipefail
 
-suite=trixie
+suite=${1:-}
+shift || true
 tree=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
-root=${FENICSMECH_DEBIAN13:-${XDG_CACHE_HOME:-$HOME/.cache}/fenicsmech/debian13}
+root=${FENICSMECH_ROOTS:-${XDG_CACHE_HOME:-$HOME/.cache}/fenicsmech}/$suite
 environment=(HOME=/root LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive
     PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
     OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_btl=^tcp
     PRTE_MCA_rmaps_default_mapping_policy=:oversubscribe)
 
 fail() {
-    printf 'tools/debian13.sh: %s\n' "$@" >&2
+    printf 'tools/debian.sh: %s\n' "$@" >&2
     exit 1
 }
 
 packages() { # the names in the package lists, without the comments
-    sed -E 's/#.*//' "$tree/tools/packages/run.txt" "$tree/tools/packages/debian13.txt" | xargs
+    sed -E 's/#.*//' "$tree/tools/packages/run.txt" "$tree/tools/packages/other-suites.txt" | xargs
 }
 
 # The mirror the host's own Debian packages come from.
@@ -108,7 +110,7 @@ fill() { # a new root
 build() {
     local mirror
     mirror=$(host_mirror)
-    echo "Building a Debian 13 root in $root from $mirror: about two minutes"
+    echo "Building a root of Debian $suite in $root from $mirror: about two minutes"
     rm -rf --one-file-system "$root.partial" "$root"
     mkdir -p "$root.partial"
     trap 'tail -n 5 "$root.log" >&2; fail "the root could not be built; the whole log is $root.log"' EXIT
@@ -116,6 +118,11 @@ build() {
     trap - EXIT
     echo "$recipe" >"$root.partial/recipe"
     mv "$root.partial" "$root"
+}
+
+upgrade() { # of a suite that moves by itself
+    enter "$root" sh -c 'apt-get update -q && apt-get dist-upgrade -qy --no-install-recommends && apt-get clean' \
+        >"$root.log" 2>&1 || fail "the root could not be brought up to date; the whole log is $root.log"
 }
 
 copy_tree() {
@@ -127,14 +134,18 @@ copy_tree() {
 
 if [ "$(id -u)" != 0 ]; then
     command -v sudo >/dev/null || fail "building and entering a root needs root or sudo, and neither is at hand"
-    pass=("FENICSMECH_DEBIAN13=$root")
+    pass=("FENICSMECH_ROOTS=${root%/*}")
     for name in http_proxy https_proxy no_proxy; do
         if [ -n "${!name:-}" ]; then pass+=("$name=${!name}"); fi
     done
-    exec sudo env "${pass[@]}" bash "${BASH_SOURCE[0]}" "$@"
+    exec sudo env "${pass[@]}" bash "${BASH_SOURCE[0]}" "$suite" "$@"
 fi
 
-[ $# -gt 0 ] || fail "no command given, for example: tools/debian13.sh python3 -c 'import fenicsmech'"
+case $suite in
+    trixie | sid) ;;
+    *) fail "'$suite' is no suite that fenicsmech is tested on: give trixie or sid" ;;
+esac
+[ $# -gt 0 ] || fail "no command given, for example: tools/debian.sh trixie python3 -c 'import fenicsmech'"
 command -v debootstrap >/dev/null || fail "debootstrap is missing; run: make install-test"
 
 mkdir -p "${root%/*}"
@@ -143,6 +154,8 @@ flock 9 # one build or run at a time
 recipe=$({ packages; declare -f fill copy_network_settings; } | sha256sum)
 if [ "$(cat "$root/recipe" 2>/dev/null)" != "$recipe" ]; then
     build
+elif [ "$suite" = sid ]; then
+    upgrade
 fi
 copy_tree
 enter "$root" env -C /fenicsmech "$@"
