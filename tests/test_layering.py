@@ -27,6 +27,7 @@ LAYERS = (
     "joints",
     "mechanism",
     "meshing",
+    "export",
     "multibody",
     "elasticity",
     "effects",
@@ -43,7 +44,7 @@ RESTRICTED = {
     "dolfinx": {"report", "joints", "mechanism"},
     "ufl": {"report", "joints", "mechanism"},
     "petsc4py": {"report", "joints", "mechanism"},
-    "gmsh": set(LAYERS) - {"compat", "meshing"},
+    "gmsh": set(LAYERS) - {"compat", "meshing", "export"},
     "matplotlib": set(LAYERS) - {"report"},
 }
 

@@ -8,19 +8,11 @@ import numpy as np
 import pytest
 
 from fenicsmech.errors import DescriptionError, MeshingError
+from fenicsmech.export import PinHole, write_step, write_stl
 from fenicsmech.mechanism import step
-from fenicsmech.meshing import (
-    PinHole,
-    boundary_loops,
-    cell_measures,
-    gmsh,
-    gmsh_session,
-    mesh_link,
-    write_step,
-    write_stl,
-)
+from fenicsmech.meshing import boundary_loops, cell_measures, gmsh, gmsh_session, mesh_link
 
-from .bent_links import CURVED, DEPTH, LENGTH, RADIUS, STRAIGHT, bent, bent_point, link
+from ..meshing.bent_links import CURVED, DEPTH, LENGTH, RADIUS, STRAIGHT, bent, bent_point, link
 
 PART = Path(__file__).parents[2] / "meshes" / "curved_link.step"
 PINS = (PinHole(CURVED[0], RADIUS), PinHole(CURVED[-1], RADIUS))

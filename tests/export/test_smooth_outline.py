@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from fenicsmech.meshing import CircleArc, boundary_loops, corners_of, distance, sampled, smooth_outline, start_of
+from fenicsmech.export import corners_of, smooth_outline
+from fenicsmech.meshing import CircleArc, boundary_loops, distance, sampled, start_of
 
-from .bent_links import CURVED, STRAIGHT, THICKNESS, bent, link
+from ..meshing.bent_links import CURVED, STRAIGHT, THICKNESS, bent, link
 
 
 def outline(mesh):

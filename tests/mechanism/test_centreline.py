@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fenicsmech.errors import DescriptionError
-from fenicsmech.meshing import Centreline
+from fenicsmech.mechanism import Centreline
 
 BENT = [(0.0, 0.0), (18.0, 34.0), (40.0, 60.0), (70.0, 55.0)]
 
