@@ -22,6 +22,7 @@ LAYERS = (
     "kernel_cache",
     "compat",
     "collective",
+    "files",
     "report",
     "joints",
     "mechanism",
@@ -35,7 +36,6 @@ LAYERS = (
     "estimates",
     "simulation",
     "design",
-    "accuracy",
 )
 
 # Libraries that belong to a few layers only: descriptions and joints know no elements, only one layer makes meshes,

@@ -16,7 +16,7 @@ from fenicsmech.design.regularisers import Regulariser
 from fenicsmech.design.rest_shape import RestShape
 from fenicsmech.design.spline_design import Target
 from fenicsmech.errors import DescriptionError
-from fenicsmech.report import atomic_write
+from fenicsmech.files import atomic_write
 from fenicsmech.simulation import Simulation
 
 _FORMAT = "fenicsmech checkpoint 1"

@@ -9,7 +9,7 @@ from time import perf_counter
 import numpy as np
 
 from fenicsmech.design.optimisers import Iterate, Optimiser
-from fenicsmech.report import Progress, Silent
+from fenicsmech.log import Progress, Silent
 
 _WINDOW = 6  # iterations whose trend is drawn on
 

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from fenicsmech.errors import DescriptionError
-from fenicsmech.report import atomic_write
+from fenicsmech.files import atomic_write
 
 _FORMAT = "fenicsmech design 1"
 

@@ -11,7 +11,6 @@
 - ``linear``: which of the two solves, and by what rule
 - ``solver``: what every equilibrium solver is
 - ``newton``: the default one, the primal–dual iteration
-- ``solvers``: others to choose and to compare
 - ``predictor``, ``path``: first guesses and load steps
 - ``dead_centre``: those of motors past the end of their slack
 - ``lead``: what leads a path that may turn back: a force, or motors
@@ -46,7 +45,6 @@ from fenicsmech.equilibrium.path_points import PathPoint, PathPoints
 from fenicsmech.equilibrium.predictor import Constant, Hermite, Predictor, Tangent
 from fenicsmech.equilibrium.reactions import Reaction, joint_reactions, motor_torques
 from fenicsmech.equilibrium.solver import EquilibriumSolver, Iteration, Linearisation, NotConverged, Solution
-from fenicsmech.equilibrium.solvers import AugmentedLagrangian, Globalisation, KktNewton, Snes
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 from fenicsmech.equilibrium.two_level import TwoLevelSolver
@@ -56,7 +54,6 @@ __all__ = [
     "ArcLength",
     "ArcMetric",
     "ArcSteps",
-    "AugmentedLagrangian",
     "BySize",
     "Constant",
     "Control",
@@ -70,12 +67,10 @@ __all__ = [
     "Factor",
     "Finish",
     "ForceLead",
-    "Globalisation",
     "Heading",
     "Hermite",
     "Iteration",
     "KktMatrix",
-    "KktNewton",
     "Lead",
     "LinearMethod",
     "Linearisation",
@@ -100,7 +95,6 @@ __all__ = [
     "Residual",
     "Sense",
     "ShareControl",
-    "Snes",
     "Solution",
     "State",
     "Step",

@@ -16,12 +16,12 @@ from fenicsmech.effects import holding
 from fenicsmech.elasticity import Formulation, Mixed, Quadrature
 from fenicsmech.equilibrium import ArcSteps, EquilibriumSolver, Hermite, Iteration, Predictor, PrimalDualNewton
 from fenicsmech.errors import DescriptionError
-from fenicsmech.estimates import AccuracyControl, Estimates, FidelityLevel, LevelErrors
+from fenicsmech.estimates import AccuracyControl, Choice, Estimates, FidelityLevel, LevelErrors
+from fenicsmech.log import Progress, Silent
 from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Leader, Mechanism, Output, Scene
 from fenicsmech.meshing import radius_ratios
 from fenicsmech.model import Fidelity, MechanismModel, read_fidelity
 from fenicsmech.multibody import Linkage
-from fenicsmech.report import Progress, Silent
 from fenicsmech.simulation.buckling import ModeShape
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.curves import Curves
@@ -91,7 +91,8 @@ class Simulation:
             raise DescriptionError("formulation", f"it is {formulation!r}", "Give Mixed() or Displacement()")
         formulation = formulation or Mixed()
         given = {"space": space, "order": order, "layers": layers, "segments": segments, "quadrature": quadrature}
-        self.scene, self.comm, self.clock, self.choice = scene, comm, Clock(), None
+        self.scene, self.comm, self.clock = scene, comm, Clock()
+        self.choice: Choice | None = None
         self._control: AccuracyControl | None = None
         self._design: np.ndarray | None = None
         if accuracy is None:
