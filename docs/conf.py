@@ -1,5 +1,6 @@
 """Settings of the pages: `make docs` builds them, offline, and takes warnings for errors."""
 
+import re
 import tomllib
 from pathlib import Path
 
@@ -23,3 +24,28 @@ autodoc_typehints = "description"
 autodoc_class_signature = "separated"
 napoleon_google_docstring = True
 napoleon_use_ivar = True
+
+
+def literal_formulas(app, what, name, obj, options, lines):
+    """Docstrings are plain text: indented blocks after an empty line are formulas, and `|`, `*`, `_` are themselves."""
+    text, found, formula, before = list(lines), [], None, 0
+    for line in text:
+        indent = len(line) - len(line.lstrip())
+        if not line.strip():
+            found.append(line)
+            continue
+        if formula is not None and indent < formula:
+            formula = None
+        if formula is None and found and not found[-1].strip() and indent > before:
+            formula = indent
+            found += [" " * before + "::", ""]
+        if formula is None:
+            before = indent
+            parts = re.split(r"(``.*?``)", line)
+            line = "".join(part if part.startswith("``") else re.sub(r"([|*_])", r"\\\1", part) for part in parts)
+        found.append(line)
+    lines[:] = found
+
+
+def setup(app):
+    app.connect("autodoc-process-docstring", literal_formulas, priority=100)  # before napoleon
