@@ -20,8 +20,8 @@ myst_enable_extensions = ["deflist"]
 myst_heading_anchors = 3
 
 autodoc_member_order = "bysource"
-autodoc_typehints = "description"
-autodoc_class_signature = "separated"
+autodoc_typehints = "none"
+highlight_language = "none"  # formulas; code says that it is python
 napoleon_google_docstring = True
 napoleon_use_ivar = True
 
