@@ -35,20 +35,11 @@ What a user sees
     ``result``            designs as plain data; ``link_files`` pictures and solids of them
 """
 
-from fenicsmech.design.barrier import Barrier
 from fenicsmech.design.characterisation import Experiment, ModulusFit, fit_modulus
-from fenicsmech.design.checkpoint import Checkpoint
+from fenicsmech.design.description import Bounds, SplineDesign, Target, bounds_of, shape_request
 from fenicsmech.design.design_problem import DesignProblem
 from fenicsmech.design.equilibria import Known, TargetEquilibria
-from fenicsmech.design.groups import group_count, split
-from fenicsmech.design.handle_optimum import HandleOptimum, ShapeError
-from fenicsmech.design.handle_step import LinkDerivatives, choose_sides, follow_spline
-from fenicsmech.design.handles import BETWEEN, LinkHandles
-from fenicsmech.design.insertion import insert, pierced
-from fenicsmech.design.laplacian import lumped_mass, stiffness
-from fenicsmech.design.link_shape import ShapeRequest, shape_link, shape_links
-from fenicsmech.design.objective import Objective, target_errors, target_scales
-from fenicsmech.design.objective_error import objective_error
+from fenicsmech.design.objective import Objective, group_count, objective_error, split, target_errors, target_scales
 from fenicsmech.design.optimisers import (
     BFGS,
     Evaluation,
@@ -61,20 +52,24 @@ from fenicsmech.design.optimisers import (
     Start,
     TooHigh,
 )
-from fenicsmech.design.optimisers.resolution import Resolution
-from fenicsmech.design.partition import solve_partition
-from fenicsmech.design.progress import DesignProgress
-from fenicsmech.design.quality import QualitySum
+from fenicsmech.design.optimisers.problem import Resolution
 from fenicsmech.design.regularisers import MeshQuality, Model, Regulariser, ShapeBounds, StayClose
 from fenicsmech.design.rest_shape import DesignedLink, RestShape
 from fenicsmech.design.result import DesignResult, LinkDesign, TargetResult
+from fenicsmech.design.run import Checkpoint, DesignProgress, minimise_together
 from fenicsmech.design.sensitivity import Adjoint, Gradient
-from fenicsmech.design.shape_map import ShapeMap
-from fenicsmech.design.spline import LinkSpline
-from fenicsmech.design.spline_design import Bounds, SplineDesign, Target, bounds_of, shape_request
-from fenicsmech.design.spline_fit import fit_spline
-from fenicsmech.design.spline_samples import SplineSamples
-from fenicsmech.design.team import minimise_together
+from fenicsmech.design.shape.handle_optimum import (
+    HandleOptimum,
+    LinkDerivatives,
+    ShapeError,
+    choose_sides,
+    follow_spline,
+)
+from fenicsmech.design.shape.handles import BETWEEN, LinkHandles
+from fenicsmech.design.shape.quality import Barrier, QualitySum
+from fenicsmech.design.shape.shape_map import ShapeMap, ShapeRequest, shape_link, shape_links
+from fenicsmech.design.shape.spline import LinkSpline, SplineSamples, fit_spline
+from fenicsmech.design.shape.weights import insert, lumped_mass, pierced, solve_partition, stiffness
 
 __all__ = [
     "Adjoint",

@@ -11,23 +11,34 @@ import numpy as np
 
 from fenicsmech.clock import Clock
 from fenicsmech.collective import on_one
-from fenicsmech.design.checkpoint import Checkpoint, fingerprint
-from fenicsmech.design.conclusion import Verification, link_designs, target_results, verify
+from fenicsmech.design.description import (
+    SplineDesign,
+    Target,
+    bounds_of,
+    check_designs,
+    check_effects,
+    check_targets,
+    shape_request,
+)
 from fenicsmech.design.equilibria import TargetEquilibria
-from fenicsmech.design.groups import Group, group_count, split
-from fenicsmech.design.handle_optimum import Placement
-from fenicsmech.design.link_files import draw_links, outline, rest_meshes, write_solids
-from fenicsmech.design.link_shape import LinkShape, shape_links
-from fenicsmech.design.objective import Objective, target_errors
-from fenicsmech.design.objective_error import objective_error
+from fenicsmech.design.objective import Group, Objective, group_count, objective_error, split, target_errors
 from fenicsmech.design.optimisers import Infeasible, Iterate, LevenbergMarquardt, Optimiser, Start
-from fenicsmech.design.problem_checks import check_designs, check_effects, check_targets
-from fenicsmech.design.progress import DesignProgress
 from fenicsmech.design.regularisers import MeshQuality, Regulariser, ShapeBounds, StayClose
 from fenicsmech.design.rest_shape import RestShape
-from fenicsmech.design.result import DesignResult
-from fenicsmech.design.spline_design import SplineDesign, Target, bounds_of, shape_request
-from fenicsmech.design.team import Outcome, minimise_together
+from fenicsmech.design.result import (
+    DesignResult,
+    Verification,
+    draw_links,
+    link_designs,
+    outline,
+    rest_meshes,
+    target_results,
+    verify,
+    write_solids,
+)
+from fenicsmech.design.run import Checkpoint, DesignProgress, Outcome, fingerprint, minimise_together
+from fenicsmech.design.shape.handle_optimum import Placement
+from fenicsmech.design.shape.shape_map import LinkShape, shape_links
 from fenicsmech.errors import DescriptionError, EquilibriumError
 from fenicsmech.simulation import Simulation
 

@@ -12,14 +12,11 @@ import numpy as np
 import ufl
 from mpi4py import MPI
 
-from fenicsmech.design.barrier import Barrier
-from fenicsmech.design.handle_optimum import HandleOptimum, Placement
-from fenicsmech.design.link_shape import LinkShape
-from fenicsmech.design.quality import QualitySum
-from fenicsmech.design.shape_map import ShapeMap
-from fenicsmech.design.spline import LinkSpline
-from fenicsmech.design.spline_design import Bounds
-from fenicsmech.design.spline_samples import SplineSamples
+from fenicsmech.design.description import Bounds
+from fenicsmech.design.shape.handle_optimum import HandleOptimum, Placement
+from fenicsmech.design.shape.quality import Barrier, QualitySum
+from fenicsmech.design.shape.shape_map import LinkShape, ShapeMap
+from fenicsmech.design.shape.spline import LinkSpline, SplineSamples
 from fenicsmech.simulation import MechanismModel
 
 

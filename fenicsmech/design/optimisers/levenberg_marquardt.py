@@ -25,10 +25,10 @@ from fenicsmech.design.optimisers.problem import (
     LeastSquaresProblem,
     Optimiser,
     Reason,
+    Resolution,
     Start,
     TooHigh,
 )
-from fenicsmech.design.optimisers.resolution import Resolution
 
 _POOR, _GOOD = 0.1, 0.75  # actual over promised reduction: below, the step is refused; above, damping falls
 _REFUSALS = 20

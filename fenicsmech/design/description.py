@@ -1,4 +1,7 @@
-"""What may change about a link, and what is wanted of the mechanism: plain data of a design problem."""
+"""What may change about a link, and what is wanted of the mechanism: plain data of a design problem.
+
+----
+What a design problem refuses: before anything is meshed, and once its first derivatives are known."""
 
 from __future__ import annotations
 
@@ -8,12 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenicsmech.checks import finite, positive
-from fenicsmech.design.link_shape import ShapeRequest
+from fenicsmech.design.shape.shape_map import ShapeRequest
 from fenicsmech.errors import DescriptionError
 from fenicsmech.joints import WELD
 from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Mechanism, Strip
 from fenicsmech.meshing import Centreline
-from fenicsmech.multibody import Linkage
+from fenicsmech.multibody import Linkage, assemble
+from fenicsmech.simulation import Simulation, read_request
 
 _RANGE = (1.0 / 3.0, 3.0)  # of thicknesses, in units of the drawn one: 1 … 9 mm for a link of 3 mm
 
@@ -150,3 +154,81 @@ def shape_request(design: SplineDesign, mechanism: Mechanism, linkage: Linkage) 
         turns=tuple(at not in welded for at in joints),
         interior=tuple(int(n) for n in interior),
     )
+
+
+_NO_EFFECT = 1e-9  # relative change of a displacement when a shape changes as much as shapes do: less is rounding
+
+
+def check_designs(designs: Sequence[SplineDesign]) -> None:
+    """Refuses designs that are none, or name a link twice.
+
+    Raises:
+        DescriptionError: saying which.
+    """
+    if not designs:
+        raise DescriptionError("design problem", "no link may change", "Name links with SplineDesign(…)")
+    for design in designs:
+        if not isinstance(design, SplineDesign):
+            raise DescriptionError("design problem", f"{design!r} is no design of a link", "Give SplineDesign(…)")
+    names = [design.link.name for design in designs]
+    for name in names:
+        if names.count(name) > 1:
+            raise DescriptionError(f"design of link {name!r}", "it is given twice", "Give each link once")
+
+
+def check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
+    """Refuses targets that are none, or whose force or configuration ``simulation`` does not have.
+
+    Raises:
+        DescriptionError: saying which.
+        AssemblyError: a configuration does not assemble.
+    """
+    if not targets:
+        raise DescriptionError("design problem", "nothing is wanted", "Give targets=[Target(…), …]")
+    for target in targets:
+        if not isinstance(target, Target):
+            raise DescriptionError("design problem", f"{target!r} is no target", "Give Target(…)")
+        read_request(
+            simulation.scene.mechanism,
+            target.force_part,
+            forces=[target.force],
+            displacements=None,
+            configuration=target.configuration,
+            others=None,
+        )
+        assemble(simulation.linkage, target.configuration)
+
+
+def check_effects(
+    targets: Sequence[Target],
+    designs: Sequence[SplineDesign],
+    *,
+    effects: np.ndarray,
+    errors: np.ndarray,
+) -> None:
+    """Refuses targets that are missed and that no parameter moves: their derivatives cannot be right, or no help.
+
+    Args:
+        targets: what is wanted.
+        designs: the links that may change.
+        effects: relative change of each displacement when one parameter changes as much as counts,
+            (targets, parameters).
+        errors: relative errors of the displacements, (targets,).
+
+    Raises:
+        DescriptionError: naming the first such target.
+    """
+    names = ", ".join(repr(design.link.name) for design in designs)
+    for target, row, error in zip(targets, effects, errors, strict=True):
+        if np.abs(row).max(initial=0.0) > _NO_EFFECT or abs(error) <= _NO_EFFECT:
+            continue
+        if target.force == 0.0:
+            reason, remedy = "no force acts", "Give a force that is not zero"
+        else:
+            reason = f"{names} do not carry the force, or something rigid holds its point"
+            remedy = "Let links change that carry it, or give targets of another force"
+        raise DescriptionError(
+            f"target of {target.force_part.name!r} ({target.force:g} in configuration {target.configuration.name!r})",
+            f"its displacement does not depend on the shapes that may change: {reason}",
+            remedy,
+        )

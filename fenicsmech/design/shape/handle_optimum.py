@@ -4,6 +4,20 @@ Links do not share cells, so S is a sum of functions of the θ of one link each.
 minimises them together, with a line search for each that refuses inverted cells. By the implicit function theorem
 
     dθ/dp = −S_θθ⁻¹ S_θp     (0 for handles held at a kink of the spline).
+
+
+----
+Newton steps for the handle positions of one link, from derivatives of S = Σρ by the maps T of its handles.
+
+The spline's tangent has a kink at interior control points, and so has S as a function of t where a handle slides over
+one. A handle there moves to the side on which S falls, and is held if S rises to both.
+
+
+----
+The Hessian of a sum over cells, seen by the maps of the handles: ∂²/∂T_j∂T_k = Σ_il r_ij ⊗ H_il ⊗ r_lk.
+
+H is the Hessian in the design field. Vertices that all handles move alike (those on one column of an extruded link)
+are added up first, which leaves little to multiply.
 """
 
 from __future__ import annotations
@@ -12,20 +26,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from petsc4py import PETSc
 from scipy.linalg import cho_factor, cho_solve
+from scipy.sparse import csr_matrix
 
-from fenicsmech.design.handle_step import (
-    LinkDerivatives,
-    LinkStep,
-    choose_sides,
-    follow_spline,
-    in_order,
-    link_step,
-    second_derivatives,
-)
-from fenicsmech.design.moment_hessian import MomentHessian
-from fenicsmech.design.quality import QualitySum
-from fenicsmech.design.shape_map import ShapeMap
+from fenicsmech.design.shape.handles import LinkHandles
+from fenicsmech.design.shape.quality import QualitySum
+from fenicsmech.design.shape.shape_map import ShapeMap
 from fenicsmech.errors import FenicsmechError
 from fenicsmech.log import logger
 
@@ -227,3 +234,182 @@ class HandleOptimum:
                 responses.append(_Response(sides.free, cho_factor(bend), mixed))
             self._known = placement, responses
         return self._known[1]
+
+
+_LARGEST_TURN = 0.5  # rad per step
+_GAP_KEPT = 0.2  # of the gap to the next handle, per step
+_FLATTEST = 1e-8  # smallest eigenvalue of the Hessian, relative to the largest
+
+
+@dataclass(frozen=True, eq=False)
+class LinkDerivatives:
+    """Derivatives of S at one point.
+
+    Attributes:
+        gradient: ∂S/∂T, (n, 2, 3).
+        hessian: ∂²S/∂T∂T, (n, 2, 3, n, 2, 3).
+    """
+
+    gradient: np.ndarray
+    hessian: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """From which side each handle is differentiated.
+
+    Attributes:
+        segments: the segment of the spline each handle moves in, (n,).
+        free: which handles move, (n,).
+    """
+
+    segments: np.ndarray
+    free: np.ndarray
+
+
+def choose_sides(handles: LinkHandles, p: np.ndarray, theta: np.ndarray, by_T: LinkDerivatives) -> Sides:
+    """The side to which S falls, for handles at a control point; their segment, for others."""
+    after = handles.segments(theta)
+    at_kink = handles.slides & (theta == after)
+    free = handles.slides | handles.turns
+    if not np.any(at_kink):
+        return Sides(after, free)
+    before = np.where(at_kink, after - 1, after)
+    forward, backward = (
+        np.sum(by_T.gradient * handles.gradients(p, theta, segments=side)[1], axis=(1, 2)) for side in (after, before)
+    )
+    held = at_kink & (forward >= 0.0) & (backward <= 0.0)
+    return Sides(np.where(at_kink & (forward >= 0.0), before, after), free & ~held)
+
+
+def second_derivatives(
+    handles: LinkHandles, p: np.ndarray, theta: np.ndarray, sides: Sides, by_T: LinkDerivatives
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """S_θ (f,), S_θθ (f, f) and S_θp (f, parameters) of the free handles."""
+    by_p, by_theta = handles.gradients(p, theta, segments=sides.segments)
+    mixed, twice = handles.curvatures(p, theta, by_T.gradient, segments=sides.segments)
+    free = sides.free
+    slope = np.einsum("jak,jak->j", by_T.gradient, by_theta)[free]
+    pulled = np.einsum("jak,jakmbl->jmbl", by_theta, by_T.hessian)[free]
+    bend = np.einsum("jmbl,mbl->jm", pulled, by_theta)[:, free] + np.diag(twice[free])
+    return slope, 0.5 * (bend + bend.T), np.einsum("jmbl,mblp->jp", pulled, by_p) + mixed[free]
+
+
+@dataclass(frozen=True, eq=False)
+class LinkStep:
+    """A step of the handles of one link.
+
+    Attributes:
+        handles: the handles.
+        step: change of θ, (n,).
+        slope: S_θ, 0 for handles that do not move, (n,).
+        segments: the segment each handle stays in, (n,).
+    """
+
+    handles: LinkHandles
+    step: np.ndarray
+    slope: np.ndarray
+    segments: np.ndarray
+
+    @property
+    def predicted(self) -> float:
+        """The decrease of S that the quadratic model predicts."""
+        return -0.5 * float(self.slope @ self.step)
+
+    def position(self, theta: np.ndarray, fraction: float) -> np.ndarray:
+        """θ after a ``fraction`` of the step; a handle that would leave its segment stops at the control point."""
+        moved = theta + fraction * self.step
+        return np.where(self.handles.slides, np.clip(moved, self.segments, self.segments + 1), moved)
+
+    def longest(self, theta: np.ndarray) -> float:
+        """The largest fraction, up to 1, that keeps handles in order and turns joints moderately."""
+        slides = self.handles.slides
+        turn = np.abs(self.step[~slides]).max(initial=0.0)
+        gaps, closing = np.diff(_along(self.handles, theta)), -np.diff(np.where(slides, self.step, 0.0))
+        limits = (1.0 - _GAP_KEPT) * gaps[closing > 0.0] / closing[closing > 0.0]
+        return min(1.0, _LARGEST_TURN / max(turn, _LARGEST_TURN), limits.min(initial=1.0))
+
+
+def link_step(handles: LinkHandles, p: np.ndarray, theta: np.ndarray, by_T: LinkDerivatives) -> LinkStep:
+    """Newton's step −|S_θθ|⁻¹ S_θ, with the eigenvalues of the Hessian made positive."""
+    sides = choose_sides(handles, p, theta, by_T)
+    free_slope, bend, _ = second_derivatives(handles, p, theta, sides, by_T)
+    values, vectors = np.linalg.eigh(bend)
+    values = np.maximum(np.abs(values), _FLATTEST * np.abs(values).max(initial=0.0))
+    step, slope = np.zeros(len(handles)), np.zeros(len(handles))
+    step[sides.free] = -vectors @ (vectors.T @ free_slope / values)
+    slope[sides.free] = free_slope
+    return LinkStep(handles, step, slope, sides.segments)
+
+
+def follow_spline(handles: LinkHandles, p: np.ndarray) -> np.ndarray:
+    """θ with joints turned like the tangent of the spline there, and all other handles at their initial t."""
+    tangents = (handles.spline.derivative(q, handles.t)[:, :2] for q in (handles.spline.initial, p))
+    before, now = (np.arctan2(tangent[:, 1], tangent[:, 0]) for tangent in tangents)
+    turn = np.remainder(now - before + np.pi, 2.0 * np.pi) - np.pi
+    return np.where(handles.slides, handles.t, np.where(handles.turns, turn, 0.0))
+
+
+def in_order(handles: LinkHandles, theta: np.ndarray) -> bool:
+    """Whether the handles follow each other along the spline, between its ends."""
+    return bool(np.all(np.diff(_along(handles, theta)) > 0.0))
+
+
+def _along(handles: LinkHandles, theta: np.ndarray) -> np.ndarray:
+    """Spline parameters of all handles, joints too."""
+    return np.where(handles.slides, theta, handles.t)
+
+
+class MomentHessian:
+    """Reduces Hessians in the design field to the maps of the handles.
+
+    Args:
+        shape_map: the map from handles to the field.
+        hessian: a matrix with the pattern of all that will be reduced (collective).
+    """
+
+    def __init__(self, shape_map: ShapeMap, hessian: PETSc.Mat) -> None:
+        self._map = shape_map
+        # class of each vertex of the whole mesh, −1 where no handle moves it; two unknowns (x, y) per class
+        classes = np.full(len(shape_map.mesh.vertices), -1)
+        self._arms, self._unknowns, first = [], [], 0
+        for vertices, reach in zip(shape_map.vertices, shape_map.reach, strict=True):
+            rows, inverse = np.unique(reach.reshape(len(reach), -1), axis=0, return_inverse=True)
+            classes[vertices] = first + inverse.ravel()
+            self._arms.append(_arms(rows.reshape(-1, *reach.shape[1:])))
+            self._unknowns.append(slice(2 * first, 2 * (first + len(rows))))
+            first += len(rows)
+        self._find_slots(hessian, classes, 2 * first)
+
+    def reduce(self, hessian: PETSc.Mat) -> list[np.ndarray]:
+        """∂²/∂T∂T per link, (handles, 2, 3, handles, 2, 3) (collective)."""
+        values = hessian.getValuesCSR()[2][self._kept]
+        self._sum.data = np.bincount(self._slots, weights=values, minlength=self._sum.nnz)
+        blocks = []
+        for mine, arms in zip(self._unknowns, self._arms, strict=True):
+            handles = arms.shape[1] // 6
+            block = arms.T @ (self._sum[mine, mine] @ arms)
+            blocks.append(block.reshape(handles, 2, 3, handles, 2, 3))
+        return self._map.sum_over_ranks(blocks)
+
+    def _find_slots(self, hessian: PETSc.Mat, classes: np.ndarray, size: int) -> None:
+        """Where each entry of the owned rows goes in the matrix between classes."""
+        dim = self._map.mesh.vertices.shape[1]
+        original = self._map.original[: self._map.owned]
+        starts, columns, _ = hessian.getValuesCSR()
+        rows = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+        # the global numbering runs through the owned nodes, rank after rank
+        everywhere = np.concatenate(hessian.comm.tompi4py().allgather(original))
+        row_class, column_class = classes[original[rows // dim]], classes[everywhere[columns // dim]]
+        self._kept = (rows % dim < 2) & (columns % dim < 2) & (row_class >= 0) & (column_class >= 0)
+        keys = (2 * row_class + rows % dim) * size + 2 * column_class + columns % dim
+        used, self._slots = np.unique(keys[self._kept], return_inverse=True)
+        self._sum = csr_matrix((np.zeros(len(used)), np.divmod(used, size)), shape=(size, size))
+
+
+def _arms(reach: np.ndarray) -> np.ndarray:
+    """∂d/∂T from r (classes, handles, 3), (2 classes, 6 handles)."""
+    count, handles, _ = reach.shape
+    arms = np.zeros((count, 2, handles, 2, 3))
+    arms[:, 0, :, 0] = arms[:, 1, :, 1] = reach
+    return arms.reshape(2 * count, 6 * handles)

@@ -6,11 +6,15 @@ With the edges e_k = (I + ∇d) J_k of a cell that meet at one vertex, J its Jac
     tetrahedra:  ρ = ½ ||e₁|² e₂×e₃ + |e₂|² e₃×e₁ + |e₃|² e₁×e₂| Σ_faces |e×e′| / D²,          3 if equilateral.
 
 ρ is undefined (NaN) in cells that d turns inside out.
-"""
+
+
+----
+The C² barrier β(x) = m ((x − x_max) / ε)³ beyond x_max, zero before (the paper's equation 15)."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 from math import factorial, inf, isnan
 
@@ -120,3 +124,30 @@ class QualitySum:
     @cached_property
     def _matrix(self) -> PETSc.Mat:
         return assemble_matrix(self._hessian_form, self._comm)
+
+
+@dataclass(frozen=True)
+class Barrier:
+    """Penalises x > ``limit``; ``width`` ε and ``strength`` m control how fast it grows.
+
+    For a lower bound, give −x the limit −x_min.
+    """
+
+    limit: float
+    width: float
+    strength: float = 1.0
+
+    def value(self, x: np.ndarray) -> np.ndarray:
+        """β."""
+        return self.strength * self._excess(x) ** 3
+
+    def slope(self, x: np.ndarray) -> np.ndarray:
+        """dβ/dx."""
+        return 3.0 * self.strength / self.width * self._excess(x) ** 2
+
+    def curvature(self, x: np.ndarray) -> np.ndarray:
+        """d²β/dx²."""
+        return 6.0 * self.strength / self.width**2 * self._excess(x)
+
+    def _excess(self, x: np.ndarray) -> np.ndarray:
+        return np.maximum(np.asarray(x, dtype=float) - self.limit, 0.0) / self.width
