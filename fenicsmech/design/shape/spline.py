@@ -1,4 +1,4 @@
-"""Cubic Hermite splines of links: centreline (x, y) and local thickness δ as functions of design parameters.
+"""Centreline and thickness of a link as a cubic Hermite spline of its design parameters; samples of it; the first one.
 
 With control points C_k (position P_k and tangent M_k, three components each) and t = k + τ, 0 ≤ τ ≤ 1,
 
@@ -6,24 +6,6 @@ With control points C_k (position P_k and tangent M_k, three components each) an
 
 The parameters p are the tangents at joints, and position and tangent at all other control points: a joint stays where
 it is and keeps its thickness. The curve is linear in p.
-
-
-----
-Samples of a spline that fabrication bounds are put on: local thickness, and curvature ratio.
-
-r = h / R,    h the mean length of two consecutive segments a, b, R the circumradius of their three ends:
-r = (|a| + |b|) (a × b) / (|a| |b| |a + b|),     with the sign of the bend, which keeps it smooth.
-
-
-----
-The spline that follows a given centreline.
-
-Joints and interior control points lie on the curve; the tangents minimise the distance across the curve,
-
-    Σ_k (n_k · (x(t_k) − c_k))² + ε² (τ_k · (x(t_k) − c_k))²,
-
-with c_k the foot point of x(t_k) on the centreline, τ_k and n_k its tangent and normal, and a small ε that keeps the
-samples from running along the curve. Foot points and tangents are improved in turn.
 """
 
 from __future__ import annotations
@@ -38,8 +20,9 @@ from numpy.polynomial.polynomial import polyder
 
 from fenicsmech.errors import DescriptionError
 from fenicsmech.meshing import Centreline
+from fenicsmech.symbolic import SmoothFunction, derive
 
-# rows: powers of τ in h₀₀ (P_k), h₁₀ (M_k), h₀₁ (P_{k+1}), h₁₁ (M_{k+1})
+# h₀₀ (P_k), h₁₀ (M_k), h₀₁ (P_{k+1}), h₁₁ (M_{k+1}) in powers of τ, and their derivatives
 _HERMITE = np.array([[1.0, 0.0, -3.0, 2.0], [0.0, 1.0, -2.0, 1.0], [0.0, 0.0, 3.0, -2.0], [0.0, 0.0, -1.0, 1.0]])
 _DERIVATIVES = [polyder(_HERMITE, order, axis=1) for order in range(5)]
 
@@ -122,14 +105,16 @@ class LinkSpline:
         return weights
 
 
-COUNT = 500
-"""Samples per spline (section VI-A of the paper)."""
-
-
 class SplineSamples:
-    """Uniform samples in t of one spline; both δ and the points are linear in p."""
+    """Samples of one spline, uniform in t: the thickness δ, and the curvature ratio of three consecutive points,
 
-    def __init__(self, spline: LinkSpline, *, count: int = COUNT) -> None:
+        r = h / R = (|a| + |b|) (a × b) / (|a| |b| |a + b|),
+
+    h the mean length of the segments a, b between them, R their circumradius, with the sign of the bend, which keeps r
+    smooth. δ and the points are linear in p. The default of 500 samples is the paper's (section VI-A).
+    """
+
+    def __init__(self, spline: LinkSpline, *, count: int = 500) -> None:
         self.t = np.linspace(0.0, spline.segments, count)
         self._gradient = spline.gradient(self.t)
         self._fixed = spline.evaluate(np.zeros(spline.size), self.t)
@@ -145,42 +130,29 @@ class SplineSamples:
 
     def curvature(self, p: np.ndarray) -> np.ndarray:
         """r, signed, at the inner samples, (count − 2,)."""
-        return _ratio(self._triples(p, slice(None)))[0]
+        return _ratio().value(*self._triples(p, slice(None)))[:, 0]
 
     def curvature_gradient(self, p: np.ndarray, chosen: np.ndarray) -> np.ndarray:
         """∂r/∂p at some of the inner samples, a mask (count − 2,), (chosen, size)."""
-        moves = np.stack([self._gradient[k : len(self.t) - 2 + k, :2][chosen] for k in range(3)], axis=1)
-        return np.einsum("nkc,nkcp->np", _ratio(self._triples(p, chosen))[1], moves)
+        moves = np.concatenate([self._gradient[k : len(self.t) - 2 + k, :2][chosen] for k in range(3)], axis=1)
+        return np.einsum("nc,ncp->np", _ratio().gradient(*self._triples(p, chosen))[:, 0], moves)
 
-    def _triples(self, p: np.ndarray, chosen: np.ndarray | slice) -> np.ndarray:
-        """Three consecutive points around the chosen inner samples, (chosen, 3, 2)."""
+    def _triples(self, p: np.ndarray, chosen: np.ndarray | slice) -> tuple[np.ndarray, np.ndarray]:
+        """Three consecutive points around the chosen inner samples, (chosen, 6), and no constants."""
         points = self._fixed[:, :2] + self._gradient[:, :2] @ p
-        return np.stack([points[k : len(points) - 2 + k][chosen] for k in range(3)], axis=1)
-
-
-def _ratio(triples: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """r (n,) of triples of points (n, 3, 2), and ∂r/∂points (n, 3, 2)."""
-    numbers = _compiled()(*triples.reshape(-1, 6).T)
-    values, *partial = (np.broadcast_to(n, len(triples)) for n in numbers)
-    return values, np.stack(partial, axis=1).reshape(-1, 3, 2)
+        triples = np.concatenate([points[k : len(points) - 2 + k][chosen] for k in range(3)], axis=1)
+        return triples, np.empty((len(triples), 0))
 
 
 @cache
-def _compiled():
-    """r and its gradient, derived symbolically (x0, x1, … are names that cse takes)."""
+def _ratio() -> SmoothFunction:
+    """r by the coordinates of three points."""
     coordinates = sympy.symbols("px py qx qy sx sy", real=True)
     p, q, s = (sympy.Matrix(coordinates[k : k + 2]) for k in (0, 2, 4))
     a, b = q - p, s - q
     lengths = [sympy.sqrt(v.dot(v)) for v in (a, b, a + b)]
-    cross = a[0] * b[1] - a[1] * b[0]
-    signed = (lengths[0] + lengths[1]) * cross / (lengths[0] * lengths[1] * lengths[2])
-    expressions = [signed, *(sympy.diff(signed, c) for c in coordinates)]
-    return sympy.lambdify(coordinates, expressions, "numpy", cse=True)
-
-
-_SAMPLES = 32  # per segment
-_ALONG = 0.1  # ε
-_ROUNDS = 40
+    ratio = (lengths[0] + lengths[1]) * (a[0] * b[1] - a[1] * b[0]) / (lengths[0] * lengths[1] * lengths[2])
+    return derive([ratio], coordinates, [], many=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,13 +171,16 @@ class SplineFit:
 
 
 def fit_spline(
-    centreline: Centreline,
-    joints: Sequence[Sequence[float]],
-    interior: Sequence[int],
-    *,
-    part: str = "spline",
+    centreline: Centreline, joints: Sequence[Sequence[float]], interior: Sequence[int], *, part: str = "spline"
 ) -> SplineFit:
     """The spline along ``centreline`` with control points at ``joints`` and evenly spaced ones between them.
+
+    The tangents minimise the distance across the curve,
+
+        Σ_k (n_k · (x(t_k) − c_k))² + ε² (τ_k · (x(t_k) − c_k))²,
+
+    with c_k the foot point of x(t_k) on the centreline, τ_k and n_k its tangent and normal, and a small ε that keeps
+    the samples from running along the curve. Foot points and tangents are improved in turn.
 
     Args:
         centreline: the curve to follow.
@@ -226,8 +201,11 @@ def fit_spline(
             f"Give {len(joints) - 1} numbers from 0 up, one per span between joints",
         )
     curve = _ArcLength(centreline)
-    order, arcs = _along(curve, joints, part)
-    joints = joints[order]
+    arcs = np.array([curve.arc(joint) for joint in joints])
+    order = np.argsort(arcs)
+    arcs = arcs[order]
+    if np.any(np.diff(arcs) <= 1e-9 * curve.length):
+        raise DescriptionError(part, "two joints are at one place of the centreline", "Move one of them")
 
     knots, is_joint = [arcs[0]], [True]
     for start, end, count in zip(arcs, arcs[1:], interior, strict=False):
@@ -235,28 +213,19 @@ def fit_spline(
         is_joint += [False] * count + [True]
     is_joint = np.array(is_joint)
     positions = curve.point(np.array(knots))
-    positions[is_joint] = joints
+    positions[is_joint] = joints[order]
 
     controls = np.zeros((len(knots), 2, 3))
     controls[:, 0, :2], controls[:, 0, 2] = positions, 1.0
-    spline = LinkSpline(controls, is_joint)
-    t = np.arange(0.5, spline.segments * _SAMPLES) / _SAMPLES
+    spline, each = LinkSpline(controls, is_joint), 32  # samples per segment
+    t = np.arange(0.5, spline.segments * each) / each
     feet = np.interp(t, np.arange(len(knots)), knots)
-    for _ in range(_ROUNDS):
+    for _ in range(40):  # the deviation has settled after a few
         controls[:, 1, :2] = _fit_tangents(spline.basis(t), positions, curve, feet)
         samples = spline.evaluate(spline.initial, t)[:, :2]
         feet = curve.foot(samples, feet)
     deviation = np.linalg.norm(samples - curve.point(feet), axis=1).max()
     return SplineFit(spline, tuple(order.tolist()), float(deviation))
-
-
-def _along(curve: _ArcLength, joints: np.ndarray, part: str) -> tuple[np.ndarray, np.ndarray]:
-    """The order of ``joints`` along the curve, and their arc lengths in this order."""
-    arcs = np.array([curve.arc(joint) for joint in joints])
-    order = np.argsort(arcs)
-    if np.any(np.diff(arcs[order]) <= 1e-9 * curve.length):
-        raise DescriptionError(part, "two joints are at one place of the centreline", "Move one of them")
-    return order, arcs[order]
 
 
 def _fit_tangents(basis: np.ndarray, positions: np.ndarray, curve: _ArcLength, feet: np.ndarray) -> np.ndarray:
@@ -265,7 +234,7 @@ def _fit_tangents(basis: np.ndarray, positions: np.ndarray, curve: _ArcLength, f
     along = curve.tangent(feet)
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
     rows, rhs = [], []
-    for direction, weight in ((across, 1.0), (along, _ALONG)):
+    for direction, weight in ((across, 1.0), (along, 0.1)):  # ε = 0.1
         rows.append(weight * (direction[:, None, :] * basis[:, 1::2, None]).reshape(len(feet), -1))
         rhs.append(-weight * np.sum(direction * gap, axis=1))
     return np.linalg.lstsq(np.concatenate(rows), np.concatenate(rhs), rcond=None)[0].reshape(-1, 2)
