@@ -106,7 +106,7 @@ class RestShape:
     def gradient(self, placement: Placement, nodal: np.ndarray) -> np.ndarray:
         """dO/dp (…, parameters) from ∂O/∂d (…, owned values) of the design placed as in ``placement`` (collective)."""
         fields = nodal.reshape(*nodal.shape[:-1], self._map.owned, -1)
-        by_p, by_theta = self._map.pull(placement.p, placement.theta, fields)
+        by_p, by_theta = self._map.apply_transpose(placement.p, placement.theta, fields)
         return self._optimum.total_gradient(placement, by_p, by_theta)
 
     def worst_ratio(self) -> float:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from dolfinx import fem
 
-from fenicsmech.compat import add_ghosts
+from fenicsmech.compat import add_ghosts, cell_dofs
 from fenicsmech.joints import RigidSpace
 from fenicsmech.meshing import on_mid_plane
 
@@ -66,9 +66,10 @@ class InterfaceMap:
         V = self._u.function_space
         marker = fem.Function(V)
         local = marker.x.array.reshape(-1, self.block)
-        for cell in np.flatnonzero(cell_body >= 0):
-            local[V.dofmap.cell_dofs(cell), 0] = cell_body[cell] + 1
-            local[V.dofmap.cell_dofs(cell), 1] = 1
+        cells = np.flatnonzero(cell_body >= 0)
+        nodes = cell_dofs(V)[cells]
+        local[nodes, 0] = cell_body[cells, None] + 1
+        local[nodes, 1] = 1
         # sum over ranks of (body + 1) and of the number of ranks that said so
         add_ghosts(marker)
         marker.x.scatter_forward()

@@ -6,7 +6,7 @@ import numpy as np
 from dolfinx import fem
 from scipy.sparse import csr_matrix
 
-from fenicsmech.compat import add_ghosts, owned_values
+from fenicsmech.compat import add_ghosts, cell_dofs, owned_values
 
 
 class DesignAtNodes:
@@ -26,7 +26,7 @@ class DesignAtNodes:
         self._pulled = fem.Function(coarse)
         dim = coarse.dofmap.index_map_bs
         self.owned = fine.dofmap.index_map.size_local
-        corners, nodes = _cell_dofs(coarse), _cell_dofs(fine)
+        corners, nodes = cell_dofs(coarse), cell_dofs(fine)
         corner_at = coarse.tabulate_dof_coordinates()[:, :dim][corners]
         offset = fine.tabulate_dof_coordinates()[:, :dim][nodes] - corner_at[:, :1]
         # barycentric coordinates of every node in its cell
@@ -51,12 +51,3 @@ class DesignAtNodes:
         self._pulled.x.array[:] = (self.matrix[: self.owned].T @ nodal).ravel()
         add_ghosts(self._pulled)
         return owned_values(self._pulled).copy()
-
-
-def _cell_dofs(space: fem.FunctionSpace) -> np.ndarray:
-    """Nodes of every cell this rank owns, perhaps none, (cells, nodes per cell)."""
-    topology = space.mesh.topology
-    found = np.empty((topology.index_map(topology.dim).size_local, space.dofmap.dof_layout.num_dofs), dtype=np.int64)
-    for cell, nodes in enumerate(found):
-        nodes[:] = space.dofmap.cell_dofs(cell)
-    return found

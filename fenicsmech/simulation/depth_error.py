@@ -23,7 +23,7 @@ import ufl
 from dolfinx import fem
 from scipy.spatial import cKDTree
 
-from fenicsmech.compat import cell_nodes, compile_form, original_nodes, scalar_space
+from fenicsmech.compat import cell_dofs, cell_nodes, compile_form, original_nodes, scalar_space
 from fenicsmech.elasticity import PLANE_STRESS
 from fenicsmech.errors import DescriptionError
 from fenicsmech.simulation.model import MechanismModel
@@ -81,6 +81,5 @@ class DepthError:
             mine = np.flatnonzero(owner == link)
             distance[mine] = cKDTree(mesh.vertices[held[owner[held] == link]]).query(mesh.vertices[mine])[0]
         field = fem.Function(scalar_space(mesh.mesh, 1), name="distance")
-        for cell, vertices in enumerate(numbers):
-            field.x.array[field.function_space.dofmap.cell_dofs(cell)] = distance[vertices]
+        field.x.array[cell_dofs(field.function_space)] = distance[numbers]
         return field

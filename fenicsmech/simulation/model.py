@@ -11,7 +11,7 @@ import numpy as np
 import ufl
 
 from fenicsmech.clock import Clock
-from fenicsmech.compat import cell_nodes, original_nodes
+from fenicsmech.compat import cell_dofs, cell_nodes, original_nodes
 from fenicsmech.effects import BodyEffect, JointSoftening, LinkEffect, LinkFields, RestStretch, find_boundaries, holding
 from fenicsmech.elasticity import ElasticBody, ElasticModel, Stretch
 from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State, load_fields
@@ -215,10 +215,8 @@ class MechanismModel:
 
     def _link_of_nodes(self) -> np.ndarray:
         """Index of the flexible link of every local node."""
-        V = self.elastic.u.function_space
         owner = np.full(len(self.interfaces.body), -1)
-        for cell, link in enumerate(self.mesh.link):
-            owner[V.dofmap.cell_dofs(cell)] = link
+        owner[cell_dofs(self.elastic.u.function_space)] = self.mesh.link[:, None]
         return owner
 
 

@@ -109,7 +109,7 @@ class HandleOptimum:
 
         Args:
             placement: from ``solve``.
-            by_p, by_theta: ∂O/∂p (…, parameters) and ∂O/∂θ (…, handles), as from ``ShapeMap.pull``.
+            by_p, by_theta: ∂O/∂p (…, parameters) and ∂O/∂θ (…, handles), as from ``ShapeMap.apply_transpose``.
         """
         slopes = self._map.positions(by_theta)
         responses = self._responses(placement)

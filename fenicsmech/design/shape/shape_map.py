@@ -1,15 +1,8 @@
-"""What changes the rest shape of one link: its spline's handles and their weights.
+"""How links change their shape: from spline parameters and handle positions to the design field, and back.
 
-----
-Where the handles of a link go: to its joints, and to regular arc lengths of the spline between them.
+    d_i = Σ_j w_ij T_j(p, θ_j) (X_i − X_j, 1) = Σ_j T_j r_ij,     d linear in the maps T_j (2 × 3) of the handles.
 
-----
-From spline parameters and handle positions to the design field on the distributed mesh, and back.
-
-    d_i = Σ_j w_ij T_j(p, θ_j) (X_i − X_j, 1),     d linear in the maps T_j (2 × 3) of the handles.
-
-With r_ij = w_ij (X_i − X_j, 1), the transpose takes a field g to the moments ∂/∂T_j = Σ_i g_i ⊗ r_ij of each handle,
-and from there to ∂/∂p and ∂/∂θ.
+The transpose takes a field g to the moments ∂/∂T_j = Σ_i g_i ⊗ r_ij of each handle, and from there to ∂/∂p and ∂/∂θ.
 """
 
 from __future__ import annotations
@@ -22,14 +15,12 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from fenicsmech.collective import from_one
-from fenicsmech.compat import cell_nodes, original_cells, original_nodes
+from fenicsmech.compat import cell_dofs, cell_nodes, original_cells, original_nodes
 from fenicsmech.design.shape.handles import BETWEEN, LinkHandles
 from fenicsmech.design.shape.spline import SplineFit, fit_spline
 from fenicsmech.design.shape.weights import handle_weights, pierced
 from fenicsmech.errors import DescriptionError
 from fenicsmech.meshing import FREE, Centreline, LinkMesh, MechanismMesh, cell_measures, plan_of
-
-_SPACING = 1.0  # of handles, in mean widths of the link
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,14 +56,12 @@ class LinkShape:
         link: index of the flexible link.
         handles: its handles.
         weights: of each handle at each vertex of the link, (n, handles).
-        deviation: largest distance from the spline to the centreline it follows.
         thickness: in the plane, where δ = 1.
     """
 
     link: int
     handles: LinkHandles
     weights: np.ndarray
-    deviation: float
     thickness: float
 
 
@@ -85,20 +74,19 @@ def shape_link(mesh: LinkMesh, request: ShapeRequest) -> LinkShape:
     part = f"link {request.name!r}"
     fit = fit_spline(request.centreline, request.joints, request.interior, part=f"spline of {part}")
     width = _mean_width(mesh, request.centreline.length)
-    handles = place_handles(mesh, fit, spacing=request.spacing or _SPACING * width, turns=request.turns, part=part)
+    handles = _place_handles(mesh, fit, spacing=request.spacing or width, turns=request.turns, part=part)
     weights = handle_weights(mesh, handles, part=part)
-    return LinkShape(request.link, handles, weights, fit.deviation, request.thickness or width)
+    return LinkShape(request.link, handles, weights, request.thickness or width)
 
 
-def shape_links(mesh: MechanismMesh, requests: Sequence[ShapeRequest], *, root: int = 0) -> list[LinkShape]:
-    """The shapes of some links, computed on ``root`` and the same on all ranks; errors too (collective)."""
-    comm = mesh.mesh.comm
+def shape_links(mesh: MechanismMesh, requests: Sequence[ShapeRequest]) -> list[LinkShape]:
+    """The shapes of some links, computed on the first rank and the same on all; errors too."""
     links = gather_links(mesh)
-    return from_one(comm, lambda: [shape_link(links[request.link], request) for request in requests], root=root)
+    return from_one(mesh.mesh.comm, lambda: [shape_link(links[request.link], request) for request in requests])
 
 
 def gather_links(mesh: MechanismMesh, vertices: np.ndarray | None = None) -> list[LinkMesh]:
-    """The mesh of every flexible link with its own numbering of interfaces, on every rank (collective).
+    """The mesh of every flexible link with its own numbering of interfaces, on every rank.
 
     Args:
         mesh: the mechanism's mesh.
@@ -119,34 +107,23 @@ def gather_links(mesh: MechanismMesh, vertices: np.ndarray | None = None) -> lis
     return links
 
 
-def _mean_width(mesh: LinkMesh, length: float) -> float:
-    """Area of the link in the plane over the length of its centreline."""
-    plan = plan_of(mesh).mesh
-    size = np.abs(cell_measures(plan.points, plan.cells)).sum()
-    return size / length if plan.dim == 2 else size / length / np.ptp(plan.points[:, 2])
+def _place_handles(mesh: LinkMesh, fit: SplineFit, *, spacing: float, turns: Sequence[bool], part: str) -> LinkHandles:
+    """The handles of one link: at its joints, and at regular arc lengths of the spline between them.
 
-
-_CLEARANCE = 0.25  # of the spacing, between an intermediary handle and an interface
-_SAMPLES = 1000  # of arc length, per segment
-
-
-def place_handles(
-    mesh: LinkMesh, fit: SplineFit, *, spacing: float, turns: Sequence[bool], part: str = "link"
-) -> LinkHandles:
-    """The handles of one link; intermediary ones in or next to an interface are left out.
+    Intermediary handles in or next to an interface are left out.
 
     Args:
         mesh: the link's mesh.
         fit: its spline; sites are the interfaces of ``mesh``.
         spacing: arc length between handles, adjusted so that it divides each span between joints evenly.
         turns: whether each site may turn, (sites,).
-        part: the link's name, for messages.
+        part: the link, for messages.
 
     Raises:
         DescriptionError: the spline leaves the link.
     """
     spline, plan = fit.spline, plan_of(mesh).mesh
-    samples = np.linspace(0.0, spline.segments, _SAMPLES * spline.segments + 1)
+    samples = np.linspace(0.0, spline.segments, 1000 * spline.segments + 1)
     curve = spline.evaluate(spline.initial, samples)[:, :2]
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
     held = plan.points[np.unique(plan.cells[plan.interface != FREE])][:, :2]
@@ -164,7 +141,8 @@ def place_handles(
                 raise DescriptionError(
                     f"spline of {part}", f"it leaves the link at ({where})", "Give a centreline inside the link"
                 )
-            clear = np.linalg.norm(held - at, axis=1).min() > _CLEARANCE * (b - a) / parts
+            # a quarter of the spacing away from interfaces
+            clear = np.linalg.norm(held - at, axis=1).min() > 0.25 * (b - a) / parts
             if clear and np.all(plan.interface[cells] == FREE):
                 t.append(candidate)
                 site.append(BETWEEN)
@@ -172,6 +150,13 @@ def place_handles(
         site.append(end_site)
     site = np.array(site)
     return LinkHandles(spline, np.array(t), site, (site != BETWEEN) & np.array(turns)[site])
+
+
+def _mean_width(mesh: LinkMesh, length: float) -> float:
+    """Area of the link in the plane over the length of its centreline."""
+    plan = plan_of(mesh).mesh
+    size = np.abs(cell_measures(plan.points, plan.cells)).sum()
+    return size / length if plan.dim == 2 else size / length / np.ptp(plan.points[:, 2])
 
 
 class ShapeMap:
@@ -220,26 +205,14 @@ class ShapeMap:
 
     def field(self, p: np.ndarray, theta: np.ndarray) -> np.ndarray:
         """d, (nodes, dim)."""
-        return self._spread(
-            [shape.handles.transforms(p_link, theta_link) for shape, p_link, theta_link in self._links(p, theta)]
-        )
+        return self.spread([shape.handles.transforms(*point) for shape, *point in self._links(p, theta)])
 
     def apply(self, p: np.ndarray, theta: np.ndarray) -> None:
         """Makes the design field hold d(p, θ)."""
         self.design.x.array[:] = self.field(p, theta).ravel()
 
-    def push(self, p: np.ndarray, theta: np.ndarray, dp: np.ndarray, dtheta: np.ndarray) -> np.ndarray:
-        """∂d/∂p dp + ∂d/∂θ dθ, (nodes, dim)."""
-        changes = []
-        for (shape, *point), dp_link, dtheta_link in zip(
-            self._links(p, theta), self.parameters(dp), self.positions(dtheta), strict=True
-        ):
-            by_p, by_theta = shape.handles.gradients(*point)
-            changes.append(by_p @ dp_link + by_theta * dtheta_link[:, None, None])
-        return self._spread(changes)
-
-    def pull(self, p: np.ndarray, theta: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The transpose of ``push``: g · ∂d/∂p (…, parameters) and g · ∂d/∂θ (…, handles) (collective).
+    def apply_transpose(self, p: np.ndarray, theta: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The transpose of the derivatives of the field: g · ∂d/∂p (…, parameters) and g · ∂d/∂θ (…, handles).
 
         g: (…, nodes or owned nodes, dim), of which the owned nodes count; summed over all ranks.
         """
@@ -250,8 +223,15 @@ class ShapeMap:
             by_theta.append(np.einsum("...jak,jak->...j", moments, theta_slope))
         return np.concatenate(by_p, axis=-1), np.concatenate(by_theta, axis=-1)
 
+    def spread(self, transforms: Sequence[np.ndarray]) -> np.ndarray:
+        """Σ_j T_j r_ij from the maps of each link's handles, (nodes, dim)."""
+        d = np.zeros((len(self.original), self.mesh.vertices.shape[1]))
+        for nodes, reach, T in zip(self._nodes, self._local_reach, transforms, strict=True):
+            d[nodes, :2] = np.einsum("ijk,jak->ia", reach, T, optimize=True)
+        return d
+
     def moments(self, g: np.ndarray) -> list[np.ndarray]:
-        """Σ_i g_i ⊗ r_ij of each handle, per link (…, handles, 2, 3), summed over all ranks (collective)."""
+        """The transpose of ``spread``: Σ_i g_i ⊗ r_ij of each handle, per link (…, handles, 2, 3), over all ranks."""
         parts = []
         for nodes, reach in zip(self._nodes, self._local_reach, strict=True):
             mine = nodes < self.owned
@@ -259,7 +239,7 @@ class ShapeMap:
         return self.sum_over_ranks(parts)
 
     def sum_over_ranks(self, parts: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """The sums over all ranks of arrays of any shapes, in one message (collective)."""
+        """The sums over all ranks of arrays of any shapes, in one message."""
         total = np.concatenate([part.ravel() for part in parts])
         self.mesh.mesh.comm.Allreduce(MPI.IN_PLACE, total)
         ends = np.cumsum([part.size for part in parts])[:-1]
@@ -267,13 +247,6 @@ class ShapeMap:
 
     def _links(self, p: np.ndarray, theta: np.ndarray):
         return zip(self.shapes, self.parameters(p), self.positions(theta), strict=True)
-
-    def _spread(self, transforms: Sequence[np.ndarray]) -> np.ndarray:
-        """Σ_j r_ij T_j, (nodes, dim)."""
-        d = np.zeros((len(self.original), self.mesh.vertices.shape[1]))
-        for nodes, reach, T in zip(self._nodes, self._local_reach, transforms, strict=True):
-            d[nodes, :2] = np.einsum("ijk,jak->ia", reach, T, optimize=True)
-        return d
 
 
 def _reach(points: np.ndarray, shape: LinkShape) -> np.ndarray:
@@ -285,8 +258,6 @@ def _reach(points: np.ndarray, shape: LinkShape) -> np.ndarray:
 def _original_vertices(design: fem.Function) -> np.ndarray:
     """The vertex of the whole mesh of every local node of a P1 field, (nodes,)."""
     V = design.function_space
-    nodes = cell_nodes(V.mesh)
     original = np.empty(len(design.x.array) // V.dofmap.index_map_bs, dtype=np.int64)
-    for cell in range(len(nodes)):
-        original[V.dofmap.cell_dofs(cell)] = nodes[cell]
+    original[cell_dofs(V)] = cell_nodes(V.mesh)
     return original_nodes(V.mesh)[original]
