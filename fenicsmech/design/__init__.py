@@ -36,7 +36,7 @@ What a user sees
 """
 
 from fenicsmech.design.characterisation import Experiment, ModulusFit, fit_modulus
-from fenicsmech.design.description import Bounds, SplineDesign, Target, bounds_of, shape_request
+from fenicsmech.design.description import Bounds, SplineDesign, Target, shape_request
 from fenicsmech.design.design_problem import DesignProblem
 from fenicsmech.design.equilibria import Known, TargetEquilibria
 from fenicsmech.design.objective import Objective, group_count, objective_error, split, target_errors, target_scales
@@ -60,9 +60,9 @@ from fenicsmech.design.run import Checkpoint, DesignProgress, minimise_together
 from fenicsmech.design.sensitivity import Adjoint, Gradient
 from fenicsmech.design.shape.handle_optimum import (
     HandleOptimum,
-    LinkDerivatives,
+    MapDerivatives,
     ShapeError,
-    choose_sides,
+    by_positions,
     follow_spline,
 )
 from fenicsmech.design.shape.handles import BETWEEN, LinkHandles
@@ -90,7 +90,7 @@ __all__ = [
     "Iterate",
     "Known",
     "LevenbergMarquardt",
-    "LinkDerivatives",
+    "MapDerivatives",
     "LinkDesign",
     "LinkHandles",
     "LinkSpline",
@@ -117,8 +117,7 @@ __all__ = [
     "TargetEquilibria",
     "TargetResult",
     "TooHigh",
-    "bounds_of",
-    "choose_sides",
+    "by_positions",
     "fit_modulus",
     "fit_spline",
     "follow_spline",

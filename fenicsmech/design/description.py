@@ -1,7 +1,4 @@
-"""What may change about a link, and what is wanted of the mechanism: plain data of a design problem.
-
-----
-What a design problem refuses: before anything is meshed, and once its first derivatives are known."""
+"""A design problem as plain data: links that may change, targets; and the checks of both."""
 
 from __future__ import annotations
 
@@ -19,7 +16,18 @@ from fenicsmech.meshing import Centreline
 from fenicsmech.multibody import Linkage, assemble
 from fenicsmech.simulation import Simulation, read_request
 
-_RANGE = (1.0 / 3.0, 3.0)  # of thicknesses, in units of the drawn one: 1 … 9 mm for a link of 3 mm
+
+@dataclass(frozen=True)
+class Bounds:
+    """Fabrication bounds of a link.
+
+    Attributes:
+        thickness: least and largest thickness in the plane.
+        bend: largest curvature ratio r.
+    """
+
+    thickness: tuple[float, float]
+    bend: float
 
 
 @dataclass(frozen=True)
@@ -60,34 +68,20 @@ class SplineDesign:
             if not least < most:
                 raise DescriptionError(part, f"thickness from {least:g} to {most:g}", "Give the smaller one first")
 
+    def bounds(self, thickness: float) -> Bounds:
+        """The bounds for a link drawn with ``thickness``.
 
-@dataclass(frozen=True)
-class Bounds:
-    """Fabrication bounds of a link.
-
-    Attributes:
-        thickness: least and largest thickness in the plane.
-        bend: largest curvature ratio r.
-    """
-
-    thickness: tuple[float, float]
-    bend: float
-
-
-def bounds_of(design: SplineDesign, thickness: float) -> Bounds:
-    """The bounds of ``design`` for a link drawn with ``thickness``.
-
-    Raises:
-        DescriptionError: the drawn thickness is not within them.
-    """
-    least, most = design.thickness or (_RANGE[0] * thickness, _RANGE[1] * thickness)
-    if not least < thickness < most:
-        raise DescriptionError(
-            f"design of link {design.link.name!r}",
-            f"its drawn thickness {thickness:.3g} is not between {least:g} and {most:g}",
-            "Draw it within the bounds, or widen them",
-        )
-    return Bounds((least, most), design.bend)
+        Raises:
+            DescriptionError: the drawn thickness is not within them.
+        """
+        least, most = self.thickness or (thickness / 3.0, 3.0 * thickness)
+        if not least < thickness < most:
+            raise DescriptionError(
+                f"design of link {self.link.name!r}",
+                f"its drawn thickness {thickness:.3g} is not between {least:g} and {most:g}",
+                "Draw it within the bounds, or widen them",
+            )
+        return Bounds((least, most), self.bend)
 
 
 @dataclass(frozen=True)
@@ -156,15 +150,8 @@ def shape_request(design: SplineDesign, mechanism: Mechanism, linkage: Linkage) 
     )
 
 
-_NO_EFFECT = 1e-9  # relative change of a displacement when a shape changes as much as shapes do: less is rounding
-
-
 def check_designs(designs: Sequence[SplineDesign]) -> None:
-    """Refuses designs that are none, or name a link twice.
-
-    Raises:
-        DescriptionError: saying which.
-    """
+    """Refuses designs of no link, and two of one link, with a DescriptionError."""
     if not designs:
         raise DescriptionError("design problem", "no link may change", "Name links with SplineDesign(…)")
     for design in designs:
@@ -177,10 +164,10 @@ def check_designs(designs: Sequence[SplineDesign]) -> None:
 
 
 def check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
-    """Refuses targets that are none, or whose force or configuration ``simulation`` does not have.
+    """Refuses targets whose force or configuration ``simulation`` does not have.
 
     Raises:
-        DescriptionError: saying which.
+        DescriptionError: there is no target, or one of another mechanism.
         AssemblyError: a configuration does not assemble.
     """
     if not targets:
@@ -200,11 +187,7 @@ def check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
 
 
 def check_effects(
-    targets: Sequence[Target],
-    designs: Sequence[SplineDesign],
-    *,
-    effects: np.ndarray,
-    errors: np.ndarray,
+    targets: Sequence[Target], designs: Sequence[SplineDesign], *, effects: np.ndarray, errors: np.ndarray
 ) -> None:
     """Refuses targets that are missed and that no parameter moves: their derivatives cannot be right, or no help.
 
@@ -218,9 +201,9 @@ def check_effects(
     Raises:
         DescriptionError: naming the first such target.
     """
-    names = ", ".join(repr(design.link.name) for design in designs)
+    names, rounding = ", ".join(repr(design.link.name) for design in designs), 1e-9
     for target, row, error in zip(targets, effects, errors, strict=True):
-        if np.abs(row).max(initial=0.0) > _NO_EFFECT or abs(error) <= _NO_EFFECT:
+        if np.abs(row).max(initial=0.0) > rounding or abs(error) <= rounding:
             continue
         if target.force == 0.0:
             reason, remedy = "no force acts", "Give a force that is not zero"

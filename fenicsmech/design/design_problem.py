@@ -14,7 +14,6 @@ from fenicsmech.collective import on_one
 from fenicsmech.design.description import (
     SplineDesign,
     Target,
-    bounds_of,
     check_designs,
     check_effects,
     check_targets,
@@ -280,8 +279,7 @@ class DesignProblem:
         return group, objective
 
     def _rest_of(self, simulation: Simulation) -> RestShape:
-        bounds = [bounds_of(design, shape.thickness) for design, shape in zip(self.designs, self._shapes, strict=True)]
-        return RestShape(simulation.model, self._shapes, [design.link.name for design in self.designs], bounds)
+        return RestShape(simulation.model, self._shapes, self.designs)
 
     def _parameters(self, result: DesignResult) -> np.ndarray:
         """Parameters of a result of the same links."""

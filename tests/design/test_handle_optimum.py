@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fenicsmech.design import HandleOptimum, LinkDerivatives, LinkHandles, ShapeError, choose_sides, follow_spline
+from fenicsmech.design import HandleOptimum, LinkHandles, MapDerivatives, ShapeError, by_positions, follow_spline
 
 from ..oracles.dense import taylor_rates
 from .shapes import bench
@@ -99,7 +99,7 @@ def test_total_gradient_agrees_with_differences_of_best_positions(dim, seed):
     difference = (value(h) - value(-h)) / (2 * h)
     assert gradient @ direction == pytest.approx(difference, rel=1e-5)
     partial = both.shape.apply_transpose(placed.p, placed.theta, g)[0] @ direction
-    assert abs(partial - difference) > 1e-3 * abs(difference)  # the handles' share is not small
+    assert abs(partial - difference) > 1e-3 * abs(difference)  # the part of the handles is not small
 
 
 @pytest.mark.parallel
@@ -162,7 +162,7 @@ def test_a_handle_at_a_kink_is_held_or_goes_to_the_side_where_the_sum_falls(held
     slope = np.linalg.lstsq(np.array([after.ravel(), before.ravel()]), wanted, rcond=None)[0]
     gradient = np.zeros((3, 2, 3))
     gradient[1] = slope.reshape(2, 3)
-    sides = choose_sides(handles, p, theta, LinkDerivatives(gradient, np.zeros((3, 2, 3, 3, 2, 3))))
+    sides = by_positions(handles, p, theta, MapDerivatives(gradient, np.zeros((3, 2, 3, 3, 2, 3))))
     assert sides.free.tolist() == [True, not held, True]
     assert held or sides.segments[1] == 1
 

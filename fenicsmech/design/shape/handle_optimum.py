@@ -1,29 +1,20 @@
 """The handle positions that make the mesh best: min over θ of S(θ, p) = Σ_e ρ(e), and how they follow p.
 
-Links do not share cells, so S is a sum of functions of the θ of one link each. Newton's method with exact Hessians
-minimises them together, with a line search for each that refuses inverted cells. By the implicit function theorem
+Links do not have cells in common, so S is a sum of functions of the θ of one link each. Newton's method with exact
+Hessians minimises them together, with a line search for each that refuses inverted cells. By the implicit function
+theorem
 
     dθ/dp = −S_θθ⁻¹ S_θp     (0 for handles held at a kink of the spline).
 
-
-----
-Newton steps for the handle positions of one link, from derivatives of S = Σρ by the maps T of its handles.
-
 The spline's tangent has a kink at interior control points, and so has S as a function of t where a handle slides over
 one. A handle there moves to the side on which S falls, and is held if S rises to both.
-
-
-----
-The Hessian of a sum over cells, seen by the maps of the handles: ∂²/∂T_j∂T_k = Σ_il r_ij ⊗ H_il ⊗ r_lk.
-
-H is the Hessian in the design field. Vertices that all handles move alike (those on one column of an extruded link)
-are added up first, which leaves little to multiply.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from petsc4py import PETSc
@@ -38,15 +29,34 @@ from fenicsmech.log import logger
 
 _log = logger(__name__)
 
-_ITERATIONS = 60
-_SETTLED = 1e-10  # predicted decrease of S, relative; one more step follows, after which it is rounding
-_ARMIJO = 1e-4
-_SHORTEST = 1e-8  # fraction of a step
-_HALVINGS = 4  # of a change of p that inverts cells
-
 
 class ShapeError(FenicsmechError):
     """A design has no rest shape without inverted cells."""
+
+
+@dataclass(frozen=True)
+class HandleOptions:
+    """Numbers of the search for the best handle positions.
+
+    Attributes:
+        iterations: most Newton iterations; designs near by take two or three.
+        settled: predicted decrease of S, relative, after which one last step is taken: smaller ones are rounding.
+        armijo: part of the decrease that the slope promises which a step must bring.
+        shortest: fraction of a step at which the search of a link ends without one.
+        halvings: of a change of p that inverts cells.
+        turn: largest turn of a joint in one step, rad.
+        kept: part of the gap to the next handle that one step must leave.
+        flattest: least eigenvalue of the Hessian in a step, relative to the largest.
+    """
+
+    iterations: int = 60
+    settled: float = 1e-10
+    armijo: float = 1e-4
+    shortest: float = 1e-8
+    halvings: int = 4
+    turn: float = 0.5
+    kept: float = 0.2
+    flattest: float = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,34 +72,26 @@ class Placement:
 
     p: np.ndarray
     theta: np.ndarray
-    quality: float
-    iterations: int
-
-
-@dataclass(frozen=True, eq=False)
-class _Response:
-    """How the handles of one link follow its parameters: θ_free = −(factor of S_θθ)⁻¹ S_θp p."""
-
-    free: np.ndarray
-    factor: tuple[np.ndarray, bool]
-    mixed: np.ndarray
+    quality: float = np.inf
+    iterations: int = 0
 
 
 class HandleOptimum:
-    """Best handle positions as a function of the design; all methods are collective.
+    """Best handle positions as a function of the design.
 
-    They leave the design field at the placement that they return or were given.
+    All methods leave the design field at the placement that they return or were given.
 
     Args:
         shape_map: from design and handle positions to the field.
         quality: Σρ in this field.
+        options: numbers of the search.
     """
 
-    def __init__(self, shape_map: ShapeMap, quality: QualitySum) -> None:
-        self._map, self._quality = shape_map, quality
+    def __init__(self, shape_map: ShapeMap, quality: QualitySum, options: HandleOptions | None = None) -> None:
+        self._map, self._quality, self._options = shape_map, quality, options or HandleOptions()
         self._handles = [shape.handles for shape in shape_map.shapes]
-        self._reducer: MomentHessian | None = None
-        self._known: tuple[Placement | None, list[_Response]] = (None, [])
+        self._reducer: _MomentHessian | None = None
+        self._known: tuple[Placement | None, list[PositionDerivatives]] = (None, [])
 
     def solve(self, p: np.ndarray, start: Placement | None = None) -> Placement:
         """The best handle positions for design ``p``.
@@ -101,8 +103,8 @@ class HandleOptimum:
         Raises:
             ShapeError: cells stay inverted however the handles are placed.
         """
-        start = start or Placement(self._map.initial, self._map.initial_theta, np.inf, 0)
-        return self._solve(np.array(p, dtype=float), start, _HALVINGS)
+        start = start or Placement(self._map.initial, self._map.initial_theta)
+        return self._solve(np.array(p, dtype=float), start, self._options.halvings)
 
     def total_gradient(self, placement: Placement, by_p: np.ndarray, by_theta: np.ndarray) -> np.ndarray:
         """dO/dp = ∂O/∂p + ∂O/∂θ dθ/dp, (…, parameters).
@@ -111,18 +113,9 @@ class HandleOptimum:
             placement: from ``solve``.
             by_p, by_theta: ∂O/∂p (…, parameters) and ∂O/∂θ (…, handles), as from ``ShapeMap.apply_transpose``.
         """
-        slopes = self._map.positions(by_theta)
-        responses = self._responses(placement)
-        followed = [cho_solve(r.factor, s[..., r.free].T).T @ r.mixed for r, s in zip(responses, slopes, strict=True)]
+        links = zip(self._second_derivatives(placement), self._map.positions(by_theta), strict=True)
+        followed = [cho_solve(link.factor, slope[..., link.free].T).T @ link.mixed for link, slope in links]
         return by_p - np.concatenate(followed, axis=-1)
-
-    def drift(self, placement: Placement, dp: np.ndarray) -> np.ndarray:
-        """dθ/dp dp, (handles,)."""
-        drift = np.zeros(len(placement.theta))
-        links = zip(self._map.positions(drift), self._responses(placement), self._map.parameters(dp), strict=True)
-        for theta, response, change in links:
-            theta[response.free] = -cho_solve(response.factor, response.mixed @ change)  # a view of drift
-        return drift
 
     def _solve(self, p: np.ndarray, start: Placement, halvings: int) -> Placement:
         theta = self._first_guess(p, start)
@@ -136,28 +129,29 @@ class HandleOptimum:
     def _first_guess(self, p: np.ndarray, start: Placement) -> np.ndarray | None:
         """The best of a few positions for each link; None if all of them invert cells of a link."""
         following = [follow_spline(h, q) for h, q in zip(self._handles, self._map.parameters(p), strict=True)]
-        guesses = [start.theta, np.concatenate(following)]
-        if self._known[0] is start:
-            guesses.append(start.theta + self.drift(start, p - start.p))
-        links = [self._map.positions(guess) for guess in guesses]
-        sums = np.array([self._sums(p, guess) for guess in links])
-        best = np.argmin(sums, axis=0)
+        guesses = [self._map.positions(start.theta), following]
+        if self._known[0] is start:  # θ + dθ/dp Δp
+            tangent = self._map.positions(start.theta.copy())
+            changes = self._map.parameters(p - start.p)
+            for theta, link, change in zip(tangent, self._known[1], changes, strict=True):
+                theta[link.free] -= cho_solve(link.factor, link.mixed @ change)
+            guesses.append(tangent)
+        sums = np.array([self._sums(p, guess) for guess in guesses])
         if not np.all(np.isfinite(sums.min(axis=0))):
             return None
-        return np.concatenate([links[choice][link] for link, choice in enumerate(best)])
+        return np.concatenate([guesses[choice][link] for link, choice in enumerate(np.argmin(sums, axis=0))])
 
     def _minimise(self, p: np.ndarray, theta: np.ndarray) -> Placement:
-        parts, positions = self._map.parameters(p), self._map.positions(theta.copy())
-        sums = self._sums(p, positions)
-        moving = set(range(len(positions)))
-        iterations = 0
-        while moving and iterations < _ITERATIONS:
+        parts, positions = self._map.parameters(p), self._map.positions(theta)
+        sums, moving, iterations = self._sums(p, positions), set(range(len(positions))), 0
+        while moving and iterations < self._options.iterations:
             iterations += 1
-            steps = {}
-            derivatives = self._derivatives(p, positions)
+            steps, derivatives = {}, self._derivatives(p, positions)
             for link in sorted(moving):
-                step = link_step(self._handles[link], parts[link], positions[link], derivatives[link])
-                if step.predicted > _SETTLED * sums[link]:
+                step = _newton_step(
+                    self._handles[link], parts[link], positions[link], derivatives[link], self._options.flattest
+                )
+                if step.predicted > self._options.settled * sums[link]:
                     steps[link] = step
                 else:
                     # the decrease drowns in rounding, the improvement of θ does not
@@ -167,27 +161,26 @@ class HandleOptimum:
                 positions, sums, stuck = self._search(p, positions, sums, steps)
                 moving -= stuck
         if moving:
-            _log.warning("handle positions did not settle in %d iterations", _ITERATIONS)
+            _log.warning("handle positions did not settle in %d iterations", iterations)
         placed = Placement(p, np.concatenate(positions), float(sums.sum()), iterations)
         self._map.apply(p, placed.theta)
         return placed
 
     def _search(
-        self, p: np.ndarray, positions: list[np.ndarray], sums: np.ndarray, steps: dict[int, LinkStep]
+        self, p: np.ndarray, positions: list[np.ndarray], sums: np.ndarray, steps: dict[int, _Step]
     ) -> tuple[list[np.ndarray], np.ndarray, set[int]]:
         """Positions and sums after a step of each link in ``steps``, and the links that found no lower sum."""
-        lengths = {link: step.longest(positions[link]) for link, step in steps.items()}
-        pending, stuck = set(steps), set()
-        trial = list(positions)
+        lengths = {link: step.longest(positions[link], self._options) for link, step in steps.items()}
+        pending, stuck, trial = set(steps), set(), list(positions)
         while pending:
             for link in pending:
                 trial[link] = steps[link].position(positions[link], lengths[link])
             new = self._sums(p, trial)
             for link in sorted(pending):
-                wanted = _ARMIJO * steps[link].slope @ (trial[link] - positions[link])
+                wanted = self._options.armijo * steps[link].slope @ (trial[link] - positions[link])
                 if new[link] <= sums[link] + wanted:
                     pending.remove(link)
-                elif lengths[link] < _SHORTEST:
+                elif lengths[link] < self._options.shortest:
                     trial[link] = positions[link]
                     pending.remove(link)
                     stuck.add(link)
@@ -205,45 +198,35 @@ class HandleOptimum:
         )
         (per_link,) = self._map.sum_over_ranks([per_link])
         sums = per_link[[shape.link for shape in self._map.shapes]]
-        ordered = [in_order(handles, theta) for handles, theta in zip(self._handles, positions, strict=True)]
-        return np.where(np.isnan(sums) | ~np.array(ordered), np.inf, sums)
+        # between its ends, handles follow each other along the spline
+        pairs = zip(self._handles, positions, strict=True)
+        ordered = np.array([np.all(np.diff(_along(handles, theta)) > 0.0) for handles, theta in pairs])
+        return np.where(np.isnan(sums) | ~ordered, np.inf, sums)
 
-    def _derivatives(self, p: np.ndarray, positions: Sequence[np.ndarray]) -> list[LinkDerivatives]:
+    def _derivatives(self, p: np.ndarray, positions: Sequence[np.ndarray]) -> list[MapDerivatives]:
         """Derivatives of S by the maps of the handles, per link."""
         self._map.apply(p, np.concatenate(positions))
         hessian = self._quality.hessian()
         if self._reducer is None:
-            self._reducer = MomentHessian(self._map, hessian)
+            self._reducer = _MomentHessian(self._map, hessian)
         moments = self._map.moments(self._quality.gradient())
-        return [LinkDerivatives(g, H) for g, H in zip(moments, self._reducer.reduce(hessian), strict=True)]
+        return [MapDerivatives(g, H) for g, H in zip(moments, self._reducer.reduce(hessian), strict=True)]
 
-    def _responses(self, placement: Placement) -> list[_Response]:
-        """How the handles of each link follow its parameters."""
+    def _second_derivatives(self, placement: Placement) -> list[PositionDerivatives]:
+        """S_θθ and S_θp of each link at ``placement``; those of the last one are kept."""
         if self._known[0] is not placement:
-            positions = self._map.positions(placement.theta)
-            responses = []
-            for handles, p, theta, by_T in zip(
-                self._handles,
-                self._map.parameters(placement.p),
-                positions,
-                self._derivatives(placement.p, positions),
-                strict=True,
-            ):
-                sides = choose_sides(handles, p, theta, by_T)
-                _, bend, mixed = second_derivatives(handles, p, theta, sides, by_T)
-                responses.append(_Response(sides.free, cho_factor(bend), mixed))
-            self._known = placement, responses
+            parts, positions = self._map.parameters(placement.p), self._map.positions(placement.theta)
+            links = zip(self._handles, parts, positions, self._derivatives(placement.p, positions), strict=True)
+            self._known = placement, [by_positions(*link) for link in links]
         return self._known[1]
 
 
-_LARGEST_TURN = 0.5  # rad per step
-_GAP_KEPT = 0.2  # of the gap to the next handle, per step
-_FLATTEST = 1e-8  # smallest eigenvalue of the Hessian, relative to the largest
+# -- derivatives of S for one link, and steps ------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
-class LinkDerivatives:
-    """Derivatives of S at one point.
+class MapDerivatives:
+    """Derivatives of S by the maps of a link's handles.
 
     Attributes:
         gradient: ∂S/∂T, (n, 2, 3).
@@ -255,48 +238,56 @@ class LinkDerivatives:
 
 
 @dataclass(frozen=True, eq=False)
-class Sides:
-    """From which side each handle is differentiated.
+class PositionDerivatives:
+    """Derivatives of S by the positions of a link's free handles, to the side to which each of them moves.
 
     Attributes:
         segments: the segment of the spline each handle moves in, (n,).
         free: which handles move, (n,).
+        slope: S_θ, (f,).
+        bend: S_θθ, (f, f).
+        mixed: S_θp, (f, parameters).
     """
 
     segments: np.ndarray
     free: np.ndarray
+    slope: np.ndarray
+    bend: np.ndarray
+    mixed: np.ndarray
+
+    @cached_property
+    def factor(self) -> tuple[np.ndarray, bool]:
+        """The Cholesky factor of S_θθ at a minimum."""
+        return cho_factor(self.bend)
 
 
-def choose_sides(handles: LinkHandles, p: np.ndarray, theta: np.ndarray, by_T: LinkDerivatives) -> Sides:
-    """The side to which S falls, for handles at a control point; their segment, for others."""
-    after = handles.segments(theta)
-    at_kink = handles.slides & (theta == after)
+def by_positions(handles: LinkHandles, p: np.ndarray, theta: np.ndarray, by_T: MapDerivatives) -> PositionDerivatives:
+    """Derivatives of S by θ, from those by the maps; at a control point to the side to which S falls.
+
+    S_θ = S_T · T_θ,     S_θθ = T_θ · S_TT · T_θ + S_T · T_θθ,     S_θp alike.
+    """
+    segments = after = handles.segments(theta)
     free = handles.slides | handles.turns
-    if not np.any(at_kink):
-        return Sides(after, free)
-    before = np.where(at_kink, after - 1, after)
-    forward, backward = (
-        np.sum(by_T.gradient * handles.gradients(p, theta, segments=side)[1], axis=(1, 2)) for side in (after, before)
-    )
-    held = at_kink & (forward >= 0.0) & (backward <= 0.0)
-    return Sides(np.where(at_kink & (forward >= 0.0), before, after), free & ~held)
-
-
-def second_derivatives(
-    handles: LinkHandles, p: np.ndarray, theta: np.ndarray, sides: Sides, by_T: LinkDerivatives
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """S_θ (f,), S_θθ (f, f) and S_θp (f, parameters) of the free handles."""
-    by_p, by_theta = handles.gradients(p, theta, segments=sides.segments)
-    mixed, twice = handles.curvatures(p, theta, by_T.gradient, segments=sides.segments)
-    free = sides.free
+    at_kink = handles.slides & (theta == after)
+    if np.any(at_kink):
+        before = np.where(at_kink, after - 1, after)
+        forward, backward = (
+            np.sum(by_T.gradient * handles.gradients(p, theta, segments=side)[1], axis=(1, 2))
+            for side in (after, before)
+        )
+        segments = np.where(at_kink & (forward >= 0.0), before, after)
+        free &= ~(at_kink & (forward >= 0.0) & (backward <= 0.0))
+    by_p, by_theta = handles.gradients(p, theta, segments=segments)
+    mixed, twice = handles.curvatures(p, theta, by_T.gradient, segments=segments)
     slope = np.einsum("jak,jak->j", by_T.gradient, by_theta)[free]
-    pulled = np.einsum("jak,jakmbl->jmbl", by_theta, by_T.hessian)[free]
-    bend = np.einsum("jmbl,mbl->jm", pulled, by_theta)[:, free] + np.diag(twice[free])
-    return slope, 0.5 * (bend + bend.T), np.einsum("jmbl,mblp->jp", pulled, by_p) + mixed[free]
+    rows = np.einsum("jak,jakmbl->jmbl", by_theta, by_T.hessian)[free]
+    bend = np.einsum("jmbl,mbl->jm", rows, by_theta)[:, free] + np.diag(twice[free])
+    mixed = np.einsum("jmbl,mblp->jp", rows, by_p) + mixed[free]
+    return PositionDerivatives(segments, free, slope, 0.5 * (bend + bend.T), mixed)
 
 
 @dataclass(frozen=True, eq=False)
-class LinkStep:
+class _Step:
     """A step of the handles of one link.
 
     Attributes:
@@ -321,25 +312,26 @@ class LinkStep:
         moved = theta + fraction * self.step
         return np.where(self.handles.slides, np.clip(moved, self.segments, self.segments + 1), moved)
 
-    def longest(self, theta: np.ndarray) -> float:
+    def longest(self, theta: np.ndarray, options: HandleOptions) -> float:
         """The largest fraction, up to 1, that keeps handles in order and turns joints moderately."""
         slides = self.handles.slides
         turn = np.abs(self.step[~slides]).max(initial=0.0)
         gaps, closing = np.diff(_along(self.handles, theta)), -np.diff(np.where(slides, self.step, 0.0))
-        limits = (1.0 - _GAP_KEPT) * gaps[closing > 0.0] / closing[closing > 0.0]
-        return min(1.0, _LARGEST_TURN / max(turn, _LARGEST_TURN), limits.min(initial=1.0))
+        limits = (1.0 - options.kept) * gaps[closing > 0.0] / closing[closing > 0.0]
+        return min(1.0, options.turn / max(turn, options.turn), limits.min(initial=1.0))
 
 
-def link_step(handles: LinkHandles, p: np.ndarray, theta: np.ndarray, by_T: LinkDerivatives) -> LinkStep:
+def _newton_step(
+    handles: LinkHandles, p: np.ndarray, theta: np.ndarray, by_T: MapDerivatives, flattest: float
+) -> _Step:
     """Newton's step −|S_θθ|⁻¹ S_θ, with the eigenvalues of the Hessian made positive."""
-    sides = choose_sides(handles, p, theta, by_T)
-    free_slope, bend, _ = second_derivatives(handles, p, theta, sides, by_T)
-    values, vectors = np.linalg.eigh(bend)
-    values = np.maximum(np.abs(values), _FLATTEST * np.abs(values).max(initial=0.0))
+    by_theta = by_positions(handles, p, theta, by_T)
+    values, vectors = np.linalg.eigh(by_theta.bend)
+    values = np.maximum(np.abs(values), flattest * np.abs(values).max(initial=0.0))
     step, slope = np.zeros(len(handles)), np.zeros(len(handles))
-    step[sides.free] = -vectors @ (vectors.T @ free_slope / values)
-    slope[sides.free] = free_slope
-    return LinkStep(handles, step, slope, sides.segments)
+    step[by_theta.free] = -vectors @ (vectors.T @ by_theta.slope / values)
+    slope[by_theta.free] = by_theta.slope
+    return _Step(handles, step, slope, by_theta.segments)
 
 
 def follow_spline(handles: LinkHandles, p: np.ndarray) -> np.ndarray:
@@ -350,22 +342,20 @@ def follow_spline(handles: LinkHandles, p: np.ndarray) -> np.ndarray:
     return np.where(handles.slides, handles.t, np.where(handles.turns, turn, 0.0))
 
 
-def in_order(handles: LinkHandles, theta: np.ndarray) -> bool:
-    """Whether the handles follow each other along the spline, between its ends."""
-    return bool(np.all(np.diff(_along(handles, theta)) > 0.0))
-
-
 def _along(handles: LinkHandles, theta: np.ndarray) -> np.ndarray:
     """Spline parameters of all handles, joints too."""
     return np.where(handles.slides, theta, handles.t)
 
 
-class MomentHessian:
-    """Reduces Hessians in the design field to the maps of the handles.
+class _MomentHessian:
+    """The Hessian H of a sum over cells, seen by the maps of the handles: ∂²/∂T_j∂T_k = Σ_il r_ij ⊗ H_il ⊗ r_lk.
+
+    Vertices that all handles move alike (those on one column of an extruded link) are added up first, which leaves
+    little to multiply.
 
     Args:
         shape_map: the map from handles to the field.
-        hessian: a matrix with the pattern of all that will be reduced (collective).
+        hessian: a matrix with the pattern of all that will be reduced.
     """
 
     def __init__(self, shape_map: ShapeMap, hessian: PETSc.Mat) -> None:
@@ -376,13 +366,16 @@ class MomentHessian:
         for vertices, reach in zip(shape_map.vertices, shape_map.reach, strict=True):
             rows, inverse = np.unique(reach.reshape(len(reach), -1), axis=0, return_inverse=True)
             classes[vertices] = first + inverse.ravel()
-            self._arms.append(_arms(rows.reshape(-1, *reach.shape[1:])))
+            # ∂d/∂T of every class from its r, (2 classes, 6 handles)
+            arms = np.zeros((len(rows), 2, reach.shape[1], 2, 3))
+            arms[:, 0, :, 0] = arms[:, 1, :, 1] = rows.reshape(-1, *reach.shape[1:])
+            self._arms.append(arms.reshape(2 * len(rows), -1))
             self._unknowns.append(slice(2 * first, 2 * (first + len(rows))))
             first += len(rows)
         self._find_slots(hessian, classes, 2 * first)
 
     def reduce(self, hessian: PETSc.Mat) -> list[np.ndarray]:
-        """∂²/∂T∂T per link, (handles, 2, 3, handles, 2, 3) (collective)."""
+        """∂²/∂T∂T per link, (handles, 2, 3, handles, 2, 3)."""
         values = hessian.getValuesCSR()[2][self._kept]
         self._sum.data = np.bincount(self._slots, weights=values, minlength=self._sum.nnz)
         blocks = []
@@ -405,11 +398,3 @@ class MomentHessian:
         keys = (2 * row_class + rows % dim) * size + 2 * column_class + columns % dim
         used, self._slots = np.unique(keys[self._kept], return_inverse=True)
         self._sum = csr_matrix((np.zeros(len(used)), np.divmod(used, size)), shape=(size, size))
-
-
-def _arms(reach: np.ndarray) -> np.ndarray:
-    """∂d/∂T from r (classes, handles, 3), (2 classes, 6 handles)."""
-    count, handles, _ = reach.shape
-    arms = np.zeros((count, 2, handles, 2, 3))
-    arms[:, 0, :, 0] = arms[:, 1, :, 1] = reach
-    return arms.reshape(2 * count, 6 * handles)

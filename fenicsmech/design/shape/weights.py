@@ -3,27 +3,10 @@
     min Σ_j ½ w_jᵀ (L M⁻¹ L + c D) w_j    with  0 ≤ w ≤ 1,  Σ_j w_j = 1,
     w_j = 1 at handle j and on the whole interface that it holds, 0 on those of all others,
 
-L, M: stiffness and lumped mass of linear elements, D = ∫ ∂N_i/∂z ∂N_k/∂z. The weights of an extruded link are
-sought on its plan, so that they do not change through its depth at all; D serves other solids. A. Jacobson, I. Baran,
-J. Popović, O. Sorkine: Bounded biharmonic weights for real-time deformation (doi:10.1145/1964921.1964973).
-
-
-----
-Points made vertices of a mesh: the cells that hold a point are split there.
-
-----
-Stiffness and lumped mass of linear elements on triangles and tetrahedra, with SciPy.
-
-----
-The quadratic program of bounded weights that sum to one, solved by PETSc/TAO.
-
-    min  Σ_j ½ w_jᵀ Q w_j + c_jᵀ w_j   over w ≥ 0 with Σ_j w_j = 1
-
-by the method of multipliers: the trust-region Newton method TRON minimises, within the bounds,
-
-    Σ_j (½ w_jᵀ Q w_j + c_jᵀ w_j) + λᵀ s + κ/2 sᵀ D s,     s = Σ_j w_j − 1,  D = diag Q,
-
-and then λ ← λ + κ D s. Every round shrinks s by a factor that does not depend on the mesh.
+L, M: stiffness and lumped mass of linear elements, D = ∫ ∂N_i/∂z ∂N_k/∂z, c = 1000 / depth². The weights of an extruded
+link are sought on its plan, so that they do not change through its depth at all; D serves other solids. Handles between
+joints are vertices of the mesh: the cells that hold them are split there. A. Jacobson, I. Baran, J. Popović,
+O. Sorkine: Bounded biharmonic weights for real-time deformation (doi:10.1145/1964921.1964973).
 """
 
 from __future__ import annotations
@@ -35,8 +18,6 @@ from scipy.sparse import coo_matrix, csr_matrix, diags, identity, kron
 from fenicsmech.design.shape.handles import BETWEEN, LinkHandles
 from fenicsmech.errors import FenicsmechError
 from fenicsmech.meshing import FREE, LinkMesh, cell_measures, plan_of
-
-_OUT_OF_PLANE = 1000.0  # c, per square of the depth
 
 
 def handle_weights(mesh: LinkMesh, handles: LinkHandles, *, part: str = "link") -> np.ndarray:
@@ -83,12 +64,11 @@ def _energy(mesh: LinkMesh) -> csr_matrix:
     Q = L @ diags(1.0 / lumped_mass(mesh)) @ L
     if mesh.dim == 3:
         depth = np.ptp(mesh.points[:, 2])
-        Q = Q + _OUT_OF_PLANE / depth**2 * stiffness(mesh, axis=2)
+        Q = Q + 1000.0 / depth**2 * stiffness(mesh, axis=2)
     return csr_matrix(Q)
 
 
-_SNAP = 0.05  # below this barycentric coordinate a point is close to the opposite face
-_INSIDE = 1e-9  # barycentric coordinates above minus this are inside
+_INSIDE = 1e-9  # barycentric coordinates above minus this are inside: rounding
 
 
 def pierced(mesh: LinkMesh, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -110,7 +90,7 @@ def pierced(mesh: LinkMesh, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     enter = np.where(rise > 0.0, crossing, np.where((rise < 0.0) | (start >= -_INSIDE), -np.inf, np.inf)).max(axis=1)
     leave = np.where(rise < 0.0, crossing, np.inf).min(axis=1)
     height = np.ptp(mesh.points[mesh.cells, 2], axis=1)
-    cells = np.flatnonzero(leave - enter > _SNAP * height)
+    cells = np.flatnonzero(leave - enter > 0.05 * height)  # the line cuts no mere corner
     return cells, np.column_stack([np.tile(at, (len(cells), 1)), 0.5 * (enter + leave)[cells]])
 
 
@@ -124,7 +104,7 @@ def insert(mesh: LinkMesh, at: np.ndarray) -> tuple[LinkMesh, int]:
     coordinates = _barycentric(mesh, at)
     home = int(np.argmax(coordinates.min(axis=1)))
     nearest = np.argsort(coordinates[home])[::-1]
-    least = np.count_nonzero(coordinates[home] > _SNAP)
+    least = np.count_nonzero(coordinates[home] > 0.05)  # below, the point is close to the opposite face
     ways = []
     for count in range(least, len(nearest) + 1):
         near = cells[home][nearest[:count]]
@@ -165,8 +145,8 @@ def _barycentric(mesh: LinkMesh, at: np.ndarray) -> np.ndarray:
 
 def lumped_mass(mesh: LinkMesh) -> np.ndarray:
     """∫ N_i dx, (n,)."""
-    share = np.abs(cell_measures(mesh.points, mesh.cells)) / (mesh.dim + 1)
-    return np.bincount(mesh.cells.ravel(), np.repeat(share, mesh.dim + 1), minlength=len(mesh.points))
+    corner = np.abs(cell_measures(mesh.points, mesh.cells)) / (mesh.dim + 1)
+    return np.bincount(mesh.cells.ravel(), np.repeat(corner, mesh.dim + 1), minlength=len(mesh.points))
 
 
 def stiffness(mesh: LinkMesh, *, axis: int | None = None) -> csr_matrix:
@@ -184,18 +164,26 @@ def stiffness(mesh: LinkMesh, *, axis: int | None = None) -> csr_matrix:
     return csr_matrix(coo_matrix((local.ravel(), (rows.ravel(), columns.ravel())), shape=(count, count)))
 
 
-_PENALTY = 3.0  # κ: larger ones save rounds, but their minimisations take longer
-_CLOSE = 1e-9
-_ROUNDS = 100
+def solve_partition(
+    Q: csr_matrix, c: np.ndarray, *, part: str, penalty: float = 3.0, tolerance: float = 1e-9, rounds: int = 100
+) -> np.ndarray:
+    """The bounded weights that sum to one and minimise a quadratic energy, by PETSc/TAO, (n, k).
 
+        min  Σ_j ½ w_jᵀ Q w_j + c_jᵀ w_j   over w ≥ 0 with Σ_j w_j = 1
 
-def solve_partition(Q: csr_matrix, c: np.ndarray, *, part: str) -> np.ndarray:
-    """The weights w (n, k), to about 1e-9.
+    by the method of multipliers: the trust-region Newton method TRON minimises, within the bounds,
+
+        Σ_j (½ w_jᵀ Q w_j + c_jᵀ w_j) + λᵀ s + κ/2 sᵀ D s,     s = Σ_j w_j − 1,  D = diag Q,
+
+    and then λ ← λ + κ D s. Every round shrinks s by a factor that does not depend on the mesh.
 
     Args:
         Q: symmetric positive definite, (n, n), sparse.
         c: linear terms, (n, k).
         part: what the weights belong to, for messages.
+        penalty: κ; larger ones save rounds, but their minimisations take longer.
+        tolerance: largest |s| accepted; TRON minimises a hundred times closer.
+        rounds: most updates of λ.
 
     Raises:
         FenicsmechError: the multipliers did not converge.
@@ -203,9 +191,9 @@ def solve_partition(Q: csr_matrix, c: np.ndarray, *, part: str) -> np.ndarray:
     n, k = c.shape
     scale = Q.diagonal().mean()
     Q, c = Q / scale, c / scale
-    penalty = _PENALTY * Q.diagonal()
+    stiff = penalty * Q.diagonal()
     # unknowns weight by weight, vertex by vertex: w_11, w_12, …, w_1k, w_21, …
-    hessian = csr_matrix(kron(Q, identity(k)) + kron(diags(penalty), np.ones((k, k))))
+    hessian = csr_matrix(kron(Q, identity(k)) + kron(diags(stiff), np.ones((k, k))))
     hessian.sort_indices()
     H = PETSc.Mat().createAIJ(hessian.shape, csr=(hessian.indptr, hessian.indices, hessian.data), comm=PETSc.COMM_SELF)
     linear = H.createVecRight()
@@ -224,18 +212,18 @@ def solve_partition(Q: csr_matrix, c: np.ndarray, *, part: str) -> np.ndarray:
     tao.setObjectiveGradient(objective, slope)
     tao.setHessian(lambda *_: None, H)
     tao.setVariableBounds((lower, upper))
-    tao.setTolerances(gatol=1e-2 * _CLOSE, grtol=0.0, gttol=0.0)
+    tao.setTolerances(gatol=1e-2 * tolerance, grtol=0.0, gttol=0.0)
     tao.getKSP().getPC().setType(PETSc.PC.Type.ICC)
     tao.setSolution(w)
 
     multipliers = np.zeros(n)
     try:
-        for _ in range(_ROUNDS):
-            linear.array[:] = (c + (multipliers - penalty)[:, None]).ravel()
+        for _ in range(rounds):
+            linear.array[:] = (c + (multipliers - stiff)[:, None]).ravel()
             tao.solve()
             excess = w.array.reshape(n, k).sum(axis=1) - 1.0
-            multipliers += penalty * excess
-            if np.abs(excess).max() < _CLOSE:
+            multipliers += stiff * excess
+            if np.abs(excess).max() < tolerance:
                 return w.array.reshape(n, k).copy()
     finally:
         # at once: PETSc forgets what the functions of a solver hold if the solver itself was queued
