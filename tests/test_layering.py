@@ -30,6 +30,8 @@ LAYERS = (
     "elasticity",
     "effects",
     "equilibrium",
+    "model",
+    "estimates",
     "simulation",
     "design",
     "accuracy",

@@ -26,7 +26,7 @@ from scipy.spatial import cKDTree
 from fenicsmech.compat import cell_dofs, cell_nodes, compile_form, original_nodes, scalar_space
 from fenicsmech.elasticity import PLANE_STRESS
 from fenicsmech.errors import DescriptionError
-from fenicsmech.simulation.model import MechanismModel
+from fenicsmech.model import MechanismModel
 
 _DECAY = 0.2  # c: estimates are 0.6 to 1.4 times what space adds to cantilever, arch, truss, claw and Klann leg
 _DEGREE = 8  # of the quadrature: w decays within a cell
