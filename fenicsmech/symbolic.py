@@ -1,6 +1,6 @@
 """Functions given by formulae: derivatives are derived symbolically, and all is compiled to Python once.
 
-    f(x; c) ∈ Rᵐ,     ∂f_k/∂x_i,     Σ_k w_k ∂²f_k/∂x_i∂x_j     with variables x ∈ Rⁿ and constants c.
+f(x; c) ∈ Rᵐ,     ∂f_k/∂x_i,     Σ_k w_k ∂²f_k/∂x_i∂x_j     with variables x ∈ Rⁿ and constants c.
 """
 
 from __future__ import annotations

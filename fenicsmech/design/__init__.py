@@ -1,38 +1,10 @@
 """Shape design of flexible links.
 
-How a link's shape follows its parameters, in the order of their use
-    ``spline``            centreline and thickness as a cubic Hermite spline; ``spline_fit`` finds the first one
-    ``handles``           where the spline takes hold of the mesh; ``transforms`` what a handle does around it,
-                          ``handle_placement`` where handles go
-    ``weights``           bounded biharmonic weights; on the plan of an extruded link, with handles as vertices
-                          (``insertion``), from a ``laplacian`` and a quadratic program (``partition``)
-    ``link_shape``        all of these for one link
-    ``shape_map``         parameters and handle positions → design field on the distributed mesh, and its transpose
-    ``quality``           aspect ratios of cells, their sum as a form
-    ``handle_optimum``    handle positions that make the mesh best, and their derivative by the parameters; one Newton
-                          step in ``handle_step``, Hessians between handles in ``moment_hessian``
-
-    ``rest_shape``        the rest shape as a function of p alone, handles at their best
-
-Derivatives of the mechanism
-    ``sensitivity``       adjoint derivatives of displacements by design field, moduli and force
-
-What is minimised
-    ``spline_design``     which links may change, and what is wanted: plain data
-    ``regularisers``      closeness to the start, bounds of fabrication at ``spline_samples``, mesh quality, by a
-                          ``barrier``
-    ``equilibria``        the targets' equilibria, followed from design to design
-    ``objective``         distances from targets plus regularisers, with derivatives
-    ``objective_error``   how wrong it is because elements are not infinitely fine
-    ``groups``, ``team``  targets spread over groups of processes; one process decides
-    ``optimisers``        Levenberg–Marquardt, BFGS
-
-    ``characterisation``  Young's modulus from measurements
-
-What a user sees
-    ``design_problem``    the entry point, with its ``problem_checks``; ``progress`` and ``checkpoint`` while it runs,
-                          ``conclusion`` at its end
-    ``result``            designs as plain data; ``link_files`` pictures and solids of them
+A ``DesignProblem`` is described as plain data (``description``), minimised by one of the ``optimisers`` in a ``run``,
+and ends in a ``DesignResult``. Its ``objective`` is made of the targets' ``equilibria`` with their adjoint
+``sensitivity``, and of ``regularisers``. The ``rest_shape`` of the links follows the parameters through ``shape``:
+``spline``, ``handles`` that ride on it, ``weights`` by which handles move the mesh, the ``shape_map`` of these, and
+the ``handle_optimum`` that makes the mesh ``quality`` best. ``characterisation`` fits Young's modulus to measurements.
 """
 
 from fenicsmech.design.characterisation import Experiment, ModulusFit, fit_modulus
@@ -40,19 +12,18 @@ from fenicsmech.design.description import Bounds, SplineDesign, Target, shape_re
 from fenicsmech.design.design_problem import DesignProblem
 from fenicsmech.design.equilibria import Known, TargetEquilibria
 from fenicsmech.design.objective import Objective, group_count, objective_error, split, target_errors, target_scales
-from fenicsmech.design.optimisers import (
-    BFGS,
+from fenicsmech.design.optimisers.bfgs import BFGS
+from fenicsmech.design.optimisers.levenberg_marquardt import LevenbergMarquardt, Resolution
+from fenicsmech.design.optimisers.problem import (
     Evaluation,
     Infeasible,
     Iterate,
-    LevenbergMarquardt,
     Optimiser,
     Quadratic,
     Reason,
     Start,
     TooHigh,
 )
-from fenicsmech.design.optimisers.problem import Resolution
 from fenicsmech.design.regularisers import MeshQuality, Model, Regulariser, ShapeBounds, StayClose
 from fenicsmech.design.rest_shape import DesignedLink, RestShape
 from fenicsmech.design.result import DesignResult, LinkDesign, TargetResult
@@ -74,8 +45,8 @@ from fenicsmech.design.shape.weights import insert, lumped_mass, pierced, solve_
 __all__ = [
     "Adjoint",
     "BETWEEN",
-    "Barrier",
     "BFGS",
+    "Barrier",
     "Bounds",
     "Checkpoint",
     "DesignProblem",
@@ -90,15 +61,15 @@ __all__ = [
     "Iterate",
     "Known",
     "LevenbergMarquardt",
-    "MapDerivatives",
     "LinkDesign",
     "LinkHandles",
     "LinkSpline",
+    "MapDerivatives",
     "MeshQuality",
-    "Optimiser",
     "Model",
     "ModulusFit",
     "Objective",
+    "Optimiser",
     "Quadratic",
     "QualitySum",
     "Reason",

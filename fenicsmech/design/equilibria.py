@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fenicsmech.design.description import Target
-from fenicsmech.design.optimisers import Infeasible
+from fenicsmech.design.optimisers.problem import Infeasible
 from fenicsmech.design.sensitivity import Adjoint
 from fenicsmech.equilibrium import IDLE_STIFFNESS, Iteration, LoadControl, NotConverged, State
 from fenicsmech.errors import EquilibriumError

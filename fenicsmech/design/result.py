@@ -1,10 +1,4 @@
-"""Designs as plain data: what was found, how well it meets its targets, and files of it.
-
-----
-The end of an optimisation: its equilibria verified, its outcome as plain data.
-
-----
-Files of designed links: a picture before and after, and solids to make them from."""
+"""Designs as plain data: what was found, how well it meets its targets; its verification, and files of its links."""
 
 from __future__ import annotations
 
@@ -19,7 +13,7 @@ from fenicsmech.collective import on_one
 from fenicsmech.design.description import Target
 from fenicsmech.design.equilibria import TargetEquilibria
 from fenicsmech.design.objective import target_errors, target_scales
-from fenicsmech.design.optimisers import Infeasible
+from fenicsmech.design.optimisers.problem import Infeasible
 from fenicsmech.design.rest_shape import DesignedLink, RestShape
 from fenicsmech.design.shape.handle_optimum import Placement
 from fenicsmech.design.shape.shape_map import gather_links
@@ -31,6 +25,7 @@ from fenicsmech.multibody import Linkage, assemble
 from fenicsmech.report import DesignShape, LinkOutline, atomic_write, draw_designs
 from fenicsmech.simulation import Draughtsman, Simulation, rest_vertices
 
+_log = logger(__name__)
 _FORMAT = "fenicsmech design 1"
 
 
@@ -137,13 +132,13 @@ class DesignResult:
         return sum(len(link.parameters) for link in self.links)
 
     def save(self, path: str | Path) -> None:
-        """Writes the result as JSON (call it on one process)."""
+        """Local. Writes the result as JSON; call it on one process."""
         with atomic_write(Path(path)) as file:
             file.write(json.dumps({"format": _FORMAT, **asdict(self)}, indent=2, ensure_ascii=False))
 
     @staticmethod
     def load(path: str | Path) -> DesignResult:
-        """A result that was saved.
+        """Local. A result that was saved.
 
         Raises:
             DescriptionError: there is no such file, or it holds no design.
@@ -164,25 +159,12 @@ class DesignResult:
 
 
 def _read(data: dict) -> DesignResult:
-    links = tuple(
-        LinkDesign(
-            name=link["name"],
-            parameters=tuple(link["parameters"]),
-            handles=tuple(link["handles"]),
-            controls=tuple(tuple(tuple(row) for row in point) for point in link["controls"]),
-            thickness=tuple(link["thickness"]),
-            bend=link["bend"],
-        )
-        for link in data.pop("links")
-    )
+    def frozen(value):
+        return tuple(map(frozen, value)) if isinstance(value, list) else value
+
+    links = tuple(LinkDesign(**{key: frozen(value) for key, value in link.items()}) for link in data.pop("links"))
     targets = tuple(TargetResult(**target) for target in data.pop("targets"))
-    active, objective = tuple(data.pop("active")), tuple(data.pop("objective"))
-    return DesignResult(links=links, targets=targets, active=active, objective=objective, **data)
-
-
-_log = logger(__name__)
-
-_SAME = 1e-6  # relative difference between displacements of one equilibrium
+    return DesignResult(links=links, targets=targets, **{key: frozen(value) for key, value in data.items()})
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,7 +183,7 @@ class Verification:
 
 
 def verify(simulation: Simulation, targets: Sequence[Target], followed: np.ndarray) -> Verification:
-    """Loads the targets from zero, which is what a user will do, and logs where that leads elsewhere (collective).
+    """Loads the targets from zero, which is what a user will do, and logs where that leads elsewhere.
 
     Args:
         simulation: has the shapes of the optimum.
@@ -215,7 +197,8 @@ def verify(simulation: Simulation, targets: Sequence[Target], followed: np.ndarr
         _log.warning("loaded from zero, the optimum does not reach all its targets: %s", failure)
         return Verification(followed, False, None)
     verified = np.array([sample.displacement for sample in traced.samples])
-    different = np.flatnonzero(np.abs(verified - followed) > _SAME * target_scales(targets))
+    # displacements of one equilibrium differ by less
+    different = np.flatnonzero(np.abs(verified - followed) > 1e-6 * target_scales(targets))
     for index in different:
         _log.warning(
             "target %d of the optimum: %.6g when loaded from zero, %.6g when followed from the drawn design",
@@ -267,7 +250,7 @@ def link_designs(rest: RestShape, placement: Placement) -> tuple[LinkDesign, ...
 
 
 def rest_meshes(simulation: Simulation, links: Sequence[FlexibleLink]) -> list[LinkMesh] | None:
-    """Meshes of some links in their present shape on the first process, None elsewhere (collective).
+    """Meshes of some links in their present shape on the first process, None elsewhere.
 
     Links of which one half is meshed are given by their plan.
     """
@@ -277,7 +260,7 @@ def rest_meshes(simulation: Simulation, links: Sequence[FlexibleLink]) -> list[L
     return on_one(simulation.comm, lambda: [plan_of(mesh).mesh for mesh in chosen] if halves else chosen)
 
 
-def outline(link: DesignedLink, mesh: LinkMesh, p: np.ndarray) -> LinkOutline:
+def _outline(link: DesignedLink, mesh: LinkMesh, p: np.ndarray) -> LinkOutline:
     """The outline of a link, with centreline, thickness and control points of its parameters ``p``."""
     plan = plan_of(mesh).mesh
     loops = [plan.points[loop] for loop in boundary_loops(f"link {link.name!r}", plan)]
@@ -293,48 +276,27 @@ def draw_links(
     path: str | Path,
     simulation: Simulation,
     links: Sequence[FlexibleLink],
-    before: Sequence[LinkOutline],
-    after: Sequence[LinkOutline],
+    designed: Sequence[DesignedLink],
+    before: tuple[np.ndarray, Sequence[LinkMesh]],
+    after: tuple[np.ndarray, Sequence[LinkMesh]],
 ) -> None:
-    """Draws links before and after a change (call it on the first process)."""
-    scene, linkage = simulation.scene, simulation.linkage
-    pen = Draughtsman(scene.mechanism, linkage, simulation.model.mesh)
-    shapes = [
-        DesignShape(link.name, old, new, np.array(_joints(linkage, link)))
-        for link, old, new in zip(links, before, after, strict=True)
-    ]
-    rigid = pen.rigid(assemble(linkage, DRAWN).poses)
+    """Local. Draws links before and after a change, from the parameters p and the meshes of both."""
+    scene, linkage, shapes = simulation.scene, simulation.linkage, []
+    for k, (link, change) in enumerate(zip(links, designed, strict=True)):
+        old, new = (_outline(change, meshes[k], p[change.place]) for p, meshes in (before, after))
+        joints = np.array([linkage.bodies[i].centre[:2] for i in linkage.interfaces[link]])
+        shapes.append(DesignShape(link.name, old, new, joints))
+    rigid = Draughtsman(scene.mechanism, linkage, simulation.model.mesh).rigid(assemble(linkage, DRAWN).poses)
     draw_designs(path, shapes, rigid=rigid, unit=scene.units.length, title=f"{scene.mechanism.name}: links")
 
 
 def write_solids(
     folder: str | Path, linkage: Linkage, links: Sequence[FlexibleLink], meshes: Sequence[LinkMesh], pin: float | None
-) -> list[Path]:
-    """Writes ``NAME.step`` and ``NAME.stl`` of every link (call it on the first process).
-
-    Args:
-        folder: where to; it is created.
-        linkage: knows the joints.
-        links: the links.
-        meshes: their meshes.
-        pin: diameter of the holes left for the pins of round interfaces; None leaves the links whole.
-
-    Returns:
-        The files.
-
-    Raises:
-        MeshingError: no solid can be made of a link.
-    """
-    files = []
+) -> None:
+    """Local. Writes ``NAME.step`` and ``NAME.stl`` of every link, see ``DesignProblem.export``."""
     for link, mesh in zip(links, meshes, strict=True):
         regions = [linkage.bodies[i] for i in linkage.interfaces[link]]
         pins = [PinHole(tuple(b.centre[:2]), pin) for b in regions if pin and isinstance(b.region, Disc)]
         stem = Path(folder) / link.name.replace(" ", "-")
         for suffix, write in ((".step", write_step), (".stl", write_stl)):
-            files.append(stem.with_suffix(suffix))
-            write(files[-1], mesh, depth=link.shape.depth, pins=pins, name=link.name)
-    return files
-
-
-def _joints(linkage: Linkage, link: FlexibleLink) -> list[tuple[float, ...]]:
-    return [linkage.bodies[i].centre[:2] for i in linkage.interfaces[link]]
+            write(stem.with_suffix(suffix), mesh, depth=link.shape.depth, pins=pins, name=link.name)

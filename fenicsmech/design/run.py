@@ -1,13 +1,8 @@
-"""One process decides, all compute: a optimiser runs on the first process, the others evaluate with it.
+"""A run of an optimiser: one process decides and all compute, with a line of progress and checkpoints on the way.
 
-Decisions that hang on the last bit of a number can then not differ between processes.
-
-
-----
-Checkpoints: what a minimisation needs to go on after its process was killed, as JSON that is always complete.
-
-----
-Progress of an optimisation: iteration, objective, worst target error, and how long still."""
+The optimiser runs on the first process, the others evaluate with it: decisions that hang on the last bit of a number
+can then not differ between processes.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +20,7 @@ from mpi4py import MPI
 from fenicsmech.collective import from_one, on_all
 from fenicsmech.design.description import Target
 from fenicsmech.design.objective import Objective
-from fenicsmech.design.optimisers import Evaluation, Infeasible, Iterate, Optimiser, Reason, Start
+from fenicsmech.design.optimisers.problem import Evaluation, Infeasible, Iterate, Optimiser, Reason, Start
 from fenicsmech.design.regularisers import Regulariser
 from fenicsmech.design.rest_shape import RestShape
 from fenicsmech.errors import DescriptionError
@@ -34,8 +29,8 @@ from fenicsmech.simulation import Simulation
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
-    """How a minimisation ended.
+class Optimum:
+    """How a run ended.
 
     Attributes:
         number, evaluations, parameters, reason: as in ``Iterate`` and its evaluation.
@@ -49,50 +44,17 @@ class Outcome:
     started: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
-class _Evaluate:
-    """A request to evaluate the objective."""
-
-    parameters: np.ndarray
-    below: float
-
-    def answer(self, objective: Objective) -> Evaluation:
-        return objective.evaluate(self.parameters, self.below)
-
-
-@dataclass(frozen=True)
-class _Estimate:
-    """A request for the errors of the residuals at the best design so far."""
-
-    def answer(self, objective: Objective) -> np.ndarray:
-        return objective.errors()
-
-
-class _Leader:
-    """The objective as the first process sees it: the others are told what to evaluate."""
-
-    def __init__(self, comm: MPI.Comm, objective: Objective) -> None:
-        self._comm, self._objective, self.lengths = comm, objective, objective.lengths
-
-    def evaluate(self, parameters: np.ndarray, below: float = np.inf) -> Evaluation:
-        return replace(self._ask(_Evaluate(parameters, below)), errors=lambda: self._ask(_Estimate()))
-
-    def _ask(self, request: _Evaluate | _Estimate):
-        self._comm.bcast(request, root=0)
-        return request.answer(self._objective)
-
-
 def minimise_together(
     comm: MPI.Comm, objective: Objective, optimiser: Optimiser, start: Start, *, watch: Callable[[Iterate], None]
-) -> Outcome:
-    """The outcome of ``optimiser`` on all processes (collective); ``watch`` is called on the first.
+) -> Optimum:
+    """The optimum found by ``optimiser``, on all processes; ``watch`` is called on the first.
 
     Raises:
         Infeasible: at the start.
         Exception: whatever ``watch`` raises, on all processes.
     """
 
-    def lead() -> Outcome:
+    def lead() -> Optimum:
         started = []
 
         def watch_first(iterate: Iterate) -> None:
@@ -100,12 +62,26 @@ def minimise_together(
             watch(iterate)
 
         try:
-            last = optimiser.minimise(_Leader(comm, objective), start, watch=watch_first)
+            last = optimiser.minimise(_Shared(comm, objective), start, watch=watch_first)
         finally:
             comm.bcast(None, root=0)
-        return Outcome(last.number, last.evaluations, last.evaluation.parameters, last.reason, started[0])
+        return Optimum(last.number, last.evaluations, last.evaluation.parameters, last.reason, started[0])
 
     return comm.bcast(on_all(comm, lambda: lead() if comm.rank == 0 else _follow(comm, objective)), root=0)
+
+
+class _Shared:
+    """The objective as the first process sees it: what it asks for, all compute."""
+
+    def __init__(self, comm: MPI.Comm, objective: Objective) -> None:
+        self._comm, self._objective, self.lengths = comm, objective, objective.lengths
+
+    def evaluate(self, parameters: np.ndarray, below: float = np.inf) -> Evaluation:
+        return replace(self._ask("evaluate", parameters, below), errors=lambda: self._ask("errors"))
+
+    def _ask(self, method: str, *arguments):
+        self._comm.bcast((method, arguments), root=0)
+        return getattr(self._objective, method)(*arguments)
 
 
 def _follow(comm: MPI.Comm, objective: Objective) -> None:
@@ -116,8 +92,9 @@ def _follow(comm: MPI.Comm, objective: Objective) -> None:
     """
     failure = None
     while (request := comm.bcast(None, root=0)) is not None:
+        method, arguments = request
         try:
-            request.answer(objective)
+            getattr(objective, method)(*arguments)
         except Infeasible:
             pass  # the first process has seen it too, and decides
         except Exception as error:  # as a rule it has seen this as well, and ends; until then it needs answers
@@ -139,7 +116,7 @@ class Saved:
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """A checkpoint file of one problem.
+    """A checkpoint file of one problem: what a run needs to go on after its process was killed, as JSON.
 
     Attributes:
         path: the file.
@@ -150,7 +127,7 @@ class Checkpoint:
     problem: Mapping[str, object]
 
     def save(self, iterate: Iterate, handles: np.ndarray) -> None:
-        """Writes an iterate and its handle positions; the file before it stays until this one is complete."""
+        """Local. Writes an iterate and its handle positions; the file before stays until this one is complete."""
         data = {
             "format": _FORMAT,
             "problem": self.problem,
@@ -165,7 +142,7 @@ class Checkpoint:
             file.write(json.dumps(data))
 
     def load(self) -> Saved:
-        """Where to go on.
+        """Local. Where to go on.
 
         Raises:
             DescriptionError: there is no such file, it is no checkpoint, or one of another problem.
@@ -193,7 +170,7 @@ class Checkpoint:
         return Saved(start, np.array(data["handles"]))
 
     def load_together(self, comm: MPI.Comm) -> Saved | None:
-        """The same on all processes, errors too; None if there is no file yet (collective)."""
+        """The same on all processes, errors too; None if there is no file yet."""
         return from_one(comm, lambda: self.load() if self.path.exists() else None)
 
 
@@ -223,14 +200,11 @@ def fingerprint(
     }
 
 
-_WINDOW = 6  # iterations whose trend is drawn on
-
-
 class DesignProgress:
-    """Shows iterates on standard error; a context manager.
+    """Shows iteration, objective, worst target error and time left on standard error; a context manager.
 
-    Time left is what the trend of the promised reduction over the last iterations says, at most what the optimiser's
-    limit of iterations leaves.
+    Time left is what the trend of the promised reduction over the last six iterations says, at most what the
+    optimiser's limit of iterations leaves.
 
     Args:
         optimiser: says when it ends.
@@ -240,7 +214,7 @@ class DesignProgress:
     def __init__(self, optimiser: Optimiser, *, leads: bool) -> None:
         self._minimiser = optimiser
         self._progress = Progress(None, "design") if leads else Silent()
-        self._recent: deque[tuple[float, float]] = deque(maxlen=_WINDOW)
+        self._recent: deque[tuple[float, float]] = deque(maxlen=6)
 
     def update(self, iterate: Iterate, errors: np.ndarray) -> None:
         """Shows an iterate; ``errors`` (targets,) are relative."""
