@@ -11,8 +11,7 @@ from fenicsmech.checks import finite, positive
 from fenicsmech.design.shape.shape_map import ShapeRequest
 from fenicsmech.errors import DescriptionError
 from fenicsmech.joints import WELD
-from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Mechanism, Strip
-from fenicsmech.meshing import Centreline
+from fenicsmech.mechanism import DRAWN, Centreline, Configuration, FlexibleLink, Force, Mechanism, Strip
 from fenicsmech.multibody import Linkage, assemble
 from fenicsmech.simulation import Simulation, read_request
 

@@ -18,11 +18,13 @@ from fenicsmech.design.rest_shape import DesignedLink, RestShape
 from fenicsmech.design.shape.handle_optimum import Placement
 from fenicsmech.design.shape.shape_map import gather_links
 from fenicsmech.errors import DescriptionError
+from fenicsmech.export import PinHole, write_step, write_stl
+from fenicsmech.files import atomic_write
 from fenicsmech.log import logger
 from fenicsmech.mechanism import DRAWN, Disc, FlexibleLink
-from fenicsmech.meshing import LinkMesh, PinHole, boundary_loops, plan_of, write_step, write_stl
+from fenicsmech.meshing import LinkMesh, boundary_loops, plan_of
 from fenicsmech.multibody import Linkage, assemble
-from fenicsmech.report import DesignShape, LinkOutline, atomic_write, draw_designs
+from fenicsmech.report import DesignShape, LinkOutline, draw_designs
 from fenicsmech.simulation import Draughtsman, Simulation, rest_vertices
 
 _log = logger(__name__)

@@ -24,7 +24,8 @@ from fenicsmech.design.optimisers.problem import Evaluation, Infeasible, Iterate
 from fenicsmech.design.regularisers import Regulariser
 from fenicsmech.design.rest_shape import RestShape
 from fenicsmech.errors import DescriptionError
-from fenicsmech.report import Progress, Silent, atomic_write
+from fenicsmech.files import atomic_write
+from fenicsmech.log import Progress, Silent
 from fenicsmech.simulation import Simulation
 
 

@@ -20,7 +20,8 @@ from fenicsmech.design.shape.handles import BETWEEN, LinkHandles
 from fenicsmech.design.shape.spline import SplineFit, fit_spline
 from fenicsmech.design.shape.weights import handle_weights, pierced
 from fenicsmech.errors import DescriptionError
-from fenicsmech.meshing import FREE, Centreline, LinkMesh, MechanismMesh, cell_measures, plan_of
+from fenicsmech.mechanism import Centreline
+from fenicsmech.meshing import FREE, LinkMesh, MechanismMesh, cell_measures, plan_of
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ import sympy
 from numpy.polynomial.polynomial import polyder
 
 from fenicsmech.errors import DescriptionError
-from fenicsmech.meshing import Centreline
+from fenicsmech.mechanism import Centreline
 from fenicsmech.symbolic import SmoothFunction, derive
 
 # h₀₀ (P_k), h₁₀ (M_k), h₀₁ (P_{k+1}), h₁₁ (M_{k+1}) in powers of τ, and their derivatives
