@@ -28,7 +28,7 @@ MPIRUN = OPENBLAS_NUM_THREADS=1 mpirun -n $(RANKS)
 heading = @printf '\n--- %s\n' '$(1)'
 
 .PHONY: help demo test check install install-test install-docs lint test-serial test-parallel test-thorough test-slow \
-    test-debian13 test-newest demos-quick hard-cases random-scenes docs bench clean
+    test-debian13 test-newest demos-quick hard-cases random-scenes random-scenes-check docs bench clean
 
 help: ## list the targets
 	@sed -nE 's/^([a-z0-9-]+):.*## (.*)/\1\t\2/p' Makefile | expand -t 16
@@ -57,7 +57,6 @@ lint: install-test ## style, types and layering: seconds
 	$(call heading,lint)
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .
-	$(PYTHON) -m mypy
 	$(PYTHON) -m pytest -q tests/test_layering.py
 
 # Two processes side by side; the tests of one file stay together. What is marked `parallel` runs on ranks instead, and
@@ -129,14 +128,22 @@ $(DEMOS:%=demo-quick-%): demo-quick-%: install
 hard-cases: install-test ## every case of tests/hard/, slow ones too, as the table in README.md
 	$(PYTHON) -m tests.hard
 
-bench: $(MECHANISMS:%=bench-%) ## seconds per frame (frame_median) of every demo's initial design: 3D, on ranks, plane stress
+# The tables that pages of the documentation include; `make bench` measures one, `make tables` all (hours).
+BENCHMARKS := solvers work_precision accuracy_control large stopping performance effects optimisers
+BENCH = OPENBLAS_NUM_THREADS=1 $(PYTHON) -m benchmarks
 
-.PHONY: $(MECHANISMS:%=bench-%)
-$(MECHANISMS:%=bench-%): bench-%: install
+bench: install ## seconds per load step of every demo's initial design: 3D, on ranks, plane stress
+	$(call heading,benchmark)
+	$(BENCH).frames --write
+	$(MPIRUN) $(PYTHON) -m benchmarks.frames --write
+	$(BENCH).frames --space plane-stress --write
+
+tables: bench $(BENCHMARKS:%=table-%) ## every benchmark, its table in docs/tables/ (hours)
+
+.PHONY: tables $(BENCHMARKS:%=table-%)
+$(BENCHMARKS:%=table-%): table-%: install
 	$(call heading,benchmark $*)
-	$(PYTHON) demos/$*.py --simulate-only --out results/bench/$*
-	$(MPIRUN) $(PYTHON) demos/$*.py --simulate-only --out results/bench/$*-$(RANKS)-ranks
-	$(PYTHON) demos/$*.py --simulate-only --space plane-stress --out results/bench/$*-plane-stress
+	$(BENCH).$* --write
 
 clean: ## remove what the targets above left in this tree
 	rm -rf .venv results docs/_build .pytest_cache .ruff_cache .hypothesis

@@ -13,14 +13,13 @@ from common import parse, simulation
 from samples import bending_test, of_modulus
 
 import fenicsmech as fm
+from benchmarks.table import format_table
+from fenicsmech.files import write_json
 from fenicsmech.report import (
     PALETTE,
     CurveSeries,
-    check_summary,
-    format_table,
     plot_curve,
     read_curve_csv,
-    write_summary,
 )
 
 SIZE = 1.0  # mm
@@ -66,8 +65,7 @@ def leave(demo, experiments, fit, seconds):
     low, high = fit.interval
     title = f"Onyx: E = {fit.youngs_modulus:.0f} MPa ({low:.0f} to {high:.0f})"
     plot_curve(demo.folder / "curve.png", series, title=title)
-    check_summary(summary)
-    write_summary(demo.folder / "summary.json", summary)
+    write_json(demo.folder / "summary.json", summary)
     rows = [
         (f"{thickness:g}", len(experiment.forces), experiment.displacements.max(), max(map(abs, residuals)))
         for thickness, experiment, residuals in zip(FILES, experiments, fit.residuals, strict=True)

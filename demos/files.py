@@ -13,14 +13,13 @@ from common import Demo
 from mpi4py import MPI
 
 import fenicsmech as fm
+from benchmarks.table import format_table
+from fenicsmech.files import write_json
 from fenicsmech.report import (
     PALETTE,
     CurveTarget,
-    check_summary,
     draw_configurations,
-    format_table,
     plot_curve,
-    write_summary,
 )
 
 
@@ -70,8 +69,7 @@ def leave(outcome: Outcome) -> None:
         curve.write_csv(folder / f"curve{_suffix(curve, curves)}.csv", errors=estimates)
     if result is not None:
         result.save(folder / "design.json")
-    check_summary(summary)
-    write_summary(folder / "summary.json", summary)
+    write_json(folder / "summary.json", summary)
     tell(outcome, summary)
 
 

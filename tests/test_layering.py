@@ -19,13 +19,16 @@ LAYERS = (
     "checks",
     "log",
     "clock",
+    "symbolic",
     "kernel_cache",
     "compat",
     "collective",
+    "files",
     "report",
     "joints",
     "mechanism",
     "meshing",
+    "export",
     "multibody",
     "elasticity",
     "effects",
@@ -34,7 +37,6 @@ LAYERS = (
     "estimates",
     "simulation",
     "design",
-    "accuracy",
 )
 
 # Libraries that belong to a few layers only: descriptions and joints know no elements, only one layer makes meshes,
@@ -43,7 +45,7 @@ RESTRICTED = {
     "dolfinx": {"report", "joints", "mechanism"},
     "ufl": {"report", "joints", "mechanism"},
     "petsc4py": {"report", "joints", "mechanism"},
-    "gmsh": set(LAYERS) - {"compat", "meshing"},
+    "gmsh": set(LAYERS) - {"compat", "meshing", "export"},
     "matplotlib": set(LAYERS) - {"report"},
 }
 

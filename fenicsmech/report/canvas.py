@@ -13,7 +13,7 @@ from matplotlib.patches import Circle
 from numpy.typing import ArrayLike
 
 from fenicsmech.errors import DescriptionError
-from fenicsmech.report.atomic import atomic_write
+from fenicsmech.files import atomic_write
 
 DPI = 150
 INK = "#333333"

@@ -15,8 +15,8 @@ from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike, NDArray
 
 from fenicsmech.errors import DescriptionError
+from fenicsmech.files import atomic_write
 from fenicsmech.report.arrays import real_array
-from fenicsmech.report.atomic import atomic_write
 from fenicsmech.report.canvas import INK, PALETTE, house_style, new_figure, open_frame, save_png
 
 _DASHES = (0, (3.0, 1.6))  # of unstable parts
