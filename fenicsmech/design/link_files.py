@@ -14,7 +14,7 @@ from fenicsmech.export import PinHole, write_step, write_stl
 from fenicsmech.mechanism import DRAWN, Disc, FlexibleLink
 from fenicsmech.meshing import LinkMesh, boundary_loops, plan_of
 from fenicsmech.multibody import Linkage, assemble
-from fenicsmech.report import DesignShape, LinkOutline, draw_designs
+from fenicsmech.plot import DesignShape, LinkOutline, draw_designs
 from fenicsmech.simulation import Draughtsman, Simulation, rest_vertices
 
 
