@@ -19,6 +19,7 @@ LAYERS = (
     "checks",
     "log",
     "clock",
+    "symbolic",
     "kernel_cache",
     "compat",
     "collective",

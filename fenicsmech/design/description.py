@@ -1,4 +1,4 @@
-"""What may change about a link, and what is wanted of the mechanism: plain data of a design problem."""
+"""A design problem as plain data: links that may change, targets; and the checks of both."""
 
 from __future__ import annotations
 
@@ -8,13 +8,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenicsmech.checks import finite, positive
-from fenicsmech.design.link_shape import ShapeRequest
+from fenicsmech.design.shape.shape_map import ShapeRequest
 from fenicsmech.errors import DescriptionError
 from fenicsmech.joints import WELD
 from fenicsmech.mechanism import DRAWN, Centreline, Configuration, FlexibleLink, Force, Mechanism, Strip
-from fenicsmech.multibody import Linkage
+from fenicsmech.multibody import Linkage, assemble
+from fenicsmech.simulation import Simulation, read_request
 
-_RANGE = (1.0 / 3.0, 3.0)  # of thicknesses, in units of the drawn one: 1 … 9 mm for a link of 3 mm
+
+@dataclass(frozen=True)
+class Bounds:
+    """Fabrication bounds of a link.
+
+    Attributes:
+        thickness: least and largest thickness in the plane.
+        bend: largest curvature ratio r.
+    """
+
+    thickness: tuple[float, float]
+    bend: float
 
 
 @dataclass(frozen=True)
@@ -55,34 +67,20 @@ class SplineDesign:
             if not least < most:
                 raise DescriptionError(part, f"thickness from {least:g} to {most:g}", "Give the smaller one first")
 
+    def bounds(self, thickness: float) -> Bounds:
+        """The bounds for a link drawn with ``thickness``.
 
-@dataclass(frozen=True)
-class Bounds:
-    """Fabrication bounds of a link.
-
-    Attributes:
-        thickness: least and largest thickness in the plane.
-        bend: largest curvature ratio r.
-    """
-
-    thickness: tuple[float, float]
-    bend: float
-
-
-def bounds_of(design: SplineDesign, thickness: float) -> Bounds:
-    """The bounds of ``design`` for a link drawn with ``thickness``.
-
-    Raises:
-        DescriptionError: the drawn thickness is not within them.
-    """
-    least, most = design.thickness or (_RANGE[0] * thickness, _RANGE[1] * thickness)
-    if not least < thickness < most:
-        raise DescriptionError(
-            f"design of link {design.link.name!r}",
-            f"its drawn thickness {thickness:.3g} is not between {least:g} and {most:g}",
-            "Draw it within the bounds, or widen them",
-        )
-    return Bounds((least, most), design.bend)
+        Raises:
+            DescriptionError: the drawn thickness is not within them.
+        """
+        least, most = self.thickness or (thickness / 3.0, 3.0 * thickness)
+        if not least < thickness < most:
+            raise DescriptionError(
+                f"design of link {self.link.name!r}",
+                f"its drawn thickness {thickness:.3g} is not between {least:g} and {most:g}",
+                "Draw it within the bounds, or widen them",
+            )
+        return Bounds((least, most), self.bend)
 
 
 @dataclass(frozen=True)
@@ -149,3 +147,70 @@ def shape_request(design: SplineDesign, mechanism: Mechanism, linkage: Linkage) 
         turns=tuple(at not in welded for at in joints),
         interior=tuple(int(n) for n in interior),
     )
+
+
+def check_designs(designs: Sequence[SplineDesign]) -> None:
+    """Refuses designs of no link, and two of one link, with a DescriptionError."""
+    if not designs:
+        raise DescriptionError("design problem", "no link may change", "Name links with SplineDesign(…)")
+    for design in designs:
+        if not isinstance(design, SplineDesign):
+            raise DescriptionError("design problem", f"{design!r} is no design of a link", "Give SplineDesign(…)")
+    names = [design.link.name for design in designs]
+    for name in names:
+        if names.count(name) > 1:
+            raise DescriptionError(f"design of link {name!r}", "it is given twice", "Give each link once")
+
+
+def check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
+    """Refuses targets whose force or configuration ``simulation`` does not have.
+
+    Raises:
+        DescriptionError: there is no target, or one of another mechanism.
+        AssemblyError: a configuration does not assemble.
+    """
+    if not targets:
+        raise DescriptionError("design problem", "nothing is wanted", "Give targets=[Target(…), …]")
+    for target in targets:
+        if not isinstance(target, Target):
+            raise DescriptionError("design problem", f"{target!r} is no target", "Give Target(…)")
+        read_request(
+            simulation.scene.mechanism,
+            target.force_part,
+            forces=[target.force],
+            displacements=None,
+            configuration=target.configuration,
+            others=None,
+        )
+        assemble(simulation.linkage, target.configuration)
+
+
+def check_effects(
+    targets: Sequence[Target], designs: Sequence[SplineDesign], *, effects: np.ndarray, errors: np.ndarray
+) -> None:
+    """Refuses targets that are missed and that no parameter moves: their derivatives cannot be right, or no help.
+
+    Args:
+        targets: what is wanted.
+        designs: the links that may change.
+        effects: relative change of each displacement when one parameter changes as much as counts,
+            (targets, parameters).
+        errors: relative errors of the displacements, (targets,).
+
+    Raises:
+        DescriptionError: naming the first such target.
+    """
+    names, rounding = ", ".join(repr(design.link.name) for design in designs), 1e-9
+    for target, row, error in zip(targets, effects, errors, strict=True):
+        if np.abs(row).max(initial=0.0) > rounding or abs(error) <= rounding:
+            continue
+        if target.force == 0.0:
+            reason, remedy = "no force acts", "Give a force that is not zero"
+        else:
+            reason = f"{names} do not carry the force, or something rigid holds its point"
+            remedy = "Let links change that carry it, or give targets of another force"
+        raise DescriptionError(
+            f"target of {target.force_part.name!r} ({target.force:g} in configuration {target.configuration.name!r})",
+            f"its displacement does not depend on the shapes that may change: {reason}",
+            remedy,
+        )

@@ -1,6 +1,12 @@
 """The handles of one link: where its spline takes hold of its mesh.
 
-A joint handle turns about its joint by θ = α. An intermediary handle rides on the spline at θ = t and may slide along.
+A handle at X moves a point v around it by T (v_x − X_x, v_y − X_y, 1), with T of shape (2, 3); the out-of-plane
+coordinate does not change:
+
+    joint handles turn about their joint by θ = α:            T = [R(α) − I | 0],
+    intermediary ones ride on the spline at θ = t, and may
+    slide along; at x, with the unit tangent e and δ there:   T = [δ R(e) R(eᵢₙᵢₜ)ᵀ − I | x − X].
+
 The map T_j of handle j depends on p and on θ_j only. For intermediary handles, with q = (x, y, δ, x′, y′) at t and
 subscripts for derivatives,
 
@@ -10,12 +16,13 @@ subscripts for derivatives,
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
+import sympy
 
-from fenicsmech.design.spline import LinkSpline
-from fenicsmech.design.transforms import riding, turning
+from fenicsmech.design.shape.spline import LinkSpline
+from fenicsmech.symbolic import SmoothFunction, derive
 
 BETWEEN = -1  # instead of the interface that a joint handle holds
 
@@ -60,9 +67,9 @@ class LinkHandles:
 
     def transforms(self, p: np.ndarray, theta: np.ndarray) -> np.ndarray:
         """The maps T of all handles, (n, 2, 3), from parameters ``p`` (size,) and ``theta`` (n,)."""
-        T = np.empty((len(self), 2, 3))
-        T[~self.slides] = turning().value(*self._angles(theta))
-        T[self.slides] = riding().value(*self._rides(p, theta, self.segments(theta)))
+        T = _turns(theta)
+        q = self._q(p, theta, self.segments(theta))
+        T[self.slides] = _riding().value(q, self._frames).reshape(-1, 2, 3)
         return T
 
     def gradients(
@@ -70,41 +77,29 @@ class LinkHandles:
     ) -> tuple[np.ndarray, np.ndarray]:
         """∂T/∂p, (n, 2, 3, size), and ∂T_j/∂θ_j, (n, 2, 3).
 
-        segments: the segment of each handle; tells at a control point from which side to differentiate by θ.
+        segments: the segment of each handle: from which side to differentiate by θ at a control point.
         """
         segments = self.segments(theta) if segments is None else segments
-        by_p, by_theta = np.zeros((len(self), 2, 3, self.spline.size)), np.empty((len(self), 2, 3))
-        by_theta[~self.slides] = turning().gradient(*self._angles(theta))[..., 0]
-        by_q = riding().gradient(*self._rides(p, theta, segments))
+        by_p, by_theta = np.zeros((len(self), 2, 3, self.spline.size)), _turns(theta, order=1)
+        by_q = _riding().gradient(self._q(p, theta, segments), self._frames).reshape(-1, 2, 3, 5)
         by_p[self.slides] = np.einsum("nabq,nqp->nabp", by_q, self._q_by_p(theta, segments))
         by_theta[self.slides] = np.einsum("nabq,nq->nab", by_q, self._q(p, theta, segments, order=1))
         return by_p, by_theta
 
     def curvatures(
-        self, p: np.ndarray, theta: np.ndarray, weights: np.ndarray, *, segments: np.ndarray | None = None
+        self, p: np.ndarray, theta: np.ndarray, weights: np.ndarray, *, segments: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Σ G ∂²T_j/∂θ_j∂p, (n, size), and Σ G ∂²T_j/∂θ_j², (n,), with ``weights`` G (n, 2, 3); others as above."""
-        segments = self.segments(theta) if segments is None else segments
-        mixed, twice = np.zeros((len(self), self.spline.size)), np.empty(len(self))
-        twice[~self.slides] = turning().hessian(*self._angles(theta), weights[~self.slides])[:, 0, 0]
-        rides, G = self._rides(p, theta, segments), weights[self.slides]
-        slope = np.einsum("nab,nabq->nq", G, riding().gradient(*rides))
+        mixed, twice = np.zeros((len(self), self.spline.size)), np.sum(weights * _turns(theta, order=2), axis=(1, 2))
+        q, G = self._q(p, theta, segments), weights[self.slides].reshape(-1, 6)
+        slope = np.einsum("ni,niq->nq", G, _riding().gradient(q, self._frames))
         velocity = self._q(p, theta, segments, order=1)
-        bend = np.einsum("nqr,nq->nr", riding().hessian(*rides, G), velocity)
+        bend = np.einsum("nqr,nq->nr", _riding().hessian(q, self._frames, G), velocity)
         mixed[self.slides] = np.einsum("nq,nqp->np", bend, self._q_by_p(theta, segments)) + np.einsum(
             "nq,nqp->np", slope, self._q_by_p(theta, segments, order=1)
         )
         twice[self.slides] = np.sum(bend * velocity + slope * self._q(p, theta, segments, order=2), axis=1)
         return mixed, twice
-
-    def _angles(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Variables and constants of the joint handles."""
-        angles = theta[~self.slides, None]
-        return angles, np.empty((len(angles), 0))
-
-    def _rides(self, p: np.ndarray, theta: np.ndarray, segments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Variables q and constants of the intermediary handles."""
-        return self._q(p, theta, segments), self._frames
 
     def _q(self, p: np.ndarray, theta: np.ndarray, segments: np.ndarray, *, order: int = 0) -> np.ndarray:
         """q of the intermediary handles, differentiated ``order`` times by t, (k, 5)."""
@@ -124,3 +119,24 @@ class LinkHandles:
         """Initial positions and unit tangents of the intermediary handles, (k, 4)."""
         tangent = self.spline.derivative(self.spline.initial, self.t)[:, :2]
         return np.column_stack([self.centre, tangent / np.linalg.norm(tangent, axis=1, keepdims=True)])[self.slides]
+
+
+def _turns(angle: np.ndarray, order: int = 0) -> np.ndarray:
+    """[R(α) − I | 0] for angles (n,), differentiated ``order`` times, (n, 2, 3)."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    for _ in range(order):
+        cosine, sine = -sine, cosine
+    T = np.zeros((len(angle), 2, 3))
+    T[:, 0, 0] = T[:, 1, 1] = cosine - (order == 0)
+    T[:, 0, 1], T[:, 1, 0] = -sine, sine
+    return T
+
+
+@cache
+def _riding() -> SmoothFunction:
+    """T of intermediary handles, row by row, by q; constants: their initial position and unit tangent."""
+    x, y, delta, u, v = q = sympy.symbols("x y delta u v", real=True)
+    X, Y, U, V = constants = sympy.symbols("X Y U V", real=True)
+    scale = delta / sympy.sqrt(u * u + v * v)
+    cosine, sine = scale * (u * U + v * V), scale * (v * U - u * V)
+    return derive([cosine - 1, -sine, x - X, sine, cosine - 1, y - Y], q, constants, many=True)

@@ -11,6 +11,7 @@ With the edges e_k = (I + ∇d) J_k of a cell that meet at one vertex, J its Jac
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 from math import factorial, inf, isnan
 
@@ -71,7 +72,7 @@ class QualitySum:
         self._sum = self._penalty / volume * measure
 
     def value(self) -> float:
-        """The sum over the whole mesh, inf if a cell is inside out (collective)."""
+        """The sum over the whole mesh, inf if a cell is inside out."""
         total = float(self._mesh.comm.allreduce(fem.assemble_scalar(self._form)))
         return inf if isnan(total) else total
 
@@ -83,11 +84,12 @@ class QualitySum:
         return evaluate_expression(self._expression, self._mesh, cells)[:, 0]
 
     def gradient(self) -> np.ndarray:
-        """∂/∂d at the owned nodes, (owned nodes, dim) (collective)."""
-        return assemble_vector(self._gradient_form, self._sums).reshape(-1, self._mesh.geometry.dim).copy()
+        """∂/∂d at the owned nodes, (owned nodes, dim)."""
+        total = fem.Function(self.design.function_space)
+        return assemble_vector(self._gradient_form, total).reshape(-1, self._mesh.geometry.dim).copy()
 
     def hessian(self) -> PETSc.Mat:
-        """∂²/∂d²; overwritten by the next call (collective)."""
+        """∂²/∂d²; overwritten by the next call."""
         matrix = self._matrix
         matrix.zeroEntries()
         fem.petsc.assemble_matrix(matrix, self._hessian_form)
@@ -113,10 +115,40 @@ class QualitySum:
         return compile_form(ufl.derivative(ufl.derivative(self._sum, self.design), self.design))
 
     @cached_property
-    def _sums(self) -> fem.Function:
-        """Where the gradient is assembled."""
-        return fem.Function(self.design.function_space)
-
-    @cached_property
     def _matrix(self) -> PETSc.Mat:
         return assemble_matrix(self._hessian_form, self._comm)
+
+
+@dataclass(frozen=True)
+class Barrier:
+    """The C² barrier β(x) = m ((x − x_max) / ε)³ beyond x_max, zero before (the paper's equation 15).
+
+    For a lower bound, give −x the limit −x_min.
+
+    Attributes:
+        limit: x_max.
+        width, strength: ε and m, which control how fast it grows.
+    """
+
+    limit: float
+    width: float
+    strength: float = 1.0
+
+    def value(self, x: np.ndarray) -> np.ndarray:
+        """β."""
+        return self.strength * self._excess(x) ** 3
+
+    def slope(self, x: np.ndarray) -> np.ndarray:
+        """dβ/dx."""
+        return 3.0 * self.strength / self.width * self._excess(x) ** 2
+
+    def curvature(self, x: np.ndarray) -> np.ndarray:
+        """d²β/dx²."""
+        return 6.0 * self.strength / self.width**2 * self._excess(x)
+
+    def symbolic(self, x):
+        """β in UFL."""
+        return self.strength * ufl.max_value((x - self.limit) / self.width, 0.0) ** 3
+
+    def _excess(self, x: np.ndarray) -> np.ndarray:
+        return np.maximum(np.asarray(x, dtype=float) - self.limit, 0.0) / self.width
