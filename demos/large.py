@@ -101,7 +101,7 @@ class Run:
         system, state = self.simulation.newton(self.force).system, self.curve.frames[-1].state
         control = LoadControl(FORCES[-1])
         system.load(state)
-        system.linearise(state, control, system.balance(state, control))
+        system.linearise(state, control, system.residual(state, control))
         return system, system.kkt.matrix(), system.force_rate(state)
 
 

@@ -25,15 +25,15 @@ def main():
     options = parser.parse_args()
     rows = []
     for name, demo in MECHANISMS.items():
-        for minimiser in (fm.LevenbergMarquardt(iterations=options.limit), fm.Bfgs(iterations=options.limit)):
+        for optimiser in (fm.LevenbergMarquardt(iterations=options.limit), fm.BFGS(iterations=options.limit)):
             scene, task = scene_and_task(demo)
             sim = fm.Simulation(scene, space="plane-stress", size=options.size or demo.SIZE)
-            result = fm.DesignProblem(sim, task.designs, targets=task.targets).optimize(minimiser=minimiser)
+            result = fm.DesignProblem(sim, task.designs, targets=task.targets).optimise(optimiser=optimiser)
             rows.append(
                 (
                     name,
                     result.parameters,
-                    type(minimiser).__name__,
+                    type(optimiser).__name__,
                     result.iterations,
                     result.evaluations,
                     round(result.seconds, 1),
@@ -48,7 +48,7 @@ def main():
 HEADERS = (
     "mechanism",
     "parameters",
-    "minimiser",
+    "optimiser",
     "iterations",
     "evaluations",
     "seconds",

@@ -62,7 +62,7 @@ def factors(sim, curve):
     system, frame = newton.system, curve.frames[-1]
     control = LoadControl(frame.force)
     system.load(frame.state)
-    system.linearise(frame.state, control, system.balance(frame.state, control))
+    system.linearise(frame.state, control, system.residual(frame.state, control))
     matrix = system.kkt.matrix()
     kept = Factor(matrix)
     kept.refactor()

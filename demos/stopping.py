@@ -81,9 +81,9 @@ def designs(name, space, size):
     demo = MECHANISMS[name]
     scene, task = scene_and_task(demo)
 
-    def optimum(space, start, minimiser):
+    def optimum(space, start, optimiser):
         sim = fm.Simulation(scene, space=space, size=size or demo.SIZE)
-        return sim, fm.DesignProblem(sim, task.designs, targets=task.targets).optimize(start=start, minimiser=minimiser)
+        return sim, fm.DesignProblem(sim, task.designs, targets=task.targets).optimise(start=start, optimiser=optimiser)
 
     start = None if space == "plane-stress" else optimum("plane-stress", None, None)[1]
     exact = optimum(space, start, fm.LevenbergMarquardt(tolerance=TOLERANCE))[1]

@@ -73,8 +73,8 @@ def curves(sim: fm.Simulation, task: Task) -> list[fm.Curve]:
 def optimise(demo: Demo, problem: fm.DesignProblem, start: fm.DesignResult | None) -> fm.DesignResult:
     """The optimum, with a checkpoint in the demo's folder after each iteration."""
     space = problem.simulation.fidelity.model.name
-    return problem.optimize(
-        minimiser=fm.Bfgs() if demo.options.bfgs else fm.LevenbergMarquardt(),
+    return problem.optimise(
+        optimiser=fm.BFGS() if demo.options.bfgs else fm.LevenbergMarquardt(),
         start=start,
         checkpoint=demo.folder / f"checkpoint-{space}.json",
         resume=demo.options.resume,

@@ -7,7 +7,7 @@ Describe a mechanism (``Mechanism``), say what acts on it (``Scene``) and how fi
 
 from fenicsmech.collective import end_together
 from fenicsmech.design import (
-    Bfgs,
+    BFGS,
     DesignProblem,
     DesignResult,
     Experiment,
@@ -90,7 +90,7 @@ __all__ = [
     "Arc",
     "AssemblyError",
     "AugmentedLagrangian",
-    "Bfgs",
+    "BFGS",
     "Configuration",
     "Curve",
     "DescriptionError",

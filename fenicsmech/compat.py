@@ -71,6 +71,12 @@ def cell_nodes(mesh: dmesh.Mesh) -> np.ndarray:
     return dofmap.array.reshape(-1, mesh.topology.dim + 1) if _LEGACY else np.asarray(dofmap)
 
 
+def cell_dofs(space: fem.FunctionSpace) -> np.ndarray:
+    """Local nodes of a space in every cell on this rank, in the reference cell's order, (cells, nodes per cell)."""
+    dofmap = space.dofmap
+    return dofmap.list.array.reshape(-1, dofmap.dof_layout.num_dofs) if _LEGACY else np.asarray(dofmap.list)
+
+
 def vector_space(mesh: dmesh.Mesh, degree: int) -> fem.FunctionSpace:
     """Continuous vector fields of ``degree``."""
     if _LEGACY:

@@ -31,6 +31,8 @@ LAYERS = (
     "elasticity",
     "effects",
     "equilibrium",
+    "model",
+    "estimates",
     "simulation",
     "design",
     "accuracy",

@@ -50,12 +50,12 @@ from fenicsmech.design.link_shape import ShapeRequest, shape_link, shape_links
 from fenicsmech.design.objective import Objective, target_errors, target_scales
 from fenicsmech.design.objective_error import objective_error
 from fenicsmech.design.optimisers import (
-    Bfgs,
+    BFGS,
     Evaluation,
     Infeasible,
     Iterate,
     LevenbergMarquardt,
-    Minimiser,
+    Optimiser,
     Quadratic,
     Reason,
     Start,
@@ -80,7 +80,7 @@ __all__ = [
     "Adjoint",
     "BETWEEN",
     "Barrier",
-    "Bfgs",
+    "BFGS",
     "Bounds",
     "Checkpoint",
     "DesignProblem",
@@ -100,7 +100,7 @@ __all__ = [
     "LinkHandles",
     "LinkSpline",
     "MeshQuality",
-    "Minimiser",
+    "Optimiser",
     "Model",
     "ModulusFit",
     "Objective",

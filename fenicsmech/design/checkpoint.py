@@ -11,7 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenicsmech.collective import from_one
-from fenicsmech.design.optimisers import Iterate, Minimiser, Start
+from fenicsmech.design.optimisers import Iterate, Optimiser, Start
 from fenicsmech.design.regularisers import Regulariser
 from fenicsmech.design.rest_shape import RestShape
 from fenicsmech.design.spline_design import Target
@@ -95,7 +95,7 @@ def fingerprint(
     rest: RestShape,
     targets: Sequence[Target],
     regulariser: Regulariser,
-    minimiser: Minimiser,
+    optimiser: Optimiser,
 ) -> dict[str, object]:
     """What is minimised and how, as plain data that a checkpoint must agree with."""
     fidelity, mechanism = simulation.fidelity, simulation.scene.mechanism
@@ -112,5 +112,5 @@ def fingerprint(
         "configurations": [[t.configuration.name, *(at for _, at in t.configuration.positions)] for t in targets],
         "targets": [[t.force, t.displacement, t.weight] for t in targets],
         "regulariser": repr(regulariser),
-        "minimiser": type(minimiser).__name__,
+        "optimiser": type(optimiser).__name__,
     }

@@ -20,7 +20,7 @@ from fenicsmech.design.link_files import draw_links, outline, rest_meshes, write
 from fenicsmech.design.link_shape import LinkShape, shape_links
 from fenicsmech.design.objective import Objective, target_errors
 from fenicsmech.design.objective_error import objective_error
-from fenicsmech.design.optimisers import Infeasible, Iterate, LevenbergMarquardt, Minimiser, Start
+from fenicsmech.design.optimisers import Infeasible, Iterate, LevenbergMarquardt, Optimiser, Start
 from fenicsmech.design.problem_checks import check_designs, check_effects, check_targets
 from fenicsmech.design.progress import DesignProgress
 from fenicsmech.design.regularisers import MeshQuality, Regulariser, ShapeBounds, StayClose
@@ -42,7 +42,7 @@ class DesignProblem:
     Nothing is meshed or compiled before it is needed; the description is checked at once.
 
     Args:
-        simulation: how displacements are computed. It has the drawn shape until ``apply`` or ``optimize`` change it.
+        simulation: how displacements are computed. It has the drawn shape until ``apply`` or ``optimise`` change it.
         designs: the links that may change.
         targets: what is wanted.
         regulariser: R; mesh quality, bounds of fabrication and a little closeness to the drawing by default.
@@ -89,10 +89,10 @@ class DesignProblem:
             )
         self._rest.place(parameters, None)
 
-    def optimize(
+    def optimise(
         self,
         *,
-        minimiser: Minimiser | None = None,
+        optimiser: Optimiser | None = None,
         start: DesignResult | None = None,
         checkpoint: str | Path | None = None,
         resume: bool = False,
@@ -103,7 +103,7 @@ class DesignProblem:
         it back.
 
         Args:
-            minimiser: Levenberg–Marquardt by default.
+            optimiser: Levenberg–Marquardt by default.
             start: where to start, as the result of a cheaper simulation; the drawn shapes by default.
             checkpoint: file that is brought up to date after each iteration.
             resume: go on from ``checkpoint`` if it exists.
@@ -114,14 +114,14 @@ class DesignProblem:
             EquilibriumError: the initial design does not carry its loads.
         """
         began, clock = perf_counter(), dict(self._clock.seconds)
-        minimiser, comm = minimiser or LevenbergMarquardt(), self.simulation.comm
+        optimiser, comm = optimiser or LevenbergMarquardt(), self.simulation.comm
         _, objective = self._team
         saved = None
         if checkpoint is not None:
-            problem = fingerprint(self.simulation, self._rest, self.targets, self._regulariser, minimiser)
+            problem = fingerprint(self.simulation, self._rest, self.targets, self._regulariser, optimiser)
             saved = Checkpoint(Path(checkpoint), problem)
         begin, near = self._beginning(start, saved if resume else None)
-        values, outcome = self._minimise(minimiser, begin, near, saved)
+        values, outcome = self._minimise(optimiser, begin, near, saved)
         placement = comm.bcast(objective.placement, root=0)
         with self._clock.phase("verification"):
             self._rest.place(outcome.parameters, placement)
@@ -166,7 +166,7 @@ class DesignProblem:
         meshes = rest_meshes(self.simulation, links)
         on_one(self.simulation.comm, lambda: write_solids(folder, self.simulation.linkage, links, meshes, pin))
 
-    # -- steps of ``optimize`` -------------------------------------------------------------------------------
+    # -- steps of ``optimise`` -------------------------------------------------------------------------------
 
     def _beginning(self, start: DesignResult | None, saved: Checkpoint | None) -> tuple[Start, Placement | None]:
         """Where to start, and the handles there if they are known: from ``saved`` if its file exists (collective)."""
@@ -178,7 +178,7 @@ class DesignProblem:
         return begin, near
 
     def _minimise(
-        self, minimiser: Minimiser, begin: Start, near: Placement | None, saved: Checkpoint | None
+        self, optimiser: Optimiser, begin: Start, near: Placement | None, saved: Checkpoint | None
     ) -> tuple[tuple[float, float], Outcome]:
         """The objective of the drawn and of the best design, and how the minimisation ended (collective)."""
         _, objective = self._team
@@ -192,12 +192,12 @@ class DesignProblem:
                 saved.save(iterate, objective.placement.theta)
             progress.update(iterate, target_errors(self.targets, objective.reached))
 
-        with DesignProgress(minimiser, leads=self.simulation.comm.rank == 0) as progress:
+        with DesignProgress(optimiser, leads=self.simulation.comm.rank == 0) as progress:
             try:
                 objective.begin(None)
                 initial = objective.traced(self.initial)
                 objective.begin(near)
-                outcome = minimise_together(self.simulation.comm, objective, minimiser, begin, watch=watch)
+                outcome = minimise_together(self.simulation.comm, objective, optimiser, begin, watch=watch)
                 return (initial, objective.evaluate(outcome.parameters).value), outcome
             except Infeasible as failure:
                 raise EquilibriumError(

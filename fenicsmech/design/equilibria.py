@@ -212,7 +212,7 @@ class TargetEquilibria:
         model, system = self._model, newton.system
         back = model.carry(end, before)
         model.load(back)
-        x = newton.solve_linear(system.balance(back, control).vector)
+        x = newton.solve_linear(system.residual(back, control).vector)
         x.scale(-1.0)
         step = system.unknowns.step(x)
         miss = system.size(system.difference(start, system.moved(back, step)))

@@ -8,7 +8,7 @@ from time import perf_counter
 
 import numpy as np
 
-from fenicsmech.design.optimisers import Iterate, Minimiser
+from fenicsmech.design.optimisers import Iterate, Optimiser
 from fenicsmech.report import Progress, Silent
 
 _WINDOW = 6  # iterations whose trend is drawn on
@@ -17,16 +17,16 @@ _WINDOW = 6  # iterations whose trend is drawn on
 class DesignProgress:
     """Shows iterates on standard error; a context manager.
 
-    Time left is what the trend of the promised reduction over the last iterations says, at most what the minimiser's
+    Time left is what the trend of the promised reduction over the last iterations says, at most what the optimiser's
     limit of iterations leaves.
 
     Args:
-        minimiser: says when it ends.
+        optimiser: says when it ends.
         leads: whether this process shows anything.
     """
 
-    def __init__(self, minimiser: Minimiser, *, leads: bool) -> None:
-        self._minimiser = minimiser
+    def __init__(self, optimiser: Optimiser, *, leads: bool) -> None:
+        self._minimiser = optimiser
         self._progress = Progress(None, "design") if leads else Silent()
         self._recent: deque[tuple[float, float]] = deque(maxlen=_WINDOW)
 

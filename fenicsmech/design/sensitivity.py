@@ -54,9 +54,9 @@ class Adjoint:
         """The derivatives of the travel of each of ``outputs`` at the equilibrium ``state`` (collective)."""
         system, control = self._system, LoadControl(state.force)
         system.load(state)
-        balance = system.balance(state, control)
+        residual = system.residual(state, control)
         forces = system.nodal_forces()
-        self._newton.factor(state, control, balance, floor)
+        self._newton.factor(state, control, residual, floor)
         gradients = [self._gradient(state, output, forces) for output in outputs]
         destroy_garbage(system.layout.comm)
         return gradients
@@ -65,7 +65,7 @@ class Adjoint:
         system = self._system
         right = system.travel_gradient(output, state)
         x = self._newton.solve_linear(right)
-        u, z = system.unknowns.push(x), system.unknowns.step(x).z
+        u, z = system.unknowns.apply(x), system.unknowns.step(x).z
         for field, values in zip(self._weights, self._model.elastic.split(u), strict=True):
             owned_values(field)[:] = values
             field.x.scatter_forward()

@@ -14,7 +14,7 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
-from fenicsmech.compat import cell_nodes, original_nodes
+from fenicsmech.compat import cell_dofs, cell_nodes, original_nodes
 from fenicsmech.design.link_shape import LinkShape
 from fenicsmech.meshing import MechanismMesh
 
@@ -132,6 +132,5 @@ def _original_vertices(design: fem.Function) -> np.ndarray:
     V = design.function_space
     nodes = cell_nodes(V.mesh)
     original = np.empty(len(design.x.array) // V.dofmap.index_map_bs, dtype=np.int64)
-    for cell in range(len(nodes)):
-        original[V.dofmap.cell_dofs(cell)] = nodes[cell]
+    original[cell_dofs(V)] = nodes
     return original_nodes(V.mesh)[original]

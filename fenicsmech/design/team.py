@@ -1,4 +1,4 @@
-"""One process decides, all compute: a minimiser runs on the first process, the others evaluate with it.
+"""One process decides, all compute: a optimiser runs on the first process, the others evaluate with it.
 
 Decisions that hang on the last bit of a number can then not differ between processes.
 """
@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 from fenicsmech.collective import on_all
 from fenicsmech.design.objective import Objective
-from fenicsmech.design.optimisers import Evaluation, Infeasible, Iterate, Minimiser, Reason, Start
+from fenicsmech.design.optimisers import Evaluation, Infeasible, Iterate, Optimiser, Reason, Start
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,9 +66,9 @@ class _Leader:
 
 
 def minimise_together(
-    comm: MPI.Comm, objective: Objective, minimiser: Minimiser, start: Start, *, watch: Callable[[Iterate], None]
+    comm: MPI.Comm, objective: Objective, optimiser: Optimiser, start: Start, *, watch: Callable[[Iterate], None]
 ) -> Outcome:
-    """The outcome of ``minimiser`` on all processes (collective); ``watch`` is called on the first.
+    """The outcome of ``optimiser`` on all processes (collective); ``watch`` is called on the first.
 
     Raises:
         Infeasible: at the start.
@@ -83,7 +83,7 @@ def minimise_together(
             watch(iterate)
 
         try:
-            last = minimiser.minimise(_Leader(comm, objective), start, watch=watch_first)
+            last = optimiser.minimise(_Leader(comm, objective), start, watch=watch_first)
         finally:
             comm.bcast(None, root=0)
         return Outcome(last.number, last.evaluations, last.evaluation.parameters, last.reason, started[0])

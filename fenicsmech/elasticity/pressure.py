@@ -9,7 +9,7 @@ import numpy as np
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 
-from fenicsmech.compat import add_ghosts, owned_values, scalar_space
+from fenicsmech.compat import add_ghosts, cell_dofs, owned_values, scalar_space
 
 
 class PressureField:
@@ -30,8 +30,7 @@ class PressureField:
         V = scalar_space(mesh, degree)
         self.p = fem.Function(V, name="pressure")
         marker = fem.Function(V)
-        for cell in cells:
-            marker.x.array[V.dofmap.cell_dofs(cell)] = 1.0
+        marker.x.array[cell_dofs(V)[cells]] = 1.0
         # a node may touch such a cell only on another rank
         add_ghosts(marker)
         self.unknown = owned_values(marker) > 0.0

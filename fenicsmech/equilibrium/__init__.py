@@ -5,7 +5,7 @@
 - ``control``: what is led along a path: a force, a displacement, motors
 - ``layout``, ``unknowns``: where each unknown stands, and the change of state it stands for
 - ``extras``, ``matrices``, ``entry_copy``, ``kkt``: the distributed KKT matrix
-- ``system``: energy, balance and KKT matrix at a state
+- ``system``: energy, residual and KKT matrix at a state
 - ``factor``: LDLᵀ with inertia
 - ``coarse``, ``smoother``, ``two_level``: conjugate gradients where the factor is too large
 - ``linear``: which of the two solves, and by what rule

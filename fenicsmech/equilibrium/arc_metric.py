@@ -62,7 +62,7 @@ def metric_at(
     """
     system, control = newton.system, lead.holding(state)
     system.load(state)
-    newton.factor(state, control, system.balance(state, control), floor)
+    newton.factor(state, control, system.residual(state, control), floor)
     x = newton.solve_linear(control.rate(system, state))
     rate = lead.heading(system.unknowns.step(x), control)
     speed = abs(lead.conjugate_rate(system, state, control, x))

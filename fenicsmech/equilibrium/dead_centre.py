@@ -73,7 +73,7 @@ class MotorPath(Path):
         """
         newton, system = self._newton, self._newton.system
         system.load(last.state)
-        newton.factor(last.state, control, system.balance(last.state, control), self._floors[0])
+        newton.factor(last.state, control, system.residual(last.state, control), self._floors[0])
         rate = newton.solve_linear(control.rate(system, last.state))
         motion = rate.duplicate()
         motion.pointwiseMult(system.unknowns.coordinates_mask(), rate)

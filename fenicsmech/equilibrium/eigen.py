@@ -109,14 +109,14 @@ def critical_changes(newton: Iteration, lead: Lead, state: State, *, floor: floa
 def _factor(newton: Iteration, lead: Lead, state: State, floor: float) -> None:
     control = lead.holding(state)
     newton.system.load(state)
-    newton.factor(state, control, newton.system.balance(state, control), floor)
+    newton.factor(state, control, newton.system.residual(state, control), floor)
 
 
 def _tangent(newton: Iteration, lead: Lead, state: State, change: Heading) -> PETSc.Mat:
     """A copy of K after a change of state."""
     moved = lead.moved(newton.system, state, change)
     control = lead.holding(moved)
-    newton.system.linearise(moved, control, newton.system.balance(moved, control))
+    newton.system.linearise(moved, control, newton.system.residual(moved, control))
     return newton.system.kkt.matrix().copy()
 
 

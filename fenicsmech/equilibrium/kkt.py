@@ -29,18 +29,18 @@ class KktMatrix:
         elastic: the flexible links.
         layout: numbering of rows and unknowns.
         unknowns: what rows and columns stand for.
-        hat: K̂, with the pattern of all its entries.
+        extended: K̂, with the pattern of all its entries.
         clock: where time is counted.
 
     Attributes:
-        hat: K̂, to which elastic stiffness may be added between ``tangent`` and ``linearise``.
+        extended: K̂, to which elastic stiffness may be added between ``tangent`` and ``linearise``.
     """
 
     def __init__(
-        self, elastic: ElasticBody, layout: Layout, unknowns: ScaledUnknowns, hat: PETSc.Mat, *, clock: Clock
+        self, elastic: ElasticBody, layout: Layout, unknowns: ScaledUnknowns, extended: PETSc.Mat, *, clock: Clock
     ) -> None:
         self._elastic, self._layout, self._unknowns = elastic, layout, unknowns
-        self.hat, self._clock = hat, clock
+        self.extended, self._clock = extended, clock
         # what shift and soften add to the diagonal
         self._added, self._shift, self._plain = unknowns.zeros(), 0.0, True
         self._entries: EntryCopy | None = None
@@ -55,23 +55,23 @@ class KktMatrix:
     def tangent(self) -> None:
         """Makes K̂ hold ∂²E/∂u² of the present fields, and nothing else."""
         with self._clock.phase("assemble"):
-            self.hat.zeroEntries()
-            self._elastic.tangent(self.hat)
+            self.extended.zeroEntries()
+            self._elastic.tangent(self.extended)
 
     def linearise(self, entries: Iterable[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> None:
         """Takes the tangent that K̂ holds and the ``entries`` of its extras, without shift and softness."""
         with self._clock.phase("assemble"):
-            self.hat.assemble()
+            self.extended.assemble()
             if self._layout.last:
                 for rows, columns, block in entries:
                     # petsc4py reads transposed arrays in memory order
-                    self.hat.setValues(
+                    self.extended.setValues(
                         rows.astype(PETSc.IntType),
                         columns.astype(PETSc.IntType),
                         np.ascontiguousarray(block),
                         addv=PETSc.InsertMode.ADD,
                     )
-            self.hat.assemble()
+            self.extended.assemble()
         self._converted = self._formed = False
         self._added.set(0.0)
         self._shift, self._plain = 0.0, True
@@ -107,7 +107,7 @@ class KktMatrix:
         dim, free = self._layout.per_node, self._layout.free
         nodes = ((self._layout.first_row + free[::dim]) // dim).astype(PETSc.IntType)
         rows = PETSc.IS().createBlock(dim, nodes, comm=self._layout.comm)
-        stiffness = self.hat.createSubMatrix(rows, rows)
+        stiffness = self.extended.createSubMatrix(rows, rows)
         stiffness.scale(self._unknowns.unit_u**2)
         stiffness.shift(self._shift)
         return stiffness
@@ -142,7 +142,7 @@ class KktMatrix:
     def _by_entries(self, *, plain: bool) -> PETSc.Mat:
         """K̂ by entries: ``plain``, or with what gives the KKT matrix the addition to its diagonal."""
         if self._entries is None:
-            self._entries = EntryCopy(self.hat)
+            self._entries = EntryCopy(self.extended)
         entries = self._entries.matrix
         if not self._converted:
             self._entries.update()

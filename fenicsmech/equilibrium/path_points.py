@@ -21,7 +21,7 @@ from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.lead import Heading, Lead
 from fenicsmech.equilibrium.solver import Iteration, NotConverged, Solution
 from fenicsmech.equilibrium.state import State
-from fenicsmech.equilibrium.system import Balance
+from fenicsmech.equilibrium.system import Residual
 
 _MOST_ITERATIONS = 10
 _NEAR = 1e-2  # residual over the forces from which on it should fall
@@ -83,14 +83,14 @@ class PathPoints:
     def at(self, state: State) -> PathPoint:
         """The point at a known equilibrium; the parameter grows along its tangent."""
         control = self.lead.holding(state)
-        balance = self._balance(state, control)
-        point = self._point(state, balance, control, (self.newton.relative(balance),), 0)
+        residual = self._residual(state, control)
+        point = self._point(state, residual, control, (self.newton.relative(residual),), 0)
         return point if point.tangent.parameter > 0.0 else point.reversed()
 
     def factor(self, point: PathPoint, near: PathPoint) -> None:
         """Factors the tangent at ``point``, held by what is held for corrections near ``near``."""
         control = self._control(point.state, near)
-        self.newton.factor(point.state, control, self._balance(point.state, control), self.floor)
+        self.newton.factor(point.state, control, self._residual(point.state, control), self.floor)
 
     def correct(self, guess: State, normal: Heading, near: PathPoint) -> PathPoint:
         """The equilibrium in the plane through ``guess`` across ``normal``, its tangent not against that.
@@ -107,18 +107,18 @@ class PathPoints:
         state, residuals, before = guess, [], math.inf
         for iteration in range(_MOST_ITERATIONS + 1):
             control = self._control(state, near)
-            balance = self._balance(state, control)
-            residuals.append(newton.relative(balance))
-            if iteration > 0 and newton.converged(balance, before):
-                point = self._point(state, balance, control, tuple(residuals), iteration + 1)
+            residual = self._residual(state, control)
+            residuals.append(newton.relative(residual))
+            if iteration > 0 and newton.converged(residual, before):
+                point = self._point(state, residual, control, tuple(residuals), iteration + 1)
                 return point if metric.dot(point.tangent, normal) > 0.0 else point.reversed()
-            if not math.isfinite(balance.norm):
+            if not math.isfinite(residual.norm):
                 raise NotConverged("elements are inverted", iteration)
             if residuals[-1] > _DIVERGED * max(min(residuals), _NEAR):
                 break
-            before = balance.norm
-            newton.factor(state, control, balance, self.floor)
-            correction = self._correction(balance)
+            before = residual.norm
+            newton.factor(state, control, residual, self.floor)
+            correction = self._correction(residual)
             rate = self._rate(state, control)
             off = self.difference(state, guess) + correction
             change = correction + rate.scaled(-metric.dot(normal, off) / metric.dot(normal, rate))
@@ -164,13 +164,13 @@ class PathPoints:
             control = self.lead.holding_conjugate(self.system, state)
         return control or self.lead.holding(state)
 
-    def _balance(self, state: State, control: Control) -> Balance:
+    def _residual(self, state: State, control: Control) -> Residual:
         self.system.load(state)
-        return self.system.balance(state, control)
+        return self.system.residual(state, control)
 
-    def _correction(self, balance: Balance) -> Heading:
+    def _correction(self, residual: Residual) -> Heading:
         """x₀."""
-        x = self.newton.solve_linear(balance.vector)
+        x = self.newton.solve_linear(residual.vector)
         x.scale(-1.0)
         return Heading(self.system.unknowns.step(x), 0.0)
 
@@ -180,11 +180,11 @@ class PathPoints:
         return self.lead.heading(self.system.unknowns.step(x), control)
 
     def _point(
-        self, state: State, balance: Balance, control: Control, residuals: tuple[float, ...], iterations: int
+        self, state: State, residual: Residual, control: Control, residuals: tuple[float, ...], iterations: int
     ) -> PathPoint:
         """Stability and tangent at the loaded equilibrium."""
         system, newton, lead = self.system, self.newton, self.lead
-        newton.factor(state, control, balance, self.floor)
+        newton.factor(state, control, residual, self.floor)
         excess = newton.inertia().negative - newton.expected
         x = newton.solve_linear(control.rate(system, state))
         verdict = lead.verdict(system, state, control, x, excess)

@@ -19,7 +19,7 @@ from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.factor import Inertia
 from fenicsmech.equilibrium.linear import BySize, LinearMethod, LinearSolver
 from fenicsmech.equilibrium.state import State, Step
-from fenicsmech.equilibrium.system import Balance, EquilibriumSystem
+from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 
 _STEP = 1e-6  # relative error of steps and tangents that iterative solvers may leave to the next iteration
 _ROUGH = 1e-3  # far from the equilibrium
@@ -119,13 +119,13 @@ class Iteration(ABC):
             raise NotConverged("elements are inverted in the predicted state", 0)
         return state
 
-    def factor(self, state: State, control: Control, balance: Balance, floor: float) -> None:
+    def factor(self, state: State, control: Control, residual: Residual, floor: float) -> None:
         """Factors the KKT matrix of the loaded ``state``, for linear solves with it (collective).
 
         Raises:
             NotConverged: it cannot be factored.
         """
-        self._factor_true(state, control, balance, floor, 0)
+        self._factor_true(state, control, residual, floor, 0)
 
     def inertia(self) -> Inertia:
         """Of the matrix last factored (collective)."""
@@ -147,30 +147,30 @@ class Iteration(ABC):
             raise NotConverged("the linear solver stalled", 0)
         return x
 
-    def relative(self, balance: Balance) -> float:
+    def relative(self, residual: Residual) -> float:
         """The residual over the forces that balance in it."""
-        return balance.norm / max(balance.forces, self._rounding(balance))
+        return residual.norm / max(residual.forces, self._rounding(residual))
 
-    def converged(self, balance: Balance, before: float = 0.0, *, noise: float = 0.0) -> bool:
+    def converged(self, residual: Residual, before: float = 0.0, *, noise: float = 0.0) -> bool:
         """Whether the residual is small beside the forces and joints are closed, or it is rounding that falls no more.
 
         Args:
-            balance: with the residual.
+            residual: with the residual.
             before: norm of the residual one iteration ago; 0 if no other iteration can follow.
             noise: what else rounds the residual, as a norm of it.
         """
-        if balance.norm <= self.options.tolerance * balance.forces < math.inf and balance.gap <= _CLOSED:
+        if residual.norm <= self.options.tolerance * residual.forces < math.inf and residual.gap <= _CLOSED:
             return True
-        return _FALLING * before < balance.norm <= max(self._rounding(balance), noise) < math.inf
+        return _FALLING * before < residual.norm <= max(self._rounding(residual), noise) < math.inf
 
-    def bearable(self, balance: Balance) -> bool:
+    def bearable(self, residual: Residual) -> bool:
         """Whether a state will do where nothing better is found, as at a bifurcation."""
-        limit = min(_BEARABLE * balance.forces, self.options.roundoff * self.system.unknowns.unit)
-        return balance.norm <= limit < math.inf
+        limit = min(_BEARABLE * residual.forces, self.options.roundoff * self.system.unknowns.unit)
+        return residual.norm <= limit < math.inf
 
-    def _rounding(self, balance: Balance) -> float:
+    def _rounding(self, residual: Residual) -> float:
         """Rounding of displacements and rotations, which are counted from the drawn configuration."""
-        return self.options.roundoff * self.system.unknowns.unit * max(balance.motion, _LEAST_MOTION)
+        return self.options.roundoff * self.system.unknowns.unit * max(residual.motion, _LEAST_MOTION)
 
     def _refactor(self, shift: float) -> bool:
         """Takes the KKT matrix last linearised with a ``shift``; whether that could be done."""
@@ -180,13 +180,13 @@ class Iteration(ABC):
                 self._linear = self.options.linear.solver(self.system)
             return self._linear.refactor()
 
-    def _factor_true(self, state: State, control: Control, balance: Balance, floor: float, iterations: int) -> None:
+    def _factor_true(self, state: State, control: Control, residual: Residual, floor: float, iterations: int) -> None:
         """Factors the KKT matrix of the loaded ``state`` with the least shift.
 
         Raises:
             NotConverged: it cannot be factored.
         """
-        self.system.linearise(state, control, balance)
+        self.system.linearise(state, control, residual)
         if not self._refactor(floor):
             raise NotConverged("the tangent at the equilibrium cannot be factored", iterations)
 
@@ -196,13 +196,13 @@ class Iteration(ABC):
             x = right.duplicate()
             return x if self._linear.solve(right, x, tolerance) else None
 
-    def _accuracy(self, balance: Balance) -> float:
+    def _accuracy(self, residual: Residual) -> float:
         """Relative error of a step from there that does no harm.
 
         A tenth of what the step leaves anyway, or what takes the residual well below the tolerance: an error of stiff
         modes counts for hundreds of times more in the residual than in the energy.
         """
-        relative = self.relative(balance)
+        relative = self.relative(residual)
         enough = _SPARE * self.options.tolerance / max(relative, self.options.tolerance)
         return min(max(0.1 * relative, enough, _STEP), _ROUGH)
 
@@ -219,19 +219,19 @@ class Iteration(ABC):
     def _bear(
         self,
         best: State,
-        balance: Balance,
+        residual: Residual,
         control: Control,
         floor: float,
         residuals: list[float],
         failure: NotConverged,
     ) -> Solution:
         """The ``best`` state where nothing better is found; raises ``failure`` unless it is bearable (collective)."""
-        if not self.bearable(balance):
+        if not self.bearable(residual):
             raise failure
         self.system.load(best)
-        balance = self.system.balance(best, control)
-        self._factor_true(best, control, balance, floor, failure.iterations)
-        residuals = [*residuals[: failure.iterations], self.relative(balance)]
+        residual = self.system.residual(best, control)
+        self._factor_true(best, control, residual, floor, failure.iterations)
+        residuals = [*residuals[: failure.iterations], self.relative(residual)]
         return self._accept(best, control, residuals, failure.iterations)
 
     def _spent(self, residuals: list[float], iterations: int) -> NotConverged:

@@ -41,7 +41,7 @@ from fenicsmech.multibody import InterfaceMap, JointSystem
 
 
 @dataclass(frozen=True)
-class Balance:
+class Residual:
     """The gradient of the Lagrangian at a state.
 
     Attributes:
@@ -77,8 +77,8 @@ class EquilibriumSystem:
 
     Attributes:
         layout: numbering of rows and unknowns.
-        unknowns: x and G, at the poses of the last ``balance``.
-        kkt: the KKT matrix last linearised; take it before another ``balance``.
+        unknowns: x and G, at the poses of the last ``residual``.
+        kkt: the KKT matrix last linearised; take it before another ``residual``.
         compliances: c, (rows,).
     """
 
@@ -108,11 +108,11 @@ class EquilibriumSystem:
         with clock.phase("setup"):
             elastic.take(np.zeros(self.layout.owned))
             elastic.update()
-            hat = create_extended_matrix(elastic, self.layout, self._extras.pattern())
-            self.unknowns = ScaledUnknowns(elastic, self.layout, interfaces, joints, hat.getDiagonal().array_r)
+            extended = create_extended_matrix(elastic, self.layout, self._extras.pattern())
+            self.unknowns = ScaledUnknowns(elastic, self.layout, interfaces, joints, extended.getDiagonal().array_r)
             scale = self.unknowns.scale
             self._extras.set_regularisation(scale[self.layout.multipliers], scale[self.layout.force])
-            self.kkt = KktMatrix(elastic, self.layout, self.unknowns, hat, clock=clock)
+            self.kkt = KktMatrix(elastic, self.layout, self.unknowns, extended, clock=clock)
         self._unbalanced = np.zeros(self.layout.displacements)
         self._unbalanced_poses = np.zeros(joints.size)
 
@@ -202,7 +202,7 @@ class EquilibriumSystem:
         """C(s) + c λ at ``multipliers`` λ, (rows,)."""
         return self.joints.value(state.poses, state.motors) + self.compliances * multipliers
 
-    def balance(self, state: State, control: Control) -> Balance:
+    def residual(self, state: State, control: Control) -> Residual:
         """Gᵀ ∇L (collective). Brings G to the poses of ``state``."""
         with self.clock.phase("residual"):
             self.unknowns.turn(state.poses)
@@ -227,32 +227,32 @@ class EquilibriumSystem:
             gap = float(np.max(np.abs(self.joints.row_scale * violation), initial=0.0))
             if control.constrained:
                 extras[layout.force] = -(self.load_displacement(state) - control.target)
-            vector = self.unknowns.pull(r, extras)
-            return Balance(vector, vector.norm(), float(np.sqrt(forces)), gap, self._motion(state), moments)
+            vector = self.unknowns.apply_transpose(r, extras)
+            return Residual(vector, vector.norm(), float(np.sqrt(forces)), gap, self._motion(state), moments)
 
     # -- derivatives at the loaded state -------------------------------------------------------------------
 
-    def linearise(self, state: State, control: Control, balance: Balance) -> None:
+    def linearise(self, state: State, control: Control, residual: Residual) -> None:
         """Brings ``kkt`` to the loaded ``state`` (collective)."""
         self.kkt.tangent()
-        self._linearise(state, control, balance.moments)
+        self._linearise(state, control, residual.moments)
 
     def linearise_mixed(
-        self, state: State, control: Control, balance: Balance, before: State, motion: np.ndarray
+        self, state: State, control: Control, residual: Residual, before: State, motion: np.ndarray
     ) -> None:
         """``linearise``, with the stress that the step δu = ``motion`` from ``before`` promised (collective).
 
         Args:
-            state, control, balance: as in ``linearise``.
+            state, control, residual: as in ``linearise``.
             before: the state before the step.
             motion: δu of owned nodes, linear in the step on interface nodes too, (owned dofs,).
         """
         with self.clock.phase("assemble"):
             self._mixed.follow(before.u, motion)
             self.kkt.tangent()
-            self._mixed.tangent(self.kkt.hat)
+            self._mixed.tangent(self.kkt.extended)
             promised = self.interfaces.moments(self._mixed.forces().reshape(-1, self.layout.per_node))
-            moments = _add_moments(balance.moments, self.layout.comm.allreduce(promised, op=_add_moments))
+            moments = _add_moments(residual.moments, self.layout.comm.allreduce(promised, op=_add_moments))
         self._linearise(state, control, moments)
 
     def _linearise(self, state: State, control: Control, moments: dict[int, np.ndarray]) -> None:
@@ -266,7 +266,7 @@ class EquilibriumSystem:
         """Gᵀ ∂(a · u_P), of a load's travel with respect to the scaled unknowns x (collective)."""
         nodal, extras = np.zeros(self.layout.owned), np.zeros(self.layout.extras)
         self._loads.add(load, 1.0, state, nodal, extras)
-        return self.unknowns.pull(nodal, extras)
+        return self.unknowns.apply_transpose(nodal, extras)
 
     def share_rate(self, state: State) -> PETSc.Vec:
         """Right-hand side whose KKT solution is the rate of x with the share of the constant loads (collective)."""
@@ -276,27 +276,27 @@ class EquilibriumSystem:
         extras[self.layout.z] -= self._potentials.rate(state)
         if self.elastic.shares:
             nodal -= self.elastic.share_residuals()
-        return self.unknowns.pull(nodal, extras)
+        return self.unknowns.apply_transpose(nodal, extras)
 
     def target_rate(self) -> PETSc.Vec:
         """Right-hand side whose KKT solution is the rate of x with the controlled displacement (collective)."""
         extras = np.zeros(self.layout.extras)
         extras[self.layout.force] = -1.0
-        return self.unknowns.pull(np.zeros(self.layout.owned), extras)
+        return self.unknowns.apply_transpose(np.zeros(self.layout.owned), extras)
 
     def motor_rate(self, state: State, direction: np.ndarray) -> PETSc.Vec:
         """Right-hand side whose KKT solution is the rate of x with motor values along ``direction`` (collective)."""
         extras = np.zeros(self.layout.extras)
         rate, twist = self.joints.motor_rate(state.poses, state.motors, state.multipliers, direction)
         extras[self.layout.multipliers], extras[self.layout.z] = rate, twist
-        return self.unknowns.pull(np.zeros(self.layout.owned), extras)
+        return self.unknowns.apply_transpose(np.zeros(self.layout.owned), extras)
 
     def nodal_forces(self) -> np.ndarray:
-        """∂E/∂u minus the loads on links of the last ``balance``, (owned displacements,)."""
+        """∂E/∂u minus the loads on links of the last ``residual``, (owned displacements,)."""
         return self._unbalanced.copy()
 
     def work(self, nodal: np.ndarray, z: np.ndarray) -> float:
-        """What all forces of the last ``balance`` lack along velocities of owned nodes and of poses (collective).
+        """What all forces of the last ``residual`` lack along velocities of owned nodes and of poses (collective).
 
         Args:
             nodal: (owned displacements,); those of interface nodes are their bodies'.

@@ -59,7 +59,7 @@ class ScaledUnknowns:
         update_map_matrix(self.map, self._layout, self._interfaces, self._joints, poses, self.scale)
         self.poses = poses
 
-    def pull(self, nodal: np.ndarray, extras: np.ndarray) -> PETSc.Vec:
+    def apply_transpose(self, nodal: np.ndarray, extras: np.ndarray) -> PETSc.Vec:
         """Gᵀ of a gradient by u, (owned dofs,), and by the last rank's (z, λ, f), (extras,) (collective)."""
         rows, owned = self._rows.array_w, self._layout.owned
         rows[:owned] = nodal
@@ -69,7 +69,7 @@ class ScaledUnknowns:
         self.map.multTranspose(self._rows, vector)
         return vector
 
-    def push(self, x: PETSc.Vec) -> np.ndarray:
+    def apply(self, x: PETSc.Vec) -> np.ndarray:
         """∂u/∂x · x as in ``State.u``, interface nodes too, (owned dofs,) (collective)."""
         self.map.mult(x, self._rows)
         return self._rows.array_r[: self._layout.owned].copy()

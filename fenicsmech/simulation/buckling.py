@@ -16,11 +16,11 @@ from fenicsmech.equilibrium import (
     softest_modes,
 )
 from fenicsmech.errors import EquilibriumError
+from fenicsmech.model import MechanismModel
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.leading import leading
 from fenicsmech.simulation.mode_shape import ModeShape, mode_shape
-from fenicsmech.simulation.model import MechanismModel
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,10 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 
 from fenicsmech.collective import from_one, on_one
-from fenicsmech.compat import cell_nodes, cellwise_space, scalar_space, vector_space, write_series
+from fenicsmech.compat import cell_dofs, cell_nodes, cellwise_space, scalar_space, vector_space, write_series
 from fenicsmech.errors import DescriptionError
+from fenicsmech.model import MechanismModel
 from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.snapshot import at_vertices
 
 
@@ -48,8 +48,7 @@ def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame])
             for written, field in nodal.items():
                 vertices = at_vertices(model, field)
                 values = written.x.array.reshape(-1, vertices.shape[1])
-                for cell, nodes in enumerate(cell_nodes(model.mesh.mesh)):
-                    values[written.function_space.dofmap.cell_dofs(cell)] = vertices[nodes]
+                values[cell_dofs(written.function_space)] = vertices[cell_nodes(model.mesh.mesh)]
             von_mises = model.elastic.von_mises()
             stress.x.array[: len(von_mises)] = von_mises
 

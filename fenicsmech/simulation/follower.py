@@ -27,11 +27,11 @@ from fenicsmech.equilibrium import (
     null_space,
 )
 from fenicsmech.errors import EquilibriumError
+from fenicsmech.model import MechanismModel
 from fenicsmech.simulation.followed import PathEvent
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.leading import leading
 from fenicsmech.simulation.mode_shape import ModeShape, mode_shape
-from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.request import CurveRequest
 from fenicsmech.simulation.tracer import Tracer
 from fenicsmech.simulation.until import Until

@@ -13,8 +13,8 @@ import numpy as np
 from mpi4py import MPI
 
 from fenicsmech.equilibrium import EquilibriumSystem, State
+from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import Motion, stiff_motions
-from fenicsmech.simulation.model import MechanismModel
 
 _ROUNDED = 1e-12  # of the work of each reaction: what is left of their sum, which vanishes
 
@@ -24,7 +24,7 @@ def idle_imbalance(model: MechanismModel, system: EquilibriumSystem, state: Stat
 
     Args:
         model: the discretised mechanism.
-        system: its equations; the last ``balance`` was that of ``state``, which is loaded.
+        system: its equations; the last ``residual`` was that of ``state``, which is loaded.
         state: an equilibrium.
         loads: magnitudes of all forces.
 

@@ -18,10 +18,10 @@ from fenicsmech.equilibrium import (
     State,
 )
 from fenicsmech.errors import EquilibriumError
+from fenicsmech.model import MechanismModel
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.goal import Goal
-from fenicsmech.simulation.model import MechanismModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,9 +68,9 @@ class Influence:
         system, state = self._newton.system, self._at.state
         if output is None and self._at.goal is Goal.FORCE:
             # ∂f/∂y is the right-hand side of the rate with the displacement, but for its sign
-            return -system.unknowns.push(self._newton.solve_linear(system.target_rate()))
+            return -system.unknowns.apply(self._newton.solve_linear(system.target_rate()))
         right = system.travel_gradient(output or system.controlled, state)
-        return system.unknowns.push(self._newton.solve_linear(right))
+        return system.unknowns.apply(self._newton.solve_linear(right))
 
 
 @contextmanager
@@ -90,7 +90,7 @@ def influence(model: MechanismModel, newton: Iteration, at: Equilibrium) -> Iter
         held = at.goal is Goal.FORCE
         control = DisplacementControl(system.load_displacement(at.state)) if held else LoadControl(at.state.force)
         try:
-            newton.factor(at.state, control, system.balance(at.state, control), at.floor)
+            newton.factor(at.state, control, system.residual(at.state, control), at.floor)
             yield Influence(newton, at)
         except NotConverged as failure:
             raise EquilibriumError(

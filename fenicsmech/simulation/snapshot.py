@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from dolfinx import fem
 
-from fenicsmech.compat import cell_nodes, original_cells, original_nodes
+from fenicsmech.compat import cell_dofs, cell_nodes, original_cells, original_nodes
+from fenicsmech.model import MechanismModel
 from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.model import MechanismModel
 
 
 @dataclass(frozen=True)
@@ -34,9 +34,8 @@ def at_vertices(model: MechanismModel, field: fem.Function) -> np.ndarray:
     mesh, dim, components = model.mesh.mesh, model.elastic.model.dim, field.function_space.dofmap.index_map_bs
     values = field.x.array.reshape(-1, components)
     vertices = np.zeros((len(mesh.geometry.x), components))
-    for nodes, cell in zip(cell_nodes(mesh), range(len(model.mesh.link)), strict=False):
-        # the first DOFs of a Lagrange cell are its vertices, in the order of the geometry
-        vertices[nodes] = values[field.function_space.dofmap.cell_dofs(cell)[: dim + 1]]
+    # the first DOFs of a Lagrange cell are its vertices, in the order of the geometry
+    vertices[cell_nodes(mesh)] = values[cell_dofs(field.function_space)[:, : dim + 1]]
     return vertices
 
 

@@ -24,11 +24,11 @@ from fenicsmech.equilibrium import (
     motor_torques,
 )
 from fenicsmech.errors import EquilibriumError
+from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import Assembly, BodyPoint, Freedom, free_motions, is_held
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.idle_balance import idle_imbalance
 from fenicsmech.simulation.leading import leading
-from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.request import CurveRequest
 
 _UNBALANCED = 1e-4  # of the loads: what may be left along idle freedoms
@@ -116,7 +116,7 @@ class Tracer:
     def _unbalanced(self, solution: Solution, control: Control) -> float:
         """Share of the loads that idle freedoms do not balance in a state that is loaded (collective)."""
         state, share = solution.state, solution.state.share
-        self._system.balance(state, control)
+        self._system.residual(state, control)
         loads = [state.force, *(share * magnitude for _, magnitude in self._request.others)]
         return idle_imbalance(self._model, self._system, state, loads)
 

@@ -53,7 +53,7 @@ def main(folder: Path, *, resume: bool) -> None:
         targets=case.targets,
         regulariser=Slow() + fm.ShapeBounds() + 1e-4 * fm.StayClose(),
     )
-    result = problem.optimize(minimiser=Told(), checkpoint=folder / "checkpoint.json", resume=resume)
+    result = problem.optimise(optimiser=Told(), checkpoint=folder / "checkpoint.json", resume=resume)
     if comm.rank == 0:
         result.save(folder / "result.json")
 

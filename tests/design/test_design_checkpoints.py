@@ -13,18 +13,18 @@ REACHABLE = ((0.1, 2.0), (0.4, 3.2))
 
 def test_resuming_without_a_checkpoint_starts_from_the_beginning(tmp_path):
     file = tmp_path / "checkpoint.json"
-    direct = truss((0.4, 1.8)).problem().optimize()
-    resumed = truss((0.4, 1.8)).problem().optimize(checkpoint=file, resume=True)
+    direct = truss((0.4, 1.8)).problem().optimise()
+    resumed = truss((0.4, 1.8)).problem().optimise(checkpoint=file, resume=True)
     assert resumed.links == direct.links
     assert file.exists()
 
 
 def test_going_on_from_a_checkpoint_ends_where_one_run_does(tmp_path):
     file = tmp_path / "checkpoint.json"
-    direct = truss(*REACHABLE).problem().optimize()
-    first = truss(*REACHABLE).problem().optimize(minimiser=fm.LevenbergMarquardt(iterations=3), checkpoint=file)
+    direct = truss(*REACHABLE).problem().optimise()
+    first = truss(*REACHABLE).problem().optimise(optimiser=fm.LevenbergMarquardt(iterations=3), checkpoint=file)
     assert not first.converged
-    resumed = truss(*REACHABLE).problem().optimize(checkpoint=file, resume=True)
+    resumed = truss(*REACHABLE).problem().optimise(checkpoint=file, resume=True)
     assert resumed.iterations == direct.iterations
     assert resumed.evaluations == direct.evaluations + 1
     assert resumed.objective == pytest.approx(direct.objective, rel=1e-6)
@@ -33,8 +33,8 @@ def test_going_on_from_a_checkpoint_ends_where_one_run_does(tmp_path):
 
 def test_a_checkpoint_is_not_used_unless_asked_for(tmp_path):
     file = tmp_path / "checkpoint.json"
-    first = truss((0.4, 1.8)).problem().optimize(checkpoint=file)
-    again = truss((0.4, 1.8)).problem().optimize(checkpoint=file)
+    first = truss((0.4, 1.8)).problem().optimise(checkpoint=file)
+    again = truss((0.4, 1.8)).problem().optimise(checkpoint=file)
     assert again.evaluations == first.evaluations
 
 
@@ -70,28 +70,28 @@ def soft_truss() -> Case:
 )
 def test_checkpoints_of_another_problem_are_refused(differs, case, options, tmp_path):
     file = tmp_path / "checkpoint.json"
-    truss((0.4, 1.8)).problem().optimize(minimiser=fm.LevenbergMarquardt(iterations=1), checkpoint=file)
+    truss((0.4, 1.8)).problem().optimise(optimiser=fm.LevenbergMarquardt(iterations=1), checkpoint=file)
     before = file.read_bytes()
     with pytest.raises(fm.DescriptionError, match=f"another problem.*{differs}"):
-        case().problem(**options).optimize(checkpoint=file, resume=True)
+        case().problem(**options).optimise(checkpoint=file, resume=True)
     assert file.read_bytes() == before
 
 
 def test_checkpoints_of_other_motor_positions_are_refused(tmp_path):
     file = tmp_path / "checkpoint.json"
-    strained(1.0).problem().optimize(minimiser=fm.LevenbergMarquardt(iterations=1), checkpoint=file)
+    strained(1.0).problem().optimise(optimiser=fm.LevenbergMarquardt(iterations=1), checkpoint=file)
     with pytest.raises(fm.DescriptionError, match="another problem: configurations differ"):
-        strained(1.0, angle=0.09).problem().optimize(checkpoint=file, resume=True)
+        strained(1.0, angle=0.09).problem().optimise(checkpoint=file, resume=True)
 
 
-def test_checkpoints_of_another_minimiser_are_refused_but_not_those_of_other_limits(tmp_path):
+def test_checkpoints_of_another_optimiser_are_refused_but_not_those_of_other_limits(tmp_path):
     file = tmp_path / "checkpoint.json"
-    truss((0.4, 1.8)).problem().optimize(minimiser=fm.LevenbergMarquardt(iterations=1), checkpoint=file)
-    with pytest.raises(fm.DescriptionError, match="minimiser"):
-        truss((0.4, 1.8)).problem().optimize(minimiser=fm.Bfgs(), checkpoint=file, resume=True)
+    truss((0.4, 1.8)).problem().optimise(optimiser=fm.LevenbergMarquardt(iterations=1), checkpoint=file)
+    with pytest.raises(fm.DescriptionError, match="optimiser"):
+        truss((0.4, 1.8)).problem().optimise(optimiser=fm.BFGS(), checkpoint=file, resume=True)
     resumed = (
         truss((0.4, 1.8))
         .problem()
-        .optimize(minimiser=fm.LevenbergMarquardt(iterations=5, tolerance=1e-2), checkpoint=file, resume=True)
+        .optimise(optimiser=fm.LevenbergMarquardt(iterations=5, tolerance=1e-2), checkpoint=file, resume=True)
     )
     assert resumed.iterations >= 1

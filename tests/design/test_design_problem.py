@@ -19,7 +19,7 @@ REACHABLE = ((0.1, 2.0), (0.4, 3.2))
 def reached() -> tuple[fm.DesignProblem, fm.DesignResult]:
     """The truss finger, optimised for targets that can be reached."""
     whole = truss(*REACHABLE).problem()
-    return whole, whole.optimize()
+    return whole, whole.optimise()
 
 
 def test_targets_are_reached(reached):
@@ -89,7 +89,7 @@ def test_the_drawn_shape_is_the_initial_design(reached):
 
 
 def test_an_unreachable_target_ends_with_the_best_design_and_says_what_holds_it_back():
-    result = truss((0.4, 0.05), thickness=(2.0, 3.5)).problem().optimize()
+    result = truss((0.4, 0.05), thickness=(2.0, 3.5)).problem().optimise()
     (target,) = result.targets
     assert target.wanted < target.reached < target.started
     assert target.error == pytest.approx(target.reached / 0.05 - 1.0)
@@ -98,12 +98,12 @@ def test_an_unreachable_target_ends_with_the_best_design_and_says_what_holds_it_
     assert 3.4 < result.thickness[1] < 3.55
     assert result.objective[1] < 0.5 * result.objective[0]
     # wider bounds lead closer to it
-    wider = truss((0.4, 0.05), thickness=(2.0, 4.5)).problem().optimize()
+    wider = truss((0.4, 0.05), thickness=(2.0, 4.5)).problem().optimise()
     assert wider.targets[0].reached < 0.9 * target.reached
 
 
 def test_contradicting_targets_end_with_their_compromise():
-    result = truss((0.4, 2.0), (0.4, 3.0)).problem().optimize(minimiser=fm.LevenbergMarquardt(tolerance=1e-6))
+    result = truss((0.4, 2.0), (0.4, 3.0)).problem().optimise(optimiser=fm.LevenbergMarquardt(tolerance=1e-6))
     # (u − 2) / 4 + (u − 3) / 9 = 0
     assert [target.reached for target in result.targets] == pytest.approx([30.0 / 13.0] * 2, rel=1e-3)
     assert result.converged
@@ -114,7 +114,7 @@ def test_weights_shift_the_compromise():
     case = truss((0.4, 2.0), (0.4, 3.0))
     push = case.targets[0].force_part
     wanted = [fm.Target(push, 0.4, 2.0), fm.Target(push, 0.4, 3.0, weight=9.0)]
-    result = Case(case.scene, case.designs, wanted).problem().optimize(minimiser=fm.LevenbergMarquardt(tolerance=1e-6))
+    result = Case(case.scene, case.designs, wanted).problem().optimise(optimiser=fm.LevenbergMarquardt(tolerance=1e-6))
     # (u − 2) / 4 + 9 (u − 3) / 9 = 0
     assert result.targets[0].reached == pytest.approx(2.8, rel=1e-3)
 
@@ -122,9 +122,9 @@ def test_weights_shift_the_compromise():
 def test_the_optimum_found_from_a_coarser_one_is_the_same():
     exact, regulariser = fm.LevenbergMarquardt(tolerance=1e-10), fm.ShapeBounds() + 1e-2 * fm.StayClose()
     case = truss((0.4, 2.2))
-    coarse = case.problem(regulariser=regulariser, size=4.0, order=1).optimize()
-    direct = case.problem(regulariser=regulariser, size=2.5).optimize(minimiser=exact)
-    refined = case.problem(regulariser=regulariser, size=2.5).optimize(minimiser=exact, start=coarse)
+    coarse = case.problem(regulariser=regulariser, size=4.0, order=1).optimise()
+    direct = case.problem(regulariser=regulariser, size=2.5).optimise(optimiser=exact)
+    refined = case.problem(regulariser=regulariser, size=2.5).optimise(optimiser=exact, start=coarse)
     assert direct.converged and refined.converged
     assert refined.objective == pytest.approx(direct.objective, rel=1e-6)  # the first is that of the drawn design
     assert refined.targets[0].started != pytest.approx(direct.targets[0].started, rel=1e-2)
@@ -134,14 +134,14 @@ def test_the_optimum_found_from_a_coarser_one_is_the_same():
 
 def test_a_second_optimisation_of_a_problem_repeats_the_first():
     whole = truss((0.4, 1.8)).problem()
-    first, second = whole.optimize(), whole.optimize()
+    first, second = whole.optimise(), whole.optimise()
     assert second.links == first.links
     assert second.objective == first.objective
     assert (second.iterations, second.evaluations) == (first.iterations, first.evaluations)
 
 
 def test_a_bfgs_run_reaches_the_targets_too():
-    result = truss((0.4, 1.8)).problem().optimize(minimiser=fm.Bfgs(iterations=40, tolerance=1e-4))
+    result = truss((0.4, 1.8)).problem().optimise(optimiser=fm.BFGS(iterations=40, tolerance=1e-4))
     assert result.worst_error < 0.01
 
 
@@ -157,7 +157,7 @@ def test_links_that_carry_their_force_themselves_or_are_strained_by_motors_can_b
         fm.Target(t.force_part, t.force, 1.3 * u, t.configuration)
         for t, u in zip(case.targets, curve.displacements, strict=True)
     ]
-    result = Case(case.scene, case.designs, wanted).problem().optimize()
+    result = Case(case.scene, case.designs, wanted).problem().optimise()
     assert result.worst_error < 0.01
 
 
@@ -169,17 +169,17 @@ def test_bounds_that_exclude_the_drawn_thickness_are_refused(thickness):
 
 def test_a_design_that_does_not_carry_its_loads_is_refused():
     with pytest.raises(fm.EquilibriumError, match="no value") as caught:
-        truss((1e4, 5.0)).problem().optimize()
+        truss((1e4, 5.0)).problem().optimise()
     assert "truss finger" in caught.value.part
     assert "smaller loads" in caught.value.remedy
 
 
 def test_results_of_other_links_are_refused():
     short, long = truss((0.4, 1.8)).problem(), truss((0.4, 1.8)).problem()
-    result = short.optimize(minimiser=fm.LevenbergMarquardt(iterations=1))
+    result = short.optimise(optimiser=fm.LevenbergMarquardt(iterations=1))
     case = truss((0.4, 1.8))
     two = fm.DesignProblem(case.simulate(), [fm.SplineDesign(case.designs[0].link, 2)], targets=case.targets)
-    for use in (two.apply, lambda result: two.optimize(start=result)):
+    for use in (two.apply, lambda result: two.optimise(start=result)):
         refused(
             lambda use=use: use(result),
             part="truss finger",
@@ -202,7 +202,7 @@ def test_the_optimum_does_not_depend_on_the_number_of_ranks(wanted, shared_tmp_p
     for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
         whole = truss(*wanted).problem(comm=comm)
         file = shared_tmp_path / f"{comm.size}.json" if comm.size > 1 else None
-        results.append(whole.optimize(checkpoint=file))
+        results.append(whole.optimise(checkpoint=file))
         push = whole.targets[0].force_part
         curve = whole.simulation.load_displacement(push, forces=[force for force, _ in wanted])
         assert curve.displacements == pytest.approx([target.reached for target in results[-1].targets], rel=1e-8)
@@ -221,15 +221,15 @@ def test_the_optimum_does_not_depend_on_the_number_of_ranks(wanted, shared_tmp_p
 def test_refusals_are_the_same_on_all_ranks(shared_tmp_path):
     file = shared_tmp_path / "checkpoint.json"
     whole = truss((0.4, 1.8)).problem(comm=MPI.COMM_WORLD)
-    whole.optimize(minimiser=fm.LevenbergMarquardt(iterations=1), checkpoint=file)
+    whole.optimise(optimiser=fm.LevenbergMarquardt(iterations=1), checkpoint=file)
     MPI.COMM_WORLD.Barrier()
     with pytest.raises(fm.DescriptionError, match="targets") as caught:
-        truss((0.4, 1.9)).problem(comm=MPI.COMM_WORLD).optimize(checkpoint=file, resume=True)
+        truss((0.4, 1.9)).problem(comm=MPI.COMM_WORLD).optimise(checkpoint=file, resume=True)
     assert len(set(MPI.COMM_WORLD.allgather(str(caught.value)))) == 1
     with pytest.raises(fm.EquilibriumError, match="no value"):
-        truss((0.4, 1.8), (1e4, 5.0)).problem(comm=MPI.COMM_WORLD).optimize()
+        truss((0.4, 1.8), (1e4, 5.0)).problem(comm=MPI.COMM_WORLD).optimise()
     with pytest.raises(fm.DescriptionError, match="drawn thickness"):
-        truss((0.4, 1.8), thickness=(1.0, 2.0)).problem(comm=MPI.COMM_WORLD).optimize()
+        truss((0.4, 1.8), thickness=(1.0, 2.0)).problem(comm=MPI.COMM_WORLD).optimise()
     # an error while the checkpoint is written, which only the first process does
     with pytest.raises(OSError):
-        whole.optimize(checkpoint=file / "not a folder" / "checkpoint.json")
+        whole.optimise(checkpoint=file / "not a folder" / "checkpoint.json")

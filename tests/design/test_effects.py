@@ -35,12 +35,12 @@ def problem(comm: MPI.Comm, designed: list[int], *targets: tuple[int, float, flo
 @pytest.mark.parallel
 def test_link_that_does_not_carry_the_force_is_named_with_the_target():
     whole = problem(MPI.COMM_WORLD, [1], (1, 1.0, 0.5), (0, 1.0, 0.5))
-    refused(lambda: whole.optimize(), part="'push upper' (1", problem="'lower' do not carry the force", remedy="carry")
+    refused(lambda: whole.optimise(), part="'push upper' (1", problem="'lower' do not carry the force", remedy="carry")
 
 
 def test_force_of_nothing_moves_nothing():
     whole = problem(MPI.COMM_SELF, [0], (0, 0.0, 0.5))
-    refused(lambda: whole.optimize(), part="push upper", problem="no force acts", remedy="not zero")
+    refused(lambda: whole.optimise(), part="push upper", problem="no force acts", remedy="not zero")
 
 
 def test_force_on_what_rigid_parts_hold_moves_nothing():
@@ -49,17 +49,17 @@ def test_force_on_what_rigid_parts_hold_moves_nothing():
     scene.mechanism.weld(base, stop, at=(-5, 10))
     stuck = scene.mechanism.force(on=stop, at=(-5, 10), direction=(1, 0), name="stuck")
     whole = Case(scene, [fm.SplineDesign(links[0], 2)], [fm.Target(stuck, 1.0, 0.5)]).problem(comm=MPI.COMM_SELF)
-    refused(lambda: whole.optimize(), part="'stuck'", problem="something rigid holds its point", remedy="carry")
+    refused(lambda: whole.optimise(), part="'stuck'", problem="something rigid holds its point", remedy="carry")
 
 
 def test_target_that_is_met_may_be_beyond_influence():
-    result = problem(MPI.COMM_SELF, [0], (0, 1.0, 0.3), (1, 0.0, 0.0)).optimize(
-        minimiser=fm.LevenbergMarquardt(iterations=2)
+    result = problem(MPI.COMM_SELF, [0], (0, 1.0, 0.3), (1, 0.0, 0.0)).optimise(
+        optimiser=fm.LevenbergMarquardt(iterations=2)
     )
     assert abs(result.targets[1].reached) < 1e-9 and result.targets[0].error != 0.0
 
 
 def test_weak_influence_is_no_refusal():
     whole = problem(MPI.COMM_SELF, [0, 1], (0, 1e-6, 0.5), (1, 1.0, 0.5))
-    result = whole.optimize(minimiser=fm.LevenbergMarquardt(iterations=1))
+    result = whole.optimise(optimiser=fm.LevenbergMarquardt(iterations=1))
     assert np.isfinite(result.worst_error)

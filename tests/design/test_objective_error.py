@@ -47,7 +47,7 @@ def test_it_is_exact_in_exact_errors():
 def test_designs_carry_the_errors_of_displacements_and_objective():
     case = truss((0.1, 6.0), (0.4, 9.0))
     problem = case.problem(size=4.0)
-    result = problem.optimize(minimiser=fm.LevenbergMarquardt(iterations=2))
+    result = problem.optimise(optimiser=fm.LevenbergMarquardt(iterations=2))
     forces = [target.force for target in result.targets]
     curve = problem.simulation.load_displacement(case.targets[0].force_part, forces=forces)
     errors = [target.finer_elements_add for target in result.targets]

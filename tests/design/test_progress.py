@@ -34,8 +34,8 @@ def shown(monkeypatch):
     monkeypatch.setattr(progress, "perf_counter", lambda: float(next(ticks)))
     monkeypatch.setattr(progress, "Progress", lambda *arguments: display)
 
-    def show(minimiser: LevenbergMarquardt, promises: list[float], last: Reason | None = None) -> list[str]:
-        with DesignProgress(minimiser, leads=True) as design:
+    def show(optimiser: LevenbergMarquardt, promises: list[float], last: Reason | None = None) -> list[str]:
+        with DesignProgress(optimiser, leads=True) as design:
             for number, promise in enumerate(promises):
                 design.update(iterate(number, promise, last if number == len(promises) - 1 else None), ERRORS)
         return display.notes

@@ -23,9 +23,9 @@ def errors(case: Case, simulation: fm.Simulation) -> np.ndarray:
 def test_targets_move_by_less_than_the_error_of_the_elements_when_it_goes_on():
     case = truss(*TARGETS)
     results, doubts = [], []
-    for minimiser in (fm.LevenbergMarquardt(), fm.LevenbergMarquardt(tolerance=1e-4)):
+    for optimiser in (fm.LevenbergMarquardt(), fm.LevenbergMarquardt(tolerance=1e-4)):
         problem = case.problem(comm=MPI.COMM_WORLD, **COARSE)
-        results.append(problem.optimize(minimiser=minimiser))
+        results.append(problem.optimise(optimiser=optimiser))
         doubts.append(errors(case, problem.simulation))
     early, late = results
     assert early.reason == Reason.RESOLVED.value and early.converged

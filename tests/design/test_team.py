@@ -74,8 +74,8 @@ class Blurred(Valley):
 
 def test_all_processes_estimate_errors_together():
     plain, blurred = (
-        minimise_together(COMM, valley, minimiser, Start(np.array([-1.2, 1.0])), watch=lambda iterate: None)
-        for valley, minimiser in ((Valley(), LevenbergMarquardt(tolerance=1e-10)), (Blurred(), LevenbergMarquardt()))
+        minimise_together(COMM, valley, optimiser, Start(np.array([-1.2, 1.0])), watch=lambda iterate: None)
+        for valley, optimiser in ((Valley(), LevenbergMarquardt(tolerance=1e-10)), (Blurred(), LevenbergMarquardt()))
     )
     assert blurred.reason is Reason.RESOLVED
     assert blurred.evaluations < plain.evaluations

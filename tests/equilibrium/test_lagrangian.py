@@ -80,7 +80,7 @@ def test_balance_is_the_gradient_of_the_lagrangian(space, where, kind):
         lambda y: lagrangian(scattered(system, columns, y)), np.zeros(len(columns)), step=largest_steps(system)[columns]
     )
     system.load(state)
-    gradient = system.balance(state, control).vector.array
+    gradient = system.residual(state, control).vector.array
     for name, unknowns in blocks(system).items():
         chosen = np.isin(columns, unknowns)
         scale = np.abs(expected[chosen]).max(initial=0.0)
@@ -98,14 +98,14 @@ def test_kkt_matrix_is_the_derivative_of_the_balance(space, where, kind):
     state, control = random_state(case, system), control_of(kind)
     parts, columns = blocks(system), sample(system, control)
 
-    def balance(y):
-        return system.balance(shifted(system, state, scattered(system, columns, y)), control).vector.array.copy()
+    def gradient_at(y):
+        return system.residual(shifted(system, state, scattered(system, columns, y)), control).vector.array.copy()
 
     expected = np.zeros((system.layout.local_unknowns,) * 2)
-    expected[:, columns] = dense.jacobian(balance, np.zeros(len(columns)), step=largest_steps(system)[columns])
+    expected[:, columns] = dense.jacobian(gradient_at, np.zeros(len(columns)), step=largest_steps(system)[columns])
     expected[parts["λ"], parts["λ"]] -= REGULARISATION
     system.load(state)
-    system.linearise(state, control, system.balance(state, control))
+    system.linearise(state, control, system.residual(state, control))
     matrix = system.kkt.matrix()
     matrix = matrix.getValues(range(matrix.size[0]), range(matrix.size[1]))
     for row, rows in parts.items():
@@ -124,7 +124,7 @@ def test_kkt_matrix_is_symmetric(space, kind):
     system = system_of(case, controlled=case.on_flexible)
     state, control = random_state(case, system), control_of(kind)
     system.load(state)
-    system.linearise(state, control, system.balance(state, control))
+    system.linearise(state, control, system.residual(state, control))
     matrix = system.kkt.matrix()
     matrix = matrix.getValues(range(matrix.size[0]), range(matrix.size[1]))
     assert np.abs(matrix - matrix.T).max() <= 1e-12 * np.abs(matrix).max()
@@ -136,7 +136,7 @@ def test_shift_raises_the_curvature_of_displacements_and_poses_alone(space):
     system = system_of(case, controlled=case.on_rigid)
     state, control = random_state(case, system), control_of(LoadControl)
     system.load(state)
-    system.linearise(state, control, system.balance(state, control))
+    system.linearise(state, control, system.residual(state, control))
     matrix = system.kkt.matrix()
     plain = matrix.getDiagonal().array.copy()
     parts = blocks(system)
@@ -162,15 +162,15 @@ def test_kkt_matrix_times_a_direction_is_the_change_of_the_balance_on_any_number
     if layout.last and not control.constrained:
         direction[-1] = 0.0
 
-    def balance(h):
-        return system.balance(shifted(system, state, h * direction), control).vector
+    def gradient_at(h):
+        return system.residual(shifted(system, state, h * direction), control).vector
 
     # D(h) = D + O(h²)
-    slopes = [(balance(h) - balance(-h)) / (2.0 * h) for h in (0.1, 0.05, 0.025)]
+    slopes = [(gradient_at(h) - gradient_at(-h)) / (2.0 * h) for h in (0.1, 0.05, 0.025)]
     finer = [(4.0 * b - a) / 3.0 for a, b in zip(slopes[:-1], slopes[1:], strict=True)]
     expected = (16.0 * finer[1] - finer[0]) / 15.0
     system.load(state)
-    system.linearise(state, control, system.balance(state, control))
+    system.linearise(state, control, system.residual(state, control))
     matrix = system.kkt.matrix()
     vector = matrix.createVecRight()
     vector.array[:] = direction
@@ -186,9 +186,9 @@ def test_balance_is_the_same_on_any_number_of_ranks(space):
         system = system_of(case, controlled=case.on_flexible)
         state, control = random_state(case, system), control_of(DisplacementControl)
         system.load(state)
-        balance = system.balance(state, control)
-        extras = balance.vector.array[len(system.layout.free) :] if system.layout.last else None
+        residual = system.residual(state, control)
+        extras = residual.vector.array[len(system.layout.free) :] if system.layout.last else None
         extras = comm.bcast(extras, root=comm.size - 1)
-        values.append((system.potential(state, state.force), balance.norm, balance.forces, extras))
+        values.append((system.potential(state, state.force), residual.norm, residual.forces, extras))
     for alone, together in zip(*values, strict=True):
         assert together == pytest.approx(alone, rel=1e-11, abs=1e-11 * np.abs(alone).max())

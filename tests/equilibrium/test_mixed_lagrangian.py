@@ -54,11 +54,11 @@ def test_balance_and_kkt_matrix_are_derivatives_of_the_lagrangian(dim, comm):
         value = system.potential(moved, moved.force) + moved.force * control.target
         return value - moved.multipliers @ system.joints.value(moved.poses, moved.motors)
 
-    def balance(h):
-        return comm.allreduce(weights @ system.balance(shifted(system, state, h * direction), control).vector.array)
+    def gradient_at(h):
+        return comm.allreduce(weights @ system.residual(shifted(system, state, h * direction), control).vector.array)
 
     system.load(state)
-    at = system.balance(state, control)
+    at = system.residual(state, control)
     slope = comm.allreduce(at.vector.array @ direction)
     system.linearise(state, control, at)
     matrix = system.kkt.matrix()
@@ -71,14 +71,14 @@ def test_balance_and_kkt_matrix_are_derivatives_of_the_lagrangian(dim, comm):
     proximal = REGULARISATION * comm.allreduce(
         weights[multipliers] @ direction[multipliers] if system.layout.last else 0.0
     )
-    assert curvature == pytest.approx(extrapolated(balance) - proximal, rel=1e-8)
+    assert curvature == pytest.approx(extrapolated(gradient_at) - proximal, rel=1e-8)
 
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_shift_leaves_pressures_alone(dim):
     system, state, control = case_of(dim, MPI.COMM_WORLD)
     system.load(state)
-    system.linearise(state, control, system.balance(state, control))
+    system.linearise(state, control, system.residual(state, control))
     matrix = system.kkt.matrix()
     plain = matrix.getDiagonal().array.copy()
     system.kkt.shift(0.25)
@@ -93,15 +93,15 @@ def test_balance_is_the_same_on_any_number_of_ranks(dim):
     for comm in COMMS.values():
         system, state, control = case_of(dim, comm)
         system.load(state)
-        balance = system.balance(state, control)
-        values.append((system.potential(state, state.force), balance.norm, balance.forces, system.volume_violation()))
+        residual = system.residual(state, control)
+        values.append((system.potential(state, state.force), residual.norm, residual.forces, system.volume_violation()))
     assert values[1] == pytest.approx(values[0], rel=1e-11)
 
 
 def test_pressures_are_about_as_large_as_displacements_in_scaled_units():
     system, state, control = case_of(2, MPI.COMM_WORLD)
     system.load(state)
-    system.linearise(state, control, system.balance(state, control))
+    system.linearise(state, control, system.residual(state, control))
     matrix = system.kkt.matrix()
     comm, layout = system.layout.comm, system.layout
     # how much of the pressures' rows lies at displacements: their coupling, about one per unit

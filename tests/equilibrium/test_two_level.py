@@ -91,7 +91,7 @@ def test_inertia_and_solutions_are_those_of_the_factor_on_both_sides_of_buckling
     for load in (0.9, 0.99, 1.03, 1.3, 5.5, 10.0):
         state = system.moved(first, compression.scaled((load - 0.5) * EULER))
         control = LoadControl(load * EULER)
-        system.linearise(state, control, system.balance(state, control))
+        system.linearise(state, control, system.residual(state, control))
         matrix = system.kkt.matrix()
         solver = solver or TwoLevelSolver(system)
         factor = Factor(matrix)
@@ -116,7 +116,7 @@ def test_stiffness_by_nodes_is_that_block_of_the_matrix():
     state = simulation.load_displacement(push, forces=[0.5 * EULER]).frames[0].state
     control = LoadControl(0.5 * EULER)
     system.load(state)
-    system.linearise(state, control, system.balance(state, control))
+    system.linearise(state, control, system.residual(state, control))
     matrix = system.kkt.matrix()
     for shift in (0.0, 0.3):
         system.kkt.shift(shift)
@@ -138,7 +138,7 @@ def test_columns_and_restrictions_are_those_of_the_matrix_shifted_and_softened()
     random = np.random.default_rng(system.layout.comm.rank)
     mapped = restricted = None
     for softness, shift in ((None, 0.0), (None, 0.3), (0.02, 0.0), (0.02, 0.3), (None, 0.0)):
-        system.linearise(state, control, system.balance(state, control))
+        system.linearise(state, control, system.residual(state, control))
         if softness is not None:
             system.kkt.soften(softness, control)
         system.kkt.shift(shift)
@@ -202,7 +202,7 @@ def test_iterations_do_not_grow_with_the_mesh():
         state = simulation.load_displacement(push, forces=[0.5 * EULER]).frames[0].state
         control = LoadControl(0.5 * EULER)
         system.load(state)
-        system.linearise(state, control, system.balance(state, control))
+        system.linearise(state, control, system.residual(state, control))
         solver = TwoLevelSolver(system)
         assert solver.refactor()
         right = system.force_rate(state)
@@ -216,7 +216,7 @@ def test_size_decides_unless_said_otherwise():
     system = simulation.newton(push).system
     state = simulation.load_displacement(push, forces=[0.0]).frames[0].state
     control = LoadControl(0.0)
-    system.linearise(state, control, system.balance(state, control))
+    system.linearise(state, control, system.residual(state, control))
     unknowns = system.kkt.matrix().getSize()[0]
     assert isinstance(BySize(limit=unknowns).solver(system), Factor)
     assert isinstance(BySize(limit=unknowns - 1).solver(system), TwoLevelSolver)

@@ -63,7 +63,7 @@ def _fidelity(scene: fm.Scene, space: str, comm: MPI.Comm) -> dict[str, Callable
         "rung's tolerance": lambda x: Rung(SPATIAL, tolerance=x),
         "Levenberg–Marquardt's tolerance": lambda x: fm.LevenbergMarquardt(tolerance=x),
         "Levenberg–Marquardt's damping": lambda x: fm.LevenbergMarquardt(damping=x),
-        "BFGS's tolerance": lambda x: fm.Bfgs(tolerance=x),
+        "BFGS's tolerance": lambda x: fm.BFGS(tolerance=x),
     }
 
 

@@ -64,7 +64,7 @@ def test_designs_give_their_memory_back():
 
     def run() -> None:
         problem = case.problem(size=1.0, comm=MPI.COMM_WORLD)
-        problem.optimize(minimiser=fm.LevenbergMarquardt(iterations=1))
+        problem.optimise(optimiser=fm.LevenbergMarquardt(iterations=1))
 
     assert growth(run, before=1, times=2) < 4.0
 

@@ -50,7 +50,7 @@ def test_nothing_is_added_where_no_link_is_bulky(space):
         simulation, push = arm(materials, space=space, formulation=formulation)
         system = simulation.newton(push).system
         elastic = simulation.model.elastic
-        hat = system.kkt.hat
+        hat = system.kkt.extended
         found.append(
             (
                 elastic.energy_ufl.signature(),

@@ -1,4 +1,4 @@
-"""Minimisers of a regularised least-squares objective O(p) = ½ |r(p)|² + R(p).
+"""Optimisers of a regularised least-squares objective O(p) = ½ |r(p)|² + R(p).
 
 - ``problem``: what is minimised, and the history of a minimisation
 - ``resolution``: the end of it where finite elements cannot tell any more
@@ -6,14 +6,14 @@
 - ``bfgs``: quasi-Newton with backtracking, as in the paper this package follows
 """
 
-from fenicsmech.design.optimisers.bfgs import Bfgs
+from fenicsmech.design.optimisers.bfgs import BFGS
 from fenicsmech.design.optimisers.levenberg_marquardt import LevenbergMarquardt
 from fenicsmech.design.optimisers.problem import (
     Evaluation,
     Infeasible,
     Iterate,
     LeastSquaresProblem,
-    Minimiser,
+    Optimiser,
     Quadratic,
     Reason,
     Start,
@@ -21,13 +21,13 @@ from fenicsmech.design.optimisers.problem import (
 )
 
 __all__ = [
-    "Bfgs",
+    "BFGS",
     "Evaluation",
     "Infeasible",
     "Iterate",
     "LeastSquaresProblem",
     "LevenbergMarquardt",
-    "Minimiser",
+    "Optimiser",
     "Quadratic",
     "Reason",
     "Start",

@@ -19,7 +19,7 @@ from fenicsmech.design.optimisers.problem import (
     Infeasible,
     Iterate,
     LeastSquaresProblem,
-    Minimiser,
+    Optimiser,
     Reason,
     Start,
 )
@@ -29,7 +29,7 @@ _HALVINGS = 30
 
 
 @dataclass(frozen=True)
-class Bfgs(Minimiser):
+class BFGS(Optimiser):
     """Stops when the expected reduction is below ``tolerance`` times the objective, or after ``iterations``.
 
     What it expects hangs on an approximate Hessian: a tolerance that is not small ends it far from a minimum.

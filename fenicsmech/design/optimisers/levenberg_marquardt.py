@@ -23,7 +23,7 @@ from fenicsmech.design.optimisers.problem import (
     Infeasible,
     Iterate,
     LeastSquaresProblem,
-    Minimiser,
+    Optimiser,
     Reason,
     Start,
     TooHigh,
@@ -39,7 +39,7 @@ _TOLERANCE = 5e-3
 
 
 @dataclass(frozen=True)
-class LevenbergMarquardt(Minimiser):
+class LevenbergMarquardt(Optimiser):
     """Ends when the undamped step promises less than ``tolerance`` of O, or three steps in a row gained less.
 
     Attributes:

@@ -1,4 +1,4 @@
-"""What minimisers minimise, what they return, and why they stop."""
+"""What optimisers minimise, what they return, and why they stop."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Infeasible(Exception):
 
 
 class TooHigh(Infeasible):
-    """The objective has a value, but one that is of no use to the minimiser."""
+    """The objective has a value, but one that is of no use to the optimiser."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +128,7 @@ class Start:
     Attributes:
         parameters: p, (n,).
         number, evaluations: iterations and objective evaluations so far.
-        memory: what the minimiser had learnt, from ``Iterate.memory``; None at the very start.
+        memory: what the optimiser had learnt, from ``Iterate.memory``; None at the very start.
     """
 
     parameters: np.ndarray
@@ -145,7 +145,7 @@ class Iterate:
         number: iterations so far.
         evaluations: objective evaluations so far, infeasible ones included.
         evaluation: the best point.
-        memory: what the minimiser has learnt, to go on with.
+        memory: what the optimiser has learnt, to go on with.
         promise: the reduction that is still expected, over the objective; inf if that is not known.
         reason: None while it goes on.
     """
@@ -158,7 +158,7 @@ class Iterate:
     reason: Reason | None
 
 
-class Minimiser(ABC):
+class Optimiser(ABC):
     """A method that minimises a least-squares problem from a start.
 
     Attributes:

@@ -30,7 +30,7 @@ import numpy as np
 from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.solver import EquilibriumSolver, Iteration, NotConverged, Solution
 from fenicsmech.equilibrium.state import State, Step
-from fenicsmech.equilibrium.system import Balance, EquilibriumSystem
+from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 from fenicsmech.errors import DescriptionError
 
 _LEAST_SHIFT = 1e-9  # in units of the mean stiffness
@@ -79,20 +79,20 @@ class AugmentedLagrangianIteration(Iteration):
         for iteration in range(options.iterations + 1):
             # multipliers of ``state`` are λ, those of ``current`` λ⁺
             current = self._updated(state, control, 1.0 / penalty)
-            balance = system.balance(current, control)
-            residuals.append(self.relative(balance))
+            residual = system.residual(current, control)
+            residuals.append(self.relative(residual))
             # λ⁺ = λ − μ C(s) holds the rounding of C, μ times
             noise = penalty * options.roundoff * system.unknowns.unit
-            if self.converged(balance, before, noise=noise) and iteration > 0:
-                self._factor_true(current, control, balance, floor, iteration)
+            if self.converged(residual, before, noise=noise) and iteration > 0:
+                self._factor_true(current, control, residual, floor, iteration)
                 return self._accept(self._normalised(current), control, residuals, iteration)
-            if best is None or balance.norm < best[1].norm:
-                best = current, balance
+            if best is None or residual.norm < best[1].norm:
+                best = current, residual
             if iteration == options.iterations:
                 break
-            before = balance.norm
-            gradient, violation = self._parts(balance)
-            if gradient <= max(omega, options.tolerance) * balance.forces:
+            before = residual.norm
+            gradient, violation = self._parts(residual)
+            if gradient <= max(omega, options.tolerance) * residual.forces:
                 if violation <= eta:
                     state = current
                     omega, eta = omega / penalty, eta * penalty**-0.9
@@ -100,9 +100,9 @@ class AugmentedLagrangianIteration(Iteration):
                     penalty = min(options.growth * penalty, _LARGEST_PENALTY)
                     omega, eta = 1.0 / penalty, penalty**-0.1
                 current = self._updated(state, control, 1.0 / penalty)
-                balance = system.balance(current, control)
-                gradient, violation = self._parts(balance)
-            step, descent, shift = self._direction(current, control, balance, 1.0 / penalty, floor, last=shift)
+                residual = system.residual(current, control)
+                gradient, violation = self._parts(residual)
+            step, descent, shift = self._direction(current, control, residual, 1.0 / penalty, floor, last=shift)
             try:
                 state = self._search(state, control, step, descent, gradient, 1.0 / penalty, iteration)
             except NotConverged as failure:
@@ -140,26 +140,26 @@ class AugmentedLagrangianIteration(Iteration):
     def _force_weight(self, softness: float) -> float:
         return softness / self.system.unknowns.scale[self.system.layout.force] ** 2
 
-    def _parts(self, balance: Balance) -> tuple[float, float]:
-        """|∇L_A|, and |C| over the mechanism's length, of a balance at λ⁺."""
-        layout, local = self.system.layout, balance.vector.array_r
+    def _parts(self, residual: Residual) -> tuple[float, float]:
+        """|∇L_A|, and |C| over the mechanism's length, of a residual at λ⁺."""
+        layout, local = self.system.layout, residual.vector.array_r
         states = len(layout.free) + (self.system.joints.size if layout.last else 0)
         squares = [float(part @ part) for part in (local[:states], local[states:])]
         gradient, violation = (math.sqrt(layout.comm.allreduce(square)) for square in squares)
         return gradient, violation / self.system.unknowns.unit
 
     def _direction(
-        self, current: State, control: Control, balance: Balance, softness: float, floor: float, *, last: float
+        self, current: State, control: Control, residual: Residual, softness: float, floor: float, *, last: float
     ) -> tuple[Step, float, float]:
         """The Newton step of s, with δ grown until it descends; the slope of L_A along it; δ."""
         system, layout = self.system, self.system.layout
-        system.linearise(current, control, balance)
+        system.linearise(current, control, residual)
         system.kkt.soften(softness, control)
-        right = balance.vector.copy()
+        right = residual.vector.copy()
         right.array_w[len(layout.free) + (system.joints.size if layout.last else 0) :] = 0.0
         shift, following = floor, max(_LEAST_SHIFT, last / 3.0)
         for _ in range(20):
-            x = self._solution(right, self._accuracy(balance)) if self._refactor(shift) else None
+            x = self._solution(right, self._accuracy(residual)) if self._refactor(shift) else None
             if x is not None and self._descends():
                 break
             shift, following = following, 8.0 * following
@@ -189,8 +189,8 @@ class AugmentedLagrangianIteration(Iteration):
             if after <= before + _DECREASE * length * slope:
                 return trial
             if math.isfinite(after) and after - before <= _ROUNDING * abs(before):
-                balance = system.balance(self._updated(trial, control, softness), control)
-                if self._parts(balance)[0] <= (1.0 - _DECREASE * length) * gradient:
+                residual = system.residual(self._updated(trial, control, softness), control)
+                if self._parts(residual)[0] <= (1.0 - _DECREASE * length) * gradient:
                     return trial
             length *= 0.5
         raise NotConverged("the line search finds no descent", iteration + 1)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.solver import EquilibriumSolver, Iteration, NotConverged, Solution
 from fenicsmech.equilibrium.state import State, Step
-from fenicsmech.equilibrium.system import Balance, EquilibriumSystem
+from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 
 _DECREASE = 1e-4
 _HALVINGS = 20
@@ -45,31 +45,31 @@ class KktIteration(Iteration):
     def solve(self, start: State, control: Control, *, floor: float = 0.0) -> Solution:
         system, options = self.system, self.options
         state = self._begin(start, control)
-        balance, residuals, before = system.balance(state, control), [], math.inf
-        best = state, balance
+        residual, residuals, before = system.residual(state, control), [], math.inf
+        best = state, residual
         for iteration in range(options.iterations + 1):
-            residuals.append(self.relative(balance))
+            residuals.append(self.relative(residual))
             if not math.isfinite(residuals[-1]):
                 raise NotConverged("the residual overflows", iteration)
-            if self.converged(balance, before) and iteration > 0:
+            if self.converged(residual, before) and iteration > 0:
                 return self._accept(state, control, residuals, iteration)
             if iteration == options.iterations:
                 break
-            self._factor_true(state, control, balance, floor, iteration)
-            x = self.solve_linear(balance.vector, tolerance=self._accuracy(balance))
+            self._factor_true(state, control, residual, floor, iteration)
+            x = self.solve_linear(residual.vector, tolerance=self._accuracy(residual))
             x.scale(-1.0)
-            before = balance.norm
+            before = residual.norm
             try:
-                state, balance = self._advance(state, control, system.unknowns.step(x), balance, iteration)
+                state, residual = self._advance(state, control, system.unknowns.step(x), residual, iteration)
             except NotConverged as failure:
                 return self._bear(*best, control, floor, residuals, failure)
-            if balance.norm < best[1].norm:
-                best = state, balance
+            if residual.norm < best[1].norm:
+                best = state, residual
         return self._bear(*best, control, floor, residuals, self._spent(residuals, options.iterations))
 
     def _advance(
-        self, state: State, control: Control, step: Step, balance: Balance, iteration: int
-    ) -> tuple[State, Balance]:
+        self, state: State, control: Control, step: Step, residual: Residual, iteration: int
+    ) -> tuple[State, Residual]:
         """The state after the whole step, or after as much of it as lowers the residual."""
         system = self.system
         for halvings in range(_HALVINGS if self.options.backtracking else 1):
@@ -77,8 +77,8 @@ class KktIteration(Iteration):
             trial = system.moved(state, step.scaled(length))
             if not math.isfinite(system.elastic_energy()):
                 continue
-            new = system.balance(trial, control)
-            falls = new.norm <= (1.0 - _DECREASE * length) * balance.norm
+            new = system.residual(trial, control)
+            falls = new.norm <= (1.0 - _DECREASE * length) * residual.norm
             if falls or self.converged(new) or not self.options.backtracking:
                 return trial, new
         reason = "no step lowers the residual" if self.options.backtracking else "the step inverts elements"

@@ -60,31 +60,31 @@ class SnesIteration(Iteration):
     def solve(self, start: State, control: Control, *, floor: float = 0.0) -> Solution:
         start = self._begin(start, control)
         equations = _Equations(self, start, control, floor)
-        if self.converged(equations.balance):  # there is nothing that a line search could lower
-            equations.test(None, 0, (0.0, 0.0, equations.balance.norm))
+        if self.converged(equations.residual):  # there is nothing that a line search could lower
+            equations.test(None, 0, (0.0, 0.0, equations.residual.norm))
             equations.setUp(None)
             return self._accept(start, control, equations.residuals, 1)
-        x = equations.balance.vector.duplicate()
+        x = equations.residual.vector.duplicate()
         snes = self._create(equations)
         snes.solve(None, x)
         reason, iterations = snes.getConvergedReason(), snes.getLinearSolveIterations()
         snes.destroy()
         if not equations.evaluate(x):
             raise NotConverged("elements are inverted", iterations)
-        if equations.factored and self.converged(equations.balance):
+        if equations.factored and self.converged(equations.residual):
             return self._accept(equations.state, control, equations.residuals, iterations)
         failure = NotConverged(f"SNES stops: {_REASONS.get(reason, f'reason {reason}')}", iterations)
-        return self._bear(equations.state, equations.balance, control, floor, equations.residuals, failure)
+        return self._bear(equations.state, equations.residual, control, floor, equations.residuals, failure)
 
     def _create(self, equations: _Equations) -> PETSc.SNES:
         system, chosen = self.system, self.options.globalisation
         snes = PETSc.SNES().create(system.layout.comm)
         options = PETSc.Options(_PREFIX)
         options["snes_linesearch_type"] = "basic" if chosen is Globalisation.TRUST_REGION else chosen.value
-        options["snes_tr_delta0"] = _FIRST_RADIUS * system.unknowns.unit * math.sqrt(equations.balance.vector.size)
+        options["snes_tr_delta0"] = _FIRST_RADIUS * system.unknowns.unit * math.sqrt(equations.residual.vector.size)
         snes.setOptionsPrefix(_PREFIX)
         snes.setType("newtontr" if chosen is Globalisation.TRUST_REGION else "newtonls")
-        snes.setFunction(equations.residual, equations.balance.vector.duplicate())
+        snes.setFunction(equations.function, equations.residual.vector.duplicate())
         snes.setJacobian(equations.jacobian, equations.matrix)
         snes.setUpdate(equations.rebase)
         snes.setConvergenceTest(equations.test)
@@ -101,7 +101,7 @@ class _Equations:
     """What SNES calls: residual, matrix, factor and convergence test at x, an increment from ``base``.
 
     Attributes:
-        state, balance: where they were evaluated last.
+        state, residual: where they were evaluated last.
         matrix: the KKT matrix.
         factored: whether its last values could be.
         residuals: relative residual of each iterate.
@@ -111,30 +111,30 @@ class _Equations:
     def __init__(self, iteration: SnesIteration, base: State, control: Control, floor: float) -> None:
         self._iteration, self._system, self._base = iteration, iteration.system, base
         self._control, self._floor = control, floor
-        self.state, self.balance = base, self._system.balance(base, control)
-        self._system.linearise(base, control, self.balance)
+        self.state, self.residual = base, self._system.residual(base, control)
+        self._system.linearise(base, control, self.residual)
         self.matrix = self._system.kkt.matrix()
         self.factored = False
         self.residuals: list[float] = []
         self.norm = math.inf
 
     def evaluate(self, x: PETSc.Vec) -> bool:
-        """Brings ``state`` and ``balance`` to x; False, with the balance as it was, if elements are inverted there."""
+        """Brings ``state`` and ``residual`` to x; False, with both as they were, if elements are inverted there."""
         self.state = self._system.moved(self._base, self._system.unknowns.step(x))
         if not math.isfinite(self._system.elastic_energy()):
             return False
-        self.balance = self._system.balance(self.state, self._control)
+        self.residual = self._system.residual(self.state, self._control)
         return True
 
-    def residual(self, snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
+    def function(self, snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
         if self.evaluate(x):
-            self.balance.vector.copy(f)
+            self.residual.vector.copy(f)
         else:
             f.set(math.inf)
 
     def jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, matrix: PETSc.Mat, preconditioner: PETSc.Mat) -> None:
         self.evaluate(x)
-        self._system.linearise(self.state, self._control, self.balance)
+        self._system.linearise(self.state, self._control, self.residual)
         self._system.kkt.matrix()  # the same object, with its new values
 
     def rebase(self, snes: PETSc.SNES, iteration: int) -> None:
@@ -146,11 +146,11 @@ class _Equations:
 
     def test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
         """Convergence as the other solvers see it."""
-        before, self.norm = self.norm, self.balance.norm
-        self.residuals.append(self._iteration.relative(self.balance))
+        before, self.norm = self.norm, self.residual.norm
+        self.residuals.append(self._iteration.relative(self.residual))
         if not math.isfinite(norms[2]):
             return PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
-        if iteration > 0 and self._iteration.converged(self.balance, before):
+        if iteration > 0 and self._iteration.converged(self.residual, before):
             return PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE
         return PETSc.SNES.ConvergedReason.ITERATING
 
@@ -158,7 +158,7 @@ class _Equations:
         self.factored = self._iteration._refactor(self._floor)
 
     def apply(self, pc: PETSc.PC, right: PETSc.Vec, x: PETSc.Vec) -> None:
-        accuracy = self._iteration._accuracy(self.balance)
+        accuracy = self._iteration._accuracy(self.residual)
         solution = self._iteration._solution(right, accuracy) if self.factored else None
         if solution is None:
             x.set(math.nan)

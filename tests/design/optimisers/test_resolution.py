@@ -44,8 +44,8 @@ class Doubtful:
         return np.full(2, self.error * self.growth ** (self.estimates - 1))
 
 
-def minimised(minimiser: LevenbergMarquardt, problem: Doubtful) -> Iterate:
-    return minimiser.minimise(problem, Start(problem.start), watch=lambda iterate: None)
+def minimised(optimiser: LevenbergMarquardt, problem: Doubtful) -> Iterate:
+    return optimiser.minimise(problem, Start(problem.start), watch=lambda iterate: None)
 
 
 @pytest.mark.parametrize("error", ERRORS)

@@ -36,10 +36,10 @@ def test_gradient_and_matrix_are_derivatives_of_the_value(space, kind):
 
     system.load(state)
     current = iteration._updated(state, control, SOFTNESS)
-    balance = system.balance(current, control)
-    assert balance.vector.dot(way) == pytest.approx(slope, rel=1e-6)
+    residual = system.residual(current, control)
+    assert residual.vector.dot(way) == pytest.approx(slope, rel=1e-6)
 
-    system.linearise(current, control, balance)
+    system.linearise(current, control, residual)
     matrix = system.kkt.matrix()
     system.kkt.soften(SOFTNESS, control)
     system.kkt.shift(0.0)

@@ -9,17 +9,27 @@ from functools import partial
 
 import numpy as np
 import ufl
+from mpi4py import MPI
 
 from fenicsmech.clock import Clock
-from fenicsmech.compat import cell_nodes, original_nodes
+from fenicsmech.collective import on_one
+from fenicsmech.compat import cell_dofs, cell_nodes, original_nodes
 from fenicsmech.effects import BodyEffect, JointSoftening, LinkEffect, LinkFields, RestStretch, find_boundaries, holding
 from fenicsmech.elasticity import ElasticBody, ElasticModel, Stretch
 from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State, load_fields
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import Effect, FlexibleLink, Force, Mechanism, Output, in_dimension
-from fenicsmech.meshing import MechanismMesh, bulge_field
+from fenicsmech.meshing import (
+    InterfaceSite,
+    LinkMesh,
+    MechanismMesh,
+    bulge_field,
+    check_link,
+    distribute,
+    mesh_link,
+)
+from fenicsmech.model.fidelity import Fidelity
 from fenicsmech.multibody import DesignAtNodes, InterfaceMap, Linkage, MaterialPoint, body_point, link_point
-from fenicsmech.simulation.fidelity import Fidelity
 
 
 class MechanismModel:
@@ -215,10 +225,8 @@ class MechanismModel:
 
     def _link_of_nodes(self) -> np.ndarray:
         """Index of the flexible link of every local node."""
-        V = self.elastic.u.function_space
         owner = np.full(len(self.interfaces.body), -1)
-        for cell, link in enumerate(self.mesh.link):
-            owner[V.dofmap.cell_dofs(cell)] = link
+        owner[cell_dofs(self.elastic.u.function_space)] = self.mesh.link[:, None]
         return owner
 
 
@@ -236,3 +244,46 @@ def _stretches(links: Sequence[FlexibleLink], model: ElasticModel, effects: Sequ
                     raise DescriptionError(f"link {link.name!r}", "it is prestrained twice", "Leave one out")
                 found[link] = stretch
     return [found.get(link) for link in links]
+
+
+def check_links(mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> None:
+    """Refuses links, joints and points that cannot be right, before anything is meshed."""
+    for link in mechanism.flexible_links:
+        points = {part.name: part.at for part in (*mechanism.forces, *mechanism.outputs) if part.on == link}
+        sites = interface_sites(linkage, link)
+        asked = _asked(link, fidelity)
+        check_link(link.name, link.shape, sites, points, **asked)
+
+
+def mesh_links(mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> list[LinkMesh]:
+    """The mesh of every flexible link, on the calling rank."""
+    return [
+        mesh_link(link.name, link.shape, interface_sites(linkage, link), **_asked(link, fidelity))
+        for link in mechanism.flexible_links
+    ]
+
+
+def _asked(link: FlexibleLink, fidelity: Fidelity) -> dict:
+    """What is asked of the mesh of ``link``."""
+    return {
+        "dim": fidelity.model.dim,
+        "size": fidelity.sizes[link],
+        "layers": fidelity.layers,
+        "segments": fidelity.segments,
+        "half": fidelity.model.symmetric,
+    }
+
+
+def interface_sites(linkage: Linkage, link: FlexibleLink) -> list[InterfaceSite]:
+    """Where joints hold ``link``."""
+    sites = []
+    for body in (linkage.bodies[i] for i in linkage.interfaces[link]):
+        # a pin along z holds its link at whatever height the link is
+        at = body.centre[:2] if body.axis[2] == 1.0 else body.centre
+        sites.append(InterfaceSite(at, body.region, body.axis, body.name))
+    return sites
+
+
+def mesh_mechanism(comm: MPI.Comm, mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> MechanismMesh:
+    """Meshes on rank 0 and distributes; an error there is raised on all ranks (collective)."""
+    return distribute(comm, on_one(comm, lambda: mesh_links(mechanism, linkage, fidelity)))

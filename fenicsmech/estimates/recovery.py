@@ -15,7 +15,7 @@ from petsc4py import PETSc
 
 from fenicsmech.compat import assemble_matrix, assemble_vector, compile_form, owned_values, scalar_space
 from fenicsmech.meshing import on_mid_plane
-from fenicsmech.simulation.model import MechanismModel
+from fenicsmech.model import MechanismModel
 
 
 class Recovery:

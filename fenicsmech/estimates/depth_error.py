@@ -23,10 +23,10 @@ import ufl
 from dolfinx import fem
 from scipy.spatial import cKDTree
 
-from fenicsmech.compat import cell_nodes, compile_form, original_nodes, scalar_space
+from fenicsmech.compat import cell_dofs, cell_nodes, compile_form, original_nodes, scalar_space
 from fenicsmech.elasticity import PLANE_STRESS
 from fenicsmech.errors import DescriptionError
-from fenicsmech.simulation.model import MechanismModel
+from fenicsmech.model import MechanismModel
 
 _DECAY = 0.2  # c: estimates are 0.6 to 1.4 times what space adds to cantilever, arch, truss, claw and Klann leg
 _DEGREE = 8  # of the quadrature: w decays within a cell
@@ -81,6 +81,5 @@ class DepthError:
             mine = np.flatnonzero(owner == link)
             distance[mine] = cKDTree(mesh.vertices[held[owner[held] == link]]).query(mesh.vertices[mine])[0]
         field = fem.Function(scalar_space(mesh.mesh, 1), name="distance")
-        for cell, vertices in enumerate(numbers):
-            field.x.array[field.function_space.dofmap.cell_dofs(cell)] = distance[vertices]
+        field.x.array[cell_dofs(field.function_space)] = distance[numbers]
         return field

@@ -16,7 +16,7 @@ from dolfinx import fem
 
 from fenicsmech.compat import compile_expression, compile_form, scalar_space, vector_space
 from fenicsmech.elasticity import ElasticBody
-from fenicsmech.simulation.recovery import Recovery
+from fenicsmech.estimates.recovery import Recovery
 
 
 class PressureError:

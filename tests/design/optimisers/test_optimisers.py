@@ -1,4 +1,4 @@
-"""Both minimisers find known minima, respect what they are told, can go on later, and say why they stop."""
+"""Both optimisers find known minima, respect what they are told, can go on later, and say why they stop."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ import pytest
 from scipy.optimize import brentq
 
 from fenicsmech.design import (
+    BFGS,
     Barrier,
-    Bfgs,
     Evaluation,
     Infeasible,
     Iterate,
     LevenbergMarquardt,
-    Minimiser,
+    Optimiser,
     Quadratic,
     Reason,
     Start,
     TooHigh,
 )
 
-MINIMISERS = [LevenbergMarquardt(iterations=200, tolerance=1e-14), Bfgs(iterations=2000, tolerance=1e-14)]
-each_minimiser = pytest.mark.parametrize("minimiser", MINIMISERS, ids=lambda minimiser: type(minimiser).__name__)
+OPTIMISERS = [LevenbergMarquardt(iterations=200, tolerance=1e-14), BFGS(iterations=2000, tolerance=1e-14)]
+each_optimiser = pytest.mark.parametrize("optimiser", OPTIMISERS, ids=lambda optimiser: type(optimiser).__name__)
 
 
 @dataclass
@@ -127,14 +127,14 @@ class Cliff(Problem):
         return np.ones(1), np.ones((1, 2))
 
 
-def watched(minimiser: Minimiser, problem: Problem, start: Start | None = None) -> tuple[Iterate, list[Iterate]]:
+def watched(optimiser: Optimiser, problem: Problem, start: Start | None = None) -> tuple[Iterate, list[Iterate]]:
     history = []
-    return minimiser.minimise(problem, start or Start(problem.start), watch=history.append), history
+    return optimiser.minimise(problem, start or Start(problem.start), watch=history.append), history
 
 
-@each_minimiser
-def test_banana_valley_is_followed_to_its_end(minimiser):
-    last, history = watched(minimiser, Rosenbrock())
+@each_optimiser
+def test_banana_valley_is_followed_to_its_end(optimiser):
+    last, history = watched(optimiser, Rosenbrock())
     assert last.reason is Reason.CONVERGED
     assert last.evaluation.parameters == pytest.approx([1.0, 1.0], abs=1e-5)
     values = [iterate.evaluation.value for iterate in history]
@@ -142,17 +142,17 @@ def test_banana_valley_is_followed_to_its_end(minimiser):
     assert [iterate.reason for iterate in history[:-1]] == [None] * (len(history) - 1)
 
 
-@each_minimiser
-def test_every_evaluation_is_counted(minimiser):
+@each_optimiser
+def test_every_evaluation_is_counted(optimiser):
     problem = Rosenbrock()
-    last, _ = watched(minimiser, problem)
+    last, _ = watched(optimiser, problem)
     assert last.evaluations == len(problem.asked)
     assert problem.refused > 0
 
 
-@each_minimiser
-def test_regulariser_moves_the_minimum_to_where_the_whole_gradient_vanishes(minimiser):
-    last, _ = watched(minimiser, Rosenbrock(pull=0.1))
+@each_optimiser
+def test_regulariser_moves_the_minimum_to_where_the_whole_gradient_vanishes(optimiser):
+    last, _ = watched(optimiser, Rosenbrock(pull=0.1))
     assert np.linalg.norm(last.evaluation.gradient) < 1e-5
     assert last.evaluation.parameters[0] < 0.9
 
@@ -167,44 +167,44 @@ def test_levenberg_marquardt_takes_the_same_way_in_any_unit_of_length():
         assert way == pytest.approx(ways[0], rel=1e-6, abs=1e-8)
 
 
-@pytest.mark.parametrize("minimiser", [LevenbergMarquardt(iterations=2, tolerance=1e-14), Bfgs(iterations=2)])
-def test_running_out_of_iterations_is_said(minimiser):
-    last, history = watched(minimiser, Rosenbrock())
+@pytest.mark.parametrize("optimiser", [LevenbergMarquardt(iterations=2, tolerance=1e-14), BFGS(iterations=2)])
+def test_running_out_of_iterations_is_said(optimiser):
+    last, history = watched(optimiser, Rosenbrock())
     assert last.reason is Reason.ITERATIONS
     assert [iterate.number for iterate in history] == [0, 1, 2]
 
 
-@each_minimiser
-def test_nothing_feasible_ahead_is_said_and_the_start_kept(minimiser):
-    last, _ = watched(minimiser, Cliff())
+@each_optimiser
+def test_nothing_feasible_ahead_is_said_and_the_start_kept(optimiser):
+    last, _ = watched(optimiser, Cliff())
     assert last.reason is Reason.NO_DESCENT
     assert np.array_equal(last.evaluation.parameters, np.zeros(2))
 
 
-@each_minimiser
-def test_a_start_without_a_value_is_refused(minimiser):
+@each_optimiser
+def test_a_start_without_a_value_is_refused(optimiser):
     with pytest.raises(Infeasible, match="too large"):
-        watched(minimiser, Rosenbrock(), Start(np.array([2.0, 0.0])))
+        watched(optimiser, Rosenbrock(), Start(np.array([2.0, 0.0])))
 
 
-@each_minimiser
-def test_a_minimum_is_recognised_at_once(minimiser):
+@each_optimiser
+def test_a_minimum_is_recognised_at_once(optimiser):
     problem = Rosenbrock()
-    last, history = watched(minimiser, problem, Start(np.ones(2)))
+    last, history = watched(optimiser, problem, Start(np.ones(2)))
     assert last.reason is Reason.CONVERGED
     assert (last.number, last.evaluations) == (0, 1)
     assert len(history) == 2
 
 
 def test_least_squares_structure_pays():
-    fast, slow = (watched(m, Rosenbrock())[0].evaluations for m in MINIMISERS)
+    fast, slow = (watched(m, Rosenbrock())[0].evaluations for m in OPTIMISERS)
     assert fast < slow
 
 
 def test_barriers_are_not_run_through_where_the_residual_would():
     exact, parabola = Wall(), Wall(quadratic=True)
-    minimiser = LevenbergMarquardt(tolerance=1e-6)
-    (last, _), (other, _) = (watched(minimiser, problem) for problem in (exact, parabola))
+    optimiser = LevenbergMarquardt(tolerance=1e-6)
+    (last, _), (other, _) = (watched(optimiser, problem) for problem in (exact, parabola))
     optimum = brentq(lambda x: exact.BARRIER.slope(x) + x - 10.0, 1.0, 2.0)
     assert last.evaluation.parameters == pytest.approx([optimum], rel=1e-5)
     assert other.evaluation.parameters == pytest.approx([optimum], rel=1e-2)
@@ -215,15 +215,15 @@ def test_barriers_are_not_run_through_where_the_residual_would():
     assert len(parabola.asked) >= 2 * len(exact.asked)
 
 
-@each_minimiser
-def test_going_on_from_any_iterate_repeats_what_would_have_come(minimiser):
-    _, history = watched(minimiser, Rosenbrock(pull=0.01))
+@each_optimiser
+def test_going_on_from_any_iterate_repeats_what_would_have_come(optimiser):
+    _, history = watched(optimiser, Rosenbrock(pull=0.01))
     assert len(history) > 8
     for index, iterate in enumerate(history[:-1]):
         # as it comes back from a file
         numbers = json.loads(json.dumps([iterate.evaluation.parameters.tolist(), iterate.memory.tolist()]))
         start = Start(np.array(numbers[0]), iterate.number, iterate.evaluations, np.array(numbers[1]))
-        _, again = watched(minimiser, Rosenbrock(pull=0.01), start)
+        _, again = watched(optimiser, Rosenbrock(pull=0.01), start)
         rest = history[index:]
         assert len(again) == len(rest)
         for ours, theirs in zip(again, rest, strict=True):

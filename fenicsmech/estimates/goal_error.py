@@ -32,9 +32,9 @@ import ufl
 from dolfinx import fem
 
 from fenicsmech.compat import compile_form, destroy_garbage, owned_values, tensor_space
-from fenicsmech.simulation.model import MechanismModel
-from fenicsmech.simulation.pressure_error import PressureError
-from fenicsmech.simulation.recovery import Recovery
+from fenicsmech.estimates.pressure_error import PressureError
+from fenicsmech.estimates.recovery import Recovery
+from fenicsmech.model import MechanismModel
 
 # c², so that effectivities lie around 1 (tests/simulation/test_goal_error.py, test_mixed_error.py)
 _CALIBRATION = {1: 1.3, 2: 1.6, 3: 2.6}
