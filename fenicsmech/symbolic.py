@@ -1,6 +1,6 @@
 """Functions given by formulae: derivatives are derived symbolically, and all is compiled to Python once.
 
-    f(x; c) ∈ Rᵐ,     ∂f_k/∂x_i,     Σ_k w_k ∂²f_k/∂x_i∂x_j     with variables x ∈ Rⁿ and constants c.
+f(x; c) ∈ Rᵐ,     ∂f_k/∂x_i,     Σ_k w_k ∂²f_k/∂x_i∂x_j     with variables x ∈ Rⁿ and constants c.
 """
 
 from __future__ import annotations
@@ -51,20 +51,18 @@ def derive(
     weights = sympy.symbols(f"w0:{m}", real=True)
     gradient = [[sympy.diff(f, x) for x in variables] for f in formulae]
     weighted = [sum((w * row[i] for w, row in zip(weights, gradient, strict=True)), sympy.S.Zero) for i in range(n)]
-    lower = [sympy.diff(weighted[i], variables[j]) if j <= i else sympy.S.Zero for i in range(n) for j in range(n)]
+    rows, columns = np.tril_indices(n)
+    lower = [sympy.diff(weighted[i], variables[j]) for i, j in zip(rows, columns, strict=True)]
+    place = np.empty((n, n), dtype=int)
+    place[rows, columns] = place[columns, rows] = np.arange(len(rows))
 
     compiled = _at_many_points if many else _at_one_point
-    half = compiled(lower, (variables, constants, weights), (n, n))
-
-    def hessian(*point: np.ndarray) -> np.ndarray:
-        below = half(*point)
-        return below + np.tril(below, -1).swapaxes(-1, -2)
-
+    triangle = compiled(lower, (variables, constants, weights), (len(rows),))
     return SmoothFunction(
         size=m,
         value=compiled(list(formulae), (variables, constants), (m,)),
         gradient=compiled([entry for row in gradient for entry in row], (variables, constants), (m, n)),
-        hessian=hessian,
+        hessian=lambda *point: triangle(*point)[..., place],
     )
 
 
@@ -73,7 +71,7 @@ def _at_one_point(expressions: list[sympy.Expr], arguments: tuple, shape: tuple[
     formula = sympy.lambdify(arguments, expressions, "math", cse=True)
 
     def evaluate(*point: np.ndarray) -> np.ndarray:
-        return np.array(formula(*(numbers.tolist() for numbers in point)), dtype=float).reshape(shape)
+        return np.array(formula(*[numbers.tolist() for numbers in point]), dtype=float).reshape(shape)
 
     return evaluate
 

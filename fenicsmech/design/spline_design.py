@@ -10,7 +10,6 @@ import numpy as np
 from fenicsmech.checks import finite, positive
 from fenicsmech.design.link_shape import ShapeRequest
 from fenicsmech.errors import DescriptionError
-from fenicsmech.joints import WELD
 from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Mechanism, Strip
 from fenicsmech.meshing import Centreline
 from fenicsmech.multibody import Linkage
@@ -140,7 +139,7 @@ def shape_request(design: SplineDesign, mechanism: Mechanism, linkage: Linkage) 
         )
     for _ in range(design.segments - len(gaps)):
         interior[int(np.argmax(gaps / (interior + 1)))] += 1
-    welded = {joint.at[:2] for joint in mechanism.joints if joint.kind is WELD and link in (joint.a, joint.b)}
+    welded = {joint.at[:2] for joint in mechanism.joints if joint.kind.clamps and link in (joint.a, joint.b)}
     return ShapeRequest(
         link=mechanism.flexible_links.index(link),
         name=link.name,

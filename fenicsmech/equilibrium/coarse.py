@@ -14,11 +14,11 @@ from dolfinx import fem
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
+from fenicsmech.compat import interpolation_matrix
 from fenicsmech.equilibrium.factor import Factor, Inertia
 from fenicsmech.equilibrium.layout import Layout
 from fenicsmech.equilibrium.matrices import create_map_matrix, update_map_matrix
 from fenicsmech.equilibrium.system import EquilibriumSystem
-from fenicsmech.multibody import DesignAtNodes
 
 
 class CoarseLevel:
@@ -72,15 +72,9 @@ class CoarseLevel:
 
 def _values_at_nodes(system: EquilibriumSystem, coarse: Layout) -> PETSc.Mat:
     """D⁻¹ N: unknowns from displacements at vertices and the extras."""
-    fine, dim, d = system.layout, system.joints.space.dim, system.elastic.d
-    weights = DesignAtNodes(d, system.elastic.u).matrix.tocsr()[fine.free[::dim] // dim]
-    weights.eliminate_zeros()
-    vertices = d.function_space.dofmap.index_map.local_to_global(np.arange(weights.shape[1], dtype=np.int32))
-    # every component alike
-    entries = weights.tocoo()
-    rows = [(dim * entries.row[:, None] + np.arange(dim)).ravel()]
-    columns = [(dim * vertices[entries.col][:, None] + np.arange(dim)).ravel()]
-    values = [np.repeat(entries.data / system.unknowns.unit_u, dim)]
+    fine, d = system.layout, system.elastic.d
+    entries = interpolation_matrix(d.function_space, system.elastic.u.function_space)[fine.free].tocoo()
+    rows, columns, values = [entries.row], [entries.col], [entries.data / system.unknowns.unit_u]
     if fine.last:
         extras = np.arange(fine.extras)
         rows.append(len(fine.free) + extras)

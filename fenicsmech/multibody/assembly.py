@@ -49,6 +49,9 @@ class AssemblyOptions:
     before_strain: float = 0.98
 
 
+_DEFAULT = AssemblyOptions()
+
+
 @dataclass(frozen=True)
 class Assembly:
     """Poses of all bodies in a configuration.
@@ -67,7 +70,7 @@ def assemble(
     linkage: Linkage,
     configuration: Configuration,
     springs: Sequence[SpringPotential] = (),
-    options: AssemblyOptions = AssemblyOptions(),
+    options: AssemblyOptions = _DEFAULT,
 ) -> Assembly:
     """The rigid assembly of ``configuration``.
 
@@ -100,7 +103,7 @@ def assemble_before_strain(
     linkage: Linkage,
     configuration: Configuration,
     springs: Sequence[SpringPotential] = (),
-    options: AssemblyOptions = AssemblyOptions(),
+    options: AssemblyOptions = _DEFAULT,
 ) -> Assembly:
     """As ``assemble``, but a little before the last position free of strain where motors strain the links.
 

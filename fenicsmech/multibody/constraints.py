@@ -71,6 +71,9 @@ class JointSystem:
         self._drawn = [c.drawn(self.bodies) for c in self.connections]
 
         pose_size = self.space.pose_size
+        # both bodies of each connection, with the places of their poses among the variables of its equations
+        first, second = slice(0, pose_size), slice(pose_size, 2 * pose_size)
+        self._ends = [((c.a, first), (c.b, second)) for c in self.connections]
         self.free_bodies = [i for i, body in enumerate(self.bodies) if not body.fixed]
         start = {body: pose_size * k for k, body in enumerate(self.free_bodies)}
         self.columns = {body: np.arange(first, first + pose_size) for body, first in start.items()}
@@ -140,9 +143,9 @@ class JointSystem:
 
     def gradient_blocks(self, poses: np.ndarray, motors: np.ndarray):
         """A as (rows, columns, block) triples; which blocks there are never changes."""
-        for k, (connection, rows) in enumerate(zip(self.connections, self._joint_rows, strict=True)):
+        for k, (ends, rows) in enumerate(zip(self._ends, self._joint_rows, strict=True)):
             both = self._constraints[k].gradient(*self._arguments(k, poses, motors))
-            for body, own in self._ends(connection):
+            for body, own in ends:
                 if body in self.columns:
                     yield rows, self.columns[body], both[:, own]
         for body, rows in self._norm_rows.items():
@@ -150,10 +153,10 @@ class JointSystem:
 
     def hessian_blocks(self, poses: np.ndarray, motors: np.ndarray, multipliers: np.ndarray):
         """Σ λ_k ∂²C_k/∂z² as (columns, columns, block) triples; which blocks there are never changes."""
-        for k, (connection, rows) in enumerate(zip(self.connections, self._joint_rows, strict=True)):
+        for k, (ends, rows) in enumerate(zip(self._ends, self._joint_rows, strict=True)):
             both = self._constraints[k].hessian(*self._arguments(k, poses, motors), multipliers[rows])
-            for i, own_i in self._ends(connection):
-                for j, own_j in self._ends(connection):
+            for i, own_i in ends:
+                for j, own_j in ends:
                     if i in self.columns and j in self.columns:
                         yield self.columns[i], self.columns[j], both[own_i, own_j]
         for body, rows in self._norm_rows.items():
@@ -165,7 +168,7 @@ class JointSystem:
     ) -> np.ndarray:
         """Generalised force Aᵀλ of connection ``k`` on the pose of ``body``, (pose_size,)."""
         both = self._constraints[k].gradient(*self._arguments(k, poses, motors))
-        return both[:, dict(self._ends(self.connections[k]))[body]].T @ multipliers[self._joint_rows[k]]
+        return both[:, dict(self._ends[k])[body]].T @ multipliers[self._joint_rows[k]]
 
     def motor_rate(
         self, poses: np.ndarray, motors: np.ndarray, multipliers: np.ndarray, direction: np.ndarray
@@ -173,22 +176,16 @@ class JointSystem:
         """∂C/∂φ (rows,) and ∂(Aᵀλ)/∂φ (size,), times ``direction`` (per connection)."""
         rate, force_rate = np.zeros(self.rows), np.zeros(self.size)
         for k in np.flatnonzero(direction):
-            connection, rows = self.connections[k], self._joint_rows[k]
-            if connection.motor is None:
+            if self.connections[k].motor is None:
                 continue
             # φ is the last variable of the connection's equations
-            arguments = self._arguments(k, poses, motors)
+            arguments, rows = self._arguments(k, poses, motors), self._joint_rows[k]
             rate[rows] = self._constraints[k].gradient(*arguments)[:, -1] * direction[k]
             mixed = self._constraints[k].hessian(*arguments, multipliers[rows])[-1] * direction[k]
-            for body, own in self._ends(connection):
+            for body, own in self._ends[k]:
                 if body in self.columns:
                     force_rate[self.columns[body]] += mixed[own]
         return rate, force_rate
-
-    def _ends(self, connection: Connection) -> tuple[tuple[int, slice], tuple[int, slice]]:
-        """Both bodies of a connection, each with the place of its pose among the variables of its equations."""
-        half = self.space.pose_size
-        return (connection.a, slice(0, half)), (connection.b, slice(half, 2 * half))
 
     def _arguments(self, k: int, poses: np.ndarray, motors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Variables and constants of the equations of connection ``k``."""

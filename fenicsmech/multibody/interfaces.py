@@ -113,9 +113,10 @@ class DesignAtNodes:
         index, dim = coarse.dofmap.index_map, coarse.dofmap.index_map_bs
         # every component alike
         weights = interpolation_matrix(coarse, fine)[::dim]
-        columns = index.global_to_local(weights.indices.astype(np.int64) // dim)
-        shape = (weights.shape[0], index.size_local + index.num_ghosts)
-        self._matrix = csr_matrix((weights.data, columns, weights.indptr), shape=shape)
+        vertices = index.local_to_global(np.arange(index.size_local + index.num_ghosts, dtype=np.int32))
+        order = np.argsort(vertices)
+        columns = order[np.searchsorted(vertices[order], weights.indices // dim)]
+        self._matrix = csr_matrix((weights.data, columns, weights.indptr), shape=(weights.shape[0], len(vertices)))
 
     def values(self) -> np.ndarray:
         """d at all local nodes of u, (nodes, dim)."""
