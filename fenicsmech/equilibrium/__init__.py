@@ -11,7 +11,6 @@
 - ``linear``: which of the two solves, and by what rule
 - ``solver``: what every equilibrium solver is
 - ``newton``: the default one, the primal–dual iteration
-- ``solvers``: others to choose and to compare
 - ``predictor``, ``path``: first guesses and load steps
 - ``dead_centre``: those of motors past the end of their slack
 - ``lead``: what leads a path that may turn back: a force, or motors
@@ -39,21 +38,19 @@ from fenicsmech.equilibrium.lead import ForceLead, Heading, Lead, MotorLead
 from fenicsmech.equilibrium.linear import BySize, Direct, LinearMethod, LinearSolver, TwoLevel
 from fenicsmech.equilibrium.load import PointLoad
 from fenicsmech.equilibrium.newton import Newton, PrimalDualNewton
-from fenicsmech.equilibrium.path import IDLE_STIFFNESS, Path, PathFailed
+from fenicsmech.equilibrium.path import ZERO_ENERGY_SHIFT, Path, PathFailed
 from fenicsmech.equilibrium.path_points import PathPoint, PathPoints
 from fenicsmech.equilibrium.predictor import Constant, Hermite, Predictor, Tangent
 from fenicsmech.equilibrium.reactions import Reaction, joint_reactions, motor_torques
-from fenicsmech.equilibrium.solver import EquilibriumSolver, Iteration, NotConverged, Solution
-from fenicsmech.equilibrium.solvers import AugmentedLagrangian, Globalisation, KktNewton, Snes
+from fenicsmech.equilibrium.solver import EquilibriumSolver, Iteration, Linearisation, NotConverged, Solution
 from fenicsmech.equilibrium.state import State, Step
-from fenicsmech.equilibrium.system import EquilibriumSystem
+from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 from fenicsmech.equilibrium.two_level import TwoLevelSolver
 
 __all__ = [
     "ArcLength",
     "ArcMetric",
     "ArcSteps",
-    "AugmentedLagrangian",
     "BySize",
     "Constant",
     "Control",
@@ -67,15 +64,13 @@ __all__ = [
     "Factor",
     "Finish",
     "ForceLead",
-    "Globalisation",
     "Heading",
     "Hermite",
-    "IDLE_STIFFNESS",
     "Iteration",
     "KktMatrix",
-    "KktNewton",
     "Lead",
     "LinearMethod",
+    "Linearisation",
     "LinearSolver",
     "LoadControl",
     "Mode",
@@ -93,9 +88,9 @@ __all__ = [
     "PrimalDualNewton",
     "REGULARISATION",
     "Reaction",
+    "Residual",
     "Sense",
     "ShareControl",
-    "Snes",
     "Solution",
     "State",
     "Step",
@@ -103,6 +98,7 @@ __all__ = [
     "Tangent",
     "TwoLevel",
     "TwoLevelSolver",
+    "ZERO_ENERGY_SHIFT",
     "critical_changes",
     "crossing",
     "follow",

@@ -33,6 +33,7 @@ class KktMatrix:
         clock: where time is counted.
 
     Attributes:
+        linearised: number of linearisations so far.
         extended: K̂, to which elastic stiffness may be added between ``tangent`` and ``linearise``.
     """
 
@@ -51,6 +52,7 @@ class KktMatrix:
         self._images: PETSc.Mat | None = None
         self._extra_columns: PETSc.Mat | None = None
         self._converted = self._entries_plain = self._formed = False
+        self.linearised = 0
 
     def tangent(self) -> None:
         """Makes K̂ hold ∂²E/∂u² of the present fields, and nothing else."""
@@ -72,6 +74,7 @@ class KktMatrix:
                         addv=PETSc.InsertMode.ADD,
                     )
             self.extended.assemble()
+        self.linearised += 1
         self._converted = self._formed = False
         self._added.set(0.0)
         self._shift, self._plain = 0.0, True

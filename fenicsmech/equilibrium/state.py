@@ -20,6 +20,7 @@ class State:
         force: magnitude f of the controlled force.
         motors: motor value per connection.
         share: how much of the constant loads acts, 0 … 1.
+        minimum_shift: least shift δ of the tangent, which zero-energy modes need, in units of the mean stiffness.
     """
 
     u: np.ndarray
@@ -28,6 +29,7 @@ class State:
     force: float
     motors: np.ndarray
     share: float = 1.0
+    minimum_shift: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

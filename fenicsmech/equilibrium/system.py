@@ -51,6 +51,8 @@ class Residual:
         gap: how far joints are from closed, over the mechanism's length, or rad.
         motion: largest displacement from the drawn configuration over the mechanism's length, or rotation.
         moments: Σ r_i ⊗ (X_i − c) of each interface body.
+        nodal: r = ∂E/∂u minus the loads on links, (owned displacements,).
+        rigid: ∂L/∂z without the nodes that bodies move, (size,).
     """
 
     vector: PETSc.Vec
@@ -59,6 +61,8 @@ class Residual:
     gap: float
     motion: float
     moments: dict[int, np.ndarray]
+    nodal: np.ndarray
+    rigid: np.ndarray
 
 
 class EquilibriumSystem:
@@ -113,8 +117,6 @@ class EquilibriumSystem:
             scale = self.unknowns.scale
             self._extras.set_regularisation(scale[self.layout.multipliers], scale[self.layout.force])
             self.kkt = KktMatrix(elastic, self.layout, self.unknowns, extended, clock=clock)
-        self._unbalanced = np.zeros(self.layout.displacements)
-        self._unbalanced_poses = np.zeros(joints.size)
 
     @cached_property
     def _mixed(self) -> MixedStress:
@@ -216,19 +218,21 @@ class EquilibriumSystem:
             reactions = self.joints.gradient(state.poses, state.motors).T @ state.multipliers
             forces = np.linalg.norm(g * scale) ** 2 + np.linalg.norm(reactions * scale[layout.z]) ** 2
             forces += layout.comm.allreduce(float(np.linalg.norm(loads * self.unknowns.unit_u) ** 2))
-            self._unbalanced = r[: layout.displacements]
-            nodal = self._unbalanced.reshape(-1, layout.per_node)
-            moments = layout.comm.allreduce(self.interfaces.moments(nodal), op=_add_moments)
+            nodal = r[: layout.displacements]
+            moments = self.interfaces.moments(nodal.reshape(-1, layout.per_node))
+            moments = layout.comm.allreduce(moments, op=_add_moments)
             extras = -g
             extras[layout.z] += self._potentials.gradient(state) - reactions
-            self._unbalanced_poses = extras[layout.z].copy()
+            rigid = extras[layout.z].copy()
             violation = self.constraints(state, state.multipliers)
             extras[layout.multipliers] = -violation
             gap = float(np.max(np.abs(self.joints.row_scale * violation), initial=0.0))
             if control.constrained:
                 extras[layout.force] = -(self.load_displacement(state) - control.target)
             vector = self.unknowns.apply_transpose(r, extras)
-            return Residual(vector, vector.norm(), float(np.sqrt(forces)), gap, self._motion(state), moments)
+            return Residual(
+                vector, vector.norm(), float(np.sqrt(forces)), gap, self._motion(state), moments, nodal, rigid
+            )
 
     # -- derivatives at the loaded state -------------------------------------------------------------------
 
@@ -290,19 +294,6 @@ class EquilibriumSystem:
         rate, twist = self.joints.motor_rate(state.poses, state.motors, state.multipliers, direction)
         extras[self.layout.multipliers], extras[self.layout.z] = rate, twist
         return self.unknowns.apply_transpose(np.zeros(self.layout.owned), extras)
-
-    def nodal_forces(self) -> np.ndarray:
-        """∂E/∂u minus the loads on links of the last ``residual``, (owned displacements,)."""
-        return self._unbalanced.copy()
-
-    def work(self, nodal: np.ndarray, z: np.ndarray) -> float:
-        """What all forces of the last ``residual`` lack along velocities of owned nodes and of poses (collective).
-
-        Args:
-            nodal: (owned displacements,); those of interface nodes are their bodies'.
-            z: of the pose unknowns, (size,); keeps joints closed.
-        """
-        return self.layout.comm.allreduce(float(self._unbalanced @ nodal)) + float(self._unbalanced_poses @ z)
 
     # -- pieces --------------------------------------------------------------------------------------------
 

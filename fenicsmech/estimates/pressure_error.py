@@ -14,7 +14,7 @@ from __future__ import annotations
 import ufl
 from dolfinx import fem
 
-from fenicsmech.compat import compile_expression, compile_form, scalar_space, vector_space
+from fenicsmech.compat import compile_expression, compile_form, interpolation_points, scalar_space, vector_space
 from fenicsmech.elasticity import ElasticBody
 from fenicsmech.estimates.recovery import Recovery
 
@@ -40,7 +40,7 @@ class PressureError:
         w = field - 0.5 * ufl.dot(self._gradient, ufl.SpatialCoordinate(elastic.mesh))
         V = scalar_space(elastic.mesh, 1)
         self._interpolated = fem.Function(V, name=f"interpolated_{field.name}")
-        self._expression = compile_expression(w, V.element.interpolation_points(), elastic.mesh.comm)
+        self._expression = compile_expression(w, interpolation_points(V), elastic.mesh.comm)
         self.error = self._interpolated - w
 
     def update(self) -> None:

@@ -35,6 +35,7 @@ from fenicsmech.mechanism.parts import (
 from fenicsmech.mechanism.scene import DRAWN, Configuration, Effect, Scene, Units
 from fenicsmech.mechanism.shapes import (
     Arc,
+    Centreline,
     Disc,
     Line,
     MeshPart,
@@ -54,6 +55,7 @@ from fenicsmech.mechanism.validation import validate
 
 __all__ = [
     "Arc",
+    "Centreline",
     "Configuration",
     "DRAWN",
     "Disc",

@@ -112,8 +112,7 @@ class Curves:
 
     def _follower(self, request: CurveRequest, until: Until, steps: ArcSteps | None) -> tuple[Follower, Freedom]:
         tracer, newton, freedom = self._tracer(request)
-        idle, steps = bool(freedom.idle), steps or ArcSteps()
-        return Follower(self._model, newton, request, tracer, until=until, steps=steps, idle=idle), freedom
+        return Follower(self._model, newton, request, tracer, until=until, steps=steps or ArcSteps()), freedom
 
     def _followed(self, request: CurveRequest, freedom: Freedom, follower: Follower) -> FollowedCurve:
         return FollowedCurve(
