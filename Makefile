@@ -27,7 +27,7 @@ export PRTE_MCA_hwloc_default_binding_policy := none
 MPIRUN = OPENBLAS_NUM_THREADS=1 mpirun -n $(RANKS)
 heading = @printf '\n--- %s\n' '$(1)'
 
-.PHONY: help demo test install install-test lint test-serial test-parallel test-slow test-debian13 demos-quick hard-cases random-scenes bench clean
+.PHONY: help demo test install install-test lint test-serial test-parallel test-slow test-debian13 test-newest demos-quick hard-cases random-scenes bench clean
 
 help: ## list the targets
 	@sed -nE 's/^([a-z0-9-]+):.*## (.*)/\1\t\2/p' Makefile | expand -t 16
@@ -85,20 +85,27 @@ random-scenes: install-test ## N random scenes from SEED on (1000, 0), each chec
 	$(call heading,random scenes)
 	OPENBLAS_NUM_THREADS=1 $(PYTHON) -m tests.hard.random_scenes --count $(N) --seed $(SEED)
 
-# What can differ between versions of dolfinx, PETSc, gmsh and Python, in a few minutes; FULL13=yes runs the rest as well.
-FULL13 :=
-CORE13 := tests/elasticity tests/joints tests/multibody tests/mechanism
-OTHERS13 := tests/meshing tests/design/test_sensitivity.py tests/design/test_weights.py \
+# What can differ between versions of dolfinx, PETSc, gmsh and Python, in a few minutes; FULL=yes runs the rest as well.
+FULL :=
+CORE_SUITES := tests/elasticity tests/joints tests/multibody tests/mechanism
+OTHERS_SUITES := tests/meshing tests/design/test_sensitivity.py tests/design/test_weights.py \
     $(patsubst %,tests/test_%.py,collective compat kernel_cache uncaught_errors) \
     tests/effects/test_contact_derivatives.py \
     $(patsubst %,tests/equilibrium/test_%.py,eigen factor lagrangian mixed_lagrangian newton path two_level) \
     $(patsubst %,tests/simulation/test_%.py,files memory ranks units)
 
-test-debian13: install-test ## the core tests in a Debian 13 root (built once, about two minutes)
+# The same tests for every suite but the one at hand; Debian's newest moves by itself and is in no other target.
+OTHER_SUITE = tools/debian.sh $(1) make --no-print-directory INSTALL= PYTHON=/usr/bin/python3 \
+    SELECT="$(SELECT) and not calculix" AROUND= \
+    $(if $(FULL),,CORE="$(CORE_SUITES)" OTHERS="$(OTHERS_SUITES)") test-serial test-parallel
+
+test-debian13: install-test ## the tests of what versions change in a Debian 13 root (built once, about two minutes)
 	$(call heading,tests in Debian 13)
-	tools/debian13.sh make --no-print-directory INSTALL= PYTHON=/usr/bin/python3 \
-	    SELECT="$(SELECT) and not calculix" AROUND= \
-	    $(if $(FULL13),,CORE="$(CORE13)" OTHERS="$(OTHERS13)") test-serial test-parallel
+	$(call OTHER_SUITE,trixie)
+
+test-newest: install-test ## the same with Debian's newest (sid)
+	$(call heading,tests in Debian sid)
+	$(call OTHER_SUITE,sid)
 
 demos-quick: $(DEMOS:%=demo-quick-%) ## every demo, coarse, in results/quick/
 

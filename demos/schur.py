@@ -49,14 +49,11 @@ class SchurSolver:
     """
 
     def __init__(self, system: EquilibriumSystem, matrix: PETSc.Mat, multigrid: Multigrid) -> None:
-        layout = system.layout
-        extras = layout.extras if layout.last else 0
-        self._free = PETSc.IS().createStride(len(layout.free), layout.first_unknown, 1, comm=matrix.comm)
-        self._extra = PETSc.IS().createStride(extras, layout.first_extra, 1, comm=matrix.comm)
-        self._b = matrix.createSubMatrix(self._extra, self._free)
-        self._c = matrix.createSubMatrix(self._extra, self._extra)
+        self._free, self._border = system.blocks.links.index_set(), system.blocks.border.index_set()
+        self._b = matrix.createSubMatrix(self._border, self._free)
+        self._c = matrix.createSubMatrix(self._border, self._border)
         k = matrix.createSubMatrix(self._free, self._free)
-        k.setBlockSize(layout.per_node)
+        k.setBlockSize(system.numbering.per_node)
         k.setNearNullSpace(rigid_motions(system))
         self._ksp = self._solver(k, multigrid)
         norms = self._columns_of_border()
@@ -82,7 +79,7 @@ class SchurSolver:
         self._ksp.setUp()
 
     def column(self, number: int, tolerance: float = EXACT) -> np.ndarray:
-        """B K⁻¹ Bᵀ e: what one column of S takes, (extras,) on all ranks."""
+        """B K⁻¹ Bᵀ e: what one column of S takes, (border,) on all ranks."""
         unit = self._c.createVecRight()
         first, end = unit.getOwnershipRange()
         if first <= number < end:
@@ -108,7 +105,7 @@ class SchurSolver:
             self._s = self._dense(self._c)
             for number in self.columns:
                 self._s[:, number] -= self.column(number)
-        b_x, b_y = right.getSubVector(self._free), right.getSubVector(self._extra)
+        b_x, b_y = right.getSubVector(self._free), right.getSubVector(self._border)
         rest = self._c.createVecLeft()
         self._b.mult(self.inverse(b_x), rest)
         y = np.linalg.solve(self._s, self._everywhere(b_y) - self._everywhere(rest))
@@ -121,10 +118,10 @@ class SchurSolver:
         solution.array_w[: x.getLocalSize()] = x.array_r
         solution.array_w[x.getLocalSize() :] = rest.array_r
         right.restoreSubVector(self._free, b_x)
-        right.restoreSubVector(self._extra, b_y)
+        right.restoreSubVector(self._border, b_y)
 
     def _columns_of_border(self) -> np.ndarray:
-        """Largest entry of each row of B, (extras,) on all ranks."""
+        """Largest entry of each row of B, (border,) on all ranks."""
         starts, _, values = self._b.getValuesCSR()
         norms = self._c.createVecLeft()
         norms.array_w[:] = [np.abs(values[a:b]).max(initial=0.0) for a, b in zip(starts, starts[1:], strict=False)]
@@ -141,10 +138,10 @@ class SchurSolver:
 
 def rigid_motions(system: EquilibriumSystem) -> PETSc.NullSpace:
     """Translations and rotations of the free nodes where they are now."""
-    layout, u = system.layout, system.elastic.u
-    dim = layout.per_node
-    nodes = layout.free[::dim] // dim
+    numbering, u = system.numbering, system.elastic.u
+    dim = numbering.per_node
+    nodes = numbering.free[::dim] // dim
     drawn = u.function_space.tabulate_dof_coordinates()[nodes, :dim]
     moved = drawn + u.x.array.reshape(-1, dim)[nodes]
-    positions = PETSc.Vec().createWithArray(moved.ravel(), bsize=dim, comm=layout.comm)
+    positions = PETSc.Vec().createWithArray(moved.ravel(), bsize=dim, comm=system.comm)
     return PETSc.NullSpace().createRigidBody(positions)

@@ -1,4 +1,4 @@
-"""Every difference between the supported versions of dolfinx (0.5.2 and 0.9) and what goes with them."""
+"""Every difference between the supported versions of dolfinx (0.5.2, 0.9 and 0.11) and what goes with them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from petsc4py import PETSc
 
 from fenicsmech.kernel_cache import compiling, options
 
-_LEGACY = tuple(int(part) for part in dolfinx.__version__.split(".")[:2]) < (0, 6)
+_VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
+_LEGACY = _VERSION < (0, 6)
 
 
 if not _LEGACY:
@@ -51,8 +52,11 @@ def create_mesh(comm: MPI.Comm, cells: np.ndarray, points: np.ndarray) -> dmesh.
         domain = ufl.Mesh(ufl.VectorElement("Lagrange", ufl.Cell(shape, geometric_dimension=dim), 1))
         partitioner = dolfinx.cpp.mesh.create_cell_partitioner()
         return dmesh.create_mesh(comm, cells, points, domain, dmesh.GhostMode.none, partitioner)
+    # dolfinx 0.10 asks how many cells may share a facet
+    facets = () if _VERSION < (0, 10) else (2,)
+    partitioner = dmesh.create_cell_partitioner(dmesh.GhostMode.none, *facets)
     domain = ufl.Mesh(basix.ufl.element("Lagrange", shape, 1, shape=(dim,)))
-    return dmesh.create_mesh(comm, cells, points, domain, dmesh.create_cell_partitioner(dmesh.GhostMode.none))
+    return dmesh.create_mesh(comm, cells, x=points, e=domain, partitioner=partitioner)
 
 
 def original_cells(mesh: dmesh.Mesh) -> np.ndarray:
@@ -67,8 +71,9 @@ def original_nodes(mesh: dmesh.Mesh) -> np.ndarray:
 
 def cell_nodes(mesh: dmesh.Mesh) -> np.ndarray:
     """Local geometry nodes of every cell on this rank, (cells, vertices)."""
-    dofmap = mesh.geometry.dofmap
-    return dofmap.array.reshape(-1, mesh.topology.dim + 1) if _LEGACY else np.asarray(dofmap)
+    if _LEGACY:
+        return mesh.geometry.dofmap.array.reshape(-1, mesh.topology.dim + 1)
+    return np.asarray(mesh.geometry.dofmap if _VERSION < (0, 10) else mesh.geometry.dofmaps[0])
 
 
 def cell_dofs(space: fem.FunctionSpace) -> np.ndarray:
@@ -105,13 +110,21 @@ def _space(mesh: dmesh.Mesh, element) -> fem.FunctionSpace:
     with _compiling():
         if _LEGACY:
             return fem.FunctionSpace(mesh, element, jit_params=options())
-        return fem.functionspace(mesh, element, jit_options=options())
+        if _VERSION < (0, 10):
+            return fem.functionspace(mesh, element, jit_options=options())
+        return fem.functionspace(mesh, element)
 
 
 def compile_form(form: ufl.Form):
     """``form`` compiled to machine code (cached on disk)."""
     with _compiling():
         return fem.form(form, jit_params=options()) if _LEGACY else fem.form(form, jit_options=options())
+
+
+def interpolation_points(V: fem.FunctionSpace) -> np.ndarray:
+    """Points of the reference cell whose values make a function of ``V``, (points, dim)."""
+    points = V.element.interpolation_points
+    return points() if _VERSION < (0, 10) else points
 
 
 def compile_expression(expression, points: np.ndarray, comm: MPI.Comm) -> fem.Expression:

@@ -26,10 +26,13 @@ LAYERS = (
     "joints",
     "mechanism",
     "meshing",
+    "export",
     "multibody",
     "elasticity",
     "effects",
     "equilibrium",
+    "model",
+    "estimates",
     "simulation",
     "design",
     "accuracy",
@@ -41,7 +44,7 @@ RESTRICTED = {
     "dolfinx": {"report", "joints", "mechanism"},
     "ufl": {"report", "joints", "mechanism"},
     "petsc4py": {"report", "joints", "mechanism"},
-    "gmsh": set(LAYERS) - {"compat", "meshing"},
+    "gmsh": set(LAYERS) - {"compat", "meshing", "export"},
     "matplotlib": set(LAYERS) - {"report"},
 }
 

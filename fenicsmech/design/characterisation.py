@@ -22,7 +22,7 @@ from scipy.stats import t as student
 
 from fenicsmech.checks import finite
 from fenicsmech.design.sensitivity import Adjoint
-from fenicsmech.equilibrium import IDLE_STIFFNESS, LoadControl
+from fenicsmech.equilibrium import LoadControl
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import DRAWN, Configuration, Force, Material
 from fenicsmech.simulation import Curve, CurveRequest, Simulation, read_request
@@ -167,10 +167,10 @@ class _Rig:
         model, newton = simulation.model, simulation.newton(part)
         model.set_youngs_modulus(self._links, modulus)
         curve = simulation.trace(self._request)
-        adjoint, floor = Adjoint(model, newton), IDLE_STIFFNESS if curve.freedom.idle else 0.0
+        adjoint = Adjoint(model, newton)
         slopes, travels = {}, {}
         for frame in curve.frames:
-            (gradient,) = adjoint.gradients(frame.state, [newton.system.controlled], floor=floor)
+            (gradient,) = adjoint.gradients(frame.state, [newton.system.controlled])
             travels[frame.force] = frame.displacement
             slopes[frame.force] = modulus * float(gradient.youngs_moduli[self._links].sum())
         forces = self._experiment.forces.tolist()

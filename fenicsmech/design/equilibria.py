@@ -22,7 +22,7 @@ import numpy as np
 from fenicsmech.design.optimisers import Infeasible
 from fenicsmech.design.sensitivity import Adjoint
 from fenicsmech.design.spline_design import Target
-from fenicsmech.equilibrium import IDLE_STIFFNESS, Iteration, LoadControl, NotConverged, State
+from fenicsmech.equilibrium import Iteration, LoadControl, NotConverged, Solution, State
 from fenicsmech.errors import EquilibriumError
 from fenicsmech.mechanism import FlexibleLink
 from fenicsmech.multibody import assemble
@@ -70,7 +70,6 @@ class TargetEquilibria:
         forces = dict.fromkeys(target.force_part for target in targets)
         self._newtons = {part: simulation.newton(part) for part in forces}
         self._adjoints = {part: Adjoint(self._model, newton) for part, newton in self._newtons.items()}
-        self._floor: dict[Target, float] = {}
         self._fixed_origin: dict[Target, float] = {}
 
     def trace(self) -> Known:
@@ -114,20 +113,20 @@ class TargetEquilibria:
         return np.array([self._error(*pair, known.design) for pair in zip(self.targets, known.samples, strict=True)])
 
     def _error(self, target: Target, sample: Sample, design: np.ndarray) -> float:
-        newton, floor = self._newtons[target.force_part], self._floor[target]
+        newton = self._newtons[target.force_part]
 
         def error(state: State) -> float:
-            return self._simulation.estimates.elements_at(newton, Equilibrium(state, design, Goal.DISPLACEMENT, floor))
+            return self._simulation.estimates.elements_at(newton, Equilibrium(state, design, Goal.DISPLACEMENT))
 
         return error(sample.state) - (0.0 if sample.origin is None else error(sample.origin))
 
     def _gradient(self, target: Target, sample: Sample) -> np.ndarray:
-        adjoint, floor = self._adjoints[target.force_part], self._floor[target]
+        adjoint = self._adjoints[target.force_part]
         outputs = [self._newtons[target.force_part].system.controlled]
-        (loaded,) = adjoint.gradients(sample.state, outputs, floor=floor)
+        (loaded,) = adjoint.gradients(sample.state, outputs)
         if sample.origin is None:
             return loaded.design
-        (unloaded,) = adjoint.gradients(sample.origin, outputs, floor=floor)
+        (unloaded,) = adjoint.gradients(sample.origin, outputs)
         return loaded.design - unloaded.design
 
     def _traced(self, targets: Sequence[Target]) -> dict[Target, Sample]:
@@ -150,7 +149,6 @@ class TargetEquilibria:
                 raise Infeasible(_unstable(target))
             if any(before.jumped for before in curve.frames if abs(before.force) <= abs(frame.force)):
                 raise Infeasible(_folded(target, "the mechanism snaps on the way there from zero load"))
-            self._floor[target] = IDLE_STIFFNESS if curve.freedom.idle else 0.0
             self._fixed_origin[target] = self._travel(target, frame.state) - frame.displacement
             origin = self._unloaded(target, curve.frames[0].state) if moving else None
             samples[target] = Sample(frame.state, origin, frame.displacement)
@@ -160,7 +158,7 @@ class TargetEquilibria:
         """The equilibrium without force and without effects, from one without force."""
         newton = self._newtons[target.force_part]
         try:
-            return newton.solve(replace(state, share=0.0), LoadControl(0.0), floor=self._floor[target]).state
+            return newton.solve(replace(state, share=0.0), LoadControl(0.0)).state
         except NotConverged as failure:
             raise Infeasible(f"no equilibrium without loads ({failure.reason})") from failure
 
@@ -179,14 +177,14 @@ class TargetEquilibria:
         guess = self._model.carry(state, after)
         newton: Iteration = self._newtons[target.force_part]
         try:
-            solution = newton.solve(guess, control, floor=self._floor[target])
+            solution = newton.solve(guess, control)
         except NotConverged as failure:
             if halvings == 0:
                 raise Infeasible(f"no equilibrium at {target.force:g} ({failure.reason})") from failure
             return self._halved(target, state, control, before, after, halvings)
         if solution.unstable_modes:
             raise Infeasible(_unstable(target))
-        if self._astray(newton, state, solution.state, control, before, after):
+        if self._astray(newton, state, solution, control, before, after):
             if halvings == 0:
                 raise Infeasible(_folded(target, "a fold lies between this design and the last one"))
             return self._halved(target, state, control, before, after, halvings)
@@ -203,16 +201,16 @@ class TargetEquilibria:
         self,
         newton: Iteration,
         start: State,
-        end: State,
+        found: Solution,
         control: LoadControl,
         before: np.ndarray,
         after: np.ndarray,
     ) -> bool:
-        """Whether ``end``, just solved for, is no continuation of ``start`` (collective)."""
+        """Whether what was ``found`` is no continuation of ``start``."""
         model, system = self._model, newton.system
-        back = model.carry(end, before)
+        back = model.carry(found.state, before)
         model.load(back)
-        x = newton.solve_linear(system.residual(back, control).vector)
+        x = found.linearisation.solve(system.residual(back, control).vector)
         x.scale(-1.0)
         step = system.unknowns.step(x)
         miss = system.size(system.difference(start, system.moved(back, step)))

@@ -10,8 +10,9 @@ import numpy as np
 from fenicsmech.collective import on_one
 from fenicsmech.design.link_shape import gather_links
 from fenicsmech.design.rest_shape import DesignedLink
+from fenicsmech.export import PinHole, write_step, write_stl
 from fenicsmech.mechanism import DRAWN, Disc, FlexibleLink
-from fenicsmech.meshing import LinkMesh, PinHole, boundary_loops, plan_of, write_step, write_stl
+from fenicsmech.meshing import LinkMesh, boundary_loops, plan_of
 from fenicsmech.multibody import Linkage, assemble
 from fenicsmech.report import DesignShape, LinkOutline, draw_designs
 from fenicsmech.simulation import Draughtsman, Simulation, rest_vertices

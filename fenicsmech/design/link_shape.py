@@ -13,7 +13,8 @@ from fenicsmech.design.handle_placement import place_handles
 from fenicsmech.design.handles import LinkHandles
 from fenicsmech.design.spline_fit import fit_spline
 from fenicsmech.design.weights import handle_weights
-from fenicsmech.meshing import FREE, Centreline, LinkMesh, MechanismMesh, cell_measures, plan_of
+from fenicsmech.mechanism import Centreline
+from fenicsmech.meshing import FREE, LinkMesh, MechanismMesh, cell_measures, plan_of
 
 _SPACING = 1.0  # of handles, in mean widths of the link
 

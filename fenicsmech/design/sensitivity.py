@@ -23,7 +23,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from fenicsmech.compat import assemble_vector, compile_form, destroy_garbage, owned_values
-from fenicsmech.equilibrium import Iteration, LoadControl, PointLoad, State
+from fenicsmech.equilibrium import Iteration, Linearisation, LoadControl, PointLoad, State
 from fenicsmech.simulation import MechanismModel
 
 
@@ -47,36 +47,31 @@ class Adjoint:
     """Sensitivities at equilibria of one model under one controlled force."""
 
     def __init__(self, model: MechanismModel, newton: Iteration) -> None:
-        self._model, self._newton, self._system = model, newton, newton.system
+        self._model, self._newton = model, newton
         self._weights = [fem.Function(field.function_space, name="adjoint") for field in model.elastic.fields]
 
-    def gradients(self, state: State, outputs: list[PointLoad], *, floor: float = 0.0) -> list[Gradient]:
+    def gradients(self, state: State, outputs: list[PointLoad]) -> list[Gradient]:
         """The derivatives of the travel of each of ``outputs`` at the equilibrium ``state`` (collective)."""
-        system, control = self._system, LoadControl(state.force)
-        system.load(state)
-        residual = system.residual(state, control)
-        forces = system.nodal_forces()
-        self._newton.factor(state, control, residual, floor)
-        gradients = [self._gradient(state, output, forces) for output in outputs]
-        destroy_garbage(system.layout.comm)
+        at = self._newton.linearise(state, LoadControl(state.force))
+        gradients = [self._gradient(at, output) for output in outputs]
+        destroy_garbage(self._model.mesh.comm)
         return gradients
 
-    def _gradient(self, state: State, output: PointLoad, forces: np.ndarray) -> Gradient:
-        system = self._system
-        right = system.travel_gradient(output, state)
-        x = self._newton.solve_linear(right)
-        u, z = system.unknowns.apply(x), system.unknowns.step(x).z
+    def _gradient(self, at: Linearisation, output: PointLoad) -> Gradient:
+        state = at.state
+        x = at.solve(at.travel_gradient(output))
+        u, z = at.displacements(x), at.step(x).z
         for field, values in zip(self._weights, self._model.elastic.split(u), strict=True):
             owned_values(field)[:] = values
             field.x.scatter_forward()
 
         stiff = self._assemble("displacement")
-        moved = self._model.design_nodes.transpose(self._interface_terms(state, z, stiff, forces))
+        moved = self._model.design_nodes.transpose(self._interface_terms(state, z, stiff, at.residual.nodal))
         return Gradient(
             design=-(self._assemble("design") + moved),
             youngs_moduli=-self._per_link("youngs_modulus"),
             poissons_ratios=-self._per_link("poissons_ratio"),
-            force=x.dot(system.force_rate(state)),
+            force=x.dot(at.travel_gradient(self._newton.system.controlled)),
         )
 
     def _interface_terms(self, state: State, z: np.ndarray, stiff: np.ndarray, forces: np.ndarray) -> np.ndarray:

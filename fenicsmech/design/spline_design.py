@@ -11,8 +11,7 @@ from fenicsmech.checks import finite, positive
 from fenicsmech.design.link_shape import ShapeRequest
 from fenicsmech.errors import DescriptionError
 from fenicsmech.joints import WELD
-from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Mechanism, Strip
-from fenicsmech.meshing import Centreline
+from fenicsmech.mechanism import DRAWN, Centreline, Configuration, FlexibleLink, Force, Mechanism, Strip
 from fenicsmech.multibody import Linkage
 
 _RANGE = (1.0 / 3.0, 3.0)  # of thicknesses, in units of the drawn one: 1 … 9 mm for a link of 3 mm

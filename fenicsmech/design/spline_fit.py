@@ -17,7 +17,7 @@ import numpy as np
 
 from fenicsmech.design.spline import LinkSpline
 from fenicsmech.errors import DescriptionError
-from fenicsmech.meshing import Centreline
+from fenicsmech.mechanism import Centreline
 
 _SAMPLES = 32  # per segment
 _ALONG = 0.1  # ε

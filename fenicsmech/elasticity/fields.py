@@ -17,7 +17,7 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from petsc4py import PETSc
 
-from fenicsmech.compat import cellwise_space, compile_expression, owned_values, vector_space
+from fenicsmech.compat import cellwise_space, compile_expression, interpolation_points, owned_values, vector_space
 from fenicsmech.elasticity.models import ElasticModel
 from fenicsmech.elasticity.pressure import PressureField
 from fenicsmech.elasticity.strain import Moduli
@@ -160,6 +160,4 @@ class BodyFields:
     def _carrying(self) -> fem.Expression:
         """H δ at the nodes of u."""
         V = self.u.function_space
-        return compile_expression(
-            ufl.dot(self.gradient(self.u), self._change), V.element.interpolation_points(), self.mesh.comm
-        )
+        return compile_expression(ufl.dot(self.gradient(self.u), self._change), interpolation_points(V), self.mesh.comm)

@@ -34,14 +34,14 @@ from fenicsmech.equilibrium.kkt import EntryCopy, KktMatrix
 from fenicsmech.equilibrium.lead import ForceLead, Heading, Lead, MotorLead
 from fenicsmech.equilibrium.linear import BySize, Direct, Factor, LinearMethod, LinearSolver, TwoLevel, TwoLevelSolver
 from fenicsmech.equilibrium.newton import Newton, PrimalDualNewton
-from fenicsmech.equilibrium.path import IDLE_STIFFNESS, Path, PathFailed
+from fenicsmech.equilibrium.path import ZERO_ENERGY_SHIFT, Path, PathFailed
 from fenicsmech.equilibrium.path_points import PathPoint, PathPoints
 from fenicsmech.equilibrium.predictor import Constant, Hermite, Predictor, Tangent
 from fenicsmech.equilibrium.reactions import Reaction, joint_reactions, motor_torques
-from fenicsmech.equilibrium.solver import EquilibriumSolver, Iteration, NotConverged, Solution
+from fenicsmech.equilibrium.solver import EquilibriumSolver, Iteration, Linearisation, NotConverged, Solution
 from fenicsmech.equilibrium.solvers import AugmentedLagrangian, Globalisation, KktNewton, Snes
 from fenicsmech.equilibrium.state import State, Step, load_fields
-from fenicsmech.equilibrium.system import EquilibriumSystem
+from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 
 __all__ = [
     "ArcLength",
@@ -66,12 +66,12 @@ __all__ = [
     "Globalisation",
     "Heading",
     "Hermite",
-    "IDLE_STIFFNESS",
     "Iteration",
     "KktMatrix",
     "KktNewton",
     "Lead",
     "LinearMethod",
+    "Linearisation",
     "LinearSolver",
     "LoadControl",
     "Mode",
@@ -89,6 +89,7 @@ __all__ = [
     "PrimalDualNewton",
     "REGULARISATION",
     "Reaction",
+    "Residual",
     "Sense",
     "ShareControl",
     "Snes",
@@ -99,6 +100,7 @@ __all__ = [
     "Tangent",
     "TwoLevel",
     "TwoLevelSolver",
+    "ZERO_ENERGY_SHIFT",
     "critical_changes",
     "crossing",
     "follow",

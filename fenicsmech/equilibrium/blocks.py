@@ -4,19 +4,20 @@ Nodes of links, poses of bodies, multipliers of joints and the controlled load a
 
                  nodes  pressures │ poses  multipliers  load
     nodes       ⎡  K      Gᵀ      │  Kᵀ_zu      0       −a_u ⎤      K     tangent of the links at their free nodes
-    pressures   ⎢  G      −M      │  G_z        0        0   ⎥      G, M  volume and compressibility of links in u–p form
+    pressures   ⎢  G      −M      │  G_z        0        0   ⎥      G, M  volume and compliance of links in u–p form
                 ⎢─────────────────┼──────────────────────────⎥
     poses       ⎢ K_zu    Gᵀ_z    │   B        −Aᵀ      −a_z ⎥      B     curvature of rigid motions, A = ∂C/∂z
     multipliers ⎢  0       0      │  −A       −ε − c     0   ⎥      c, ε  compliance of joints, regularisation
     load        ⎣ −a_uᵀ    0      │ −a_zᵀ       0        0   ⎦      a     direction of the load at its point
 
-It is 2 × 2 blocks: links (thousands of unknowns, sparse, distributed) and the border (dozens, on the last rank). Nodes on
-interfaces are functions of the poses of their bodies, which couples both: K_zu, G_z and a part of B come from the links.
-Where the load is given instead of the displacement of its point, the load's row is −f alone.
+It is 2 × 2 blocks: links (thousands of unknowns, sparse, distributed) and the border (dozens, on the last rank). Nodes
+on interfaces are functions of the poses of their bodies, which couples both: K_zu, G_z and a part of B come from the
+links. Where the load is given instead of the displacement of its point, the load's row is −f alone.
 
-One matrix, no elimination of the border: by Sylvester's law the pivots of LDLᵀ have the signs of the eigenvalues, and at
-a stable equilibrium as many of these are negative as there are pressures, multipliers and the load (Gould,
-doi:10.1007/BF02592103). A Schur complement would lose small stiffnesses in the difference of large ones.
+All blocks stand in one matrix, factored as LDLᵀ: by Sylvester's law its pivots have the signs of the eigenvalues, and
+at a stable equilibrium as many of these are negative as there are pressures, multipliers and the load (Gould,
+doi:10.1007/BF02592103). The factor that solves for a step decides on stability at no extra cost. Elimination of the
+nodes would leave a Schur complement of the border, in which small stiffnesses are differences of large ones.
 
 Every block is a named index set, enough for PETSc's fieldsplit preconditioners:
 

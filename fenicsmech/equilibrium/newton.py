@@ -92,18 +92,18 @@ class Newton(Iteration):
 
     options: PrimalDualNewton
 
-    def solve(self, start: State, control: Control, *, floor: float = 0.0) -> Solution:
-        system, options = self.system, self.options
+    def solve(self, start: State, control: Control) -> Solution:
+        system, options, least = self.system, self.options, start.minimum_shift
         start = self._begin(start, control)
         state, residual = start, system.residual(start, control)
         best, spent, careful, passed, missed = (state, residual), 0, False, None, None
-        residuals, shift, trusted, mixed, norm = [], floor, True, False, math.inf
+        residuals, shift, trusted, mixed, norm = [], least, True, False, math.inf
         for iteration in range(options.iterations + 1):
             residuals.append(self.relative(residual))
             if self.converged(residual, norm) and iteration > 0:
-                if mixed or shift > floor or options.stale == 0.0:  # stability is of the true matrix
-                    self._factor_true(state, control, residual, floor, iteration)
-                return self._accept(state, control, residuals, iteration)
+                if mixed or shift > least or options.stale == 0.0:  # stability is of the true matrix
+                    self._factor_true(state, control, residual, iteration)
+                return self._accept(state, control, residual, residuals, iteration)
             if iteration == options.iterations:
                 break
             near = trusted and residuals[-1] < options.near
@@ -112,7 +112,7 @@ class Newton(Iteration):
                 system.linearise_mixed(state, control, residual, *passed)
             else:
                 system.linearise(state, control, residual)
-            x, shift = self._direction(residual, floor, last=shift, any_inertia=near)
+            x, shift = self._direction(residual, least, last=shift, any_inertia=near)
             step, motion = system.unknowns.step(x), system.unknowns.apply(x)
             _log.debug("iteration %d: residual %.2e, shift %.1e", iteration, residuals[-1], shift)
             before, norm = state, residual.norm
@@ -120,9 +120,9 @@ class Newton(Iteration):
             try:
                 state, residual, length = advance(state, control, step, residual, iteration)
             except NotConverged as failure:
-                return self._bear(*best, control, floor, residuals, failure)
+                return self._bear(*best, control, residuals, failure)
             # a pressure of its own is a stress that the step solves for already
-            passed = (before, length * motion) if options.mixed_stress and not system.layout.pressures else None
+            passed = (before, length * motion) if options.mixed_stress and not system.blocks.pressures.size else None
             if near and residual.norm > norm and not self.converged(residual, norm):
                 if missed is None and self.relative(residual) < options.near:
                     missed = before  # once may happen: just beyond a bifurcation small residuals hide large motions
@@ -131,7 +131,7 @@ class Newton(Iteration):
                     state, trusted, careful, passed = missed or before, False, True, None
                     system.load(state)
                     residual = system.residual(state, control)
-            elif near and shift == floor and length == 1.0:
+            elif near and shift == least and length == 1.0:
                 state, residual, norm = self._finish(state, control, residual, norm, step)
             if residual.norm < best[1].norm:
                 best, spent = (state, residual), 0
@@ -141,16 +141,16 @@ class Newton(Iteration):
                 state, careful, passed = best[0], True, None
                 system.load(state)
                 residual = system.residual(state, control)
-        return self._bear(*best, control, floor, residuals, self._spent(residuals, options.iterations))
+        return self._bear(*best, control, residuals, self._spent(residuals, options.iterations))
 
     def _direction(
-        self, residual: Residual, floor: float, *, last: float, any_inertia: bool
+        self, residual: Residual, least: float, *, last: float, any_inertia: bool
     ) -> tuple[PETSc.Vec, float]:
         """The Newton step; unless ``any_inertia`` will do, raises δ until the inertia promises descent.
 
-        δ = ``floor`` is tried first; then a third of the ``last`` one that served, and eight times that, …
+        δ = ``least`` is tried first; then a third of the ``last`` one that served, and eight times that, …
         """
-        shift, following = floor, max(_LEAST_SHIFT, last / 3.0)
+        shift, following = least, max(_LEAST_SHIFT, last / 3.0)
         for _ in range(20):
             x = self._solution(residual.vector, self._accuracy(residual)) if self._refactor(shift) else None
             if x is not None and (any_inertia or self._descends()):

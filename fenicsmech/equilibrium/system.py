@@ -210,10 +210,10 @@ class EquilibriumSystem:
     def residual(self, state: State, control: Control) -> Residual:
         """Gᵀ ∇L. Brings G to the poses of ``state``.
 
-            links         ∂E/∂(u, p) − loads
-            poses         ∂V/∂z − loads − Aᵀ λ
-            multipliers   −(C + c λ)
-            load          −(a · u_P − target), or 0 where f is given
+        links         ∂E/∂(u, p) − loads
+        poses         ∂V/∂z − loads − Aᵀ λ
+        multipliers   −(C + c λ)
+        load          −(a · u_P − target), or 0 where f is given
         """
         with self.clock.phase("residual"):
             self.unknowns.turn(state.poses)

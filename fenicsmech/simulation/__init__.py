@@ -2,8 +2,8 @@
 
 - ``simulation``: the entry point, which computes curves
 - ``postprocessing``: what it tells of them
-- ``fidelity``, ``dial``: how finely it is computed, as given or as found by the accuracy asked for
-- ``discretisation``: a scene at one fidelity, with the discretised mechanism behind it (``link_meshes``, ``model``)
+- ``dial``: how finely it is computed to reach the accuracy asked for
+- ``discretisation``: a scene at one fidelity, with the discretised mechanism behind it
 - ``request``, ``curves``, ``tracer``: what a curve is asked for, and how it is traced
 - ``idle_balance``: whether loads balance along motions that deform no link
 - ``frame``, ``curve``: what comes out
@@ -18,21 +18,19 @@
 - ``snapshot``, ``picture``, ``export``: a state gathered, drawn, written
 """
 
+from fenicsmech.estimates import PressureError, Recovery
+from fenicsmech.model import SPACES, MechanismModel, check_scene, fits
 from fenicsmech.simulation.buckling import BucklingLoad, BucklingPosition, SoftMode
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.dial import Dial, Outcome, Rung, Trial, corrections, family
 from fenicsmech.simulation.explanation import PLASTIC_WEIGHT, weight_influence
-from fenicsmech.simulation.fidelity import SPACES, check_scene, fits
 from fenicsmech.simulation.followed import FollowedCurve, PathEvent
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.friction import PinFriction, friction_band
 from fenicsmech.simulation.goal import Goal
 from fenicsmech.simulation.influence import Equilibrium
 from fenicsmech.simulation.mode_shape import ModeShape
-from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.picture import Draughtsman
-from fenicsmech.simulation.pressure_error import PressureError
-from fenicsmech.simulation.recovery import Recovery
 from fenicsmech.simulation.request import CurveRequest, read_request
 from fenicsmech.simulation.simulation import Simulation
 from fenicsmech.simulation.snapshot import gather, rest_vertices

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from fenicsmech.equilibrium import (
-    IDLE_STIFFNESS,
     ForceLead,
     Iteration,
     Lead,
@@ -16,11 +15,11 @@ from fenicsmech.equilibrium import (
     softest_modes,
 )
 from fenicsmech.errors import EquilibriumError
+from fenicsmech.model import MechanismModel
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.leading import leading
 from fenicsmech.simulation.mode_shape import ModeShape, mode_shape
-from fenicsmech.simulation.model import MechanismModel
 
 
 @dataclass(frozen=True)
@@ -81,10 +80,9 @@ def _at(
     lead: Lead,
     modes: Callable[..., list[Mode]],
 ) -> list[Mode]:
-    floor = IDLE_STIFFNESS if curve.freedom.idle else 0.0
     with model.shaped(frame.design):
         try:
-            return modes(newton, lead, frame.state, floor=floor, count=count)
+            return modes(newton, lead, frame.state, count=count)
         except NotConverged as failure:
             raise EquilibriumError(
                 f"modes of {curve.part.name!r} in configuration {curve.configuration.name!r}",

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from fenicsmech.equilibrium import ArcSteps, EquilibriumSolver, Iteration, Predictor, Sense
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import Force, Leader, Units
+from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import Freedom, assemble_before_strain, count_freedom
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.followed import FollowedCurve, PathEvent
@@ -15,7 +16,6 @@ from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.goal import Goal
 from fenicsmech.simulation.leading import leading
 from fenicsmech.simulation.mode_shape import ModeShape
-from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.request import CurveRequest
 from fenicsmech.simulation.tracer import Tracer
 from fenicsmech.simulation.until import Until
@@ -112,8 +112,7 @@ class Curves:
 
     def _follower(self, request: CurveRequest, until: Until, steps: ArcSteps | None) -> tuple[Follower, Freedom]:
         tracer, newton, freedom = self._tracer(request)
-        idle, steps = bool(freedom.idle), steps or ArcSteps()
-        return Follower(self._model, newton, request, tracer, until=until, steps=steps, idle=idle), freedom
+        return Follower(self._model, newton, request, tracer, until=until, steps=steps or ArcSteps()), freedom
 
     def _followed(self, request: CurveRequest, freedom: Freedom, follower: Follower) -> FollowedCurve:
         return FollowedCurve(

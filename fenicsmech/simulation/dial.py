@@ -36,7 +36,7 @@ from fenicsmech.errors import DescriptionError
 from fenicsmech.log import logger
 from fenicsmech.mechanism import FlexibleLink, MeshPart, Scene, StepPart
 from fenicsmech.meshing import typical_thickness
-from fenicsmech.simulation.fidelity import Fidelity, check_scene, fits
+from fenicsmech.model import Fidelity, check_scene, fits
 
 _log = logger(__name__)
 _LEFT_OF_DEPTH = 0.6  # of what space is estimated to add, once it is added

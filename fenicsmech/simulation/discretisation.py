@@ -10,12 +10,10 @@ from fenicsmech.clock import Clock
 from fenicsmech.collective import on_one
 from fenicsmech.equilibrium import EquilibriumSolver, Predictor
 from fenicsmech.mechanism import Scene
+from fenicsmech.model import Fidelity, MechanismModel, check_links, mesh_mechanism
 from fenicsmech.multibody import build_linkage
 from fenicsmech.simulation.curves import Curves
 from fenicsmech.simulation.estimates import Estimates
-from fenicsmech.simulation.fidelity import Fidelity
-from fenicsmech.simulation.link_meshes import check_links, mesh_mechanism
-from fenicsmech.simulation.model import MechanismModel
 
 
 class Discretisation:

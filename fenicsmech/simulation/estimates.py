@@ -9,12 +9,11 @@ import numpy as np
 
 from fenicsmech.elasticity import PLANE_STRESS
 from fenicsmech.equilibrium import Iteration
+from fenicsmech.estimates import DepthError, GoalError
 from fenicsmech.mechanism import Output
+from fenicsmech.model import MechanismModel
 from fenicsmech.simulation.curve import Curve
-from fenicsmech.simulation.depth_error import DepthError
-from fenicsmech.simulation.goal_error import GoalError
 from fenicsmech.simulation.influence import Equilibrium, influence
-from fenicsmech.simulation.model import MechanismModel
 
 
 class Estimates:

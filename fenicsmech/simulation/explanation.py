@@ -15,11 +15,11 @@ from fenicsmech.collective import from_one
 from fenicsmech.compat import compile_form
 from fenicsmech.effects import Gravity
 from fenicsmech.mechanism import FlexibleLink, Strip, Units
+from fenicsmech.model import MechanismModel
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.goal import Goal
 from fenicsmech.simulation.influence import Equilibrium, influence
-from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.snapshot import gather
 
 PLASTIC_WEIGHT = 1.2e-9 * 9810.0

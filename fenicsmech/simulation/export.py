@@ -15,8 +15,8 @@ from dolfinx import mesh as dmesh
 from fenicsmech.collective import from_one, on_one
 from fenicsmech.compat import cell_dofs, cell_nodes, cellwise_space, scalar_space, vector_space, write_series
 from fenicsmech.errors import DescriptionError
+from fenicsmech.model import MechanismModel
 from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.snapshot import at_vertices
 
 

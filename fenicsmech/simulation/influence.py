@@ -9,19 +9,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenicsmech.equilibrium import (
-    IDLE_STIFFNESS,
     DisplacementControl,
+    EquilibriumSystem,
     Iteration,
+    Linearisation,
     LoadControl,
     NotConverged,
     PointLoad,
     State,
 )
 from fenicsmech.errors import EquilibriumError
+from fenicsmech.model import MechanismModel
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.goal import Goal
-from fenicsmech.simulation.model import MechanismModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,25 +33,23 @@ class Equilibrium:
         state: the equilibrium.
         design: the rest shape it belongs to, this rank's values of the design field, flat.
         goal: the displacement under a prescribed force, or the force at a prescribed displacement.
-        floor: least shift of its tangent.
     """
 
     state: State
     design: np.ndarray
     goal: Goal
-    floor: float
 
     @staticmethod
     def on(curve: Curve, frame: Frame) -> Equilibrium:
         """That of a frame, under what the curve prescribes."""
-        return Equilibrium(frame.state, frame.design, curve.goal, IDLE_STIFFNESS if curve.freedom.idle else 0.0)
+        return Equilibrium(frame.state, frame.design, curve.goal)
 
 
 class Influence:
-    """Adjoints at one equilibrium, which the model holds and whose KKT matrix ``newton`` has factored."""
+    """Adjoints at one equilibrium, which the model holds."""
 
-    def __init__(self, newton: Iteration, at: Equilibrium) -> None:
-        self._newton, self._at = newton, at
+    def __init__(self, system: EquilibriumSystem, goal: Goal, at: Linearisation) -> None:
+        self._system, self._goal, self._at = system, goal, at
 
     def on(self, output: PointLoad | None) -> np.ndarray:
         """z with δQ = z · δF while what is prescribed stays as it is (collective).
@@ -65,12 +64,11 @@ class Influence:
         Returns:
             this rank's owned values at the nodes of u, and of pressures behind them, flat.
         """
-        system, state = self._newton.system, self._at.state
-        if output is None and self._at.goal is Goal.FORCE:
+        at = self._at
+        if output is None and self._goal is Goal.FORCE:
             # ∂f/∂y is the right-hand side of the rate with the displacement, but for its sign
-            return -system.unknowns.apply(self._newton.solve_linear(system.target_rate()))
-        right = system.travel_gradient(output or system.controlled, state)
-        return system.unknowns.apply(self._newton.solve_linear(right))
+            return -at.displacements(at.rate())
+        return at.displacements(at.solve(at.travel_gradient(output or self._system.controlled)))
 
 
 @contextmanager
@@ -90,8 +88,7 @@ def influence(model: MechanismModel, newton: Iteration, at: Equilibrium) -> Iter
         held = at.goal is Goal.FORCE
         control = DisplacementControl(system.load_displacement(at.state)) if held else LoadControl(at.state.force)
         try:
-            newton.factor(at.state, control, system.residual(at.state, control), at.floor)
-            yield Influence(newton, at)
+            yield Influence(system, at.goal, newton.linearise(at.state, control))
         except NotConverged as failure:
             raise EquilibriumError(
                 f"equilibrium under {system.controlled.name!r}",

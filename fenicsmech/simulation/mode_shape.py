@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenicsmech.equilibrium import Step
-from fenicsmech.simulation.model import MechanismModel
+from fenicsmech.model import MechanismModel
 
 
 @dataclass(frozen=True, eq=False)

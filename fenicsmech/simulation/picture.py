@@ -8,6 +8,7 @@ import numpy as np
 
 from fenicsmech.mechanism import Force, Link, Mechanism, in_dimension
 from fenicsmech.meshing import MechanismMesh
+from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import Linkage
 from fenicsmech.report import (
     Arrow,
@@ -21,7 +22,6 @@ from fenicsmech.report import (
     rigid_outline,
 )
 from fenicsmech.simulation.curve import Curve
-from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.snapshot import Snapshot, gather
 
 

@@ -14,6 +14,7 @@ from fenicsmech.equilibrium import Iteration
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import Force, Leader, Output
 from fenicsmech.meshing import radius_ratios
+from fenicsmech.model import Fidelity, MechanismModel
 from fenicsmech.multibody import Linkage
 from fenicsmech.report import Panel, Trace, draw_configurations
 from fenicsmech.simulation.buckling import (
@@ -29,9 +30,7 @@ from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.estimates import Estimates
 from fenicsmech.simulation.explanation import Explanation, hints, simulated
 from fenicsmech.simulation.export import write_xdmf
-from fenicsmech.simulation.fidelity import Fidelity
 from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.picture import panel
 from fenicsmech.simulation.snapshot import gather, rest_vertices
 

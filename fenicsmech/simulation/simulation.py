@@ -25,11 +25,11 @@ from fenicsmech.equilibrium import (
 )
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Leader, Mechanism, Output, Scene
+from fenicsmech.model import read_fidelity
 from fenicsmech.report import Progress, Silent
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.dial import Choice, Dial, Outcome, Rung, corrections, refuse_beside_accuracy
 from fenicsmech.simulation.discretisation import Discretisation
-from fenicsmech.simulation.fidelity import read_fidelity
 from fenicsmech.simulation.followed import FollowedCurve, PathEvent
 from fenicsmech.simulation.mode_shape import ModeShape
 from fenicsmech.simulation.postprocessing import Postprocessing

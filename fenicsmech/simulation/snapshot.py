@@ -8,8 +8,8 @@ import numpy as np
 from dolfinx import fem
 
 from fenicsmech.compat import cell_dofs, cell_nodes, original_cells, original_nodes
+from fenicsmech.model import MechanismModel
 from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.model import MechanismModel
 
 
 @dataclass(frozen=True)

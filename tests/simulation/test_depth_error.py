@@ -33,7 +33,7 @@ def test_estimate_is_near_what_space_adds(name):
 
 
 def test_blocking_all_contraction_is_plane_strain(monkeypatch):
-    monkeypatch.setattr("fenicsmech.simulation.depth_error._DECAY", 1e6)
+    monkeypatch.setattr("fenicsmech.estimates.depth_error._DECAY", 1e6)
     scene, push, load = cantilever()
     values = []
     for space in ("plane-stress", "plane-strain"):

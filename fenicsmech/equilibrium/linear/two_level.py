@@ -14,8 +14,8 @@ elements are too stiff to show. Conjugate gradients stay in W if the smoother S 
 
     x ← P KKT₁⁻¹ Pᵀ b,     then with the preconditioner  (I − P KKT₁⁻¹ Pᵀ KKT) S.
 
-S is a polynomial of the stiffness A of free nodes that damps what varies from node to node, PETSc's Chebyshev iteration:
-with D the 3 × 3 (2 × 2 in the plane) diagonal blocks of A and λ the largest eigenvalue of D⁻¹A,
+S is a polynomial of the stiffness A of free nodes that damps what varies from node to node, PETSc's Chebyshev
+iteration: with D the 3 × 3 (2 × 2 in the plane) diagonal blocks of A and λ the largest eigenvalue of D⁻¹A,
 
     S = q(D⁻¹A) D⁻¹,     1 − t q(t) = T_m((θ − t)/δ) / T_m(θ/δ),     θ, δ = (b ± a)/2,  a = ratio · b,  b ≥ λ:
 
@@ -235,7 +235,9 @@ class TwoLevelSolver(LinearSolver):
         r.axpy(-1.0, self._image)
         for known in found:
             r.axpy(-known.p.dot(r) / known.curvature, known.image)
-        for iterations, (_, direction) in zip(range(options.iterations), self._conjugate(r, options.probe, found), strict=False):
+        for iterations, (_, direction) in zip(
+            range(options.iterations), self._conjugate(r, options.probe, found), strict=False
+        ):
             if direction.curvature < 0.0:
                 return Direction(direction.p.copy(), direction.image.copy(), direction.curvature), iterations
         return None, iterations

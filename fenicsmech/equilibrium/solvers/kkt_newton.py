@@ -42,7 +42,7 @@ class KktIteration(Iteration):
 
     options: KktNewton
 
-    def solve(self, start: State, control: Control, *, floor: float = 0.0) -> Solution:
+    def solve(self, start: State, control: Control) -> Solution:
         system, options = self.system, self.options
         state = self._begin(start, control)
         residual, residuals, before = system.residual(state, control), [], math.inf
@@ -52,20 +52,22 @@ class KktIteration(Iteration):
             if not math.isfinite(residuals[-1]):
                 raise NotConverged("the residual overflows", iteration)
             if self.converged(residual, before) and iteration > 0:
-                return self._accept(state, control, residuals, iteration)
+                return self._accept(state, control, residual, residuals, iteration)
             if iteration == options.iterations:
                 break
-            self._factor_true(state, control, residual, floor, iteration)
-            x = self.solve_linear(residual.vector, tolerance=self._accuracy(residual))
+            self._factor_true(state, control, residual, iteration)
+            x = self._solution(residual.vector, self._accuracy(residual))
+            if x is None:
+                raise NotConverged("the linear solver stalled", iteration)
             x.scale(-1.0)
             before = residual.norm
             try:
                 state, residual = self._advance(state, control, system.unknowns.step(x), residual, iteration)
             except NotConverged as failure:
-                return self._bear(*best, control, floor, residuals, failure)
+                return self._bear(*best, control, residuals, failure)
             if residual.norm < best[1].norm:
                 best = state, residual
-        return self._bear(*best, control, floor, residuals, self._spent(residuals, options.iterations))
+        return self._bear(*best, control, residuals, self._spent(residuals, options.iterations))
 
     def _advance(
         self, state: State, control: Control, step: Step, residual: Residual, iteration: int

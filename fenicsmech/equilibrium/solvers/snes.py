@@ -57,13 +57,13 @@ class SnesIteration(Iteration):
 
     options: Snes
 
-    def solve(self, start: State, control: Control, *, floor: float = 0.0) -> Solution:
+    def solve(self, start: State, control: Control) -> Solution:
         start = self._begin(start, control)
-        equations = _Equations(self, start, control, floor)
+        equations = _Equations(self, start, control)
         if self.converged(equations.residual):  # there is nothing that a line search could lower
             equations.test(None, 0, (0.0, 0.0, equations.residual.norm))
             equations.setUp(None)
-            return self._accept(start, control, equations.residuals, 1)
+            return self._accept(start, control, equations.residual, equations.residuals, 1)
         x = equations.residual.vector.duplicate()
         snes = self._create(equations)
         snes.solve(None, x)
@@ -72,13 +72,13 @@ class SnesIteration(Iteration):
         if not equations.evaluate(x):
             raise NotConverged("elements are inverted", iterations)
         if equations.factored and self.converged(equations.residual):
-            return self._accept(equations.state, control, equations.residuals, iterations)
+            return self._accept(equations.state, control, equations.residual, equations.residuals, iterations)
         failure = NotConverged(f"SNES stops: {_REASONS.get(reason, f'reason {reason}')}", iterations)
-        return self._bear(equations.state, equations.residual, control, floor, equations.residuals, failure)
+        return self._bear(equations.state, equations.residual, control, equations.residuals, failure)
 
     def _create(self, equations: _Equations) -> PETSc.SNES:
         system, chosen = self.system, self.options.globalisation
-        snes = PETSc.SNES().create(system.layout.comm)
+        snes = PETSc.SNES().create(system.comm)
         options = PETSc.Options(_PREFIX)
         options["snes_linesearch_type"] = "basic" if chosen is Globalisation.TRUST_REGION else chosen.value
         options["snes_tr_delta0"] = _FIRST_RADIUS * system.unknowns.unit * math.sqrt(equations.residual.vector.size)
@@ -108,9 +108,9 @@ class _Equations:
         norm: of the last iterate's residual.
     """
 
-    def __init__(self, iteration: SnesIteration, base: State, control: Control, floor: float) -> None:
+    def __init__(self, iteration: SnesIteration, base: State, control: Control) -> None:
         self._iteration, self._system, self._base = iteration, iteration.system, base
-        self._control, self._floor = control, floor
+        self._control = control
         self.state, self.residual = base, self._system.residual(base, control)
         self._system.linearise(base, control, self.residual)
         self.matrix = self._system.kkt.matrix()
@@ -155,7 +155,7 @@ class _Equations:
         return PETSc.SNES.ConvergedReason.ITERATING
 
     def setUp(self, pc: PETSc.PC) -> None:
-        self.factored = self._iteration._refactor(self._floor)
+        self.factored = self._iteration._refactor(self._base.minimum_shift)
 
     def apply(self, pc: PETSc.PC, right: PETSc.Vec, x: PETSc.Vec) -> None:
         accuracy = self._iteration._accuracy(self.residual)
