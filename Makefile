@@ -57,7 +57,7 @@ lint: install-test ## style and layering: seconds
 CORE := tests/design tests/effects tests/elasticity tests/joints tests/multibody \
     tests/mechanism tests/meshing
 OTHERS := tests/equilibrium tests/simulation
-AROUND := tests/demos tests/accuracy tests/hard tests/oracles tests/report \
+AROUND := tests/demos tests/benchmarks tests/hard tests/oracles tests/plot \
     $(filter-out tests/test_layering.py,$(wildcard tests/test_*.py))
 PYTEST = OPENBLAS_NUM_THREADS=1 $(PYTHON) -m pytest -p no:cacheprovider --durations=5 --durations-min=5 -m "$(SELECT)"
 
@@ -117,14 +117,22 @@ $(DEMOS:%=demo-quick-%): demo-quick-%: install
 hard-cases: install-test ## every case of tests/hard/, slow ones too, as the table in README.md
 	$(PYTHON) -m tests.hard
 
-bench: $(MECHANISMS:%=bench-%) ## seconds per frame (frame_median) of every demo's initial design: 3D, on ranks, plane stress
+# The tables that pages of the documentation include; `make bench` measures one, `make tables` all (hours).
+BENCHMARKS := solvers work_precision accuracy_control large stopping performance effects optimisers
+BENCH = OPENBLAS_NUM_THREADS=1 $(PYTHON) -m benchmarks
 
-.PHONY: $(MECHANISMS:%=bench-%)
-$(MECHANISMS:%=bench-%): bench-%: install
+bench: install ## seconds per load step of every demo's initial design: 3D, on ranks, plane stress
+	$(call heading,benchmark)
+	$(BENCH).frames --write
+	$(MPIRUN) $(PYTHON) -m benchmarks.frames --write
+	$(BENCH).frames --space plane-stress --write
+
+tables: bench $(BENCHMARKS:%=table-%) ## every benchmark, its table in docs/tables/ (hours)
+
+.PHONY: tables $(BENCHMARKS:%=table-%)
+$(BENCHMARKS:%=table-%): table-%: install
 	$(call heading,benchmark $*)
-	$(PYTHON) demos/$*.py --simulate-only --out results/bench/$*
-	$(MPIRUN) $(PYTHON) demos/$*.py --simulate-only --out results/bench/$*-$(RANKS)-ranks
-	$(PYTHON) demos/$*.py --simulate-only --space plane-stress --out results/bench/$*-plane-stress
+	$(BENCH).$* --write
 
 clean: ## remove what the targets above left in this tree
 	rm -rf .venv results .pytest_cache .ruff_cache .hypothesis

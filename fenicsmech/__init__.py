@@ -34,12 +34,8 @@ from fenicsmech.effects import (
 from fenicsmech.elasticity import Displacement, Mixed
 from fenicsmech.equilibrium import (
     ArcSteps,
-    AugmentedLagrangian,
     Critical,
-    Globalisation,
-    KktNewton,
     PrimalDualNewton,
-    Snes,
 )
 from fenicsmech.errors import AssemblyError, DescriptionError, EquilibriumError, FenicsmechError, MeshingError
 from fenicsmech.mechanism import (
@@ -89,7 +85,6 @@ __all__ = [
     "SMOOTH_SIL_950",
     "Arc",
     "AssemblyError",
-    "AugmentedLagrangian",
     "BFGS",
     "Configuration",
     "Curve",
@@ -107,7 +102,6 @@ __all__ = [
     "IsochoricNeoHookean",
     "IsochoricSimoNeoHookean",
     "LevenbergMarquardt",
-    "KktNewton",
     "Line",
     "LogarithmicNeoHookean",
     "Mass",
@@ -123,7 +117,6 @@ __all__ = [
     "Scene",
     "ShapeBounds",
     "Simulation",
-    "Snes",
     "SplineDesign",
     "StayClose",
     "Target",
@@ -136,7 +129,6 @@ __all__ = [
     "strip",
     "Contact",
     "Cylinder",
-    "Globalisation",
     "HalfPlane",
     "JointCompliance",
     "JointSpring",

@@ -9,7 +9,6 @@
 - ``linear``: its factor LDLᵀ with inertia, or conjugate gradients on two levels where that is too large
 - ``solver``: what every equilibrium solver is
 - ``newton``: the default one, the primal–dual iteration
-- ``solvers``: others to choose and to compare
 - ``predictor``, ``path``: first guesses and load steps
 - ``dead_centre``: those of motors past the end of their slack
 - ``lead``: what leads a path that may turn back: a force, or motors
@@ -22,7 +21,7 @@
 
 from fenicsmech.equilibrium.arc_length import ArcLength, ArcSteps
 from fenicsmech.equilibrium.arc_metric import ArcMetric, metric_at
-from fenicsmech.equilibrium.blocks import Block, Blocks
+from fenicsmech.equilibrium.blocks import Block, Blocks, Border
 from fenicsmech.equilibrium.border import REGULARISATION, PointLoad
 from fenicsmech.equilibrium.branching import Sense, crossing, null_space
 from fenicsmech.equilibrium.continuation import Finish, Stretch, follow
@@ -39,7 +38,6 @@ from fenicsmech.equilibrium.path_points import PathPoint, PathPoints
 from fenicsmech.equilibrium.predictor import Constant, Hermite, Predictor, Tangent
 from fenicsmech.equilibrium.reactions import Reaction, joint_reactions, motor_torques
 from fenicsmech.equilibrium.solver import EquilibriumSolver, Iteration, Linearisation, NotConverged, Solution
-from fenicsmech.equilibrium.solvers import AugmentedLagrangian, Globalisation, KktNewton, Snes
 from fenicsmech.equilibrium.state import State, Step, load_fields
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 
@@ -47,9 +45,9 @@ __all__ = [
     "ArcLength",
     "ArcMetric",
     "ArcSteps",
-    "AugmentedLagrangian",
     "Block",
     "Blocks",
+    "Border",
     "BySize",
     "Constant",
     "Control",
@@ -63,12 +61,10 @@ __all__ = [
     "Factor",
     "Finish",
     "ForceLead",
-    "Globalisation",
     "Heading",
     "Hermite",
     "Iteration",
     "KktMatrix",
-    "KktNewton",
     "Lead",
     "LinearMethod",
     "Linearisation",
@@ -92,7 +88,6 @@ __all__ = [
     "Residual",
     "Sense",
     "ShareControl",
-    "Snes",
     "Solution",
     "State",
     "Step",
