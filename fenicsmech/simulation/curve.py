@@ -23,9 +23,10 @@ from fenicsmech.equilibrium import (
 )
 from fenicsmech.errors import DescriptionError
 from fenicsmech.estimates import AccuracyOptions, Equilibrium, ErrorKind
+from fenicsmech.files import write_csv
 from fenicsmech.mechanism import Configuration, Force, Joint, Leader, Output, Units
 from fenicsmech.multibody import Freedom
-from fenicsmech.report import CurveSeries, Panel, Trace, draw_configurations, plot_curve, write_curve_csv
+from fenicsmech.plot import CurveSeries, Panel, Trace, draw_configurations, plot_curve
 from fenicsmech.simulation.buckling import BucklingLoad, BucklingPosition, ModeShape, SoftMode, modes_at
 from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.explanation import Explanation, ExplanationOptions, explain
@@ -348,7 +349,7 @@ class Curve:
             columns[f"finer elements add to the {name} [{unit}]"] = self.error_estimates()
             columns[f"corrected {name} [{unit}]"] = self.corrected
         if self._writes:
-            write_curve_csv(Path(path), columns)
+            write_csv(Path(path), columns)
 
     # -- what the above need -------------------------------------------------------------------------------------
 

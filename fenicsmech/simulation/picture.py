@@ -9,7 +9,7 @@ import numpy as np
 from fenicsmech.mechanism import Force, Link, Mechanism, in_dimension
 from fenicsmech.meshing import MechanismMesh
 from fenicsmech.multibody import Linkage
-from fenicsmech.report import (
+from fenicsmech.plot import (
     Arrow,
     FlexibleShape,
     MechanismShape,

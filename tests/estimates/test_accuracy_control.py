@@ -15,7 +15,7 @@ from fenicsmech.estimates import (
     Trial,
     fidelity_levels,
 )
-from fenicsmech.report import read_curve_csv
+from fenicsmech.files import read_csv
 
 from ..simulation.demo_scenes import describe
 from ..simulation.refined import arch, cantilever
@@ -110,7 +110,7 @@ def test_curves_are_as_accurate_as_asked_for_with_their_corrections(tmp_path):
         assert error < accuracy
         assert error < 0.5 * computed
     curve.write_csv(tmp_path / "curve.csv", errors=True)
-    columns = read_curve_csv(tmp_path / "curve.csv")
+    columns = read_csv(tmp_path / "curve.csv")
     assert columns["corrected displacement [mm]"] == pytest.approx(curve.displacements + curve.corrections)
 
 
