@@ -5,7 +5,7 @@ Describe a mechanism (``Mechanism``), say what acts on it (``Scene``) and how fi
 (``DesignProblem``), and ask for their shapes.
 """
 
-from fenicsmech.collective import end_together
+from fenicsmech.collective import mpi_abort_on_error
 from fenicsmech.design import (
     BFGS,
     DesignProblem,
@@ -34,12 +34,8 @@ from fenicsmech.effects import (
 from fenicsmech.elasticity import Displacement, Mixed
 from fenicsmech.equilibrium import (
     ArcSteps,
-    AugmentedLagrangian,
     Critical,
-    Globalisation,
-    KktNewton,
     PrimalDualNewton,
-    Snes,
 )
 from fenicsmech.errors import AssemblyError, DescriptionError, EquilibriumError, FenicsmechError, MeshingError
 from fenicsmech.mechanism import (
@@ -89,7 +85,6 @@ __all__ = [
     "SMOOTH_SIL_950",
     "Arc",
     "AssemblyError",
-    "AugmentedLagrangian",
     "BFGS",
     "Configuration",
     "Curve",
@@ -107,7 +102,6 @@ __all__ = [
     "IsochoricNeoHookean",
     "IsochoricSimoNeoHookean",
     "LevenbergMarquardt",
-    "KktNewton",
     "Line",
     "LogarithmicNeoHookean",
     "Mass",
@@ -123,20 +117,19 @@ __all__ = [
     "Scene",
     "ShapeBounds",
     "Simulation",
-    "Snes",
     "SplineDesign",
     "StayClose",
     "Target",
     "Units",
     "fit_modulus",
     "gmsh_mesh",
+    "mpi_abort_on_error",
     "outline",
     "polygon",
     "step",
     "strip",
     "Contact",
     "Cylinder",
-    "Globalisation",
     "HalfPlane",
     "JointCompliance",
     "JointSpring",
@@ -154,5 +147,3 @@ __all__ = [
     "SoftMode",
     "Until",
 ]
-
-end_together()

@@ -17,12 +17,15 @@ PACKAGE = Path(__file__).parents[1] / ROOT
 LAYERS = (
     "errors",
     "checks",
+    "symbolic",
     "log",
     "clock",
+    "symbolic",
     "kernel_cache",
     "compat",
     "collective",
-    "report",
+    "files",
+    "plot",
     "joints",
     "mechanism",
     "meshing",
@@ -35,17 +38,16 @@ LAYERS = (
     "estimates",
     "simulation",
     "design",
-    "accuracy",
 )
 
 # Libraries that belong to a few layers only: descriptions and joints know no elements, only one layer makes meshes,
 # only one draws.
 RESTRICTED = {
-    "dolfinx": {"report", "joints", "mechanism"},
-    "ufl": {"report", "joints", "mechanism"},
-    "petsc4py": {"report", "joints", "mechanism"},
+    "dolfinx": {"plot", "joints", "mechanism"},
+    "ufl": {"plot", "joints", "mechanism"},
+    "petsc4py": {"plot", "joints", "mechanism"},
     "gmsh": set(LAYERS) - {"compat", "meshing", "export"},
-    "matplotlib": set(LAYERS) - {"report"},
+    "matplotlib": set(LAYERS) - {"plot"},
 }
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from fenicsmech.checks import point, positive
 from fenicsmech.errors import MeshingError
 from fenicsmech.export.smooth_outline import smooth_outline
+from fenicsmech.files import atomic_write
 from fenicsmech.meshing import (
     CircleArc,
     Curve,
@@ -35,7 +36,6 @@ from fenicsmech.meshing import (
     sampled,
     shown,
 )
-from fenicsmech.report import atomic_write
 
 
 @dataclass(frozen=True)
