@@ -78,7 +78,6 @@ from fenicsmech.simulation import (
     Simulation,
     SoftMode,
     Until,
-    friction_band,
 )
 
 __version__ = "0.1.0"
@@ -148,7 +147,6 @@ __all__ = [
     "Pressure",
     "Prestrain",
     "PinFriction",
-    "friction_band",
     "ArcSteps",
     "BucklingLoad",
     "BucklingPosition",
