@@ -68,7 +68,7 @@ def main():
     problem = fm.DesignProblem(sim, **wanted(*task))
     saved = {"checkpoint": options.out / f"checkpoint-{options.space}.json", "resume": options.resume}
     result = problem.optimise(start=start, **saved)
-    sim = sim.with_design(problem.rest_shape(result))
+    sim = sim.with_design(result)
     after = sim.load_displacement(push, forces=FORCES)
     design = fm.Design(problem, result, before=[before], start=start, pin=PIN)
     fm.write_report(options.out, sim, [after], design=design).show()
