@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from fenicsmech.collective import on_one
-from fenicsmech.design.description import Target
+from fenicsmech.design.description import SplineDesign, Target
 from fenicsmech.design.equilibria import TargetEquilibria
 from fenicsmech.design.objective import target_errors, target_scales
 from fenicsmech.design.optimisers.problem import Infeasible
@@ -38,10 +38,12 @@ class LinkDesign:
     Attributes:
         name: of the link.
         parameters: its part of p.
-        handles: positions θ of its handles, which are the best near those of the designs on the way.
+        handles: positions θ of its handles, the best near those of the designs on the way. Several can be good: the
+            parameters alone fix displacements to about 1 % only.
         controls: position and thickness (x, y, δ), then tangent, of every control point, (points, 2, 3).
         thickness: least and largest thickness in the plane.
         bend: largest curvature ratio.
+        centreline: points that the drawn centreline runs through, if they were given.
     """
 
     name: str
@@ -50,6 +52,7 @@ class LinkDesign:
     controls: tuple[tuple[tuple[float, ...], ...], ...]
     thickness: tuple[float, float]
     bend: float
+    centreline: tuple[tuple[float, ...], ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -132,6 +135,28 @@ class DesignResult:
     def parameters(self) -> int:
         """Number of parameters."""
         return sum(len(link.parameters) for link in self.links)
+
+    def rest_shape(self, simulation: Simulation) -> np.ndarray:
+        """The design field on the mesh of a simulation of the same mechanism: this rank's values, ghosts last, flat.
+
+        Raises:
+            DescriptionError: the mechanism has no such links.
+            ShapeError: cells of the mesh are inverted in this shape.
+        """
+        links = {link.name: link for link in simulation.scene.mechanism.flexible_links}
+        for own in self.links:
+            if own.name not in links:
+                raise DescriptionError(
+                    f"design of {self.mechanism!r}",
+                    f"{simulation.scene.mechanism.name!r} has no flexible link {own.name!r}",
+                    "Give a simulation of the same mechanism",
+                )
+        rest = RestShape.of(
+            simulation,
+            [SplineDesign(links[own.name], len(own.controls) - 1, centreline=own.centreline) for own in self.links],
+        )
+        p, theta = (np.concatenate(own) for own in zip(*((o.parameters, o.handles) for o in self.links), strict=True))
+        return rest.field(p, rest.known(p, theta))
 
     def save(self, path: str | Path) -> None:
         """Local. Writes the result as JSON; call it on one process."""
@@ -232,10 +257,10 @@ def target_results(
     )
 
 
-def link_designs(rest: RestShape, placement: Placement) -> tuple[LinkDesign, ...]:
+def link_designs(rest: RestShape, wanted: Sequence[SplineDesign], placement: Placement) -> tuple[LinkDesign, ...]:
     """The shapes of all links at a placement."""
     designs = []
-    for link, handles in zip(rest.links, rest.handles(placement), strict=True):
+    for link, design, handles in zip(rest.links, wanted, rest.handles(placement), strict=True):
         own = placement.p[link.place]
         thickness, bend = link.thickness * link.samples.thickness(own), link.samples.curvature(own)
         designs.append(
@@ -246,6 +271,7 @@ def link_designs(rest: RestShape, placement: Placement) -> tuple[LinkDesign, ...
                 controls=tuple(tuple(map(tuple, point)) for point in link.spline.controls_at(own).tolist()),
                 thickness=(float(thickness.min()), float(thickness.max())),
                 bend=float(np.abs(bend).max(initial=0.0)),
+                centreline=design.centreline and tuple(tuple(map(float, point)) for point in design.centreline),
             )
         )
     return tuple(designs)
