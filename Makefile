@@ -57,7 +57,7 @@ lint: install-test ## style and layering: seconds
 CORE := tests/design tests/effects tests/elasticity tests/joints tests/multibody \
     tests/mechanism tests/meshing
 OTHERS := tests/equilibrium tests/simulation
-AROUND := tests/demos tests/benchmarks tests/hard tests/oracles tests/report \
+AROUND := tests/demos tests/benchmarks tests/hard tests/oracles tests/plot \
     $(filter-out tests/test_layering.py,$(wildcard tests/test_*.py))
 PYTEST = OPENBLAS_NUM_THREADS=1 $(PYTHON) -m pytest -p no:cacheprovider --durations=5 --durations-min=5 -m "$(SELECT)"
 

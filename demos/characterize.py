@@ -14,13 +14,8 @@ from samples import bending_test, of_modulus
 
 import fenicsmech as fm
 from benchmarks.table import format_table
-from fenicsmech.files import write_json
-from fenicsmech.report import (
-    PALETTE,
-    CurveSeries,
-    plot_curve,
-    read_curve_csv,
-)
+from fenicsmech.files import read_csv, write_json
+from fenicsmech.plot import PALETTE, CurveSeries, plot_curve
 
 SIZE = 1.0  # mm
 GUESS = of_modulus(1000.0)
@@ -30,7 +25,7 @@ TRUE = 1770.0  # MPa, of the data that come with the demo
 
 def measured(folder):
     """The readings of each sample: thickness → (forces, displacements)."""
-    tables = {thickness: read_curve_csv(folder / name) for thickness, name in FILES.items()}
+    tables = {thickness: read_csv(folder / name) for thickness, name in FILES.items()}
     return {thickness: (table["force [N]"], table["displacement [mm]"]) for thickness, table in tables.items()}
 
 

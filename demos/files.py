@@ -15,12 +15,7 @@ from mpi4py import MPI
 import fenicsmech as fm
 from benchmarks.table import format_table
 from fenicsmech.files import write_json
-from fenicsmech.report import (
-    PALETTE,
-    CurveTarget,
-    draw_configurations,
-    plot_curve,
-)
+from fenicsmech.plot import PALETTE, CurveTarget, draw_configurations, plot_curve
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,8 @@
-"""Files that appear complete or not at all, and plain data as JSON."""
+"""Files that appear complete or not at all: text and bytes, plain data as JSON, columns of numbers as CSV."""
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 import os
@@ -12,7 +13,9 @@ from pathlib import Path
 from typing import IO
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
+from fenicsmech.checks import finite, real_array
 from fenicsmech.errors import DescriptionError
 
 
@@ -92,3 +95,59 @@ def _plain(key: str, value: object) -> object:
 
 def _error(key: str, problem: str, remedy: str) -> DescriptionError:
     return DescriptionError(f"entry '{key}' of a file" if key else "the data of a file", problem, remedy)
+
+
+def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> None:
+    """Write columns of numbers under their headers; floats keep every digit.
+
+    Args:
+        path: the CSV file.
+        columns: header with unit ("force [N]") to (n,) values; flags become 0 and 1.
+
+    Raises:
+        DescriptionError: no column, columns of different length, or a value that is not finite.
+    """
+    if not columns:
+        raise DescriptionError(f"table '{path}'", "there is no column", "Give at least one")
+    rows = None
+    checked = []
+    for header, values in columns.items():
+        column = real_array(f"column '{header}' of '{path}'", values, rows)
+        rows = len(column)
+        exact = np.asarray(values)
+        checked.append(exact.astype(int) if exact.dtype.kind in "bui" else column)
+    with atomic_write(path) as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(zip(*(column.tolist() for column in checked), strict=True))
+
+
+def read_csv(path: str | Path) -> dict[str, NDArray[np.float64]]:
+    """Read what :func:`write_csv` writes, or a spreadsheet's export of the same form.
+
+    Blank lines and lines that start with # are skipped.
+
+    Returns:
+        header to (n,) values, in the order of the file.
+
+    Raises:
+        DescriptionError: no header, a repeated header, a row of another length, or a field that is no finite number.
+        OSError: the file cannot be read.
+    """
+    with open(path, encoding="utf-8-sig", newline="") as file:  # -sig: spreadsheets put a byte-order mark first
+        reader = csv.reader(file)
+        lines = [(reader.line_num, row) for row in reader]
+    rows = [(line, row) for line, row in lines if "".join(row).strip() and not row[0].lstrip().startswith("#")]
+    if not rows:
+        raise DescriptionError(f"table '{path}'", "it is empty", "Start it with a line of headers")
+    headers = [header.strip() for header in rows[0][1]]
+    if len(set(headers)) < len(headers) or "" in headers:
+        raise DescriptionError(f"table '{path}'", f"the headers are {headers}", "Give each column its own name")
+    values = np.empty((len(rows) - 1, len(headers)))
+    for index, (line, row) in enumerate(rows[1:]):
+        if len(row) != len(headers):
+            raise DescriptionError(
+                f"table '{path}', line {line}", f"{len(row)} fields for {len(headers)} columns", "Complete the line"
+            )
+        values[index] = [finite(f"table '{path}', line {line}", field) for field in row]
+    return {header: values[:, k].copy() for k, header in enumerate(headers)}

@@ -24,7 +24,7 @@ LAYERS = (
     "compat",
     "collective",
     "files",
-    "report",
+    "plot",
     "joints",
     "mechanism",
     "meshing",
@@ -42,11 +42,11 @@ LAYERS = (
 # Libraries that belong to a few layers only: descriptions and joints know no elements, only one layer makes meshes,
 # only one draws.
 RESTRICTED = {
-    "dolfinx": {"report", "joints", "mechanism"},
-    "ufl": {"report", "joints", "mechanism"},
-    "petsc4py": {"report", "joints", "mechanism"},
+    "dolfinx": {"plot", "joints", "mechanism"},
+    "ufl": {"plot", "joints", "mechanism"},
+    "petsc4py": {"plot", "joints", "mechanism"},
     "gmsh": set(LAYERS) - {"compat", "meshing", "export"},
-    "matplotlib": set(LAYERS) - {"report"},
+    "matplotlib": set(LAYERS) - {"plot"},
 }
 
 

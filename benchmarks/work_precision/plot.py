@@ -12,19 +12,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import ArrayLike, NDArray
 
+from fenicsmech.checks import real_array
 from fenicsmech.errors import DescriptionError
-from fenicsmech.report import (
-    INK,
-    PALETTE,
-    Labels,
-    Spot,
-    house_style,
-    new_figure,
-    open_frame,
-    real_array,
-    save_png,
-    text_size,
-)
+from fenicsmech.plot import INK, PALETTE, Labels, Spot, house_style, new_figure, open_frame, save_png, text_size
 
 _MARKERS = ("o", "s", "^", "D", "v", "P")
 # of labels from their points: to the lower left first, where the front leaves nothing

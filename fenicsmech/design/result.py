@@ -24,7 +24,7 @@ from fenicsmech.log import logger
 from fenicsmech.mechanism import DRAWN, Disc, FlexibleLink
 from fenicsmech.meshing import LinkMesh, boundary_loops, plan_of
 from fenicsmech.multibody import Linkage, assemble
-from fenicsmech.report import DesignShape, LinkOutline, draw_designs
+from fenicsmech.plot import DesignShape, LinkOutline, draw_designs
 from fenicsmech.simulation import Draughtsman, Simulation, rest_vertices
 
 _log = logger(__name__)

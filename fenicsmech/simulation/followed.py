@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from fenicsmech.equilibrium import Critical, CriticalPoint
-from fenicsmech.report import CurveMark, CurveSeries
+from fenicsmech.plot import CurveMark, CurveSeries
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.mode_shape import ModeShape

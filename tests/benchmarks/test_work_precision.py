@@ -4,7 +4,7 @@ import pytest
 from benchmarks.work_precision import ModellingError, WorkSeries, pareto_front, plot_work_precision
 from fenicsmech.errors import DescriptionError
 
-from ..report.png import png_size, share_of_colour
+from ..plot.png import png_size, share_of_colour
 
 GREY, BLUE = (238, 238, 238), (33, 102, 172)
 

@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 import fenicsmech as fm
 from fenicsmech.equilibrium import Iteration
-from fenicsmech.report import read_curve_csv
+from fenicsmech.files import read_csv
 
 from .demo_scenes import describe
 from .five_problems import case
@@ -94,7 +94,7 @@ def test_curve_file_names_what_the_errors_are_of(tmp_path):
     headers = []
     for number, made in enumerate((curve, held, followed)):
         made.write_csv(tmp_path / f"{number}.csv", errors=simulation.error_estimates(made))
-        (header,) = [name for name in read_curve_csv(tmp_path / f"{number}.csv") if name.startswith("finer")]
+        (header,) = [name for name in read_csv(tmp_path / f"{number}.csv") if name.startswith("finer")]
         headers.append(header)
     assert headers == ["finer elements add to the displacement [mm]", *2 * ["finer elements add to the force [N]"]]
 

@@ -1,16 +1,45 @@
-"""Meshes seen from above: the top of a tetrahedral mesh and the rim of a triangle mesh."""
+"""Outlines: of a rigid link from its joints, of a solid mesh seen from above, the rim of a triangle mesh."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from matplotlib.path import Path
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import ConvexHull
 
+from fenicsmech.checks import index_array, real_array
 from fenicsmech.errors import DescriptionError
-from fenicsmech.report.arrays import index_array, real_array
 
-_FACES = ((1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2))  # face i is opposite to vertex i
+Reals = NDArray[np.float64]
+
+
+def rigid_outline(points: ArrayLike, width: float) -> Reals:
+    """All points within ``width``/2 of the convex hull of the joints: the hull of discs around them.
+
+    One point gives a disc, two a bar with round ends, three and more a rounded plate.
+
+    Args:
+        points: (k, 2) joint positions; coincident and collinear ones are allowed.
+        width: of the bar, in the unit of the points.
+
+    Returns:
+        (m, 2) polygon, counter-clockwise, not closed.
+
+    Raises:
+        DescriptionError: no point, values that are not finite, or a width that is not positive.
+    """
+    joints = real_array("joints of a rigid link", points, None, 2)
+    if not len(joints):
+        raise DescriptionError("outline of a rigid link", "there is no joint", "Give at least one point")
+    if not (width > 0.0 and np.isfinite(width)):
+        raise DescriptionError("outline of a rigid link", f"the width is {width}", "Give a positive width")
+    angles = np.linspace(0.0, 2.0 * np.pi, 384, endpoint=False)  # of the polygon that stands for a disc
+    circle = 0.5 * width * np.column_stack((np.cos(angles), np.sin(angles)))
+    discs = (joints[:, None] + circle).reshape(-1, 2)
+    return discs[ConvexHull(discs).vertices]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +69,7 @@ def plan_view(points: ArrayLike, tets: ArrayLike) -> PlanView:
     """
     vertices = real_array("points of a solid mesh", points, None, 3)
     cells = index_array("tetrahedra of a solid mesh", tets, None, 4, below=len(vertices))
-    faces = cells[:, _FACES].reshape(-1, 3)
+    faces = cells[:, ((1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2))].reshape(-1, 3)  # face i is opposite to vertex i
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     boundary = first[count == 1]
     faces, opposite, owner = faces[boundary], cells.reshape(-1)[boundary], boundary // 4
@@ -86,3 +115,8 @@ def rim(triangles: NDArray[np.int64]) -> list[NDArray[np.int64]]:
             vertex = other if one == vertex else one
         loops.append(np.array(loop))
     return loops
+
+
+def path_of(loops: Iterable[Reals]) -> Path:
+    """Closed loops (n, 2) as one path, which fills without the seams that single triangles leave."""
+    return Path.make_compound_path(*(Path(np.vstack((loop, loop[:1])), closed=True) for loop in loops))

@@ -3,7 +3,7 @@ import pytest
 from matplotlib.colors import to_rgb
 
 from fenicsmech.errors import DescriptionError
-from fenicsmech.report import FLEXIBLE, INK, DesignShape, LinkOutline, RigidShape, draw_designs
+from fenicsmech.plot import FLEXIBLE, INK, DesignShape, LinkOutline, RigidShape, draw_designs
 
 from .png import png_size, share_of_colour
 from .strips import design, four_bar, strip

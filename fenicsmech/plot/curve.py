@@ -1,10 +1,9 @@
-"""Load–displacement curves: as a table for other programs and as a plot for the eye."""
+"""Plots of load–displacement curves, as in the field's papers: displacement across, force up."""
 
 from __future__ import annotations
 
-import csv
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,18 +11,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.lines import Line2D
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from fenicsmech.checks import real_array
 from fenicsmech.errors import DescriptionError
-from fenicsmech.files import atomic_write
-from fenicsmech.report.arrays import real_array
-from fenicsmech.report.canvas import INK, PALETTE, house_style, new_figure, open_frame, save_png
+from fenicsmech.plot.style import INK, MUTED, PALETTE, house_style, new_figure, open_frame, save_png
 
 _DASHES = (0, (3.0, 1.6))  # of unstable parts
 _DOTS = (0, (1.0, 1.6))  # of jumps
-_TIP = 0.1  # of a jump is drawn solid, with the head of its arrow
-_FAINT = 0.45  # of the colour remains
-_MIXED = "#777777"  # what curves of several colours share
 _MARKERS = ("s", "^", "X", "P", "v", "*")  # of the kinds of marks, in the order of their names
 
 
@@ -141,16 +136,16 @@ def _colour(curve: CurveSeries, index: int) -> str:
     return curve.colour or PALETTE[index % len(PALETTE)]
 
 
-def _pen(colour: str, *, faint: bool) -> tuple[str, float, float]:
+def _line_style(colour: str, *, faint: bool) -> tuple[str, float, float]:
     """Colour and width of the line, and size of the dots on it."""
     if not faint:
         return colour, 2.0, 4.5
-    return to_hex(1.0 - _FAINT * (1.0 - np.array(to_rgb(colour)))), 1.4, 3.2
+    return to_hex(1.0 - 0.45 * (1.0 - np.array(to_rgb(colour)))), 1.4, 3.2
 
 
 def _draw_series(axes: Axes, curve: CurveSeries, colour: str) -> None:
     x, y, stable = curve.displacement, curve.force, curve.stable
-    colour, width, size = _pen(colour, faint=curve.faint)
+    colour, width, size = _line_style(colour, faint=curve.faint)
     behind = 1.0 if curve.faint else 0.0
     if curve.joined:
         # a step is stable when both its ends are, and no equilibria lie along a jump
@@ -167,7 +162,7 @@ def _draw_series(axes: Axes, curve: CurveSeries, colour: str) -> None:
             start, end = np.array([x[index], y[index]]), np.array([x[index + 1], y[index + 1]])
             axes.plot(*np.array([start, end]).T, ls=_DOTS, color=colour, lw=0.7 * width, zorder=3 - behind)
             tip = {"arrowstyle": "-|>", "shrinkA": 0.0, "shrinkB": 3.0, "color": colour, "lw": 0.7 * width}
-            axes.annotate("", xy=end, xytext=end - _TIP * (end - start), arrowprops=tip, zorder=3 - behind)
+            axes.annotate("", xy=end, xytext=end - 0.1 * (end - start), arrowprops=tip, zorder=3 - behind)
     size = size if len(x) <= 40 else 0.55 * size
     for part, face in ((stable, colour), (~stable, "white")):
         axes.plot(x[part], y[part], "o", ms=size, mfc=face, mec=colour, mew=1.0, zorder=4 - 1.5 * behind)
@@ -204,16 +199,16 @@ def _draw_legend(axes: Axes, series: Sequence[CurveSeries], targets: Sequence[Cu
     handles = []
     for label, group in same.items():
         curve = group[0][0]
-        colour, width, size = _pen(_common([colour for _, colour in group]), faint=curve.faint)
+        colour, width, size = _line_style(_common([colour for _, colour in group]), faint=curve.faint)
         handles.append(
             Line2D([], [], color=colour, label=label, lw=width if curve.joined else 0.0, marker="o", ms=size)
         )
     if any(curve.joined and not curve.stable.all() for curve in series):
         handles.append(
-            Line2D([], [], color=_MIXED, ls=_DASHES, lw=2.0, marker="o", ms=4.5, mfc="white", label="unstable")
+            Line2D([], [], color=MUTED, ls=_DASHES, lw=2.0, marker="o", ms=4.5, mfc="white", label="unstable")
         )
     if any(curve.joined and curve.jumped.any() for curve in series):
-        handles.append(Line2D([], [], color=_MIXED, ls=_DOTS, lw=1.4, marker=">", markevery=(1, 1), ms=5, label="jump"))
+        handles.append(Line2D([], [], color=MUTED, ls=_DOTS, lw=1.4, marker=">", markevery=(1, 1), ms=5, label="jump"))
     for kind, marker in _markers(series).items():
         handles.append(Line2D([], [], lw=0, marker=marker, ms=8, mfc="white", mec=INK, mew=1.5, label=kind))
     if targets:
@@ -225,70 +220,4 @@ def _draw_legend(axes: Axes, series: Sequence[CurveSeries], targets: Sequence[Cu
 
 def _common(colours: Sequence[str]) -> str:
     """The colour they share, or grey."""
-    return colours[0] if len(set(colours)) == 1 else _MIXED
-
-
-def write_curve_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> None:
-    """Write columns of numbers under their headers; floats keep every digit.
-
-    Args:
-        path: the CSV file.
-        columns: header with unit ("force [N]") to (n,) values; flags become 0 and 1.
-
-    Raises:
-        DescriptionError: no column, columns of different length, or a value that is not finite.
-    """
-    if not columns:
-        raise DescriptionError(f"table '{path}'", "there is no column", "Give at least one")
-    rows = None
-    checked = []
-    for header, values in columns.items():
-        column = real_array(f"column '{header}' of '{path}'", values, rows)
-        rows = len(column)
-        exact = np.asarray(values)
-        checked.append(exact.astype(int) if exact.dtype.kind in "bui" else column)
-    with atomic_write(path) as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows(zip(*(column.tolist() for column in checked), strict=True))
-
-
-def read_curve_csv(path: str | Path) -> dict[str, NDArray[np.float64]]:
-    """Read what :func:`write_curve_csv` writes, or a spreadsheet's export of the same form.
-
-    Blank lines and lines that start with # are skipped.
-
-    Returns:
-        header to (n,) values, in the order of the file.
-
-    Raises:
-        DescriptionError: no header, a repeated header, a row of another length, or a field that is no finite number.
-        OSError: the file cannot be read.
-    """
-    with open(path, encoding="utf-8-sig", newline="") as file:  # -sig: spreadsheets put a byte-order mark first
-        reader = csv.reader(file)
-        lines = [(reader.line_num, row) for row in reader]
-    rows = [(line, row) for line, row in lines if "".join(row).strip() and not row[0].lstrip().startswith("#")]
-    if not rows:
-        raise DescriptionError(f"table '{path}'", "it is empty", "Start it with a line of headers")
-    headers = [header.strip() for header in rows[0][1]]
-    if len(set(headers)) < len(headers) or "" in headers:
-        raise DescriptionError(f"table '{path}'", f"the headers are {headers}", "Give each column its own name")
-    values = np.empty((len(rows) - 1, len(headers)))
-    for index, (line, row) in enumerate(rows[1:]):
-        if len(row) != len(headers):
-            raise DescriptionError(
-                f"table '{path}', line {line}", f"{len(row)} fields for {len(headers)} columns", "Complete the line"
-            )
-        values[index] = [_number(f"table '{path}', line {line}", field) for field in row]
-    return {header: values[:, k].copy() for k, header in enumerate(headers)}
-
-
-def _number(part: str, field: str) -> float:
-    try:
-        number = float(field)
-    except ValueError:
-        raise DescriptionError(part, f"'{field}' is not a number", "Give a number with a decimal point") from None
-    if not np.isfinite(number):
-        raise DescriptionError(part, f"the value is {number}", "Give a finite number")
-    return number
+    return colours[0] if len(set(colours)) == 1 else MUTED

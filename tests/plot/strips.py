@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fenicsmech.report import DesignShape, LinkOutline
+from fenicsmech.plot import DesignShape, LinkOutline
 
 
 def strip(points, thickness):

@@ -3,7 +3,8 @@ import pytest
 from matplotlib.colors import to_rgb
 
 from fenicsmech.errors import DescriptionError
-from fenicsmech.report import PALETTE, CurveSeries, CurveTarget, curve, plot_curve, read_curve_csv, write_curve_csv
+from fenicsmech.files import read_csv, write_csv
+from fenicsmech.plot import PALETTE, CurveSeries, CurveTarget, curve, plot_curve
 
 from .png import png_size, share_of_colour
 
@@ -33,8 +34,8 @@ def test_columns_survive_the_round_trip_to_the_last_digit(tmp_path):
         "stable": np.array([True, True, False, True]),
         "iterations": [0, 3, 4, 17],
     }
-    write_curve_csv(tmp_path / "curve.csv", columns)
-    read = read_curve_csv(tmp_path / "curve.csv")
+    write_csv(tmp_path / "curve.csv", columns)
+    read = read_csv(tmp_path / "curve.csv")
     assert list(read) == list(columns)
     for header, values in columns.items():
         assert np.array_equal(read[header], np.asarray(values, dtype=float))
@@ -42,8 +43,8 @@ def test_columns_survive_the_round_trip_to_the_last_digit(tmp_path):
 
 
 def test_a_table_without_rows_is_a_table(tmp_path):
-    write_curve_csv(tmp_path / "curve.csv", {"force [N]": []})
-    assert read_curve_csv(tmp_path / "curve.csv")["force [N]"].shape == (0,)
+    write_csv(tmp_path / "curve.csv", {"force [N]": []})
+    assert read_csv(tmp_path / "curve.csv")["force [N]"].shape == (0,)
 
 
 def test_comments_blank_lines_and_a_byte_order_mark_are_understood(tmp_path):
@@ -51,7 +52,7 @@ def test_comments_blank_lines_and_a_byte_order_mark_are_understood(tmp_path):
     path.write_bytes(
         "\ufeff# sample 1 mm, µ-test\r\n displacement [mm], force [N]\r\n\r\n0, 0\r\n1.5,2e-1\r\n".encode()
     )
-    read = read_curve_csv(path)
+    read = read_csv(path)
     assert read["displacement [mm]"].tolist() == [0.0, 1.5]
     assert read["force [N]"].tolist() == [0.0, 0.2]
 
@@ -71,7 +72,7 @@ def test_a_bad_table_is_refused_with_its_line(tmp_path, text, message):
     path = tmp_path / "bad.csv"
     path.write_text(text)
     with pytest.raises(DescriptionError, match=message):
-        read_curve_csv(path)
+        read_csv(path)
 
 
 @pytest.mark.parametrize(
@@ -85,7 +86,7 @@ def test_a_bad_table_is_refused_with_its_line(tmp_path, text, message):
 )
 def test_bad_columns_are_refused_and_nothing_is_written(tmp_path, columns, message):
     with pytest.raises(DescriptionError, match=message):
-        write_curve_csv(tmp_path / "curve.csv", columns)
+        write_csv(tmp_path / "curve.csv", columns)
     assert not list(tmp_path.iterdir())
 
 

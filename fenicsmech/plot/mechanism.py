@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
-from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
@@ -18,17 +17,10 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 from matplotlib.tri import Triangulation
 
 from fenicsmech.errors import DescriptionError
-from fenicsmech.report.canvas import FLEXIBLE, FLEXIBLE_RIM, PALETTE, draw_pin, house_style, save_png
-from fenicsmech.report.frame import Frame, arrow_ends, lay_out
-from fenicsmech.report.plan import rim
-from fenicsmech.report.shapes import (
-    Arrow,
-    FlexibleShape,
-    MechanismShape,
-    Panel,
-    RigidShape,
-    Trace,
-)
+from fenicsmech.plot.layout import MechanismLayout, arrow_ends, lay_out
+from fenicsmech.plot.outlines import path_of, rim
+from fenicsmech.plot.shapes import Arrow, FlexibleShape, MechanismShape, Panel, RigidShape
+from fenicsmech.plot.style import FLEXIBLE, FLEXIBLE_RIM, HALO, PALETTE, draw_pin, house_style, save_png
 
 _RIGID, _RIGID_RIM = "#c9ccd1", "#6b7078"
 _FIXED, _FIXED_RIM, _FIXED_HATCH = "#565b63", "#2e3238", "#7d838d"
@@ -38,24 +30,6 @@ _TRACES = (PALETTE[2], PALETTE[4], PALETTE[5])
 _STRESS = LinearSegmentedColormap.from_list(
     "stress", ("#fff3d6", "#fdd28a", "#f6983f", "#d9542b", "#a01c3b", "#5c0b3e")
 )
-_HALO = (patheffects.withStroke(linewidth=2.5, foreground="white"),)
-
-
-def draw_mechanism(
-    path: str | Path,
-    *,
-    undeformed: MechanismShape,
-    deformed: Sequence[MechanismShape] = (),
-    arrows: Sequence[Arrow] = (),
-    traces: Sequence[Trace] = (),
-    title: str = "",
-    colour_label: str = "",
-    colour_limits: tuple[float, float] | None = None,
-    unit: str = "mm",
-) -> None:
-    """Draw one mechanism; the arguments are those of :class:`Panel` and :func:`draw_configurations`."""
-    panel = Panel(undeformed, tuple(deformed), tuple(arrows), tuple(traces), title)
-    draw_configurations(path, [panel], colour_label=colour_label, colour_limits=colour_limits, unit=unit)
 
 
 def draw_configurations(
@@ -91,23 +65,16 @@ def draw_configurations(
     values = [v for panel in panels for shape in _filled(panel).flexible for v in _values(shape)]
     norm = _normalise(values, colour_limits) if values else None
     with house_style():
-        frame = lay_out(
-            panels,
-            colour_bar=norm is not None,
-            heading=title,
-            legend=tuple(_legend(panels)),
-        )
-        for axes, panel in zip(frame.axes, panels, strict=True):
-            _draw_panel(axes, panel, frame, norm)
+        legend = _legend(panels)
+        layout = lay_out(panels, colour_bar=norm is not None, heading=title, legend=tuple(legend))
+        for axes, panel in zip(layout.axes, panels, strict=True):
+            _draw_panel(axes, panel, layout, norm)
             axes.set_xlabel(f"x [{unit}]")
-        frame.axes[0].set_ylabel(f"y [{unit}]")
-        if title:
-            left = frame.axes[0].get_position().x0
-            frame.figure.text(left, 1.0 - 0.35 * frame.line, title, fontsize=11.5, fontweight="bold", va="top")
+        layout.axes[0].set_ylabel(f"y [{unit}]")
         if norm is not None:
-            _draw_colour_bar(frame, norm, np.concatenate(values), colour_label)
-        _draw_legend(frame, panels)
-        save_png(frame.figure, path)
+            _draw_colour_bar(layout, norm, np.concatenate(values), colour_label)
+        layout.page.write(title, {label: Line2D([], [], color=c, lw=1.4) for label, c in legend.items()})
+        save_png(layout.page.figure, path)
 
 
 def _filled(panel: Panel) -> MechanismShape:
@@ -133,50 +100,40 @@ def _normalise(values: Sequence[np.ndarray], limits: tuple[float, float] | None)
     return Normalize(low, high)
 
 
-def _draw_panel(axes: Axes, panel: Panel, frame: Frame, norm: Normalize | None) -> None:
+def _draw_panel(axes: Axes, panel: Panel, layout: MechanismLayout, norm: Normalize | None) -> None:
     axes.set_title(panel.title, loc="left")
     if panel.deformed:
-        for outline in _outlines(panel.undeformed):
+        still = panel.undeformed
+        outlines = [*(path_of([rigid.outline]) for rigid in still.rigid), *map(_rim, still.flexible)]
+        for outline in outlines:
             axes.add_patch(PathPatch(outline, fc="none", ec=_PALE, lw=1.0, zorder=2))
     for state in panel.deformed[:-1]:
         for rigid in state.rigid:
-            axes.add_patch(PathPatch(_polygon(rigid), fc=_RIGID, ec="none", alpha=0.35, zorder=2.5))
+            axes.add_patch(Polygon(rigid.outline, closed=True, fc=_RIGID, ec="none", alpha=0.35, zorder=2.5))
         for flexible in state.flexible:
-            axes.add_patch(PathPatch(_outline(flexible), fc=FLEXIBLE, ec="none", alpha=0.25, zorder=2.6))
+            axes.add_patch(PathPatch(_rim(flexible), fc=FLEXIBLE, ec="none", alpha=0.25, zorder=2.6))
     state = _filled(panel)
     for rigid in sorted(state.rigid, key=lambda shape: not shape.fixed):
         _draw_rigid(axes, rigid)
     for flexible in state.flexible:
         _draw_flexible(axes, flexible, norm)
     for pin in state.pins:
-        draw_pin(axes, pin.at, pin.radius or 0.014 * frame.size)
+        draw_pin(axes, pin.at, pin.radius or 0.014 * layout.size)
     for index, trace in enumerate(panel.traces):
         colour = _trace_colour(index)
         axes.plot(*trace.points.T, color=colour, lw=1.4, zorder=5)
         axes.plot(*trace.marks.T, "o", ms=4.5, mfc=colour, mec="white", mew=0.8, zorder=7)
     for arrow in panel.arrows:
-        _draw_arrow(axes, arrow, frame.arrow_scale)
+        _draw_arrow(axes, arrow, layout.arrow_scale)
     axes.grid(True, color="#ededed")  # last: coloured meshes switch it off
 
 
-def _outlines(state: MechanismShape) -> Iterator[Outline]:
-    for rigid in state.rigid:
-        yield _polygon(rigid)
-    for flexible in state.flexible:
-        yield _outline(flexible)
-
-
-def _polygon(shape: RigidShape) -> Outline:
-    return Outline(np.vstack((shape.outline, shape.outline[:1])), closed=True)
-
-
-def _outline(shape: FlexibleShape) -> Outline:
-    """The rim as one path: fills without the seams that single triangles leave."""
+def _rim(shape: FlexibleShape) -> Outline:
+    """The rim of a flexible link as one path."""
     corners = shape.points[shape.triangles]
     (ax, ay), (bx, by) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
     turned = np.where((ax * by < ay * bx)[:, None], shape.triangles[:, [0, 2, 1]], shape.triangles)
-    loops = [shape.points[loop] for loop in rim(turned)]
-    return Outline.make_compound_path(*(Outline(np.vstack((p, p[:1])), closed=True) for p in loops))
+    return path_of(shape.points[loop] for loop in rim(turned))
 
 
 def _draw_rigid(axes: Axes, shape: RigidShape) -> None:
@@ -199,7 +156,7 @@ def _draw_flexible(axes: Axes, shape: FlexibleShape, norm: Normalize | None) -> 
         mesh = Triangulation(*shape.points.T, shape.triangles)
         axes.tripcolor(mesh, shape.point_values, shading="gouraud", cmap=_STRESS, norm=norm, zorder=4)
         face = "none"
-    axes.add_patch(PathPatch(_outline(shape), fc=face, ec=FLEXIBLE_RIM, lw=0.9, joinstyle="round", zorder=4))
+    axes.add_patch(PathPatch(_rim(shape), fc=face, ec=FLEXIBLE_RIM, lw=0.9, joinstyle="round", zorder=4))
 
 
 def _draw_arrow(axes: Axes, arrow: Arrow, scale: float) -> None:
@@ -219,14 +176,14 @@ def _draw_arrow(axes: Axes, arrow: Arrow, scale: float) -> None:
             arrow.label, free, xytext=5.0 * side, textcoords="offset points", color=_FORCE, fontweight="bold",
             ha="right" if side[0] < -0.5 else "left" if side[0] > 0.5 else "center",
             va="top" if side[1] < -0.5 else "bottom" if side[1] > 0.5 else "center",
-            path_effects=_HALO, zorder=9,
+            path_effects=HALO, zorder=9,
         )  # fmt: skip
 
 
-def _draw_colour_bar(frame: Frame, norm: Normalize, values: np.ndarray, label: str) -> None:
+def _draw_colour_bar(layout: MechanismLayout, norm: Normalize, values: np.ndarray, label: str) -> None:
     over, under = values.max() > norm.vmax, values.min() < norm.vmin
     extend = "both" if over and under else "max" if over else "min" if under else "neither"
-    bar = frame.figure.colorbar(ScalarMappable(norm, _STRESS), cax=frame.bar, extend=extend, extendfrac=0.04)
+    bar = layout.page.figure.colorbar(ScalarMappable(norm, _STRESS), cax=layout.bar, extend=extend, extendfrac=0.04)
     bar.locator, bar.formatter = MaxNLocator(5), FuncFormatter(lambda value, _: f"{value:.3g}")
     bar.set_label(label)
     bar.outline.set_linewidth(0.6)
@@ -241,11 +198,3 @@ def _legend(panels: Sequence[Panel]) -> dict[str, str]:
 
 def _trace_colour(index: int) -> str:
     return _TRACES[index % len(_TRACES)]
-
-
-def _draw_legend(frame: Frame, panels: Sequence[Panel]) -> None:
-    handles = [Line2D([], [], color=colour, lw=1.4, label=label) for label, colour in _legend(panels).items()]
-    if handles:
-        frame.figure.legend(
-            handles=handles, loc="lower center", bbox_to_anchor=(0.5, 0.0), ncol=len(handles), frameon=False
-        )

@@ -13,22 +13,29 @@ from matplotlib.path import Path as Outline
 from numpy.typing import NDArray
 
 from fenicsmech.errors import DescriptionError
-from fenicsmech.report.canvas import FLEXIBLE, FLEXIBLE_RIM, INK, draw_pin, house_style, save_png
-from fenicsmech.report.design_frame import IN_PLACE, DesignFrame, View, lay_out_designs
-from fenicsmech.report.design_shapes import DesignShape, LinkOutline
-from fenicsmech.report.labels import Labels, Spot, text_size
-from fenicsmech.report.shapes import RigidShape
+from fenicsmech.plot.labels import Labels, Spot
+from fenicsmech.plot.layout import IN_PLACE, DesignLayout, View, lay_out_designs, legend_width
+from fenicsmech.plot.outlines import path_of
+from fenicsmech.plot.shapes import DesignShape, LinkOutline, RigidShape
+from fenicsmech.plot.style import (
+    FLEXIBLE,
+    FLEXIBLE_RIM,
+    HEADING,
+    INK,
+    LENGTHS,
+    NAME,
+    SMALL,
+    TITLE,
+    draw_pin,
+    house_style,
+    save_png,
+    text_size,
+)
 
 _BEFORE, _BEFORE_RIM = "#dfe2e6", "#6b7078"
 _DASHES = (0, (3.5, 2.0))
 _RIGID, _RIGID_RIM = "#f4f5f6", "#d3d6da"
-_PIN = 0.075  # in, radius
-_HEADING = {"fontsize": 11.5, "fontweight": "bold"}
-_NAME = {"fontsize": 9.5, "fontweight": "bold"}
-_SMALL = {"fontsize": 8.5}
 _CONTROL = {"marker": "o", "ms": 4.2, "mfc": INK, "mec": "white", "mew": 0.7}
-_TICK = 0.04  # in, half the stroke at the end of a dimension
-_SAME = 1e-3  # of the thickness: smaller differences are none
 
 
 def draw_designs(
@@ -60,24 +67,24 @@ def draw_designs(
     thicknesses = [_thickness_line(design, unit) for design in designs]
     with house_style():
         handles, subtitle = _handles(designs), _subtitle(designs, thicknesses)
-        frame = lay_out_designs(
+        layout = lay_out_designs(
             designs,
             captions=[
-                max(text_size(design.name, **_NAME)[0], text_size(line, **_SMALL)[0])
+                max(text_size(design.name, **NAME)[0], text_size(line, **SMALL)[0])
                 for design, line in zip(designs, thicknesses, strict=True)
             ],
-            heading=text_size(title, **_HEADING)[0],
-            legend=sum(text_size(label, fontsize=9.0)[0] + 0.6 for label in handles),
-            subtitle=text_size(subtitle, fontsize=10.5, fontweight="bold")[0],
+            heading=text_size(title, **HEADING)[0],
+            legend=legend_width(handles),
+            subtitle=text_size(subtitle, **TITLE)[0],
         )
-        _draw_in_place(frame, designs, rigid, unit, subtitle)
-        if frame.details is None:
-            _draw_dimensions_in_place(frame, designs[0])
+        _draw_in_place(layout, designs, rigid, unit, subtitle)
+        if layout.details is None:
+            _draw_dimensions_in_place(layout, designs[0])
         else:
-            _draw_names(frame, designs)
-            _draw_details(frame, designs, thicknesses, unit)
-        _draw_heading_and_legend(frame, title, handles)
-        save_png(frame.figure, path)
+            _draw_names(layout, designs)
+            _draw_details(layout, designs, thicknesses, unit)
+        layout.page.write(title, handles)
+        save_png(layout.page.figure, path)
 
 
 def _subtitle(designs: Sequence[DesignShape], thicknesses: Sequence[str]) -> str:
@@ -89,26 +96,16 @@ def _subtitle(designs: Sequence[DesignShape], thicknesses: Sequence[str]) -> str
 
 
 def _draw_in_place(
-    frame: DesignFrame, designs: Sequence[DesignShape], rigid: Sequence[RigidShape], unit: str, subtitle: str
+    layout: DesignLayout, designs: Sequence[DesignShape], rigid: Sequence[RigidShape], unit: str, subtitle: str
 ) -> None:
     """All links where they are in the mechanism, the rigid ones behind."""
     for shape in rigid:
-        frame.place.add_patch(Polygon(shape.outline, closed=True, fc=_RIGID, ec=_RIGID_RIM, lw=0.8, zorder=1.5))
+        layout.place.add_patch(Polygon(shape.outline, closed=True, fc=_RIGID, ec=_RIGID_RIM, lw=0.8, zorder=1.5))
     for design in designs:
-        _draw_link(frame.place, design, IN_PLACE, frame.place_scale, detailed=frame.details is None)
-    frame.place.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]")
-    frame.place.set_title(subtitle, loc="left")
-    frame.place.grid(True, color="#ededed")
-
-
-def _draw_heading_and_legend(frame: DesignFrame, title: str, handles: dict[str, object]) -> None:
-    if title:
-        left = frame.place.get_position().x0
-        frame.figure.text(left, 1.0 - 0.35 * frame.line, title, va="top", **_HEADING)
-    frame.figure.legend(
-        list(handles.values()), list(handles),
-        loc="lower center", bbox_to_anchor=(0.5, 0.0), ncol=len(handles), frameon=False,
-    )  # fmt: skip
+        _draw_link(layout.place, design, IN_PLACE, layout.place_scale, detailed=layout.details is None)
+    layout.place.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]")
+    layout.place.set_title(subtitle, loc="left")
+    layout.place.grid(True, color="#ededed")
 
 
 def _draw_link(axes: Axes, design: DesignShape, view: View, scale: float, *, detailed: bool) -> None:
@@ -122,42 +119,41 @@ def _draw_link(axes: Axes, design: DesignShape, view: View, scale: float, *, det
     axes.plot(*view(before.controls).T, lw=0, zorder=4.5, **(_CONTROL | {"mfc": _BEFORE_RIM, "ms": 3.4}))
     axes.plot(*view(after.controls).T, lw=0, zorder=5, **_CONTROL)
     for at in view(design.joints):
-        draw_pin(axes, at, _PIN / scale)
+        draw_pin(axes, at, LENGTHS.pin / scale)
 
 
 def _path(outline: LinkOutline, view: View) -> Outline:
     """The loops as one path; holes run against the outer rim, so that they stay empty."""
-    paths = []
+    loops = []
     for index, loop in enumerate(outline.loops):
         points = view(loop)
         x, y = points.T
         counter_clockwise = x @ np.roll(y, -1) > y @ np.roll(x, -1)
-        points = points if counter_clockwise == (index == 0) else points[::-1]
-        paths.append(Outline(np.vstack((points, points[:1])), closed=True))
-    return Outline.make_compound_path(*paths)
+        loops.append(points if counter_clockwise == (index == 0) else points[::-1])
+    return path_of(loops)
 
 
-def _draw_dimensions_in_place(frame: DesignFrame, design: DesignShape) -> None:
-    labels = Labels(frame.place, _shapes(design, IN_PLACE))
-    _draw_dimensions(labels, frame.place, design, IN_PLACE, frame.place_scale)
+def _draw_dimensions_in_place(layout: DesignLayout, design: DesignShape) -> None:
+    labels = Labels(layout.place, _shapes(design, IN_PLACE))
+    _draw_dimensions(labels, layout.place, design, IN_PLACE, layout.place_scale)
 
 
-def _draw_names(frame: DesignFrame, designs: Sequence[DesignShape]) -> None:
-    labels = Labels(frame.place, [shape for design in designs for shape in _shapes(design, IN_PLACE)])
+def _draw_names(layout: DesignLayout, designs: Sequence[DesignShape]) -> None:
+    labels = Labels(layout.place, [shape for design in designs for shape in _shapes(design, IN_PLACE)])
     for design in designs:
-        labels.add(design.name, _beside(design), **_NAME)
+        labels.add(design.name, _beside(design), **NAME)
 
 
-def _draw_details(frame: DesignFrame, designs: Sequence[DesignShape], thicknesses: Sequence[str], unit: str) -> None:
-    axes = frame.details
-    shapes = [s for design, view in zip(designs, frame.views, strict=True) for s in _shapes(design, view)]
+def _draw_details(layout: DesignLayout, designs: Sequence[DesignShape], thicknesses: Sequence[str], unit: str) -> None:
+    axes = layout.details
+    shapes = [s for design, view in zip(designs, layout.views, strict=True) for s in _shapes(design, view)]
     labels = Labels(axes, shapes)
-    for design, view, corner, line in zip(designs, frame.views, frame.captions, thicknesses, strict=True):
-        _draw_link(axes, design, view, frame.details_scale, detailed=True)
-        axes.text(*corner, design.name, va="top", **_NAME)
-        axes.annotate(line, corner, xytext=(0.0, -14.0), textcoords="offset points", va="top", **_SMALL)
-        _draw_dimensions(labels, axes, design, view, frame.details_scale)
-    _draw_scale_bar(axes, frame.details_scale, unit)
+    for design, view, corner, line in zip(designs, layout.views, layout.captions, thicknesses, strict=True):
+        _draw_link(axes, design, view, layout.details_scale, detailed=True)
+        axes.text(*corner, design.name, va="top", **NAME)
+        axes.annotate(line, corner, xytext=(0.0, -14.0), textcoords="offset points", va="top", **SMALL)
+        _draw_dimensions(labels, axes, design, view, layout.details_scale)
+    _draw_scale_bar(axes, layout.details_scale, unit)
 
 
 def _shapes(design: DesignShape, view: View) -> list[NDArray[np.float64]]:
@@ -200,10 +196,10 @@ def _draw_dimensions(labels: Labels, axes: Axes, design: DesignShape, view: View
             continue
         normal = np.array([-tangents[k, 1], tangents[k, 0]])
         ends = line[k] + 0.5 * thickness[k] * np.array([[-1.0], [1.0]]) * normal
-        for stroke in (ends, *(end + _TICK / scale * np.array([[-1.0], [1.0]]) * tangents[k] for end in ends)):
+        for stroke in (ends, *(end + LENGTHS.tick / scale * np.array([[-1.0], [1.0]]) * tangents[k] for end in ends)):
             axes.plot(*stroke.T, color=INK, lw=1.1, zorder=5)
         places = [Spot(ends[1], normal), Spot(ends[0], -normal)]
-        labels.add(f"{extreme:.3g}", places, leader=True, color=INK, **_SMALL)
+        labels.add(f"{extreme:.3g}", places, leader=True, color=INK, **SMALL)
 
 
 def _extremes(thickness: NDArray[np.float64], away: NDArray[np.float64]) -> list[tuple[int, float]]:
@@ -212,7 +208,7 @@ def _extremes(thickness: NDArray[np.float64], away: NDArray[np.float64]) -> list
     Of places of the same thickness the one that is most ``away``.
     """
     least, most = float(thickness.min()), float(thickness.max())
-    tolerance = _SAME * most
+    tolerance = 1e-3 * most  # smaller differences are none
     extremes = [(thickness <= least + tolerance, least)]
     if most - least > tolerance:
         extremes.append((thickness >= most - tolerance, most))
@@ -239,7 +235,7 @@ def _draw_scale_bar(axes: Axes, scale: float, unit: str) -> None:
     length = power * max(digit for digit in (1.0, 2.0, 5.0) if digit * power * scale <= 1.2)
     low = 0.04 / scale
     axes.plot([0, length], [low, low], color=INK, lw=1.6, marker="|", ms=7.0, mew=1.6, clip_on=False)
-    axes.text(length + 0.1 / scale, low, f"{length:g} {unit}", va="center", **_SMALL)
+    axes.text(length + 0.1 / scale, low, f"{length:g} {unit}", va="center", **SMALL)
 
 
 def _handles(designs: Sequence[DesignShape]) -> dict[str, object]:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from fenicsmech.errors import DescriptionError
-from fenicsmech.report import plan_view, rim
+from fenicsmech.plot import plan_view, rim
 
 from .grids import box, rectangle
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import fenicsmech.report
+import fenicsmech.plot
 from fenicsmech.errors import DescriptionError
-from fenicsmech.report import (
+from fenicsmech.plot import (
     Arrow,
     FlexibleShape,
     MechanismShape,
@@ -17,7 +17,6 @@ from fenicsmech.report import (
     RigidShape,
     Trace,
     draw_configurations,
-    draw_mechanism,
     lay_out,
     plan_view,
     rigid_outline,
@@ -40,6 +39,11 @@ def mechanism(bend=0.0, values=None, scale=1.0):
         rigid=(RigidShape(scale * base, "base", fixed=True), RigidShape(scale * tool, "tool")),
         pins=(Pin((0.0, 0.0)), Pin(scale * tip, radius=scale * 1.5)),
     )
+
+
+def draw_mechanism(path, *, undeformed, deformed=(), arrows=(), traces=(), title="", **options):
+    """The picture of one configuration."""
+    draw_configurations(path, [Panel(undeformed, tuple(deformed), tuple(arrows), tuple(traces), title)], **options)
 
 
 def test_a_mechanism_is_drawn_with_all_its_parts_and_the_same_bytes_every_time(tmp_path):
@@ -87,9 +91,9 @@ def test_a_solid_is_drawn_from_above_with_the_values_of_its_top_cells(tmp_path):
 
 def test_panels_share_limits_and_scale_and_a_millimetre_is_as_long_in_x_as_in_y():
     panels = [Panel(mechanism(bend), title=f"bend {bend}") for bend in (0.0, 40.0, -10.0)]
-    frame = lay_out(panels, colour_bar=True, heading="strip", legend=("foot path",))
-    first = frame.axes[0]
-    for axes in frame.axes:
+    layout = lay_out(panels, colour_bar=True, heading="strip", legend=("foot path",))
+    first = layout.axes[0]
+    for axes in layout.axes:
         assert axes.get_xlim() == first.get_xlim() and axes.get_ylim() == first.get_ylim()
         (left, low), (right, high) = axes.transData.transform([(0.0, 0.0), (10.0, 10.0)])
         assert right - left == pytest.approx(high - low, rel=1e-9)
@@ -97,8 +101,8 @@ def test_panels_share_limits_and_scale_and_a_millimetre_is_as_long_in_x_as_in_y(
 
 def test_everything_lies_inside_the_limits():
     panel = Panel(mechanism(), (mechanism(30.0),), (Arrow((80, 35), (0, -7), "7 N"),), (Trace([(-50, 0), (0, 90)]),))
-    frame = lay_out([panel], colour_bar=False, heading="", legend=())
-    (x0, x1), (y0, y1) = frame.axes[0].get_xlim(), frame.axes[0].get_ylim()
+    layout = lay_out([panel], colour_bar=False, heading="", legend=())
+    (x0, x1), (y0, y1) = layout.axes[0].get_xlim(), layout.axes[0].get_ylim()
     assert x0 < -50 and x1 > 84 and y0 < -20 and y1 > 90
 
 
@@ -107,8 +111,8 @@ def test_the_label_at_the_free_end_of_an_arrow_has_room(pushes):
     widths = []
     for label in ("", "a force of 10 N"):
         arrow = Arrow((60, 0), (-10 if pushes else 10, 0), label, pushes=pushes)
-        frame = lay_out([Panel(mechanism(), arrows=(arrow,))], colour_bar=False, heading="", legend=())
-        widths.append(np.array(frame.axes[0].get_xlim()))
+        layout = lay_out([Panel(mechanism(), arrows=(arrow,))], colour_bar=False, heading="", legend=())
+        widths.append(np.array(layout.axes[0].get_xlim()))
     (_, short), (_, long) = widths
     assert long > short + 5.0
 
@@ -133,21 +137,21 @@ def test_a_long_title_fits_above_a_slender_link():
     points, triangles = rectangle(2, 20, 2.0, 60.0)
     title = "a slender link under its own weight, initial design"
     panel = Panel(MechanismShape((FlexibleShape(points, triangles),)), title=title)
-    frame = lay_out([panel], colour_bar=False, heading="", legend=())
-    text = frame.axes[0].set_title(title, loc="left", fontsize=10.5, fontweight="bold")
-    assert text.get_window_extent(frame.figure.canvas.get_renderer()).x1 < frame.figure.bbox.x1
+    layout = lay_out([panel], colour_bar=False, heading="", legend=())
+    text = layout.axes[0].set_title(title, loc="left", fontsize=10.5, fontweight="bold")
+    assert text.get_window_extent(layout.page.figure.canvas.get_renderer()).x1 < layout.page.figure.bbox.x1
 
 
 def test_neither_a_display_nor_pyplot_is_needed(tmp_path):
     code = (
         "import sys\n"
-        "from fenicsmech.report import CurveSeries, MechanismShape, Pin, draw_mechanism, plot_curve\n"
-        "draw_mechanism('picture.png', undeformed=MechanismShape(pins=(Pin((0, 0)),)))\n"
+        "from fenicsmech.plot import CurveSeries, MechanismShape, Panel, Pin, draw_configurations, plot_curve\n"
+        "draw_configurations('picture.png', [Panel(MechanismShape(pins=(Pin((0, 0)),)))])\n"
         "plot_curve('curve.png', [CurveSeries([0, 1], [0, 1])])\n"
         "assert 'matplotlib.pyplot' not in sys.modules\n"
     )
     environment = {key: value for key, value in os.environ.items() if "DISPLAY" not in key}
-    environment["PYTHONPATH"] = str(Path(fenicsmech.report.__file__).parents[2])
+    environment["PYTHONPATH"] = str(Path(fenicsmech.plot.__file__).parents[2])
     environment["MPLBACKEND"] = "TkAgg"  # the user's choice for windows must not matter
     # dolfinx 0.9 warns on import where numba is missing
     strict = ["-W", "error", "-W", "ignore::ImportWarning"]

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from fenicsmech.errors import DescriptionError
-from fenicsmech.report import rigid_outline
+from fenicsmech.plot import rigid_outline
 
 
 def area(polygon):

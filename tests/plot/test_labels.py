@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from fenicsmech.report import Labels, Spot, new_figure, text_size
+from fenicsmech.plot import Labels, Spot, new_figure, text_size
 
 SQUARE = np.array([(0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0)])
 UP, DOWN, RIGHT = np.array([0.0, 1.0]), np.array([0.0, -1.0]), np.array([1.0, 0.0])

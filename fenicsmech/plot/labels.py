@@ -6,20 +6,39 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.path import Path
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
-from fenicsmech.report.canvas import DPI, house_style, new_figure
+from fenicsmech.plot.style import HALO
 
-_HALO = (patheffects.withStroke(linewidth=2.5, foreground="white"),)
-_GAPS = (3.0, 6.0, 10.0, 15.0, 21.0, 28.0)  # pt, between anchor and label
-_MARGIN = 2.0  # pt, of air around a label
-_OUTSIDE, _LABEL, _FILLED, _LINE = 1e6, 1e5, 1e3, 1e2  # costs; a point of distance costs 1
-_ORDER = 0.5  # cost of the next spot
+
+@dataclass(frozen=True)
+class Placement:
+    """Costs of places for labels; a point of distance from the anchor costs 1.
+
+    Attributes:
+        gaps: distances from the anchor that are tried, pt.
+        margin: air around a label, pt.
+        outside: of leaving the picture.
+        label: of each label that is hidden.
+        filled: of a centre inside a shape.
+        line: of each point of an outline that is hidden.
+        order: of the next spot in the list.
+    """
+
+    gaps: tuple[float, ...] = (3.0, 6.0, 10.0, 15.0, 21.0, 28.0)
+    margin: float = 2.0
+    outside: float = 1e6
+    label: float = 1e5
+    filled: float = 1e3
+    line: float = 1e2
+    order: float = 0.5
+
+
+_COSTS = Placement()
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,46 +75,38 @@ class Labels:
             leader: whether a thin line leads from the anchor to a label that is not right beside it.
             style: of the text.
         """
-        label = self._axes.text(0.0, 0.0, text, ha="center", va="center", path_effects=_HALO, zorder=9, **style)
+        label = self._axes.text(0.0, 0.0, text, ha="center", va="center", path_effects=HALO, zorder=9, **style)
         extent = label.get_window_extent(self._renderer)
         half = 0.5 * np.array([extent.width, extent.height])
         best = np.inf, np.zeros(2), spots[0], 0.0
         for order, spot in enumerate(spots):
             anchor = self._axes.transData.transform(spot.anchor)
             reach = float(np.min(half / np.maximum(np.abs(spot.direction), 1e-9)))  # from its centre to its edge
-            for gap in _GAPS:
+            for gap in _COSTS.gaps:
                 centre = anchor + (reach + gap * self._point) * spot.direction
-                cost = self._cost(centre, half) + gap + _ORDER * order
+                cost = self._cost(centre, half) + gap + _COSTS.order * order
                 if cost < best[0]:
                     best = cost, centre, spot, gap
         _, centre, spot, gap = best
         self._taken.append(Bbox([centre - half, centre + half]))
         back = self._axes.transData.inverted()
         label.set_position(back.transform(centre))
-        if leader and gap > _GAPS[0]:
+        if leader and gap > _COSTS.gaps[0]:
             start = self._axes.transData.transform(spot.anchor)
             end = back.transform(start + (gap - 1.0) * self._point * spot.direction)
             self._axes.plot(*np.array([spot.anchor, end]).T, color=label.get_color(), lw=0.7, zorder=8)
         return label
 
     def _cost(self, centre: NDArray[np.float64], half: NDArray[np.float64]) -> float:
-        air = half + _MARGIN * self._point
+        air = half + _COSTS.margin * self._point
         low, high = centre - air, centre + air
         box = Bbox([low, high])
         cost = 0.0
         if (low < self._frame.min).any() or (high > self._frame.max).any():
-            cost += _OUTSIDE
-        cost += _LABEL * sum(box.overlaps(other) for other in self._taken)
-        cost += _FILLED * sum(bool(shape.contains_point(centre)) for shape in self._shapes)
-        return cost + _LINE * float(((self._lines > low) & (self._lines < high)).all(axis=1).sum())
-
-
-def text_size(text: str, **style: object) -> tuple[float, float]:
-    """Width and height of ``text`` in inches, in the look of the figures."""
-    with house_style():
-        figure = new_figure(1.0, 1.0)
-        extent = figure.text(0.0, 0.0, text, **style).get_window_extent(figure.canvas.get_renderer())
-    return extent.width / DPI, extent.height / DPI
+            cost += _COSTS.outside
+        cost += _COSTS.label * sum(box.overlaps(other) for other in self._taken)
+        cost += _COSTS.filled * sum(bool(shape.contains_point(centre)) for shape in self._shapes)
+        return cost + _COSTS.line * float(((self._lines > low) & (self._lines < high)).all(axis=1).sum())
 
 
 def _dense(loop: NDArray[np.float64], step: float) -> NDArray[np.float64]:
