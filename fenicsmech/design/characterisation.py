@@ -21,7 +21,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from fenicsmech.checks import finite
-from fenicsmech.design.sensitivity import Adjoint
+from fenicsmech.design.sensitivity import Sensitivity
 from fenicsmech.equilibrium import LoadControl
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import DRAWN, Configuration, Force, Material
@@ -163,7 +163,7 @@ class _Rig:
         model, newton = simulation.model, simulation.newton(part)
         model.set_youngs_modulus(self._links, modulus)
         curve = simulation.trace(self._request)
-        adjoint = Adjoint(model, newton)
+        adjoint = Sensitivity(model, newton)
         slopes, travels = {}, {}
         for frame in curve.frames:
             (gradient,) = adjoint.gradients(frame.state, [newton.system.controlled])

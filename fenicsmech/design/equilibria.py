@@ -21,7 +21,7 @@ import numpy as np
 
 from fenicsmech.design.description import Target
 from fenicsmech.design.optimisers.problem import Infeasible
-from fenicsmech.design.sensitivity import Adjoint
+from fenicsmech.design.sensitivity import Sensitivity
 from fenicsmech.equilibrium import LoadControl, NotConverged, State
 from fenicsmech.errors import EquilibriumError
 from fenicsmech.mechanism import FlexibleLink
@@ -82,7 +82,7 @@ class TargetEquilibria:
         self.targets = tuple(targets)
         forces = dict.fromkeys(target.force_part for target in targets)
         self._newtons = {part: simulation.newton(part) for part in forces}
-        self._adjoints = {part: Adjoint(self._model, newton) for part, newton in self._newtons.items()}
+        self._sensitivities = {part: Sensitivity(self._model, newton) for part, newton in self._newtons.items()}
 
     def trace(self) -> Known:
         """From zero load to every target, at the present design.
@@ -133,7 +133,7 @@ class TargetEquilibria:
         return error(sample.state) - (0.0 if sample.origin is None else error(sample.origin))
 
     def _gradient(self, target: Target, sample: Sample) -> np.ndarray:
-        adjoint = self._adjoints[target.force_part]
+        adjoint = self._sensitivities[target.force_part]
         outputs = [self._newtons[target.force_part].system.controlled]
         (loaded,) = adjoint.gradients(sample.state, outputs)
         if sample.origin is None:

@@ -1,15 +1,20 @@
-"""Adjoint sensitivities of an equilibrium: design field, moduli and force, one linear solve per output.
+"""Sensitivities of an equilibrium: derivatives by design field, moduli and force, one adjoint per output.
 
-At an equilibrium F(y, p) = Gᵀ ∇L = 0 with y = (s, λ). For an output O(y), with the symmetric KKT matrix ∂F/∂y,
+At an equilibrium F(y, p) = Gᵀ ∇L = 0 with y = (s, λ). For an output O(y), with its adjoint x,
 
     KKT x = ∂O/∂y,     dO/dp = −xᵀ ∂F/∂p.
 
 With û = ∂u/∂y · x at all nodes, pressures included where links have some of their own, and ẑ the poses' part of x,
 
-    xᵀ ∂F/∂d = ∂(r · û)/∂d  +  Σ_i over interface nodes [ (K û)_i · (R − I) + r_i · (ẑ_r ∂R/∂r) ] ∂X_i/∂d,
+    xᵀ ∂F/∂d = ∂(r · û)/∂d  +  Σ_i over interface nodes [ (K û)_i · (R − I) + r_i · (ẑ_r ∂R/∂r) ] ∂X_i/∂d.
 
-the second part because an interface node's displacement depends on where it was drawn. Source: implicit function
-theorem, equations 8 and 9 of the paper this package follows.
+The first part is a form, differentiated symbolically: elements know X₀ + d, and so do effects whose energy is a form.
+The second part is derived by hand. An interface node moves with its body, u_i = t + (R − I)(X_i − X_b): where it was
+drawn enters its displacement through G, which is no form. The work of forces at points is no form either; they stay at
+the same place of their cell, or of their body, so that it depends on d through the displacements of nodes alone, and
+the nodal forces r hold it.
+
+Source: implicit function theorem, equations 8 and 9 of the paper this package follows.
 """
 
 from __future__ import annotations
@@ -43,7 +48,7 @@ class Gradient:
     force: float
 
 
-class Adjoint:
+class Sensitivity:
     """Sensitivities at equilibria of one model under one controlled force."""
 
     def __init__(self, model: MechanismModel, newton: Iteration) -> None:
@@ -51,7 +56,7 @@ class Adjoint:
         self._weights = [fem.Function(field.function_space, name="adjoint") for field in model.elastic.fields]
 
     def gradients(self, state: State, outputs: list[PointLoad]) -> list[Gradient]:
-        """The derivatives of the travel of each of ``outputs`` at the equilibrium ``state`` (collective)."""
+        """The derivatives of the travel of each of ``outputs`` at the equilibrium ``state``."""
         at = self._newton.linearise(state, LoadControl(state.force))
         gradients = [self._gradient(at, output) for output in outputs]
         destroy_garbage(self._model.mesh.comm)
@@ -90,36 +95,27 @@ class Adjoint:
         return nodal
 
     @cached_property
-    def _by(self) -> dict[str, fem.Function]:
-        """What r · û is differentiated by."""
+    def _forms(self) -> dict[str, tuple[fem.Form, fem.Function]]:
+        """r · û, differentiated by design, displacement and moduli, and where each derivative is assembled."""
         elastic = self._model.elastic
-        return {
+        fields = {
             "design": elastic.d,
             "displacement": elastic.u,
             "youngs_modulus": elastic.youngs_modulus,
             "poissons_ratio": elastic.poissons_ratio,
         }
-
-    @cached_property
-    def _sums(self) -> dict[str, fem.Function]:
-        """Where the derivatives are assembled."""
-        return {name: fem.Function(field.function_space) for name, field in self._by.items()}
-
-    @cached_property
-    def _forms(self) -> dict:
-        """r · û, differentiated by the design, the displacement and the moduli."""
-        elastic = self._model.elastic
-        works = [
-            ufl.derivative(elastic.energy_ufl, field, weight)
-            for field, weight in zip(elastic.fields, self._weights, strict=True)
-        ]
-        work = sum(works[1:], start=works[0])
+        weighted = zip(elastic.fields, self._weights, strict=True)
+        first, *more = (ufl.derivative(elastic.energy_ufl, field, weight) for field, weight in weighted)
+        work = sum(more, start=first)
         with self._model.clock.phase("compile"):
-            return {name: compile_form(ufl.derivative(work, field)) for name, field in self._by.items()}
+            return {
+                name: (compile_form(ufl.derivative(work, field)), fem.Function(field.function_space))
+                for name, field in fields.items()
+            }
 
     def _assemble(self, name: str) -> np.ndarray:
         with self._model.clock.phase("adjoint"):
-            return assemble_vector(self._forms[name], self._sums[name])
+            return assemble_vector(*self._forms[name])
 
     def _per_link(self, name: str) -> np.ndarray:
         cells = self._assemble(name)
