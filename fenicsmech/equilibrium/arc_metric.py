@@ -77,8 +77,8 @@ def metric_at(
 
 def mean_product(system: EquilibriumSystem, a: Heading, b: Heading) -> float:
     """Mean product of two motions of free nodes and bodies, displacements over the mechanism's length (collective)."""
-    comm, joints = system.layout.comm, system.joints
-    free = system.layout.free[: system.layout.free_displacements]
+    comm, joints = system.comm, system.joints
+    free = system.numbering.free[system.blocks.nodes.local]
     own = np.array([float(a.step.u[free] @ b.step.u[free]) / joints.length**2, float(len(free))])
     nodes, count = comm.allreduce(own)
     bodies = float(np.sum(a.step.z * b.step.z / joints.pose_scale**2))

@@ -30,7 +30,7 @@ class SoftMode:
         self._mask = system.unknowns.coordinates_mask()
         self._mode = self._mask.duplicate()
         # of no symmetry, lest it has nothing of the mode in it
-        rank = system.layout.comm.rank
+        rank = system.comm.rank
         self._mode.array_w[:] = np.random.default_rng(rank).standard_normal(self._mode.local_size)
 
     def stiffness(self, at: Linearisation) -> float:

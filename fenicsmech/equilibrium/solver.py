@@ -17,10 +17,9 @@ from petsc4py import PETSc
 
 from fenicsmech.checks import positive
 from fenicsmech.compat import destroy_garbage
+from fenicsmech.equilibrium.border import PointLoad
 from fenicsmech.equilibrium.control import Control
-from fenicsmech.equilibrium.factor import Inertia
-from fenicsmech.equilibrium.linear import BySize, LinearMethod, LinearSolver
-from fenicsmech.equilibrium.load import PointLoad
+from fenicsmech.equilibrium.linear import BySize, Inertia, LinearMethod, LinearSolver
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 
@@ -283,7 +282,7 @@ class Iteration(ABC):
     @property
     def expected(self) -> int:
         """Negative eigenvalues where stable: one per multiplier and pressure, one for the controlled force."""
-        return self.system.joints.rows + 1 + self.system.layout.pressures
+        return self.system.joints.rows + 1 + self.system.blocks.pressures.size
 
     def _bear(
         self, best: State, residual: Residual, control: Control, residuals: list[float], failure: NotConverged
@@ -308,7 +307,7 @@ class Iteration(ABC):
     ) -> Solution:
         """Stability and tangent at the equilibrium, from the matrix last factored, without what mends steps."""
         system = self.system
-        destroy_garbage(system.layout.comm)
+        destroy_garbage(system.comm)
         right = control.rate(system, state)
         x = right.duplicate()
         with system.clock.phase("solve"):
