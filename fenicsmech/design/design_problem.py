@@ -167,20 +167,22 @@ class DesignProblem:
             lambda: draw_links(path, self.simulation, links, self._rest.links, before, after),
         )
 
-    def export(self, folder: str | Path, design: DesignResult, *, pin: float | None = None) -> None:
+    def export(
+        self, folder: str | Path, design: DesignResult | np.ndarray, *, pin_diameter: float | None = None
+    ) -> None:
         """Writes ``NAME.step`` and ``NAME.stl`` of every link that may change.
 
         Args:
             folder: where to; it is created.
             design: the shapes of the links.
-            pin: diameter of the holes left for pins; none by default.
+            pin_diameter: of the holes left for the pins of round interfaces; none are left by default.
 
         Raises:
             DescriptionError: the design is one of other links.
             MeshingError: no solid can be made of a link.
         """
         links, meshes = [own.link for own in self.designs], self._meshes(self._given(design))
-        on_one(self.simulation.comm, lambda: write_solids(folder, self.simulation.linkage, links, meshes, pin))
+        on_one(self.simulation.comm, lambda: write_solids(folder, self.simulation.linkage, links, meshes, pin_diameter))
 
     # -- steps of ``optimise`` -------------------------------------------------------------------------------
 

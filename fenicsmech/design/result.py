@@ -25,7 +25,7 @@ from fenicsmech.mechanism import DRAWN, Disc, FlexibleLink
 from fenicsmech.meshing import LinkMesh, boundary_loops, plan_of
 from fenicsmech.multibody import Linkage, assemble
 from fenicsmech.plot import DesignShape, LinkOutline, draw_designs
-from fenicsmech.simulation import Draughtsman, Simulation, rest_vertices
+from fenicsmech.simulation import MechanismPlotter, Simulation, rest_vertices
 
 _log = logger(__name__)
 _FORMAT = "fenicsmech design 1"
@@ -314,17 +314,23 @@ def draw_links(
         old, new = (_outline(change, meshes[k], p[change.place]) for p, meshes in (before, after))
         joints = np.array([linkage.bodies[i].centre[:2] for i in linkage.interfaces[link]])
         shapes.append(DesignShape(link.name, old, new, joints))
-    rigid = Draughtsman(scene.mechanism, linkage, simulation.model.mesh).rigid(assemble(linkage, DRAWN).poses)
+    rigid = MechanismPlotter(scene.mechanism, linkage, simulation.model.mesh).rigid(assemble(linkage, DRAWN).poses)
     draw_designs(path, shapes, rigid=rigid, unit=scene.units.length, title=f"{scene.mechanism.name}: links")
 
 
 def write_solids(
-    folder: str | Path, linkage: Linkage, links: Sequence[FlexibleLink], meshes: Sequence[LinkMesh], pin: float | None
+    folder: str | Path,
+    linkage: Linkage,
+    links: Sequence[FlexibleLink],
+    meshes: Sequence[LinkMesh],
+    pin_diameter: float | None,
 ) -> None:
     """Local. Writes ``NAME.step`` and ``NAME.stl`` of every link, see ``DesignProblem.export``."""
     for link, mesh in zip(links, meshes, strict=True):
         regions = [linkage.bodies[i] for i in linkage.interfaces[link]]
-        pins = [PinHole(tuple(b.centre[:2]), pin) for b in regions if pin and isinstance(b.region, Disc)]
+        pins = [
+            PinHole(tuple(b.centre[:2]), pin_diameter) for b in regions if pin_diameter and isinstance(b.region, Disc)
+        ]
         stem = Path(folder) / link.name.replace(" ", "-")
         for suffix, write in ((".step", write_step), (".stl", write_stl)):
             write(stem.with_suffix(suffix), mesh, depth=link.shape.depth, pins=pins, name=link.name)

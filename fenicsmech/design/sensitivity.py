@@ -28,8 +28,8 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from fenicsmech.compat import assemble_vector, compile_form, destroy_garbage, owned_values
-from fenicsmech.equilibrium import Iteration, Linearisation, LoadControl, PointLoad, State
-from fenicsmech.simulation import MechanismModel
+from fenicsmech.equilibrium import Adjoint, Iteration, Linearisation, LoadControl, PointLoad, State
+from fenicsmech.model import MechanismModel
 
 
 @dataclass(frozen=True)
@@ -63,34 +63,32 @@ class Sensitivity:
         return gradients
 
     def _gradient(self, at: Linearisation, output: PointLoad) -> Gradient:
-        state = at.state
-        x = at.solve(at.travel_gradient(output))
-        u, z = at.displacements(x), at.step(x).z
-        for field, values in zip(self._weights, self._model.elastic.split(u), strict=True):
+        adjoint = Adjoint.of_travel(at, output)
+        for field, values in zip(self._weights, self._model.elastic.split(adjoint.nodal), strict=True):
             owned_values(field)[:] = values
             field.x.scatter_forward()
 
         stiff = self._assemble("displacement")
-        moved = self._model.design_nodes.transpose(self._interface_terms(state, z, stiff, at.residual.nodal))
+        moved = self._model.design_nodes.transpose(self._interface_terms(at, adjoint.poses, stiff))
         return Gradient(
             design=-(self._assemble("design") + moved),
             youngs_moduli=-self._per_link("youngs_modulus"),
             poissons_ratios=-self._per_link("poissons_ratio"),
-            force=x.dot(at.travel_gradient(self._newton.system.controlled)),
+            force=adjoint.x.dot(at.travel_gradient(self._newton.system.controlled)),
         )
 
-    def _interface_terms(self, state: State, z: np.ndarray, stiff: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    def _interface_terms(self, at: Linearisation, z: np.ndarray, stiff: np.ndarray) -> np.ndarray:
         """(R − I)ᵀ (K û)_i + (ẑ_r ∂R/∂r)ᵀ r_i at owned interface nodes, (owned nodes, dim)."""
         interfaces, joints = self._model.interfaces, self._model.linkage.joints
         dim = joints.space.dim
-        stiff, forces = stiff.reshape(-1, interfaces.block), forces.reshape(-1, interfaces.block)
+        stiff, forces = (values.reshape(-1, interfaces.block) for values in (stiff, at.residual.nodal))
         nodal = np.zeros_like(stiff)
         for body, nodes in interfaces.nodes.items():
             mine = nodes[nodes < interfaces.owned]
             turn = np.einsum(
-                "a,aij->ij", z[joints.columns[body]][dim:], joints.space.rotation_gradient(state.poses[body])
+                "a,aij->ij", z[joints.columns[body]][dim:], joints.space.rotation_gradient(at.state.poses[body])
             )
-            back = joints.space.rotation_increment(state.poses[body])
+            back = joints.space.rotation_increment(at.state.poses[body])
             nodal[mine, :dim] = stiff[mine, :dim] @ back + forces[mine, :dim] @ turn
         return nodal
 
