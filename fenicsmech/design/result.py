@@ -325,12 +325,10 @@ def write_solids(
     meshes: Sequence[LinkMesh],
     pin_diameter: float | None,
 ) -> None:
-    """Local. Writes ``NAME.step`` and ``NAME.stl`` of every link, see ``DesignProblem.export``."""
+    """Local. Writes ``NAME.step`` and ``NAME.stl`` of every link, with holes of this diameter for pins if given."""
     for link, mesh in zip(links, meshes, strict=True):
         regions = [linkage.bodies[i] for i in linkage.interfaces[link]]
-        pins = [
-            PinHole(tuple(b.centre[:2]), pin_diameter) for b in regions if pin_diameter and isinstance(b.region, Disc)
-        ]
+        pins = [PinHole(tuple(b.centre[:2]), hole) for b in regions if hole and isinstance(b.region, Disc)]
         stem = Path(folder) / link.name.replace(" ", "-")
         for suffix, write in ((".step", write_step), (".stl", write_stl)):
             write(stem.with_suffix(suffix), mesh, depth=link.shape.depth, pins=pins, name=link.name)
