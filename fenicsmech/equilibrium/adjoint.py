@@ -16,7 +16,7 @@ from enum import Enum
 import numpy as np
 from petsc4py import PETSc
 
-from fenicsmech.equilibrium.load import PointLoad
+from fenicsmech.equilibrium.border import PointLoad
 from fenicsmech.equilibrium.solver import Linearisation
 
 
