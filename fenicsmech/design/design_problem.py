@@ -30,8 +30,7 @@ from fenicsmech.design.result import (
     draw_links,
     link_designs,
     rest_meshes,
-    target_results,
-    verify,
+    verified_targets,
     write_solids,
 )
 from fenicsmech.design.run import Checkpoint, DesignProgress, Optimum, fingerprint, minimise_together
@@ -133,17 +132,21 @@ class DesignProblem:
             placement = comm.bcast(objective.placement, root=0)
             with self._clock.phase("verification"):
                 self._rest.place(optimum.parameters, placement)
-                found = verify(self.simulation, self.targets, objective.reached)
+                targets, same = verified_targets(self.simulation, self.targets, optimum.started, objective.reached)
             result = DesignResult(
                 mechanism=self.simulation.scene.mechanism.name,
                 links=link_designs(self._rest, self.designs, placement),
-                targets=target_results(self.targets, optimum.started, found),
+                targets=targets,
                 reason=optimum.reason.value,
                 converged=optimum.reason.converged,
-                verified=found.same,
+                verified=same,
                 active=objective.active(optimum.parameters),
                 objective=values,
-                objective_error=objective_error(self.targets, found.displacements, found.errors),
+                objective_error=objective_error(
+                    self.targets,
+                    np.array([target.reached for target in targets]),
+                    [target.finer_elements_add for target in targets],
+                ),
                 iterations=optimum.number,
                 evaluations=optimum.evaluations,
                 mesh_ratio_max=self._rest.worst_ratio(),

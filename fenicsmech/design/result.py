@@ -194,55 +194,42 @@ def _read(data: dict) -> DesignResult:
     return DesignResult(links=links, targets=targets, **{key: frozen(value) for key, value in data.items()})
 
 
-@dataclass(frozen=True, eq=False)
-class Verification:
-    """What a user will find when loading the optimum from zero.
-
-    Attributes:
-        displacements: of the targets' points, (targets,); as followed, where one of them is not reached.
-        same: whether these are the ones that were followed.
-        errors: what finer elements would add to them, (targets,); None if one of them is not reached.
-    """
-
-    displacements: np.ndarray
-    same: bool
-    errors: np.ndarray | None
-
-
-def verify(simulation: Simulation, targets: Sequence[Target], followed: np.ndarray) -> Verification:
-    """Loads the targets from zero, which is what a user will do, and logs where that leads elsewhere.
+def verified_targets(
+    simulation: Simulation, targets: Sequence[Target], started: np.ndarray, followed: np.ndarray
+) -> tuple[tuple[TargetResult, ...], bool]:
+    """How far each target is reached when it is loaded from zero, which is what a user will do; logs where not.
 
     Args:
-        simulation: has the shapes of the optimum.
+        simulation: its model has the shapes of the optimum.
         targets: what was wanted.
+        started: displacements at the start, (targets,).
         followed: displacements of the equilibria that were followed from design to design, (targets,).
+
+    Returns:
+        The targets' results, with the displacements as followed and without an estimate if one of them is not reached,
+        and whether loading leads to the equilibria that were followed.
     """
-    equilibria = TargetEquilibria(simulation, targets)
+    equilibria, same = TargetEquilibria(simulation, targets), False
+    reached, finer = followed, [None] * len(targets)
     try:
         traced = equilibria.trace()
     except Infeasible as failure:
         _log.warning("loaded from zero, the optimum does not reach all its targets: %s", failure)
-        return Verification(followed, False, None)
-    verified = np.array([sample.displacement for sample in traced.samples])
-    # displacements of one equilibrium differ by less
-    different = np.flatnonzero(np.abs(verified - followed) > 1e-6 * target_scales(targets))
-    for index in different:
-        _log.warning(
-            "target %d of the optimum: %.6g when loaded from zero, %.6g when followed from the drawn design",
-            index + 1,
-            verified[index],
-            followed[index],
+    else:
+        reached, finer = (
+            np.array([sample.displacement for sample in traced.samples]),
+            equilibria.errors(traced).tolist(),
         )
-    return Verification(verified, len(different) == 0, equilibria.errors(traced))
-
-
-def target_results(
-    targets: Sequence[Target], started: np.ndarray, verification: Verification
-) -> tuple[TargetResult, ...]:
-    """How far each target was reached, from displacements at the start, (targets,), and at the end."""
-    reached, finer = verification.displacements, verification.errors
+        # displacements of one equilibrium differ by less
+        different = np.flatnonzero(np.abs(reached - followed) > 1e-6 * target_scales(targets))
+        same = len(different) == 0
+        for k in different:
+            _log.warning(
+                "target %d of the optimum: %.6g when loaded from zero, %.6g when followed from the drawn design",
+                *(k + 1, reached[k], followed[k]),
+            )
     errors = target_errors(targets, reached)
-    return tuple(
+    results = tuple(
         TargetResult(
             force_name=target.force_part.name,
             configuration=target.configuration.name,
@@ -251,10 +238,11 @@ def target_results(
             started=float(started[k]),
             reached=float(reached[k]),
             error=float(errors[k]),
-            finer_elements_add=None if finer is None else float(finer[k]),
+            finer_elements_add=finer[k],
         )
         for k, target in enumerate(targets)
     )
+    return results, same
 
 
 def link_designs(rest: RestShape, wanted: Sequence[SplineDesign], placement: Placement) -> tuple[LinkDesign, ...]:
@@ -323,7 +311,7 @@ def write_solids(
     linkage: Linkage,
     links: Sequence[FlexibleLink],
     meshes: Sequence[LinkMesh],
-    pin_diameter: float | None,
+    hole: float | None,
 ) -> None:
     """Local. Writes ``NAME.step`` and ``NAME.stl`` of every link, with holes of this diameter for pins if given."""
     for link, mesh in zip(links, meshes, strict=True):
