@@ -102,7 +102,7 @@ def main():
     result = problem.optimise(start=start, **saved)
     sim = sim.with_design(result)
     after = [sim.load_displacement(lift, forces=FORCES, configuration=place) for place in stroke]
-    design = fm.Design(problem, result, before=before, start=start, pin=PIN)
+    design = fm.Design(problem, result, before=before, start=start, pin_diameter=PIN)
     fm.write_report(options.out, sim, after, design=design).show()
 
     motor = scene.mechanism.motors[0]

@@ -16,7 +16,7 @@ import fenicsmech as fm
 
 SIZE, QUICK = 2.1, 3.0  # mm, elements
 FORCES = [0.0, 0.025, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4]  # N
-PIN = 3.0  # mm
+PIN = 3.0  # mm: radius of the discs that hold the diagonal, and diameter of the holes left for its pins
 
 
 def describe():
@@ -70,7 +70,7 @@ def main():
     result = problem.optimise(start=start, **saved)
     sim = sim.with_design(result)
     after = sim.load_displacement(push, forces=FORCES)
-    design = fm.Design(problem, result, before=[before], start=start, pin=PIN)
+    design = fm.Design(problem, result, before=[before], start=start, pin_diameter=PIN)
     fm.write_report(options.out, sim, [after], design=design).show()
 
 

@@ -64,14 +64,14 @@ class Design:
         result: its optimum.
         before: curves of the drawn design.
         start: the optimum of a cheaper simulation that the optimisation started from.
-        pin: diameter of the holes that are left for pins in the exported links.
+        pin_diameter: of the holes that are left for pins in the exported links.
     """
 
     problem: DesignProblem
     result: DesignResult
     before: Sequence[Curve] = ()
     start: DesignResult | None = None
-    pin: float | None = None
+    pin_diameter: float | None = None
 
 
 def write_report(
@@ -102,7 +102,7 @@ def write_report(
         curve.write_csv(folder / f"curve{path}.csv", errors=True)
     if design is not None:
         design.problem.picture(folder / "links.png", design.result)
-        design.problem.export(folder / "links", design.result, pin=design.pin)
+        design.problem.export(folder / "links", design.result, pin_diameter=design.pin_diameter)
     summary = _summarise(simulation, curves, design)
 
     def write() -> None:
@@ -300,7 +300,7 @@ def format_table(headers: Sequence[str], rows: Sequence[Sequence[object]], *, di
             raise DescriptionError(
                 f"row {index} of the table", f"{len(row)} cells for {len(headers)} columns", "Give one cell per column"
             )
-    cells = [[_text(cell, digits) for cell in line] for line in (headers, *rows)]
+    cells = [[_cell(cell, digits) for cell in line] for line in (headers, *rows)]
     widths = [max(3, *(len(line[k]) for line in cells)) for k in range(len(headers))]
     right = [bool(rows) and all(_stands_right(row[k]) for row in rows) for k in range(len(headers))]
     rule = ["-" * (w - 1) + ":" if r else "-" * w for w, r in zip(widths, right, strict=True)]
@@ -316,7 +316,7 @@ def _stands_right(cell: object) -> bool:
     return cell is None or (isinstance(cell, Real) and not isinstance(cell, bool))
 
 
-def _text(cell: object, digits: int) -> str:
+def _cell(cell: object, digits: int) -> str:
     if cell is None:
         return "–"
     if isinstance(cell, bool | np.bool_):
