@@ -75,7 +75,6 @@ from fenicsmech.simulation import (
     Simulation,
     SoftMode,
     Until,
-    friction_band,
 )
 
 __version__ = "0.1.0"
@@ -140,7 +139,6 @@ __all__ = [
     "PinFriction",
     "PlanarMarker",
     "SpatialMarker",
-    "friction_band",
     "ArcSteps",
     "BucklingLoad",
     "BucklingPosition",

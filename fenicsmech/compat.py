@@ -195,6 +195,17 @@ def assemble_matrix(form, comm: MPI.Comm) -> PETSc.Mat:
     return matrix
 
 
+def create_block_matrix(forms) -> PETSc.Mat:
+    """An empty matrix for compiled bilinear ``forms``, a list of rows; per rank, the owned values of each space."""
+    return fem.petsc.create_matrix_block(forms) if _VERSION < (0, 10) else fem.petsc.create_matrix(forms)
+
+
+def add_blocks(matrix: PETSc.Mat, forms) -> None:
+    """Adds ``forms`` into a matrix made by ``create_block_matrix``, which it leaves unassembled."""
+    assemble = fem.petsc.assemble_matrix_block if _VERSION < (0, 10) else fem.petsc.assemble_matrix
+    assemble(matrix, forms)
+
+
 def destroy_garbage(comm: MPI.Comm) -> None:
     """Destroys the PETSc objects on ``comm`` that no Python object refers to any more (collective).
 
