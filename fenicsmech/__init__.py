@@ -74,7 +74,6 @@ from fenicsmech.simulation import (
     Simulation,
     SoftMode,
     Until,
-    friction_band,
 )
 
 __version__ = "0.1.0"
@@ -136,7 +135,6 @@ __all__ = [
     "Pressure",
     "Prestrain",
     "PinFriction",
-    "friction_band",
     "ArcSteps",
     "BucklingLoad",
     "BucklingPosition",
