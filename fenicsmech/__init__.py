@@ -5,7 +5,7 @@ Describe a mechanism (``Mechanism``), say what acts on it (``Scene``) and how fi
 (``DesignProblem``), and ask for their shapes.
 """
 
-from fenicsmech.collective import end_together
+from fenicsmech.collective import mpi_abort_on_error
 from fenicsmech.design import (
     BFGS,
     DesignProblem,
@@ -74,7 +74,6 @@ from fenicsmech.simulation import (
     Simulation,
     SoftMode,
     Until,
-    friction_band,
 )
 
 __version__ = "0.1.0"
@@ -123,6 +122,7 @@ __all__ = [
     "Units",
     "fit_modulus",
     "gmsh_mesh",
+    "mpi_abort_on_error",
     "outline",
     "polygon",
     "step",
@@ -135,7 +135,6 @@ __all__ = [
     "Pressure",
     "Prestrain",
     "PinFriction",
-    "friction_band",
     "ArcSteps",
     "BucklingLoad",
     "BucklingPosition",
@@ -146,5 +145,3 @@ __all__ = [
     "SoftMode",
     "Until",
 ]
-
-end_together()

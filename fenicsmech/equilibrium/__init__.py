@@ -15,10 +15,12 @@
 - ``arc_metric``, ``path_points``: the equilibria of such a path
 - ``arc_length``, ``continuation``: steps along it, and where it ends
 - ``critical``, ``soft_mode``, ``branching``: their limit points and bifurcations, and the paths that cross there
+- ``adjoint``: of displacements and forces
 - ``eigen``: the softest modes of a tangent, and buckling loads
 - ``reactions``: what joints and motors exert
 """
 
+from fenicsmech.equilibrium.adjoint import Adjoint, Quantity
 from fenicsmech.equilibrium.arc_length import ArcLength, ArcSteps
 from fenicsmech.equilibrium.arc_metric import ArcMetric, metric_at
 from fenicsmech.equilibrium.blocks import Block, Blocks, Border
@@ -42,6 +44,7 @@ from fenicsmech.equilibrium.state import State, Step, load_fields
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 
 __all__ = [
+    "Adjoint",
     "ArcLength",
     "ArcMetric",
     "ArcSteps",
@@ -83,6 +86,7 @@ __all__ = [
     "PointLoad",
     "Predictor",
     "PrimalDualNewton",
+    "Quantity",
     "REGULARISATION",
     "Reaction",
     "Residual",

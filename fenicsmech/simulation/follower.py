@@ -27,10 +27,10 @@ from fenicsmech.equilibrium import (
 )
 from fenicsmech.errors import EquilibriumError
 from fenicsmech.model import MechanismModel
+from fenicsmech.simulation.buckling import ModeShape, mode_shape
 from fenicsmech.simulation.followed import PathEvent
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.leading import leading
-from fenicsmech.simulation.mode_shape import ModeShape, mode_shape
 from fenicsmech.simulation.request import CurveRequest
 from fenicsmech.simulation.tracer import Tracer
 from fenicsmech.simulation.until import Until

@@ -41,12 +41,12 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
+from fenicsmech.compat import interpolation_matrix
 from fenicsmech.equilibrium.blocks import Numbering
 from fenicsmech.equilibrium.linear.direct import Direct, Factor, Inertia, LinearMethod, LinearSolver
 from fenicsmech.equilibrium.system import EquilibriumSystem
 from fenicsmech.equilibrium.unknowns import UnknownMap
 from fenicsmech.errors import DescriptionError
-from fenicsmech.multibody import DesignAtNodes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -374,15 +374,13 @@ class CoarseLevel:
 
 def _values_at_nodes(system: EquilibriumSystem, coarse: Numbering) -> PETSc.Mat:
     """D⁻¹ N: unknowns from displacements at vertices and the border."""
-    free, blocks, dim, d = system.numbering.free, system.blocks, system.joints.space.dim, system.elastic.d
-    weights = DesignAtNodes(d, system.elastic.u).matrix.tocsr()[free[::dim] // dim]
-    weights.eliminate_zeros()
-    vertices = d.function_space.dofmap.index_map.local_to_global(np.arange(weights.shape[1], dtype=np.int32))
-    # every component alike, then the identity of the border
-    entries, components, border = weights.tocoo(), np.arange(dim), np.arange(blocks.border.count)
-    rows = [(dim * entries.row[:, None] + components).ravel(), blocks.border.local.start + border]
-    columns = [(dim * vertices[entries.col][:, None] + components).ravel(), coarse.rows.border.first + border]
-    values = [np.repeat(entries.data, dim), np.ones(len(border))]
+    blocks, elastic = system.blocks, system.elastic
+    weights = interpolation_matrix(elastic.d.function_space, elastic.u.function_space)[system.numbering.free].tocoo()
+    # then the identity of the border
+    border = np.arange(blocks.border.count)
+    rows = [weights.row, blocks.border.local.start + border]
+    columns = [weights.col, coarse.rows.border.first + border]
+    values = [weights.data, np.ones(len(border))]
     local = csr_matrix(
         (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))),
         shape=(blocks.local, coarse.rows.size),
