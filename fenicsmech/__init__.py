@@ -39,6 +39,7 @@ from fenicsmech.equilibrium import (
 )
 from fenicsmech.errors import AssemblyError, DescriptionError, EquilibriumError, FenicsmechError, MeshingError
 from fenicsmech.files import read_csv
+from fenicsmech.joints import JointKind, PlanarMarker, SpatialMarker
 from fenicsmech.mechanism import (
     DRAWN,
     ONYX,
@@ -146,7 +147,10 @@ __all__ = [
     "JointSpring",
     "Pressure",
     "Prestrain",
+    "JointKind",
     "PinFriction",
+    "PlanarMarker",
+    "SpatialMarker",
     "ArcSteps",
     "BucklingLoad",
     "BucklingPosition",

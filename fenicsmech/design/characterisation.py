@@ -40,7 +40,7 @@ class Experiment:
         configuration: motor positions.
 
     Raises:
-        DescriptionError: the numbers do not pair, are not finite, or tell nothing.
+        DescriptionError: the numbers do not pair, are not finite, or hold no information.
     """
 
     simulation: Simulation

@@ -6,7 +6,7 @@ factor that is there already:
 
     ŷ₀ = y + δ,   δ = −K₁⁻¹ R(y; d₀),   y the state y₁ carried back,     |y₀ − ŷ₀| ≤ 2 |δ|
 
-on one branch if d₁ − d₀ is small enough, and halved if that fails. Halves that fail too tell a fold.
+on one branch if d₁ − d₀ is small enough, and halved if that fails. Halves that fail too mean a fold.
 
 A displacement counts from the unloaded configuration. Where that moves with the design (the force acts on a flexible
 link, or motors strain the links), it is an equilibrium that is followed too.
