@@ -142,8 +142,8 @@ def test_two_ranks_give_the_same_curve_and_the_same_optimum(truss_alone, tmp_pat
 def test_an_interrupted_optimisation_goes_on(truss_alone):
     alone, _, folder = truss_alone
     again, _ = report("truss", folder, *QUICK, "--resume")
-    assert again["objective"]["final"] == pytest.approx(alone["objective"]["final"], rel=1e-6)
-    assert again["evaluations"] <= alone["evaluations"] + 2
+    assert again["iterations"] >= alone["iterations"]
+    assert again["objective"]["final"] <= (1.0 + 1e-6) * alone["objective"]["final"]
 
 
 def test_characterisation_finds_the_modulus_of_the_synthetic_data(tmp_path):
