@@ -6,6 +6,7 @@ Describe a mechanism (``Mechanism``), say what acts on it (``Scene``) and how fi
 """
 
 from fenicsmech.collective import end_together
+from fenicsmech.continuation import ArcSteps, Critical
 from fenicsmech.design import (
     BFGS,
     DesignProblem,
@@ -33,9 +34,7 @@ from fenicsmech.effects import (
 )
 from fenicsmech.elasticity import Displacement, Mixed
 from fenicsmech.equilibrium import (
-    ArcSteps,
     AugmentedLagrangian,
-    Critical,
     Globalisation,
     KktNewton,
     PrimalDualNewton,

@@ -30,6 +30,7 @@ LAYERS = (
     "elasticity",
     "effects",
     "equilibrium",
+    "continuation",
     "model",
     "estimates",
     "simulation",

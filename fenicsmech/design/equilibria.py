@@ -22,7 +22,7 @@ import numpy as np
 from fenicsmech.design.optimisers import Infeasible
 from fenicsmech.design.sensitivity import Adjoint
 from fenicsmech.design.spline_design import Target
-from fenicsmech.equilibrium import Iteration, LoadControl, NotConverged, Solution, State
+from fenicsmech.equilibrium import EquilibriumPoint, Iteration, LoadControl, NotConverged, State
 from fenicsmech.errors import EquilibriumError
 from fenicsmech.mechanism import FlexibleLink
 from fenicsmech.multibody import assemble
@@ -158,7 +158,7 @@ class TargetEquilibria:
         """The equilibrium without force and without effects, from one without force."""
         newton = self._newtons[target.force_part]
         try:
-            return newton.solve(replace(state, share=0.0), LoadControl(0.0)).state
+            return newton.solve(replace(state, load_factor=0.0), LoadControl(0.0)).state
         except NotConverged as failure:
             raise Infeasible(f"no equilibrium without loads ({failure.reason})") from failure
 
@@ -201,7 +201,7 @@ class TargetEquilibria:
         self,
         newton: Iteration,
         start: State,
-        found: Solution,
+        found: EquilibriumPoint,
         control: LoadControl,
         before: np.ndarray,
         after: np.ndarray,

@@ -10,6 +10,6 @@ from fenicsmech.multibody import InterfaceMap
 def load_fields(elastic: ElasticBody, interfaces: InterfaceMap, state: State) -> None:
     """Makes the fields of ``elastic`` hold ``state``, with interface nodes on their bodies (collective)."""
     elastic.take(state.u)
-    elastic.share.value = state.share
+    elastic.share.value = state.load_factor
     elastic.update()
     interfaces.place(state.poses)

@@ -35,7 +35,7 @@ class Loads:
 
     def acting(self, state: State) -> list[tuple[PointLoad, float]]:
         """All of them with their magnitudes at ``state``."""
-        return [(self.controlled, state.force), *((load, state.share * size) for load, size in self.constant)]
+        return [(self.controlled, state.force), *((load, state.load_factor * size) for load, size in self.constant)]
 
     def travel(self, load: PointLoad, state: State) -> float:
         """a · u_P, how far a load's point has moved along it in the loaded ``state`` (collective)."""
@@ -44,7 +44,7 @@ class Loads:
     def work(self, state: State, force: float) -> float:
         """Σ loads · u_P + f a · u_P with ``force`` for f (collective)."""
         constant = sum(magnitude * self.travel(load, state) for load, magnitude in self.constant)
-        return force * self.travel(self.controlled, state) + state.share * constant
+        return force * self.travel(self.controlled, state) + state.load_factor * constant
 
     def add(self, load: PointLoad, magnitude: float, state: State, nodal: np.ndarray, extras: np.ndarray) -> None:
         """Adds magnitude · a · ∂u_P/∂(u, z) to owned ``nodal`` forces and ``extras``."""

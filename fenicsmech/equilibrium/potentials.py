@@ -1,6 +1,6 @@
-"""Potentials of body poses that effects add: value, gradient, blocks of the Hessian, times the share σ that acts.
+"""Potentials of body poses that effects add: value, gradient, blocks of the Hessian, times the factor σ that acts.
 
-σ is 1 for what holds the mechanism, and the share of the constant loads for all else.
+σ is 1 for what holds the mechanism, and the load factor for all else.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class BodyPotentials:
         return self._slope(state, lambda potential: _acting(potential, state))
 
     def rate(self, state: State) -> np.ndarray:
-        """The derivative of the gradient by the share, (size,)."""
+        """The derivative of the gradient by the load factor, (size,)."""
         return self._slope(state, lambda potential: 0.0 if potential.holds else 1.0)
 
     def hessian_blocks(self, state: State) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
@@ -69,4 +69,4 @@ class BodyPotentials:
 
 def _acting(potential: PosePotential, state: State) -> float:
     """σ."""
-    return 1.0 if potential.holds else state.share
+    return 1.0 if potential.holds else state.load_factor

@@ -138,6 +138,8 @@ class EquilibriumSystem:
             poses=poses,
             multipliers=state.multipliers + step.multipliers,
             force=state.force + step.force,
+            motors=state.motors + step.motors,
+            load_factor=state.load_factor + step.load_factor,
         )
         self.load(moved)
         return replace(moved, u=self.elastic.values())
@@ -163,6 +165,8 @@ class EquilibriumSystem:
             self.joints.unknowns(later.poses) - self.joints.unknowns(earlier.poses),
             later.multipliers - earlier.multipliers,
             later.force - earlier.force,
+            later.motors - earlier.motors,
+            later.load_factor - earlier.load_factor,
         )
 
     def independent(self, step: Step) -> Step:
@@ -262,18 +266,14 @@ class EquilibriumSystem:
     def _linearise(self, state: State, control: Control, moments: dict[int, np.ndarray]) -> None:
         self.kkt.linearise(self._extras.entries(state, control, self._loads.acting(state), moments))
 
-    def force_rate(self, state: State) -> PETSc.Vec:
-        """Right-hand side whose KKT solution is the rate of x with the controlled force (collective)."""
-        return self.travel_gradient(self.controlled, state)
-
     def travel_gradient(self, load: PointLoad, state: State) -> PETSc.Vec:
         """Gᵀ ∂(a · u_P), of a load's travel with respect to the scaled unknowns x (collective)."""
         nodal, extras = np.zeros(self.layout.owned), np.zeros(self.layout.extras)
         self._loads.add(load, 1.0, state, nodal, extras)
         return self.unknowns.apply_transpose(nodal, extras)
 
-    def share_rate(self, state: State) -> PETSc.Vec:
-        """Right-hand side whose KKT solution is the rate of x with the share of the constant loads (collective)."""
+    def load_factor_rate(self, state: State) -> PETSc.Vec:
+        """Right-hand side whose KKT solution is the rate of x with the factor of the constant loads (collective)."""
         nodal, extras = np.zeros(self.layout.owned), np.zeros(self.layout.extras)
         for load, magnitude in self._loads.constant:
             self._loads.add(load, magnitude, state, nodal, extras)

@@ -4,17 +4,14 @@
 - ``postprocessing``: what it tells of them
 - ``dial``: how finely it is computed to reach the accuracy asked for
 - ``discretisation``: a scene at one fidelity, with the discretised mechanism behind it
-- ``request``, ``curves``, ``tracer``: what a curve is asked for, and how it is traced
-- ``idle_balance``: whether loads balance along motions that deform no link
+- ``request``: what a curve is asked for
+- ``curves``, ``tracing``, ``following``: how it is computed, sample by sample or along the path, with its events
 - ``frame``, ``curve``: what comes out
-- ``leading``: what leads a curve, a force or a motor
-- ``until``, ``follower``, ``followed``: curves that are followed wherever they lead, and their events
 - ``buckling``, ``mode_shape``: buckling loads, buckling positions and soft modes of an equilibrium
 - ``goal``, ``estimates``, ``influence``: how wrong displacements and forces are, by an adjoint: of elements
   (``goal_error`` by ``recovery``, ``pressure_error``), of plane stress (``depth_error``)
 - ``explanation``: what is simulated and left out, in words
 - ``friction``: how far friction in hinges holds a curve's load
-- ``unloaded``: where points are while motors move
 - ``snapshot``, ``picture``, ``export``: a state gathered, drawn, written
 """
 
@@ -24,17 +21,16 @@ from fenicsmech.simulation.buckling import BucklingLoad, BucklingPosition, SoftM
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.dial import Dial, Outcome, Rung, Trial, corrections, family
 from fenicsmech.simulation.explanation import PLASTIC_WEIGHT, weight_influence
-from fenicsmech.simulation.followed import FollowedCurve, PathEvent
+from fenicsmech.simulation.following import FollowedCurve, PathEvent
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.friction import PinFriction, friction_band
 from fenicsmech.simulation.goal import Goal
 from fenicsmech.simulation.influence import Equilibrium
 from fenicsmech.simulation.mode_shape import ModeShape
 from fenicsmech.simulation.picture import Draughtsman
-from fenicsmech.simulation.request import CurveRequest, read_request
+from fenicsmech.simulation.request import CurveRequest, Until, read_request
 from fenicsmech.simulation.simulation import Simulation
 from fenicsmech.simulation.snapshot import gather, rest_vertices
-from fenicsmech.simulation.until import Until
 
 __all__ = [
     "BucklingLoad",

@@ -5,21 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from fenicsmech.equilibrium import (
-    ForceLead,
-    Iteration,
-    Lead,
-    Mode,
-    NotConverged,
-    critical_changes,
-    softest_modes,
-)
+from fenicsmech.continuation import Mode, critical_changes, softest_modes
+from fenicsmech.equilibrium import Iteration, LoadControl, MotorControl, NotConverged
 from fenicsmech.errors import EquilibriumError
 from fenicsmech.model import MechanismModel
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.leading import leading
 from fenicsmech.simulation.mode_shape import ModeShape, mode_shape
+from fenicsmech.simulation.request import followed_control, quantities
 
 
 @dataclass(frozen=True)
@@ -50,7 +43,7 @@ def buckling_loads(
     model: MechanismModel, newton: Iteration, curve: Curve, frame: Frame, count: int
 ) -> tuple[BucklingLoad, ...]:
     """The ``count`` nearest buckling loads of ``frame`` (collective)."""
-    modes = _at(model, newton, curve, frame, count, ForceLead(), critical_changes)
+    modes = _at(model, newton, curve, frame, count, LoadControl(), critical_changes)
     return tuple(BucklingLoad(frame.force + mode.value, mode_shape(model, mode.step)) for mode in modes)
 
 
@@ -58,8 +51,8 @@ def buckling_positions(
     model: MechanismModel, newton: Iteration, curve: Curve, frame: Frame, count: int
 ) -> tuple[BucklingPosition, ...]:
     """The ``count`` nearest buckling positions of ``frame``, which motors led to (collective)."""
-    lead = leading(curve.part).lead(model.linkage.joints)
-    modes = _at(model, newton, curve, frame, count, lead, critical_changes)
+    held = followed_control(curve.part, model.linkage.joints)
+    modes = _at(model, newton, curve, frame, count, held, critical_changes)
     return tuple(BucklingPosition(frame.displacement + mode.value, mode_shape(model, mode.step)) for mode in modes)
 
 
@@ -67,7 +60,7 @@ def soft_modes(
     model: MechanismModel, newton: Iteration, curve: Curve, frame: Frame, count: int
 ) -> tuple[SoftMode, ...]:
     """The ``count`` softest modes of ``frame`` under dead loads (collective)."""
-    modes = _at(model, newton, curve, frame, count, ForceLead(), softest_modes)
+    modes = _at(model, newton, curve, frame, count, LoadControl(), softest_modes)
     return tuple(SoftMode(mode.value, mode_shape(model, mode.step)) for mode in modes)
 
 
@@ -77,16 +70,16 @@ def _at(
     curve: Curve,
     frame: Frame,
     count: int,
-    lead: Lead,
+    held: LoadControl | MotorControl,
     modes: Callable[..., list[Mode]],
 ) -> list[Mode]:
     with model.shaped(frame.design):
         try:
-            return modes(newton, lead, frame.state, count=count)
+            return modes(newton, held, frame.state, count=count)
         except NotConverged as failure:
             raise EquilibriumError(
                 f"modes of {curve.part.name!r} in configuration {curve.configuration.name!r}",
-                f"they cannot be told at {leading(curve.part).up} {frame.force:g} ({failure.reason})",
+                f"they cannot be told at {quantities(curve.part)[1]} {frame.force:g} ({failure.reason})",
                 "Choose another frame, or another part to lead",
                 last=frame,
             ) from failure

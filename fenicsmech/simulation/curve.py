@@ -14,7 +14,7 @@ from fenicsmech.multibody import Freedom
 from fenicsmech.report import CurveSeries, plot_curve, write_curve_csv
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.goal import Goal
-from fenicsmech.simulation.leading import Axis, leading
+from fenicsmech.simulation.request import Axis, axes
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,7 @@ class Curve:
     @property
     def axes(self) -> tuple[Axis, Axis]:
         """What lies across and up on plots."""
-        return leading(self.part).axes(self.units)
+        return axes(self.part, self.units)
 
     @property
     def forces(self) -> np.ndarray:

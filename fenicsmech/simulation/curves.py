@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from fenicsmech.equilibrium import ArcSteps, EquilibriumSolver, Iteration, Predictor, Sense
+from fenicsmech.continuation import ArcSteps, Predictor, Sense
+from fenicsmech.equilibrium import EquilibriumSolver, Iteration
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import Force, Leader, Units
 from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import Freedom, assemble_before_strain, count_freedom
 from fenicsmech.simulation.curve import Curve
-from fenicsmech.simulation.followed import FollowedCurve, PathEvent
-from fenicsmech.simulation.follower import Follower
+from fenicsmech.simulation.following import CurveFollower, FollowedCurve, PathEvent
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.goal import Goal
-from fenicsmech.simulation.leading import leading
 from fenicsmech.simulation.mode_shape import ModeShape
-from fenicsmech.simulation.request import CurveRequest
-from fenicsmech.simulation.tracer import Tracer
-from fenicsmech.simulation.until import Until
+from fenicsmech.simulation.request import CurveRequest, Until, controlled_load
+from fenicsmech.simulation.tracing import CurveTracer
 
 
 class Curves:
@@ -36,11 +34,11 @@ class Curves:
         self._newtons: dict[tuple, Iteration] = {}
 
     def newton(self, part: Leader, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
-        """The solver for what leads and some fixed forces, kept for all configurations."""
+        """The solver for a prescribed part and some fixed forces, kept for all configurations."""
         key, model = (part, others), self._model
         if key not in self._newtons:
             loads = tuple((model.point_load(other), float(magnitude)) for other, magnitude in others)
-            self._newtons[key] = self._solver.on(model.system(leading(part).load(model), loads))
+            self._newtons[key] = self._solver.on(model.system(controlled_load(part, model), loads))
         return self._newtons[key]
 
     def trace(self, request: CurveRequest, watch: Callable[[int], None]) -> Curve:
@@ -69,7 +67,7 @@ class Curves:
     def follow(
         self, request: CurveRequest, until: Until, steps: ArcSteps | None, watch: Callable[[int], None]
     ) -> FollowedCurve:
-        """The curve from the configuration without the force that leads, as ``Simulation.follow``."""
+        """The curve from the configuration without the controlled force, as ``Simulation.follow``."""
         follower, freedom = self._follower(request, until, steps)
         follower.from_rest(watch)
         return self._followed(request, freedom, follower)
@@ -99,7 +97,7 @@ class Curves:
                 found.append(self._followed(request, freedom, follower))
         return found[0], found[1]
 
-    def _tracer(self, request: CurveRequest) -> tuple[Tracer, Iteration, Freedom]:
+    def _tracer(self, request: CurveRequest) -> tuple[CurveTracer, Iteration, Freedom]:
         """What starts the path of a request, its solver, and the freedom of its configuration."""
         linkage, holding = self._model.linkage, self._model.holding
         assembly = assemble_before_strain(linkage, request.configuration, holding)
@@ -107,14 +105,14 @@ class Curves:
         motors = assembly.fraction * rigid.motor_values(request.configuration.position)
         freedom = count_freedom(rigid, assembly.poses, motors, holding)
         newton = self.newton(request.part, request.others)
-        tracer = Tracer(self._model, newton, request, assembly=assembly, freedom=freedom, predictor=self._predictor)
-        return tracer, newton, freedom
+        how = {"assembly": assembly, "freedom": freedom, "predictor": self._predictor}
+        return CurveTracer(self._model, newton, request, **how), newton, freedom
 
-    def _follower(self, request: CurveRequest, until: Until, steps: ArcSteps | None) -> tuple[Follower, Freedom]:
+    def _follower(self, request: CurveRequest, until: Until, steps: ArcSteps | None) -> tuple[CurveFollower, Freedom]:
         tracer, newton, freedom = self._tracer(request)
-        return Follower(self._model, newton, request, tracer, until=until, steps=steps or ArcSteps()), freedom
+        return CurveFollower(self._model, newton, request, tracer, until=until, steps=steps or ArcSteps()), freedom
 
-    def _followed(self, request: CurveRequest, freedom: Freedom, follower: Follower) -> FollowedCurve:
+    def _followed(self, request: CurveRequest, freedom: Freedom, follower: CurveFollower) -> FollowedCurve:
         return FollowedCurve(
             request.part,
             request.configuration,

@@ -8,7 +8,8 @@ from mpi4py import MPI
 
 from fenicsmech.clock import Clock
 from fenicsmech.collective import on_one
-from fenicsmech.equilibrium import EquilibriumSolver, Predictor
+from fenicsmech.continuation import Predictor
+from fenicsmech.equilibrium import EquilibriumSolver
 from fenicsmech.mechanism import Scene
 from fenicsmech.model import Fidelity, MechanismModel, check_links, mesh_mechanism
 from fenicsmech.multibody import build_linkage

@@ -10,19 +10,14 @@ from mpi4py import MPI
 
 from fenicsmech.checks import positive
 from fenicsmech.clock import Clock
+from fenicsmech.continuation import ArcSteps, Hermite, Predictor
 from fenicsmech.effects import holding
 from fenicsmech.elasticity import (
     Formulation,
     Mixed,
     Quadrature,
 )
-from fenicsmech.equilibrium import (
-    ArcSteps,
-    EquilibriumSolver,
-    Hermite,
-    Predictor,
-    PrimalDualNewton,
-)
+from fenicsmech.equilibrium import EquilibriumSolver, PrimalDualNewton
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Leader, Mechanism, Output, Scene
 from fenicsmech.model import read_fidelity
@@ -30,12 +25,11 @@ from fenicsmech.report import Progress, Silent
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.dial import Choice, Dial, Outcome, Rung, corrections, refuse_beside_accuracy
 from fenicsmech.simulation.discretisation import Discretisation
-from fenicsmech.simulation.followed import FollowedCurve, PathEvent
+from fenicsmech.simulation.following import FollowedCurve, PathEvent
 from fenicsmech.simulation.mode_shape import ModeShape
 from fenicsmech.simulation.postprocessing import Postprocessing
-from fenicsmech.simulation.request import CurveRequest, read_path, read_request
-from fenicsmech.simulation.unloaded import unloaded_positions
-from fenicsmech.simulation.until import Until, check_until
+from fenicsmech.simulation.request import CurveRequest, Until, check_until, read_path, read_request
+from fenicsmech.simulation.tracing import unloaded_positions
 
 
 class Simulation(Postprocessing):
@@ -183,8 +177,7 @@ class Simulation(Postprocessing):
         """
         self._check_description()
         self._check_rung(part)
-        request = read_path(self.scene.mechanism, part, configuration=configuration, others=others)
-        check_until(until, part)
+        request = read_path(self.scene.mechanism, part, until=until, configuration=configuration, others=others)
         with Progress(until.frames, configuration.name) if self.comm.rank == 0 else Silent() as progress:
             self._last = self._discretisation.curves.follow(request, until, steps, progress.update)
         return self._last

@@ -90,7 +90,7 @@ def test_steps_of_a_led_force_and_of_constant_loads_do_not_depend_on_what_is_out
             simulation.load_displacement(push, forces=[load])
         with pytest.raises(fm.EquilibriumError, match="constant loads") as constant:
             simulation.load_displacement(push, forces=[0.0], others={other: load})
-        share = constant.value.last.state.share
+        share = constant.value.last.state.load_factor
         assert f"beyond {100.0 * share:.3g}% of them" in str(constant.value)
         reached += [led.value.last.force, share * load]
     assert reached == pytest.approx([reached[0]] * 4, rel=1e-6)
