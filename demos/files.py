@@ -13,15 +13,9 @@ from common import Demo
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.report import (
-    PALETTE,
-    CurveTarget,
-    check_summary,
-    draw_configurations,
-    format_table,
-    plot_curve,
-    write_summary,
-)
+from benchmarks.table import format_table
+from fenicsmech.files import write_json
+from fenicsmech.plot import PALETTE, CurveTarget, draw_configurations, plot_curve
 
 
 @dataclass(frozen=True)
@@ -70,8 +64,7 @@ def leave(outcome: Outcome) -> None:
         curve.write_csv(folder / f"curve{_suffix(curve, curves)}.csv", errors=estimates)
     if result is not None:
         result.save(folder / "design.json")
-    check_summary(summary)
-    write_summary(folder / "summary.json", summary)
+    write_json(folder / "summary.json", summary)
     tell(outcome, summary)
 
 

@@ -34,11 +34,7 @@ from fenicsmech.effects import (
 )
 from fenicsmech.elasticity import Displacement, Mixed
 from fenicsmech.equilibrium import (
-    AugmentedLagrangian,
-    Globalisation,
-    KktNewton,
     PrimalDualNewton,
-    Snes,
 )
 from fenicsmech.errors import AssemblyError, DescriptionError, EquilibriumError, FenicsmechError, MeshingError
 from fenicsmech.mechanism import (
@@ -88,7 +84,6 @@ __all__ = [
     "SMOOTH_SIL_950",
     "Arc",
     "AssemblyError",
-    "AugmentedLagrangian",
     "BFGS",
     "Configuration",
     "Curve",
@@ -106,7 +101,6 @@ __all__ = [
     "IsochoricNeoHookean",
     "IsochoricSimoNeoHookean",
     "LevenbergMarquardt",
-    "KktNewton",
     "Line",
     "LogarithmicNeoHookean",
     "Mass",
@@ -122,7 +116,6 @@ __all__ = [
     "Scene",
     "ShapeBounds",
     "Simulation",
-    "Snes",
     "SplineDesign",
     "StayClose",
     "Target",
@@ -135,7 +128,6 @@ __all__ = [
     "strip",
     "Contact",
     "Cylinder",
-    "Globalisation",
     "HalfPlane",
     "JointCompliance",
     "JointSpring",

@@ -19,9 +19,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenicsmech.design.optimisers import Infeasible
+from fenicsmech.design.description import Target
+from fenicsmech.design.optimisers.problem import Infeasible
 from fenicsmech.design.sensitivity import Adjoint
-from fenicsmech.design.spline_design import Target
 from fenicsmech.equilibrium import EquilibriumPoint, Iteration, LoadControl, NotConverged, State
 from fenicsmech.errors import EquilibriumError
 from fenicsmech.mechanism import FlexibleLink

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenicsmech.checks import finite, positive
-from fenicsmech.design.barrier import Barrier
-from fenicsmech.design.handle_optimum import Placement
-from fenicsmech.design.optimisers import Quadratic
+from fenicsmech.design.optimisers.problem import Quadratic
 from fenicsmech.design.rest_shape import DesignedLink, RestShape
+from fenicsmech.design.shape.handle_optimum import Placement
+from fenicsmech.design.shape.quality import Barrier
 
 Model = Callable[[np.ndarray], Quadratic]
 

@@ -11,7 +11,6 @@
 - ``linear``: which of the two solves, and by what rule
 - ``solver``: the interface of equilibrium solvers, and the tangent at an equilibrium
 - ``newton``: the default one, the primal–dual iteration
-- ``solvers``: others to choose and to compare
 - ``reactions``: what joints and motors exert
 """
 
@@ -36,7 +35,6 @@ from fenicsmech.equilibrium.load import PointLoad
 from fenicsmech.equilibrium.newton import Newton, PrimalDualNewton
 from fenicsmech.equilibrium.reactions import Reaction, joint_reactions, motor_torques
 from fenicsmech.equilibrium.solver import EquilibriumPoint, EquilibriumSolver, Iteration, Linearisation, NotConverged
-from fenicsmech.equilibrium.solvers import AugmentedLagrangian, Globalisation, KktNewton, Snes
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 from fenicsmech.equilibrium.two_level import TwoLevelSolver
@@ -44,7 +42,6 @@ from fenicsmech.equilibrium.two_level import TwoLevelSolver
 __all__ = [
     "ArcLengthControl",
     "ArcMetric",
-    "AugmentedLagrangian",
     "BySize",
     "Control",
     "Direct",
@@ -54,10 +51,8 @@ __all__ = [
     "EquilibriumSolver",
     "EquilibriumSystem",
     "Factor",
-    "Globalisation",
     "Iteration",
     "KktMatrix",
-    "KktNewton",
     "LinearMethod",
     "LinearSolver",
     "Linearisation",
@@ -71,7 +66,6 @@ __all__ = [
     "REGULARISATION",
     "Reaction",
     "Residual",
-    "Snes",
     "Stability",
     "State",
     "Step",

@@ -26,6 +26,7 @@ from fenicsmech.mechanism.places import in_dimension, mechanism_length, same_pla
 from fenicsmech.mechanism.scene import DRAWN, Configuration, Scene
 from fenicsmech.mechanism.shapes import (
     Arc,
+    Centreline,
     Disc,
     Line,
     MeshPart,
@@ -46,6 +47,7 @@ from fenicsmech.mechanism.validation import validate
 
 __all__ = [
     "Arc",
+    "Centreline",
     "Configuration",
     "DRAWN",
     "Disc",

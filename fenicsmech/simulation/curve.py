@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from fenicsmech.errors import DescriptionError
+from fenicsmech.files import write_csv
 from fenicsmech.mechanism import Configuration, Drive, Force, Leader, Motor, Units
 from fenicsmech.multibody import Freedom
-from fenicsmech.report import CurveSeries, plot_curve, write_curve_csv
+from fenicsmech.plot import CurveSeries, plot_curve
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.goal import Goal
 from fenicsmech.simulation.request import Axis, axes
@@ -164,7 +165,7 @@ class Curve:
                 columns[f"correction within the {self.goal.value} [{unit}]"] = np.array(self.corrections)
             if errors is not None:
                 columns[f"finer elements add to the {self.goal.value} [{unit}]"] = errors
-            write_curve_csv(Path(path), columns)
+            write_csv(Path(path), columns)
 
     def _corrected(self, goal: Goal, values: list[float]) -> np.ndarray:
         corrected = self.corrections and goal is self.goal

@@ -20,7 +20,7 @@ from fenicsmech.continuation import (
 from fenicsmech.equilibrium import EquilibriumPoint, Iteration, LoadControl, NotConverged, State
 from fenicsmech.errors import EquilibriumError
 from fenicsmech.model import MechanismModel
-from fenicsmech.report import CurveMark, CurveSeries
+from fenicsmech.plot import CurveMark, CurveSeries
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.mode_shape import ModeShape, mode_shape

@@ -10,7 +10,7 @@ from fenicsmech.mechanism import Force, Link, Mechanism, in_dimension
 from fenicsmech.meshing import MechanismMesh
 from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import Linkage
-from fenicsmech.report import (
+from fenicsmech.plot import (
     Arrow,
     FlexibleShape,
     MechanismShape,

@@ -16,7 +16,7 @@ from fenicsmech.mechanism import Force, Leader, Output
 from fenicsmech.meshing import radius_ratios
 from fenicsmech.model import Fidelity, MechanismModel
 from fenicsmech.multibody import Linkage
-from fenicsmech.report import Panel, Trace, draw_configurations
+from fenicsmech.plot import Panel, Trace, draw_configurations
 from fenicsmech.simulation.buckling import (
     BucklingLoad,
     BucklingPosition,

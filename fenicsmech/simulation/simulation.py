@@ -19,9 +19,9 @@ from fenicsmech.elasticity import (
 )
 from fenicsmech.equilibrium import EquilibriumSolver, PrimalDualNewton
 from fenicsmech.errors import DescriptionError
+from fenicsmech.log import Progress, Silent
 from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Leader, Mechanism, Output, Scene
 from fenicsmech.model import read_fidelity
-from fenicsmech.report import Progress, Silent
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.dial import Choice, Dial, Outcome, Rung, corrections, refuse_beside_accuracy
 from fenicsmech.simulation.discretisation import Discretisation

@@ -10,7 +10,7 @@ from fenicsmech.compat import create_mesh
 from fenicsmech.elasticity import ElasticBody, ElasticModel, Quadrature
 from fenicsmech.mechanism import EnergyLaw, Material, NeoHookean
 
-from ..report.grids import box, rectangle
+from ..plot.grids import box, rectangle
 
 
 def single_link(

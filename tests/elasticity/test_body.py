@@ -8,7 +8,7 @@ from fenicsmech.compat import cell_nodes, create_mesh
 from fenicsmech.elasticity import PLANE_STRAIN, ElasticBody, Quadrature
 from fenicsmech.mechanism import IsochoricNeoHookean, Material, NeoHookean
 
-from ..report.grids import rectangle
+from ..plot.grids import rectangle
 from . import textbook
 from .cases import each_case
 from .single_link import distorted, forces, interpolate, nodes, single_link, wave

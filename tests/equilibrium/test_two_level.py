@@ -7,16 +7,13 @@ from petsc4py import PETSc
 
 import fenicsmech as fm
 from fenicsmech.equilibrium import (
-    AugmentedLagrangian,
     BySize,
     Direct,
     DisplacementControl,
     Factor,
     KktMatrix,
-    KktNewton,
     LoadControl,
     PrimalDualNewton,
-    Snes,
     TwoLevel,
     TwoLevelSolver,
 )
@@ -246,15 +243,6 @@ def test_nor_do_they_suit_pressures_and_mid_planes_which_the_factor_solves_at_an
     simulation, tip = tongue(TwoLevel(), **unsuited)
     with pytest.raises(fm.DescriptionError, match="TwoLevel"):
         simulation.load_displacement(tip, forces=[0.02])
-
-
-@pytest.mark.parametrize("solver", [AugmentedLagrangian, KktNewton, Snes])
-def test_other_solvers_take_two_levels_too(solver):
-    curves = []
-    for linear in (TwoLevel(), Direct()):
-        simulation, push = finger("3d", size=6.0, solver=solver(linear=linear))
-        curves.append(simulation.load_displacement(push, forces=[0.5, 1.0]))
-    same(*curves)
 
 
 def test_followed_paths_end_where_those_of_the_factor_do():

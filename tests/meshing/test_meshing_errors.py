@@ -188,13 +188,6 @@ def test_senseless_arguments_are_refused(options):
         mesh_link("rod", BAR, **{"dim": 3, "size": 2.0, **options})
 
 
-def test_a_strip_thinner_than_its_pin_is_refused_before_meshing():
-    shape = strip([(0.0, 0.0), (60.0, 0.0)], thickness=1.0, depth=5.0)
-    site = InterfaceSite((0.0, 0.0), Disc(3.0), name="hinge")
-    with pytest.raises(MeshingError, match=r"'hinge' on link 'rod': the strip is thinner \(1\) than its pin"):
-        check_link("rod", shape, [site], {}, dim=2, size=1.0)
-
-
 @pytest.mark.parametrize(
     "shape",
     [

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from fenicsmech.mechanism import Disc, Rectangle, strip
-from fenicsmech.meshing import FREE, Centreline, InterfaceSite, cell_measures, mesh_link, radius_ratios
+from fenicsmech.mechanism import Centreline, Disc, Rectangle, strip
+from fenicsmech.meshing import FREE, InterfaceSite, cell_measures, mesh_link, radius_ratios
 
 STRAIGHT = [(0.0, 0.0), (40.0, 0.0)]
 BENT = [(0.0, 0.0), (18.0, 34.0), (40.0, 60.0)]

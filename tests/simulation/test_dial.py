@@ -7,7 +7,7 @@ import pytest
 
 import fenicsmech as fm
 from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRESS, SPATIAL, Mixed
-from fenicsmech.report import read_curve_csv
+from fenicsmech.files import read_csv
 from fenicsmech.simulation import Dial, Outcome, Rung, Trial, corrections, family
 
 from .demo_scenes import describe
@@ -103,7 +103,7 @@ def test_curves_are_as_accurate_as_asked_for_with_their_corrections(tmp_path):
         assert error < accuracy
         assert error < 0.5 * computed
     curve.write_csv(tmp_path / "curve.csv")
-    columns = read_curve_csv(tmp_path / "curve.csv")
+    columns = read_csv(tmp_path / "curve.csv")
     assert columns["correction within the displacement [mm]"] == pytest.approx(curve.corrections)
 
 

@@ -7,7 +7,8 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.meshing import PinHole, gmsh, gmsh_session, write_step
+from fenicsmech.export import PinHole, write_step
+from fenicsmech.meshing import gmsh, gmsh_session
 
 from ..meshing.bent_links import CURVED, DEPTH, LENGTH, RADIUS, STRAIGHT, THICKNESS, bent, bent_point, link
 

@@ -9,10 +9,11 @@ from dolfinx.io import XDMFFile
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.report import Trace, read_curve_csv
+from fenicsmech.files import read_csv
+from fenicsmech.plot import Trace
 from fenicsmech.simulation import gather
 
-from ..report.png import png_size, share_of_colour
+from ..plot.png import png_size, share_of_colour
 from .demo_scenes import describe
 
 pytestmark = pytest.mark.parallel
@@ -113,7 +114,7 @@ def test_curve_is_drawn_and_tabulated(shared_tmp_path):
     curve.write_csv(shared_tmp_path / "curve.csv")
     assert names(shared_tmp_path) == {"curve.png", "curve.csv"}
     assert min(png_size(shared_tmp_path / "curve.png")) > 300
-    table = read_curve_csv(shared_tmp_path / "curve.csv")
+    table = read_csv(shared_tmp_path / "curve.csv")
     assert table["force [N]"] == pytest.approx(FORCES, abs=0.0)
     assert table["displacement [mm]"] == pytest.approx(curve.displacements, abs=0.0)
     assert table["stable"] == pytest.approx([1.0, 1.0, 1.0])

@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 import fenicsmech as fm
 from fenicsmech.equilibrium import Iteration
-from fenicsmech.report import read_curve_csv
+from fenicsmech.files import read_csv
 
 from .demo_scenes import describe
 from .five_problems import case
@@ -94,7 +94,7 @@ def test_curve_file_names_what_the_errors_are_of(tmp_path):
     headers = []
     for number, made in enumerate((curve, held, followed)):
         made.write_csv(tmp_path / f"{number}.csv", errors=simulation.error_estimates(made))
-        (header,) = [name for name in read_curve_csv(tmp_path / f"{number}.csv") if name.startswith("finer")]
+        (header,) = [name for name in read_csv(tmp_path / f"{number}.csv") if name.startswith("finer")]
         headers.append(header)
     assert headers == ["finer elements add to the displacement [mm]", *2 * ["finer elements add to the force [N]"]]
 
@@ -128,8 +128,8 @@ def test_estimate_falls_with_the_mesh_and_vanishes_without_load():
 
 def test_estimate_takes_half_of_the_factors_of_its_frame_at_most(monkeypatch):
     simulation, push, forces = grasping()
-    factored, refactor = [], Iteration._refactor
-    monkeypatch.setattr(Iteration, "_refactor", lambda *args: factored.append(1) or refactor(*args))
+    factored, refactor = [], Iteration.factor
+    monkeypatch.setattr(Iteration, "factor", lambda *args: factored.append(1) or refactor(*args))
     curve = simulation.load_displacement(push, forces=forces)
     frames = len(factored)
     simulation.error_estimates(curve)
