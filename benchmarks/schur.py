@@ -49,14 +49,11 @@ class SchurSolver:
     """
 
     def __init__(self, system: EquilibriumSystem, matrix: PETSc.Mat, multigrid: Multigrid) -> None:
-        layout = system.layout
-        border = layout.extras if layout.last else 0
-        self._free = PETSc.IS().createStride(len(layout.free), layout.first_unknown, 1, comm=matrix.comm)
-        self._border = PETSc.IS().createStride(border, layout.first_extra, 1, comm=matrix.comm)
+        self._free, self._border = system.blocks.links.index_set(), system.blocks.border.index_set()
         self._b = matrix.createSubMatrix(self._border, self._free)
         self._c = matrix.createSubMatrix(self._border, self._border)
         k = matrix.createSubMatrix(self._free, self._free)
-        k.setBlockSize(layout.per_node)
+        k.setBlockSize(system.numbering.per_node)
         k.setNearNullSpace(rigid_motions(system))
         self._ksp = self._solver(k, multigrid)
         norms = self._columns_of_border()
@@ -141,10 +138,10 @@ class SchurSolver:
 
 def rigid_motions(system: EquilibriumSystem) -> PETSc.NullSpace:
     """Translations and rotations of the free nodes where they are now."""
-    layout, u = system.layout, system.elastic.u
-    dim = layout.per_node
-    nodes = layout.free[::dim] // dim
+    numbering, u = system.numbering, system.elastic.u
+    dim = numbering.per_node
+    nodes = numbering.free[::dim] // dim
     drawn = u.function_space.tabulate_dof_coordinates()[nodes, :dim]
     moved = drawn + u.x.array.reshape(-1, dim)[nodes]
-    positions = PETSc.Vec().createWithArray(moved.ravel(), bsize=dim, comm=layout.comm)
+    positions = PETSc.Vec().createWithArray(moved.ravel(), bsize=dim, comm=system.comm)
     return PETSc.NullSpace().createRigidBody(positions)

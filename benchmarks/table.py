@@ -14,6 +14,7 @@ import dolfinx
 import numpy as np
 from mpi4py import MPI
 
+import fenicsmech as fm
 from fenicsmech.errors import DescriptionError
 from fenicsmech.files import atomic_write
 
@@ -21,11 +22,12 @@ ROOT = Path(__file__).parents[1]
 
 
 def command(description: str) -> argparse.ArgumentParser:
-    """The options that every benchmark has.
+    """The options that every benchmark has; an error on one process ends all.
 
     Args:
         description: the docstring of the benchmark; its first line is the help text.
     """
+    fm.mpi_abort_on_error()
     parser = argparse.ArgumentParser(description=description.splitlines()[0])
     parser.add_argument("--write", action="store_true", help="write the table to docs/tables/ as well")
     return parser

@@ -5,7 +5,7 @@ Describe a mechanism (``Mechanism``), say what acts on it (``Scene``) and how fi
 (``DesignProblem``), and ask for their shapes.
 """
 
-from fenicsmech.collective import end_together
+from fenicsmech.collective import mpi_abort_on_error
 from fenicsmech.continuation import ArcSteps, Critical
 from fenicsmech.design import (
     BFGS,
@@ -122,6 +122,7 @@ __all__ = [
     "Units",
     "fit_modulus",
     "gmsh_mesh",
+    "mpi_abort_on_error",
     "outline",
     "polygon",
     "step",
@@ -145,5 +146,3 @@ __all__ = [
     "SoftMode",
     "Until",
 ]
-
-end_together()

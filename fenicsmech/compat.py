@@ -15,6 +15,7 @@ from dolfinx import fem, io
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from petsc4py import PETSc
+from scipy.sparse import csr_matrix
 
 from fenicsmech.kernel_cache import compiling, options
 
@@ -80,6 +81,23 @@ def cell_dofs(space: fem.FunctionSpace) -> np.ndarray:
     """Local nodes of a space in every cell on this rank, in the reference cell's order, (cells, nodes per cell)."""
     dofmap = space.dofmap
     return dofmap.list.array.reshape(-1, dofmap.dof_layout.num_dofs) if _LEGACY else np.asarray(dofmap.list)
+
+
+def interpolation_matrix(coarse: fem.FunctionSpace, fine: fem.FunctionSpace) -> csr_matrix:
+    """Interpolation of functions on ``coarse`` by functions on ``fine``.
+
+    Returns:
+        This rank's owned DOFs of ``fine`` by all DOFs of ``coarse``, numbered over all ranks.
+    """
+    matrix = dolfinx.cpp.fem.petsc.interpolation_matrix(coarse._cpp_object, fine._cpp_object)
+    matrix.assemble()
+    starts, columns, values = matrix.getValuesCSR()
+    shape = matrix.getLocalSize()[0], matrix.getSize()[1]
+    matrix.destroy()  # what is on the communicator of a mesh is not collected
+    values[np.abs(values) < 1e-12] = 0.0  # rounding
+    found = csr_matrix((values, columns, starts), shape=shape)
+    found.eliminate_zeros()
+    return found
 
 
 def vector_space(mesh: dmesh.Mesh, degree: int) -> fem.FunctionSpace:
@@ -175,6 +193,17 @@ def assemble_matrix(form, comm: MPI.Comm) -> PETSc.Mat:
     matrix.setLGMap(*own.getLGMap())
     own.destroy()
     return matrix
+
+
+def create_block_matrix(forms) -> PETSc.Mat:
+    """An empty matrix for compiled bilinear ``forms``, a list of rows; per rank, the owned values of each space."""
+    return fem.petsc.create_matrix_block(forms) if _VERSION < (0, 10) else fem.petsc.create_matrix(forms)
+
+
+def add_blocks(matrix: PETSc.Mat, forms) -> None:
+    """Adds ``forms`` into a matrix made by ``create_block_matrix``, which it leaves unassembled."""
+    assemble = fem.petsc.assemble_matrix_block if _VERSION < (0, 10) else fem.petsc.assemble_matrix
+    assemble(matrix, forms)
 
 
 def destroy_garbage(comm: MPI.Comm) -> None:

@@ -16,13 +16,13 @@ from fenicsmech.errors import DescriptionError
 ROOT = "fenicsmech"
 
 
-class _RankZero(logging.Filter):
-    """Drops the records of every rank but the first, so that a message appears once whatever the number of ranks."""
+class _RankZero(logging.LoggerAdapter):
+    """A logger that is silent on every rank but the first, so that a message appears once whatever their number."""
 
-    def filter(self, record: logging.LogRecord) -> bool:
+    def isEnabledFor(self, level: int) -> bool:
         from mpi4py import MPI  # here, not above: describing a mechanism must not start MPI
 
-        return MPI.COMM_WORLD.rank == 0
+        return MPI.COMM_WORLD.rank == 0 and super().isEnabledFor(level)
 
 
 class _Console(logging.StreamHandler):
@@ -33,21 +33,16 @@ class _Console(logging.StreamHandler):
         self.setFormatter(logging.Formatter("%(asctime)s %(levelname)-7s %(name)s: %(message)s", "%H:%M:%S"))
 
 
-_RANK_ZERO = _RankZero()
-
-
-def logger(name: str) -> logging.Logger:
+def logger(name: str) -> logging.LoggerAdapter:
     """The logger of a module.
 
     Args:
         name: the module's `__name__`.
 
     Returns:
-        The standard logger of that name; it emits on rank 0 of MPI.COMM_WORLD only.
+        The standard logger of that name, which emits on rank 0 of MPI.COMM_WORLD only.
     """
-    found = logging.getLogger(name)
-    found.addFilter(_RANK_ZERO)  # on each logger: a filter on a parent does not see the records of its children
-    return found
+    return _RankZero(logging.getLogger(name), {})
 
 
 def configure(level: int = logging.INFO) -> None:

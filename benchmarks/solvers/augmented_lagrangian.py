@@ -28,6 +28,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fenicsmech.equilibrium import (
+    Border,
     Control,
     EquilibriumPoint,
     EquilibriumSolver,
@@ -62,7 +63,7 @@ class AugmentedLagrangian(EquilibriumSolver):
     growth: float = 100.0
 
     def on(self, system: EquilibriumSystem) -> AugmentedLagrangianIteration:
-        if system.layout.pressures:
+        if system.blocks.pressures.size:
             raise DescriptionError(
                 "solver",
                 "the augmented Lagrangian method minimises, and links have pressures of their own, in which the energy "
@@ -123,13 +124,13 @@ class AugmentedLagrangianIteration(Iteration):
 
     def _updated(self, state: State, control: Control, softness: float) -> State:
         """``state``, whose multipliers are λ, with λ⁺ instead; softness is 1/μ."""
-        system, layout = self.system, self.system.layout
-        weight = softness / system.unknowns.scale[layout.multipliers] ** 2
+        system = self.system
+        weight = self._weights(softness).multipliers
         violation = system.constraints(state, np.zeros(system.joints.rows))
         multipliers = (weight * state.multipliers - violation) / (weight + system.compliances)
         force = state.force
         if control.constrained:
-            force -= (system.load_displacement(state) - control.target) / self._force_weight(softness)
+            force -= (system.load_displacement(state) - control.target) / self._weights(softness).load[0]
         return replace(state, multipliers=multipliers, force=force)
 
     def _value(self, state: State, control: Control, softness: float) -> float:
@@ -137,33 +138,33 @@ class AugmentedLagrangianIteration(Iteration):
         system = self.system
         new = self._updated(state, control, softness)
         multipliers, change = new.multipliers, new.multipliers - state.multipliers
-        weight = softness / system.unknowns.scale[system.layout.multipliers] ** 2
+        weight = self._weights(softness).multipliers
         value = system.potential(state, new.force) - multipliers @ system.constraints(state, 0.5 * multipliers)
         value -= 0.5 * change @ (weight * change)
         if control.constrained:
-            value += new.force * control.target - 0.5 * self._force_weight(softness) * (new.force - state.force) ** 2
+            value += new.force * control.target - 0.5 * self._weights(softness).load[0] * (new.force - state.force) ** 2
         return value
 
-    def _force_weight(self, softness: float) -> float:
-        return softness / self.system.unknowns.scale[self.system.layout.force] ** 2
+    def _weights(self, softness: float) -> Border:
+        """``softness`` in the units of the multipliers and the load."""
+        return self.system.blocks.restrict_border(softness / self.system.unknowns.scale**2)
 
     def _parts(self, residual: Residual) -> tuple[float, float]:
         """|∇L_A|, and |C| over the mechanism's length, of a residual at λ⁺."""
-        layout, local = self.system.layout, residual.vector.array_r
-        states = len(layout.free) + (self.system.joints.size if layout.last else 0)
+        local, states = residual.vector.array_r, self.system.blocks.multipliers.local.start
         squares = [float(part @ part) for part in (local[:states], local[states:])]
-        gradient, violation = (math.sqrt(layout.comm.allreduce(square)) for square in squares)
+        gradient, violation = (math.sqrt(self.system.comm.allreduce(square)) for square in squares)
         return gradient, violation / self.system.unknowns.unit
 
     def _direction(
         self, current: State, control: Control, residual: Residual, softness: float, floor: float, *, last: float
     ) -> tuple[Step, float, float]:
         """The Newton step of s, with δ grown until it descends; the slope of L_A along it; δ."""
-        system, layout = self.system, self.system.layout
+        system = self.system
         system.linearise(current, control, residual)
         system.kkt.soften(softness, control)
         right = residual.vector.copy()
-        right.array_w[len(layout.free) + (system.joints.size if layout.last else 0) :] = 0.0
+        right.array_w[system.blocks.multipliers.local.start :] = 0.0
         shift, following = floor, max(_LEAST_SHIFT, last / 3.0)
         for _ in range(20):
             x = self.try_solve(right, self.step_accuracy(residual)) if self.factor(shift) else None

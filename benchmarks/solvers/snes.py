@@ -82,7 +82,7 @@ class SNESIteration(Iteration):
 
     def _create(self, equations: _Equations) -> PETSc.SNES:
         system, chosen = self.system, self.options.globalisation
-        snes = PETSc.SNES().create(system.layout.comm)
+        snes = PETSc.SNES().create(system.comm)
         options = PETSc.Options(_PREFIX)
         options["snes_linesearch_type"] = "basic" if chosen is Globalisation.TRUST_REGION else chosen.value
         options["snes_tr_delta0"] = _FIRST_RADIUS * system.unknowns.unit * math.sqrt(equations.residual.vector.size)

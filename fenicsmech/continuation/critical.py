@@ -167,7 +167,7 @@ class _SoftestMode:
         self._mask = system.unknowns.coordinates_mask()
         self._mode = self._mask.duplicate()
         # without symmetry, so that it has something of every mode in it
-        self._mode.array_w[:] = np.random.default_rng(system.layout.comm.rank).standard_normal(self._mode.local_size)
+        self._mode.array_w[:] = np.random.default_rng(system.comm.rank).standard_normal(self._mode.local_size)
 
     def stiffness(self, at: Linearisation) -> float:
         """μ of a tangent, to a relative change of 1e-3.

@@ -148,7 +148,7 @@ def _largest(
         apply: the map.
         count: how many.
     """
-    comm = system.layout.comm
+    comm = system.comm
     total = comm.allreduce(size)
     operator = PETSc.Mat().createPython(((size, total), (size, total)), _Operator(apply), comm=comm)
     solver = SLEPc.EPS().create(comm)

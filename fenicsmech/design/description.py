@@ -10,7 +10,6 @@ import numpy as np
 from fenicsmech.checks import finite, positive
 from fenicsmech.design.shape.shape_map import ShapeRequest
 from fenicsmech.errors import DescriptionError
-from fenicsmech.joints import WELD
 from fenicsmech.mechanism import DRAWN, Centreline, Configuration, FlexibleLink, Force, Mechanism, Strip
 from fenicsmech.multibody import Linkage, assemble
 from fenicsmech.simulation import Simulation, read_request
@@ -137,7 +136,7 @@ def shape_request(design: SplineDesign, mechanism: Mechanism, linkage: Linkage) 
         )
     for _ in range(design.segments - len(gaps)):
         interior[int(np.argmax(gaps / (interior + 1)))] += 1
-    welded = {joint.at[:2] for joint in mechanism.joints if joint.kind is WELD and link in (joint.a, joint.b)}
+    welded = {joint.at[:2] for joint in mechanism.joints if joint.kind.clamps and link in (joint.a, joint.b)}
     return ShapeRequest(
         link=mechanism.flexible_links.index(link),
         name=link.name,

@@ -14,10 +14,7 @@ from dataclasses import dataclass
 from fenicsmech.checks import positive
 from fenicsmech.effects.protocol import JointSoftening
 from fenicsmech.errors import DescriptionError
-from fenicsmech.joints import REVOLUTE, SPHERICAL, UNIVERSAL, WELD
 from fenicsmech.mechanism import Joint
-
-_PINNED = (REVOLUTE, SPHERICAL, UNIVERSAL, WELD)  # their first equations are x_b − x_a = 0
 
 
 @dataclass(frozen=True)
@@ -46,7 +43,7 @@ class JointCompliance(JointSoftening):
             raise DescriptionError(
                 name, f"{self.joint.name!r} is no joint of {mechanism.name!r}", "Name a joint of the mechanism"
             )
-        if self.joint.kind not in _PINNED:
+        if not self.joint.kind.shares_point:
             raise DescriptionError(
                 name,
                 f"the links of a {self.joint.kind.name} joint share no point",

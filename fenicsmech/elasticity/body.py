@@ -22,9 +22,11 @@ from dolfinx import mesh as dmesh
 from petsc4py import PETSc
 
 from fenicsmech.compat import (
+    add_blocks,
     assemble_vector,
     compile_expression,
     compile_form,
+    create_block_matrix,
     evaluate_expression,
 )
 from fenicsmech.elasticity.energies import density
@@ -226,14 +228,14 @@ class ElasticBody(BodyFields):
         """An empty matrix for ``tangent``: per rank, the owned values of u, then those of p (collective)."""
         if self.pressure is None:
             return fem.petsc.create_matrix(self.tangent_form)
-        return fem.petsc.create_matrix_block(self.tangent_blocks)
+        return create_block_matrix(self.tangent_blocks)
 
     def tangent(self, matrix: PETSc.Mat) -> None:
         """Adds ∂²E/∂(u, p)² into ``matrix`` (collective; leaves it unassembled)."""
         if self.pressure is None:
             fem.petsc.assemble_matrix(matrix, self.tangent_form)
         else:
-            fem.petsc.assemble_matrix_block(matrix, self.tangent_blocks)
+            add_blocks(matrix, self.tangent_blocks)
 
     @cached_property
     def pressure_unit(self) -> float:

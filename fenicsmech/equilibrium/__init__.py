@@ -1,19 +1,19 @@
 """Equilibria of a mechanism: elements and joints meet here.
 
-- ``state``, ``fields``: displacements, poses, multipliers; the finite-element fields that hold them
-- ``load``, ``loads``, ``potentials``: point loads, and what depends on poses of bodies
+- ``state``: displacements, poses, multipliers, controlled force
 - ``control``: what is prescribed: a force, a displacement, motors, an arc length
-- ``layout``, ``unknowns``: where each unknown stands, and the change of state it stands for
-- ``extras``, ``matrices``, ``entry_copy``, ``kkt``: the distributed KKT matrix
+- ``blocks``, ``unknowns``: where each unknown stands, and the change of state it stands for
+- ``border``: loads, potentials of poses and joints
+- ``kkt``: the distributed KKT matrix
 - ``system``: energy, residual and KKT matrix at a state
-- ``factor``: LDLᵀ with inertia
-- ``coarse``, ``smoother``, ``two_level``: conjugate gradients where the factor is too large
-- ``linear``: which of the two solves, and by what rule
+- ``linear``: its factor LDLᵀ with inertia, or conjugate gradients on two levels where that is too large
 - ``solver``: the interface of equilibrium solvers, and the tangent at an equilibrium
 - ``newton``: the default one, the primal–dual iteration
 - ``reactions``: what joints and motors exert
 """
 
+from fenicsmech.equilibrium.blocks import Block, Blocks, Border
+from fenicsmech.equilibrium.border import REGULARISATION, PointLoad
 from fenicsmech.equilibrium.control import (
     ArcLengthControl,
     ArcMetric,
@@ -25,23 +25,20 @@ from fenicsmech.equilibrium.control import (
     Stability,
     mean_product,
 )
-from fenicsmech.equilibrium.entry_copy import EntryCopy
-from fenicsmech.equilibrium.extras import REGULARISATION
-from fenicsmech.equilibrium.factor import Factor
-from fenicsmech.equilibrium.fields import load_fields
-from fenicsmech.equilibrium.kkt import KktMatrix
-from fenicsmech.equilibrium.linear import BySize, Direct, LinearMethod, LinearSolver, TwoLevel
-from fenicsmech.equilibrium.load import PointLoad
+from fenicsmech.equilibrium.kkt import EntryCopy, KktMatrix
+from fenicsmech.equilibrium.linear import BySize, Direct, Factor, LinearMethod, LinearSolver, TwoLevel, TwoLevelSolver
 from fenicsmech.equilibrium.newton import Newton, PrimalDualNewton
 from fenicsmech.equilibrium.reactions import Reaction, joint_reactions, motor_torques
 from fenicsmech.equilibrium.solver import EquilibriumPoint, EquilibriumSolver, Iteration, Linearisation, NotConverged
-from fenicsmech.equilibrium.state import State, Step
+from fenicsmech.equilibrium.state import State, Step, load_fields
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
-from fenicsmech.equilibrium.two_level import TwoLevelSolver
 
 __all__ = [
     "ArcLengthControl",
     "ArcMetric",
+    "Block",
+    "Blocks",
+    "Border",
     "BySize",
     "Control",
     "Direct",

@@ -262,10 +262,10 @@ class ArcMetric:
 
 def mean_product(system, a: Step, b: Step) -> float:
     """Mean product of two motions of free nodes and bodies, displacements over the mechanism's length."""
-    layout, joints = system.layout, system.joints
-    free = layout.free[: layout.free_displacements]
+    comm, joints = system.comm, system.joints
+    free = system.numbering.free[system.blocks.nodes.local]
     own = np.array([float(a.u[free] @ b.u[free]) / joints.length**2, float(len(free))])
-    nodes, count = layout.comm.allreduce(own)
+    nodes, count = comm.allreduce(own)
     bodies = float(np.sum(a.z * b.z / joints.pose_scale**2))
     return nodes / max(count, 1.0) + bodies / max(len(a.z), 1)
 

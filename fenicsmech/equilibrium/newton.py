@@ -121,7 +121,7 @@ class Newton(Iteration):
             except NotConverged as failure:
                 return self.accept_best(*best, control, residuals, failure)
             # a pressure of its own is a stress that the step solves for already
-            passed = (before, length * motion) if options.mixed_stress and not system.layout.pressures else None
+            passed = (before, length * motion) if options.mixed_stress and not system.blocks.pressures.size else None
             if near and residual.norm > norm and not self.converged(residual, norm):
                 if missed is None and self.relative(residual) < options.near:
                     missed = before  # once may happen: just beyond a bifurcation small residuals hide large motions

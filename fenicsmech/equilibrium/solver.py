@@ -23,10 +23,9 @@ from petsc4py import PETSc
 
 from fenicsmech.checks import positive
 from fenicsmech.compat import destroy_garbage
+from fenicsmech.equilibrium.border import PointLoad
 from fenicsmech.equilibrium.control import ArcLengthControl, Control, Stability
-from fenicsmech.equilibrium.factor import Inertia
-from fenicsmech.equilibrium.linear import BySize, LinearMethod, LinearSolver
-from fenicsmech.equilibrium.load import PointLoad
+from fenicsmech.equilibrium.linear import BySize, Inertia, LinearMethod, LinearSolver
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 
@@ -166,7 +165,7 @@ class Linearisation:
         self._check()
         self._turn()
         system, control = self._system, self.control
-        destroy_garbage(system.layout.comm)
+        destroy_garbage(system.comm)
         right = control.rate(system, self.state)
         x = right.duplicate()
         with system.clock.phase("solve"):
@@ -294,7 +293,7 @@ class Iteration(ABC):
     @property
     def expected(self) -> int:
         """Negative eigenvalues where stable: one per multiplier and pressure, one for the controlled force."""
-        return self.system.joints.rows + 1 + self.system.layout.pressures
+        return self.system.joints.rows + 1 + self.system.blocks.pressures.size
 
     def relative(self, residual: Residual) -> float:
         """The residual over the forces that balance in it."""

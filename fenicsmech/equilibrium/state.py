@@ -1,4 +1,4 @@
-"""The state of a mechanism: displacement, poses, multipliers, controlled force."""
+"""The state of a mechanism: displacements, poses, multipliers, controlled force; and the fields that hold it."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+
+from fenicsmech.elasticity import ElasticBody
+from fenicsmech.multibody import InterfaceMap
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,3 +72,11 @@ class Step:
 
         u, z = outside(self.u, [step.u for step in steps]), outside(self.z, [step.z for step in steps])
         return replace(self, u=u, z=z)
+
+
+def load_fields(elastic: ElasticBody, interfaces: InterfaceMap, state: State) -> None:
+    """Makes the fields of ``elastic`` hold ``state``, with interface nodes on their bodies."""
+    elastic.take(state.u)
+    elastic.share.value = state.load_factor
+    elastic.update()
+    interfaces.place(state.poses)

@@ -1,15 +1,13 @@
-"""What the user describes, as pure data.
+"""The description of a mechanism, as pure data.
 
 - ``materials``: elastic constants and strain-energy laws
 - ``shapes``: strips, outlines, STEP parts, meshes; interface regions
-- ``parts``: links, joints, motors, forces, outputs
+- ``parts``: links, joints, motors, forces, outputs, and where they are
 - ``mechanism``: the builder that collects parts
-- ``scene``: effects and configurations; ``effect``: what effects have in common; ``units``: labels
-- ``places``: positions in a dimension, and which are one place
-- ``validation``: checks of the whole; ``checks``: checks of single values
+- ``scene``: effects, configurations and names of units
+- ``validation``: checks of the whole
 """
 
-from fenicsmech.mechanism.effect import Effect
 from fenicsmech.mechanism.materials import (
     ONYX,
     SMOOTH_SIL_950,
@@ -21,9 +19,20 @@ from fenicsmech.mechanism.materials import (
     NeoHookean,
 )
 from fenicsmech.mechanism.mechanism import Mechanism
-from fenicsmech.mechanism.parts import Drive, FlexibleLink, Force, Joint, Leader, Link, Motor, Output, RigidLink
-from fenicsmech.mechanism.places import in_dimension, mechanism_length, same_place
-from fenicsmech.mechanism.scene import DRAWN, Configuration, Scene
+from fenicsmech.mechanism.parts import (
+    Drive,
+    FlexibleLink,
+    Force,
+    Joint,
+    Leader,
+    Link,
+    Motor,
+    Output,
+    RigidLink,
+    in_dimension,
+    same_place,
+)
+from fenicsmech.mechanism.scene import DRAWN, Configuration, Effect, Scene, Units
 from fenicsmech.mechanism.shapes import (
     Arc,
     Centreline,
@@ -42,7 +51,6 @@ from fenicsmech.mechanism.shapes import (
     step,
     strip,
 )
-from fenicsmech.mechanism.units import Units
 from fenicsmech.mechanism.validation import validate
 
 __all__ = [
@@ -82,7 +90,6 @@ __all__ = [
     "Units",
     "gmsh_mesh",
     "in_dimension",
-    "mechanism_length",
     "outline",
     "polygon",
     "same_place",

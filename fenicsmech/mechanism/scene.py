@@ -1,16 +1,44 @@
-"""What acts on a mechanism: the effects simulated and the configurations it is looked at in."""
+"""The scene of a mechanism: the effects simulated, its configurations, and names of units."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from fenicsmech.checks import finite
 from fenicsmech.errors import DescriptionError
-from fenicsmech.mechanism.effect import Effect
 from fenicsmech.mechanism.mechanism import Mechanism
 from fenicsmech.mechanism.parts import Motor
-from fenicsmech.mechanism.units import Units
+
+
+class Effect(ABC):
+    """Something that acts on a mechanism beside its links, joints and forces.
+
+    An effect is described by a frozen dataclass. What it does to equilibria it says in the terms of the ``effects``
+    layer, one file per effect.
+    """
+
+    @abstractmethod
+    def check(self, mechanism: Mechanism, dim: int) -> None:
+        """Refuses what makes no sense for ``mechanism`` in ``dim`` dimensions.
+
+        Raises:
+            DescriptionError: saying which part, and the remedy.
+        """
+
+    @abstractmethod
+    def explain(self) -> str:
+        """The effect in one plain sentence without a full stop."""
+
+
+@dataclass(frozen=True)
+class Units:
+    """Names of a consistent set of units, stress in force over length squared; for labels only."""
+
+    length: str = "mm"
+    force: str = "N"
+    stress: str = "MPa"
 
 
 @dataclass(frozen=True)
@@ -34,6 +62,10 @@ class Configuration:
             for motor, value in self.positions
         )
         object.__setattr__(self, "positions", tuple(checked))
+
+    def __repr__(self) -> str:
+        positions = ", ".join(f"{motor.name!r} at {position:g}" for motor, position in self.positions)
+        return f"Configuration({self.name!r}: {positions or 'every motor as drawn'})"
 
     def position(self, motor: Motor) -> float:
         """The position of ``motor``: 0 (as drawn) unless given."""
@@ -67,6 +99,10 @@ class Scene:
                 raise DescriptionError(
                     "scene", f"{effect!r} is not an effect", "List effects, as Gravity(…); links, joints and forces act"
                 )
+
+    def __repr__(self) -> str:
+        effects = "; ".join(effect.explain() for effect in self.effects)
+        return f"Scene({self.mechanism.name!r}: {effects or 'no effects'})"
 
     def configuration(self, name: str, positions: Mapping[Motor, float]) -> Configuration:
         """A configuration with the given motor positions (rad or length, from the drawn configuration).

@@ -18,7 +18,6 @@ import numpy as np
 
 from fenicsmech.checks import positive
 from fenicsmech.errors import DescriptionError
-from fenicsmech.joints import REVOLUTE
 from fenicsmech.mechanism import Joint
 from fenicsmech.multibody import JointCoordinate, Linkage
 from fenicsmech.simulation.curve import Curve
@@ -70,7 +69,8 @@ def friction_band(
         raise DescriptionError("friction band", "the curve has one frame only", "Ask for two forces or more")
     angles, moments = [], []
     for joint, pin in pins.items():
-        if joint.kind != REVOLUTE or joint.name not in curve.frames[0].reactions:
+        is_hinge = joint.kind.motorised and not joint.kind.sliding
+        if not is_hinge or joint.name not in curve.frames[0].reactions:
             raise DescriptionError(
                 "friction band", f"{joint.name!r} is no hinge of this curve that turns", "Name its revolute joints"
             )

@@ -35,9 +35,9 @@ from fenicsmech.multibody import (
     Assembly,
     BodyPoint,
     Freedom,
-    Holding,
     Linkage,
     Motion,
+    SpringPotential,
     assemble,
     free_motions,
     is_held,
@@ -305,7 +305,7 @@ class CurveTracer:
 
 
 def unloaded_positions(
-    linkage: Linkage, part: Force | Output, configurations: Sequence[Configuration], holding: Sequence[Holding]
+    linkage: Linkage, part: Force | Output, configurations: Sequence[Configuration], holding: Sequence[SpringPotential]
 ) -> np.ndarray:
     """Positions of the point of a force or output in each unloaded configuration, (configurations, dim).
 

@@ -20,7 +20,7 @@ def test_gradient_and_matrix_are_derivatives_of_the_value(space, kind):
     system, control = system_of(case, controlled=case.on_rigid), control_of(kind)
     iteration = AugmentedLagrangian().on(system)
     state = control.prepare(random_state(case, system))
-    states = len(system.layout.free) + system.joints.size
+    states = system.blocks.multipliers.local.start
 
     way = system.unknowns.control_row()
     way.array[:] = np.random.default_rng(2).standard_normal(len(way.array))

@@ -33,10 +33,17 @@ SHAPES = {
     "curved, an eye in the middle": lambda size: link(size, pins=(0, 1, 2)),
     "curved, round ends": lambda size: link(size, radius=0.5 * THICKNESS),
     "straight, wide eyes": lambda size: link(size, points=STRAIGHT, radius=THICKNESS, pins=(0, 1, 2)),
+    "curved, eyes much wider than the strip": lambda size: link(size, radius=2.5 * THICKNESS, pins=(0, 1, 2)),
     "bent": lambda size: bent(link(size, points=STRAIGHT)),
     "bent, round ends": lambda size: bent(link(size, points=STRAIGHT, radius=0.5 * THICKNESS)),
 }
-CORNERS = {"curved, an eye in the middle": 8, "curved, round ends": 0, "straight, wide eyes": 8, "bent, round ends": 0}
+CORNERS = {
+    "curved, an eye in the middle": 8,
+    "curved, round ends": 0,
+    "straight, wide eyes": 8,
+    "curved, eyes much wider than the strip": 8,
+    "bent, round ends": 0,
+}
 
 
 @pytest.mark.parametrize("size", [1.0, 1.73, 3.0])

@@ -12,7 +12,7 @@ from fenicsmech.export import PinHole, write_step, write_stl
 from fenicsmech.mechanism import step
 from fenicsmech.meshing import boundary_loops, cell_measures, gmsh, gmsh_session, mesh_link
 
-from ..meshing.bent_links import CURVED, DEPTH, LENGTH, RADIUS, STRAIGHT, bent, bent_point, link
+from ..meshing.bent_links import CURVED, DEPTH, LENGTH, RADIUS, STRAIGHT, THICKNESS, bent, bent_point, link
 
 PART = Path(__file__).parents[2] / "meshes" / "curved_link.step"
 PINS = (PinHole(CURVED[0], RADIUS), PinHole(CURVED[-1], RADIUS))
@@ -120,6 +120,23 @@ def test_the_surface_is_closed_and_looks_outward(name, dim, tmp_path):
     volume = np.einsum("md,md->", corners[:, 0], outward) / 6.0
     assert volume == pytest.approx(DEPTH * (plan_area(mesh) - holes_area(pins)), rel=5e-3)
     assert np.einsum("md,md->m", normals, outward) == pytest.approx(np.linalg.norm(outward, axis=1), rel=1e-3)
+
+
+def test_eyes_much_wider_than_the_strip_are_exported(tmp_path):
+    radius = 2.5 * THICKNESS
+    mesh = link(1.0, points=STRAIGHT, radius=radius)
+    pins = [PinHole(at, RADIUS) for at in (STRAIGHT[0], STRAIGHT[-1])]
+    half = 0.5 * THICKNESS
+    inside = half * np.sqrt(radius**2 - half**2) + radius**2 * np.arcsin(half / radius)  # of the strip, in one eye
+    area = LENGTH * THICKNESS + 2.0 * (np.pi * radius**2 - inside) - holes_area(pins)
+    write_step(tmp_path / "link.step", mesh, depth=DEPTH, pins=pins)
+    with gmsh_session("again"):
+        (solid,) = gmsh.model.occ.importShapes(str(tmp_path / "link.step"))
+        assert gmsh.model.occ.getMass(*solid) == pytest.approx(DEPTH * area, rel=1e-6)
+    write_stl(tmp_path / "link.stl", mesh, depth=DEPTH, pins=pins)
+    _, corners = facets_of(tmp_path / "link.stl")
+    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert np.einsum("md,md->", corners[:, 0], outward) / 6.0 == pytest.approx(DEPTH * area, rel=2e-3)
 
 
 def test_facets_are_as_fine_as_asked_for(tmp_path):

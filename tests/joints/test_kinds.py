@@ -63,4 +63,4 @@ def test_a_new_joint_is_one_class():
             apart = b.origin - a.origin
             return [apart.dot(a.e1), apart.dot(a.e2)]
 
-    assert constraint(Pin(), 3, False).rows == 2
+    assert constraint(Pin(), 3, False).size == 2

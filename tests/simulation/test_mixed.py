@@ -50,17 +50,17 @@ def test_nothing_is_added_where_no_link_is_bulky(space):
         simulation, push = arm(materials, space=space, formulation=formulation)
         system = simulation.newton(push).system
         elastic = simulation.model.elastic
-        hat = system.kkt.extended
+        extended = system.kkt.extended
         found.append(
             (
                 elastic.energy_ufl.signature(),
-                hat.size,
-                hat.getInfo()["nz_used"],
-                hat.getBlockSize(),
-                system.layout.block,
+                extended.size,
+                extended.getInfo()["nz_used"],
+                extended.getBlockSize(),
+                system.numbering.block,
             )
         )
-        assert elastic.pressure is None and simulation.model.pressure_dofs == system.layout.pressures == 0
+        assert elastic.pressure is None and simulation.model.pressure_dofs == system.blocks.pressures.size == 0
         assert len(elastic.fields) == 1
     assert found[0] == found[1]
 

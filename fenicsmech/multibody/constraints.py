@@ -1,4 +1,4 @@
-"""All constraints between a set of bodies: C(z), A = ∂C/∂z, Σ λ_k ∂²C_k/∂z².
+"""Bodies that move rigidly, and all constraints between them: C(z), A = ∂C/∂z, Σ λ_k ∂²C_k/∂z².
 
 Rows: the connections in order (a motor's row last in its connection), then the norm constraints of the
 unfixed bodies. Columns: the poses of the unfixed bodies in order. Fixed bodies carry no columns.
@@ -12,10 +12,28 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenicsmech.joints import RIGID_SPACES, JointKind, constraint
-from fenicsmech.mechanism import Motor
-from fenicsmech.multibody.body import Body
+from fenicsmech.mechanism import Link, Motor, Region
 
-_ROUNDING = 4.0 * np.finfo(float).eps
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid link, or one interface of a flexible link.
+
+    Attributes:
+        name: for messages: of the rigid link, or of the (first) joint that an interface belongs to.
+        link: the link it is, or is part of.
+        centre: reference centre c of its pose, (dim,).
+        fixed: it never moves and carries no unknowns.
+        region: interface region (None for rigid links).
+        axis: axis of the interface region.
+    """
+
+    name: str
+    link: Link
+    centre: tuple[float, ...]
+    fixed: bool
+    region: Region | None = None
+    axis: tuple[float, ...] = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -29,6 +47,11 @@ class Connection:
     at: tuple[float, ...]
     triad: tuple[tuple[float, ...], ...]
     motor: Motor | None = None
+
+    def drawn(self, bodies: Sequence[Body]) -> np.ndarray:
+        """The constants of the connection's equations: ``at`` from the centres of both bodies, then the triad."""
+        anchors = np.array(self.at) - np.array([bodies[self.a].centre, bodies[self.b].centre])
+        return np.concatenate([anchors.ravel(), np.ravel(self.triad)])
 
 
 class JointSystem:
@@ -45,16 +68,17 @@ class JointSystem:
         self.bodies, self.connections, self.length = tuple(bodies), tuple(connections), length
         self.space = RIGID_SPACES[dim]
         self._constraints = [constraint(c.kind, dim, c.motor is not None) for c in self.connections]
-        self._triads = [np.array(c.triad) for c in self.connections]
-        centres = np.array([body.centre for body in self.bodies])
-        self._anchors = [np.array(c.at) - centres[[c.a, c.b]] for c in self.connections]
+        self._drawn = [c.drawn(self.bodies) for c in self.connections]
 
         pose_size = self.space.pose_size
+        # both bodies of each connection, with the places of their poses among the variables of its equations
+        first, second = slice(0, pose_size), slice(pose_size, 2 * pose_size)
+        self._ends = [((c.a, first), (c.b, second)) for c in self.connections]
         self.free_bodies = [i for i, body in enumerate(self.bodies) if not body.fixed]
         start = {body: pose_size * k for k, body in enumerate(self.free_bodies)}
         self.columns = {body: np.arange(first, first + pose_size) for body, first in start.items()}
         self.size = pose_size * len(self.free_bodies)
-        counts = [c.rows for c in self._constraints]
+        counts = [c.size for c in self._constraints]
         norms = len(self.space.norm_residual(self.space.identity))
         offsets = np.concatenate([[0], np.cumsum(counts)]).astype(int)
         self._joint_rows = [np.arange(first, first + n) for first, n in zip(offsets[:-1], counts, strict=True)]
@@ -106,8 +130,8 @@ class JointSystem:
         for body, rows in self._norm_rows.items():
             residual[rows] = self.space.norm_residual(poses[body])
         if self.space.dim == 3:
-            # products of unit vectors and quaternions: their rounding would outweigh the smallest loads
-            residual[np.abs(self.row_scale * residual) <= _ROUNDING] = 0.0
+            # products of unit vectors and quaternions: their rounding of some ε would outweigh the smallest loads
+            residual[np.abs(self.row_scale * residual) <= 4.0 * np.finfo(float).eps] = 0.0
         return residual
 
     def gradient(self, poses: np.ndarray, motors: np.ndarray) -> np.ndarray:
@@ -119,52 +143,54 @@ class JointSystem:
 
     def gradient_blocks(self, poses: np.ndarray, motors: np.ndarray):
         """A as (rows, columns, block) triples; which blocks there are never changes."""
-        half = self.space.pose_size
-        for k, (connection, rows) in enumerate(zip(self.connections, self._joint_rows, strict=True)):
+        for k, (ends, rows) in enumerate(zip(self._ends, self._joint_rows, strict=True)):
             both = self._constraints[k].gradient(*self._arguments(k, poses, motors))
-            for body, block in ((connection.a, both[:, :half]), (connection.b, both[:, half:])):
+            for body, own in ends:
                 if body in self.columns:
-                    yield rows, self.columns[body], block
+                    yield rows, self.columns[body], both[:, own]
         for body, rows in self._norm_rows.items():
             yield rows, self.columns[body], self.space.norm_gradient(poses[body])
 
     def hessian_blocks(self, poses: np.ndarray, motors: np.ndarray, multipliers: np.ndarray):
         """Σ λ_k ∂²C_k/∂z² as (columns, columns, block) triples; which blocks there are never changes."""
-        half = self.space.pose_size
-        for k, (connection, rows) in enumerate(zip(self.connections, self._joint_rows, strict=True)):
+        for k, (ends, rows) in enumerate(zip(self._ends, self._joint_rows, strict=True)):
             both = self._constraints[k].hessian(*self._arguments(k, poses, motors), multipliers[rows])
-            ends = ((connection.a, slice(0, half)), (connection.b, slice(half, None)))
-            for i, rows_i in ends:
-                for j, rows_j in ends:
+            for i, own_i in ends:
+                for j, own_j in ends:
                     if i in self.columns and j in self.columns:
-                        yield self.columns[i], self.columns[j], both[rows_i, rows_j]
+                        yield self.columns[i], self.columns[j], both[own_i, own_j]
         for body, rows in self._norm_rows.items():
             curvature = np.einsum("k,kij->ij", multipliers[rows], self.space.norm_hessian())
             yield self.columns[body], self.columns[body], curvature
 
-    def pull(self, k: int, body: int, poses: np.ndarray, motors: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+    def generalised_force(
+        self, k: int, body: int, poses: np.ndarray, motors: np.ndarray, multipliers: np.ndarray
+    ) -> np.ndarray:
         """Generalised force Aᵀλ of connection ``k`` on the pose of ``body``, (pose_size,)."""
-        half = self.space.pose_size
         both = self._constraints[k].gradient(*self._arguments(k, poses, motors))
-        end = both[:, :half] if body == self.connections[k].a else both[:, half:]
-        return end.T @ multipliers[self._joint_rows[k]]
+        return both[:, dict(self._ends[k])[body]].T @ multipliers[self._joint_rows[k]]
 
     def motor_rate(
         self, poses: np.ndarray, motors: np.ndarray, multipliers: np.ndarray, direction: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """∂C/∂φ (rows,) and ∂(Aᵀλ)/∂φ (size,), times ``direction`` (per connection)."""
-        rate, twist = np.zeros(self.rows), np.zeros(self.size)
-        half = self.space.pose_size
+        rate, force_rate = np.zeros(self.rows), np.zeros(self.size)
         for k in np.flatnonzero(direction):
-            arguments, rows, connection = self._arguments(k, poses, motors), self._joint_rows[k], self.connections[k]
-            rate[rows] = self._constraints[k].rate(*arguments) * direction[k]
-            both = self._constraints[k].twist(*arguments, multipliers[rows]) * direction[k]
-            for body, part in ((connection.a, both[:half]), (connection.b, both[half:])):
+            if self.connections[k].motor is None:
+                continue
+            # φ is the last variable of the connection's equations
+            arguments, rows = self._arguments(k, poses, motors), self._joint_rows[k]
+            rate[rows] = self._constraints[k].gradient(*arguments)[:, -1] * direction[k]
+            mixed = self._constraints[k].hessian(*arguments, multipliers[rows])[-1] * direction[k]
+            for body, own in self._ends[k]:
                 if body in self.columns:
-                    twist[self.columns[body]] += part
-        return rate, twist
+                    force_rate[self.columns[body]] += mixed[own]
+        return rate, force_rate
 
-    def _arguments(self, k: int, poses: np.ndarray, motors: np.ndarray):
+    def _arguments(self, k: int, poses: np.ndarray, motors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Variables and constants of the equations of connection ``k``."""
         connection = self.connections[k]
-        z = np.concatenate([poses[connection.a], poses[connection.b]])
-        return z, self._anchors[k], self._triads[k], float(motors[k])
+        ends = [poses[connection.a], poses[connection.b]]
+        if connection.motor is not None:
+            ends.append(motors[k : k + 1])
+        return np.concatenate(ends), self._drawn[k]

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenicsmech.joints import WELD
-from fenicsmech.mechanism import FlexibleLink, Joint, Link, Mechanism, in_dimension, mechanism_length, same_place
-from fenicsmech.multibody.body import Body, rigid_body
-from fenicsmech.multibody.system import Connection, JointSystem
+from fenicsmech.joints import WELD, free_coordinate
+from fenicsmech.mechanism import FlexibleLink, Joint, Link, Mechanism, in_dimension, same_place
+from fenicsmech.multibody.constraints import Body, Connection, JointSystem
 
 
 @dataclass(frozen=True)
@@ -37,10 +36,39 @@ class Linkage:
         return next(i for i, body in enumerate(self.bodies) if body.link == link)
 
 
+class JointCoordinate:
+    """φ, the free coordinate of a ``joint`` that can have a motor: the angle or travel of its second link.
+
+    Attributes:
+        bodies: indices of both bodies.
+    """
+
+    def __init__(self, linkage: Linkage, joint: Joint) -> None:
+        connection = next(c for c in linkage.joints.connections if c.name == joint.name)
+        self.bodies = (connection.a, connection.b)
+        self._drawn = connection.drawn(linkage.bodies)
+        self._formula = free_coordinate(joint.kind, linkage.dim)
+
+    def value(self, poses: np.ndarray) -> float:
+        """φ, zero as drawn, from the ``poses`` of all bodies, (bodies, pose_size)."""
+        return float(self._formula.value(*self._point(poses))[0])
+
+    def gradient(self, poses: np.ndarray) -> np.ndarray:
+        """∂φ/∂z of ``bodies``, one after the other, (2 pose_size,)."""
+        return self._formula.gradient(*self._point(poses))[0]
+
+    def hessian(self, poses: np.ndarray) -> np.ndarray:
+        """∂²φ/∂z², (2 pose_size, 2 pose_size)."""
+        return self._formula.hessian(*self._point(poses), np.ones(1))
+
+    def _point(self, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return poses[list(self.bodies)].ravel(), self._drawn
+
+
 def build_linkage(mechanism: Mechanism, dim: int) -> Linkage:
     """The bodies and constraints of ``mechanism`` in ``dim`` dimensions."""
-    bodies = [rigid_body(link, _centre(mechanism, link, dim)) for link in mechanism.rigid_links]
-    length = mechanism_length(mechanism)
+    bodies = [Body(link.name, link, _centre(mechanism, link, dim), link.fixed) for link in mechanism.rigid_links]
+    length = mechanism.length
     interfaces: dict[FlexibleLink, tuple[int, ...]] = {}
     for link in mechanism.flexible_links:
         first = len(bodies)
@@ -48,7 +76,7 @@ def build_linkage(mechanism: Mechanism, dim: int) -> Linkage:
             known = any(same_place(body.centre, joint.at, dim=dim, length=length) for body in bodies[first:])
             if link in (joint.a, joint.b) and not known:
                 region = joint.regions[(joint.a, joint.b).index(link)]
-                axis = joint.axis if joint.kind.bored else (0.0, 0.0, 1.0)
+                axis = joint.axis if joint.kind.pin_along_axis else (0.0, 0.0, 1.0)
                 at = in_dimension(joint.at, dim)
                 bodies.append(Body(joint.name, link, at, False, region, axis))
         interfaces[link] = tuple(range(first, len(bodies)))
@@ -98,7 +126,7 @@ def _triad(joint: Joint, dim: int) -> tuple[tuple[float, ...], ...]:
     """Unit vectors of a joint as rows: in space the axis last, in the plane (axis, normal)."""
     axis = np.array(joint.axis)
     if dim == 2:
-        first = axis[:2] if joint.kind.sliding else np.array([1.0, 0.0])
+        first = axis[:2] if joint.kind.axis_in_plane else np.array([1.0, 0.0])
         return tuple(first), (-first[1], first[0])
     # the coordinate direction least aligned with the axis; the plane's x for axes along z
     helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
