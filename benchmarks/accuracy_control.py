@@ -15,7 +15,7 @@ from mpi4py import MPI
 
 import fenicsmech as fm
 from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRESS
-from fenicsmech.simulation import Dial, family
+from fenicsmech.estimates import AccuracyControl, fidelity_levels
 
 from .mechanisms import NAMES, mechanism
 from .table import command, format_table, publish
@@ -36,7 +36,7 @@ class Case:
 
     def at(self, level):
         """A simulation at a fidelity level."""
-        fidelity = Dial(self.scene, 1.0, None, fm.Mixed()).fidelity(level)
+        fidelity = AccuracyControl(self.scene, 1.0, None, fm.Mixed()).fidelity(level)
         return fm.Simulation(
             self.scene,
             space=fidelity.model.name,
@@ -87,23 +87,23 @@ def main():
     rows, reports = [], []
     for name in options.mechanisms:
         case = Case(name)
-        *levels, finest_level = [*family(PLANE_STRESS), *family(MID_PLANE_SYMMETRIC)]
+        *levels, finest_level = [*fidelity_levels(PLANE_STRESS), *fidelity_levels(MID_PLANE_SYMMETRIC)]
         # the second run does not compile; the finest is too slow to count
         brute = [(level, *[timed(at_level, case, level) for _ in range(2)][1]) for level in levels]
         brute.append((finest_level, *timed(at_level, case, finest_level)))
         _, finest, curve, _ = brute[-1]
-        reference = curve.displacements[-1] + finest.error_estimates(curve)[-1]
+        reference = curve.displacements[-1] + curve.error_estimates()[-1]
         for accuracy in options.accuracy:
             good = [row for row in brute if abs(row[2].displacements[-1] / reference - 1.0) <= accuracy]
             cheapest = min(good, key=lambda row: row[3])[0]
             simulation, curve, seconds, least = race(case, accuracy, cheapest, options.repeats)
-            trial, error = simulation.choice.chosen, abs(curve.displacements[-1] / reference - 1.0)
-            computed = curve.frames[-1].displacement
+            trial, error = simulation.choice.chosen, abs(curve.corrected[-1] / reference - 1.0)
+            computed = curve.displacements[-1]
             rows.append(
                 (
                     name,
                     f"{accuracy:.1%}",
-                    trial.rung.name,
+                    trial.level.name,
                     f"{trial.error:.2%}",
                     f"{error:.2%}",
                     f"{abs(computed / reference - 1.0):.2%}",

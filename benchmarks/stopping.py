@@ -57,7 +57,7 @@ def equilibria(name, space, size, repeats):
         if turn:
             for way in WAYS:
                 seconds[way].append(spent[way] / spent[STRICT])
-    estimates = np.concatenate([sims[STRICT].error_estimates(curve) for curve in found[STRICT]])
+    estimates = np.concatenate([curve.error_estimates() for curve in found[STRICT]])
     exact = displacements(found[STRICT])
     loaded = exact != 0.0
     for way in WAYS:
@@ -83,7 +83,7 @@ def designs(name, space, size):
     exact = optimum(space, start, fm.LevenbergMarquardt(tolerance=TOLERANCE))[1]
     sim, early = optimum(space, start, fm.LevenbergMarquardt())
     errors = [
-        abs(sim.error_estimates(curve)[-1] / target.displacement)
+        abs(curve.error_estimates()[-1] / target.displacement)
         for target in case.targets
         for curve in [sim.load_displacement(case.force, forces=[target.force], configuration=target.configuration)]
     ]

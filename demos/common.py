@@ -10,7 +10,7 @@ from time import perf_counter
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.simulation import SPACES
+from fenicsmech.model import SPACES
 
 
 @dataclass

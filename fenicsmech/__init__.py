@@ -73,7 +73,6 @@ from fenicsmech.simulation import (
     Simulation,
     SoftMode,
     Until,
-    friction_band,
 )
 
 __version__ = "0.1.0"
@@ -135,7 +134,6 @@ __all__ = [
     "Pressure",
     "Prestrain",
     "PinFriction",
-    "friction_band",
     "ArcSteps",
     "BucklingLoad",
     "BucklingPosition",

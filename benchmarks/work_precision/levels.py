@@ -10,7 +10,7 @@ from fenicsmech.checks import positive
 from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRAIN, PLANE_STRESS, SPATIAL, ElasticModel, Quadrature
 from fenicsmech.equilibrium import PrimalDualNewton
 from fenicsmech.mechanism import Scene
-from fenicsmech.simulation import check_scene, fits
+from fenicsmech.model import check_scene, fits
 
 TOLERANCE = PrimalDualNewton().tolerance
 """Newton's tolerance unless a level says otherwise."""

@@ -22,11 +22,12 @@ import numpy as np
 from fenicsmech.design.description import Target
 from fenicsmech.design.optimisers.problem import Infeasible
 from fenicsmech.design.sensitivity import Adjoint
-from fenicsmech.equilibrium import EquilibriumPoint, Iteration, LoadControl, NotConverged, State
+from fenicsmech.equilibrium import EquilibriumPoint, Iteration, LoadControl, NotConverged, Quantity, State
 from fenicsmech.errors import EquilibriumError
+from fenicsmech.estimates import Equilibrium
 from fenicsmech.mechanism import FlexibleLink
 from fenicsmech.multibody import assemble
-from fenicsmech.simulation import CurveRequest, Equilibrium, Goal, Simulation
+from fenicsmech.simulation import CurveRequest, Simulation
 
 _HALVINGS = 2  # of a change of design whose equilibrium is not found, or lies elsewhere
 _ASTRAY = 2.0  # times δ, how far the prediction may miss: up to 1.7 on one branch, 3.8 and more across folds
@@ -116,7 +117,8 @@ class TargetEquilibria:
         newton = self._newtons[target.force_part]
 
         def error(state: State) -> float:
-            return self._simulation.estimates.elements_at(newton, Equilibrium(state, design, Goal.DISPLACEMENT))
+            (added,) = self._simulation.estimates.at(newton, Equilibrium(state, design, Quantity.DISPLACEMENT))
+            return added
 
         return error(sample.state) - (0.0 if sample.origin is None else error(sample.origin))
 

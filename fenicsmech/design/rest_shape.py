@@ -16,7 +16,7 @@ from fenicsmech.design.shape.handle_optimum import HandleOptimum, Placement
 from fenicsmech.design.shape.quality import Barrier, QualitySum
 from fenicsmech.design.shape.shape_map import LinkShape, ShapeMap
 from fenicsmech.design.shape.spline import LinkSpline, SplineSamples
-from fenicsmech.simulation import MechanismModel
+from fenicsmech.model import MechanismModel
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,7 +25,7 @@ from fenicsmech.mechanism import DRAWN, Disc, FlexibleLink
 from fenicsmech.meshing import LinkMesh, boundary_loops, plan_of
 from fenicsmech.multibody import Linkage, assemble
 from fenicsmech.plot import DesignShape, LinkOutline, draw_designs
-from fenicsmech.simulation import Draughtsman, Simulation, rest_vertices
+from fenicsmech.simulation import MechanismPlotter, Simulation, rest_vertices
 
 _log = logger(__name__)
 _FORMAT = "fenicsmech design 1"
@@ -288,7 +288,7 @@ def draw_links(
         old, new = (_outline(change, meshes[k], p[change.place]) for p, meshes in (before, after))
         joints = np.array([linkage.bodies[i].centre[:2] for i in linkage.interfaces[link]])
         shapes.append(DesignShape(link.name, old, new, joints))
-    rigid = Draughtsman(scene.mechanism, linkage, simulation.model.mesh).rigid(assemble(linkage, DRAWN).poses)
+    rigid = MechanismPlotter(scene.mechanism, linkage, simulation.model.mesh).rigid(assemble(linkage, DRAWN).poses)
     draw_designs(path, shapes, rigid=rigid, unit=scene.units.length, title=f"{scene.mechanism.name}: links")
 
 

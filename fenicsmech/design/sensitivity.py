@@ -24,7 +24,7 @@ from mpi4py import MPI
 
 from fenicsmech.compat import assemble_vector, compile_form, destroy_garbage, owned_values
 from fenicsmech.equilibrium import Iteration, Linearisation, LoadControl, PointLoad, State
-from fenicsmech.simulation import MechanismModel
+from fenicsmech.model import MechanismModel
 
 
 @dataclass(frozen=True)

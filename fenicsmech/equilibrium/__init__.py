@@ -9,9 +9,11 @@
 - ``linear``: its factor LDLᵀ with inertia, or conjugate gradients on two levels where that is too large
 - ``solver``: the interface of equilibrium solvers, and the tangent at an equilibrium
 - ``newton``: the default one, the primal–dual iteration
+- ``adjoint``: of displacements and forces
 - ``reactions``: what joints and motors exert
 """
 
+from fenicsmech.equilibrium.adjoint import Adjoint, Quantity
 from fenicsmech.equilibrium.blocks import Block, Blocks, Border
 from fenicsmech.equilibrium.border import REGULARISATION, PointLoad
 from fenicsmech.equilibrium.control import (
@@ -34,6 +36,7 @@ from fenicsmech.equilibrium.state import State, Step, load_fields
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 
 __all__ = [
+    "Adjoint",
     "ArcLengthControl",
     "ArcMetric",
     "Block",
@@ -60,6 +63,7 @@ __all__ = [
     "NotConverged",
     "PointLoad",
     "PrimalDualNewton",
+    "Quantity",
     "REGULARISATION",
     "Reaction",
     "Residual",

@@ -21,9 +21,9 @@ from fenicsmech.equilibrium import EquilibriumPoint, Iteration, LoadControl, Not
 from fenicsmech.errors import EquilibriumError
 from fenicsmech.model import MechanismModel
 from fenicsmech.plot import CurveMark, CurveSeries
+from fenicsmech.simulation.buckling import ModeShape, mode_shape
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.mode_shape import ModeShape, mode_shape
 from fenicsmech.simulation.request import CurveRequest, Until, quantities
 from fenicsmech.simulation.tracing import CurveTracer
 
@@ -63,7 +63,7 @@ class PathEvent:
         return self.critical.modes
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class FollowedCurve(Curve):
     """Frames in the order of the path, however often it turns back.
 

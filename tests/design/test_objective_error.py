@@ -51,6 +51,6 @@ def test_designs_carry_the_errors_of_displacements_and_objective():
     forces = [target.force for target in result.targets]
     curve = problem.simulation.load_displacement(case.targets[0].force_part, forces=forces)
     errors = [target.finer_elements_add for target in result.targets]
-    assert errors == pytest.approx(problem.simulation.error_estimates(curve), rel=1e-5)
+    assert errors == pytest.approx(curve.error_estimates(), rel=1e-5)
     reached = np.array([target.reached for target in result.targets])
     assert result.objective_error == pytest.approx(objective_error(case.targets, reached, np.array(errors)))

@@ -76,7 +76,7 @@ def _requests(simulation: fm.Simulation, push) -> dict[str, Callable[[float], ob
         problem.apply(design)
 
     def explained(x: float) -> None:
-        simulation.explain(simulation.load_displacement(push, forces=[0.1]), tolerance=x)
+        simulation.load_displacement(push, forces=[0.1]).explain(tolerance=x)
 
     return {
         "force of a curve": lambda x: simulation.load_displacement(push, forces=[0.1, x]),

@@ -74,7 +74,7 @@ def test_results_are_the_same_on_any_number_of_ranks(space):
         inner = simulation.scene.mechanism.forces[1]
         curves.append(simulation.load_displacement(push, forces=[0.005, 0.02], others={inner: 0.01}))
         simulation.load_displacement(inner, displacements=[1.0])
-        errors.append(simulation.error_estimates(curves[-1]))
+        errors.append(curves[-1].error_estimates())
     assert_alike(*curves)
     assert errors[1] == pytest.approx(errors[0], rel=1e-5)
     assert all(frame.stable for frame in curves[0].frames)
@@ -110,9 +110,9 @@ def test_wherever_the_limit_is_set_compressible_links_bend_alike():
 @pytest.mark.parallel
 def test_pressure_is_written(shared_tmp_path):
     simulation, push = arm(comm=MPI.COMM_WORLD)
-    simulation.load_displacement(push, forces=[0.0, 0.02])
+    curve = simulation.load_displacement(push, forces=[0.0, 0.02])
     path = shared_tmp_path / "arm.xdmf"
-    simulation.write(path)
+    curve.write(path)
     names = {attribute.get("Name") for attribute in ElementTree.parse(path).iter("Attribute")}
     assert names == {"displacement", "von Mises stress", "pressure"}
     with XDMFFile(MPI.COMM_WORLD, str(path), "r") as file:

@@ -1,7 +1,6 @@
 """How far a displacement or force is from that of infinitely fine elements on the same outline: an estimate.
 
-With the errors e_u of the displacement and e_z of its adjoint z (what forces on the links do to the goal Q), to first
-order
+With the errors e_u of the displacement and e_z of the adjoint z of the quantity Q, to first order
 
     Q(u) − Q(u_h) = ∫ ∇e_u : ∂²W/∂F∂F : ∇e_z dV.
 
@@ -12,19 +11,20 @@ fields of the gradient's degree (at least 1), see ``recovery``,
 
 where only one half of the links is meshed with G₁₃ = G₂₃ = G₃₁ = G₃₂ = 0 on the mid-plane, as symmetry has it. Where
 links have a pressure of their own, Π(F, p) takes the place of W, and the other second derivatives follow, with the
-errors e_p of p and e_q of its adjoint q (``pressure_error``):
+errors e_p of p and e_q of its adjoint q (``recovery``):
 
     + ∫ e_p ∂²Π/∂p∂F : ∇e_z + e_q ∂²Π/∂p∂F : ∇e_u + e_p ∂²Π/∂p² e_q dV.
 
-c² was measured once per order, see ``_CALIBRATION``. Sources: Zienkiewicz & Zhu (doi:10.1002/nme.1620240206) for the
-recovery, Oden & Prudhomme (doi:10.1016/S0898-1221(00)00317-5) for the goal.
+c² was measured once per order, see ``Calibration``. Sources: Zienkiewicz & Zhu (doi:10.1002/nme.1620240206) for the
+recovery, Oden & Prudhomme (doi:10.1016/S0898-1221(00)00317-5) for goal-oriented estimates.
 
-Not included: the difference between models in the plane and in space, see ``depth_error``; and, with elements of order
-1, that polygons stand for curved outlines.
+Not included: the difference between models in the plane and in space, see ``plane_stress_error``; and, with elements of
+order 1, that polygons stand for curved outlines.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
 
 import numpy as np
@@ -32,24 +32,23 @@ import ufl
 from dolfinx import fem
 
 from fenicsmech.compat import compile_form, destroy_garbage, owned_values, tensor_space
-from fenicsmech.estimates.pressure_error import PressureError
-from fenicsmech.estimates.recovery import Recovery
+from fenicsmech.equilibrium import Adjoint
+from fenicsmech.estimates.recovery import PressureError, Recovery
 from fenicsmech.model import MechanismModel
 
-# c², so that effectivities lie around 1 (tests/simulation/test_goal_error.py, test_mixed_error.py)
-_CALIBRATION = {1: 1.3, 2: 1.6, 3: 2.6}
-_WITH_PRESSURE = {2: 0.75, 3: 1.2}
 
-
-class GoalError:
-    """Error estimates of goals of one model, which holds the equilibrium in question; all methods are collective.
+class ElementError:
+    """What finer elements would add to quantities of one model, which holds the equilibrium in question.
 
     Args:
-        model: of the simulation.
+        model: the discretised mechanism.
+        calibration: c² of displacement elements by order.
+        mixed: c² of elements with a pressure by order.
     """
 
-    def __init__(self, model: MechanismModel) -> None:
-        self._model, elastic = model, model.elastic
+    def __init__(self, model: MechanismModel, calibration: Mapping[int, float], mixed: Mapping[int, float]) -> None:
+        self._model, elastic, order = model, model.elastic, model.elastic.order
+        self._squares = [(mixed if own else calibration)[order] for own in model.with_pressure]
         names = ("adjoint", "adjoint_pressure")
         self._adjoint = [
             fem.Function(field.function_space, name=name) for field, name in zip(elastic.fields, names, strict=False)
@@ -58,14 +57,10 @@ class GoalError:
         self._recovered = [fem.Function(tensors, name=name) for name in ("recovered_gradient", "recovered_adjoint")]
         self._sums = fem.Function(tensors)
 
-    def of(self, z: np.ndarray) -> float:
-        """Q(u) − Q(u_h).
-
-        Args:
-            z: the goal's adjoint, this rank's owned values at the nodes of u, and of p behind them, flat.
-        """
+    def of(self, adjoint: Adjoint) -> float:
+        """Q(u) − Q(u_h), from the adjoint of Q."""
         elastic = self._model.elastic
-        for field, values in zip(self._adjoint, elastic.split(z), strict=True):
+        for field, values in zip(self._adjoint, elastic.split(adjoint.nodal), strict=True):
             owned_values(field)[:] = values
             field.x.scatter_forward()
         dim = elastic.model.dim
@@ -105,13 +100,11 @@ class GoalError:
     @cached_property
     def _scale(self) -> fem.Function:
         """c of each cell's link."""
-        order = self._model.elastic.order
-        squares = [(_WITH_PRESSURE if own else _CALIBRATION)[order] for own in self._model.with_pressure]
-        return self._model.elastic.cellwise(np.sqrt(squares))
+        return self._model.elastic.cellwise(np.sqrt(self._squares))
 
     @cached_property
     def _pressures(self) -> list[PressureError]:
-        """Of p and its adjoint, where links have a pressure of their own."""
+        """Of p and its adjoint, where elements are mixed."""
         elastic = self._model.elastic
         if elastic.pressure is None:
             return []

@@ -9,9 +9,9 @@ between plane stress and plane strain. By it a displacement changes, to first or
 
     Q(space) − Q(plane stress) ≈ −∂V/∂u · z.
 
-c was measured once, see ``_DECAY``. Source for estimates of what a model leaves out by an adjoint: Oden & Vemaganti
-(doi:10.1006/jcph.2000.6585). Not included: wide links that bend so sharply that they cannot bulge across their depth
-(b² times the curvature over the thickness far above 1), and motion out of the plane.
+c was measured once, see ``Calibration``. Source for estimates of what a model leaves out by an adjoint: Oden &
+Vemaganti (doi:10.1006/jcph.2000.6585). Not included: wide links that bend so sharply that they cannot bulge across
+their depth (b² times the curvature over the thickness far above 1), and motion out of the plane.
 """
 
 from __future__ import annotations
@@ -25,24 +25,23 @@ from scipy.spatial import cKDTree
 
 from fenicsmech.compat import cell_dofs, cell_nodes, compile_form, original_nodes, scalar_space
 from fenicsmech.elasticity import PLANE_STRESS
+from fenicsmech.equilibrium import Adjoint
 from fenicsmech.errors import DescriptionError
 from fenicsmech.model import MechanismModel
 
-_DECAY = 0.2  # c: estimates are 0.6 to 1.4 times what space adds to cantilever, arch, truss, claw and Klann leg
-_DEGREE = 8  # of the quadrature: w decays within a cell
 
-
-class DepthError:
-    """Estimates of what space would add to goals in plane stress.
+class PlaneStressError:
+    """What a simulation in space would add to quantities in plane stress.
 
     Args:
-        model: of the simulation, which holds the equilibrium in question.
+        model: the discretised mechanism, which holds the equilibrium in question.
+        decay: c.
 
     Raises:
         DescriptionError: the simulation is not in plane stress.
     """
 
-    def __init__(self, model: MechanismModel) -> None:
+    def __init__(self, model: MechanismModel, decay: float) -> None:
         space = model.elastic.model
         if space is not PLANE_STRESS:
             raise DescriptionError(
@@ -50,27 +49,24 @@ class DepthError:
                 f"there is no estimate for space={space.name!r}",
                 "Simulate in plane stress, or in 3D",
             )
-        self._model = model
+        self._model, self._decay = model, decay
 
-    def of(self, z: np.ndarray) -> float:
-        """Q(space) − Q(plane stress) (collective).
-
-        Args:
-            z: the goal's adjoint, this rank's owned values at the nodes of u, flat.
-        """
+    def of(self, adjoint: Adjoint) -> float:
+        """Q(space) − Q(plane stress), from the adjoint of Q."""
         elastic = self._model.elastic
-        return -elastic.mesh.comm.allreduce(float(elastic.assembled(self._force) @ z))
+        return -elastic.mesh.comm.allreduce(float(elastic.assembled(self._force) @ adjoint.nodal))
 
     @cached_property
     def _force(self):
         """∂V/∂u, compiled."""
         elastic = self._model.elastic
-        reach = elastic.cellwise([_DECAY * link.shape.depth for link in self._model.mechanism.flexible_links])
-        energy = elastic.contraction_energy(ufl.exp(-self._distance() / reach), degree=_DEGREE)
+        reach = elastic.cellwise([self._decay * link.shape.depth for link in self._model.mechanism.flexible_links])
+        # w decays within a cell: of a high degree
+        energy = elastic.contraction_energy(ufl.exp(-self._distance() / reach), degree=8)
         return compile_form(ufl.derivative(energy, elastic.u))
 
     def _distance(self) -> fem.Function:
-        """r, linear in each cell (collective)."""
+        """r, linear in each cell."""
         mesh = self._model.mesh
         numbers = original_nodes(mesh.mesh)[cell_nodes(mesh.mesh)]
         held = np.concatenate(mesh.mesh.comm.allgather(np.unique(numbers[mesh.interface >= 0])))

@@ -12,9 +12,9 @@ import fenicsmech as fm
 from fenicsmech.equilibrium import Iteration
 from fenicsmech.files import read_csv
 
-from .demo_scenes import describe
-from .five_problems import case
-from .refined import arch, cantilever, refine
+from ..simulation.demo_scenes import describe
+from ..simulation.five_problems import case
+from ..simulation.refined import arch, cantilever, refine
 
 
 def estimated(
@@ -24,7 +24,7 @@ def estimated(
     scene, push, load = case(name)
     simulation = fm.Simulation(scene, space=space, order=order, size=size, comm=comm)
     curve = simulation.load_displacement(push, forces=[0.5 * load, load])
-    return curve.displacements[-1], simulation.error_estimates(curve)[-1]
+    return curve.displacements[-1], curve.error_estimates()[-1]
 
 
 def reference(name: str, space: str, size: float) -> float:
@@ -48,7 +48,7 @@ def test_effectivity_of_forces_at_prescribed_displacements_is_between_a_half_and
     simulation = fm.Simulation(scene, space="plane-stress", size=2.0)
     reached = simulation.load_displacement(push, forces=[0.5 * load, load]).displacements
     curve = simulation.load_displacement(push, displacements=list(reached))
-    estimates = simulation.error_estimates(curve)
+    estimates = curve.error_estimates()
     refine(monkeypatch, 1)
     finer = fm.Simulation(scene, space="plane-stress", order=3, size=2.0)
     errors = finer.load_displacement(push, displacements=list(reached)).forces - curve.forces
@@ -62,10 +62,9 @@ def test_errors_of_force_and_displacement_differ_by_the_stiffness():
     simulation = fm.Simulation(scene, space="plane-stress", size=3.0)
     loads = load * np.array([0.999, 1.0, 1.001])
     curve = simulation.load_displacement(push, forces=list(loads))
-    at_force = simulation.error_estimates(curve)[1]
-    at_displacement = simulation.error_estimates(
-        simulation.load_displacement(push, displacements=[curve.displacements[1]])
-    )[0]
+    at_force = curve.error_estimates()[1]
+    held = simulation.load_displacement(push, displacements=[curve.displacements[1]])
+    at_displacement = held.error_estimates()[0]
     stiffness = (loads[2] - loads[0]) / (curve.displacements[2] - curve.displacements[0])
     assert at_displacement == pytest.approx(-stiffness * at_force, rel=1e-4)
 
@@ -78,7 +77,7 @@ def test_effectivity_of_the_displacement_of_an_output_is_between_a_half_and_two(
     samples = {"forces": [load]} if held == "force" else {"displacements": [0.05]}
     simulation = fm.Simulation(scene, space="plane-stress", size=4.0)
     curve = simulation.load_displacement(push, **samples)
-    (estimate,) = simulation.error_estimates(curve, output=crown)
+    (estimate,) = curve.error_estimates(output=crown)
     refine(monkeypatch, 2)
     finer = fm.Simulation(scene, space="plane-stress", order=3, size=4.0)
     error = finer.load_displacement(push, **samples).frames[0].outputs[crown] - curve.frames[0].outputs[crown]
@@ -93,7 +92,7 @@ def test_curve_file_names_what_the_errors_are_of(tmp_path):
     held = simulation.load_displacement(push, displacements=list(curve.displacements))
     headers = []
     for number, made in enumerate((curve, held, followed)):
-        made.write_csv(tmp_path / f"{number}.csv", errors=simulation.error_estimates(made))
+        made.write_csv(tmp_path / f"{number}.csv", errors=True)
         (header,) = [name for name in read_csv(tmp_path / f"{number}.csv") if name.startswith("finer")]
         headers.append(header)
     assert headers == ["finer elements add to the displacement [mm]", *2 * ["finer elements add to the force [N]"]]
@@ -121,7 +120,7 @@ def test_estimate_falls_with_the_mesh_and_vanishes_without_load():
     for size in (3.0, 1.5, 0.75):
         simulation = fm.Simulation(scene, space="plane-stress", size=size)
         curve = simulation.load_displacement(push, forces=[0.0, load])
-        estimates.append(simulation.error_estimates(curve))
+        estimates.append(curve.error_estimates())
     assert np.all(np.abs(np.array(estimates)[:, 0]) < 1e-12)
     assert estimates[0][1] > 2.0 * estimates[1][1] > 4.0 * estimates[2][1] > 0.0
 
@@ -132,7 +131,7 @@ def test_estimate_takes_half_of_the_factors_of_its_frame_at_most(monkeypatch):
     monkeypatch.setattr(Iteration, "factor", lambda *args: factored.append(1) or refactor(*args))
     curve = simulation.load_displacement(push, forces=forces)
     frames = len(factored)
-    simulation.error_estimates(curve)
+    curve.error_estimates()
     assert len(factored) - frames == len(forces) <= 0.5 * frames
 
 
@@ -144,7 +143,7 @@ def test_estimate_costs_half_of_its_frame_at_most():
         start = process_time()
         curve = simulation.load_displacement(push, forces=forces)
         between = process_time()
-        simulation.error_estimates(curve)
+        curve.error_estimates()
         seconds.append((between - start, process_time() - between))
     frames, estimates = np.min(seconds, axis=0)
     assert estimates <= 0.5 * frames

@@ -1,4 +1,4 @@
-"""States of a mechanism as an XDMF time series for ParaView."""
+"""Fields of frames: gathered on one process for pictures, or written as an XDMF time series for ParaView."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import os
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,17 +14,89 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 
 from fenicsmech.collective import from_one, on_one
-from fenicsmech.compat import cell_dofs, cell_nodes, cellwise_space, scalar_space, vector_space, write_series
+from fenicsmech.compat import (
+    cell_dofs,
+    cell_nodes,
+    cellwise_space,
+    original_cells,
+    original_nodes,
+    scalar_space,
+    vector_space,
+    write_series,
+)
 from fenicsmech.errors import DescriptionError
 from fenicsmech.model import MechanismModel
 from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.snapshot import at_vertices
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Fields of one frame on the whole mesh, and the poses of all bodies.
+
+    Attributes:
+        rest: vertices of the unloaded links, (vertices, dim).
+        displacement: from there, (vertices, dim).
+        von_mises: at the midpoints of the mesh's cells, (cells,).
+        poses: (bodies, pose_size).
+    """
+
+    rest: np.ndarray
+    displacement: np.ndarray
+    von_mises: np.ndarray
+    poses: np.ndarray
+
+
+def at_vertices(model: MechanismModel, field: fem.Function) -> np.ndarray:
+    """Values of a Lagrange field (d, u or p) at this rank's geometry nodes, (nodes, components)."""
+    mesh, dim, components = model.mesh.mesh, model.elastic.model.dim, field.function_space.dofmap.index_map_bs
+    values = field.x.array.reshape(-1, components)
+    vertices = np.zeros((len(mesh.geometry.x), components))
+    # the first DOFs of a Lagrange cell are its vertices, in the order of the geometry
+    vertices[cell_nodes(mesh)] = values[cell_dofs(field.function_space)[:, : dim + 1]]
+    return vertices
+
+
+def rest_vertices(model: MechanismModel) -> np.ndarray | None:
+    """Vertices of the present rest shape on rank 0, (vertices, dim); None elsewhere."""
+    mesh = model.mesh
+    parts = mesh.mesh.comm.gather((original_nodes(mesh.mesh), at_vertices(model, model.elastic.d)), root=0)
+    if parts is None:
+        return None
+    rest = mesh.vertices.copy()
+    for nodes, design in parts:
+        rest[nodes] = mesh.vertices[nodes] + design
+    return rest
+
+
+def gather(model: MechanismModel, frame: Frame) -> Snapshot | None:
+    """The snapshot of ``frame``, on rank 0; None elsewhere."""
+    mesh = model.mesh
+    own = mesh.mesh.topology.index_map(mesh.mesh.topology.dim).size_local
+    with model.shaped(frame.design):
+        model.load(frame.state)
+        rest = rest_vertices(model)
+        parts = mesh.mesh.comm.gather(
+            (
+                original_nodes(mesh.mesh),
+                at_vertices(model, model.elastic.u),
+                original_cells(mesh.mesh)[:own],
+                model.elastic.von_mises()[:own],
+            ),
+            root=0,
+        )
+    if parts is None:
+        return None
+    displacement, stress = np.zeros_like(mesh.vertices), np.zeros(len(mesh.cells))
+    for nodes, u, cells, values in parts:
+        displacement[nodes] = u
+        stress[cells] = values
+    return Snapshot(rest, displacement, stress, frame.state.poses)
 
 
 def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame]) -> None:
-    """Writes vertex displacements and von Mises stress of ``frames`` of one design; time is the force (collective).
+    """Writes vertex displacements and von Mises stress of ``frames`` of one design; time is the force.
 
-    And pressures at vertices, where links have some of their own: zero in all other links. The files appear when they
+    And pressures at vertices, where elements are mixed: zero in all other links. The files appear when they
     are complete.
 
     Raises:

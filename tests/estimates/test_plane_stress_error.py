@@ -6,9 +6,10 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
+from fenicsmech.estimates import Calibration, ErrorKind, Estimates
 
-from .demo_scenes import describe
-from .refined import cantilever
+from ..simulation.demo_scenes import describe
+from ..simulation.refined import cantilever
 
 LOADS = {"truss": 0.4, "claw": 10.0, "klann": 5.0}
 
@@ -27,20 +28,21 @@ def test_estimate_is_near_what_space_adds(name):
     curve = flat.load_displacement(push, forces=[0.5 * load, load])
     deep = fm.Simulation(scene, space="3d-symmetric", order=3, size=7.5, layers=1)
     there = deep.load_displacement(push, forces=[0.5 * load, load])
-    added = there.displacements[-1] + deep.error_estimates(there)[-1] - curve.displacements[-1]
+    added = there.displacements[-1] + there.error_estimates()[-1] - curve.displacements[-1]
     assert added < 0.0
-    assert 0.5 < flat.modelling_errors(curve)[-1] / added < 2.0
+    assert 0.5 < curve.modelling_errors()[-1] / added < 2.0
 
 
-def test_blocking_all_contraction_is_plane_strain(monkeypatch):
-    monkeypatch.setattr("fenicsmech.estimates.depth_error._DECAY", 1e6)
+def test_blocking_all_contraction_is_plane_strain():
     scene, push, load = cantilever()
     values = []
     for space in ("plane-stress", "plane-strain"):
         simulation = fm.Simulation(scene, space=space, size=3.0)
-        values.append(simulation.load_displacement(push, forces=[1e-3 * load]).displacements[-1])
+        curve = simulation.load_displacement(push, forces=[1e-3 * load])
+        values.append(curve.displacements[-1])
         if space == "plane-stress":
-            estimate = simulation.modelling_errors()[-1]
+            estimates, at = Estimates(simulation.model, Calibration(decay=1e6)), curve.equilibrium(curve.frames[-1])
+            (estimate,) = estimates.at(simulation.newton(push), at, [ErrorKind.PLANE_STRESS])
     # first order of a change of 13 %
     assert estimate == pytest.approx(values[1] - values[0], rel=0.2)
 
@@ -51,28 +53,29 @@ def test_estimate_is_the_same_on_any_number_of_processes():
     found = []
     for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
         simulation = fm.Simulation(scene, space="plane-stress", size=3.0, comm=comm)
-        simulation.load_displacement(push, forces=[load])
-        found.append(simulation.modelling_errors()[-1])
+        found.append(simulation.load_displacement(push, forces=[load]).modelling_errors()[-1])
     assert found[0] == pytest.approx(found[1], rel=1e-6)
 
 
 def test_other_models_are_refused():
     scene, push, load = cantilever()
     simulation = fm.Simulation(scene, space="plane-strain", size=3.0)
-    simulation.load_displacement(push, forces=[load])
+    curve = simulation.load_displacement(push, forces=[load])
     with pytest.raises(fm.DescriptionError, match="plane-strain"):
-        simulation.modelling_errors()
+        curve.modelling_errors()
 
 
-def test_both_kinds_of_error_share_one_factor_per_frame(monkeypatch):
+def test_both_kinds_of_error_need_one_factor_per_frame_once(monkeypatch):
     scene, push, load = cantilever()
     simulation = fm.Simulation(scene, space="plane-stress", size=3.0)
-    curve = simulation.load_displacement(push, forces=[0.5 * load, load])
-    apart = simulation.error_estimates(curve), simulation.modelling_errors(curve)
+    loads = [0.5 * load, load]
+    apart, together = (simulation.load_displacement(push, forces=loads) for _ in range(2))
+    one, other = apart.error_estimates(), apart.modelling_errors()
     newton, factored = type(simulation.newton(push)), []
-    plain = newton.factor
-    monkeypatch.setattr(newton, "factor", lambda *arguments: factored.append(arguments) or plain(*arguments))
-    together = simulation.estimates.elements_and_depth(curve)
-    assert len(factored) == len(curve.frames)
-    for one, other in zip(apart, together, strict=True):
-        assert list(one) == pytest.approx(list(other), rel=1e-10)
+    plain = newton.linearise
+    monkeypatch.setattr(newton, "linearise", lambda *arguments: factored.append(arguments) or plain(*arguments))
+    assert together.corrections == pytest.approx(one + other, rel=1e-10)
+    assert together.corrected == pytest.approx(together.displacements + one + other, rel=1e-10)
+    assert list(together.displacements) == [frame.displacement for frame in together.frames]
+    assert list(together.error_estimates()) == pytest.approx(list(one), rel=1e-10)
+    assert len(factored) == len(loads)
