@@ -59,7 +59,7 @@ from fenicsmech.mechanism import (
     gmsh_mesh,
     outline,
     polygon,
-    step,
+    step_file,
     strip,
 )
 from fenicsmech.simulation import (
@@ -125,7 +125,7 @@ __all__ = [
     "mpi_abort_on_error",
     "outline",
     "polygon",
-    "step",
+    "step_file",
     "strip",
     "Contact",
     "Cylinder",
