@@ -38,6 +38,7 @@ from fenicsmech.equilibrium import (
     PrimalDualNewton,
 )
 from fenicsmech.errors import AssemblyError, DescriptionError, EquilibriumError, FenicsmechError, MeshingError
+from fenicsmech.joints import JointKind, PlanarMarker, SpatialMarker
 from fenicsmech.mechanism import (
     DRAWN,
     ONYX,
@@ -134,7 +135,10 @@ __all__ = [
     "JointSpring",
     "Pressure",
     "Prestrain",
+    "JointKind",
     "PinFriction",
+    "PlanarMarker",
+    "SpatialMarker",
     "ArcSteps",
     "BucklingLoad",
     "BucklingPosition",
