@@ -53,7 +53,7 @@ def leave(outcome: Outcome) -> None:
         curve.write_csv(folder / f"curve{_suffix(curve, curves)}.csv", errors=True)
     if result is not None:
         outcome.problem.picture(folder / "links.png", result)
-        outcome.problem.export(folder / "links", pin=outcome.pin)
+        outcome.problem.export(folder / "links", result, pin_diameter=outcome.pin)
     errors = [curve.error_estimates() for curve in curves]
     summary = summarise(outcome, errors)
     if not demo.leads:

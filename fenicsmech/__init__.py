@@ -37,6 +37,7 @@ from fenicsmech.equilibrium import (
     PrimalDualNewton,
 )
 from fenicsmech.errors import AssemblyError, DescriptionError, EquilibriumError, FenicsmechError, MeshingError
+from fenicsmech.joints import JointKind, PlanarMarker, SpatialMarker
 from fenicsmech.mechanism import (
     DRAWN,
     ONYX,
@@ -58,7 +59,7 @@ from fenicsmech.mechanism import (
     gmsh_mesh,
     outline,
     polygon,
-    step,
+    step_file,
     strip,
 )
 from fenicsmech.simulation import (
@@ -124,7 +125,7 @@ __all__ = [
     "mpi_abort_on_error",
     "outline",
     "polygon",
-    "step",
+    "step_file",
     "strip",
     "Contact",
     "Cylinder",
@@ -133,7 +134,10 @@ __all__ = [
     "JointSpring",
     "Pressure",
     "Prestrain",
+    "JointKind",
     "PinFriction",
+    "PlanarMarker",
+    "SpatialMarker",
     "ArcSteps",
     "BucklingLoad",
     "BucklingPosition",
