@@ -102,7 +102,7 @@ class Run:
         control = LoadControl(FORCES[-1])
         system.load(state)
         system.linearise(state, control, system.residual(state, control))
-        return system, system.kkt.matrix(), system.force_rate(state)
+        return system, system.kkt.matrix(), system.travel_gradient(system.controlled, state)
 
 
 def seconds(action) -> float:

@@ -6,6 +6,7 @@ Describe a mechanism (``Mechanism``), say what acts on it (``Scene``) and how fi
 """
 
 from fenicsmech.collective import mpi_abort_on_error
+from fenicsmech.continuation import ArcSteps, Critical
 from fenicsmech.design import (
     BFGS,
     DesignProblem,
@@ -33,8 +34,6 @@ from fenicsmech.effects import (
 )
 from fenicsmech.elasticity import Displacement, Mixed
 from fenicsmech.equilibrium import (
-    ArcSteps,
-    Critical,
     PrimalDualNewton,
 )
 from fenicsmech.errors import AssemblyError, DescriptionError, EquilibriumError, FenicsmechError, MeshingError
@@ -61,7 +60,7 @@ from fenicsmech.mechanism import (
     gmsh_mesh,
     outline,
     polygon,
-    step,
+    step_file,
     strip,
 )
 from fenicsmech.model import SPACES
@@ -137,7 +136,7 @@ __all__ = [
     "plot_curve",
     "polygon",
     "read_csv",
-    "step",
+    "step_file",
     "strip",
     "write_report",
     "Contact",

@@ -34,6 +34,7 @@ LAYERS = (
     "elasticity",
     "effects",
     "equilibrium",
+    "continuation",
     "model",
     "estimates",
     "simulation",
