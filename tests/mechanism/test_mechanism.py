@@ -80,6 +80,16 @@ def test_joint_of_a_link_with_itself_is_refused():
     )
 
 
+def test_joint_kind_that_is_none_is_refused():
+    p = parts()
+    assert_refused(
+        lambda: p.mechanism.join("hinge", p.base, p.crank, at=(0.0, 0.0)),
+        "joint",
+        "'hinge' is not a joint kind",
+        "Give an instance of a JointKind",
+    )
+
+
 GHOST = RigidLink("ghost")
 
 
@@ -127,7 +137,7 @@ def test_interface_that_is_no_region_is_refused():
     assert_refused(
         lambda: p.mechanism.weld(p.crank, p.rod, at=(40.0, 0.0), region=2.0, name="clamp"),
         "'clamp'",
-        "2.0 is no interface region",
+        "2.0 is not an interface region",
         "Give region=Disc(…) or region=Rectangle(…)",
     )
 
