@@ -54,7 +54,7 @@ def test_second_load_of_a_name_is_refused(kind):
     )
 
 
-def test_joints_between_the_same_links_are_told_apart_by_their_place():
+def test_joints_between_the_same_links_differ_by_their_place():
     m = Mechanism("clamp")
     a, b = m.rigid("a", fixed=True), m.rigid("b")
     names = [m.weld(a, b, at=at).name for at in ((0.0, 0.0), (1.0, 0.0))]
