@@ -58,7 +58,7 @@ def test_what_springs_hold_is_held_however_soft_they_are(stiffness):
     def loose(*joints: Joint) -> tuple[int, tuple[str, ...]]:
         springs = holding([JointSpring(joint, stiffness) for joint in joints], linkage)
         freedom = count_freedom(linkage.rigid, drawn, still, springs)
-        return freedom.mobility, freedom.idle
+        return freedom.mobility, freedom.zero_energy
 
     assert loose() == (3, ("upper", "fore", "hand"))
     assert loose(shoulder) == (3, ("fore", "hand"))
