@@ -67,7 +67,7 @@ class Freedom:
     Attributes:
         mobility: number of free directions left.
         mobile: names of the links that can move.
-        zero_energy: names of the links that move in zero-energy modes, which wind up no spring; empty if springs hold all.
+        zero_energy: names of the links that move in zero-energy modes; empty if springs hold all.
         redundancy: number of dependent constraint equations.
         redundant: names of the joints whose equations depend on each other.
     """
