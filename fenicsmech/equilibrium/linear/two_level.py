@@ -54,9 +54,8 @@ class TwoLevel(LinearMethod):
     """Conjugate gradients over a factor for linear displacements.
 
     Attributes:
-        degree: m of the smoother, products with A that one application takes, plus one; measured on claws of 16,000 to
-            240,000 unknowns, where it is flat between 6 and 10.
-        ratio: a/b of the smoother, likewise.
+        degree: m of the smoother, products with A that one application takes, plus one.
+        ratio: a/b of the smoother; both measured on the claw, whose curve takes least time with these.
         safety: b over the estimate of λ, which is one from below: single bad cells are seen late.
         iterations: most conjugate gradients of one solve; more say that the coarse level does not suit.
         probe: relative energy down to which a random start is followed for the inertia.
