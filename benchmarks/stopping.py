@@ -14,9 +14,10 @@ from time import process_time
 import numpy as np
 
 import fenicsmech as fm
+from fenicsmech.report import format_table
 
 from .mechanisms import NAMES, mechanism
-from .table import command, format_table, publish
+from .table import command, publish
 
 STRICT = "1e-10, a factor for each correction"
 WAYS = {

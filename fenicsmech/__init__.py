@@ -37,6 +37,7 @@ from fenicsmech.equilibrium import (
     PrimalDualNewton,
 )
 from fenicsmech.errors import AssemblyError, DescriptionError, EquilibriumError, FenicsmechError, MeshingError
+from fenicsmech.files import read_csv
 from fenicsmech.joints import JointKind, PlanarMarker, SpatialMarker
 from fenicsmech.mechanism import (
     DRAWN,
@@ -62,6 +63,9 @@ from fenicsmech.mechanism import (
     step_file,
     strip,
 )
+from fenicsmech.model import SPACES
+from fenicsmech.plot import CurveSeries, Trace, plot_curve
+from fenicsmech.report import Design, Report, write_report
 from fenicsmech.simulation import (
     BucklingLoad,
     BucklingPosition,
@@ -82,12 +86,15 @@ __all__ = [
     "DRAWN",
     "ONYX",
     "SMOOTH_SIL_950",
+    "SPACES",
     "Arc",
     "AssemblyError",
     "BFGS",
     "Configuration",
     "Curve",
+    "CurveSeries",
     "DescriptionError",
+    "Design",
     "DesignProblem",
     "DesignResult",
     "Disc",
@@ -113,20 +120,25 @@ __all__ = [
     "NeoHookean",
     "PrimalDualNewton",
     "Rectangle",
+    "Report",
     "Scene",
     "ShapeBounds",
     "Simulation",
     "SplineDesign",
     "StayClose",
     "Target",
+    "Trace",
     "Units",
     "fit_modulus",
     "gmsh_mesh",
     "mpi_abort_on_error",
     "outline",
+    "plot_curve",
     "polygon",
+    "read_csv",
     "step_file",
     "strip",
+    "write_report",
     "Contact",
     "Cylinder",
     "HalfPlane",

@@ -39,6 +39,7 @@ LAYERS = (
     "estimates",
     "simulation",
     "design",
+    "report",
 )
 
 # Libraries that belong to a few layers only: descriptions and joints know no elements, only one layer makes meshes,

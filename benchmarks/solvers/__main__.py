@@ -19,9 +19,10 @@ from mpi4py import MPI
 
 import fenicsmech as fm
 from fenicsmech.equilibrium import EquilibriumPoint, EquilibriumSolver, Iteration, LoadControl, NotConverged
+from fenicsmech.report import format_table
 
 from ..mechanisms import mechanism
-from ..table import command, format_table, publish
+from ..table import command, publish
 from . import SNES, AugmentedLagrangian, Globalisation, KKTNewton
 
 SOLVERS = {

@@ -101,9 +101,7 @@ class Simulation:
             self._control = AccuracyControl(scene, accuracy, size, formulation)
             fidelity = self._control.fidelity(self._control.level)
         solver, predictor = solver or PrimalDualNewton(), predictor or Hermite()
-        self._discretisation = Discretisation(
-            scene, fidelity, solver=solver, predictor=predictor, clock=self.clock, comm=comm
-        )
+        self._discretisation = Discretisation(scene, fidelity, solver, predictor, self.clock, comm)
         self._described = _description(scene.mechanism)
 
     def __repr__(self) -> str:
@@ -148,7 +146,7 @@ class Simulation:
             configuration=configuration,
             others=others,
         )
-        with self._progress(len(request.controls), configuration) as progress, self._shaped():
+        with self._progress(len(request.controls), configuration) as progress:
             if self._control is None:
                 return self.trace(request, watch=progress.update)
             curves: list[Curve] = []
@@ -256,19 +254,10 @@ class Simulation:
 
     def on(self, comm: MPI.Comm) -> Simulation:
         """The same scene at the same fidelity for other processes, as drawn."""
-        return Simulation(
-            self.scene,
-            space=self.fidelity.model.name,
-            order=self.fidelity.order,
-            size=self.fidelity.sizes,
-            quadrature=self.fidelity.quadrature,
-            layers=self.fidelity.layers,
-            segments=self.fidelity.segments,
-            formulation=self.fidelity.formulation,
-            solver=self._discretisation.solver,
-            predictor=self._discretisation.predictor,
-            comm=comm,
-        )
+        other = copy(self)
+        other.comm, other.clock, other._control, other._design = comm, Clock(), None, None
+        other._discretisation = self._discretisation.at(self.fidelity, other.clock, comm)
+        return other
 
     # -- what it computes with -----------------------------------------------------------------------------------
 
@@ -309,13 +298,14 @@ class Simulation:
         return self._discretisation.newton(part, others)
 
     def trace(self, request: CurveRequest, *, watch: Callable[[int], None] = lambda done: None) -> Curve:
-        """The curve of a checked request at the present shape of ``model``, without showing progress.
+        """The curve of a checked request, as ``load_displacement`` without showing progress.
 
         Args:
             request: what is asked for.
             watch: called with the number of frames so far.
         """
-        return CurveTracer(self._discretisation, request).curve(watch)
+        with self._shaped():
+            return CurveTracer(self._discretisation, request).curve(watch)
 
     @contextmanager
     def _shaped(self) -> Iterator[None]:
@@ -336,7 +326,7 @@ class Simulation:
         fidelity = self._control.fidelity(level)
         if fidelity != self.fidelity:
             # curves keep what they were computed with
-            self._discretisation, self.choice = self._discretisation.at(fidelity), None
+            self._discretisation, self.choice = self._discretisation.at(fidelity, self.clock, self.comm), None
         curve = self.trace(request, watch=watch)
         curves[:] = [curve]
         elements, plane_stress = curve.errors_by_kind()

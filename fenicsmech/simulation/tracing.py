@@ -174,7 +174,7 @@ class CurveTracer:
         state = replace(
             self._model.assembled_state(assembly.poses, fraction * motors),
             load_factor=0.0 if self.request.others or self._model.effects else 1.0,
-            minimum_shift=LoadSteps().minimum_shift if self.freedom.idle else 0.0,
+            minimum_shift=LoadSteps().minimum_shift if self.freedom.zero_energy else 0.0,
         )
         if fraction == 1.0:
             return state
@@ -250,8 +250,8 @@ class CurveTracer:
                 "The springs are softer than the rounding of the stiffest links: "
                 "make links rigid that hardly bend, or springs stiffer"
             )
-        elif self.freedom.idle:
-            names = ", ".join(map(repr, self.freedom.idle))
+        elif self.freedom.zero_energy:
+            names = ", ".join(map(repr, self.freedom.zero_energy))
             otherwise = f"Nothing but the force holds {names}: add a joint or a motor, or check the force's direction"
         return EquilibriumError(where, problem, otherwise, last=last, frames=before)
 
