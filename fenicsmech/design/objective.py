@@ -180,7 +180,7 @@ def target_errors(targets: Sequence[Target], reached: np.ndarray) -> np.ndarray:
     return (reached - [target.displacement for target in targets]) / target_scales(targets)
 
 
-def objective_error(targets: Sequence[Target], reached: np.ndarray, errors: np.ndarray) -> float:
+def objective_error(targets: Sequence[Target], reached: np.ndarray, errors: Sequence[float | None]) -> float | None:
     """How wrong the objective is because elements are not infinitely fine: O(u + d) − O(u).
 
     With the errors d_k of the targets' displacements, of scale s_k, and with residuals r_k,
@@ -193,10 +193,12 @@ def objective_error(targets: Sequence[Target], reached: np.ndarray, errors: np.n
     Args:
         targets: what is wanted.
         reached: displacements u, (targets,).
-        errors: d, what finer elements would add to them, (targets,).
+        errors: d, what finer elements would add to them, (targets,); None where that is not known.
     """
+    if any(error is None for error in errors):
+        return None
     weights = np.array([target.weight for target in targets])
-    relative = errors / target_scales(targets)
+    relative = np.asarray(errors) / target_scales(targets)
     return float(weights @ (target_errors(targets, reached) * relative + 0.5 * relative**2))
 
 

@@ -11,12 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from fenicsmech.design.description import Bounds, SplineDesign
+from fenicsmech.design.description import Bounds, SplineDesign, shape_request
 from fenicsmech.design.shape.handle_optimum import HandleOptimum, Placement
 from fenicsmech.design.shape.quality import Barrier, QualitySum
-from fenicsmech.design.shape.shape_map import LinkShape, ShapeMap
+from fenicsmech.design.shape.shape_map import LinkShape, ShapeMap, shape_links
 from fenicsmech.design.shape.spline import LinkSpline, SplineSamples
 from fenicsmech.model import MechanismModel
+from fenicsmech.simulation import Simulation
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +73,12 @@ class RestShape:
         self.links = tuple(links)
         self.lengths = np.concatenate([np.where(s.spline.is_thickness, 1.0, s.thickness) for s in self.links])
 
+    @staticmethod
+    def of(simulation: Simulation, designs: Sequence[SplineDesign]) -> RestShape:
+        """That of a simulation, handles and weights computed on its mesh."""
+        requests = [shape_request(design, simulation.scene.mechanism, simulation.linkage) for design in designs]
+        return RestShape(simulation.model, shape_links(simulation.model.mesh, requests), designs)
+
     def known(self, p: np.ndarray, theta: np.ndarray) -> Placement | None:
         """A placement to start from, for handle positions found before; None if there are as many handles no more."""
         if theta.shape != self._map.initial_theta.shape:
@@ -95,6 +102,13 @@ class RestShape:
         placement = self._optimum.solve(p, near)
         self._model.reshape(self._model.elastic.d.x.array)
         return placement
+
+    def field(self, p: np.ndarray, near: Placement | None) -> np.ndarray:
+        """This rank's values of the design field for ``p``, ghosts last, flat; the links keep the shape they have."""
+        before = self._model.elastic.d.x.array.copy()
+        with self._model.shaped(before):
+            self.place(p, near)
+            return self._model.elastic.d.x.array.copy()
 
     def gradient(self, placement: Placement, nodal: np.ndarray) -> np.ndarray:
         """dO/dp (…, parameters) from ∂O/∂d (…, owned values) of the design placed as in ``placement``."""
