@@ -302,7 +302,7 @@ def draw_links(
         old, new = (_outline(change, meshes[k], p[change.place]) for p, meshes in (before, after))
         joints = np.array([linkage.bodies[i].centre[:2] for i in linkage.interfaces[link]])
         shapes.append(DesignShape(link.name, old, new, joints))
-    rigid = MechanismPlotter(scene.mechanism, linkage, simulation.model.mesh).rigid(assemble(linkage, DRAWN).poses)
+    rigid = MechanismPlotter(simulation.model).rigid(assemble(linkage, DRAWN).poses)
     draw_designs(path, shapes, rigid=rigid, unit=scene.units.length, title=f"{scene.mechanism.name}: links")
 
 
