@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fenicsmech.joints import WELD
 from fenicsmech.mechanism import Force, Link, in_dimension
 from fenicsmech.model import MechanismModel
 from fenicsmech.plot import (
@@ -64,7 +65,10 @@ class MechanismPlotter:
         return np.array([self.position(link, at, poses) for at in (*joints, *points)])
 
     def _pins(self, poses: np.ndarray) -> tuple[Pin, ...]:
-        return tuple(Pin(self._moved(each.a, each.at, poses)) for each in self._linkage.joints.connections)
+        return tuple(
+            Pin(self._moved(each.a, each.at, poses), welded=each.kind is WELD)
+            for each in self._linkage.joints.connections
+        )
 
     def _moved(self, body: int, at: Sequence[float], poses: np.ndarray) -> np.ndarray:
         """Where the point drawn at ``at`` of a body is, (2,)."""

@@ -25,12 +25,11 @@ from fenicsmech.model import Fidelity, MechanismModel, read_fidelity
 from fenicsmech.multibody import Linkage
 from fenicsmech.simulation.buckling import ModeShape
 from fenicsmech.simulation.curve import Curve
-from fenicsmech.simulation.curves import Curves
 from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.fields import rest_vertices
-from fenicsmech.simulation.following import FollowedCurve, PathEvent
+from fenicsmech.simulation.following import FollowedCurve, PathEvent, branches, follow
 from fenicsmech.simulation.request import CurveRequest, Until, check_until, read_path, read_request
-from fenicsmech.simulation.tracing import unloaded_positions
+from fenicsmech.simulation.tracing import CurveTracer, unloaded_positions
 
 
 class RestShape(Protocol):
@@ -185,7 +184,7 @@ class Simulation:
         self._check_chosen(part)
         request = read_path(self.scene.mechanism, part, until=until, configuration=configuration, others=others)
         with self._progress(until.frames, configuration) as progress, self._shaped():
-            return Curves(self._discretisation).follow(request, until, steps, progress.update)
+            return follow(self._discretisation, request, until, steps or ArcSteps(), progress.update)
 
     def branches(
         self,
@@ -219,7 +218,7 @@ class Simulation:
                 "it was computed at another fidelity than this simulation has now",
                 "Ask the simulation that computed it, before an accuracy makes it go on to a finer mesh",
             )
-        return Curves(self._discretisation).branches(curve, event, until, steps, mode)
+        return branches(curve, event, until, steps or ArcSteps(), mode)
 
     def path(self, part: Force | Output, configurations: Sequence[Configuration]) -> np.ndarray:
         """Where the unloaded point of a force or output is in each configuration, (configurations, dim).
@@ -306,7 +305,7 @@ class Simulation:
             watch: called with the number of frames so far.
         """
         with self._shaped():
-            return Curves(self._discretisation).trace(request, watch)
+            return CurveTracer(self._discretisation, request).curve(watch)
 
     @contextmanager
     def _shaped(self) -> Iterator[None]:
