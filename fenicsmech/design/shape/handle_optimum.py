@@ -60,7 +60,7 @@ class HandleOptions:
 
 
 @dataclass(frozen=True, eq=False)
-class Placement:
+class HandlePlacement:
     """The best handle positions of a design.
 
     Attributes:
@@ -91,9 +91,9 @@ class HandleOptimum:
         self._map, self._quality, self._options = shape_map, quality, options or HandleOptions()
         self._handles = [shape.handles for shape in shape_map.shapes]
         self._reducer: _MomentHessian | None = None
-        self._known: tuple[Placement | None, list[PositionDerivatives]] = (None, [])
+        self._known: tuple[HandlePlacement | None, list[PositionDerivatives]] = (None, [])
 
-    def solve(self, p: np.ndarray, start: Placement | None = None) -> Placement:
+    def solve(self, p: np.ndarray, start: HandlePlacement | None = None) -> HandlePlacement:
         """The best handle positions for design ``p``.
 
         Args:
@@ -103,10 +103,10 @@ class HandleOptimum:
         Raises:
             ShapeError: cells stay inverted however the handles are placed.
         """
-        start = start or Placement(self._map.initial, self._map.initial_theta)
+        start = start or HandlePlacement(self._map.initial, self._map.initial_theta)
         return self._solve(np.array(p, dtype=float), start, self._options.halvings)
 
-    def total_gradient(self, placement: Placement, by_p: np.ndarray, by_theta: np.ndarray) -> np.ndarray:
+    def total_gradient(self, placement: HandlePlacement, by_p: np.ndarray, by_theta: np.ndarray) -> np.ndarray:
         """dO/dp = ∂O/∂p + ∂O/∂θ dθ/dp, (…, parameters).
 
         Args:
@@ -117,7 +117,7 @@ class HandleOptimum:
         followed = [cho_solve(link.factor, slope[..., link.free].T).T @ link.mixed for link, slope in links]
         return by_p - np.concatenate(followed, axis=-1)
 
-    def _solve(self, p: np.ndarray, start: Placement, halvings: int) -> Placement:
+    def _solve(self, p: np.ndarray, start: HandlePlacement, halvings: int) -> HandlePlacement:
         theta = self._first_guess(p, start)
         if theta is not None:
             return self._minimise(p, theta)
@@ -126,7 +126,7 @@ class HandleOptimum:
         halfway = self._solve(0.5 * (start.p + p), start, halvings - 1)
         return self._solve(p, halfway, halvings - 1)
 
-    def _first_guess(self, p: np.ndarray, start: Placement) -> np.ndarray | None:
+    def _first_guess(self, p: np.ndarray, start: HandlePlacement) -> np.ndarray | None:
         """The best of a few positions for each link; None if all of them invert cells of a link."""
         following = [follow_spline(h, q) for h, q in zip(self._handles, self._map.parameters(p), strict=True)]
         guesses = [self._map.positions(start.theta), following]
@@ -141,7 +141,7 @@ class HandleOptimum:
             return None
         return np.concatenate([guesses[choice][link] for link, choice in enumerate(np.argmin(sums, axis=0))])
 
-    def _minimise(self, p: np.ndarray, theta: np.ndarray) -> Placement:
+    def _minimise(self, p: np.ndarray, theta: np.ndarray) -> HandlePlacement:
         parts, positions = self._map.parameters(p), self._map.positions(theta)
         sums, moving, iterations = self._sums(p, positions), set(range(len(positions))), 0
         while moving and iterations < self._options.iterations:
@@ -162,7 +162,7 @@ class HandleOptimum:
                 moving -= stuck
         if moving:
             _log.warning("handle positions did not settle in %d iterations", iterations)
-        placed = Placement(p, np.concatenate(positions), float(sums.sum()), iterations)
+        placed = HandlePlacement(p, np.concatenate(positions), float(sums.sum()), iterations)
         self._map.apply(p, placed.theta)
         return placed
 
@@ -212,7 +212,7 @@ class HandleOptimum:
         moments = self._map.moments(self._quality.gradient())
         return [MapDerivatives(g, H) for g, H in zip(moments, self._reducer.reduce(hessian), strict=True)]
 
-    def _second_derivatives(self, placement: Placement) -> list[PositionDerivatives]:
+    def _second_derivatives(self, placement: HandlePlacement) -> list[PositionDerivatives]:
         """S_θθ and S_θp of each link at ``placement``; those of the last one are kept."""
         if self._known[0] is not placement:
             parts, positions = self._map.parameters(placement.p), self._map.positions(placement.theta)
