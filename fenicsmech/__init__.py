@@ -6,6 +6,7 @@ Describe a mechanism (``Mechanism``), say what acts on it (``Scene``) and how fi
 """
 
 from fenicsmech.collective import mpi_abort_on_error
+from fenicsmech.continuation import ArcSteps, Critical
 from fenicsmech.design import (
     BFGS,
     DesignProblem,
@@ -33,11 +34,10 @@ from fenicsmech.effects import (
 )
 from fenicsmech.elasticity import Displacement, Mixed
 from fenicsmech.equilibrium import (
-    ArcSteps,
-    Critical,
     PrimalDualNewton,
 )
 from fenicsmech.errors import AssemblyError, DescriptionError, EquilibriumError, FenicsmechError, MeshingError
+from fenicsmech.files import read_csv
 from fenicsmech.joints import JointKind, PlanarMarker, SpatialMarker
 from fenicsmech.mechanism import (
     DRAWN,
@@ -60,9 +60,12 @@ from fenicsmech.mechanism import (
     gmsh_mesh,
     outline,
     polygon,
-    step,
+    step_file,
     strip,
 )
+from fenicsmech.model import SPACES
+from fenicsmech.plot import CurveSeries, Trace, plot_curve
+from fenicsmech.report import Design, Report, write_report
 from fenicsmech.simulation import (
     BucklingLoad,
     BucklingPosition,
@@ -83,12 +86,15 @@ __all__ = [
     "DRAWN",
     "ONYX",
     "SMOOTH_SIL_950",
+    "SPACES",
     "Arc",
     "AssemblyError",
     "BFGS",
     "Configuration",
     "Curve",
+    "CurveSeries",
     "DescriptionError",
+    "Design",
     "DesignProblem",
     "DesignResult",
     "Disc",
@@ -114,20 +120,25 @@ __all__ = [
     "NeoHookean",
     "PrimalDualNewton",
     "Rectangle",
+    "Report",
     "Scene",
     "ShapeBounds",
     "Simulation",
     "SplineDesign",
     "StayClose",
     "Target",
+    "Trace",
     "Units",
     "fit_modulus",
     "gmsh_mesh",
     "mpi_abort_on_error",
     "outline",
+    "plot_curve",
     "polygon",
-    "step",
+    "read_csv",
+    "step_file",
     "strip",
+    "write_report",
     "Contact",
     "Cylinder",
     "HalfPlane",

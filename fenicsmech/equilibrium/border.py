@@ -77,7 +77,7 @@ class BorderTerms:
     def work(self, state: State, force: float) -> float:
         """Σ f_k (a_k · u_k) + f (a · u_P) with ``force`` for f."""
         constant = sum(magnitude * self.travel(load, state) for load, magnitude in self._constant)
-        return force * self.travel(self._controlled, state) + state.share * constant
+        return force * self.travel(self._controlled, state) + state.load_factor * constant
 
     def pose_potential(self, state: State) -> float:
         """V. Local."""
@@ -91,7 +91,7 @@ class BorderTerms:
 
     def loads(self, state: State) -> list[tuple[PointLoad, float]]:
         """All loads with their magnitudes at ``state``. Local."""
-        return [(self._controlled, state.force), *((load, state.share * size) for load, size in self._constant)]
+        return [(self._controlled, state.force), *((load, state.load_factor * size) for load, size in self._constant)]
 
     def load_forces(self, loads: Iterable[tuple[PointLoad, float]], state: State) -> tuple[np.ndarray, np.ndarray]:
         """Σ magnitude · ∂(a · u_P) over ``loads``. Local."""
@@ -116,7 +116,7 @@ class BorderTerms:
             _add(total, places, _factor(potential, state) * potential.gradient(state.poses))
         return total
 
-    def share_rate(self, state: State) -> tuple[np.ndarray, np.ndarray]:
+    def load_factor_rate(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """−∂²L_b/∂(u, z)∂σ. Local."""
         links, border = self.load_forces(self._constant, state)
         weights = np.zeros(self._joints.size)
@@ -220,7 +220,7 @@ class BorderTerms:
 
 def _factor(potential: PosePotential, state: State) -> float:
     """The load factor that a potential counts with."""
-    return 1.0 if potential.holds else state.share
+    return 1.0 if potential.holds else state.load_factor
 
 
 def _add(total: np.ndarray, places: list[tuple[slice, np.ndarray]], gradient: np.ndarray) -> None:

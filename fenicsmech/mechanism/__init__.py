@@ -48,7 +48,7 @@ from fenicsmech.mechanism.shapes import (
     gmsh_mesh,
     outline,
     polygon,
-    step,
+    step_file,
     strip,
 )
 from fenicsmech.mechanism.validation import validate
@@ -93,7 +93,7 @@ __all__ = [
     "outline",
     "polygon",
     "same_place",
-    "step",
+    "step_file",
     "strip",
     "validate",
 ]

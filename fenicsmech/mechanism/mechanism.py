@@ -81,7 +81,7 @@ class Mechanism:
             raise DescriptionError(
                 f"link {name!r}",
                 f"its shape is {shape!r}",
-                "Make one with strip(), polygon(), outline(), step() or gmsh_mesh()",
+                "Make one with strip(), polygon(), outline(), step_file() or gmsh_mesh()",
             )
         if not isinstance(material, Material):
             raise DescriptionError(

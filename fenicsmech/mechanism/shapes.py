@@ -132,7 +132,7 @@ def outline(start: Sequence[float], segments: Sequence[Line | Arc], *, depth: fl
     return Outline(point("outline start", start, dimensions=(2,)), tuple(checked), positive("outline depth", depth))
 
 
-def step(path: str | Path, *, depth: float, section: float = 0.0) -> StepPart:
+def step_file(path: str | Path, *, depth: float, section: float = 0.0) -> StepPart:
     """The solid in the STEP file ``path``; ``depth`` and ``section`` serve the 2D models."""
     return StepPart(Path(path), positive("STEP depth", depth), finite("STEP section", section))
 

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from fenicsmech.equilibrium import ArcSteps, Iteration, Quantity, Sense
+from fenicsmech.continuation import ArcSteps, Sense
+from fenicsmech.equilibrium import Iteration, Quantity
 from fenicsmech.errors import DescriptionError
 from fenicsmech.multibody import Freedom, assemble_before_strain, count_freedom
 from fenicsmech.simulation.buckling import ModeShape
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.discretisation import Discretisation
-from fenicsmech.simulation.followed import FollowedCurve, PathEvent
-from fenicsmech.simulation.follower import Follower
+from fenicsmech.simulation.following import CurveFollower, FollowedCurve, PathEvent
 from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.request import CurveRequest
-from fenicsmech.simulation.tracer import Tracer
-from fenicsmech.simulation.until import Until
+from fenicsmech.simulation.request import CurveRequest, Until
+from fenicsmech.simulation.tracing import CurveTracer
 
 
 class Curves:
@@ -53,7 +52,7 @@ class Curves:
     def follow(
         self, request: CurveRequest, until: Until, steps: ArcSteps | None, watch: Callable[[int], None]
     ) -> FollowedCurve:
-        """The curve from the configuration without the force that leads, as ``Simulation.follow``."""
+        """The curve from the configuration without the controlled force, as ``Simulation.follow``."""
         follower, freedom = self._follower(request, until, steps)
         follower.from_rest(watch)
         return self._followed(request, freedom, follower)
@@ -83,7 +82,7 @@ class Curves:
                 found.append(self._followed(request, freedom, follower))
         return found[0], found[1]
 
-    def _tracer(self, request: CurveRequest) -> tuple[Tracer, Iteration, Freedom]:
+    def _tracer(self, request: CurveRequest) -> tuple[CurveTracer, Iteration, Freedom]:
         """What starts the path of a request, its solver, and the freedom of its configuration."""
         linkage, holding = self._model.linkage, self._model.holding
         assembly = assemble_before_strain(linkage, request.configuration, holding)
@@ -91,16 +90,16 @@ class Curves:
         motors = assembly.fraction * rigid.motor_values(request.configuration.position)
         freedom = count_freedom(rigid, assembly.poses, motors, holding)
         newton = self._discretisation.newton(request.part, request.others)
-        tracer = Tracer(
+        tracer = CurveTracer(
             self._model, newton, request, assembly=assembly, freedom=freedom, predictor=self._discretisation.predictor
         )
         return tracer, newton, freedom
 
-    def _follower(self, request: CurveRequest, until: Until, steps: ArcSteps | None) -> tuple[Follower, Freedom]:
+    def _follower(self, request: CurveRequest, until: Until, steps: ArcSteps | None) -> tuple[CurveFollower, Freedom]:
         tracer, newton, freedom = self._tracer(request)
-        return Follower(self._model, newton, request, tracer, until=until, steps=steps or ArcSteps()), freedom
+        return CurveFollower(self._model, newton, request, tracer, until=until, steps=steps or ArcSteps()), freedom
 
-    def _followed(self, request: CurveRequest, freedom: Freedom, follower: Follower) -> FollowedCurve:
+    def _followed(self, request: CurveRequest, freedom: Freedom, follower: CurveFollower) -> FollowedCurve:
         return FollowedCurve(
             request.part,
             request.configuration,

@@ -8,12 +8,13 @@ from mpi4py import MPI
 
 from fenicsmech.clock import Clock
 from fenicsmech.collective import on_one
-from fenicsmech.equilibrium import EquilibriumSolver, Iteration, Predictor
+from fenicsmech.continuation import Predictor
+from fenicsmech.equilibrium import EquilibriumSolver, Iteration
 from fenicsmech.estimates import Estimates
 from fenicsmech.mechanism import Force, Leader, Scene
 from fenicsmech.model import Fidelity, MechanismModel, check_links, mesh_mechanism
 from fenicsmech.multibody import build_linkage
-from fenicsmech.simulation.leading import leading
+from fenicsmech.simulation.request import controlled_load
 
 
 class Discretisation:
@@ -75,5 +76,5 @@ class Discretisation:
         key = part, others
         if key not in self._newtons:
             loads = tuple((self.model.point_load(other), float(magnitude)) for other, magnitude in others)
-            self._newtons[key] = self.solver.on(self.model.system(leading(part).load(self.model), loads))
+            self._newtons[key] = self.solver.on(self.model.system(controlled_load(part, self.model), loads))
         return self._newtons[key]

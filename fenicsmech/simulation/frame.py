@@ -13,11 +13,11 @@ from fenicsmech.mechanism import Motor, Output
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """An equilibrium and what was measured in it.
+    """An equilibrium and what was measured in it; prints its figures, not its fields.
 
     Attributes:
-        force: magnitude of the force that leads, or what the motor that leads exerts.
-        displacement: of the force's point along it, from the assembled configuration, or the motor's position, from
+        force: magnitude of the prescribed force, or what the prescribed motors exert.
+        displacement: of the force's point along it, from the assembled configuration, or the motors' position, from
             the drawing.
         stable: whether small disturbances die out under dead loads.
         jumped: whether the mechanism snapped on the way from the frame before: the path turns back there, and this
@@ -54,3 +54,11 @@ class Frame:
     phases: Mapping[str, float]
     state: State
     design: np.ndarray
+
+    def __repr__(self) -> str:
+        figures = [f"force={self.force:.6g}", f"displacement={self.displacement:.6g}", f"stable={self.stable}"]
+        figures += ["jumped=True"] * self.jumped
+        figures += [f"strain_energy={self.strain_energy:.4g}", f"max_stress={self.max_stress:.4g}"]
+        figures += [f"{output.name}={value:.6g}" for output, value in self.outputs.items()]
+        figures += [f"{motor.name}={value:.4g}" for motor, value in self.motors.items()]
+        return f"Frame({', '.join([*figures, f'iterations={self.iterations}'])})"

@@ -12,9 +12,10 @@ from mpi4py import MPI
 
 from fenicsmech.clock import Clock
 from fenicsmech.collective import from_one
+from fenicsmech.continuation import ArcSteps, Hermite, Predictor
 from fenicsmech.effects import holding
 from fenicsmech.elasticity import Formulation, Mixed, Quadrature
-from fenicsmech.equilibrium import ArcSteps, EquilibriumSolver, Hermite, Iteration, Predictor, PrimalDualNewton
+from fenicsmech.equilibrium import EquilibriumSolver, Iteration, PrimalDualNewton
 from fenicsmech.errors import DescriptionError
 from fenicsmech.estimates import AccuracyControl, Choice, Estimates, FidelityLevel, LevelErrors
 from fenicsmech.log import Progress, Silent
@@ -27,10 +28,9 @@ from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.curves import Curves
 from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.fields import rest_vertices
-from fenicsmech.simulation.followed import FollowedCurve, PathEvent
-from fenicsmech.simulation.request import CurveRequest, read_path, read_request
-from fenicsmech.simulation.unloaded import unloaded_positions
-from fenicsmech.simulation.until import Until, check_until
+from fenicsmech.simulation.following import FollowedCurve, PathEvent
+from fenicsmech.simulation.request import CurveRequest, Until, check_until, read_path, read_request
+from fenicsmech.simulation.tracing import unloaded_positions
 
 
 class RestShape(Protocol):
@@ -185,8 +185,7 @@ class Simulation:
         """
         self._check_description()
         self._check_chosen(part)
-        request = read_path(self.scene.mechanism, part, configuration=configuration, others=others)
-        check_until(until, part)
+        request = read_path(self.scene.mechanism, part, until=until, configuration=configuration, others=others)
         with self._progress(until.frames, configuration) as progress, self._shaped():
             return Curves(self._discretisation).follow(request, until, steps, progress.update)
 
