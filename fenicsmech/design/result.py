@@ -121,6 +121,13 @@ class DesignResult:
     processes: int
     groups: int
 
+    def __str__(self) -> str:
+        reached = (
+            f"  {t.force_name!r} of {t.force:g}, {t.configuration}: {t.reached:.4g} of {t.wanted:.4g} ({t.error:+.2%})"
+            for t in self.targets
+        )
+        return "\n".join([f"design of {self.mechanism!r} after {self.iterations} iterations: {self.reason}", *reached])
+
     @property
     def worst_error(self) -> float:
         """Largest relative error among the targets."""
