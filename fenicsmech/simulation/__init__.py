@@ -3,7 +3,7 @@
 - ``simulation``: the entry point, which computes curves
 - ``discretisation``: the meshed and compiled parts that simulations of several designs share
 - ``request``: what is prescribed and asked for
-- ``curves``, ``tracing``, ``following``: curves computed sample by sample, or along the path with its events
+- ``tracing``, ``following``: curves computed sample by sample, or along the path with its events
 - ``frame``, ``curve``: the results, and what can be asked of them
 - ``buckling``: buckling loads, buckling positions and soft modes of an equilibrium
 - ``friction``: how far friction in hinges holds a curve's load

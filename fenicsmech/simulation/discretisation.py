@@ -39,7 +39,6 @@ class Discretisation:
         self,
         scene: Scene,
         fidelity: Fidelity,
-        *,
         solver: EquilibriumSolver,
         predictor: Predictor,
         clock: Clock,
@@ -51,11 +50,9 @@ class Discretisation:
         self._newtons: dict[tuple, Iteration] = {}
         on_one(comm, lambda: check_links(scene.mechanism, self.linkage, fidelity))
 
-    def at(self, fidelity: Fidelity) -> Discretisation:
-        """The same scene at another fidelity, with nothing meshed yet."""
-        return Discretisation(
-            self.scene, fidelity, solver=self.solver, predictor=self.predictor, clock=self.clock, comm=self.comm
-        )
+    def at(self, fidelity: Fidelity, clock: Clock, comm: MPI.Comm) -> Discretisation:
+        """The same scene at another fidelity or on other processes, with nothing meshed yet."""
+        return Discretisation(self.scene, fidelity, self.solver, self.predictor, clock, comm)
 
     @cached_property
     def model(self) -> MechanismModel:

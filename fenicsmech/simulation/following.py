@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 from fenicsmech.continuation import (
@@ -17,12 +17,12 @@ from fenicsmech.continuation import (
     locate,
     null_space,
 )
-from fenicsmech.equilibrium import EquilibriumPoint, Iteration, LoadControl, NotConverged, State
-from fenicsmech.errors import EquilibriumError
-from fenicsmech.model import MechanismModel
+from fenicsmech.equilibrium import EquilibriumPoint, LoadControl, NotConverged, Quantity, State
+from fenicsmech.errors import DescriptionError, EquilibriumError
 from fenicsmech.plot import CurveMark, CurveSeries
 from fenicsmech.simulation.buckling import ModeShape, mode_shape
 from fenicsmech.simulation.curve import Curve
+from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.request import CurveRequest, Until, quantities
 from fenicsmech.simulation.tracing import CurveTracer
@@ -44,8 +44,11 @@ class PathEvent:
     kind: Critical
     frame: Frame
     index: int
-    null_space: tuple[ModeShape, ...] = field(repr=False)
-    critical: CriticalPoint = field(repr=False)
+    null_space: tuple[ModeShape, ...]
+    critical: CriticalPoint
+
+    def __repr__(self) -> str:
+        return f"<PathEvent: {self.kind.value} at frame {self.index}, value {self.value:.6g}, {self.frame!r}>"
 
     @property
     def mode(self) -> ModeShape:
@@ -97,35 +100,93 @@ class FollowedCurve(Curve):
         return tuple(event for event in self.events if event.kind is kind)
 
 
+def follow(
+    discretisation: Discretisation,
+    request: CurveRequest,
+    until: Until,
+    steps: ArcSteps,
+    watch: Callable[[int], None],
+) -> FollowedCurve:
+    """The curve of a request from its configuration without the controlled force.
+
+    Args:
+        discretisation: of the scene, at its present rest shape.
+        request: what is asked for.
+        until: where the curve ends.
+        steps: how finely it is followed.
+        watch: called with the number of frames so far.
+
+    Raises:
+        AssemblyError: the configuration does not assemble.
+        EquilibriumError: the curve ends early; carries the frames before that.
+    """
+    follower = CurveFollower(CurveTracer(discretisation, request), until, steps)
+    follower.from_rest(watch)
+    return follower.curve()
+
+
+def branches(
+    curve: FollowedCurve, event: PathEvent, until: Until, steps: ArcSteps, mode: ModeShape | None
+) -> tuple[FollowedCurve, FollowedCurve]:
+    """The curve that crosses another one, in both senses.
+
+    Args:
+        curve, event: a followed curve and one of its bifurcations.
+        until, steps: as in ``follow``.
+        mode: one of the event's ``null_space``, if several modes become unstable at once.
+
+    Raises:
+        DescriptionError: the event is not a bifurcation of the curve, the mode is missing or none of its.
+        EquilibriumError: the curve is not found, or ends early; carries the frames before that.
+    """
+    if event not in curve.bifurcations:
+        raise DescriptionError("branches", "the event is no bifurcation of the curve", "Choose from its bifurcations")
+    if mode is None and event.modes != 1:
+        raise DescriptionError(
+            "branches",
+            f"{event.modes} modes become unstable at once: {', '.join(shape.link for shape in event.null_space)}",
+            "Say which with mode=event.null_space[…], or break the symmetry a little",
+        )
+    if mode is not None and mode not in event.null_space:
+        raise DescriptionError("branches", "the mode is none of the event's", "Choose from its null_space")
+    request, found = CurveRequest(curve.part, (), curve.configuration, curve.others), []
+    with curve.discretisation.model.shaped(event.frame.design):
+        for sense in Sense:
+            follower = CurveFollower(CurveTracer(curve.discretisation, request), until, steps)
+            follower.from_bifurcation(event, mode or event.mode, sense)
+            found.append(follower.curve())
+    return found[0], found[1]
+
+
 class CurveFollower:
     """The path of one request.
 
     Args:
-        model: the discretised mechanism.
-        solver: for the request's forces.
-        request: what is asked for.
-        tracer: of the same request.
+        tracer: of the request.
         until: where the path ends.
         steps: how finely it is followed.
-
-    Attributes:
-        frames, events: of the path so far.
     """
 
-    def __init__(
-        self,
-        model: MechanismModel,
-        solver: Iteration,
-        request: CurveRequest,
-        tracer: CurveTracer,
-        *,
-        until: Until,
-        steps: ArcSteps,
-    ) -> None:
-        self._model, self._solver, self._request, self._tracer = model, solver, request, tracer
-        self._until, self._steps, self._followed = until, steps, tracer.followed
-        self.frames: list[Frame] = []
-        self.events: list[PathEvent] = []
+    def __init__(self, tracer: CurveTracer, until: Until, steps: ArcSteps) -> None:
+        self._tracer, self._until, self._steps = tracer, until, steps
+        self._followed, self._system = tracer.followed, tracer.solver.system
+        self._frames: list[Frame] = []
+        self._events: list[PathEvent] = []
+
+    def curve(self) -> FollowedCurve:
+        """What was found."""
+        tracer, request = self._tracer, self._tracer.request
+        return FollowedCurve(
+            request.part,
+            request.configuration,
+            tracer.freedom,
+            tuple(self._frames),
+            tracer.discretisation,
+            others=request.others,
+            # loads have limit points, where no displacement belongs to a slightly larger one
+            quantity=Quantity.FORCE,
+            events=tuple(self._events),
+        )
 
     def from_rest(self, watch: Callable[[int], None]) -> None:
         """Follows the path from the configuration without the controlled force.
@@ -134,7 +195,7 @@ class CurveFollower:
             EquilibriumError: the path ends early; carries the frames before that.
         """
         first = self._tracer.frame(LoadControl(0.0), ())
-        self.frames.append(first)
+        self._frames.append(first)
         try:
             path = self._path(first.state)
         except NotConverged as failure:
@@ -146,25 +207,25 @@ class CurveFollower:
             start = start.scaled(-1.0)
         self._walk(path, start, watch)
 
-    def from_bifurcation(self, event: PathEvent, mode: ModeShape, sense: Sense, watch: Callable[[int], None]) -> None:
+    def from_bifurcation(self, event: PathEvent, mode: ModeShape, sense: Sense) -> None:
         """Follows the path that crosses another one at ``event`` along ``mode``.
 
         Raises:
             EquilibriumError: the path is not found, or ends early; carries the frames before that.
         """
-        self.frames.append(event.frame)
+        self._frames.append(event.frame)
         rest = self._tracer.frame(LoadControl(0.0), ())  # the tangent at the bifurcation has no scale
         try:
             path = self._path(rest.state)
             first = crossing(path, event.critical, mode.step, sense)
         except NotConverged as failure:
             raise self._ended(failure) from failure
-        self.frames.append(self._tracer.record(first))
-        self._walk(path, first, watch)
+        self._frames.append(self._tracer.record(first))
+        self._walk(path, first, lambda done: None)
 
     def _walk(self, path: ArcLengthTracer, start: EquilibriumPoint, watch: Callable[[int], None]) -> None:
-        clock = self._model.clock
-        stretches = path.follow(start, self._finishes(path), most=self._until.frames - len(self.frames))
+        clock = self._tracer.discretisation.clock
+        stretches = path.follow(start, self._finishes(path), most=self._until.frames - len(self._frames))
         while True:
             began, seconds = perf_counter(), dict(clock.seconds)
             try:
@@ -176,8 +237,8 @@ class CurveFollower:
             except NotConverged as failure:
                 raise self._ended(failure) from failure
             frame = self._tracer.record(ends[1])
-            self.frames.append(replace(frame, seconds=perf_counter() - began, phases=clock.since(seconds)))
-            watch(min(len(self.frames), self._until.frames))  # critical points come on top
+            self._frames.append(replace(frame, seconds=perf_counter() - began, phases=clock.since(seconds)))
+            watch(min(len(self._frames), self._until.frames))  # critical points come on top
 
     def _record_event(self, path: ArcLengthTracer, critical: CriticalPoint) -> None:
         if critical.kind is Critical.BIFURCATION:
@@ -186,16 +247,16 @@ class CurveFollower:
             step = critical.point.tangent
             steps = [step.scaled(1.0 / path.system.size(step))]
         frame = self._tracer.record(critical.point)
-        modes = tuple(mode_shape(self._model, step) for step in steps)
-        self.events.append(PathEvent(critical.kind, frame, len(self.frames), modes, critical))
-        self.frames.append(frame)
+        modes = tuple(mode_shape(self._tracer.discretisation.model, step) for step in steps)
+        self._events.append(PathEvent(critical.kind, frame, len(self._frames), modes, critical))
+        self._frames.append(frame)
 
     def _path(self, state: State) -> ArcLengthTracer:
         """The path through ``state``, in units of what is asked for."""
-        until, value, conjugate = self._until, self._followed.value(self._solver.system, state), self._conjugate(state)
+        until, value, conjugate = self._until, self._followed.value(self._system, state), self._conjugate(state)
         values, conjugates = (until.travel, until.force) if self._followed.displaces else (until.force, until.travel)
         return ArcLengthTracer(
-            self._solver,
+            self._tracer.solver,
             self._followed,
             state,
             steps=self._steps,
@@ -216,16 +277,16 @@ class CurveFollower:
 
     def _conjugate(self, state: State) -> float:
         """As on curves, displacements from the unloaded configuration."""
-        self._solver.system.load(state)
+        self._system.load(state)
         origin = 0.0 if self._followed.displaces else self._tracer.origin
-        return self._followed.conjugate(self._solver.system, state) - origin
+        return self._followed.conjugate(self._system, state) - origin
 
     def _ended(self, failure: NotConverged) -> EquilibriumError:
-        last, (across, up) = self.frames[-1], quantities(self._request.part)
+        last, (across, up) = self._frames[-1], quantities(self._tracer.request.part)
         return EquilibriumError(
-            f"path of {self._request.where}",
+            f"path of {self._tracer.request.where}",
             f"it cannot be followed beyond {across} {last.displacement:g} at {up} {last.force:g} ({failure})",
             "End it before, allow smaller steps with ArcSteps(smallest=…), or use a finer mesh",
             last=last,
-            frames=self.frames,
+            frames=self._frames,
         )

@@ -13,7 +13,7 @@ from fenicsmech.mechanism import Motor, Output
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """An equilibrium and what was measured in it; prints its figures, not its fields.
+    """An equilibrium and what was measured in it; prints its figures, not its arrays.
 
     Attributes:
         force: magnitude of the prescribed force, or what the prescribed motors exert.
@@ -56,9 +56,8 @@ class Frame:
     design: np.ndarray
 
     def __repr__(self) -> str:
-        figures = [f"force={self.force:.6g}", f"displacement={self.displacement:.6g}", f"stable={self.stable}"]
-        figures += ["jumped=True"] * self.jumped
-        figures += [f"strain_energy={self.strain_energy:.4g}", f"max_stress={self.max_stress:.4g}"]
-        figures += [f"{output.name}={value:.6g}" for output, value in self.outputs.items()]
-        figures += [f"{motor.name}={value:.4g}" for motor, value in self.motors.items()]
-        return f"Frame({', '.join([*figures, f'iterations={self.iterations}'])})"
+        figures = [f"force {self.force:.6g}", f"displacement {self.displacement:.6g}"]
+        figures += [f"{part.name} {value:.6g}" for part, value in (*self.outputs.items(), *self.motors.items())]
+        figures += [f"strain energy {self.strain_energy:.4g}", f"stress {self.max_stress:.4g}"]
+        figures += ["stable" if self.stable else f"{self.unstable_modes} unstable modes"] + ["snapped"] * self.jumped
+        return f"<Frame: {', '.join(figures)}>"

@@ -200,7 +200,9 @@ def check_until(until: object, part: Leader) -> None:
     if not isinstance(until, Until):
         raise DescriptionError("end of a path", f"{until!r} does not say where", f"Give until=Until({has}=…)")
     if getattr(until, lacks):
-        raise DescriptionError("end of a path", f"{part.name!r} leads, which has no {lacks}", f"Give its {has}=…")
+        raise DescriptionError(
+            "end of a path", f"{part.name!r} is prescribed, which has no {lacks}", f"Give its {has}=…"
+        )
 
 
 def _drive(part: Motor | Drive) -> Drive:
@@ -214,7 +216,7 @@ def _read_others(
     for other in others:
         _check_force(mechanism, other)
     if part in others:
-        raise DescriptionError(f"{part.name!r}", "it is led and held constant at once", "Leave it out of others")
+        raise DescriptionError(f"{part.name!r}", "it changes and is held constant at once", "Leave it out of others")
     return tuple((other, finite(f"magnitude of {other.name!r}", value)) for other, value in others.items())
 
 

@@ -8,21 +8,21 @@ refused.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
 from mpi4py import MPI
 
-from fenicsmech.continuation import LoadStepper, LoadSteps, LoadStepsFailed, MotorStepper, Predictor
+from fenicsmech.continuation import LoadStepper, LoadSteps, LoadStepsFailed, MotorStepper
 from fenicsmech.equilibrium import (
     Control,
     DisplacementControl,
     EquilibriumPoint,
-    Iteration,
     LoadFactorControl,
     MotorControl,
+    Quantity,
     Residual,
     State,
     joint_reactions,
@@ -30,19 +30,21 @@ from fenicsmech.equilibrium import (
 )
 from fenicsmech.errors import AssemblyError, EquilibriumError
 from fenicsmech.mechanism import Configuration, Force, Output, in_dimension
-from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import (
     Assembly,
     BodyPoint,
-    Freedom,
     Linkage,
     Motion,
     SpringPotential,
     assemble,
+    assemble_before_strain,
+    count_freedom,
     free_motions,
     is_held,
     stiff_motions,
 )
+from fenicsmech.simulation.curve import Curve
+from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.request import CurveRequest, followed_control
 
@@ -51,33 +53,28 @@ class CurveTracer:
     """The unloaded equilibrium of a configuration, and load steps from there.
 
     Args:
-        model: the discretised mechanism.
-        solver: for the request's forces.
+        discretisation: of the scene, at its present rest shape.
         request: what is asked for.
-        assembly: the rigid assembly of the configuration.
-        freedom: its mobility.
-        predictor: how the next equilibrium is guessed.
 
     Attributes:
+        solver: for the request's forces.
+        freedom: mobility of the configuration.
         followed: the control whose value changes along the curve.
         origin: what displacements are counted from, that of the force's point in the unloaded configuration.
 
     Raises:
+        AssemblyError: the configuration does not assemble.
         EquilibriumError: motors that strain the links, or the constant forces, lead to no equilibrium.
     """
 
-    def __init__(
-        self,
-        model: MechanismModel,
-        solver: Iteration,
-        request: CurveRequest,
-        *,
-        assembly: Assembly,
-        freedom: Freedom,
-        predictor: Predictor,
-    ) -> None:
-        self._model, self._solver, self._request, self._predictor = model, solver, request, predictor
-        self._system, self._joints, self._freedom = solver.system, model.linkage.joints, freedom
+    def __init__(self, discretisation: Discretisation, request: CurveRequest) -> None:
+        self.discretisation, self.request, self._model = discretisation, request, discretisation.model
+        model, rigid = self._model, self._model.linkage.rigid
+        assembly = assemble_before_strain(model.linkage, request.configuration, model.holding)
+        motors = assembly.fraction * rigid.motor_values(request.configuration.position)
+        self.freedom = count_freedom(rigid, assembly.poses, motors, model.holding)
+        self.solver = discretisation.newton(request.part, request.others)
+        self._system, self._joints = self.solver.system, model.linkage.joints
         self.followed = followed_control(request.part, self._joints)
         self.origin, self._origins = 0.0, dict.fromkeys(model.mechanism.outputs, 0.0)
         self._snaps = 0  # of the path so far that no frame reports
@@ -92,7 +89,27 @@ class CurveTracer:
             self._system.load(state)
         self._state = state
         control = DisplacementControl() if any(c.constrained for c in request.controls) else self.followed
-        self._path = LoadStepper(solver, state, control, predictor=predictor)
+        self._path = LoadStepper(self.solver, state, control, predictor=discretisation.predictor)
+
+    def curve(self, watch: Callable[[int], None]) -> Curve:
+        """The frames of all samples; ``watch`` is called with the number of frames so far.
+
+        Raises:
+            EquilibriumError: a sample was not reached; carries the frames before it.
+        """
+        request, frames = self.request, []
+        for control in request.controls:
+            frames.append(self.frame(control, frames))
+            watch(len(frames))
+        return Curve(
+            request.part,
+            request.configuration,
+            self.freedom,
+            tuple(frames),
+            self.discretisation,
+            others=request.others,
+            quantity=Quantity.FORCE if request.controls[0].constrained else Quantity.DISPLACEMENT,
+        )
 
     def frame(self, control: Control, before: Sequence[Frame]) -> Frame:
         """The equilibrium under ``control``; ``before`` are the frames so far.
@@ -109,10 +126,10 @@ class CurveTracer:
         except LoadStepsFailed as failure:
             raise self._unreached(control, failure, before) from failure
         record = self.record(point)
-        if self._freedom.mobility and not control.constrained and self._imbalance(point.state, control) > 1e-4:
-            names = ", ".join(map(repr, self._freedom.mobile))
+        if self.freedom.mobility and not control.constrained and self._imbalance(point.state, control) > 1e-4:
+            names = ", ".join(map(repr, self.freedom.mobile))
             problem = f"at force {control.target:g} where {names} come to rest is lost in the rounding of stiff links"
-            raise self._error(self._request.where, problem, before[-1] if before else None, before)
+            raise self._error(self.request.where, problem, before[-1] if before else None, before)
         jumped, self._snaps = self._snaps + path.snaps > snaps, 0
         return replace(
             record,
@@ -152,17 +169,17 @@ class CurveTracer:
 
     def _unloaded(self, assembly: Assembly) -> State:
         """The configuration without force or effect: the rigid assembly, or where motors that strain links lead."""
-        configuration, fraction = self._request.configuration, assembly.fraction
+        configuration, fraction = self.request.configuration, assembly.fraction
         motors = self._joints.motor_values(configuration.position)
         state = replace(
             self._model.assembled_state(assembly.poses, fraction * motors),
-            load_factor=0.0 if self._request.others or self._model.effects else 1.0,
-            minimum_shift=LoadSteps().minimum_shift if self._freedom.idle else 0.0,
+            load_factor=0.0 if self.request.others or self._model.effects else 1.0,
+            minimum_shift=LoadSteps().minimum_shift if self.freedom.zero_energy else 0.0,
         )
         if fraction == 1.0:
             return state
         control = MotorControl(fraction, motors)
-        path = MotorStepper(self._solver, state, control, predictor=self._predictor)
+        path = MotorStepper(self.solver, state, control, predictor=self.discretisation.predictor)
         # a quarter of a radian, or of the mechanism's length: in space a motor's equation is periodic
         steps = int(np.ceil((1.0 - fraction) * self._joints.travel(motors) / 0.25))
         try:
@@ -182,15 +199,15 @@ class CurveTracer:
     def _under_constant_loads(self, state: State) -> State:
         """The configuration under the request's constant forces and the scene's effects, which grow together."""
         control = LoadFactorControl()
-        path = LoadStepper(self._solver, control.prepare(state), control, predictor=self._predictor)
+        path = LoadStepper(self.solver, control.prepare(state), control, predictor=self.discretisation.predictor)
         try:
             state = path.advance(control.at(1.0)).state
             self._snaps += path.snaps
         except LoadStepsFailed as failure:
-            forces = [repr(force.name) for force, _ in self._request.others]
+            forces = [repr(force.name) for force, _ in self.request.others]
             names = ", ".join([*forces, *(effect.explain() for effect in self._model.effects)])
             raise self._error(
-                f"constant loads ({names}) in configuration {self._request.configuration.name!r}",
+                f"constant loads ({names}) in configuration {self.request.configuration.name!r}",
                 f"no equilibrium beyond {100.0 * failure.reached:.3g}% of them ({failure.reason})",
                 self._last(failure),
                 otherwise="Choose smaller ones",
@@ -200,7 +217,7 @@ class CurveTracer:
     # -- failures ----------------------------------------------------------------------------------------------
 
     def _unreached(self, control: Control, failure: LoadStepsFailed, before: Sequence[Frame]) -> EquilibriumError:
-        last, where = self._last(failure), self._request.where
+        last, where = self._last(failure), self.request.where
         if control.constrained and self._is_held():
             return EquilibriumError(
                 where,
@@ -233,8 +250,8 @@ class CurveTracer:
                 "The springs are softer than the rounding of the stiffest links: "
                 "make links rigid that hardly bend, or springs stiffer"
             )
-        elif self._freedom.idle:
-            names = ", ".join(map(repr, self._freedom.idle))
+        elif self.freedom.zero_energy:
+            names = ", ".join(map(repr, self.freedom.zero_energy))
             otherwise = f"Nothing but the force holds {names}: add a joint or a motor, or check the force's direction"
         return EquilibriumError(where, problem, otherwise, last=last, frames=before)
 
@@ -253,7 +270,7 @@ class CurveTracer:
 
     def _springs_are_lost(self) -> bool:
         """Whether some freedom is held by springs that rounding of the links' stiffness, 1e-15 of it, outweighs."""
-        rigid, motors = self._model.linkage.rigid, self._joints.motor_values(self._request.configuration.position)
+        rigid, motors = self._model.linkage.rigid, self._joints.motor_values(self.request.configuration.position)
         motors = np.concatenate([motors, np.zeros(len(rigid.connections) - len(motors))])  # welds of links
         free = free_motions(rigid, self._poses, motors, self._model.holding)
         held = np.abs(np.linalg.eigvalsh(free.curvature)) if self._model.holding else np.zeros(0)
@@ -268,7 +285,7 @@ class CurveTracer:
         nothing moves.
         """
         model, joints, residual = self._model, self._joints, self._system.residual(state, control)
-        size = abs(state.force) + sum(abs(state.load_factor * magnitude) for _, magnitude in self._request.others)
+        size = abs(state.force) + sum(abs(state.load_factor * magnitude) for _, magnitude in self.request.others)
         size, worst = size + self._effects(state), 0.0
         parts = np.abs(state.multipliers) @ np.abs(joints.gradient(state.poses, state.motors))
         for motion in stiff_motions(model.linkage, state.poses, state.motors):
