@@ -145,7 +145,7 @@ class _Pin:
     """A pin in a strip, in units of the element size.
 
     Attributes:
-        site: the site, moved onto the centreline, and its disc to the strip's sides, if it misses them by less than a mesh can tell.
+        site: the site, moved onto the centreline, and its disc to the strip's sides, where it almost meets them.
         half: half the strip's thickness.
         inward: unit vector along the strip, away from its nearer end, shape (2,).
         station: parameter of the centreline's point nearest to the pin.
