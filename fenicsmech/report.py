@@ -95,7 +95,7 @@ def write_report(
     folder, name, comm = Path(folder), simulation.scene.mechanism.name, simulation.comm
     if not curves:
         raise DescriptionError(f"report on {name!r}", "there is no curve", "Give at least one")
-    stress = simulation.scene.units.stress
+    units = simulation.scene.units
     panels, paths = [curve.panel() for curve in curves], [_suffixed(curve, curves) for curve in curves]
     for curve, path in zip(curves, paths, strict=True):
         curve.write(folder / f"deformed{path}.xdmf")
@@ -106,8 +106,8 @@ def write_report(
     summary = _summarise(simulation, curves, design)
 
     def write() -> None:
-        label = f"von Mises stress [{stress}]"
-        draw_configurations(folder / "mechanism.png", panels, title=name, colour_label=label)
+        label = f"von Mises stress [{units.stress}]"
+        draw_configurations(folder / "mechanism.png", panels, title=name, colour_label=label, unit=units.length)
         _plot(folder / "curve.png", name, curves, design)
         if design is not None:
             design.result.save(folder / "design.json")
@@ -146,6 +146,7 @@ def _summarise(sim: Simulation, curves: Sequence[Curve], design: Design | None) 
         "space": sim.fidelity.model.name,
         "order": sim.fidelity.order,
         "ranks": sim.comm.size,
+        "units": {"length": sim.scene.units.length, "force": sim.scene.units.force, "stress": sim.scene.units.stress},
         "dofs": {"rigid": sim.model.rigid_dofs, "flexible": sim.model.flexible_dofs},
         "parameters": result and result.parameters,
         "targets": [],
@@ -238,7 +239,9 @@ def _loaded(curves: Sequence[Curve]) -> list[Frame]:
 def _text(summary: dict, folder: Path) -> str:
     """Equilibria, targets, size of the problem and times, for the console."""
     keys = ("configuration", "force", "displacement", "displacement_error", "stable", "iterations", "seconds")
-    headers = ("configuration", "force", "displacement", "finer elements add", "stable", "iterations", "seconds")
+    length, force = summary["units"]["length"], summary["units"]["force"]
+    headers = ("configuration", f"force [{force}]", f"displacement [{length}]", f"finer elements add [{length}]")
+    headers += ("stable", "iterations", "seconds")
     lines = [format_table(headers, [[frame[key] for key in keys] for frame in summary["frames"]])]
     if summary["parameters"] is not None:
         lines += _design_text(summary)
@@ -256,14 +259,16 @@ def _text(summary: dict, folder: Path) -> str:
 
 
 def _design_text(summary: dict) -> list[str]:
-    headers = ("configuration", "force", "wanted", "reached", "finer elements add", "error [%]")
+    length, force = summary["units"]["length"], summary["units"]["force"]
+    headers = ("configuration", f"force [{force}]", *(f"{name} [{length}]" for name in ("wanted", "reached")))
+    headers += (f"finer elements add [{length}]", "error [%]")
     rows = [
         [t["configuration"], t["force"], t["wanted"], t["reached"], t["reached_error"], 100.0 * t["relative_error"]]
         for t in summary["targets"]
     ]
     start = summary.get("start")
     if start is not None:
-        headers += ("optimum of the start", "the same here")
+        headers += (f"optimum of the start [{length}]", f"the same here [{length}]")
         rows = [[*row, *pair] for row, *pair in zip(rows, start["reached"], start["reached_here"], strict=True)]
     (least, most), objective, error = summary["thickness"], summary["objective"], summary["objective_error"]
     finer = "" if error is None else f", to which finer elements add {error:.2g}"
@@ -273,7 +278,7 @@ def _design_text(summary: dict) -> list[str]:
         format_table(headers, rows),
         f"{summary['parameters']} parameters, {summary['iterations']} iterations, {summary['evaluations']} "
         f"evaluations: objective {objective['initial']:.3g} -> {objective['final']:.3g}{finer} ({summary['ended']})",
-        f"thickness {least:.2f} to {most:.2f}, curvature ratio up to {summary['curvature_ratio_max']:.3f}, "
+        f"thickness {least:.2f} to {most:.2f} {length}, curvature ratio up to {summary['curvature_ratio_max']:.3f}, "
         f"aspect ratio of cells up to {summary['mesh_ratio_max']:.1f}; "
         f"active: {', '.join(summary['active_bounds']) or 'no bound'}",
         f"optimisation: {seconds:.1f} s" + (f", {start['seconds']:.1f} s of it for the start" if start else ""),
