@@ -6,6 +6,7 @@ Describe a mechanism (``Mechanism``), say what acts on it (``Scene``) and how fi
 """
 
 from fenicsmech.collective import mpi_abort_on_error
+from fenicsmech.continuation import ArcSteps, Critical
 from fenicsmech.design import (
     BFGS,
     DesignProblem,
@@ -33,11 +34,11 @@ from fenicsmech.effects import (
 )
 from fenicsmech.elasticity import Displacement, Mixed
 from fenicsmech.equilibrium import (
-    ArcSteps,
-    Critical,
     PrimalDualNewton,
 )
 from fenicsmech.errors import AssemblyError, DescriptionError, EquilibriumError, FenicsmechError, MeshingError
+from fenicsmech.files import read_csv
+from fenicsmech.joints import JointKind, PlanarMarker, SpatialMarker
 from fenicsmech.mechanism import (
     DRAWN,
     ONYX,
@@ -59,9 +60,12 @@ from fenicsmech.mechanism import (
     gmsh_mesh,
     outline,
     polygon,
-    step,
+    step_file,
     strip,
 )
+from fenicsmech.model import SPACES
+from fenicsmech.plot import CurveSeries, Trace, plot_curve
+from fenicsmech.report import Optimisation, Report, write_report
 from fenicsmech.simulation import (
     BucklingLoad,
     BucklingPosition,
@@ -82,11 +86,13 @@ __all__ = [
     "DRAWN",
     "ONYX",
     "SMOOTH_SIL_950",
+    "SPACES",
     "Arc",
     "AssemblyError",
     "BFGS",
     "Configuration",
     "Curve",
+    "CurveSeries",
     "DescriptionError",
     "DesignProblem",
     "DesignResult",
@@ -109,24 +115,30 @@ __all__ = [
     "MeshQuality",
     "MeshingError",
     "Mixed",
+    "Optimisation",
     "ModulusFit",
     "NeoHookean",
     "PrimalDualNewton",
     "Rectangle",
+    "Report",
     "Scene",
     "ShapeBounds",
     "Simulation",
     "SplineDesign",
     "StayClose",
     "Target",
+    "Trace",
     "Units",
     "fit_modulus",
     "gmsh_mesh",
     "mpi_abort_on_error",
     "outline",
+    "plot_curve",
     "polygon",
-    "step",
+    "read_csv",
+    "step_file",
     "strip",
+    "write_report",
     "Contact",
     "Cylinder",
     "HalfPlane",
@@ -134,7 +146,10 @@ __all__ = [
     "JointSpring",
     "Pressure",
     "Prestrain",
+    "JointKind",
     "PinFriction",
+    "PlanarMarker",
+    "SpatialMarker",
     "ArcSteps",
     "BucklingLoad",
     "BucklingPosition",

@@ -18,15 +18,16 @@ import numpy as np
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.equilibrium import EquilibriumSolver, Iteration, LoadControl, NotConverged, Solution
+from fenicsmech.equilibrium import EquilibriumPoint, EquilibriumSolver, Iteration, LoadControl, NotConverged
+from fenicsmech.report import format_table
 
 from ..mechanisms import mechanism
-from ..table import command, format_table, publish
+from ..table import command, publish
 from . import SNES, AugmentedLagrangian, Globalisation, KKTNewton
 
 SOLVERS = {
     "default": fm.PrimalDualNewton(),
-    "without mixed stress": fm.PrimalDualNewton(mixed_stress=False, allowance=4),
+    "without mixed stress": fm.PrimalDualNewton(mixed_stress=False, watchdog=4),
     "augmented Lagrangian": AugmentedLagrangian(),
     "KKT Newton": KKTNewton(),
     "with backtracking": KKTNewton(backtracking=True),
@@ -67,7 +68,7 @@ class Counted(EquilibriumSolver):
         iteration = self.solver.on(system)
         solve = iteration.solve
 
-        def counted(*arguments, **options) -> Solution:
+        def counted(*arguments, **options) -> EquilibriumPoint:
             if perf_counter() > self.count.deadline:
                 raise Stopped
             try:
@@ -250,7 +251,7 @@ def cases():
         "column past buckling": curve(strut, push, size=2.0, forces=[f * euler for f in (0.5, 0.9, 1.1, 1.5)]),
         "stiffness contrast 1e6": curve(*contrast(), size=3.0, forces=[0.002, 0.005, 0.01]),
         "redundant loop, 3D": curve(*four_bar(hinged), space="3d", order=1, size=4.0, forces=[2.0, 5.0]),
-        "idle spin, 3D": curve(*four_bar(balled), space="3d", order=1, size=4.0, forces=[2.0, 5.0]),
+        "free spin, 3D": curve(*four_bar(balled), space="3d", order=1, size=4.0, forces=[2.0, 5.0]),
         "arch through its limit point": curve(bow, crown, size=1.0, displacements=travel),
         "silicone stretched threefold": curve(*rubber_band(), size=2.0, displacements=[15.0, 30.0, 60.0]),
     }

@@ -25,10 +25,10 @@ from fenicsmech.design.optimisers.problem import (
     TooHigh,
 )
 from fenicsmech.design.regularisers import MeshQuality, Model, Regulariser, ShapeBounds, StayClose
-from fenicsmech.design.rest_shape import DesignedLink, RestShape
+from fenicsmech.design.rest_shape import DesignedLink, ParametricShape
 from fenicsmech.design.result import DesignResult, LinkDesign, TargetResult
 from fenicsmech.design.run import Checkpoint, DesignProgress, minimise_together
-from fenicsmech.design.sensitivity import Adjoint, Gradient
+from fenicsmech.design.sensitivity import Gradient, Sensitivity
 from fenicsmech.design.shape.handle_optimum import (
     HandleOptimum,
     MapDerivatives,
@@ -43,7 +43,7 @@ from fenicsmech.design.shape.spline import LinkSpline, SplineSamples, fit_spline
 from fenicsmech.design.shape.weights import insert, lumped_mass, pierced, solve_partition, stiffness
 
 __all__ = [
-    "Adjoint",
+    "Sensitivity",
     "BETWEEN",
     "BFGS",
     "Barrier",
@@ -75,7 +75,7 @@ __all__ = [
     "Reason",
     "Regulariser",
     "Resolution",
-    "RestShape",
+    "ParametricShape",
     "ShapeBounds",
     "ShapeError",
     "ShapeMap",

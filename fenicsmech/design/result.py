@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from fenicsmech.collective import on_one
-from fenicsmech.design.description import Target
+from fenicsmech.design.description import SplineDesign, Target
 from fenicsmech.design.equilibria import TargetEquilibria
 from fenicsmech.design.objective import target_errors, target_scales
 from fenicsmech.design.optimisers.problem import Infeasible
-from fenicsmech.design.rest_shape import DesignedLink, RestShape
-from fenicsmech.design.shape.handle_optimum import Placement
+from fenicsmech.design.rest_shape import DesignedLink, ParametricShape
+from fenicsmech.design.shape.handle_optimum import HandlePlacement
 from fenicsmech.design.shape.shape_map import gather_links
 from fenicsmech.errors import DescriptionError
 from fenicsmech.export import PinHole, write_step, write_stl
@@ -38,10 +38,12 @@ class LinkDesign:
     Attributes:
         name: of the link.
         parameters: its part of p.
-        handles: positions θ of its handles, which are the best near those of the designs on the way.
+        handles: positions θ of its handles, the best near those of the designs on the way. Several can be good: the
+            parameters alone fix displacements to about 1 % only.
         controls: position and thickness (x, y, δ), then tangent, of every control point, (points, 2, 3).
         thickness: least and largest thickness in the plane.
         bend: largest curvature ratio.
+        centreline: points that the drawn centreline runs through, if they were given.
     """
 
     name: str
@@ -50,6 +52,7 @@ class LinkDesign:
     controls: tuple[tuple[tuple[float, ...], ...], ...]
     thickness: tuple[float, float]
     bend: float
+    centreline: tuple[tuple[float, ...], ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -118,6 +121,13 @@ class DesignResult:
     processes: int
     groups: int
 
+    def __str__(self) -> str:
+        reached = (
+            f"  {t.force_name!r} of {t.force:g}, {t.configuration}: {t.reached:.4g} of {t.wanted:.4g} ({t.error:+.2%})"
+            for t in self.targets
+        )
+        return "\n".join([f"design of {self.mechanism!r} after {self.iterations} iterations: {self.reason}", *reached])
+
     @property
     def worst_error(self) -> float:
         """Largest relative error among the targets."""
@@ -132,6 +142,28 @@ class DesignResult:
     def parameters(self) -> int:
         """Number of parameters."""
         return sum(len(link.parameters) for link in self.links)
+
+    def rest_shape(self, simulation: Simulation) -> np.ndarray:
+        """The design field on the mesh of a simulation of the same mechanism: this rank's values, ghosts last, flat.
+
+        Raises:
+            DescriptionError: the mechanism has no such links.
+            ShapeError: cells of the mesh are inverted in this shape.
+        """
+        links = {link.name: link for link in simulation.scene.mechanism.flexible_links}
+        for own in self.links:
+            if own.name not in links:
+                raise DescriptionError(
+                    f"design of {self.mechanism!r}",
+                    f"{simulation.scene.mechanism.name!r} has no flexible link {own.name!r}",
+                    "Give a simulation of the same mechanism",
+                )
+        rest = ParametricShape.of(
+            simulation,
+            [SplineDesign(links[own.name], len(own.controls) - 1, centreline=own.centreline) for own in self.links],
+        )
+        p, theta = (np.concatenate(own) for own in zip(*((o.parameters, o.handles) for o in self.links), strict=True))
+        return rest.field(p, rest.known(p, theta))
 
     def save(self, path: str | Path) -> None:
         """Local. Writes the result as JSON; call it on one process."""
@@ -169,55 +201,42 @@ def _read(data: dict) -> DesignResult:
     return DesignResult(links=links, targets=targets, **{key: frozen(value) for key, value in data.items()})
 
 
-@dataclass(frozen=True, eq=False)
-class Verification:
-    """What a user will find when loading the optimum from zero.
-
-    Attributes:
-        displacements: of the targets' points, (targets,); as followed, where one of them is not reached.
-        same: whether these are the ones that were followed.
-        errors: what finer elements would add to them, (targets,); None if one of them is not reached.
-    """
-
-    displacements: np.ndarray
-    same: bool
-    errors: np.ndarray | None
-
-
-def verify(simulation: Simulation, targets: Sequence[Target], followed: np.ndarray) -> Verification:
-    """Loads the targets from zero, which is what a user will do, and logs where that leads elsewhere.
+def verified_targets(
+    simulation: Simulation, targets: Sequence[Target], started: np.ndarray, followed: np.ndarray
+) -> tuple[tuple[TargetResult, ...], bool]:
+    """How far each target is reached when it is loaded from zero, which is what a user will do; logs where not.
 
     Args:
-        simulation: has the shapes of the optimum.
+        simulation: its model has the shapes of the optimum.
         targets: what was wanted.
+        started: displacements at the start, (targets,).
         followed: displacements of the equilibria that were followed from design to design, (targets,).
+
+    Returns:
+        The targets' results, with the displacements as followed and without an estimate if one of them is not reached,
+        and whether loading leads to the equilibria that were followed.
     """
-    equilibria = TargetEquilibria(simulation, targets)
+    equilibria, same = TargetEquilibria(simulation, targets), False
+    reached, finer = followed, [None] * len(targets)
     try:
         traced = equilibria.trace()
     except Infeasible as failure:
         _log.warning("loaded from zero, the optimum does not reach all its targets: %s", failure)
-        return Verification(followed, False, None)
-    verified = np.array([sample.displacement for sample in traced.samples])
-    # displacements of one equilibrium differ by less
-    different = np.flatnonzero(np.abs(verified - followed) > 1e-6 * target_scales(targets))
-    for index in different:
-        _log.warning(
-            "target %d of the optimum: %.6g when loaded from zero, %.6g when followed from the drawn design",
-            index + 1,
-            verified[index],
-            followed[index],
+    else:
+        reached, finer = (
+            np.array([sample.displacement for sample in traced.samples]),
+            equilibria.errors(traced).tolist(),
         )
-    return Verification(verified, len(different) == 0, equilibria.errors(traced))
-
-
-def target_results(
-    targets: Sequence[Target], started: np.ndarray, verification: Verification
-) -> tuple[TargetResult, ...]:
-    """How far each target was reached, from displacements at the start, (targets,), and at the end."""
-    reached, finer = verification.displacements, verification.errors
+        # displacements of one equilibrium differ by less
+        different = np.flatnonzero(np.abs(reached - followed) > 1e-6 * target_scales(targets))
+        same = len(different) == 0
+        for k in different:
+            _log.warning(
+                "target %d of the optimum: %.6g when loaded from zero, %.6g when followed from the drawn design",
+                *(k + 1, reached[k], followed[k]),
+            )
     errors = target_errors(targets, reached)
-    return tuple(
+    results = tuple(
         TargetResult(
             force_name=target.force_part.name,
             configuration=target.configuration.name,
@@ -226,16 +245,19 @@ def target_results(
             started=float(started[k]),
             reached=float(reached[k]),
             error=float(errors[k]),
-            finer_elements_add=None if finer is None else float(finer[k]),
+            finer_elements_add=finer[k],
         )
         for k, target in enumerate(targets)
     )
+    return results, same
 
 
-def link_designs(rest: RestShape, placement: Placement) -> tuple[LinkDesign, ...]:
+def link_designs(
+    rest: ParametricShape, wanted: Sequence[SplineDesign], placement: HandlePlacement
+) -> tuple[LinkDesign, ...]:
     """The shapes of all links at a placement."""
     designs = []
-    for link, handles in zip(rest.links, rest.handles(placement), strict=True):
+    for link, design, handles in zip(rest.links, wanted, rest.handles(placement), strict=True):
         own = placement.p[link.place]
         thickness, bend = link.thickness * link.samples.thickness(own), link.samples.curvature(own)
         designs.append(
@@ -246,6 +268,7 @@ def link_designs(rest: RestShape, placement: Placement) -> tuple[LinkDesign, ...
                 controls=tuple(tuple(map(tuple, point)) for point in link.spline.controls_at(own).tolist()),
                 thickness=(float(thickness.min()), float(thickness.max())),
                 bend=float(np.abs(bend).max(initial=0.0)),
+                centreline=design.centreline and tuple(tuple(map(float, point)) for point in design.centreline),
             )
         )
     return tuple(designs)
@@ -288,17 +311,21 @@ def draw_links(
         old, new = (_outline(change, meshes[k], p[change.place]) for p, meshes in (before, after))
         joints = np.array([linkage.bodies[i].centre[:2] for i in linkage.interfaces[link]])
         shapes.append(DesignShape(link.name, old, new, joints))
-    rigid = MechanismPlotter(scene.mechanism, linkage, simulation.model.mesh).rigid(assemble(linkage, DRAWN).poses)
+    rigid = MechanismPlotter(simulation.model).rigid(assemble(linkage, DRAWN).poses)
     draw_designs(path, shapes, rigid=rigid, unit=scene.units.length, title=f"{scene.mechanism.name}: links")
 
 
 def write_solids(
-    folder: str | Path, linkage: Linkage, links: Sequence[FlexibleLink], meshes: Sequence[LinkMesh], pin: float | None
+    folder: str | Path,
+    linkage: Linkage,
+    links: Sequence[FlexibleLink],
+    meshes: Sequence[LinkMesh],
+    hole: float | None,
 ) -> None:
-    """Local. Writes ``NAME.step`` and ``NAME.stl`` of every link, see ``DesignProblem.export``."""
+    """Local. Writes ``NAME.step`` and ``NAME.stl`` of every link, with holes of this diameter for pins if given."""
     for link, mesh in zip(links, meshes, strict=True):
         regions = [linkage.bodies[i] for i in linkage.interfaces[link]]
-        pins = [PinHole(tuple(b.centre[:2]), pin) for b in regions if pin and isinstance(b.region, Disc)]
+        pins = [PinHole(tuple(b.centre[:2]), hole) for b in regions if hole and isinstance(b.region, Disc)]
         stem = Path(folder) / link.name.replace(" ", "-")
         for suffix, write in ((".step", write_step), (".stl", write_stl)):
             write(stem.with_suffix(suffix), mesh, depth=link.shape.depth, pins=pins, name=link.name)

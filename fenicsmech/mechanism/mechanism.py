@@ -21,7 +21,7 @@ from fenicsmech.joints import (
 )
 from fenicsmech.mechanism.materials import Material
 from fenicsmech.mechanism.parts import FlexibleLink, Force, Joint, Link, Motor, Output, RigidLink, in_dimension
-from fenicsmech.mechanism.shapes import Disc, Rectangle, Region, Shape
+from fenicsmech.mechanism.shapes import Disc, Rectangle, Region, Shape, Strip, end_clamp
 
 _Z = (0.0, 0.0, 1.0)
 
@@ -81,7 +81,7 @@ class Mechanism:
             raise DescriptionError(
                 f"link {name!r}",
                 f"its shape is {shape!r}",
-                "Make one with strip(), polygon(), outline(), step() or gmsh_mesh()",
+                "Make one with strip(), polygon(), outline(), step_file() or gmsh_mesh()",
             )
         if not isinstance(material, Material):
             raise DescriptionError(
@@ -115,9 +115,12 @@ class Mechanism:
             name: for messages; unique.
 
         Raises:
-            DescriptionError: a link is not in the mechanism or joined with itself, a flexible link lacks an
-                interface, the interface is no region or given twice, numbers are not finite, or the name is taken.
+            DescriptionError: ``kind`` is not a joint kind, a link is not in the mechanism or joined with itself, a
+                flexible link lacks an interface, the interface is not a region or given twice, numbers are not
+                finite, or the name is taken.
         """
+        if not isinstance(kind, JointKind):
+            raise DescriptionError("joint", f"{kind!r} is not a joint kind", "Give an instance of a JointKind")
         for link in (a, b):
             self._check_member(f"{name or f'{kind.name} joint'!r}", link)
         given, name = name, name or f"{kind.name} joint {a.name}–{b.name}"
@@ -167,6 +170,27 @@ class Mechanism:
     def weld(self, a: Link, b: Link, *, at: Sequence[float], **options) -> Joint:
         """Joins two links firmly (a clamp, if one of them is flexible); options as in ``join``."""
         return self.join(WELD, a, b, at=at, **options)
+
+    def clamp(self, a: Link, strip: FlexibleLink, *, end: str, length: float, name: str | None = None) -> Joint:
+        """Welds link ``a`` to an end of a strip, which it holds over its whole width.
+
+        Args:
+            a: a link of this mechanism.
+            strip: a flexible link whose shape is a strip.
+            end: "start" or "end" of its centreline.
+            length: of the clamped piece, along the centreline; its inner face stands across the strip.
+            name: for messages; unique.
+
+        Raises:
+            DescriptionError: as ``join``; the link is no strip, or the clamp does not fit it.
+        """
+        part = f"{name or f'clamp {a.name}–{strip.name}'!r}"
+        if not isinstance(strip, FlexibleLink) or not isinstance(strip.shape, Strip):
+            raise DescriptionError(
+                part, f"link {strip.name!r} is no strip", "Use weld(…, at=…, region=Rectangle(…)) for other shapes"
+            )
+        at, region = end_clamp(strip.shape, end, length, part=part)
+        return self.weld(a, strip, at=at, region=region, name=name)
 
     def motor(self, joint: Joint, *, name: str | None = None) -> Motor:
         """Adds a motor that prescribes the free coordinate of ``joint``, as the angle of a revolute one.
@@ -253,4 +277,4 @@ def _interface(part: str, radius: float | None, region: Region | None) -> Region
                 positive(f"width of the interface of {part}", width),
                 finite(f"angle of the interface of {part}", angle),
             )
-    raise DescriptionError(part, f"{region!r} is no interface region", "Give region=Disc(…) or region=Rectangle(…)")
+    raise DescriptionError(part, f"{region!r} is not an interface region", "Give region=Disc(…) or region=Rectangle(…)")

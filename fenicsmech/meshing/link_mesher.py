@@ -11,9 +11,13 @@ import numpy as np
 
 from fenicsmech.checks import positive
 from fenicsmech.errors import DescriptionError, MeshingError
+from fenicsmech.log import logger
 from fenicsmech.mechanism import Arc, Outline, Shape, Strip
 from fenicsmech.meshing.link_mesh import FREE, LinkMesh, cell_measures, count_pieces, shown
 from fenicsmech.meshing.request import LEAST_SEGMENTS, InterfaceSite, MeshRequest, check_shape, holds, mesh_shape
+from fenicsmech.meshing.strip import clamp_defect
+
+_log = logger(__name__)
 
 
 def mesh_link(
@@ -72,6 +76,8 @@ def check_link(
 ) -> None:
     """Refuse what can be seen to be wrong with a link before it is meshed; arguments as in ``mesh_link``.
 
+    A warning is logged for rectangles that do not hold a strip as a clamp across it would.
+
     Args:
         points: further points that must be on the link, by name: where forces act and displacements are read.
 
@@ -81,6 +87,9 @@ def check_link(
     """
     request = _request(name, sites, dim, size, layers, segments, half)
     check_shape(shape, request)
+    for site in request.sites:
+        if isinstance(shape, Strip) and (defect := clamp_defect(shape, site)):
+            _log.warning("%s: %s. %s", request.part_at(site), *defect)
     for part, at in points.items():
         if not holds(shape, request, tuple(at)):
             raise MeshingError(f"{part!r}", f"the point {shown(at)} is not on link {name!r}", "Move it onto the link")

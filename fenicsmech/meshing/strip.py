@@ -15,7 +15,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from fenicsmech.errors import MeshingError
-from fenicsmech.mechanism import Centreline, Disc, Strip
+from fenicsmech.mechanism import Centreline, Disc, Rectangle, Strip
 from fenicsmech.meshing.cutting import DimTag, circle_segments, gap_refinement, region_face
 from fenicsmech.meshing.gmsh_session import gmsh
 from fenicsmech.meshing.link_mesh import LinkMesh, shown
@@ -97,12 +97,55 @@ def _check_on_strip(centreline: Centreline, thickness: float, site: InterfaceSit
         )
 
 
+def clamp_defect(shape: Strip, site: InterfaceSite) -> tuple[str, str] | None:
+    """Why the rectangle of ``site`` does not hold the strip as a clamp across it would, with a remedy; None if it does.
+
+    A clamp's inner face, where the centreline leaves the rectangle, stands across the strip (to 1°, more than rounded
+    angles miss it by) and is at least as wide.
+    """
+    if not isinstance(site.region, Rectangle) or not site.is_planar:
+        return None
+    curve, halves = Centreline(shape.centreline), 0.5 * np.array([site.region.length, site.region.width])
+    c, s = math.cos(site.region.angle), math.sin(site.region.angle)
+    axes, centre = np.array([[c, s], [-s, c]]), site.centre[:2]
+
+    def inside(at: np.ndarray) -> np.ndarray:
+        return np.all(np.abs((curve.evaluate(at) - centre) @ axes.T) <= halves, axis=-1)
+
+    samples = curve.samples(64)
+    held = inside(samples)
+    for k in np.flatnonzero(held[1:] != held[:-1]):
+        kept, left = samples[[k, k + 1] if held[k] else [k + 1, k]]
+        for _ in range(50):
+            middle = 0.5 * (kept + left)
+            kept, left = (middle, left) if inside(middle) else (kept, middle)
+        place, normal = curve.evaluate(kept), 0.5 * shape.thickness * curve.normal(kept)
+        face = int(np.argmax(np.abs(axes @ (place - centre)) / halves))
+        turn = math.degrees(math.asin(min(1.0, abs(axes[face] @ normal) / (0.5 * shape.thickness))))
+        if turn > 1.0:
+            right = math.atan2(*curve.tangent(kept)[::-1]) + (0.5 * math.pi if face else 0.0)
+            return (
+                f"the face of its {site.region} near {shown(place)} is turned by {turn:.3g}° from across the strip",
+                f"Use Mechanism.clamp(…), or angle={right:.6g} (rad, from x)",
+            )
+        edges = np.array([place + normal, place - normal]) - centre
+        if np.abs(edges @ axes[1 - face]).max() < halves[1 - face] * (1.0 + 1e-6):
+            continue
+        return (
+            f"its {site.region} does not cover the width {shape.thickness:g} of the strip near {shown(place)}",
+            "Use Mechanism.clamp(…), or make it wider",
+        )
+    if not held.any():
+        return f"its {site.region} does not reach the centreline of the strip", "Use Mechanism.clamp(…), or move it"
+    return None
+
+
 @dataclass(frozen=True)
 class _Pin:
     """A pin in a strip, in units of the element size.
 
     Attributes:
-        site: the site, moved onto the centreline, and its disc to the strip's sides, if they miss by a hair.
+        site: the site, moved onto the centreline, and its disc to the strip's sides, where it almost meets them.
         half: half the strip's thickness.
         inward: unit vector along the strip, away from its nearer end, shape (2,).
         station: parameter of the centreline's point nearest to the pin.
@@ -129,8 +172,8 @@ class _Pin:
         if abs(offset) <= _ON_CENTRELINE * thickness:
             at, offset = foot, 0.0
         inward = centreline.tangent(s) * (1.0 if nearer == 0.0 else -1.0)
-        # the polygon that stands for a circle cannot tell radii apart that differ by less than a chord's height
-        # r (1 − cos(π/n)): what is thinner than that (and than 2 % of the strip) is no place for an element
+        # the polygon that stands for a circle does not resolve differences of the radius below a chord's height
+        # r (1 − cos(π/n)): an element does not fit into what is thinner than that, and than 2 % of the strip
         radius = site.region.radius
         height = radius * (1.0 - math.cos(math.pi / circle_segments(radius, 1.0)))
         radius = half if abs(radius - half) <= min(height, 0.02 * half) else radius

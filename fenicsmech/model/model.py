@@ -43,7 +43,7 @@ class MechanismModel:
         design_nodes: the design field at the nodes of the displacement.
         node_link: index of the flexible link of every local node.
         clock: where time goes.
-        with_pressure: whether each flexible link has the pressure as an unknown of its own.
+        with_pressure: whether each flexible link has the u–p (mixed) formulation.
         effects: what acts beside links, joints and forces.
         potentials: potentials of body poses.
         holding: those of springs, which act from the start.
@@ -106,7 +106,7 @@ class MechanismModel:
 
     @property
     def flexible_dofs(self) -> int:
-        """Displacements of the flexible links that are unknown, interfaces and mid-planes excluded (collective)."""
+        """Displacements of the flexible links that are unknown, interfaces and mid-planes excluded."""
         return self.mesh.mesh.comm.allreduce(int(np.sum(self.interfaces.unknown)))
 
     @property
@@ -139,7 +139,7 @@ class MechanismModel:
             self.reshape(before)
 
     def carry(self, state: State, design: np.ndarray) -> State:
-        """Reshapes the links and guesses the equilibrium there from the one at the present shape (collective)."""
+        """Reshapes the links and guesses the equilibrium there from the one at the present shape."""
         self.load(state)
         carried = self.elastic.carried(design - self.elastic.d.x.array)
         self.reshape(design)
@@ -147,11 +147,11 @@ class MechanismModel:
         return replace(state, u=np.concatenate([carried[: len(displacements)], *pressures]))
 
     def load(self, state: State) -> None:
-        """Makes the finite-element fields hold ``state`` (collective)."""
+        """Makes the finite-element fields hold ``state``."""
         load_fields(self.elastic, self.interfaces, state)
 
     def point(self, part: Force | Output) -> MaterialPoint:
-        """The material point of a force or output (collective)."""
+        """The material point of a force or output."""
         if not isinstance(part.on, FlexibleLink):
             at = np.array(in_dimension(part.at, self.linkage.dim))
             body = self.linkage.body_of(part.on)
@@ -166,7 +166,7 @@ class MechanismModel:
         return link_point(f"{part.name!r}", at, self.elastic.u, cells, corners, self._bulges(cells))
 
     def point_load(self, force: Force | Output) -> PointLoad:
-        """The point load of a force, or of a unit force along an output (collective)."""
+        """The point load of a force, or of a unit force along an output."""
         if force not in self._point_loads:
             dim = self.elastic.model.dim if isinstance(force.on, FlexibleLink) else self.linkage.dim
             direction = np.array(in_dimension(force.direction, dim))
@@ -174,12 +174,12 @@ class MechanismModel:
         return self._point_loads[force]
 
     def travel(self, part: Force | Output, state: State) -> float:
-        """How far the point of a force or output has moved along its direction in the loaded ``state`` (collective)."""
+        """How far the point of a force or output has moved along its direction in the loaded ``state``."""
         load = self.point_load(part)
         return float(load.direction @ load.point.displacement(self.elastic.u, state.poses))
 
     def system(self, controlled: PointLoad, loads: tuple[tuple[PointLoad, float], ...]) -> EquilibriumSystem:
-        """The equilibrium equations with one controlled and several fixed loads (collective)."""
+        """The equilibrium equations with one controlled and several fixed loads."""
         return EquilibriumSystem(
             self.elastic,
             self.interfaces,
@@ -193,7 +193,7 @@ class MechanismModel:
         )
 
     def assembled_state(self, poses: np.ndarray, motors: np.ndarray) -> State:
-        """The state of a rigid assembly: every flexible link carried along by its first interface (collective)."""
+        """The state of a rigid assembly: every flexible link carried along by its first interface."""
         dim, owned = self.linkage.dim, self.interfaces.owned
         positions = self.elastic.drawn_nodes[:owned, :dim] + self.design_nodes.values()[:owned, :dim]
         u = np.zeros((owned, self.interfaces.block))
@@ -250,40 +250,30 @@ def check_links(mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> N
     """Refuses links, joints and points that cannot be right, before anything is meshed."""
     for link in mechanism.flexible_links:
         points = {part.name: part.at for part in (*mechanism.forces, *mechanism.outputs) if part.on == link}
-        sites = interface_sites(linkage, link)
-        asked = _asked(link, fidelity)
-        check_link(link.name, link.shape, sites, points, **asked)
+        sites, options = _mesh_request(link, linkage, fidelity)
+        check_link(link.name, link.shape, sites, points, **options)
 
 
 def mesh_links(mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> list[LinkMesh]:
-    """The mesh of every flexible link, on the calling rank."""
-    return [
-        mesh_link(link.name, link.shape, interface_sites(linkage, link), **_asked(link, fidelity))
-        for link in mechanism.flexible_links
-    ]
-
-
-def _asked(link: FlexibleLink, fidelity: Fidelity) -> dict:
-    """What is asked of the mesh of ``link``."""
-    return {
-        "dim": fidelity.model.dim,
-        "size": fidelity.sizes[link],
-        "layers": fidelity.layers,
-        "segments": fidelity.segments,
-        "half": fidelity.model.symmetric,
-    }
-
-
-def interface_sites(linkage: Linkage, link: FlexibleLink) -> list[InterfaceSite]:
-    """Where joints hold ``link``."""
-    sites = []
-    for body in (linkage.bodies[i] for i in linkage.interfaces[link]):
-        # a pin along z holds its link at whatever height the link is
-        at = body.centre[:2] if body.axis[2] == 1.0 else body.centre
-        sites.append(InterfaceSite(at, body.region, body.axis, body.name))
-    return sites
+    """The mesh of every flexible link. Local."""
+    meshes = []
+    for link in mechanism.flexible_links:
+        sites, options = _mesh_request(link, linkage, fidelity)
+        meshes.append(mesh_link(link.name, link.shape, sites, **options))
+    return meshes
 
 
 def mesh_mechanism(comm: MPI.Comm, mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> MechanismMesh:
-    """Meshes on rank 0 and distributes; an error there is raised on all ranks (collective)."""
+    """Meshes on rank 0 and distributes; an error there is raised on all ranks."""
     return distribute(comm, on_one(comm, lambda: mesh_links(mechanism, linkage, fidelity)))
+
+
+def _mesh_request(link: FlexibleLink, linkage: Linkage, fidelity: Fidelity) -> tuple[list[InterfaceSite], dict]:
+    """Where joints hold ``link``, and how finely it is meshed."""
+    bodies = [linkage.bodies[index] for index in linkage.interfaces[link]]
+    # a pin along z holds its link at whatever height the link is
+    ats = [body.centre[:2] if body.axis[2] == 1.0 else body.centre for body in bodies]
+    sites = [InterfaceSite(at, body.region, body.axis, body.name) for at, body in zip(ats, bodies, strict=True)]
+    size, half = fidelity.sizes[link], fidelity.model.symmetric
+    options = {"layers": fidelity.layers, "segments": fidelity.segments}
+    return sites, {"dim": fidelity.model.dim, "size": size, "half": half, **options}

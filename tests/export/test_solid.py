@@ -9,7 +9,7 @@ import pytest
 
 from fenicsmech.errors import DescriptionError, MeshingError
 from fenicsmech.export import PinHole, write_step, write_stl
-from fenicsmech.mechanism import step
+from fenicsmech.mechanism import step_file
 from fenicsmech.meshing import boundary_loops, cell_measures, gmsh, gmsh_session, mesh_link
 
 from ..meshing.bent_links import CURVED, DEPTH, LENGTH, RADIUS, STRAIGHT, THICKNESS, bent, bent_point, link
@@ -22,7 +22,7 @@ BENT_PINS = (PinHole(bent_point(0.0), RADIUS), PinHole(bent_point(LENGTH), RADIU
 LINKS = {
     "curved": (lambda size, dim: link(size, dim=dim), PINS),
     "bent": (lambda size, dim: bent(link(size, dim=dim, points=STRAIGHT)), BENT_PINS),
-    "part with holes": (lambda size, dim: mesh_link("part", step(PART, depth=DEPTH), dim=2, size=size), ()),
+    "part with holes": (lambda size, dim: mesh_link("part", step_file(PART, depth=DEPTH), dim=2, size=size), ()),
 }
 each_link = pytest.mark.parametrize("name", LINKS)
 each_dim = pytest.mark.parametrize("dim", [2, 3])
@@ -30,7 +30,7 @@ each_dim = pytest.mark.parametrize("dim", [2, 3])
 
 def measures(path):
     """Volume, lowest and highest corner of the one solid in a STEP file."""
-    mesh = mesh_link("again", step(path, depth=DEPTH), dim=3, size=0.8)
+    mesh = mesh_link("again", step_file(path, depth=DEPTH), dim=3, size=0.8)
     with gmsh_session("again"):
         entities = gmsh.model.occ.importShapes(str(path), highestDimOnly=False)
         assert [dim for dim, _ in entities].count(3) == 1
@@ -201,7 +201,7 @@ def crossing():
         ),
         (lambda: link(2.0), [PinHole((20.0, 0.0), 1.0)], r"pin hole at \(20, 0\) .*not on the link"),
         (lambda: link(2.0), [PinHole((0.0, 0.0), 2.0), PinHole((1.0, 1.0), 1.0)], r"it meets the one at \(0, 0\)"),
-        (lambda: mesh_link("p", step(PART, depth=DEPTH), dim=3, size=3.0), (), "do not stand in layers along z"),
+        (lambda: mesh_link("p", step_file(PART, depth=DEPTH), dim=3, size=3.0), (), "do not stand in layers along z"),
     ],
     ids=["turned over", "crossing", "too large", "off the link", "meeting", "no layers"],
 )

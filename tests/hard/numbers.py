@@ -73,7 +73,7 @@ def _requests(simulation: fm.Simulation, push) -> dict[str, Callable[[float], ob
     def applied(x: float) -> None:
         design = problem.initial.copy()
         design[-1] = x
-        problem.apply(design)
+        problem.rest_shape(design)
 
     def explained(x: float) -> None:
         simulation.load_displacement(push, forces=[0.1]).explain(tolerance=x)

@@ -18,7 +18,7 @@ from fenicsmech.mechanism import (
     gmsh_mesh,
     outline,
     polygon,
-    step,
+    step_file,
     strip,
 )
 
@@ -51,7 +51,7 @@ def described():
         strip([[0, 0], [1, 0]], thickness=1, depth=1),
         polygon([[0, 0], [1, 0], [0, 1]], depth=1),
         outline([0, 0], [Line([1, 0]), Arc([1, 1], [0, 1])], depth=1),
-        step("part.step", depth=1),
+        step_file("part.step", depth=1),
         gmsh_mesh("part.msh", depth=1),
     ]
 

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fenicsmech.mechanism import Disc, polygon, step, strip
+from fenicsmech.mechanism import Disc, polygon, step_file, strip
 from fenicsmech.meshing import InterfaceSite, cell_measures, circle_segments, mesh_link
 
 MESHES = Path(__file__).parents[2] / "meshes"
 BOW = strip([(0.0, 0.0), (18.0, 34.0), (40.0, 60.0)], thickness=3.0, depth=8.0)
 PLATE = polygon([(0.0, 0.0), (30.0, 0.0), (30.0, 12.0), (0.0, 20.0)], depth=4.0)
-PART = step(MESHES / "curved_link.step", depth=10.0)
+PART = step_file(MESHES / "curved_link.step", depth=10.0)
 HOLE = 1.5  # radius of the pin holes of the STEP part
 
 

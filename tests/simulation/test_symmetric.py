@@ -254,7 +254,7 @@ def from_file(shape) -> tuple[fm.Scene, Force]:
 def test_half_of_a_step_part_moves_as_the_whole_does_but_for_the_mesh():
     values = []
     for space in (WHOLE, HALF):
-        scene, push = from_file(fm.step(MESHES / "curved_link.step", depth=10.0))
+        scene, push = from_file(fm.step_file(MESHES / "curved_link.step", depth=10.0))
         simulation = simulate(scene, space, size=3.0)
         curve = simulation.load_displacement(push, forces=[5.0])
         values.append((curve.displacements[0], curve.error_estimates()[0], simulation.model.flexible_dofs))

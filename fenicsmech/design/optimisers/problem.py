@@ -120,7 +120,7 @@ class Reason(Enum):
 
     @property
     def converged(self) -> bool:
-        """Whether a minimum was found, as far as it can be told."""
+        """Whether a minimum was found, as far as errors let one see."""
         return self in (Reason.CONVERGED, Reason.RESOLVED)
 
 

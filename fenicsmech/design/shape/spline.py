@@ -94,7 +94,7 @@ class LinkSpline:
     def basis(self, t: np.ndarray, *, order: int = 0, segments: np.ndarray | None = None) -> np.ndarray:
         """Weights of P_0, M_0, P_1, M_1, … in the curve, differentiated ``order`` times by t, at ``t`` (m,), (m, 2n).
 
-        segments: the segment of each t; tells at a control point which of the two cubics is meant.
+        segments: the segment of each t; at a control point one of two cubics is meant.
         """
         segments = self.segments_of(t) if segments is None else segments
         weights = np.zeros((len(t), 2 * len(self.controls)))
