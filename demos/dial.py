@@ -39,7 +39,7 @@ class Case:
 
     def at(self, rung):
         """A simulation on a rung of the dial."""
-        fidelity = Dial(self.scene, 1.0, None, fm.Mixed()).fidelity(rung)
+        fidelity = Dial(self.scene, 1.0, None, fm.MixedFormulation()).fidelity(rung)
         return fm.Simulation(
             self.scene,
             space=fidelity.model.name,

@@ -20,6 +20,6 @@ def bending_test(thickness, material=fm.ONYX):
     return fm.Scene(rig), push
 
 
-def of_modulus(youngs_modulus):
+def of_modulus(E):
     """Onyx with another Young's modulus."""
-    return replace(fm.ONYX, youngs_modulus=youngs_modulus)
+    return replace(fm.ONYX, law=replace(fm.ONYX.law, E=E))

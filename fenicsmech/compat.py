@@ -11,6 +11,7 @@ import dolfinx
 import dolfinx.fem.petsc
 import numpy as np
 import ufl
+import ufl.algorithms
 from dolfinx import fem, io
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
@@ -108,14 +109,44 @@ def _space(mesh: dmesh.Mesh, element) -> fem.FunctionSpace:
         return fem.functionspace(mesh, element, jit_options=options())
 
 
+class _Frozen(ufl.Coefficient):
+    """Stands for an expression until derivatives have been taken."""
+
+    def __init__(self, expression) -> None:
+        if _LEGACY:
+            mesh, element = expression.ufl_domain(), ufl.FiniteElement("DG", expression.ufl_domain().ufl_cell(), 0)
+        else:
+            mesh = ufl.domain.extract_unique_domain(expression)
+            element = basix.ufl.element("DG", mesh.basix_cell(), 0)
+        super().__init__(ufl.FunctionSpace(mesh, element))
+        self.expression = expression
+
+
+def freeze(expression):
+    """A scalar expression in UFL that derivatives take for constant, in what ``compile_form`` compiles and the like."""
+    return _Frozen(expression)
+
+
+def _thaw(expression):
+    """Puts frozen expressions, which may hold others, in their places once derivatives have been taken."""
+    while True:
+        coefficients = ufl.algorithms.extract_coefficients(expression)
+        frozen = {c: c.expression for c in coefficients if isinstance(c, _Frozen)}
+        if not frozen:
+            return expression
+        expression = ufl.replace(ufl.algorithms.expand_derivatives(expression), frozen)
+
+
 def compile_form(form: ufl.Form):
     """``form`` compiled to machine code (cached on disk)."""
+    form = _thaw(form)
     with _compiling():
         return fem.form(form, jit_params=options()) if _LEGACY else fem.form(form, jit_options=options())
 
 
 def compile_expression(expression, points: np.ndarray, comm: MPI.Comm) -> fem.Expression:
     """``expression`` compiled for evaluation at ``points`` of the reference cell."""
+    expression = _thaw(expression)
     with _compiling():
         if _LEGACY:
             return fem.Expression(expression, points, jit_params=options())

@@ -22,6 +22,7 @@ LAYERS = (
     "kernel_cache",
     "compat",
     "collective",
+    "laws",
     "report",
     "joints",
     "mechanism",

@@ -33,13 +33,12 @@ class Gradient:
 
     Attributes:
         design: with respect to the design field, this rank's owned P1 values, flat.
-        youngs_moduli, poissons_ratios: with respect to each link's constants, (links,).
+        parameters: with respect to the parameters of the links' laws, by name, (links,).
         force: with respect to the controlled force.
     """
 
     design: np.ndarray
-    youngs_moduli: np.ndarray
-    poissons_ratios: np.ndarray
+    parameters: dict[str, np.ndarray]
     force: float
 
 
@@ -74,8 +73,7 @@ class Adjoint:
         moved = self._model.design_nodes.transpose(self._interface_terms(state, z, stiff, forces))
         return Gradient(
             design=-(self._assemble("design") + moved),
-            youngs_moduli=-self._per_link("youngs_modulus"),
-            poissons_ratios=-self._per_link("poissons_ratio"),
+            parameters={name: -self._per_link(name) for name in self._model.elastic.parameters},
             force=x.dot(system.force_rate(state)),
         )
 
@@ -98,12 +96,7 @@ class Adjoint:
     def _by(self) -> dict[str, fem.Function]:
         """What r · û is differentiated by."""
         elastic = self._model.elastic
-        return {
-            "design": elastic.d,
-            "displacement": elastic.u,
-            "youngs_modulus": elastic.youngs_modulus,
-            "poissons_ratio": elastic.poissons_ratio,
-        }
+        return {"design": elastic.d, "displacement": elastic.u, **elastic.parameters}
 
     @cached_property
     def _sums(self) -> dict[str, fem.Function]:

@@ -12,16 +12,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fenicsmech.checks import positive
-from fenicsmech.effects.protocol import JointSoftening
 from fenicsmech.errors import DescriptionError
 from fenicsmech.joints import REVOLUTE, SPHERICAL, UNIVERSAL, WELD
-from fenicsmech.mechanism import Joint
+from fenicsmech.mechanism import Effect, Joint
 
 _PINNED = (REVOLUTE, SPHERICAL, UNIVERSAL, WELD)  # their first equations are x_b − x_a = 0
 
 
 @dataclass(frozen=True)
-class JointCompliance(JointSoftening):
+class JointCompliance(Effect):
     """A joint whose links share a point gives way there, alike in all directions; its axis stays aligned.
 
     Two compliances of one joint act in series. What is stored in the joint is not part of a frame's strain energy.
@@ -41,14 +40,10 @@ class JointCompliance(JointSoftening):
         object.__setattr__(self, "compliance", positive(f"compliance of {self.joint.name!r}", self.compliance))
 
     def check(self, mechanism, dim):
-        name = f"compliance of {self.joint.name!r}"
-        if self.joint not in mechanism.joints:
-            raise DescriptionError(
-                name, f"{self.joint.name!r} is no joint of {mechanism.name!r}", "Name a joint of the mechanism"
-            )
+        super().check(mechanism, dim)
         if self.joint.kind not in _PINNED:
             raise DescriptionError(
-                name,
+                f"compliance of {self.joint.name!r}",
                 f"the links of a {self.joint.kind.name} joint share no point",
                 "Soften revolute, spherical, universal or weld joints",
             )
@@ -56,6 +51,6 @@ class JointCompliance(JointSoftening):
     def explain(self):
         return f"compliance {self.compliance:g} of {self.joint.name!r}"
 
-    def compliances(self, linkage):
+    def soften(self, linkage):
         rows = [row for row, name in enumerate(linkage.joints.row_names) if name == self.joint.name]
         return dict.fromkeys(rows[: linkage.dim], self.compliance)

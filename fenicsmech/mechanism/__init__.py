@@ -1,6 +1,6 @@
 """What the user describes, as pure data.
 
-- ``materials``: elastic constants and strain-energy laws
+- ``materials``: names and laws with their numbers
 - ``shapes``: strips, outlines, STEP parts, meshes; interface regions
 - ``parts``: links, joints, motors, forces, outputs
 - ``mechanism``: the builder that collects parts
@@ -13,12 +13,7 @@ from fenicsmech.mechanism.effect import Effect
 from fenicsmech.mechanism.materials import (
     ONYX,
     SMOOTH_SIL_950,
-    EnergyLaw,
-    IsochoricNeoHookean,
-    IsochoricSimoNeoHookean,
-    LogarithmicNeoHookean,
     Material,
-    NeoHookean,
 )
 from fenicsmech.mechanism.mechanism import Mechanism
 from fenicsmech.mechanism.parts import Drive, FlexibleLink, Force, Joint, Leader, Link, Motor, Output, RigidLink
@@ -51,21 +46,16 @@ __all__ = [
     "Disc",
     "Drive",
     "Effect",
-    "EnergyLaw",
     "FlexibleLink",
     "Force",
-    "IsochoricNeoHookean",
-    "IsochoricSimoNeoHookean",
     "Joint",
     "Leader",
     "Line",
     "Link",
-    "LogarithmicNeoHookean",
     "Material",
     "Mechanism",
     "MeshPart",
     "Motor",
-    "NeoHookean",
     "ONYX",
     "Outline",
     "Output",

@@ -190,7 +190,7 @@ class Dial:
         scene: what is simulated.
         accuracy: relative error that is asked for.
         thickness: of the links, all or each; None where their shapes tell.
-        formulation: which links have the pressure as an unknown of its own.
+        formulation: which links are in the u–p (mixed) formulation.
 
     Raises:
         DescriptionError: the scene cannot be simulated, or the thickness of a link is not known.

@@ -63,7 +63,7 @@ def simulated(model: MechanismModel, space: str, order: int) -> tuple[str, ...]:
     links = ", ".join(
         f"{link.name} ({link.material.name}, {type(link.material.law).__name__})" for link in mechanism.flexible_links
     )
-    bulky = [link.name for link, own in zip(mechanism.flexible_links, model.with_pressure, strict=True) if own]
+    bulky = [link.name for link, own in zip(mechanism.flexible_links, model.mixed, strict=True) if own]
     items = [
         f"flexible links in large deformation ({space}, order {order}): {links}",
         f"rigid links: {', '.join(link.name for link in mechanism.rigid_links)}",
@@ -71,7 +71,7 @@ def simulated(model: MechanismModel, space: str, order: int) -> tuple[str, ...]:
         "forces that keep their direction, applied without inertia",
     ]
     if bulky:
-        items.insert(1, f"pressure as an unknown of its own in {', '.join(bulky)}")
+        items.insert(1, f"u–p (mixed) formulation of {', '.join(bulky)}")
     return (*items, *(effect.explain() for effect in model.effects))
 
 
@@ -136,16 +136,16 @@ def _compressibility_hint(model: MechanismModel, order: int) -> Hint | None:
     limit, links = _LOCKS[order], model.mechanism.flexible_links
     stiff = [
         link.name
-        for link, own in zip(links, model.with_pressure, strict=True)
-        if link.material.poissons_ratio > limit and model.elastic.model.confined and not own
+        for link, own in zip(links, model.mixed, strict=True)
+        if link.material.law.nu > limit and model.elastic.model.confined and not own
     ]
     if not stiff:
         return None
     remedy = "use order 2 or 3 with" if order == 1 else "use"
     return Hint(
-        "pressure as an unknown of its own",
+        "u–p (mixed) formulation",
         f"Poisson's ratio of {', '.join(stiff)} is above {limit:g}: elements of order {order} are too stiff there; "
-        f"{remedy} formulation=Mixed(above={limit:g}), or compare two sizes",
+        f"{remedy} formulation=MixedFormulation(above={limit:g}), or compare two sizes",
         True,
     )
 
@@ -204,5 +204,5 @@ def _slenderness(model: MechanismModel, link: FlexibleLink, frame: Frame) -> tup
     length = hypot(*(last - first))
     forces = [frame.reactions[joint.name].force[:2] for joint in joints if joint.name in frame.reactions]
     load = max((float(np.linalg.norm(force)) for force in forces), default=0.0)
-    critical = pi**2 * link.material.youngs_modulus * link.shape.thickness * link.shape.depth**3 / 12.0 / length**2
+    critical = pi**2 * link.material.law.E * link.shape.thickness * link.shape.depth**3 / 12.0 / length**2
     return load / critical, link.name

@@ -11,7 +11,7 @@ fields of the gradient's degree (at least 1), see ``recovery``,
     ∇e ≈ c (G(∇u_h) − ∇u_h),
 
 where only one half of the links is meshed with G₁₃ = G₂₃ = G₃₁ = G₃₂ = 0 on the mid-plane, as symmetry has it. Where
-links have a pressure of their own, Π(F, p) takes the place of W, and the other second derivatives follow, with the
+links are in the u–p formulation, Π(F, p) takes the place of W, and the other second derivatives follow, with the
 errors e_p of p and e_q of its adjoint q (``pressure_error``):
 
     + ∫ e_p ∂²Π/∂p∂F : ∇e_z + e_q ∂²Π/∂p∂F : ∇e_u + e_p ∂²Π/∂p² e_q dV.
@@ -38,7 +38,7 @@ from fenicsmech.simulation.recovery import Recovery
 
 # c², so that effectivities lie around 1 (tests/simulation/test_goal_error.py, test_mixed_error.py)
 _CALIBRATION = {1: 1.3, 2: 1.6, 3: 2.6}
-_WITH_PRESSURE = {2: 0.75, 3: 1.2}
+_MIXED = {2: 0.75, 3: 1.2}
 
 
 class GoalError:
@@ -106,12 +106,12 @@ class GoalError:
     def _scale(self) -> fem.Function:
         """c of each cell's link."""
         order = self._model.elastic.order
-        squares = [(_WITH_PRESSURE if own else _CALIBRATION)[order] for own in self._model.with_pressure]
+        squares = [(_MIXED if own else _CALIBRATION)[order] for own in self._model.mixed]
         return self._model.elastic.cellwise(np.sqrt(squares))
 
     @cached_property
     def _pressures(self) -> list[PressureError]:
-        """Of p and its adjoint, where links have a pressure of their own."""
+        """Of p and its adjoint, where links are in the u–p formulation."""
         elastic = self._model.elastic
         if elastic.pressure is None:
             return []

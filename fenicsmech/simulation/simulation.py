@@ -13,7 +13,7 @@ from fenicsmech.clock import Clock
 from fenicsmech.effects import holding
 from fenicsmech.elasticity import (
     Formulation,
-    Mixed,
+    MixedFormulation,
     Quadrature,
 )
 from fenicsmech.equilibrium import (
@@ -57,8 +57,8 @@ class Simulation(Postprocessing):
         layers: of elements through the depth, or half of it where half is meshed; by default from depth and size.
         segments: of elements around pins, at least; 8 by default.
         quadrature: quadrature degree; the measured optimum by default.
-        formulation: ``Mixed()`` gives nearly incompressible links the pressure as an unknown of its own;
-            ``Displacement()`` none.
+        formulation: ``MixedFormulation()``: pressures are unknowns in nearly incompressible links;
+            ``DisplacementFormulation()``: in none.
         solver: how equilibria are found.
         predictor: how the next equilibrium on a curve is guessed.
         comm: processes that share the work.
@@ -84,8 +84,10 @@ class Simulation(Postprocessing):
         comm: MPI.Comm = MPI.COMM_WORLD,
     ) -> None:
         if formulation is not None and not isinstance(formulation, Formulation):
-            raise DescriptionError("formulation", f"it is {formulation!r}", "Give Mixed() or Displacement()")
-        formulation = formulation or Mixed()
+            raise DescriptionError(
+                "formulation", f"it is {formulation!r}", "Give MixedFormulation() or DisplacementFormulation()"
+            )
+        formulation = formulation or MixedFormulation()
         self.choice: Choice | None = None
         self._dial: Dial | None = None
         if accuracy is None:

@@ -11,7 +11,7 @@ from dolfinx import fem
 
 from fenicsmech.compat import compile_form
 from fenicsmech.elasticity import ElasticModel, Quadrature
-from fenicsmech.mechanism import NeoHookean
+from fenicsmech.laws import NeoHookean
 
 from ..report.grids import box, rectangle
 from .dirichlet_newton import solve
@@ -37,7 +37,7 @@ def errors(model: ElasticModel, *, order: int, count: int) -> Errors:
     """Errors on the unit square or cube, ``count`` squares cut in two or cubes cut in six along each side."""
     points, cells = rectangle(count, count, 1.0, 1.0) if model.dim == 2 else box(*[count] * 3, (1.0, 1.0, 1.0))
     body, accurate = (
-        single_link(points, cells, model=model, law=NeoHookean(), order=order, quadrature=quadrature)
+        single_link(points, cells, model=model, law=NeoHookean, order=order, quadrature=quadrature)
         for quadrature in (None, EXACT)
     )
     x = ufl.SpatialCoordinate(accurate.mesh)

@@ -19,7 +19,7 @@ from .case import Check, Fact, HardCase, deviation
 
 STRAIN, SPACE = "plane-strain", "3d"
 RUBBERS = (0.45, 0.49, 0.499, 0.4999)  # Poisson's ratios
-ALONE, PRESSED = fm.Displacement(), fm.Mixed(above=0.4)
+ALONE, PRESSED = fm.DisplacementFormulation(), fm.MixedFormulation(above=0.4)
 SHEAR_MODULUS, THICKNESS, LENGTH = 1.0, 4.0, 60.0
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRESS, SPATIAL, Mixed
+from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRESS, SPATIAL, MixedFormulation
 from fenicsmech.report import read_curve_csv
 from fenicsmech.simulation import Dial, Outcome, Rung, Trial, corrections, family
 
@@ -17,7 +17,7 @@ LOADS = {"truss": 0.4, "claw": 10.0, "klann": 5.0}
 
 
 def dial(accuracy: float, **changes) -> Dial:
-    return Dial(cantilever()[0], accuracy, None, Mixed(), **changes)
+    return Dial(cantilever()[0], accuracy, None, MixedFormulation(), **changes)
 
 
 class Recorder:
@@ -173,7 +173,7 @@ def test_what_corrections_leave_is_what_they_may_leave(name):
 
 
 def _at(scene: fm.Scene, rung: Rung) -> fm.Simulation:
-    fidelity = Dial(scene, 1.0, None, Mixed()).fidelity(rung)
+    fidelity = Dial(scene, 1.0, None, MixedFormulation()).fidelity(rung)
     return fm.Simulation(
         scene,
         space=fidelity.model.name,
