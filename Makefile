@@ -27,7 +27,8 @@ export PRTE_MCA_hwloc_default_binding_policy := none
 MPIRUN = OPENBLAS_NUM_THREADS=1 mpirun -n $(RANKS)
 heading = @printf '\n--- %s\n' '$(1)'
 
-.PHONY: help demo test install install-test lint test-serial test-parallel test-slow test-debian13 demos-quick hard-cases random-scenes bench clean
+.PHONY: help demo test check install install-test install-docs lint test-serial test-parallel test-thorough test-slow \
+    test-debian13 test-newest demos-quick hard-cases random-scenes random-scenes-check docs bench clean
 
 help: ## list the targets
 	@sed -nE 's/^([a-z0-9-]+):.*## (.*)/\1\t\2/p' Makefile | expand -t 16
@@ -35,7 +36,10 @@ help: ## list the targets
 demo: install ## install what is missing and run the truss finger; pictures and summary.json in results/truss/
 	$(PYTHON) demos/truss.py
 
-test: lint test-serial test-parallel demos-quick test-debian13 ## everything but the slow tests
+test: lint test-serial test-parallel demos-quick ## style, types, layers; fast tests on one process and on two ranks; quick demos
+
+# What moves by itself, as Debian's newest, is no part of it.
+check: test-thorough test-slow hard-cases random-scenes-check docs test-debian13 ## everything else, after `make test`
 
 # Where the packages come from elsewhere (the Debian 13 root), INSTALL= switches the installation off.
 INSTALL := yes
@@ -46,36 +50,38 @@ install: ## what `make demo` needs
 install-test: ## what `make test` needs
 	$(if $(INSTALL),@tools/install-debian.sh test)
 
-lint: install-test ## style and layering: seconds
+install-docs: install-test ## what `make docs` needs
+	$(if $(INSTALL),@tools/install-debian.sh docs)
+
+lint: install-test ## style, types and layering: seconds
 	$(call heading,lint)
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .
 	$(PYTHON) -m pytest -q tests/test_layering.py
 
-# The tests on one process in two runs side by side, of about the same length. The demos come first: the peak memory of
-# a program starts from that of the process that calls it.
-CORE := tests/design tests/effects tests/elasticity tests/joints tests/multibody \
-    tests/mechanism tests/meshing
-OTHERS := tests/equilibrium tests/simulation
-AROUND := tests/demos tests/accuracy tests/hard tests/oracles tests/report \
-    $(filter-out tests/test_layering.py,$(wildcard tests/test_*.py))
-PYTEST = OPENBLAS_NUM_THREADS=1 $(PYTHON) -m pytest -p no:cacheprovider --durations=5 --durations-min=5 -m "$(SELECT)"
+# Two processes side by side; the tests of one file stay together. What is marked `parallel` runs on ranks instead, and
+# on one process in `make test-thorough`.
+PYTEST = OPENBLAS_NUM_THREADS=1 $(PYTHON) -m pytest -p no:cacheprovider --durations=5 --durations-min=5
+SERIAL = $(PYTEST) -n 2 --dist loadfile --ignore tests/test_layering.py
+TESTS := tests
 
-test-serial: install-test ## the tests on one process each
+test-serial: install-test ## the fast tests on one process each
 	$(call heading,tests on one process)
-	@log=$$(mktemp); $(PYTEST) $(CORE) >"$$log" 2>&1 & core=$$!; \
-	status=0; $(PYTEST) $(AROUND) $(OTHERS) || status=1; \
-	wait $$core || status=1; cat "$$log"; rm -f "$$log"; exit $$status
+	$(SERIAL) -m "not parallel and not thorough and $(SELECT)" $(TESTS)
 
-test-parallel: install-test ## the tests marked `parallel`, on two MPI ranks
+test-parallel: install-test ## the fast tests marked `parallel`, on two MPI ranks
 	$(call heading,tests on $(RANKS) ranks)
-	$(MPIRUN) $(PYTHON) -m pytest --color=no -p no:cacheprovider -m "parallel and ($(SELECT))" \
-	    $(CORE) $(OTHERS) $(AROUND)
+	$(MPIRUN) $(PYTHON) -m pytest --color=no -p no:cacheprovider -m "parallel and not thorough and $(SELECT)" $(TESTS)
+
+test-thorough: install-test ## the others: parallel ones on one process, those marked `thorough` on one process and on ranks
+	$(call heading,thorough tests)
+	$(SERIAL) -m "(parallel or thorough) and $(SELECT)" $(TESTS)
+	$(MPIRUN) $(PYTHON) -m pytest --color=no -p no:cacheprovider -m "parallel and thorough and $(SELECT)" $(TESTS)
 	OPENBLAS_NUM_THREADS=1 mpirun -n 4 $(PYTHON) -m pytest --color=no -p no:cacheprovider tests/simulation/test_ranks.py
 
 test-slow: install-test ## the tests marked `slow`
 	$(call heading,slow tests)
-	$(PYTHON) -m pytest -m slow
+	$(SERIAL) -m slow $(TESTS)
 
 # Verdicts are kept: the same command goes on after an interruption.
 N := 1000
@@ -85,20 +91,32 @@ random-scenes: install-test ## N random scenes from SEED on (1000, 0), each chec
 	$(call heading,random scenes)
 	OPENBLAS_NUM_THREADS=1 $(PYTHON) -m tests.hard.random_scenes --count $(N) --seed $(SEED)
 
-# What can differ between versions of dolfinx, PETSc, gmsh and Python, in a few minutes; FULL13=yes runs the rest as well.
-FULL13 :=
-CORE13 := tests/elasticity tests/joints tests/multibody tests/mechanism
-OTHERS13 := tests/meshing tests/design/test_sensitivity.py tests/design/test_weights.py \
+random-scenes-check: install-test ## the first hundred of them, afresh
+	$(call heading,a hundred random scenes)
+	OPENBLAS_NUM_THREADS=1 $(PYTHON) -m tests.hard.random_scenes --count 100 --seed 0 --out "$$(mktemp -d)"
+
+# What can differ between versions of dolfinx, PETSc, gmsh and Python; FULL=yes runs everything that is fast.
+FULL :=
+VERSION_TESTS := tests/elasticity tests/joints tests/multibody tests/mechanism tests/meshing \
+    tests/design/test_sensitivity.py tests/design/test_weights.py \
     $(patsubst %,tests/test_%.py,collective compat kernel_cache uncaught_errors) \
     tests/effects/test_contact_derivatives.py \
     $(patsubst %,tests/equilibrium/test_%.py,eigen factor lagrangian mixed_lagrangian newton path two_level) \
     $(patsubst %,tests/simulation/test_%.py,files memory ranks units)
+OTHER_SUITE = tools/debian.sh $(1) make --no-print-directory INSTALL= PYTHON=/usr/bin/python3 \
+    SELECT="$(SELECT) and not calculix" $(if $(FULL),,TESTS="$(VERSION_TESTS)") test-serial test-parallel
 
-test-debian13: install-test ## the core tests in a Debian 13 root (built once, about two minutes)
+test-debian13: install-test ## the tests of what versions change in a Debian 13 root (built once, about two minutes)
 	$(call heading,tests in Debian 13)
-	tools/debian13.sh make --no-print-directory INSTALL= PYTHON=/usr/bin/python3 \
-	    SELECT="$(SELECT) and not calculix" AROUND= \
-	    $(if $(FULL13),,CORE="$(CORE13)" OTHERS="$(OTHERS13)") test-serial test-parallel
+	$(call OTHER_SUITE,trixie)
+
+test-newest: install-test ## the same with Debian's newest (sid), which moves by itself
+	$(call heading,tests in Debian sid)
+	$(call OTHER_SUITE,sid)
+
+docs: install-docs ## the pages in docs/_build/html; warnings are errors
+	$(call heading,documentation)
+	$(PYTHON) -m sphinx -q -W --keep-going -b html docs docs/_build/html
 
 demos-quick: $(DEMOS:%=demo-quick-%) ## every demo, coarse, in results/quick/
 
@@ -110,15 +128,23 @@ $(DEMOS:%=demo-quick-%): demo-quick-%: install
 hard-cases: install-test ## every case of tests/hard/, slow ones too, as the table in README.md
 	$(PYTHON) -m tests.hard
 
-bench: $(MECHANISMS:%=bench-%) ## seconds per frame (frame_median) of every demo's initial design: 3D, on ranks, plane stress
+# The tables that pages of the documentation include; `make bench` measures one, `make tables` all (hours).
+BENCHMARKS := solvers work_precision accuracy_control large stopping performance effects optimisers
+BENCH = OPENBLAS_NUM_THREADS=1 $(PYTHON) -m benchmarks
 
-.PHONY: $(MECHANISMS:%=bench-%)
-$(MECHANISMS:%=bench-%): bench-%: install
+bench: install ## seconds per load step of every demo's initial design: 3D, on ranks, plane stress
+	$(call heading,benchmark)
+	$(BENCH).frames --write
+	$(MPIRUN) $(PYTHON) -m benchmarks.frames --write
+	$(BENCH).frames --space plane-stress --write
+
+tables: bench $(BENCHMARKS:%=table-%) ## every benchmark, its table in docs/tables/ (hours)
+
+.PHONY: tables $(BENCHMARKS:%=table-%)
+$(BENCHMARKS:%=table-%): table-%: install
 	$(call heading,benchmark $*)
-	$(PYTHON) demos/$*.py --simulate-only --out results/bench/$*
-	$(MPIRUN) $(PYTHON) demos/$*.py --simulate-only --out results/bench/$*-$(RANKS)-ranks
-	$(PYTHON) demos/$*.py --simulate-only --space plane-stress --out results/bench/$*-plane-stress
+	$(BENCH).$* --write
 
 clean: ## remove what the targets above left in this tree
-	rm -rf .venv results .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv results docs/_build .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -prune -exec rm -rf {} +

@@ -13,15 +13,9 @@ from common import parse, simulation
 from samples import bending_test, of_modulus
 
 import fenicsmech as fm
-from fenicsmech.report import (
-    PALETTE,
-    CurveSeries,
-    check_summary,
-    format_table,
-    plot_curve,
-    read_curve_csv,
-    write_summary,
-)
+from benchmarks.table import format_table
+from fenicsmech.files import read_csv, write_json
+from fenicsmech.plot import PALETTE, CurveSeries, plot_curve
 
 SIZE = 1.0  # mm
 GUESS = of_modulus(1000.0)
@@ -31,7 +25,7 @@ TRUE = 1770.0  # MPa, of the data that come with the demo
 
 def measured(folder):
     """The readings of each sample: thickness → (forces, displacements)."""
-    tables = {thickness: read_curve_csv(folder / name) for thickness, name in FILES.items()}
+    tables = {thickness: read_csv(folder / name) for thickness, name in FILES.items()}
     return {thickness: (table["force [N]"], table["displacement [mm]"]) for thickness, table in tables.items()}
 
 
@@ -66,8 +60,7 @@ def leave(demo, experiments, fit, seconds):
     low, high = fit.interval
     title = f"Onyx: E = {fit.youngs_modulus:.0f} MPa ({low:.0f} to {high:.0f})"
     plot_curve(demo.folder / "curve.png", series, title=title)
-    check_summary(summary)
-    write_summary(demo.folder / "summary.json", summary)
+    write_json(demo.folder / "summary.json", summary)
     rows = [
         (f"{thickness:g}", len(experiment.forces), experiment.displacements.max(), max(map(abs, residuals)))
         for thickness, experiment, residuals in zip(FILES, experiments, fit.residuals, strict=True)

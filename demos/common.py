@@ -10,7 +10,7 @@ from time import perf_counter
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.simulation import SPACES
+from fenicsmech.model import SPACES
 
 
 @dataclass
@@ -41,6 +41,7 @@ def parse(name: str, description: str, *, size: float, quick_size: float, data: 
 
     ``size`` and ``quick_size`` are its default element sizes in mm.
     """
+    fm.mpi_abort_on_error()
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--space", choices=list(SPACES), default="3d", help=f"one of {', '.join(SPACES)}")
     parser.add_argument("--order", type=int, choices=(1, 2), default=2, help="degree of the displacement field")

@@ -13,15 +13,9 @@ from common import Demo
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.report import (
-    PALETTE,
-    CurveTarget,
-    check_summary,
-    draw_configurations,
-    format_table,
-    plot_curve,
-    write_summary,
-)
+from benchmarks.table import format_table
+from fenicsmech.files import write_json
+from fenicsmech.plot import PALETTE, CurveTarget, plot_curve
 
 
 @dataclass(frozen=True)
@@ -52,26 +46,22 @@ class Outcome:
 
 def leave(outcome: Outcome) -> None:
     """Leaves pictures, curves, fields, designs and summary in the demo's folder, prints what was found (collective)."""
-    demo, sim, curves, result = outcome.demo, outcome.sim, outcome.curves, outcome.result
-    folder, name = demo.folder, sim.scene.mechanism.name
-    panels = [sim.panel(curve) for curve in curves]
+    demo, curves, result, folder = outcome.demo, outcome.curves, outcome.result, outcome.demo.folder
+    curves[0].picture(folder / "mechanism.png", beside=curves[1:])
     for curve in curves:
-        sim.write(folder / f"deformed{_suffix(curve, curves)}.xdmf", curve)
+        curve.write(folder / f"deformed{_suffix(curve, curves)}.xdmf")
+        curve.write_csv(folder / f"curve{_suffix(curve, curves)}.csv", errors=True)
     if result is not None:
         outcome.problem.picture(folder / "links.png", result)
-        outcome.problem.export(folder / "links", pin=outcome.pin)
-    errors = [sim.error_estimates(curve) for curve in curves]
+        outcome.problem.export(folder / "links", result, pin_diameter=outcome.pin)
+    errors = [curve.error_estimates() for curve in curves]
     summary = summarise(outcome, errors)
     if not demo.leads:
         return
-    draw_configurations(folder / "mechanism.png", panels, title=name, colour_label="von Mises stress [MPa]")
     _plot(outcome)
-    for curve, estimates in zip(curves, errors, strict=True):
-        curve.write_csv(folder / f"curve{_suffix(curve, curves)}.csv", errors=estimates)
     if result is not None:
         result.save(folder / "design.json")
-    check_summary(summary)
-    write_summary(folder / "summary.json", summary)
+    write_json(folder / "summary.json", summary)
     tell(outcome, summary)
 
 

@@ -14,7 +14,7 @@ from common import parse
 from task import Task, run
 
 import fenicsmech as fm
-from fenicsmech.report import Trace
+from fenicsmech.plot import Trace
 
 SIZE = 1.71  # mm
 FORCES = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]

@@ -12,7 +12,8 @@ import argparse
 from pathlib import Path
 
 import fenicsmech as fm
-from fenicsmech.report import format_table, plot_curve
+from benchmarks.table import format_table
+from fenicsmech.plot import plot_curve
 
 PIVOT, KNEE, PIN, ROOT = (0, 0), (25, 8), (50, 0), (50, -40)
 HEAD, BOW = (25, 68), (45, 38)  # the finger's end of the spring, and the middle of its bow

@@ -52,7 +52,8 @@ def run(demo: Demo, scene: fm.Scene, task: Task) -> Outcome:
             coarse = optimise(demo, fm.DesignProblem(simulation(demo, scene, "plane-stress"), **wanted(task)), None)
         problem = fm.DesignProblem(sim, **wanted(task))
         result = optimise(demo, problem, coarse)
-        outcome = Outcome(demo, sim, curves(sim, task), task.targets, before, problem, result, coarse, task.pin)
+        after = sim.with_design(result)
+        outcome = Outcome(demo, after, curves(after, task), task.targets, before, problem, result, coarse, task.pin)
     leave(outcome)
     return outcome
 

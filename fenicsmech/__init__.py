@@ -5,7 +5,7 @@ Describe a mechanism (``Mechanism``), say what acts on it (``Scene``) and how fi
 (``DesignProblem``), and ask for their shapes.
 """
 
-from fenicsmech.collective import end_together
+from fenicsmech.collective import mpi_abort_on_error
 from fenicsmech.design import (
     BFGS,
     DesignProblem,
@@ -36,14 +36,11 @@ from fenicsmech.effects import (
 from fenicsmech.elasticity import DisplacementFormulation, MixedFormulation
 from fenicsmech.equilibrium import (
     ArcSteps,
-    AugmentedLagrangian,
     Critical,
-    Globalisation,
-    KktNewton,
     PrimalDualNewton,
-    Snes,
 )
 from fenicsmech.errors import AssemblyError, DescriptionError, EquilibriumError, FenicsmechError, MeshingError
+from fenicsmech.joints import JointKind, PlanarMarker, SpatialMarker
 from fenicsmech.laws import (
     IsochoricNeoHookean,
     IsochoricSimoNeoHookean,
@@ -72,7 +69,7 @@ from fenicsmech.mechanism import (
     gmsh_mesh,
     outline,
     polygon,
-    step,
+    step_file,
     strip,
 )
 from fenicsmech.simulation import (
@@ -87,7 +84,6 @@ from fenicsmech.simulation import (
     Simulation,
     SoftMode,
     Until,
-    friction_band,
 )
 
 __version__ = "0.1.0"
@@ -98,7 +94,6 @@ __all__ = [
     "SMOOTH_SIL_950",
     "Arc",
     "AssemblyError",
-    "AugmentedLagrangian",
     "BFGS",
     "Configuration",
     "Curve",
@@ -117,7 +112,6 @@ __all__ = [
     "IsochoricNeoHookean",
     "IsochoricSimoNeoHookean",
     "LevenbergMarquardt",
-    "KktNewton",
     "Law",
     "Line",
     "LinkFields",
@@ -136,7 +130,6 @@ __all__ = [
     "Scene",
     "ShapeBounds",
     "Simulation",
-    "Snes",
     "SplineDesign",
     "SplitLaw",
     "StayClose",
@@ -146,20 +139,22 @@ __all__ = [
     "Volumetric",
     "fit_modulus",
     "gmsh_mesh",
+    "mpi_abort_on_error",
     "outline",
     "polygon",
-    "step",
+    "step_file",
     "strip",
     "Contact",
     "Cylinder",
-    "Globalisation",
     "HalfPlane",
     "JointCompliance",
     "JointSpring",
     "Pressure",
     "Prestrain",
+    "JointKind",
     "PinFriction",
-    "friction_band",
+    "PlanarMarker",
+    "SpatialMarker",
     "ArcSteps",
     "BucklingLoad",
     "BucklingPosition",
@@ -170,5 +165,3 @@ __all__ = [
     "SoftMode",
     "Until",
 ]
-
-end_together()

@@ -1,4 +1,4 @@
-"""What processes do for each other: work that one does for all, and errors that all see, so that none waits in vain."""
+"""Work that one process does for all, and errors that all processes see, so that none waits for one that has failed."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from typing import TypeVar
 from mpi4py import MPI
 
 T = TypeVar("T")
-_GRACE = 3.0  # seconds for all processes to fail
 
 
 def on_one(comm: MPI.Comm, work: Callable[[], T], *, root: int = 0) -> T | None:
@@ -51,36 +50,37 @@ def on_all(comm: MPI.Comm, work: Callable[[], T]) -> T:
         done = work()
     except Exception as error:
         failure = error
-    told = comm.allgather(_sendable(failure))
-    first = next((rank for rank, other in enumerate(told) if other is not None), None)
+    failures = comm.allgather(_sendable(failure))
+    first = next((rank for rank, other in enumerate(failures) if other is not None), None)
     try:
         if first is not None:
-            raise failure if first == comm.rank else told[first]
+            raise failure if first == comm.rank else failures[first]
     finally:
         # an error that its own traceback refers to would keep all that is in there until Python looks for cycles
-        failure = told = None
+        failure = failures = None
     return done
 
 
-def end_together() -> None:
-    """Makes an error of one process that nobody catches end all: MPI would let the others wait for it for ever.
+def mpi_abort_on_error() -> None:
+    """Lets an uncaught error on one process end all of them; MPI by itself leaves the others waiting for ever.
 
-    Where all fail, as they do in most cases, each comes to its end as usual.
+    A script calls it once, at its start. It replaces ``sys.excepthook`` where there are several processes. Where all
+    fail, as they do in most cases, each comes to its end as usual.
     """
     show, world = sys.excepthook, MPI.COMM_WORLD
 
-    def show_and_end(kind, error, trace) -> None:
+    def show_and_abort(kind, error, trace) -> None:
         show(kind, error, trace)
         sys.stdout.flush()
         sys.stderr.flush()
-        arrival, deadline = world.Ibarrier(), time.monotonic() + _GRACE
+        arrival, deadline = world.Ibarrier(), time.monotonic() + 3.0  # s, for all to fail
         while not arrival.Test():
             if time.monotonic() > deadline:
                 world.Abort(1)
             time.sleep(0.01)
 
     if world.size > 1:
-        sys.excepthook = show_and_end
+        sys.excepthook = show_and_abort
 
 
 def _sendable(failure: Exception | None) -> Exception | None:

@@ -1,4 +1,4 @@
-"""Every difference between the supported versions of dolfinx (0.5.2 and 0.9) and what goes with them."""
+"""Every difference between the supported versions of dolfinx (0.5.2, 0.9 and 0.11) and what goes with them."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ import dolfinx
 import dolfinx.fem.petsc
 import numpy as np
 import ufl
-import ufl.algorithms
 from dolfinx import fem, io
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from petsc4py import PETSc
+from scipy.sparse import csr_matrix
 
 from fenicsmech.kernel_cache import compiling, options
 
-_LEGACY = tuple(int(part) for part in dolfinx.__version__.split(".")[:2]) < (0, 6)
+_VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
+_LEGACY = _VERSION < (0, 6)
 
 
 if not _LEGACY:
@@ -52,8 +53,11 @@ def create_mesh(comm: MPI.Comm, cells: np.ndarray, points: np.ndarray) -> dmesh.
         domain = ufl.Mesh(ufl.VectorElement("Lagrange", ufl.Cell(shape, geometric_dimension=dim), 1))
         partitioner = dolfinx.cpp.mesh.create_cell_partitioner()
         return dmesh.create_mesh(comm, cells, points, domain, dmesh.GhostMode.none, partitioner)
+    # dolfinx 0.10 asks how many cells may share a facet
+    facets = () if _VERSION < (0, 10) else (2,)
+    partitioner = dmesh.create_cell_partitioner(dmesh.GhostMode.none, *facets)
     domain = ufl.Mesh(basix.ufl.element("Lagrange", shape, 1, shape=(dim,)))
-    return dmesh.create_mesh(comm, cells, points, domain, dmesh.create_cell_partitioner(dmesh.GhostMode.none))
+    return dmesh.create_mesh(comm, cells, x=points, e=domain, partitioner=partitioner)
 
 
 def original_cells(mesh: dmesh.Mesh) -> np.ndarray:
@@ -68,14 +72,32 @@ def original_nodes(mesh: dmesh.Mesh) -> np.ndarray:
 
 def cell_nodes(mesh: dmesh.Mesh) -> np.ndarray:
     """Local geometry nodes of every cell on this rank, (cells, vertices)."""
-    dofmap = mesh.geometry.dofmap
-    return dofmap.array.reshape(-1, mesh.topology.dim + 1) if _LEGACY else np.asarray(dofmap)
+    if _LEGACY:
+        return mesh.geometry.dofmap.array.reshape(-1, mesh.topology.dim + 1)
+    return np.asarray(mesh.geometry.dofmap if _VERSION < (0, 10) else mesh.geometry.dofmaps[0])
 
 
 def cell_dofs(space: fem.FunctionSpace) -> np.ndarray:
     """Local nodes of a space in every cell on this rank, in the reference cell's order, (cells, nodes per cell)."""
     dofmap = space.dofmap
     return dofmap.list.array.reshape(-1, dofmap.dof_layout.num_dofs) if _LEGACY else np.asarray(dofmap.list)
+
+
+def interpolation_matrix(coarse: fem.FunctionSpace, fine: fem.FunctionSpace) -> csr_matrix:
+    """Interpolation of functions on ``coarse`` by functions on ``fine``.
+
+    Returns:
+        This rank's owned DOFs of ``fine`` by all DOFs of ``coarse``, numbered over all ranks.
+    """
+    matrix = dolfinx.cpp.fem.petsc.interpolation_matrix(coarse._cpp_object, fine._cpp_object)
+    matrix.assemble()
+    starts, columns, values = matrix.getValuesCSR()
+    shape = matrix.getLocalSize()[0], matrix.getSize()[1]
+    matrix.destroy()  # what is on the communicator of a mesh is not collected
+    values[np.abs(values) < 1e-12] = 0.0  # rounding
+    found = csr_matrix((values, columns, starts), shape=shape)
+    found.eliminate_zeros()
+    return found
 
 
 def vector_space(mesh: dmesh.Mesh, degree: int) -> fem.FunctionSpace:
@@ -106,47 +128,25 @@ def _space(mesh: dmesh.Mesh, element) -> fem.FunctionSpace:
     with _compiling():
         if _LEGACY:
             return fem.FunctionSpace(mesh, element, jit_params=options())
-        return fem.functionspace(mesh, element, jit_options=options())
-
-
-class _Frozen(ufl.Coefficient):
-    """Stands for an expression until derivatives have been taken."""
-
-    def __init__(self, expression) -> None:
-        if _LEGACY:
-            mesh, element = expression.ufl_domain(), ufl.FiniteElement("DG", expression.ufl_domain().ufl_cell(), 0)
-        else:
-            mesh = ufl.domain.extract_unique_domain(expression)
-            element = basix.ufl.element("DG", mesh.basix_cell(), 0)
-        super().__init__(ufl.FunctionSpace(mesh, element))
-        self.expression = expression
-
-
-def freeze(expression):
-    """A scalar expression in UFL that derivatives take for constant, in what ``compile_form`` compiles and the like."""
-    return _Frozen(expression)
-
-
-def _thaw(expression):
-    """Puts frozen expressions, which may hold others, in their places once derivatives have been taken."""
-    while True:
-        coefficients = ufl.algorithms.extract_coefficients(expression)
-        frozen = {c: c.expression for c in coefficients if isinstance(c, _Frozen)}
-        if not frozen:
-            return expression
-        expression = ufl.replace(ufl.algorithms.expand_derivatives(expression), frozen)
+        if _VERSION < (0, 10):
+            return fem.functionspace(mesh, element, jit_options=options())
+        return fem.functionspace(mesh, element)
 
 
 def compile_form(form: ufl.Form):
     """``form`` compiled to machine code (cached on disk)."""
-    form = _thaw(form)
     with _compiling():
         return fem.form(form, jit_params=options()) if _LEGACY else fem.form(form, jit_options=options())
 
 
+def interpolation_points(V: fem.FunctionSpace) -> np.ndarray:
+    """Points of the reference cell whose values make a function of ``V``, (points, dim)."""
+    points = V.element.interpolation_points
+    return points() if _VERSION < (0, 10) else points
+
+
 def compile_expression(expression, points: np.ndarray, comm: MPI.Comm) -> fem.Expression:
     """``expression`` compiled for evaluation at ``points`` of the reference cell."""
-    expression = _thaw(expression)
     with _compiling():
         if _LEGACY:
             return fem.Expression(expression, points, jit_params=options())
@@ -193,6 +193,17 @@ def assemble_matrix(form, comm: MPI.Comm) -> PETSc.Mat:
     matrix.setLGMap(*own.getLGMap())
     own.destroy()
     return matrix
+
+
+def create_block_matrix(forms) -> PETSc.Mat:
+    """An empty matrix for compiled bilinear ``forms``, a list of rows; per rank, the owned values of each space."""
+    return fem.petsc.create_matrix_block(forms) if _VERSION < (0, 10) else fem.petsc.create_matrix(forms)
+
+
+def add_blocks(matrix: PETSc.Mat, forms) -> None:
+    """Adds ``forms`` into a matrix made by ``create_block_matrix``, which it leaves unassembled."""
+    assemble = fem.petsc.assemble_matrix_block if _VERSION < (0, 10) else fem.petsc.assemble_matrix
+    assemble(matrix, forms)
 
 
 def destroy_garbage(comm: MPI.Comm) -> None:

@@ -1,19 +1,28 @@
-"""Logging: the standard library's, on MPI rank 0 only."""
+"""Messages of a run: the standard library's logging, on MPI rank 0 only, and progress lines of long runs."""
 
 from __future__ import annotations
 
 import logging
+import math
+import shutil
+import sys
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import TextIO
+
+from fenicsmech.errors import DescriptionError
 
 ROOT = "fenicsmech"
 
 
-class _RankZero(logging.Filter):
-    """Drops the records of every rank but the first, so that a message appears once whatever the number of ranks."""
+class _RankZero(logging.LoggerAdapter):
+    """A logger that is silent on every rank but the first, so that a message appears once whatever their number."""
 
-    def filter(self, record: logging.LogRecord) -> bool:
+    def isEnabledFor(self, level: int) -> bool:
         from mpi4py import MPI  # here, not above: describing a mechanism must not start MPI
 
-        return MPI.COMM_WORLD.rank == 0
+        return MPI.COMM_WORLD.rank == 0 and super().isEnabledFor(level)
 
 
 class _Console(logging.StreamHandler):
@@ -24,21 +33,16 @@ class _Console(logging.StreamHandler):
         self.setFormatter(logging.Formatter("%(asctime)s %(levelname)-7s %(name)s: %(message)s", "%H:%M:%S"))
 
 
-_RANK_ZERO = _RankZero()
-
-
-def logger(name: str) -> logging.Logger:
+def logger(name: str) -> logging.LoggerAdapter:
     """The logger of a module.
 
     Args:
         name: the module's `__name__`.
 
     Returns:
-        The standard logger of that name; it emits on rank 0 of MPI.COMM_WORLD only.
+        The standard logger of that name, which emits on rank 0 of MPI.COMM_WORLD only.
     """
-    found = logging.getLogger(name)
-    found.addFilter(_RANK_ZERO)  # on each logger: a filter on a parent does not see the records of its children
-    return found
+    return _RankZero(logging.getLogger(name), {})
 
 
 def configure(level: int = logging.INFO) -> None:
@@ -60,3 +64,114 @@ def configure(level: int = logging.INFO) -> None:
     for handler in others.handlers:
         if type(handler) is logging.StreamHandler:  # not the handlers of an application or a test runner
             handler.setLevel(max(handler.level, logging.WARNING))
+
+
+_TERMINAL_PAUSE = 0.5  # s between redrawn lines
+_LOG_PAUSE = 5.0  # s between lines in a file or pipe
+
+
+class Progress:
+    """Shows the progress of one task on a stream.
+
+    A terminal gets one line that is redrawn at most twice a second; a file or pipe gets a line every five seconds.
+    The last update is always shown. Use it as a context manager, or call :meth:`close` at the end.
+
+    Args:
+        total: how much there is to do; None if that is not known.
+        label: what is being done.
+        stream: where to write; None is the standard error stream.
+        clock: seconds from an arbitrary start, increasing.
+
+    Raises:
+        DescriptionError: ``total`` is not positive.
+    """
+
+    def __init__(
+        self,
+        total: float | None,
+        label: str,
+        stream: TextIO | None = None,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        if total is not None and not (total > 0 and math.isfinite(total)):
+            raise DescriptionError(f"progress of '{label}'", f"the total is {total}", "Give a positive total or None")
+        self._total, self._label, self._clock = total, label, clock
+        self._stream = sys.stderr if stream is None else stream
+        self._terminal = self._stream.isatty()
+        self._start = clock()
+        self._shown = -math.inf
+        self._pending: str | None = None
+        self._open_line = False
+
+    def update(self, done: float, note: str = "") -> None:
+        """Report that ``done`` of the total is finished; ``note`` says something about the latest step."""
+        now = self._clock()
+        self._pending = self._describe(done, note, now - self._start)
+        complete = self._total is not None and done >= self._total
+        if complete or now - self._shown >= (_TERMINAL_PAUSE if self._terminal else _LOG_PAUSE):
+            self._show(now)
+
+    def close(self) -> None:
+        """Show the last update, if it is not yet shown, and end the line."""
+        if self._pending is not None:
+            self._show(self._clock())
+        if self._open_line:
+            self._stream.write("\n")
+            self._stream.flush()
+            self._open_line = False
+
+    def __enter__(self) -> Progress:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _describe(self, done: float, note: str, elapsed: float) -> str:
+        line = f"{self._label}: {done:g}"
+        if self._total is not None:
+            line += f"/{self._total:g}"
+        line += f"  {_duration(elapsed)}"
+        if self._total is not None and 0 < done < self._total:
+            line += f", {_duration(elapsed * (self._total - done) / done)} left"
+        return f"{line}  {note}" if note else line
+
+    def _show(self, now: float) -> None:
+        line, self._pending, self._shown = self._pending, None, now
+        if self._terminal:
+            width = shutil.get_terminal_size().columns - 1  # a full line would wrap and not be overwritten
+            self._stream.write(f"\r{line[:width]}\x1b[K")
+            self._open_line = True
+        else:
+            self._stream.write(f"{line}\n")
+        self._stream.flush()
+
+
+class Silent:
+    """Takes the calls of :class:`Progress` and shows nothing: for every rank but the first."""
+
+    def update(self, done: float, note: str = "") -> None:
+        """Ignore the report."""
+
+    def close(self) -> None:
+        """Nothing was opened."""
+
+    def __enter__(self) -> Silent:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _duration(seconds: float) -> str:
+    """``seconds`` as 4.2 s, 3:07 min or 2:05:09 h."""
+    if seconds < 59.95:
+        return f"{seconds:.1f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    if minutes < 60:
+        return f"{minutes}:{rest:02d} min"
+    return f"{minutes // 60}:{minutes % 60:02d}:{rest:02d} h"

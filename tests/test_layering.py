@@ -17,33 +17,38 @@ PACKAGE = Path(__file__).parents[1] / ROOT
 LAYERS = (
     "errors",
     "checks",
+    "laws",
+    "symbolic",
     "log",
     "clock",
+    "symbolic",
     "kernel_cache",
     "compat",
     "collective",
-    "laws",
-    "report",
+    "files",
+    "plot",
     "joints",
     "mechanism",
     "meshing",
+    "export",
     "multibody",
     "elasticity",
     "effects",
     "equilibrium",
+    "model",
+    "estimates",
     "simulation",
     "design",
-    "accuracy",
 )
 
 # Libraries that belong to a few layers only: descriptions and joints know no elements, only one layer makes meshes,
 # only one draws.
 RESTRICTED = {
-    "dolfinx": {"report", "joints", "mechanism"},
-    "ufl": {"report", "joints", "mechanism"},
-    "petsc4py": {"report", "joints", "mechanism"},
-    "gmsh": set(LAYERS) - {"compat", "meshing"},
-    "matplotlib": set(LAYERS) - {"report"},
+    "dolfinx": {"plot", "joints", "mechanism"},
+    "ufl": {"plot", "joints", "mechanism"},
+    "petsc4py": {"plot", "joints", "mechanism"},
+    "gmsh": set(LAYERS) - {"compat", "meshing", "export"},
+    "matplotlib": set(LAYERS) - {"plot"},
 }
 
 

@@ -1,11 +1,15 @@
 """Errors that nobody catches end a program on all ranks: none waits for one that is gone."""
 
+import subprocess
+import sys
+
 import pytest
 
 RANKS = 2
 FAILING = """
-import fenicsmech
+import fenicsmech as fm
 from mpi4py import MPI
+fm.mpi_abort_on_error()
 print("rank", MPI.COMM_WORLD.rank)
 if MPI.COMM_WORLD.rank in {ranks}:
     raise ValueError("broken")
@@ -20,3 +24,19 @@ def test_a_program_ends_when_an_error_is_not_caught_on(ranks, mpirun, tmp_path):
     done = mpirun(RANKS, script)
     assert done.returncode == 1
     assert done.stderr.count("ValueError: broken") == len(ranks)
+
+
+def test_importing_the_package_changes_nothing_outside_it():
+    script = """
+import logging, sys
+import dolfinx
+hook, root = sys.excepthook, logging.getLogger()
+handlers, level = list(root.handlers), root.level
+import fenicsmech
+assert sys.excepthook is hook
+assert root.handlers == handlers and root.level == level
+for name, logger in logging.Logger.manager.loggerDict.items():
+    if name.startswith("fenicsmech") and isinstance(logger, logging.Logger):
+        assert not logger.filters and not logger.handlers and logger.propagate and logger.level == logging.NOTSET
+"""
+    subprocess.run([sys.executable, "-c", script], check=True)

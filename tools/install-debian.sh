@@ -3,6 +3,7 @@
 #
 #   tools/install-debian.sh run       what `make demo` needs; downloads from Debian only
 #   tools/install-debian.sh test      that, and what `make test` needs: more packages, and pinned tools from PyPI
+#   tools/install-debian.sh docs      that, and what `make docs` needs
 #
 # Does nothing, quickly, when all is in place. Needs root or sudo if a package is missing.
 set -euo pipefail
@@ -19,7 +20,8 @@ fail() {
 
 packages() { # the names in the package lists of this purpose, without the comments
     local lists=(tools/packages/run.txt)
-    if [ "$purpose" = test ]; then lists+=(tools/packages/test.txt); fi
+    if [ "$purpose" != run ]; then lists+=(tools/packages/test.txt); fi
+    if [ "$purpose" = docs ]; then lists+=(tools/packages/docs.txt); fi
     sed -E 's/#.*//' "${lists[@]}" | xargs -n 1
 }
 
@@ -61,8 +63,8 @@ for tool in tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-depe
 }
 
 case $purpose in
-    run | test) ;;
-    *) fail "usage: tools/install-debian.sh run|test" ;;
+    run | test | docs) ;;
+    *) fail "usage: tools/install-debian.sh run|test|docs" ;;
 esac
 command -v apt-get >/dev/null || fail "this is not Debian: install the packages listed in tools/packages by hand."
 
@@ -83,7 +85,7 @@ if [ "$(cat "$venv/recipe-run" 2>/dev/null)" != "$recipe" ]; then
     make_venv
     echo "$recipe" >"$venv/recipe-run"
 fi
-if [ "$purpose" = test ] && [ "$(cat "$venv/recipe-test" 2>/dev/null)" != "$recipe" ]; then
+if [ "$purpose" != run ] && [ "$(cat "$venv/recipe-test" 2>/dev/null)" != "$recipe" ]; then
     install_tools
     echo "$recipe" >"$venv/recipe-test"
 fi

@@ -13,7 +13,7 @@ from characterize import FILES, TRUE
 from samples import bending_test, of_modulus
 
 import fenicsmech as fm
-from fenicsmech.report import write_curve_csv
+from fenicsmech.files import write_csv
 
 LARGEST = {1.0: 0.225, 2.0: 1.75}  # N
 READINGS = 12
@@ -30,7 +30,7 @@ def main():
         exact = sim.load_displacement(push, forces=list(forces)).displacements
         read = exact + NOISE * exact.max() * random.standard_normal(READINGS)
         columns = {"force [N]": forces, "displacement [mm]": np.round(read, 3)}
-        write_curve_csv(Path(__file__).parent / name, columns)
+        write_csv(Path(__file__).parent / name, columns)
 
 
 if __name__ == "__main__":

@@ -1,86 +1,52 @@
 """Shape design of flexible links.
 
-How a link's shape follows its parameters, in the order of their use
-    ``spline``            centreline and thickness as a cubic Hermite spline; ``spline_fit`` finds the first one
-    ``handles``           where the spline takes hold of the mesh; ``transforms`` what a handle does around it,
-                          ``handle_placement`` where handles go
-    ``weights``           bounded biharmonic weights; on the plan of an extruded link, with handles as vertices
-                          (``insertion``), from a ``laplacian`` and a quadratic program (``partition``)
-    ``link_shape``        all of these for one link
-    ``shape_map``         parameters and handle positions → design field on the distributed mesh, and its transpose
-    ``quality``           aspect ratios of cells, their sum as a form
-    ``handle_optimum``    handle positions that make the mesh best, and their derivative by the parameters; one Newton
-                          step in ``handle_step``, Hessians between handles in ``moment_hessian``
-
-    ``rest_shape``        the rest shape as a function of p alone, handles at their best
-
-Derivatives of the mechanism
-    ``sensitivity``       adjoint derivatives of displacements by design field, moduli and force
-
-What is minimised
-    ``spline_design``     which links may change, and what is wanted: plain data
-    ``regularisers``      closeness to the start, bounds of fabrication at ``spline_samples``, mesh quality, by a
-                          ``barrier``
-    ``equilibria``        the targets' equilibria, followed from design to design
-    ``objective``         distances from targets plus regularisers, with derivatives
-    ``objective_error``   how wrong it is because elements are not infinitely fine
-    ``groups``, ``team``  targets spread over groups of processes; one process decides
-    ``optimisers``        Levenberg–Marquardt, BFGS
-
-    ``characterisation``  Young's modulus from measurements
-
-What a user sees
-    ``design_problem``    the entry point, with its ``problem_checks``; ``progress`` and ``checkpoint`` while it runs,
-                          ``conclusion`` at its end
-    ``result``            designs as plain data; ``link_files`` pictures and solids of them
+A ``DesignProblem`` is described as plain data (``description``), minimised by one of the ``optimisers`` in a ``run``,
+and ends in a ``DesignResult``. Its ``objective`` is made of the targets' ``equilibria`` with their adjoint
+``sensitivity``, and of ``regularisers``. The ``rest_shape`` of the links follows the parameters through ``shape``:
+``spline``, ``handles`` that ride on it, ``weights`` by which handles move the mesh, the ``shape_map`` of these, and
+the ``handle_optimum`` that makes the mesh ``quality`` best. ``characterisation`` fits Young's modulus to measurements.
 """
 
-from fenicsmech.design.barrier import Barrier
 from fenicsmech.design.characterisation import Experiment, ModulusFit, fit_modulus
-from fenicsmech.design.checkpoint import Checkpoint
+from fenicsmech.design.description import Bounds, SplineDesign, Target, shape_request
 from fenicsmech.design.design_problem import DesignProblem
 from fenicsmech.design.equilibria import Known, TargetEquilibria
-from fenicsmech.design.groups import group_count, split
-from fenicsmech.design.handle_optimum import HandleOptimum, ShapeError
-from fenicsmech.design.handle_step import LinkDerivatives, choose_sides, follow_spline
-from fenicsmech.design.handles import BETWEEN, LinkHandles
-from fenicsmech.design.insertion import insert, pierced
-from fenicsmech.design.laplacian import lumped_mass, stiffness
-from fenicsmech.design.link_shape import ShapeRequest, shape_link, shape_links
-from fenicsmech.design.objective import Objective, target_errors, target_scales
-from fenicsmech.design.objective_error import objective_error
-from fenicsmech.design.optimisers import (
-    BFGS,
+from fenicsmech.design.objective import Objective, group_count, objective_error, split, target_errors, target_scales
+from fenicsmech.design.optimisers.bfgs import BFGS
+from fenicsmech.design.optimisers.levenberg_marquardt import LevenbergMarquardt, Resolution
+from fenicsmech.design.optimisers.problem import (
     Evaluation,
     Infeasible,
     Iterate,
-    LevenbergMarquardt,
     Optimiser,
     Quadratic,
     Reason,
     Start,
     TooHigh,
 )
-from fenicsmech.design.optimisers.resolution import Resolution
-from fenicsmech.design.partition import solve_partition
-from fenicsmech.design.progress import DesignProgress
-from fenicsmech.design.quality import QualitySum
 from fenicsmech.design.regularisers import MeshQuality, Model, Regulariser, ShapeBounds, StayClose
 from fenicsmech.design.rest_shape import DesignedLink, RestShape
 from fenicsmech.design.result import DesignResult, LinkDesign, TargetResult
-from fenicsmech.design.sensitivity import Adjoint, Gradient
-from fenicsmech.design.shape_map import ShapeMap
-from fenicsmech.design.spline import LinkSpline
-from fenicsmech.design.spline_design import Bounds, SplineDesign, Target, bounds_of, shape_request
-from fenicsmech.design.spline_fit import fit_spline
-from fenicsmech.design.spline_samples import SplineSamples
-from fenicsmech.design.team import minimise_together
+from fenicsmech.design.run import Checkpoint, DesignProgress, minimise_together
+from fenicsmech.design.sensitivity import Gradient, Sensitivity
+from fenicsmech.design.shape.handle_optimum import (
+    HandleOptimum,
+    MapDerivatives,
+    ShapeError,
+    by_positions,
+    follow_spline,
+)
+from fenicsmech.design.shape.handles import BETWEEN, LinkHandles
+from fenicsmech.design.shape.quality import Barrier, QualitySum
+from fenicsmech.design.shape.shape_map import ShapeMap, ShapeRequest, shape_link, shape_links
+from fenicsmech.design.shape.spline import LinkSpline, SplineSamples, fit_spline
+from fenicsmech.design.shape.weights import insert, lumped_mass, pierced, solve_partition, stiffness
 
 __all__ = [
-    "Adjoint",
+    "Sensitivity",
     "BETWEEN",
-    "Barrier",
     "BFGS",
+    "Barrier",
     "Bounds",
     "Checkpoint",
     "DesignProblem",
@@ -95,15 +61,15 @@ __all__ = [
     "Iterate",
     "Known",
     "LevenbergMarquardt",
-    "LinkDerivatives",
     "LinkDesign",
     "LinkHandles",
     "LinkSpline",
+    "MapDerivatives",
     "MeshQuality",
-    "Optimiser",
     "Model",
     "ModulusFit",
     "Objective",
+    "Optimiser",
     "Quadratic",
     "QualitySum",
     "Reason",
@@ -122,8 +88,7 @@ __all__ = [
     "TargetEquilibria",
     "TargetResult",
     "TooHigh",
-    "bounds_of",
-    "choose_sides",
+    "by_positions",
     "fit_modulus",
     "fit_spline",
     "follow_spline",

@@ -21,15 +21,11 @@ import numpy as np
 from scipy.stats import t as student
 
 from fenicsmech.checks import finite
-from fenicsmech.design.sensitivity import Adjoint
-from fenicsmech.equilibrium import IDLE_STIFFNESS, LoadControl
+from fenicsmech.design.sensitivity import Sensitivity
+from fenicsmech.equilibrium import LoadControl
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import DRAWN, Configuration, Force, Material
 from fenicsmech.simulation import Curve, CurveRequest, Simulation, read_request
-
-_SETTLED = 1e-6  # change of ln E
-_ITERATIONS = 30
-_LARGEST_STEP = 1.0  # of ln E
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +40,7 @@ class Experiment:
         configuration: motor positions.
 
     Raises:
-        DescriptionError: the numbers do not pair, are not finite, or tell nothing.
+        DescriptionError: the numbers do not pair, are not finite, or hold no information.
     """
 
     simulation: Simulation
@@ -105,7 +101,7 @@ class ModulusFit:
 
 
 def fit_modulus(experiments: Sequence[Experiment], material: Material) -> ModulusFit:
-    """Young's modulus of ``material`` (collective); the simulations keep it.
+    """Young's modulus of ``material``; the simulations keep it.
 
     Args:
         experiments: measurements, at least two readings in all.
@@ -126,9 +122,9 @@ def fit_modulus(experiments: Sequence[Experiment], material: Material) -> Modulu
         curves, residuals, slopes = zip(*(rig.compare(np.exp(log_modulus)) for rig in rigs), strict=True)
         scaled = np.concatenate([r / rig.range for r, rig in zip(residuals, rigs, strict=True)])
         J = np.concatenate([slope / rig.range for slope, rig in zip(slopes, rigs, strict=True)])
-        if abs(step) <= _SETTLED or iterations == _ITERATIONS:
+        if abs(step) <= 1e-6 or iterations == 30:
             break
-        step = float(np.clip(-(J @ scaled) / (J @ J), -_LARGEST_STEP, _LARGEST_STEP))
+        step = float(np.clip(-(J @ scaled) / (J @ J), -1.0, 1.0))  # far from the minimum, by a factor of e at most
         log_modulus += step
         iterations += 1
     spread = float(np.sqrt(scaled @ scaled / (readings - 1)))
@@ -167,10 +163,10 @@ class _Rig:
         model, newton = simulation.model, simulation.newton(part)
         model.set_parameter(self._links, "E", modulus)
         curve = simulation.trace(self._request)
-        adjoint, floor = Adjoint(model, newton), IDLE_STIFFNESS if curve.freedom.idle else 0.0
+        adjoint = Sensitivity(model, newton)
         slopes, travels = {}, {}
         for frame in curve.frames:
-            (gradient,) = adjoint.gradients(frame.state, [newton.system.controlled], floor=floor)
+            (gradient,) = adjoint.gradients(frame.state, [newton.system.controlled])
             travels[frame.force] = frame.displacement
             slopes[frame.force] = modulus * float(gradient.parameters["E"][self._links].sum())
         forces = self._experiment.forces.tolist()

@@ -11,24 +11,33 @@ import numpy as np
 
 from fenicsmech.clock import Clock
 from fenicsmech.collective import on_one
-from fenicsmech.design.checkpoint import Checkpoint, fingerprint
-from fenicsmech.design.conclusion import Verification, link_designs, target_results, verify
+from fenicsmech.design.description import (
+    SplineDesign,
+    Target,
+    check_designs,
+    check_effects,
+    check_targets,
+    shape_request,
+)
 from fenicsmech.design.equilibria import TargetEquilibria
-from fenicsmech.design.groups import Group, group_count, split
-from fenicsmech.design.handle_optimum import Placement
-from fenicsmech.design.link_files import draw_links, outline, rest_meshes, write_solids
-from fenicsmech.design.link_shape import LinkShape, shape_links
-from fenicsmech.design.objective import Objective, target_errors
-from fenicsmech.design.objective_error import objective_error
-from fenicsmech.design.optimisers import Infeasible, Iterate, LevenbergMarquardt, Optimiser, Start
-from fenicsmech.design.problem_checks import check_designs, check_effects, check_targets
-from fenicsmech.design.progress import DesignProgress
+from fenicsmech.design.objective import Group, Objective, group_count, objective_error, split, target_errors
+from fenicsmech.design.optimisers.levenberg_marquardt import LevenbergMarquardt
+from fenicsmech.design.optimisers.problem import Infeasible, Iterate, Optimiser, Start
 from fenicsmech.design.regularisers import MeshQuality, Regulariser, ShapeBounds, StayClose
 from fenicsmech.design.rest_shape import RestShape
-from fenicsmech.design.result import DesignResult
-from fenicsmech.design.spline_design import SplineDesign, Target, bounds_of, shape_request
-from fenicsmech.design.team import Outcome, minimise_together
+from fenicsmech.design.result import (
+    DesignResult,
+    draw_links,
+    link_designs,
+    rest_meshes,
+    verified_targets,
+    write_solids,
+)
+from fenicsmech.design.run import Checkpoint, DesignProgress, Optimum, fingerprint, minimise_together
+from fenicsmech.design.shape.handle_optimum import Placement
+from fenicsmech.design.shape.shape_map import LinkShape, shape_links
 from fenicsmech.errors import DescriptionError, EquilibriumError
+from fenicsmech.meshing import LinkMesh
 from fenicsmech.simulation import Simulation
 
 DEFAULT_REGULARISER = MeshQuality() + ShapeBounds() + 1e-4 * StayClose()
@@ -42,10 +51,12 @@ class DesignProblem:
     Nothing is meshed or compiled before it is needed; the description is checked at once.
 
     Args:
-        simulation: how displacements are computed. It has the drawn shape until ``apply`` or ``optimise`` change it.
+        simulation: how displacements are computed; it keeps the shapes it has. ``simulation.with_design`` gives one of
+            a result.
         designs: the links that may change.
         targets: what is wanted.
-        regulariser: R; mesh quality, bounds of fabrication and a little closeness to the drawing by default.
+        regulariser: R; by default mesh quality, bounds of fabrication, and closeness to the drawing with weight 1e-4,
+            where the paper has 1: with 1 the targets of the demos are missed by 19–79 %.
 
     Raises:
         DescriptionError: the problem contradicts itself or the simulation's scene.
@@ -69,25 +80,20 @@ class DesignProblem:
 
     @property
     def initial(self) -> np.ndarray:
-        """Parameters of the drawn shapes, (parameters,) (collective)."""
+        """Parameters of the drawn shapes, (parameters,)."""
         return self._rest.initial
 
-    def apply(self, design: DesignResult | np.ndarray) -> None:
-        """Gives the simulation the shapes of a result or of parameters (parameters,) (collective).
+    def rest_shape(self, design: DesignResult | np.ndarray) -> np.ndarray:
+        """The design field of a result or of parameters (parameters,), as ``Simulation.with_design`` takes it.
+
+        This rank's values, ghosts last, flat. Parameters alone fix displacements to about 1 % only: several positions
+        of the handles can be good, and results carry those that were found on the way.
 
         Raises:
             DescriptionError: the design is one of other links.
             ShapeError: cells of the mesh are inverted in this shape.
         """
-        if isinstance(design, DesignResult):
-            self._rest.place(self._parameters(design), self._placement(design))
-            return
-        parameters = np.array(design, dtype=float)
-        if parameters.shape != self.initial.shape or not np.all(np.isfinite(parameters)):
-            raise DescriptionError(
-                "design", f"parameters of shape {parameters.shape}", f"Give {len(self.initial)} finite numbers"
-            )
-        self._rest.place(parameters, None)
+        return self._rest.field(*self._given(design))
 
     def optimise(
         self,
@@ -97,7 +103,7 @@ class DesignProblem:
         checkpoint: str | Path | None = None,
         resume: bool = False,
     ) -> DesignResult:
-        """The best design; the simulation has its shapes afterwards (collective).
+        """The best design; the simulation stays as it is.
 
         Targets that cannot be reached lead to the best design found, with the error of each and the bounds that hold
         it back.
@@ -113,7 +119,7 @@ class DesignProblem:
                 the point of a target.
             EquilibriumError: the initial design does not carry its loads.
         """
-        began, clock = perf_counter(), dict(self._clock.seconds)
+        began, clock, model = perf_counter(), dict(self._clock.seconds), self.simulation.model
         optimiser, comm = optimiser or LevenbergMarquardt(), self.simulation.comm
         _, objective = self._team
         saved = None
@@ -121,66 +127,80 @@ class DesignProblem:
             problem = fingerprint(self.simulation, self._rest, self.targets, self._regulariser, optimiser)
             saved = Checkpoint(Path(checkpoint), problem)
         begin, near = self._beginning(start, saved if resume else None)
-        values, outcome = self._minimise(optimiser, begin, near, saved)
-        placement = comm.bcast(objective.placement, root=0)
-        with self._clock.phase("verification"):
-            self._rest.place(outcome.parameters, placement)
-            found = verify(self.simulation, self.targets, objective.reached)
-        spent, phases = perf_counter() - began, self._clock.since(clock)
-        result = self._result(outcome, placement, found, values, seconds=spent, phases=phases)
+        with model.shaped(model.elastic.d.x.array.copy()):
+            values, optimum = self._minimise(optimiser, begin, near, saved)
+            placement = comm.bcast(objective.placement, root=0)
+            with self._clock.phase("verification"):
+                self._rest.place(optimum.parameters, placement)
+                targets, same = verified_targets(self.simulation, self.targets, optimum.started, objective.reached)
+            result = DesignResult(
+                mechanism=self.simulation.scene.mechanism.name,
+                links=link_designs(self._rest, self.designs, placement),
+                targets=targets,
+                reason=optimum.reason.value,
+                converged=optimum.reason.converged,
+                verified=same,
+                active=objective.active(optimum.parameters),
+                objective=values,
+                objective_error=objective_error(
+                    self.targets,
+                    np.array([target.reached for target in targets]),
+                    [target.finer_elements_add for target in targets],
+                ),
+                iterations=optimum.number,
+                evaluations=optimum.evaluations,
+                mesh_ratio_max=self._rest.worst_ratio(),
+                seconds=perf_counter() - began,
+                phases=self._clock.since(clock),
+                processes=comm.size,
+                groups=group_count(comm.size, len(self.targets)),
+            )
         return comm.bcast(result, root=0)  # processes differ in times and in the last bits
 
     def picture(self, path: str | Path, design: DesignResult) -> None:
-        """Draws the links as drawn and as in ``design``, as a PNG (collective).
+        """Draws the links as drawn and as in ``design``, as a PNG.
 
         Raises:
             DescriptionError: the design is one of other links.
         """
-        links, model = [design.link for design in self.designs], self.simulation.model
-        shapes = []
-        with model.shaped(model.elastic.d.x.array.copy()):
-            for parameters, near in ((self.initial, None), (self._parameters(design), self._placement(design))):
-                self._rest.place(parameters, near)
-                shapes.append((parameters, rest_meshes(self.simulation, links)))
+        before, after = ((given[0], self._meshes(given)) for given in ((self.initial, None), self._given(design)))
+        links = [design.link for design in self.designs]
+        on_one(
+            self.simulation.comm,
+            lambda: draw_links(path, self.simulation, links, self._rest.links, before, after),
+        )
 
-        def draw() -> None:
-            before, after = (
-                [outline(link, mesh, p[link.place]) for link, mesh in zip(self._rest.links, meshes, strict=True)]
-                for p, meshes in shapes
-            )
-            draw_links(path, self.simulation, links, before, after)
-
-        on_one(self.simulation.comm, draw)
-
-    def export(self, folder: str | Path, *, pin: float | None = None) -> None:
-        """Writes ``NAME.step`` and ``NAME.stl`` of every link that may change, in its present shape (collective).
+    def export(
+        self, folder: str | Path, design: DesignResult | np.ndarray, *, pin_diameter: float | None = None
+    ) -> None:
+        """Writes ``NAME.step`` and ``NAME.stl`` of every link that may change.
 
         Args:
             folder: where to; it is created.
-            pin: diameter of the holes left for pins; none by default.
+            design: the shapes of the links.
+            pin_diameter: of the holes left for the pins of round interfaces; none are left by default.
 
         Raises:
+            DescriptionError: the design is one of other links.
             MeshingError: no solid can be made of a link.
         """
-        links = [design.link for design in self.designs]
-        meshes = rest_meshes(self.simulation, links)
-        on_one(self.simulation.comm, lambda: write_solids(folder, self.simulation.linkage, links, meshes, pin))
+        links, meshes = [own.link for own in self.designs], self._meshes(self._given(design))
+        on_one(self.simulation.comm, lambda: write_solids(folder, self.simulation.linkage, links, meshes, pin_diameter))
 
     # -- steps of ``optimise`` -------------------------------------------------------------------------------
 
     def _beginning(self, start: DesignResult | None, saved: Checkpoint | None) -> tuple[Start, Placement | None]:
-        """Where to start, and the handles there if they are known: from ``saved`` if its file exists (collective)."""
-        begin, near = Start(self.initial), None
-        if start is not None:
-            begin, near = Start(self._parameters(start)), self._placement(start)
+        """Where to start, and the handles there if they are known: from ``saved`` if its file exists."""
+        parameters, near = (self.initial, None) if start is None else self._given(start)
+        begin = Start(parameters)
         if saved is not None and (found := saved.load_together(self.simulation.comm)) is not None:
             begin, near = found.start, self._rest.known(found.start.parameters, found.handles)
         return begin, near
 
     def _minimise(
         self, optimiser: Optimiser, begin: Start, near: Placement | None, saved: Checkpoint | None
-    ) -> tuple[tuple[float, float], Outcome]:
-        """The objective of the drawn and of the best design, and how the minimisation ended (collective)."""
+    ) -> tuple[tuple[float, float], Optimum]:
+        """The objective of the drawn and of the best design, and how the minimisation ended."""
         _, objective = self._team
 
         def watch(iterate: Iterate) -> None:
@@ -197,47 +217,14 @@ class DesignProblem:
                 objective.begin(None)
                 initial = objective.traced(self.initial)
                 objective.begin(near)
-                outcome = minimise_together(self.simulation.comm, objective, optimiser, begin, watch=watch)
-                return (initial, objective.evaluate(outcome.parameters).value), outcome
+                optimum = minimise_together(self.simulation.comm, objective, optimiser, begin, watch=watch)
+                return (initial, objective.evaluate(optimum.parameters).value), optimum
             except Infeasible as failure:
                 raise EquilibriumError(
                     f"design of {self.simulation.scene.mechanism.name!r}",
                     f"the design to start from has no value: {failure}",
                     "Draw links that carry the targets' loads, or start with smaller loads",
                 ) from failure
-
-    def _result(
-        self,
-        outcome: Outcome,
-        placement: Placement,
-        found: Verification,
-        values: tuple[float, float],
-        *,
-        seconds: float,
-        phases: dict[str, float],
-    ) -> DesignResult:
-        """The verified optimum, which the simulation has, as plain data (collective)."""
-        (_, objective), comm, error = self._team, self.simulation.comm, None
-        if found.errors is not None:
-            error = objective_error(self.targets, found.displacements, found.errors)
-        return DesignResult(
-            mechanism=self.simulation.scene.mechanism.name,
-            links=link_designs(self._rest, placement),
-            targets=target_results(self.targets, outcome.started, found),
-            reason=outcome.reason.value,
-            converged=outcome.reason.converged,
-            verified=found.same,
-            active=objective.active(outcome.parameters),
-            objective=values,
-            objective_error=error,
-            iterations=outcome.number,
-            evaluations=outcome.evaluations,
-            mesh_ratio_max=self.simulation.mesh_ratio_max,
-            seconds=seconds,
-            phases=phases,
-            processes=comm.size,
-            groups=group_count(comm.size, len(self.targets)),
-        )
 
     # -- parts ---------------------------------------------------------------------------------------------
 
@@ -251,7 +238,7 @@ class DesignProblem:
 
     @cached_property
     def _rest(self) -> RestShape:
-        return self._rest_of(self.simulation)
+        return RestShape(self.simulation.model, self._shapes, self.designs)
 
     @cached_property
     def _team(self) -> tuple[Group, Objective]:
@@ -261,33 +248,41 @@ class DesignProblem:
             group, simulation = split(self.simulation.comm, len(self.targets)), self.simulation
             if group.comm is not simulation.comm:
                 simulation = simulation.on(group.comm)
-                rest = self._rest_of(simulation)
+                rest = RestShape(simulation.model, self._shapes, self.designs)
             equilibria = TargetEquilibria(simulation, [self.targets[k] for k in group.mine])
             objective = Objective(
                 rest, equilibria, targets=self.targets, regulariser=self._regulariser, group=group, clock=self._clock
             )
         return group, objective
 
-    def _rest_of(self, simulation: Simulation) -> RestShape:
-        bounds = [bounds_of(design, shape.thickness) for design, shape in zip(self.designs, self._shapes, strict=True)]
-        return RestShape(simulation.model, self._shapes, [design.link.name for design in self.designs], bounds)
+    def _meshes(self, given: tuple[np.ndarray, Placement | None]) -> list[LinkMesh] | None:
+        """Meshes of the links that may change on the first process, None elsewhere."""
+        model = self.simulation.model
+        with model.shaped(self._rest.field(*given)):
+            return rest_meshes(self.simulation, [design.link for design in self.designs])
 
-    def _parameters(self, result: DesignResult) -> np.ndarray:
-        """Parameters of a result of the same links."""
-        wanted = [(link.name, link.place.stop - link.place.start) for link in self._rest.links]
-        given = {link.name: link.parameters for link in result.links}
-        for name, size in wanted:
-            if len(given.get(name, ())) != size:
+    def _given(self, design: DesignResult | np.ndarray) -> tuple[np.ndarray, Placement | None]:
+        """Parameters of a design, and its handle positions if it is a result.
+
+        Raises:
+            DescriptionError: the result is one of other links, or the parameters are not as many finite numbers.
+        """
+        if not isinstance(design, DesignResult):
+            parameters = np.array(design, dtype=float)
+            if parameters.shape != self.initial.shape or not np.all(np.isfinite(parameters)):
                 raise DescriptionError(
-                    f"design of {result.mechanism!r}",
-                    f"it has {len(given.get(name, ()))} parameters of link {name!r} instead of {size}",
+                    "design", f"parameters of shape {parameters.shape}", f"Give {len(self.initial)} finite numbers"
+                )
+            return parameters, None
+        given = {link.name: link for link in design.links}
+        for link in self._rest.links:
+            size, found = link.spline.size, len(given[link.name].parameters) if link.name in given else 0
+            if found != size:
+                raise DescriptionError(
+                    f"design of {design.mechanism!r}",
+                    f"it has {found} parameters of link {link.name!r} instead of {size}",
                     "Use a result of the same links and numbers of segments",
                 )
-        return np.concatenate([given[name] for name, _ in wanted])
-
-    def _placement(self, result: DesignResult) -> Placement | None:
-        """Handle positions of a result of the same links."""
-        given = {link.name: link.handles for link in result.links}
-        return self._rest.known(
-            self._parameters(result), np.concatenate([given[link.name] for link in self._rest.links])
-        )
+        own = [given[link.name] for link in self._rest.links]
+        parameters, theta = (np.concatenate(parts) for parts in ([o.parameters for o in own], [o.handles for o in own]))
+        return parameters, self._rest.known(parameters, theta)

@@ -6,7 +6,7 @@ factor that is there already:
 
     ŷ₀ = y + δ,   δ = −K₁⁻¹ R(y; d₀),   y the state y₁ carried back,     |y₀ − ŷ₀| ≤ 2 |δ|
 
-on one branch if d₁ − d₀ is small enough, and halved if that fails. Halves that fail too tell a fold.
+on one branch if d₁ − d₀ is small enough, and halved if that fails. Halves that fail too mean a fold.
 
 A displacement counts from the unloaded configuration. Where that moves with the design (the force acts on a flexible
 link, or motors strain the links), it is an equilibrium that is followed too.
@@ -19,18 +19,30 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenicsmech.design.optimisers import Infeasible
-from fenicsmech.design.sensitivity import Adjoint
-from fenicsmech.design.spline_design import Target
-from fenicsmech.equilibrium import IDLE_STIFFNESS, Iteration, LoadControl, NotConverged, State
+from fenicsmech.design.description import Target
+from fenicsmech.design.optimisers.problem import Infeasible
+from fenicsmech.design.sensitivity import Sensitivity
+from fenicsmech.equilibrium import LoadControl, NotConverged, Quantity, State
 from fenicsmech.errors import EquilibriumError
+from fenicsmech.estimates import Equilibrium
 from fenicsmech.mechanism import FlexibleLink
 from fenicsmech.multibody import assemble
-from fenicsmech.simulation import CurveRequest, Equilibrium, Goal, Simulation
+from fenicsmech.simulation import CurveRequest, Simulation
 
-_HALVINGS = 2  # of a change of design whose equilibrium is not found, or lies elsewhere
-_ASTRAY = 2.0  # times δ, how far the prediction may miss: up to 1.7 on one branch, 3.8 and more across folds
-_LEAST_MISS = 1e-6  # of the mechanism's length, or rad: what is a miss at all
+
+@dataclass(frozen=True)
+class FollowOptions:
+    """When an equilibrium at one design is a continuation of the one at another.
+
+    Attributes:
+        halvings: of a change of design whose equilibrium is not found, or lies elsewhere.
+        astray: times |δ|, how far the prediction may miss: up to 1.7 on one branch, 3.8 and more across folds.
+        rounding: misses below this part of the mechanism's length, or rad, are none.
+    """
+
+    halvings: int = 2
+    astray: float = 2.0
+    rounding: float = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,11 +52,13 @@ class Sample:
     Attributes:
         state: under the target's force.
         origin: unloaded; None if it does not depend on the design.
-        displacement: of the target's point, from the unloaded configuration.
+        start: travel of the target's point there.
+        displacement: of the target's point, from there.
     """
 
     state: State
     origin: State | None
+    start: float
     displacement: float
 
 
@@ -62,16 +76,14 @@ class Known:
 
 
 class TargetEquilibria:
-    """The equilibria of ``targets`` in one simulation; all methods are collective on its communicator."""
+    """The equilibria of ``targets`` in one simulation."""
 
-    def __init__(self, simulation: Simulation, targets: Sequence[Target]) -> None:
-        self._simulation, self._model = simulation, simulation.model
+    def __init__(self, simulation: Simulation, targets: Sequence[Target], options: FollowOptions | None = None) -> None:
+        self._simulation, self._model, self._options = simulation, simulation.model, options or FollowOptions()
         self.targets = tuple(targets)
         forces = dict.fromkeys(target.force_part for target in targets)
         self._newtons = {part: simulation.newton(part) for part in forces}
-        self._adjoints = {part: Adjoint(self._model, newton) for part, newton in self._newtons.items()}
-        self._floor: dict[Target, float] = {}
-        self._fixed_origin: dict[Target, float] = {}
+        self._sensitivities = {part: Sensitivity(self._model, newton) for part, newton in self._newtons.items()}
 
     def trace(self) -> Known:
         """From zero load to every target, at the present design.
@@ -114,20 +126,21 @@ class TargetEquilibria:
         return np.array([self._error(*pair, known.design) for pair in zip(self.targets, known.samples, strict=True)])
 
     def _error(self, target: Target, sample: Sample, design: np.ndarray) -> float:
-        newton, floor = self._newtons[target.force_part], self._floor[target]
+        newton = self._newtons[target.force_part]
 
         def error(state: State) -> float:
-            return self._simulation.estimates.elements_at(newton, Equilibrium(state, design, Goal.DISPLACEMENT, floor))
+            (added,) = self._simulation.estimates.at(newton, Equilibrium(state, design, Quantity.DISPLACEMENT))
+            return added
 
         return error(sample.state) - (0.0 if sample.origin is None else error(sample.origin))
 
     def _gradient(self, target: Target, sample: Sample) -> np.ndarray:
-        adjoint, floor = self._adjoints[target.force_part], self._floor[target]
+        adjoint = self._sensitivities[target.force_part]
         outputs = [self._newtons[target.force_part].system.controlled]
-        (loaded,) = adjoint.gradients(sample.state, outputs, floor=floor)
+        (loaded,) = adjoint.gradients(sample.state, outputs)
         if sample.origin is None:
             return loaded.design
-        (unloaded,) = adjoint.gradients(sample.origin, outputs, floor=floor)
+        (unloaded,) = adjoint.gradients(sample.origin, outputs)
         return loaded.design - unloaded.design
 
     def _traced(self, targets: Sequence[Target]) -> dict[Target, Sample]:
@@ -150,74 +163,63 @@ class TargetEquilibria:
                 raise Infeasible(_unstable(target))
             if any(before.jumped for before in curve.frames if abs(before.force) <= abs(frame.force)):
                 raise Infeasible(_folded(target, "the mechanism snaps on the way there from zero load"))
-            self._floor[target] = IDLE_STIFFNESS if curve.freedom.idle else 0.0
-            self._fixed_origin[target] = self._travel(target, frame.state) - frame.displacement
+            start = self._travel(target, frame.state) - frame.displacement
             origin = self._unloaded(target, curve.frames[0].state) if moving else None
-            samples[target] = Sample(frame.state, origin, frame.displacement)
+            samples[target] = Sample(frame.state, origin, start, frame.displacement)
         return samples
 
     def _unloaded(self, target: Target, state: State) -> State:
         """The equilibrium without force and without effects, from one without force."""
         newton = self._newtons[target.force_part]
         try:
-            return newton.solve(replace(state, share=0.0), LoadControl(0.0), floor=self._floor[target]).state
+            return newton.solve(replace(state, share=0.0), LoadControl(0.0)).state
         except NotConverged as failure:
             raise Infeasible(f"no equilibrium without loads ({failure.reason})") from failure
 
     def _followed(self, target: Target, sample: Sample, before: np.ndarray, after: np.ndarray) -> Sample:
-        state = self._moved(target, sample.state, LoadControl(target.force), before, after, _HALVINGS)
-        if sample.origin is None:
-            return Sample(state, None, self._travel(target, state) - self._fixed_origin[target])
-        origin = self._moved(target, sample.origin, LoadControl(0.0), before, after, _HALVINGS)
-        return Sample(state, origin, self._travel(target, state) - self._travel(target, origin))
+        halvings, origin, start = self._options.halvings, sample.origin, sample.start
+        state = self._moved(target, sample.state, LoadControl(target.force), before, after, halvings)
+        reached = self._travel(target, state)
+        if origin is not None:
+            origin = self._moved(target, origin, LoadControl(0.0), before, after, halvings)
+            start = self._travel(target, origin)
+        return Sample(state, origin, start, reached - start)
 
     def _moved(
         self, target: Target, state: State, control: LoadControl, before: np.ndarray, after: np.ndarray, halvings: int
     ) -> State:
         """The equilibrium at design ``after``, from the one at ``before``, halfway first if need be."""
-        self._model.reshape(before)
-        guess = self._model.carry(state, after)
-        newton: Iteration = self._newtons[target.force_part]
         try:
-            solution = newton.solve(guess, control, floor=self._floor[target])
-        except NotConverged as failure:
+            return self._next(target, state, control, before, after)
+        except _Lost:
             if halvings == 0:
-                raise Infeasible(f"no equilibrium at {target.force:g} ({failure.reason})") from failure
-            return self._halved(target, state, control, before, after, halvings)
-        if solution.unstable_modes:
-            raise Infeasible(_unstable(target))
-        if self._astray(newton, state, solution.state, control, before, after):
-            if halvings == 0:
-                raise Infeasible(_folded(target, "a fold lies between this design and the last one"))
-            return self._halved(target, state, control, before, after, halvings)
-        return solution.state
-
-    def _halved(
-        self, target: Target, state: State, control: LoadControl, before: np.ndarray, after: np.ndarray, halvings: int
-    ) -> State:
+                raise
         halfway = 0.5 * (before + after)
         state = self._moved(target, state, control, before, halfway, halvings - 1)
         return self._moved(target, state, control, halfway, after, halvings - 1)
 
-    def _astray(
-        self,
-        newton: Iteration,
-        start: State,
-        end: State,
-        control: LoadControl,
-        before: np.ndarray,
-        after: np.ndarray,
-    ) -> bool:
-        """Whether ``end``, just solved for, is no continuation of ``start`` (collective)."""
-        model, system = self._model, newton.system
-        back = model.carry(end, before)
+    def _next(self, target: Target, start: State, control: LoadControl, before: np.ndarray, after: np.ndarray) -> State:
+        """The same in one step."""
+        model, newton = self._model, self._newtons[target.force_part]
+        model.reshape(before)
+        guess = model.carry(start, after)
+        try:
+            found = newton.solve(guess, control)
+        except NotConverged as failure:
+            raise _Lost(f"no equilibrium at {target.force:g} ({failure.reason})") from failure
+        if found.unstable_modes:
+            raise Infeasible(_unstable(target))
+        # δ = −K₁⁻¹ R(y; d₀) with y the state carried back, and how far ŷ₀ = y + δ misses y₀
+        system, back = newton.system, model.carry(found.state, before)
         model.load(back)
-        x = newton.solve_linear(system.balance(back, control).vector)
+        x = found.linearisation.solve(system.residual(back, control).vector)
         x.scale(-1.0)
         step = system.unknowns.step(x)
         miss = system.size(system.difference(start, system.moved(back, step)))
         model.reshape(after)
-        return miss > max(_ASTRAY * system.size(step), _LEAST_MISS)
+        if miss > max(self._options.astray * system.size(step), self._options.rounding):
+            raise _Lost(_folded(target, "a fold lies between this design and the last one"))
+        return found.state
 
     def _origin_moves(self, target: Target) -> bool:
         """Whether the unloaded position of the target's point depends on the design."""
@@ -227,6 +229,10 @@ class TargetEquilibria:
     def _travel(self, target: Target, state: State) -> float:
         self._model.load(state)
         return self._model.travel(target.force_part, state)
+
+
+class _Lost(Infeasible):
+    """The equilibrium at another design is not found, or is not a continuation."""
 
 
 def _unstable(target: Target) -> str:

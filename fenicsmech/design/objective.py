@@ -3,41 +3,28 @@
     O(p) = Σ ½ w_k r_k² + R(p),     r_k = (u_k(p) − ū_k) / |ū_k|,      k over targets
 
 (the paper's equation 5 and section V-A, relative to the targets and so free of units). Each evaluation places the
-handles, reshapes the links, follows the equilibria of all targets from those of the best design so far, and pulls
-their adjoint sensitivities back to p. Groups of processes share the targets.
+handles, reshapes the links, follows the equilibria of all targets from those of the best design so far, and takes
+their adjoint derivatives to p. Targets are spread over groups of processes, each with a communicator of its own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
+from mpi4py import MPI
 
 from fenicsmech.clock import Clock
 from fenicsmech.collective import on_all
+from fenicsmech.design.description import Target
 from fenicsmech.design.equilibria import Known, TargetEquilibria
-from fenicsmech.design.groups import Group
-from fenicsmech.design.handle_optimum import Placement, ShapeError
-from fenicsmech.design.optimisers import Evaluation, Infeasible, TooHigh
+from fenicsmech.design.optimisers.problem import Evaluation, Infeasible, TooHigh
 from fenicsmech.design.regularisers import Model, Regulariser
 from fenicsmech.design.rest_shape import RestShape
-from fenicsmech.design.spline_design import Target
+from fenicsmech.design.shape.handle_optimum import Placement, ShapeError
 
-T = TypeVar("T")
-_SMALL = 0.1  # targets below this share of the largest one are measured by it
-
-
-def target_scales(targets: Sequence[Target]) -> np.ndarray:
-    """|ū_k|, or a share of the largest where ū_k is next to nothing, (targets,)."""
-    wanted = np.abs([target.displacement for target in targets])
-    return np.maximum(wanted, _SMALL * wanted.max()) if wanted.any() else np.ones(len(wanted))
-
-
-def target_errors(targets: Sequence[Target], reached: np.ndarray) -> np.ndarray:
-    """Errors of displacements ``reached`` (targets,) relative to these scales, (targets,)."""
-    return (reached - [target.displacement for target in targets]) / target_scales(targets)
+_PARTS = MPI.Comm.Create_keyval()  # of a communicator: its parts by their number, made once
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +37,7 @@ class _Base:
 
 
 class Objective:
-    """O(p) of one simulation; collective on all groups.
+    """O(p) of one simulation.
 
     Args:
         rest: from p to the rest shape of this group's simulation.
@@ -104,13 +91,14 @@ class Objective:
             Infeasible: cells invert, or a target's equilibrium is not found or is unstable.
             TooHigh: the value is above ``below``; derivatives were not computed.
         """
-        placement, model, known = self._together(lambda: self._solve(parameters, self._base))
+        placement, model, known = on_all(self._group.everyone, lambda: self._solve(parameters, self._base))
         reached = self._displacements(known)
         value = self._value(parameters, model, reached)
         if value > below:
             raise TooHigh(f"the objective is {value:.3g}")
         with self._clock.phase("gradients"):
-            rows = self._together(lambda: self._rest.gradient(placement, self._equilibria.gradients(known)))
+            everyone = self._group.everyone
+            rows = on_all(everyone, lambda: self._rest.gradient(placement, self._equilibria.gradients(known)))
             jacobian = self._gathered(rows) / self._scale[:, None]
         if self._base is None or value < self._base.value:
             self._base = _Base(value, placement, known)
@@ -126,7 +114,7 @@ class Objective:
     def errors(self) -> np.ndarray:
         """Estimated errors |e| of the residuals of the best design so far, those of the finite elements, (targets,)."""
         with self._clock.phase("estimates"):
-            estimates = self._together(lambda: self._equilibria.errors(self._base.known))
+            estimates = on_all(self._group.everyone, lambda: self._equilibria.errors(self._base.known))
         return np.abs(self._gathered(estimates[:, None])[:, 0]) / self._scale
 
     def traced(self, parameters: np.ndarray) -> float:
@@ -135,7 +123,7 @@ class Objective:
         Raises:
             Infeasible: cells invert, or a target's equilibrium is not found or is unstable.
         """
-        _, model, known = self._together(lambda: self._solve(parameters, None))
+        _, model, known = on_all(self._group.everyone, lambda: self._solve(parameters, None))
         return self._value(parameters, model, self._displacements(known))
 
     def effects(self, evaluation: Evaluation) -> np.ndarray:
@@ -144,7 +132,7 @@ class Objective:
 
     def active(self, parameters: np.ndarray) -> tuple[str, ...]:
         """The bounds that hold the design ``parameters`` back, in words."""
-        placement = self._together(lambda: self._rest.place(parameters, self.placement))
+        placement = on_all(self._group.everyone, lambda: self._rest.place(parameters, self.placement))
         return self._group.everyone.bcast(self._regulariser.active(self._rest, placement), root=0)
 
     def _residuals(self, reached: np.ndarray) -> np.ndarray:
@@ -171,10 +159,6 @@ class Objective:
             known = self._equilibria.follow(base.known) if base else self._equilibria.trace()
         return placement, model, known
 
-    def _together(self, work: Callable[[], T]) -> T:
-        """What each group's ``work`` returns; what it raises in one is raised in all."""
-        return on_all(self._group.everyone, work)
-
     def _gathered(self, rows: np.ndarray) -> np.ndarray:
         """One row per target from the rows of each group's targets, (targets, n)."""
         everyone = self._group.everyone
@@ -183,3 +167,84 @@ class Objective:
         for mine, part in parts:
             gathered[list(mine)] = part
         return gathered
+
+
+def target_scales(targets: Sequence[Target]) -> np.ndarray:
+    """|ū_k|, or a tenth of the largest where ū_k is less, (targets,)."""
+    wanted = np.abs([target.displacement for target in targets])
+    return np.maximum(wanted, 0.1 * wanted.max()) if wanted.any() else np.ones(len(wanted))
+
+
+def target_errors(targets: Sequence[Target], reached: np.ndarray) -> np.ndarray:
+    """Errors of displacements ``reached`` (targets,) relative to these scales, (targets,)."""
+    return (reached - [target.displacement for target in targets]) / target_scales(targets)
+
+
+def objective_error(targets: Sequence[Target], reached: np.ndarray, errors: Sequence[float | None]) -> float | None:
+    """How wrong the objective is because elements are not infinitely fine: O(u + d) − O(u).
+
+    With the errors d_k of the targets' displacements, of scale s_k, and with residuals r_k,
+
+        O(u + d) − O(u) = Σ w_k (r_k d_k / s_k + ½ (d_k / s_k)²).
+
+    Far from the targets the first term counts, and the estimate is as good as those of displacements; where targets
+    are met the second one is left, whose factor is the square of theirs. R depends on the design alone.
+
+    Args:
+        targets: what is wanted.
+        reached: displacements u, (targets,).
+        errors: d, what finer elements would add to them, (targets,); None where that is not known.
+    """
+    if any(error is None for error in errors):
+        return None
+    weights = np.array([target.weight for target in targets])
+    relative = np.asarray(errors) / target_scales(targets)
+    return float(weights @ (target_errors(targets, reached) * relative + 0.5 * relative**2))
+
+
+# -- groups of processes ---
+
+
+@dataclass(frozen=True)
+class Group:
+    """This process's group.
+
+    Attributes:
+        everyone: the communicator of all groups.
+        comm: the communicator of this one.
+        mine: indices of the targets of this group.
+    """
+
+    everyone: MPI.Comm
+    comm: MPI.Comm
+    mine: tuple[int, ...]
+
+    @property
+    def leads(self) -> bool:
+        """Whether this process speaks for its group."""
+        return self.comm.rank == 0
+
+
+def group_count(processes: int, targets: int) -> int:
+    """The number of groups that promises the shortest time.
+
+    A group of n processes works off ⌈targets / groups⌉ equilibria, each in a time of 1 / √n: two are 1.4
+    times as fast as one.
+    """
+    choices = range(1, min(processes, targets) + 1)
+    return min(choices, key=lambda groups: -(-targets // groups) / (processes // groups) ** 0.5)
+
+
+def split(comm: MPI.Comm, targets: int) -> Group:
+    """Groups of neighbouring processes of ``comm``; target k goes to group k modulo their number."""
+    count = group_count(comm.size, targets)
+    if count == 1:
+        return Group(comm, comm, tuple(range(targets)))
+    mine = comm.rank * count // comm.size
+    parts: dict[int, MPI.Comm] | None = comm.Get_attr(_PARTS)
+    if parts is None:
+        parts = {}
+        comm.Set_attr(_PARTS, parts)
+    if count not in parts:
+        parts[count] = comm.Split(color=mine, key=comm.rank)
+    return Group(comm, parts[count], tuple(range(mine, targets, count)))

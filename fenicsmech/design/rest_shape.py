@@ -9,18 +9,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import ufl
 from mpi4py import MPI
 
-from fenicsmech.design.barrier import Barrier
-from fenicsmech.design.handle_optimum import HandleOptimum, Placement
-from fenicsmech.design.link_shape import LinkShape
-from fenicsmech.design.quality import QualitySum
-from fenicsmech.design.shape_map import ShapeMap
-from fenicsmech.design.spline import LinkSpline
-from fenicsmech.design.spline_design import Bounds
-from fenicsmech.design.spline_samples import SplineSamples
-from fenicsmech.simulation import MechanismModel
+from fenicsmech.design.description import Bounds, SplineDesign, shape_request
+from fenicsmech.design.shape.handle_optimum import HandleOptimum, Placement
+from fenicsmech.design.shape.quality import Barrier, QualitySum
+from fenicsmech.design.shape.shape_map import LinkShape, ShapeMap, shape_links
+from fenicsmech.design.shape.spline import LinkSpline, SplineSamples
+from fenicsmech.model import MechanismModel
+from fenicsmech.simulation import Simulation
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,51 +42,55 @@ class DesignedLink:
 
 
 class RestShape:
-    """The rest shape of one model; methods marked collective are so on the model's communicator.
+    """The rest shape of one model.
 
     Args:
         model: whose links change.
         shapes: handles and weights of these links.
-        names: of these links.
-        bounds: of these links.
+        designs: how they may change.
 
     Attributes:
         links: the links that change.
         initial: p of the drawn design, (parameters,).
         lengths: what a unit of (p − p₀) / lengths stands for, (parameters,): a link's thickness; 1 for δ.
+
+    Raises:
+        DescriptionError: the drawn thickness of a link is not within its bounds.
     """
 
-    def __init__(
-        self, model: MechanismModel, shapes: Sequence[LinkShape], names: Sequence[str], bounds: Sequence[Bounds]
-    ) -> None:
+    def __init__(self, model: MechanismModel, shapes: Sequence[LinkShape], designs: Sequence[SplineDesign]) -> None:
         self._model, design = model, model.elastic.d
         self._map = ShapeMap(model.mesh, design, shapes)
         self._ratio = QualitySum(design, comm=model.mesh.comm)
         self._optimum = HandleOptimum(self._map, self._ratio)
         self._penalties: dict[Barrier, QualitySum] = {}
         self.initial = self._map.initial
-        splines = [shape.handles.spline for shape in shapes]
-        ends = np.cumsum([0, *(spline.size for spline in splines)])
-        self.links = tuple(
-            DesignedLink(name, slice(a, b), spline, SplineSamples(spline), shape.thickness, bound)
-            for name, a, b, spline, shape, bound in zip(
-                names, ends[:-1], ends[1:], splines, shapes, bounds, strict=True
-            )
-        )
+        links, first = [], 0
+        for shape, wanted in zip(shapes, designs, strict=True):
+            spline, h = shape.handles.spline, shape.thickness
+            place = slice(first, first := first + spline.size)
+            links.append(DesignedLink(wanted.link.name, place, spline, SplineSamples(spline), h, wanted.bounds(h)))
+        self.links = tuple(links)
         self.lengths = np.concatenate([np.where(s.spline.is_thickness, 1.0, s.thickness) for s in self.links])
+
+    @staticmethod
+    def of(simulation: Simulation, designs: Sequence[SplineDesign]) -> RestShape:
+        """That of a simulation, handles and weights computed on its mesh."""
+        requests = [shape_request(design, simulation.scene.mechanism, simulation.linkage) for design in designs]
+        return RestShape(simulation.model, shape_links(simulation.model.mesh, requests), designs)
 
     def known(self, p: np.ndarray, theta: np.ndarray) -> Placement | None:
         """A placement to start from, for handle positions found before; None if there are as many handles no more."""
         if theta.shape != self._map.initial_theta.shape:
             return None
-        return Placement(p, theta, np.inf, 0)
+        return Placement(p, theta)
 
     def handles(self, placement: Placement) -> list[np.ndarray]:
         """Positions of the handles of each link."""
         return self._map.positions(placement.theta)
 
     def place(self, p: np.ndarray, near: Placement | None) -> Placement:
-        """Gives the links the shape of design ``p``, handles placed at their best (collective).
+        """Gives the links the shape of design ``p``, handles placed at their best.
 
         Args:
             p: the design, (parameters,).
@@ -102,30 +103,27 @@ class RestShape:
         self._model.reshape(self._model.elastic.d.x.array)
         return placement
 
-    def design(self) -> np.ndarray:
-        """This rank's values of the design field, ghosts last, flat."""
-        return self._model.elastic.d.x.array.copy()
+    def field(self, p: np.ndarray, near: Placement | None) -> np.ndarray:
+        """This rank's values of the design field for ``p``, ghosts last, flat; the links keep the shape they have."""
+        before = self._model.elastic.d.x.array.copy()
+        with self._model.shaped(before):
+            self.place(p, near)
+            return self._model.elastic.d.x.array.copy()
 
     def gradient(self, placement: Placement, nodal: np.ndarray) -> np.ndarray:
-        """dO/dp (…, parameters) from ∂O/∂d (…, owned values) of the design placed as in ``placement`` (collective)."""
+        """dO/dp (…, parameters) from ∂O/∂d (…, owned values) of the design placed as in ``placement``."""
         fields = nodal.reshape(*nodal.shape[:-1], self._map.owned, -1)
-        by_p, by_theta = self._map.pull(placement.p, placement.theta, fields)
+        by_p, by_theta = self._map.apply_transpose(placement.p, placement.theta, fields)
         return self._optimum.total_gradient(placement, by_p, by_theta)
 
     def worst_ratio(self) -> float:
-        """Largest ρ among the cells of the present rest shape (collective)."""
+        """Largest ρ among the cells of the present rest shape."""
         worst = float(self._ratio.cell_values().max(initial=0.0))
         return self._model.mesh.mesh.comm.allreduce(worst, op=MPI.MAX)
 
     def quality_penalty(self, barrier: Barrier, placement: Placement) -> tuple[float, np.ndarray]:
-        """Σ_e β(ρ_e) of the present rest shape, and its derivative by p (collective)."""
+        """Σ_e β(ρ_e) of the present rest shape, and its derivative by p."""
         if barrier not in self._penalties:
-            self._penalties[barrier] = QualitySum(self._model.elastic.d, lambda rho: _symbolic(barrier, rho))
+            self._penalties[barrier] = QualitySum(self._model.elastic.d, barrier.symbolic)
         total = self._penalties[barrier]
         return total.value(), self.gradient(placement, total.gradient().ravel())
-
-
-def _symbolic(barrier: Barrier, rho):
-    """β(ρ) in UFL."""
-    excess = ufl.max_value((rho - barrier.limit) / barrier.width, 0.0)
-    return barrier.strength * excess**3

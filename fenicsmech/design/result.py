@@ -1,15 +1,33 @@
-"""Designs as plain data: what was found, how well it meets its targets, and files of it."""
+"""Designs as plain data: what was found, how well it meets its targets; its verification, and files of its links."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from fenicsmech.errors import DescriptionError
-from fenicsmech.report import atomic_write
+import numpy as np
 
+from fenicsmech.collective import on_one
+from fenicsmech.design.description import SplineDesign, Target
+from fenicsmech.design.equilibria import TargetEquilibria
+from fenicsmech.design.objective import target_errors, target_scales
+from fenicsmech.design.optimisers.problem import Infeasible
+from fenicsmech.design.rest_shape import DesignedLink, RestShape
+from fenicsmech.design.shape.handle_optimum import Placement
+from fenicsmech.design.shape.shape_map import gather_links
+from fenicsmech.errors import DescriptionError
+from fenicsmech.export import PinHole, write_step, write_stl
+from fenicsmech.files import atomic_write
+from fenicsmech.log import logger
+from fenicsmech.mechanism import DRAWN, Disc, FlexibleLink
+from fenicsmech.meshing import LinkMesh, boundary_loops, plan_of
+from fenicsmech.multibody import Linkage, assemble
+from fenicsmech.plot import DesignShape, LinkOutline, draw_designs
+from fenicsmech.simulation import MechanismPlotter, Simulation, rest_vertices
+
+_log = logger(__name__)
 _FORMAT = "fenicsmech design 1"
 
 
@@ -20,10 +38,12 @@ class LinkDesign:
     Attributes:
         name: of the link.
         parameters: its part of p.
-        handles: positions θ of its handles, which are the best near those of the designs on the way.
+        handles: positions θ of its handles, the best near those of the designs on the way. Several can be good: the
+            parameters alone fix displacements to about 1 % only.
         controls: position and thickness (x, y, δ), then tangent, of every control point, (points, 2, 3).
         thickness: least and largest thickness in the plane.
         bend: largest curvature ratio.
+        centreline: points that the drawn centreline runs through, if they were given.
     """
 
     name: str
@@ -32,6 +52,7 @@ class LinkDesign:
     controls: tuple[tuple[tuple[float, ...], ...], ...]
     thickness: tuple[float, float]
     bend: float
+    centreline: tuple[tuple[float, ...], ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -115,14 +136,36 @@ class DesignResult:
         """Number of parameters."""
         return sum(len(link.parameters) for link in self.links)
 
+    def rest_shape(self, simulation: Simulation) -> np.ndarray:
+        """The design field on the mesh of a simulation of the same mechanism: this rank's values, ghosts last, flat.
+
+        Raises:
+            DescriptionError: the mechanism has no such links.
+            ShapeError: cells of the mesh are inverted in this shape.
+        """
+        links = {link.name: link for link in simulation.scene.mechanism.flexible_links}
+        for own in self.links:
+            if own.name not in links:
+                raise DescriptionError(
+                    f"design of {self.mechanism!r}",
+                    f"{simulation.scene.mechanism.name!r} has no flexible link {own.name!r}",
+                    "Give a simulation of the same mechanism",
+                )
+        rest = RestShape.of(
+            simulation,
+            [SplineDesign(links[own.name], len(own.controls) - 1, centreline=own.centreline) for own in self.links],
+        )
+        p, theta = (np.concatenate(own) for own in zip(*((o.parameters, o.handles) for o in self.links), strict=True))
+        return rest.field(p, rest.known(p, theta))
+
     def save(self, path: str | Path) -> None:
-        """Writes the result as JSON (call it on one process)."""
+        """Local. Writes the result as JSON; call it on one process."""
         with atomic_write(Path(path)) as file:
             file.write(json.dumps({"format": _FORMAT, **asdict(self)}, indent=2, ensure_ascii=False))
 
     @staticmethod
     def load(path: str | Path) -> DesignResult:
-        """A result that was saved.
+        """Local. A result that was saved.
 
         Raises:
             DescriptionError: there is no such file, or it holds no design.
@@ -143,17 +186,137 @@ class DesignResult:
 
 
 def _read(data: dict) -> DesignResult:
-    links = tuple(
-        LinkDesign(
-            name=link["name"],
-            parameters=tuple(link["parameters"]),
-            handles=tuple(link["handles"]),
-            controls=tuple(tuple(tuple(row) for row in point) for point in link["controls"]),
-            thickness=tuple(link["thickness"]),
-            bend=link["bend"],
-        )
-        for link in data.pop("links")
-    )
+    def frozen(value):
+        return tuple(map(frozen, value)) if isinstance(value, list) else value
+
+    links = tuple(LinkDesign(**{key: frozen(value) for key, value in link.items()}) for link in data.pop("links"))
     targets = tuple(TargetResult(**target) for target in data.pop("targets"))
-    active, objective = tuple(data.pop("active")), tuple(data.pop("objective"))
-    return DesignResult(links=links, targets=targets, active=active, objective=objective, **data)
+    return DesignResult(links=links, targets=targets, **{key: frozen(value) for key, value in data.items()})
+
+
+def verified_targets(
+    simulation: Simulation, targets: Sequence[Target], started: np.ndarray, followed: np.ndarray
+) -> tuple[tuple[TargetResult, ...], bool]:
+    """How far each target is reached when it is loaded from zero, which is what a user will do; logs where not.
+
+    Args:
+        simulation: its model has the shapes of the optimum.
+        targets: what was wanted.
+        started: displacements at the start, (targets,).
+        followed: displacements of the equilibria that were followed from design to design, (targets,).
+
+    Returns:
+        The targets' results, with the displacements as followed and without an estimate if one of them is not reached,
+        and whether loading leads to the equilibria that were followed.
+    """
+    equilibria, same = TargetEquilibria(simulation, targets), False
+    reached, finer = followed, [None] * len(targets)
+    try:
+        traced = equilibria.trace()
+    except Infeasible as failure:
+        _log.warning("loaded from zero, the optimum does not reach all its targets: %s", failure)
+    else:
+        reached, finer = (
+            np.array([sample.displacement for sample in traced.samples]),
+            equilibria.errors(traced).tolist(),
+        )
+        # displacements of one equilibrium differ by less
+        different = np.flatnonzero(np.abs(reached - followed) > 1e-6 * target_scales(targets))
+        same = len(different) == 0
+        for k in different:
+            _log.warning(
+                "target %d of the optimum: %.6g when loaded from zero, %.6g when followed from the drawn design",
+                *(k + 1, reached[k], followed[k]),
+            )
+    errors = target_errors(targets, reached)
+    results = tuple(
+        TargetResult(
+            force_name=target.force_part.name,
+            configuration=target.configuration.name,
+            force=target.force,
+            wanted=target.displacement,
+            started=float(started[k]),
+            reached=float(reached[k]),
+            error=float(errors[k]),
+            finer_elements_add=finer[k],
+        )
+        for k, target in enumerate(targets)
+    )
+    return results, same
+
+
+def link_designs(rest: RestShape, wanted: Sequence[SplineDesign], placement: Placement) -> tuple[LinkDesign, ...]:
+    """The shapes of all links at a placement."""
+    designs = []
+    for link, design, handles in zip(rest.links, wanted, rest.handles(placement), strict=True):
+        own = placement.p[link.place]
+        thickness, bend = link.thickness * link.samples.thickness(own), link.samples.curvature(own)
+        designs.append(
+            LinkDesign(
+                name=link.name,
+                parameters=tuple(own.tolist()),
+                handles=tuple(handles.tolist()),
+                controls=tuple(tuple(map(tuple, point)) for point in link.spline.controls_at(own).tolist()),
+                thickness=(float(thickness.min()), float(thickness.max())),
+                bend=float(np.abs(bend).max(initial=0.0)),
+                centreline=design.centreline and tuple(tuple(map(float, point)) for point in design.centreline),
+            )
+        )
+    return tuple(designs)
+
+
+def rest_meshes(simulation: Simulation, links: Sequence[FlexibleLink]) -> list[LinkMesh] | None:
+    """Meshes of some links in their present shape on the first process, None elsewhere.
+
+    Links of which one half is meshed are given by their plan.
+    """
+    meshes = gather_links(simulation.model.mesh, rest_vertices(simulation.model))
+    everyone, halves = simulation.scene.mechanism.flexible_links, simulation.fidelity.model.symmetric
+    chosen = [meshes[everyone.index(link)] for link in links]
+    return on_one(simulation.comm, lambda: [plan_of(mesh).mesh for mesh in chosen] if halves else chosen)
+
+
+def _outline(link: DesignedLink, mesh: LinkMesh, p: np.ndarray) -> LinkOutline:
+    """The outline of a link, with centreline, thickness and control points of its parameters ``p``."""
+    plan = plan_of(mesh).mesh
+    loops = [plan.points[loop] for loop in boundary_loops(f"link {link.name!r}", plan)]
+    return LinkOutline(
+        loops,
+        centreline=link.spline.evaluate(p, link.samples.t)[:, :2],
+        thickness=link.thickness * link.samples.thickness(p),
+        controls=link.spline.controls_at(p)[:, 0, :2],
+    )
+
+
+def draw_links(
+    path: str | Path,
+    simulation: Simulation,
+    links: Sequence[FlexibleLink],
+    designed: Sequence[DesignedLink],
+    before: tuple[np.ndarray, Sequence[LinkMesh]],
+    after: tuple[np.ndarray, Sequence[LinkMesh]],
+) -> None:
+    """Local. Draws links before and after a change, from the parameters p and the meshes of both."""
+    scene, linkage, shapes = simulation.scene, simulation.linkage, []
+    for k, (link, change) in enumerate(zip(links, designed, strict=True)):
+        old, new = (_outline(change, meshes[k], p[change.place]) for p, meshes in (before, after))
+        joints = np.array([linkage.bodies[i].centre[:2] for i in linkage.interfaces[link]])
+        shapes.append(DesignShape(link.name, old, new, joints))
+    rigid = MechanismPlotter(scene.mechanism, linkage, simulation.model.mesh).rigid(assemble(linkage, DRAWN).poses)
+    draw_designs(path, shapes, rigid=rigid, unit=scene.units.length, title=f"{scene.mechanism.name}: links")
+
+
+def write_solids(
+    folder: str | Path,
+    linkage: Linkage,
+    links: Sequence[FlexibleLink],
+    meshes: Sequence[LinkMesh],
+    hole: float | None,
+) -> None:
+    """Local. Writes ``NAME.step`` and ``NAME.stl`` of every link, with holes of this diameter for pins if given."""
+    for link, mesh in zip(links, meshes, strict=True):
+        regions = [linkage.bodies[i] for i in linkage.interfaces[link]]
+        pins = [PinHole(tuple(b.centre[:2]), hole) for b in regions if hole and isinstance(b.region, Disc)]
+        stem = Path(folder) / link.name.replace(" ", "-")
+        for suffix, write in ((".step", write_step), (".stl", write_stl)):
+            write(stem.with_suffix(suffix), mesh, depth=link.shape.depth, pins=pins, name=link.name)

@@ -13,10 +13,7 @@ from dataclasses import dataclass
 
 from fenicsmech.checks import positive
 from fenicsmech.errors import DescriptionError
-from fenicsmech.joints import REVOLUTE, SPHERICAL, UNIVERSAL, WELD
 from fenicsmech.mechanism import Effect, Joint
-
-_PINNED = (REVOLUTE, SPHERICAL, UNIVERSAL, WELD)  # their first equations are x_b − x_a = 0
 
 
 @dataclass(frozen=True)
@@ -41,7 +38,7 @@ class JointCompliance(Effect):
 
     def check(self, mechanism, dim):
         super().check(mechanism, dim)
-        if self.joint.kind not in _PINNED:
+        if not self.joint.kind.shares_point:
             raise DescriptionError(
                 f"compliance of {self.joint.name!r}",
                 f"the links of a {self.joint.kind.name} joint share no point",

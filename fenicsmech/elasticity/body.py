@@ -22,7 +22,14 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from petsc4py import PETSc
 
-from fenicsmech.compat import assemble_vector, compile_expression, compile_form, evaluate_expression
+from fenicsmech.compat import (
+    add_blocks,
+    assemble_vector,
+    compile_expression,
+    compile_form,
+    create_block_matrix,
+    evaluate_expression,
+)
 from fenicsmech.elasticity.fields import BodyFields, Growth, Stretch
 from fenicsmech.elasticity.models import ElasticModel, cauchy_stress
 from fenicsmech.errors import DescriptionError
@@ -216,14 +223,14 @@ class ElasticBody(BodyFields):
         """An empty matrix for ``tangent``: per rank, the owned values of u, then those of p."""
         if self.pressure is None:
             return fem.petsc.create_matrix(self.tangent_forms[0][0])
-        return fem.petsc.create_matrix_block(self.tangent_forms)
+        return create_block_matrix(self.tangent_forms)
 
     def tangent(self, matrix: PETSc.Mat) -> None:
         """Adds ∂²E/∂(u, p)² into ``matrix`` and leaves it unassembled."""
         if self.pressure is None:
             fem.petsc.assemble_matrix(matrix, self.tangent_forms[0][0])
         else:
-            fem.petsc.assemble_matrix_block(matrix, self.tangent_forms)
+            add_blocks(matrix, self.tangent_forms)
 
     @cached_property
     def pressure_unit(self) -> float:

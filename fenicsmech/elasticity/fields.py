@@ -26,7 +26,7 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from petsc4py import PETSc
 
-from fenicsmech.compat import cellwise_space, compile_expression, owned_values, vector_space
+from fenicsmech.compat import cellwise_space, compile_expression, interpolation_points, owned_values, vector_space
 from fenicsmech.elasticity.formulation import PressureField
 from fenicsmech.elasticity.models import ElasticModel
 from fenicsmech.mechanism import Material
@@ -167,9 +167,7 @@ class BodyFields:
     def _carrying(self) -> fem.Expression:
         """H δ at the nodes of u."""
         V = self.u.function_space
-        return compile_expression(
-            ufl.dot(self.gradient(self.u), self._change), V.element.interpolation_points(), self.mesh.comm
-        )
+        return compile_expression(ufl.dot(self.gradient(self.u), self._change), interpolation_points(V), self.mesh.comm)
 
 
 @dataclass(frozen=True)

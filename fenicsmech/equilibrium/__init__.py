@@ -1,59 +1,56 @@
 """Equilibria of a mechanism: elements and joints meet here.
 
-- ``state``, ``fields``: displacements, poses, multipliers; the finite-element fields that hold them
-- ``load``, ``loads``, ``potentials``: point loads, and what depends on poses of bodies
+- ``state``: displacements, poses, multipliers, controlled force
 - ``control``: what is led along a path: a force, a displacement, motors
-- ``layout``, ``unknowns``: where each unknown stands, and the change of state it stands for
-- ``extras``, ``matrices``, ``entry_copy``, ``kkt``: the distributed KKT matrix
-- ``system``: energy, balance and KKT matrix at a state
-- ``factor``: LDLᵀ with inertia
-- ``coarse``, ``smoother``, ``two_level``: conjugate gradients where the factor is too large
-- ``linear``: which of the two solves, and by what rule
+- ``blocks``, ``unknowns``: where each unknown stands, and the change of state it stands for
+- ``border``: loads, potentials of poses and joints
+- ``kkt``: the distributed KKT matrix
+- ``system``: energy, residual and KKT matrix at a state
+- ``linear``: its factor LDLᵀ with inertia, or conjugate gradients on two levels where that is too large
 - ``solver``: what every equilibrium solver is
 - ``newton``: the default one, the primal–dual iteration
-- ``solvers``: others to choose and to compare
 - ``predictor``, ``path``: first guesses and load steps
 - ``dead_centre``: those of motors past the end of their slack
 - ``lead``: what leads a path that may turn back: a force, or motors
 - ``arc_metric``, ``path_points``: the equilibria of such a path
 - ``arc_length``, ``continuation``: steps along it, and where it ends
 - ``critical``, ``soft_mode``, ``branching``: their limit points and bifurcations, and the paths that cross there
+- ``adjoint``: of displacements and forces
 - ``eigen``: the softest modes of a tangent, and buckling loads
 - ``reactions``: what joints and motors exert
 """
 
+from fenicsmech.equilibrium.adjoint import Adjoint, Quantity
 from fenicsmech.equilibrium.arc_length import ArcLength, ArcSteps
 from fenicsmech.equilibrium.arc_metric import ArcMetric, metric_at
+from fenicsmech.equilibrium.blocks import Block, Blocks, Border
+from fenicsmech.equilibrium.border import REGULARISATION, PointLoad
 from fenicsmech.equilibrium.branching import Sense, crossing, null_space
 from fenicsmech.equilibrium.continuation import Finish, Stretch, follow
 from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadControl, MotorControl, ShareControl
 from fenicsmech.equilibrium.critical import Critical, CriticalPoint
 from fenicsmech.equilibrium.dead_centre import MotorPath
 from fenicsmech.equilibrium.eigen import Mode, critical_changes, softest_modes
-from fenicsmech.equilibrium.entry_copy import EntryCopy
-from fenicsmech.equilibrium.extras import REGULARISATION
-from fenicsmech.equilibrium.factor import Factor
-from fenicsmech.equilibrium.fields import load_fields
-from fenicsmech.equilibrium.kkt import KktMatrix
+from fenicsmech.equilibrium.kkt import EntryCopy, KktMatrix
 from fenicsmech.equilibrium.lead import ForceLead, Heading, Lead, MotorLead
-from fenicsmech.equilibrium.linear import BySize, Direct, LinearMethod, LinearSolver, TwoLevel
-from fenicsmech.equilibrium.load import PointLoad
+from fenicsmech.equilibrium.linear import BySize, Direct, Factor, LinearMethod, LinearSolver, TwoLevel, TwoLevelSolver
 from fenicsmech.equilibrium.newton import Newton, PrimalDualNewton
-from fenicsmech.equilibrium.path import IDLE_STIFFNESS, Path, PathFailed
+from fenicsmech.equilibrium.path import ZERO_ENERGY_SHIFT, Path, PathFailed
 from fenicsmech.equilibrium.path_points import PathPoint, PathPoints
 from fenicsmech.equilibrium.predictor import Constant, Hermite, Predictor, Tangent
 from fenicsmech.equilibrium.reactions import Reaction, joint_reactions, motor_torques
-from fenicsmech.equilibrium.solver import EquilibriumSolver, Iteration, NotConverged, Solution
-from fenicsmech.equilibrium.solvers import AugmentedLagrangian, Globalisation, KktNewton, Snes
-from fenicsmech.equilibrium.state import State, Step
-from fenicsmech.equilibrium.system import EquilibriumSystem
-from fenicsmech.equilibrium.two_level import TwoLevelSolver
+from fenicsmech.equilibrium.solver import EquilibriumSolver, Iteration, Linearisation, NotConverged, Solution
+from fenicsmech.equilibrium.state import State, Step, load_fields
+from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 
 __all__ = [
+    "Adjoint",
     "ArcLength",
     "ArcMetric",
     "ArcSteps",
-    "AugmentedLagrangian",
+    "Block",
+    "Blocks",
+    "Border",
     "BySize",
     "Constant",
     "Control",
@@ -67,15 +64,13 @@ __all__ = [
     "Factor",
     "Finish",
     "ForceLead",
-    "Globalisation",
     "Heading",
     "Hermite",
-    "IDLE_STIFFNESS",
     "Iteration",
     "KktMatrix",
-    "KktNewton",
     "Lead",
     "LinearMethod",
+    "Linearisation",
     "LinearSolver",
     "LoadControl",
     "Mode",
@@ -91,11 +86,12 @@ __all__ = [
     "PointLoad",
     "Predictor",
     "PrimalDualNewton",
+    "Quantity",
     "REGULARISATION",
     "Reaction",
+    "Residual",
     "Sense",
     "ShareControl",
-    "Snes",
     "Solution",
     "State",
     "Step",
@@ -103,6 +99,7 @@ __all__ = [
     "Tangent",
     "TwoLevel",
     "TwoLevelSolver",
+    "ZERO_ENERGY_SHIFT",
     "critical_changes",
     "crossing",
     "follow",

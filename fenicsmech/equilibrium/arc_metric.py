@@ -45,7 +45,7 @@ class ArcMetric:
 
 
 def metric_at(
-    newton: Iteration, lead: Lead, state: State, *, floor: float, parameter: float | None, conjugate: float | None
+    newton: Iteration, lead: Lead, state: State, *, parameter: float | None, conjugate: float | None
 ) -> ArcMetric:
     """The metric in which a linear mechanism would go one unit until it is where the path shall lead (collective).
 
@@ -53,7 +53,6 @@ def metric_at(
         newton: the solver.
         lead: the path's parameter.
         state: the equilibrium the path starts from.
-        floor: least shift of the tangent.
         parameter: change of the parameter that is of interest, or
         conjugate: change of its conjugate; of two, the one that is reached first.
 
@@ -61,9 +60,7 @@ def metric_at(
         NotConverged: the parameter moves nothing.
     """
     system, control = newton.system, lead.holding(state)
-    system.load(state)
-    newton.factor(state, control, system.balance(state, control), floor)
-    x = newton.solve_linear(control.rate(system, state))
+    x = newton.linearise(state, control).rate()
     rate = lead.heading(system.unknowns.step(x), control)
     speed = abs(lead.conjugate_rate(system, state, control, x))
     motion = math.sqrt(mean_product(system, rate, rate))
@@ -80,8 +77,8 @@ def metric_at(
 
 def mean_product(system: EquilibriumSystem, a: Heading, b: Heading) -> float:
     """Mean product of two motions of free nodes and bodies, displacements over the mechanism's length (collective)."""
-    comm, joints = system.layout.comm, system.joints
-    free = system.layout.free[: system.layout.free_displacements]
+    comm, joints = system.comm, system.joints
+    free = system.numbering.free[system.blocks.nodes.local]
     own = np.array([float(a.step.u[free] @ b.step.u[free]) / joints.length**2, float(len(free))])
     nodes, count = comm.allreduce(own)
     bodies = float(np.sum(a.step.z * b.step.z / joints.pose_scale**2))

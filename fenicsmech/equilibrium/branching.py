@@ -63,4 +63,4 @@ def null_space(points: PathPoints, critical: CriticalPoint) -> list[Step]:
     As many vectors as modes change their stability there.
     """
     state, count = critical.point.state, critical.modes
-    return [mode.step for mode in softest_modes(points.newton, points.lead, state, floor=points.floor, count=count)]
+    return [mode.step for mode in softest_modes(points.newton, points.lead, state, count=count)]

@@ -88,14 +88,14 @@ class _Piece:
         self.points, self.before, self.after = points, before, after
         self.width = points.along(before, after)
         self.course = points.metric.unit(points.difference(after.state, before.state))
-        self._mode = SoftMode(points.newton)
+        self._mode = SoftMode(points.system)
 
     def ends(self) -> tuple[_Sample, _Sample]:
         """Both ends."""
         samples = []
         for distance, point in ((0.0, self.before), (self.width, self.after)):
-            self.points.factor(point, self.before)
-            samples.append(_Sample(distance, point, self._mode.stiffness()))
+            at = self.points.linearise(point, self.before)
+            samples.append(_Sample(distance, point, self._mode.stiffness(at)))
         return samples[0], samples[1]
 
     def at(self, distance: float) -> _Sample:
@@ -109,7 +109,7 @@ class _Piece:
         off = chord + self.course.scaled(-metric.dot(chord, self.course))
         if metric.norm(off) > _STRAYED * metric.dot(chord, self.course):
             raise NotConverged("it strays off the path", point.iterations)
-        return _Sample(distance, point, self._mode.stiffness())
+        return _Sample(distance, point, self._mode.stiffness(point.linearisation))
 
 
 def _search(piece: _Piece, low: _Sample, high: _Sample, tolerance: float) -> list[CriticalPoint]:

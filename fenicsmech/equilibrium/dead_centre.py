@@ -14,6 +14,8 @@ ever. From a state that strains instead it converges, λ being the curvature. Su
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.path import BEYOND, SMALLEST, STRIDE, Path, PathFailed
 from fenicsmech.equilibrium.predictor import Anchor
@@ -72,13 +74,12 @@ class MotorPath(Path):
             NotConverged: the tangent cannot be factored, or solved with, or has a maximum of the energy in it.
         """
         newton, system = self._newton, self._newton.system
-        system.load(last.state)
-        newton.factor(last.state, control, system.balance(last.state, control), self._floors[0])
-        rate = newton.solve_linear(control.rate(system, last.state))
+        at = newton.linearise(replace(last.state, minimum_shift=self._shifts[0]), control)
+        rate = at.rate()
         motion = rate.duplicate()
         motion.pointwiseMult(system.unknowns.coordinates_mask(), rate)
         motion.normalize()
-        strain = newton.solve_linear(motion)
+        strain = at.solve(motion)
         compliance = motion.dot(strain)
         if not compliance > 0.0:
             raise NotConverged("nothing resists the motion towards a dead centre", 0)

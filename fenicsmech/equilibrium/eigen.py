@@ -44,24 +44,24 @@ class Mode:
     step: Step
 
 
-def softest_modes(newton: Iteration, lead: Lead, state: State, *, floor: float, count: int) -> list[Mode]:
+def softest_modes(newton: Iteration, lead: Lead, state: State, *, count: int) -> list[Mode]:
     """The ``count`` modes with the stiffnesses μ nearest to zero while the lead is held, nearest first (collective).
 
     Stiffnesses are in units of the mean stiffness of the links; negative ones are unstable.
     """
-    _factor(newton, lead, state, floor)
+    at = newton.linearise(state, lead.holding(state))
     mask = newton.system.unknowns.coordinates_mask()
     own = len(mask.array_r)
 
     def apply(x: np.ndarray, y: np.ndarray) -> None:
         right = mask.duplicate()
         right.array_w[:] = mask.array_r * x
-        y[:] = newton.solve_linear(right).array_r
+        y[:] = at.solve(right).array_r
 
     return _largest(newton.system, own, lambda x: x, apply, count)
 
 
-def critical_changes(newton: Iteration, lead: Lead, state: State, *, floor: float, count: int) -> list[Mode]:
+def critical_changes(newton: Iteration, lead: Lead, state: State, *, count: int) -> list[Mode]:
     """The ``count`` changes Δ of the lead's parameter that make the tangent singular, nearest first (collective).
 
     Both senses count. Exact to second order in Δ.
@@ -71,8 +71,7 @@ def critical_changes(newton: Iteration, lead: Lead, state: State, *, floor: floa
     """
     system = newton.system
     control = lead.holding(state)
-    _factor(newton, lead, state, floor)
-    x = newton.solve_linear(control.rate(system, state))
+    x = newton.linearise(state, control).rate()
     rate = lead.heading(system.unknowns.step(x), control)
     if not lead.moves(system, rate):
         raise NotConverged("it moves nothing", 0)
@@ -80,18 +79,18 @@ def critical_changes(newton: Iteration, lead: Lead, state: State, *, floor: floa
     unit = _UNIT / size
     later, earlier = (_tangent(newton, lead, state, rate.scaled(sign * _FIRST / size)) for sign in (1.0, -1.0))
     first = _combined([(0.5 * unit * size / _FIRST, later), (-0.5 * unit * size / _FIRST, earlier)])
-    _factor(newton, lead, state, floor)
+    at = newton.linearise(state, control)
     bend = x.duplicate()
     first.mult(x, bend)
     bend.scale(-1.0 / unit)
-    bend = Heading(system.unknowns.step(newton.solve_linear(bend)), 0.0)
+    bend = Heading(system.unknowns.step(at.solve(bend)), 0.0)
     amount = _SECOND / size
     later, here, earlier = (
         _tangent(newton, lead, state, rate.scaled(t) + bend.scaled(0.5 * t * t)) for t in (amount, 0.0, -amount)
     )
     weight = 0.5 * (unit / amount) ** 2
     second = _combined([(weight, later), (-2.0 * weight, here), (weight, earlier)])
-    _factor(newton, lead, state, floor)
+    at = newton.linearise(state, control)
     own = len(x.array_r)
 
     def apply(x: np.ndarray, y: np.ndarray) -> None:
@@ -99,24 +98,18 @@ def critical_changes(newton: Iteration, lead: Lead, state: State, *, floor: floa
         v.array_w[:], shape.array_w[:] = x[:own], x[own:]
         right = first * v + second * shape
         right.scale(-1.0)
-        y[:own], y[own:] = newton.solve_linear(right).array_r, v.array_r
+        y[:own], y[own:] = at.solve(right).array_r, v.array_r
 
     template = system.unknowns.control_row()
     values = _largest(system, 2 * own, lambda x: x[own:], apply, count)
     return [Mode(unit * mode.value, mode.step) for mode in values]
 
 
-def _factor(newton: Iteration, lead: Lead, state: State, floor: float) -> None:
-    control = lead.holding(state)
-    newton.system.load(state)
-    newton.factor(state, control, newton.system.balance(state, control), floor)
-
-
 def _tangent(newton: Iteration, lead: Lead, state: State, change: Heading) -> PETSc.Mat:
     """A copy of K after a change of state."""
     moved = lead.moved(newton.system, state, change)
     control = lead.holding(moved)
-    newton.system.linearise(moved, control, newton.system.balance(moved, control))
+    newton.system.linearise(moved, control, newton.system.residual(moved, control))
     return newton.system.kkt.matrix().copy()
 
 
@@ -155,7 +148,7 @@ def _largest(
         apply: the map.
         count: how many.
     """
-    comm = system.layout.comm
+    comm = system.comm
     total = comm.allreduce(size)
     operator = PETSc.Mat().createPython(((size, total), (size, total)), _Operator(apply), comm=comm)
     solver = SLEPc.EPS().create(comm)

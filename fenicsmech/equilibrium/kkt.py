@@ -1,80 +1,117 @@
 """The KKT matrix Gᵀ K̂ G in scaled unknowns.
 
-The product over all unknowns is formed for those who ask for it. Others need no more than its stiffness by blocks of
-nodes, its columns of poses, multipliers and force, and Pᵀ KKT P = (G P)ᵀ K̂ (G P) for a narrow P.
+K̂ is the Hessian of the Lagrangian by all degrees of freedom, those on interfaces too, the "extended matrix"
+
+    K̂ = [[∂²E/∂u², 0    , 0   , −a_u],
+         [0       , B    , −Aᵀ , −a_z],
+         [0       , −A   , −ε−c, 0   ],
+         [−a_uᵀ   , −a_zᵀ, 0   , 0   ]]
+
+and G the map from the scaled unknowns. K̂ is stored by the blocks of its nodes, into which element matrices go in half
+the time; products of sparse matrices want it by entries. The product over all unknowns is formed for those who ask for
+it. Others need no more than its stiffness by blocks of nodes, its columns of the border, and Pᵀ KKT P = (G P)ᵀ K̂ (G P)
+for a narrow P.
 """
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Iterable
 
 import numpy as np
 from petsc4py import PETSc
+from scipy.sparse import csr_matrix
 
 from fenicsmech.clock import Clock
 from fenicsmech.elasticity import ElasticBody
+from fenicsmech.equilibrium.blocks import Numbering
+from fenicsmech.equilibrium.border import REGULARISATION, Entries
 from fenicsmech.equilibrium.control import Control
-from fenicsmech.equilibrium.entry_copy import EntryCopy
-from fenicsmech.equilibrium.extras import REGULARISATION
-from fenicsmech.equilibrium.layout import Layout
 from fenicsmech.equilibrium.unknowns import ScaledUnknowns
 
 
 class KktMatrix:
-    """K̂ and its products with G, whose patterns never change; all methods are collective.
+    """K̂ and its products with G, whose patterns never change.
 
     Products are of the K̂ last linearised, with the G of ``unknowns``: take them before either changes.
 
     Args:
         elastic: the flexible links.
-        layout: numbering of rows and unknowns.
+        numbering: of rows and unknowns.
         unknowns: what rows and columns stand for.
-        hat: K̂, with the pattern of all its entries.
+        extended: K̂, with the pattern of all its entries.
         clock: where time is counted.
 
     Attributes:
-        hat: K̂, to which elastic stiffness may be added between ``tangent`` and ``linearise``.
+        linearised: number of linearisations so far.
+        extended: K̂, to which elastic stiffness may be added between ``tangent`` and ``linearise``.
     """
 
     def __init__(
-        self, elastic: ElasticBody, layout: Layout, unknowns: ScaledUnknowns, hat: PETSc.Mat, *, clock: Clock
+        self, elastic: ElasticBody, numbering: Numbering, unknowns: ScaledUnknowns, extended: PETSc.Mat, *, clock: Clock
     ) -> None:
-        self._elastic, self._layout, self._unknowns = elastic, layout, unknowns
-        self.hat, self._clock = hat, clock
-        # what shift and soften add to the diagonal
+        self._elastic, self._numbering, self._unknowns = elastic, numbering, unknowns
+        self._rows, self._blocks = numbering.rows, numbering.unknowns
+        self.extended, self._clock, self.linearised = extended, clock, 0
+        # what shift and soften add to the diagonal, and whether that is nothing
         self._added, self._shift, self._plain = unknowns.zeros(), 0.0, True
+        # K̂ by entries: its copy, whether it is up to date, its diagonal, and whether that is without what is added
         self._entries: EntryCopy | None = None
+        self._converted, self._entries_plain = False, False
         self._entries_diagonal: PETSc.Vec | None = None
+        # the whole matrix, whether it is up to date, and its diagonal without what is added
         self._matrix: PETSc.Mat | None = None
+        self._formed = False
         self._diagonal: PETSc.Vec | None = None
-        self._extra_map: PETSc.Mat | None = None
+        # G of the border, K̂ G of it, Gᵀ K̂ G of it
+        self._border_map: PETSc.Mat | None = None
         self._images: PETSc.Mat | None = None
-        self._extra_columns: PETSc.Mat | None = None
-        self._converted = self._entries_plain = self._formed = False
+        self._border_columns: PETSc.Mat | None = None
 
     def tangent(self) -> None:
         """Makes K̂ hold ∂²E/∂u² of the present fields, and nothing else."""
         with self._clock.phase("assemble"):
-            self.hat.zeroEntries()
-            self._elastic.tangent(self.hat)
+            self.extended.zeroEntries()
+            self._elastic.tangent(self.extended)
 
-    def linearise(self, entries: Iterable[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> None:
-        """Takes the tangent that K̂ holds and the ``entries`` of its extras, without shift and softness."""
+    def linearise(self, entries: Entries) -> None:
+        """Takes the tangent that K̂ holds and the ``entries`` of its border, without shift and softness."""
         with self._clock.phase("assemble"):
-            self.hat.assemble()
-            if self._layout.last:
+            self.extended.assemble()
+            if self._rows.last:
                 for rows, columns, block in entries:
                     # petsc4py reads transposed arrays in memory order
-                    self.hat.setValues(
+                    self.extended.setValues(
                         rows.astype(PETSc.IntType),
                         columns.astype(PETSc.IntType),
                         np.ascontiguousarray(block),
                         addv=PETSc.InsertMode.ADD,
                     )
-            self.hat.assemble()
+            self.extended.assemble()
+        self.linearised += 1
         self._converted = self._formed = False
         self._added.set(0.0)
         self._shift, self._plain = 0.0, True
+
+    def shift(self, shift: float) -> None:
+        """Makes the matrix hold ``shift`` · I more than it was assembled with, for displacements and poses."""
+        self._shift, self._plain = shift, self._plain and shift == 0.0
+        parts = self._blocks.restrict(self._added.array_w)
+        parts.nodes[:] = parts.poses[:] = shift
+        del parts  # gives the vector's values back
+        if self._formed:
+            self._add_to_diagonal()
+
+    def soften(self, softness: float, control: Control) -> None:
+        """Makes the matrix hold −``softness`` · I instead of −ε · I for multipliers.
+
+        The load is one of them under a ``control`` that constrains. Before ``shift``, which makes it take effect.
+        """
+        self._plain = False
+        parts = self._blocks.restrict(self._added.array_w)
+        parts.multipliers[:] = REGULARISATION - softness
+        if control.constrained:
+            parts.load[:] = -softness
 
     def matrix(self) -> PETSc.Mat:
         """The KKT matrix, the same object every time."""
@@ -82,7 +119,7 @@ class KktMatrix:
             with self._clock.phase("project"):
                 self._matrix = self._by_entries(plain=True).ptap(self._unknowns.map, result=self._matrix)
                 self._diagonal, self._formed = self._matrix.getDiagonal(), True
-                self._raise_diagonal()
+                self._add_to_diagonal()
         return self._matrix
 
     def restricted(self, mapped: PETSc.Mat, result: PETSc.Mat | None = None) -> PETSc.Mat:
@@ -90,51 +127,27 @@ class KktMatrix:
         with self._clock.phase("project"):
             return self._by_entries(plain=self._plain).ptap(mapped, result=result)
 
-    def extra_columns(self) -> PETSc.Mat:
-        """The columns of (z, λ, f), (unknowns, extras), the same object every time."""
-        layout = self._layout
+    def border_columns(self) -> PETSc.Mat:
+        """The columns of (z, λ, f), (unknowns, border), the same object every time."""
         with self._clock.phase("project"):
-            rows = PETSc.IS().createStride(layout.local_rows, layout.first_row, 1, comm=layout.comm)
-            extras = layout.extras if layout.last else 0
-            columns = PETSc.IS().createStride(extras, layout.first_extra, 1, comm=layout.comm)
-            self._extra_map = self._unknowns.map.createSubMatrix(rows, columns, self._extra_map)
-            self._images = self._by_entries(plain=self._plain).matMult(self._extra_map, result=self._images)
-            self._extra_columns = self._unknowns.map.transposeMatMult(self._images, result=self._extra_columns)
-        return self._extra_columns
+            rows = PETSc.IS().createStride(self._rows.local, self._rows.links.first, 1, comm=self._rows.comm)
+            columns = self._blocks.border.index_set()
+            self._border_map = self._unknowns.map.createSubMatrix(rows, columns, self._border_map)
+            self._images = self._by_entries(plain=self._plain).matMult(self._border_map, result=self._images)
+            self._border_columns = self._unknowns.map.transposeMatMult(self._images, result=self._border_columns)
+        return self._border_columns
 
     def nodal_stiffness(self) -> PETSc.Mat:
-        """A new matrix of the KKT matrix's rows and columns of free displacements, by blocks of nodes."""
-        dim, free = self._layout.per_node, self._layout.free
-        nodes = ((self._layout.first_row + free[::dim]) // dim).astype(PETSc.IntType)
-        rows = PETSc.IS().createBlock(dim, nodes, comm=self._layout.comm)
-        stiffness = self.hat.createSubMatrix(rows, rows)
+        """A new matrix of the block of nodes, stored by blocks of one node each."""
+        per_node, free = self._numbering.per_node, self._numbering.free
+        nodes = ((self._rows.nodes.first + free[::per_node]) // per_node).astype(PETSc.IntType)
+        rows = PETSc.IS().createBlock(per_node, nodes, comm=self._rows.comm)
+        stiffness = self.extended.createSubMatrix(rows, rows)
         stiffness.scale(self._unknowns.unit_u**2)
         stiffness.shift(self._shift)
         return stiffness
 
-    def shift(self, shift: float) -> None:
-        """Makes the matrix hold ``shift`` · I more than it was assembled with, in the block of s."""
-        layout, self._shift, self._plain = self._layout, shift, self._plain and shift == 0.0
-        added = self._added.array_w
-        added[: layout.free_displacements] = shift
-        if layout.last:
-            added[len(layout.free) :][layout.z] = shift
-        if self._formed:
-            self._raise_diagonal()
-
-    def soften(self, softness: float, control: Control) -> None:
-        """Makes the matrix hold −``softness`` · I instead of −ε · I in the block of multipliers.
-
-        The force is one of them under a ``control`` that constrains. Before ``shift``, which makes it take effect.
-        """
-        self._plain = False
-        if self._layout.last:
-            extras = self._added.array_w[len(self._layout.free) :]
-            extras[self._layout.multipliers] = REGULARISATION - softness
-            if control.constrained:
-                extras[self._layout.force] = -softness
-
-    def _raise_diagonal(self) -> None:
+    def _add_to_diagonal(self) -> None:
         """Makes the whole matrix hold what was assembled and what is added to its diagonal."""
         if not self._plain:
             self._matrix.setDiagonal(self._diagonal + self._added)
@@ -142,7 +155,7 @@ class KktMatrix:
     def _by_entries(self, *, plain: bool) -> PETSc.Mat:
         """K̂ by entries: ``plain``, or with what gives the KKT matrix the addition to its diagonal."""
         if self._entries is None:
-            self._entries = EntryCopy(self.hat)
+            self._entries = EntryCopy(self.extended)
         entries = self._entries.matrix
         if not self._converted:
             self._entries.update()
@@ -152,17 +165,121 @@ class KktMatrix:
         if self._entries_plain:
             self._entries_diagonal = entries.getDiagonal()
         # where G holds one entry per row; rows of nodes inside interfaces have no diagonal
-        layout, units = self._layout, self._unknowns.units
-        rows = layout.free
-        if layout.last:
-            rows = np.concatenate([rows, layout.owned + np.arange(layout.extras)])
-            units = np.concatenate([units, self._unknowns.scale])
+        border = self._rows.border.local
+        rows = np.concatenate([self._numbering.free, np.arange(border.start, border.stop)])
         diagonal = self._entries_diagonal.array_r[rows]
         if not plain:
-            diagonal = diagonal + self._added.array_r / units**2
-        places = (layout.first_row + rows).astype(PETSc.IntType)
+            diagonal = diagonal + self._added.array_r / self._unknowns.units**2
+        places = (self._rows.links.first + rows).astype(PETSc.IntType)
         starts = np.arange(len(rows) + 1, dtype=PETSc.IntType)
         entries.setValuesIJV(starts, places, diagonal, rowmap=places)
         entries.assemble()
         self._entries_plain = plain
         return entries
+
+
+def create_extended_matrix(
+    elastic: ElasticBody, numbering: Numbering, pattern: Iterable[tuple[np.ndarray, np.ndarray]]
+) -> PETSc.Mat:
+    """K̂ with the finite-element pattern and that of the border: (global rows, global columns) of full blocks.
+
+    Holds ∂²E/∂(u, p)² of the current fields.
+    """
+    fem = elastic.create_tangent()
+    elastic.tangent(fem)
+    fem.assemble()
+    starts, columns, values = fem.getValuesCSR()
+    lgmap = fem.getLGMap()
+    fem.destroy()  # large, and not needed any more
+    rows = numbering.rows
+
+    wanted: dict[int, list[np.ndarray]] = {}
+    for block_rows, block_columns in pattern:
+        own = block_rows - rows.links.first
+        for row in own[(own >= 0) & (own < rows.local)]:
+            wanted.setdefault(int(row), []).append(block_columns)
+    # rows of the border are empty so far
+    starts = np.concatenate([starts, np.full(rows.local - rows.links.count, starts[-1])]).astype(int)
+    places, added, counts = [], [], np.zeros(rows.local, dtype=int)
+    for row in sorted(wanted):
+        there = columns[starts[row] : starts[row + 1]]
+        new = np.setdiff1d(np.concatenate(wanted[row]), there)
+        places.append(starts[row] + np.searchsorted(there, new))
+        added.append(new)
+        counts[row] = len(new)
+    if wanted:
+        columns = np.insert(columns, np.concatenate(places), np.concatenate(added))
+        values = np.insert(values, np.concatenate(places), 0.0)
+    starts += np.concatenate([[0], np.cumsum(counts)])
+
+    size = numbering.block
+    blocks = csr_matrix((values, columns, starts), shape=(rows.local, rows.size)).tobsr((size, size))
+    matrix = PETSc.Mat().createBAIJ(
+        [(rows.local, rows.size), (rows.local, rows.size)],
+        size,
+        csr=(blocks.indptr.astype(PETSc.IntType), blocks.indices.astype(PETSc.IntType), blocks.data),
+        comm=rows.comm,
+    )
+    matrix.setLGMap(*lgmap)
+    matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_LOCATION_ERR, True)
+    return matrix
+
+
+class EntryCopy:
+    """A matrix by entries that follows one by blocks of the same pattern.
+
+    PETSc's conversion finds the place of each entry anew, which takes a third as long as assembling them all. Here it
+    is asked once, with the numbers of the entries for values; from then on values are copied in that order.
+
+    Args:
+        blocked: the matrix by blocks, assembled, whose pattern does not change any more.
+
+    Attributes:
+        matrix: its copy by entries, good after an ``update``.
+    """
+
+    def __init__(self, blocked: PETSc.Mat) -> None:
+        self._blocked, self.matrix = blocked, PETSc.Mat()
+        kept = [values.copy() for values in _values(blocked, "BAIJ")]
+        for values in _values(blocked, "BAIJ"):
+            values[:] = np.arange(len(values))
+        blocked.convert(PETSc.Mat.Type.AIJ, self.matrix)
+        self._order = [numbers.astype(np.int32) for numbers in _values(self.matrix, "AIJ")]
+        for values, before in zip(_values(blocked, "BAIJ"), kept, strict=True):
+            values[:] = before
+
+    def update(self) -> None:
+        """Takes the values of the matrix by blocks."""
+        pairs = zip(_values(self._blocked, "BAIJ"), _values(self.matrix, "AIJ"), self._order, strict=True)
+        for values, entries, order in pairs:
+            np.take(values, order, out=entries, mode="clip")  # the only mode that takes without a copy
+        self.matrix.stateIncrease()
+
+
+# petsc4py shows the arrays of values of neither format, hence functions of PETSc's library, to which it is linked
+_LIBRARY = ctypes.CDLL(PETSc.__file__)
+
+
+def _values(matrix: PETSc.Mat, kind: str) -> list[np.ndarray]:
+    """The values that this rank stores in a matrix of ``kind``, in its own columns and in those of others."""
+    pointer = ctypes.c_void_p
+    parts = [pointer(matrix.handle)]
+    if matrix.comm.size > 1:
+        parts = [pointer(), pointer()]
+        # the columns' numbers are of no interest
+        _call(f"MatMPI{kind}GetSeq{kind}", pointer(matrix.handle), *map(ctypes.byref, parts), None)
+    found = []
+    for part in parts:
+        # MatInfo is ten doubles, nz_used the third; 1 is MAT_LOCAL
+        info, values = (ctypes.c_double * 10)(), ctypes.POINTER(ctypes.c_double)()
+        _call("MatGetInfo", part, ctypes.c_int(1), info)
+        _call(f"MatSeq{kind}GetArray", part, ctypes.byref(values))
+        count = int(info[2])
+        found.append(np.ctypeslib.as_array(values, (count,)) if count else np.empty(0))
+    return found
+
+
+def _call(name: str, *arguments) -> None:
+    """One of PETSc's functions."""
+    if code := getattr(_LIBRARY, name)(*arguments):
+        raise RuntimeError(f"{name} of PETSc failed with code {code}")

@@ -43,7 +43,7 @@ from fenicsmech.checks import positive
 from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.solver import EquilibriumSolver, Iteration, NotConverged, Solution
 from fenicsmech.equilibrium.state import State, Step
-from fenicsmech.equilibrium.system import Balance, EquilibriumSystem
+from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 from fenicsmech.log import logger
 
 _log = logger(__name__)
@@ -92,65 +92,67 @@ class Newton(Iteration):
 
     options: PrimalDualNewton
 
-    def solve(self, start: State, control: Control, *, floor: float = 0.0) -> Solution:
-        system, options = self.system, self.options
+    def solve(self, start: State, control: Control) -> Solution:
+        system, options, least = self.system, self.options, start.minimum_shift
         start = self._begin(start, control)
-        state, balance = start, system.balance(start, control)
-        best, spent, careful, passed, missed = (state, balance), 0, False, None, None
-        residuals, shift, trusted, mixed, norm = [], floor, True, False, math.inf
+        state, residual = start, system.residual(start, control)
+        best, spent, careful, passed, missed = (state, residual), 0, False, None, None
+        residuals, shift, trusted, mixed, norm = [], least, True, False, math.inf
         for iteration in range(options.iterations + 1):
-            residuals.append(self.relative(balance))
-            if self.converged(balance, norm) and iteration > 0:
-                if mixed or shift > floor or options.stale == 0.0:  # stability is of the true matrix
-                    self._factor_true(state, control, balance, floor, iteration)
-                return self._accept(state, control, residuals, iteration)
+            residuals.append(self.relative(residual))
+            if self.converged(residual, norm) and iteration > 0:
+                if mixed or shift > least or options.stale == 0.0:  # stability is of the true matrix
+                    self._factor_true(state, control, residual, iteration)
+                return self._accept(state, control, residual, residuals, iteration)
             if iteration == options.iterations:
                 break
             near = trusted and residuals[-1] < options.near
             mixed = not near and passed is not None
             if mixed:
-                system.linearise_mixed(state, control, balance, *passed)
+                system.linearise_mixed(state, control, residual, *passed)
             else:
-                system.linearise(state, control, balance)
-            x, shift = self._direction(balance, floor, last=shift, any_inertia=near)
-            step, motion = system.unknowns.step(x), system.unknowns.push(x)
+                system.linearise(state, control, residual)
+            x, shift = self._direction(residual, least, last=shift, any_inertia=near)
+            step, motion = system.unknowns.step(x), system.unknowns.apply(x)
             _log.debug("iteration %d: residual %.2e, shift %.1e", iteration, residuals[-1], shift)
-            before, norm = state, balance.norm
+            before, norm = state, residual.norm
             advance = self._search if careful else self._full_step
             try:
-                state, balance, length = advance(state, control, step, balance, iteration)
+                state, residual, length = advance(state, control, step, residual, iteration)
             except NotConverged as failure:
-                return self._bear(*best, control, floor, residuals, failure)
+                return self._bear(*best, control, residuals, failure)
             # a pressure of its own is a stress that the step solves for already
-            passed = (before, length * motion) if options.mixed_stress and not system.layout.pressures else None
-            if near and balance.norm > norm and not self.converged(balance, norm):
-                if missed is None and self.relative(balance) < options.near:
+            passed = (before, length * motion) if options.mixed_stress and not system.blocks.pressures.size else None
+            if near and residual.norm > norm and not self.converged(residual, norm):
+                if missed is None and self.relative(residual) < options.near:
                     missed = before  # once may happen: just beyond a bifurcation small residuals hide large motions
                 else:
                     # no contraction: near a limit or bifurcation point, where only descent leads on
                     state, trusted, careful, passed = missed or before, False, True, None
                     system.load(state)
-                    balance = system.balance(state, control)
-            elif near and shift == floor and length == 1.0:
-                state, balance, norm = self._finish(state, control, balance, norm, step)
-            if balance.norm < best[1].norm:
-                best, spent = (state, balance), 0
+                    residual = system.residual(state, control)
+            elif near and shift == least and length == 1.0:
+                state, residual, norm = self._finish(state, control, residual, norm, step)
+            if residual.norm < best[1].norm:
+                best, spent = (state, residual), 0
             else:
                 spent += 1
             if spent > options.allowance and not careful:
                 state, careful, passed = best[0], True, None
                 system.load(state)
-                balance = system.balance(state, control)
-        return self._bear(*best, control, floor, residuals, self._spent(residuals, options.iterations))
+                residual = system.residual(state, control)
+        return self._bear(*best, control, residuals, self._spent(residuals, options.iterations))
 
-    def _direction(self, balance: Balance, floor: float, *, last: float, any_inertia: bool) -> tuple[PETSc.Vec, float]:
+    def _direction(
+        self, residual: Residual, least: float, *, last: float, any_inertia: bool
+    ) -> tuple[PETSc.Vec, float]:
         """The Newton step; unless ``any_inertia`` will do, raises δ until the inertia promises descent.
 
-        δ = ``floor`` is tried first; then a third of the ``last`` one that served, and eight times that, …
+        δ = ``least`` is tried first; then a third of the ``last`` one that served, and eight times that, …
         """
-        shift, following = floor, max(_LEAST_SHIFT, last / 3.0)
+        shift, following = least, max(_LEAST_SHIFT, last / 3.0)
         for _ in range(20):
-            x = self._solution(balance.vector, self._accuracy(balance)) if self._refactor(shift) else None
+            x = self._solution(residual.vector, self._accuracy(residual)) if self._refactor(shift) else None
             if x is not None and (any_inertia or self._descends()):
                 break
             shift, following = following, 8.0 * following
@@ -160,24 +162,24 @@ class Newton(Iteration):
         return x, shift
 
     def _finish(
-        self, state: State, control: Control, balance: Balance, before: float, step: Step
-    ) -> tuple[State, Balance, float]:
+        self, state: State, control: Control, residual: Residual, before: float, step: Step
+    ) -> tuple[State, Residual, float]:
         """Corrections with the factor that ``step`` to ``state`` was solved with, as long as it is current.
 
         Their lengths fall by the factor's relative error: |K⁻¹ r(y₁)| / |K⁻¹ r(y₀)| ≈ |K⁻¹ (K(y) − K)| as y₁ → y.
 
         Args:
-            state, balance: where the step led.
+            state, residual: where the step led.
             control: what is asked for.
             before: residual norm before the step.
             step: the step.
 
         Returns:
-            State and balance after the corrections, and the residual norm before the last one.
+            State and residual after the corrections, and the residual norm before the last one.
         """
         system, size = self.system, self.system.size(step)
-        while not self.converged(balance, before):
-            x = self._solution(balance.vector, self._accuracy(balance))
+        while not self.converged(residual, before):
+            x = self._solution(residual.vector, self._accuracy(residual))
             if x is None:
                 break
             x.scale(-1.0)
@@ -186,29 +188,29 @@ class Newton(Iteration):
             if not length <= self.options.stale * size:
                 break
             following = system.moved(state, correction)
-            found = system.balance(following, control)
-            if not (found.norm < balance.norm or self.converged(found, balance.norm)):
+            found = system.residual(following, control)
+            if not (found.norm < residual.norm or self.converged(found, residual.norm)):
                 system.load(state)
-                return state, system.balance(state, control), before
-            state, balance, before, size = following, found, balance.norm, length
-        return state, balance, before
+                return state, system.residual(state, control), before
+            state, residual, before, size = following, found, residual.norm, length
+        return state, residual, before
 
     def _full_step(
-        self, state: State, control: Control, step: Step, balance: Balance, iteration: int
-    ) -> tuple[State, Balance, float]:
+        self, state: State, control: Control, step: Step, residual: Residual, iteration: int
+    ) -> tuple[State, Residual, float]:
         """The whole step, shortened only where it turns too far or inverts elements."""
         system = self.system
         length = min(1.0, self.options.largest_turn / max(system.size(step), 1e-300))
         for _ in range(12):
             trial = system.moved(state, step.scaled(length))
             if math.isfinite(system.elastic_energy()):
-                return trial, system.balance(trial, control), length
+                return trial, system.residual(trial, control), length
             length *= 0.5
         raise NotConverged("every step along the Newton direction inverts elements", iteration + 1)
 
     def _search(
-        self, state: State, control: Control, step: Step, balance: Balance, iteration: int
-    ) -> tuple[State, Balance, float]:
+        self, state: State, control: Control, step: Step, residual: Residual, iteration: int
+    ) -> tuple[State, Residual, float]:
         """Armijo backtracking on the augmented Lagrangian; near convergence a smaller residual will do."""
         system = self.system
         state, step = system.pressed(state, step)
@@ -220,8 +222,8 @@ class Newton(Iteration):
             trial = system.moved(state, step.scaled(length))
             after = self._merit(trial, control, *towards)
             if math.isfinite(after):
-                new = system.balance(trial, control)
-                if after < before or new.norm < 0.9 * balance.norm:
+                new = system.residual(trial, control)
+                if after < before or new.norm < 0.9 * residual.norm:
                     return trial, new, length
             length *= 0.5
         raise NotConverged("the line search finds no descent", iteration + 1)

@@ -9,6 +9,8 @@ leapt over a fold, where the path turns back: it halves too, and where that does
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.predictor import Anchor, Predictor, Tangent
 from fenicsmech.equilibrium.solver import Iteration, NotConverged, Solution
@@ -28,9 +30,9 @@ _RUNAWAY = 5.0 * STRIDE  # a prediction that moves anything this far is none
 _BENT = 2.2  # times the rate at its end: how far a step off a bifurcation may go
 _LEAST_MOTION = 1e-4  # of the mechanism's length, or rad: what is no leap in any case, as past a bifurcation
 _SMALLEST_LEAP = 1.0 / 64.0  # likewise: a step that is not halved any more because it leaps
-IDLE_STIFFNESS = 1e-10
-"""What is lent to idle freedoms, in units of the mean stiffness."""
-_LESS = (1.0, 1e-3, 0.0)  # shares of it that are tried: soft springs, or forces, may hold what is idle with less yet
+ZERO_ENERGY_SHIFT = 1e-10
+"""Least shift of the tangent where freedoms have no stiffness, in units of the mean stiffness."""
+_LESS = (1.0, 1e-3, 0.0)  # parts of it that are tried: soft springs, or forces, may hold such freedoms with less yet
 
 
 class PathFailed(Exception):
@@ -56,17 +58,16 @@ class Path:
         start: a first guess at ``value``.
         value: the control value there.
         predictor: how the next equilibrium is guessed.
-        idle: whether the mechanism has freedoms without stiffness.
 
     Attributes:
         iterations: KKT systems factored and solved so far.
         leaps: how often the path turned back, and the equilibrium that was reached lies on another one.
     """
 
-    def __init__(self, newton: Iteration, start: State, value: float, *, predictor: Predictor, idle: bool) -> None:
+    def __init__(self, newton: Iteration, start: State, value: float, *, predictor: Predictor) -> None:
         self._newton, self._start, self._value, self._predictor = newton, start, value, predictor
         self._origin, self._way = value, 0.0  # farthest from there so far
-        self._floors = tuple(share * IDLE_STIFFNESS for share in _LESS) if idle else (0.0,)
+        self._shifts = tuple(part * start.minimum_shift for part in _LESS) if start.minimum_shift else (0.0,)
         self._anchors: list[Anchor] = []
         self._last: Solution | None = None
         self._rate: Step | None = None  # at which the last step moved, by the control value
@@ -119,22 +120,22 @@ class Path:
         self._remember(Anchor(self._value, solution.state, solution.tangent))
 
     def _solve(self, guess: State, control: Control) -> Solution:
-        """The equilibrium near ``guess``, with the largest loan to idle freedoms that leads there.
+        """The equilibrium near ``guess``, with the largest shift for zero-energy modes that leads there.
 
-        A loan slows Newton's method down where the true stiffness is smaller still.
+        A shift slows Newton's method down where the true stiffness is smaller still.
 
         Raises:
             NotConverged: none leads there.
         """
-        for place, floor in enumerate(self._floors):
+        for place, shift in enumerate(self._shifts):
             try:
-                solution = self._newton.solve(guess, control, floor=floor)
+                solution = self._newton.solve(replace(guess, minimum_shift=shift), control)
             except NotConverged as failure:
                 self.iterations += failure.iterations
                 reason = failure.reason
                 continue
             self.iterations += solution.iterations
-            self._floors = self._floors[place:]
+            self._shifts = self._shifts[place:]
             return solution
         raise NotConverged(reason, 0)
 

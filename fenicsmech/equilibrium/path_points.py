@@ -19,9 +19,8 @@ from dataclasses import dataclass, replace
 from fenicsmech.equilibrium.arc_metric import ArcMetric
 from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.lead import Heading, Lead
-from fenicsmech.equilibrium.solver import Iteration, NotConverged, Solution
+from fenicsmech.equilibrium.solver import Iteration, Linearisation, NotConverged, Solution
 from fenicsmech.equilibrium.state import State
-from fenicsmech.equilibrium.system import Balance
 
 _MOST_ITERATIONS = 10
 _NEAR = 1e-2  # residual over the forces from which on it should fall
@@ -41,6 +40,7 @@ class PathPoint:
         unstable_under_control: the same while the displacement of what leads is held.
         iterations: KKT systems factored on the way.
         residuals: relative residual before each iteration and at the end.
+        linearisation: the KKT matrix there.
     """
 
     state: State
@@ -50,6 +50,7 @@ class PathPoint:
     unstable_under_control: int
     iterations: int
     residuals: tuple[float, ...]
+    linearisation: Linearisation
 
     def reversed(self) -> PathPoint:
         """The same equilibrium, on the way back."""
@@ -64,6 +65,7 @@ class PathPoint:
             self.unstable_modes,
             self.unstable_under_control,
             self.tangent.step,
+            self.linearisation,
         )
 
 
@@ -74,23 +76,20 @@ class PathPoints:
         newton: the solver, whose linear algebra is used; the iteration is the one above.
         lead: the path's parameter.
         metric: what distances are measured in.
-        floor: least shift of the tangent, for mechanisms with idle freedoms.
     """
 
-    def __init__(self, newton: Iteration, lead: Lead, metric: ArcMetric, *, floor: float) -> None:
-        self.newton, self.system, self.lead, self.metric, self.floor = newton, newton.system, lead, metric, floor
+    def __init__(self, newton: Iteration, lead: Lead, metric: ArcMetric) -> None:
+        self.newton, self.system, self.lead, self.metric = newton, newton.system, lead, metric
 
     def at(self, state: State) -> PathPoint:
         """The point at a known equilibrium; the parameter grows along its tangent."""
-        control = self.lead.holding(state)
-        balance = self._balance(state, control)
-        point = self._point(state, balance, control, (self.newton.relative(balance),), 0)
+        at = self.newton.linearise(state, self.lead.holding(state))
+        point = self._point(at, (self.newton.relative(at.residual),), 0)
         return point if point.tangent.parameter > 0.0 else point.reversed()
 
-    def factor(self, point: PathPoint, near: PathPoint) -> None:
-        """Factors the tangent at ``point``, held by what is held for corrections near ``near``."""
-        control = self._control(point.state, near)
-        self.newton.factor(point.state, control, self._balance(point.state, control), self.floor)
+    def linearise(self, point: PathPoint, near: PathPoint) -> Linearisation:
+        """The tangent at ``point``, held by what is held for corrections near ``near``."""
+        return self.newton.linearise(point.state, self._control(point.state, near))
 
     def correct(self, guess: State, normal: Heading, near: PathPoint) -> PathPoint:
         """The equilibrium in the plane through ``guess`` across ``normal``, its tangent not against that.
@@ -103,23 +102,24 @@ class PathPoints:
         Raises:
             NotConverged: there is none near.
         """
-        newton, metric = self.newton, self.metric
+        newton, system, metric = self.newton, self.system, self.metric
         state, residuals, before = guess, [], math.inf
         for iteration in range(_MOST_ITERATIONS + 1):
             control = self._control(state, near)
-            balance = self._balance(state, control)
-            residuals.append(newton.relative(balance))
-            if iteration > 0 and newton.converged(balance, before):
-                point = self._point(state, balance, control, tuple(residuals), iteration + 1)
+            system.load(state)
+            residual = system.residual(state, control)
+            residuals.append(newton.relative(residual))
+            if iteration > 0 and newton.converged(residual, before):
+                point = self._point(newton.linearise(state, control), tuple(residuals), iteration + 1)
                 return point if metric.dot(point.tangent, normal) > 0.0 else point.reversed()
-            if not math.isfinite(balance.norm):
+            if not math.isfinite(residual.norm):
                 raise NotConverged("elements are inverted", iteration)
             if residuals[-1] > _DIVERGED * max(min(residuals), _NEAR):
                 break
-            before = balance.norm
-            newton.factor(state, control, balance, self.floor)
-            correction = self._correction(balance)
-            rate = self._rate(state, control)
+            before = residual.norm
+            at = newton.linearise(state, control)
+            correction = self._correction(at)
+            rate = self.lead.heading(at.step(at.rate()), control)
             off = self.difference(state, guess) + correction
             change = correction + rate.scaled(-metric.dot(normal, off) / metric.dot(normal, rate))
             if not self.system.size(change.step) <= _LARGEST_CHANGE:
@@ -164,31 +164,19 @@ class PathPoints:
             control = self.lead.holding_conjugate(self.system, state)
         return control or self.lead.holding(state)
 
-    def _balance(self, state: State, control: Control) -> Balance:
-        self.system.load(state)
-        return self.system.balance(state, control)
-
-    def _correction(self, balance: Balance) -> Heading:
+    def _correction(self, at: Linearisation) -> Heading:
         """x₀."""
-        x = self.newton.solve_linear(balance.vector)
+        x = at.solve(at.residual.vector)
         x.scale(-1.0)
-        return Heading(self.system.unknowns.step(x), 0.0)
+        return Heading(at.step(x), 0.0)
 
-    def _rate(self, state: State, control: Control) -> Heading:
-        """x₁."""
-        x = self.newton.solve_linear(control.rate(self.system, state))
-        return self.lead.heading(self.system.unknowns.step(x), control)
-
-    def _point(
-        self, state: State, balance: Balance, control: Control, residuals: tuple[float, ...], iterations: int
-    ) -> PathPoint:
-        """Stability and tangent at the loaded equilibrium."""
-        system, newton, lead = self.system, self.newton, self.lead
-        newton.factor(state, control, balance, self.floor)
-        excess = newton.inertia().negative - newton.expected
-        x = newton.solve_linear(control.rate(system, state))
+    def _point(self, at: Linearisation, residuals: tuple[float, ...], iterations: int) -> PathPoint:
+        """Stability and tangent at an equilibrium."""
+        system, state, control, lead = self.system, at.state, at.control, self.lead
+        excess = at.inertia().negative - self.newton.expected
+        x = at.rate()
         verdict = lead.verdict(system, state, control, x, excess)
-        rate = lead.heading(system.unknowns.step(x), control)
+        rate = lead.heading(at.step(x), control)
         scale = 1.0 / self.metric.norm(rate)
         return PathPoint(
             state,
@@ -198,4 +186,5 @@ class PathPoints:
             verdict.unstable_under_control,
             iterations,
             residuals,
+            at,
         )

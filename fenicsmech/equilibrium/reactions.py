@@ -31,11 +31,11 @@ def joint_reactions(joints: JointSystem, state: State) -> dict[str, Reaction]:
         body, sign = (connection.b, 1.0) if connection.b in joints.columns else (connection.a, -1.0)
         if body not in joints.columns:
             continue
-        pull = sign * joints.pull(k, body, state.poses, state.motors, state.multipliers)
-        force = pull[: space.dim]
+        force_on_pose = sign * joints.generalised_force(k, body, state.poses, state.motors, state.multipliers)
+        force = force_on_pose[: space.dim]
         pose = state.poses[body]
         lever = space.rotate(pose, np.array(connection.at) - np.array(joints.bodies[body].centre))
-        about_centre = space.turns(pose).T @ pull[space.dim :]
+        about_centre = space.turns(pose).T @ force_on_pose[space.dim :]
         reactions[connection.name] = Reaction(force, about_centre - _cross(lever, force))
     return reactions
 

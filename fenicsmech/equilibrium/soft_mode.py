@@ -12,7 +12,8 @@ import math
 
 import numpy as np
 
-from fenicsmech.equilibrium.solver import Iteration
+from fenicsmech.equilibrium.solver import Linearisation
+from fenicsmech.equilibrium.system import EquilibriumSystem
 
 _SETTLED = 1e-3  # relative change of μ
 _MOST = 12  # iterations: where two modes are as soft as each other, any of them will do
@@ -22,24 +23,24 @@ class SoftMode:
     """Keeps the mode from one state of a path to the next.
 
     Args:
-        newton: whose factor is used.
+        system: whose scaled unknowns are used.
     """
 
-    def __init__(self, newton: Iteration) -> None:
-        self._newton, self._mask = newton, newton.system.unknowns.coordinates_mask()
+    def __init__(self, system: EquilibriumSystem) -> None:
+        self._mask = system.unknowns.coordinates_mask()
         self._mode = self._mask.duplicate()
         # of no symmetry, lest it has nothing of the mode in it
-        rank = newton.system.layout.comm.rank
+        rank = system.comm.rank
         self._mode.array_w[:] = np.random.default_rng(rank).standard_normal(self._mode.local_size)
 
-    def stiffness(self) -> float:
-        """μ of the matrix last factored (collective)."""
+    def stiffness(self, at: Linearisation) -> float:
+        """μ of a tangent."""
         mask, mode, before = self._mask, self._mode, math.inf
         right = mask.duplicate()
         for _ in range(_MOST):
             right.pointwiseMult(mask, mode)
             right.normalize()
-            mode = self._newton.solve_linear(right)
+            mode = at.solve(right)
             product = mode.dot(right)
             masked = mask.duplicate()
             masked.pointwiseMult(mask, mode)

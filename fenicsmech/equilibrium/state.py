@@ -1,4 +1,4 @@
-"""The state of a mechanism: displacement, poses, multipliers, controlled force."""
+"""The state of a mechanism: displacements, poses, multipliers, controlled force; and the fields that hold it."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
+from fenicsmech.elasticity import ElasticBody
+from fenicsmech.multibody import InterfaceMap
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,6 +23,7 @@ class State:
         force: magnitude f of the controlled force.
         motors: motor value per connection.
         share: how much of the constant loads acts, 0 … 1.
+        minimum_shift: least shift δ of the tangent, which zero-energy modes need, in units of the mean stiffness.
     """
 
     u: np.ndarray
@@ -28,6 +32,7 @@ class State:
     force: float
     motors: np.ndarray
     share: float = 1.0
+    minimum_shift: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,3 +76,11 @@ class Step:
 
     def __add__(self, other: Step) -> Step:
         return Step(self.u + other.u, self.z + other.z, self.multipliers + other.multipliers, self.force + other.force)
+
+
+def load_fields(elastic: ElasticBody, interfaces: InterfaceMap, state: State) -> None:
+    """Makes the fields of ``elastic`` hold ``state``, with interface nodes on their bodies."""
+    elastic.take(state.u)
+    elastic.share.value = state.share
+    elastic.update()
+    interfaces.place(state.poses)

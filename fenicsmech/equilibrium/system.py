@@ -1,14 +1,11 @@
-"""The equilibrium equations of a mechanism and their KKT matrix, distributed.
+"""The equilibrium equations of a mechanism and their KKT matrix.
 
     L(s, λ, f) = E(u(s)) + V(z) − Σ loads − f (a · u_P) − λᵀ C(s) − ½ λᵀ c λ,     s = (u_free, z)
 
-    K̂ = [[∂²E/∂u², 0    , 0  , −a_u],          unknowns x = scaled increments of (u_free, z, λ, f):
-         [0       , B    , −Aᵀ, −a_z],             x ↦ (u, z, λ, f) = G x,   G = diag(∂u/∂s, 1) · D
-         [0       , −A   , −ε−c, 0 ],           KKT = Gᵀ K̂ G,   right-hand side −Gᵀ ∇L
-         [−a_uᵀ   , −a_zᵀ, 0  , 0   ]]
+    residual   Gᵀ ∇L,     KKT matrix   Gᵀ ∇²L G,     x ↦ (u, z, λ, f) = G x
 
-Where links have a pressure p of their own, u stands for (u, p) in all of this; E is a saddle then, stationary in p.
-B is the curvature of the rigid coordinates, c the compliance of joints, 0 unless an effect softens them.
+Where links are in u–p form, u stands for (u, p) in all of this; E is a saddle then, stationary in p. The terms of L
+beside E are those of ``border``, the blocks of the equations those of ``blocks``, their matrix that of ``kkt``.
 """
 
 from __future__ import annotations
@@ -26,22 +23,17 @@ from fenicsmech.clock import Clock
 from fenicsmech.compat import destroy_garbage
 from fenicsmech.effects import PosePotential
 from fenicsmech.elasticity import ElasticBody, MixedStress
+from fenicsmech.equilibrium.blocks import Numbering
+from fenicsmech.equilibrium.border import REGULARISATION, BorderTerms, PointLoad
 from fenicsmech.equilibrium.control import Control
-from fenicsmech.equilibrium.extras import ExtraEntries
-from fenicsmech.equilibrium.fields import load_fields
-from fenicsmech.equilibrium.kkt import KktMatrix
-from fenicsmech.equilibrium.layout import Layout
-from fenicsmech.equilibrium.load import PointLoad
-from fenicsmech.equilibrium.loads import Loads
-from fenicsmech.equilibrium.matrices import create_extended_matrix
-from fenicsmech.equilibrium.potentials import BodyPotentials
-from fenicsmech.equilibrium.state import State, Step
+from fenicsmech.equilibrium.kkt import KktMatrix, create_extended_matrix
+from fenicsmech.equilibrium.state import State, Step, load_fields
 from fenicsmech.equilibrium.unknowns import ScaledUnknowns
 from fenicsmech.multibody import InterfaceMap, JointSystem
 
 
 @dataclass(frozen=True)
-class Balance:
+class Residual:
     """The gradient of the Lagrangian at a state.
 
     Attributes:
@@ -51,6 +43,8 @@ class Balance:
         gap: how far joints are from closed, over the mechanism's length, or rad.
         motion: largest displacement from the drawn configuration over the mechanism's length, or rotation.
         moments: Σ r_i ⊗ (X_i − c) of each interface body.
+        nodal: r = ∂E/∂u minus the loads on links, (owned displacements,).
+        rigid: ∂L/∂z without the nodes that bodies move, (size,).
     """
 
     vector: PETSc.Vec
@@ -59,10 +53,12 @@ class Balance:
     gap: float
     motion: float
     moments: dict[int, np.ndarray]
+    nodal: np.ndarray
+    rigid: np.ndarray
 
 
 class EquilibriumSystem:
-    """Energy, gradient and KKT matrix at a state.
+    """Energy, residual and KKT matrix at a state.
 
     Args:
         elastic: the flexible links.
@@ -76,10 +72,10 @@ class EquilibriumSystem:
         comm: the processes that share the links.
 
     Attributes:
-        layout: numbering of rows and unknowns.
-        unknowns: x and G, at the poses of the last ``balance``.
-        kkt: the KKT matrix last linearised; take it before another ``balance``.
-        compliances: c, (rows,).
+        numbering: of rows and unknowns.
+        blocks: of the unknowns.
+        unknowns: x and G, at the poses of the last ``residual``.
+        kkt: the KKT matrix last linearised; take it before another ``residual``.
     """
 
     def __init__(
@@ -97,28 +93,37 @@ class EquilibriumSystem:
     ) -> None:
         destroy_garbage(comm)  # of systems before this one
         self.elastic, self.interfaces, self.joints = elastic, interfaces, joints
-        self.controlled, self.clock = controlled, clock
-        self.layout = Layout(comm, interfaces, joints, elastic.pressure)
-        self._loads = Loads(controlled, loads, elastic, joints, self.layout)
-        self._potentials = BodyPotentials(potentials, joints)
-        self.compliances = np.array([compliances.get(row, 0.0) for row in range(joints.rows)])
-        self._extras = ExtraEntries(joints, self.layout, controlled, self._potentials, self.compliances)
+        self.controlled, self.clock, self.comm = controlled, clock, comm
+        self.numbering = numbering = Numbering(comm, interfaces, joints, elastic.pressure)
+        self.blocks = numbering.unknowns
+        self._border = BorderTerms(
+            elastic,
+            joints,
+            numbering,
+            controlled=controlled,
+            constant=loads,
+            potentials=potentials,
+            compliances=compliances,
+        )
         with clock.phase("compile"):
             elastic.compile()
         with clock.phase("setup"):
-            elastic.take(np.zeros(self.layout.owned))
+            elastic.take(np.zeros(numbering.rows.links.count))
             elastic.update()
-            hat = create_extended_matrix(elastic, self.layout, self._extras.pattern())
-            self.unknowns = ScaledUnknowns(elastic, self.layout, interfaces, joints, hat.getDiagonal().array_r)
-            scale = self.unknowns.scale
-            self._extras.set_regularisation(scale[self.layout.multipliers], scale[self.layout.force])
-            self.kkt = KktMatrix(elastic, self.layout, self.unknowns, hat, clock=clock)
-        self._unbalanced = np.zeros(self.layout.displacements)
-        self._unbalanced_poses = np.zeros(joints.size)
+            extended = create_extended_matrix(elastic, numbering, self._border.pattern())
+            self.unknowns = ScaledUnknowns(elastic, numbering, interfaces, joints, extended.getDiagonal().array_r)
+            self.kkt = KktMatrix(elastic, numbering, self.unknowns, extended, clock=clock)
+        scale = self.blocks.restrict_border(self.unknowns.scale)
+        self._regularisation = np.concatenate([REGULARISATION / scale.multipliers**2, 1.0 / scale.load**2])
 
     @cached_property
     def _mixed(self) -> MixedStress:
         return MixedStress(self.elastic)
+
+    @property
+    def compliances(self) -> np.ndarray:
+        """c, (rows,)."""
+        return self._border.compliances
 
     @property
     def rigid_rows(self) -> np.ndarray:
@@ -128,7 +133,7 @@ class EquilibriumSystem:
     # -- states --------------------------------------------------------------------------------------------
 
     def moved(self, state: State, step: Step) -> State:
-        """``state`` after ``step``: rotations back on their manifold, interface nodes on their bodies (collective)."""
+        """``state`` after ``step``: rotations back on their manifold, interface nodes on their bodies."""
         poses = self.joints.with_unknowns(state.poses, self.joints.unknowns(state.poses) + step.z)
         moved = replace(
             state,
@@ -141,21 +146,20 @@ class EquilibriumSystem:
         return replace(moved, u=self.elastic.values())
 
     def pressed(self, state: State, step: Step) -> tuple[State, Step]:
-        """``state`` with the pressures that ``step`` leads to, and the rest of ``step``."""
-        first = self.layout.displacements
+        """``state`` with the pressures that ``step`` leads to, and the rest of ``step``. Local."""
         if self.elastic.pressure is None:
             return state, step
-        u, rest = state.u.copy(), step.u.copy()
-        u[first:] += step.u[first:]
-        rest[first:] = 0.0
+        pressures, u, rest = self.numbering.rows.pressures.local, state.u.copy(), step.u.copy()
+        u[pressures] += step.u[pressures]
+        rest[pressures] = 0.0
         return replace(state, u=u), replace(step, u=rest)
 
     def load(self, state: State) -> None:
-        """Makes the finite-element fields hold ``state`` (collective)."""
+        """Makes the finite-element fields hold ``state``."""
         load_fields(self.elastic, self.interfaces, state)
 
     def difference(self, later: State, earlier: State) -> Step:
-        """``later`` − ``earlier``."""
+        """``later`` − ``earlier``. Local."""
         return Step(
             later.u - earlier.u,
             self.joints.unknowns(later.poses) - self.joints.unknowns(earlier.poses),
@@ -164,154 +168,151 @@ class EquilibriumSystem:
         )
 
     def independent(self, step: Step) -> Step:
-        """``step`` without the displacements of nodes that bodies move."""
-        free, u = self.layout.free, np.zeros_like(step.u)
+        """``step`` without the displacements of nodes that bodies move. Local."""
+        free, u = self.numbering.free, np.zeros_like(step.u)
         u[free] = step.u[free]
         return replace(step, u=u)
 
     def size(self, step: Step) -> float:
-        """Largest displacement over the mechanism's length, or rotation, in ``step`` (collective)."""
-        nodes = float(np.max(np.abs(step.u[: self.layout.displacements]), initial=0.0)) / self.joints.length
+        """Largest displacement over the mechanism's length, or rotation, in ``step``."""
+        displacements = step.u[self.numbering.rows.nodes.local]
+        nodes = float(np.max(np.abs(displacements), initial=0.0)) / self.joints.length
         bodies = float(np.max(np.abs(step.z / self.joints.pose_scale), initial=0.0))
-        return max(self.layout.comm.allgather(max(nodes, bodies)))
+        return max(self.comm.allgather(max(nodes, bodies)))
 
     # -- values at the loaded state ------------------------------------------------------------------------
 
     def elastic_energy(self) -> float:
-        """E_int; NaN where an element is inverted (collective)."""
+        """E_int; NaN where an element is inverted."""
         with self.clock.phase("energy"):
             return self.elastic.energy()
 
     def load_displacement(self, state: State) -> float:
-        """a · u_P, how far the controlled force's point has moved along it (collective)."""
-        return self._loads.travel(self.controlled, state)
+        """a · u_P, how far the controlled force's point has moved along it."""
+        return self._border.travel(self.controlled, state)
 
     def potential(self, state: State, force: float) -> float:
-        """E_int − Σ loads − f a · u_P with ``force`` for f (collective)."""
-        return self.elastic_energy() + self._potentials.value(state) - self._loads.work(state, force)
+        """E_int + V − Σ loads − f a · u_P with ``force`` for f."""
+        return self.elastic_energy() + self._border.pose_potential(state) - self._border.work(state, force)
 
     def volume_violation(self) -> float:
-        """Norm of ∂E/∂p of the loaded state in scaled units: by how much volumes miss their pressures (collective)."""
+        """Norm of ∂E/∂p of the loaded state in scaled units: by how much volumes miss their pressures."""
         if self.elastic.pressure is None:
             return 0.0
-        layout = self.layout
-        missed = (self.elastic.residuals()[layout.free] * self.unknowns.units)[layout.free_displacements :]
-        return float(np.sqrt(layout.comm.allreduce(float(missed @ missed))))
+        links = self.elastic.residuals()[self.numbering.free] * self.unknowns.units[self.blocks.links.local]
+        missed = links[self.blocks.pressures.local]
+        return float(np.sqrt(self.comm.allreduce(float(missed @ missed))))
 
     def constraints(self, state: State, multipliers: np.ndarray) -> np.ndarray:
-        """C(s) + c λ at ``multipliers`` λ, (rows,)."""
-        return self.joints.value(state.poses, state.motors) + self.compliances * multipliers
+        """C(s) + c λ at ``multipliers`` λ, (rows,). Local."""
+        return self._border.constraints(state, multipliers)
 
-    def balance(self, state: State, control: Control) -> Balance:
-        """Gᵀ ∇L (collective). Brings G to the poses of ``state``."""
+    def residual(self, state: State, control: Control) -> Residual:
+        """Gᵀ ∇L. Brings G to the poses of ``state``.
+
+        links         ∂E/∂(u, p) − loads
+        poses         ∂V/∂z − loads − Aᵀ λ
+        multipliers   −(C + c λ)
+        load          −(a · u_P − target), or 0 where f is given
+        """
         with self.clock.phase("residual"):
             self.unknowns.turn(state.poses)
-            layout, scale = self.layout, self.unknowns.scale
+            scale, joints = self.unknowns.scale, self.joints
             r = self.elastic.residuals()
-            loads = np.zeros_like(r)
-            g = np.zeros(layout.extras)
-            for load, magnitude in self._loads.acting(state):
-                self._loads.add(load, magnitude, state, loads, g)
+            loads, rigid_loads = self._border.load_forces(self._border.loads(state), state)
             r -= loads
-            reactions = self.joints.gradient(state.poses, state.motors).T @ state.multipliers
-            forces = np.linalg.norm(g * scale) ** 2 + np.linalg.norm(reactions * scale[layout.z]) ** 2
-            forces += layout.comm.allreduce(float(np.linalg.norm(loads * self.unknowns.unit_u) ** 2))
-            self._unbalanced = r[: layout.displacements]
-            nodal = self._unbalanced.reshape(-1, layout.per_node)
-            moments = layout.comm.allreduce(self.interfaces.moments(nodal), op=_add_moments)
-            extras = -g
-            extras[layout.z] += self._potentials.gradient(state) - reactions
-            self._unbalanced_poses = extras[layout.z].copy()
+            reactions = joints.gradient(state.poses, state.motors).T @ state.multipliers
+            border = -rigid_loads
+            poses, multipliers, load = self.blocks.restrict_border(border)
+            poses += self._border.pose_gradient(state) - reactions
             violation = self.constraints(state, state.multipliers)
-            extras[layout.multipliers] = -violation
-            gap = float(np.max(np.abs(self.joints.row_scale * violation), initial=0.0))
+            multipliers[:] = -violation
             if control.constrained:
-                extras[layout.force] = -(self.load_displacement(state) - control.target)
-            vector = self.unknowns.pull(r, extras)
-            return Balance(vector, vector.norm(), float(np.sqrt(forces)), gap, self._motion(state), moments)
+                load[:] = -(self.load_displacement(state) - control.target)
+            vector = self.unknowns.apply_transpose(r, border)
+
+            forces = np.linalg.norm(rigid_loads * scale) ** 2
+            forces += np.linalg.norm(reactions * self.blocks.restrict_border(scale).poses) ** 2
+            forces += self.comm.allreduce(float(np.linalg.norm(loads * self.unknowns.unit_u) ** 2))
+            nodal = r[self.numbering.rows.nodes.local]
+            return Residual(
+                vector,
+                vector.norm(),
+                float(np.sqrt(forces)),
+                float(np.max(np.abs(joints.row_scale * violation), initial=0.0)),
+                self._motion(state),
+                self._moments(nodal),
+                nodal,
+                poses.copy(),
+            )
 
     # -- derivatives at the loaded state -------------------------------------------------------------------
 
-    def linearise(self, state: State, control: Control, balance: Balance) -> None:
-        """Brings ``kkt`` to the loaded ``state`` (collective)."""
+    def linearise(self, state: State, control: Control, residual: Residual) -> None:
+        """Brings ``kkt`` to the loaded ``state``."""
         self.kkt.tangent()
-        self._linearise(state, control, balance.moments)
+        self.kkt.linearise(self._border.entries(state, control, residual.moments, self._regularisation))
 
     def linearise_mixed(
-        self, state: State, control: Control, balance: Balance, before: State, motion: np.ndarray
+        self, state: State, control: Control, residual: Residual, before: State, motion: np.ndarray
     ) -> None:
-        """``linearise``, with the stress that the step δu = ``motion`` from ``before`` promised (collective).
+        """``linearise``, with the stress that the step δu = ``motion`` from ``before`` promised.
 
         Args:
-            state, control, balance: as in ``linearise``.
+            state, control, residual: as in ``linearise``.
             before: the state before the step.
             motion: δu of owned nodes, linear in the step on interface nodes too, (owned dofs,).
         """
         with self.clock.phase("assemble"):
             self._mixed.follow(before.u, motion)
             self.kkt.tangent()
-            self._mixed.tangent(self.kkt.hat)
-            promised = self.interfaces.moments(self._mixed.forces().reshape(-1, self.layout.per_node))
-            moments = _add_moments(balance.moments, self.layout.comm.allreduce(promised, op=_add_moments))
-        self._linearise(state, control, moments)
+            self._mixed.tangent(self.kkt.extended)
+            moments = _added(residual.moments, self._moments(self._mixed.forces()))
+        self.kkt.linearise(self._border.entries(state, control, moments, self._regularisation))
 
-    def _linearise(self, state: State, control: Control, moments: dict[int, np.ndarray]) -> None:
-        self.kkt.linearise(self._extras.entries(state, control, self._loads.acting(state), moments))
+    # -- right-hand sides whose KKT solutions are rates of x with … -------------------------------------------
 
     def force_rate(self, state: State) -> PETSc.Vec:
-        """Right-hand side whose KKT solution is the rate of x with the controlled force (collective)."""
+        """… the controlled force."""
         return self.travel_gradient(self.controlled, state)
 
     def travel_gradient(self, load: PointLoad, state: State) -> PETSc.Vec:
-        """Gᵀ ∂(a · u_P), of a load's travel with respect to the scaled unknowns x (collective)."""
-        nodal, extras = np.zeros(self.layout.owned), np.zeros(self.layout.extras)
-        self._loads.add(load, 1.0, state, nodal, extras)
-        return self.unknowns.pull(nodal, extras)
+        """… the magnitude of a load: Gᵀ ∂(a · u_P), the gradient of its travel by x."""
+        return self.unknowns.apply_transpose(*self._border.load_forces([(load, 1.0)], state))
 
     def share_rate(self, state: State) -> PETSc.Vec:
-        """Right-hand side whose KKT solution is the rate of x with the share of the constant loads (collective)."""
-        nodal, extras = np.zeros(self.layout.owned), np.zeros(self.layout.extras)
-        for load, magnitude in self._loads.constant:
-            self._loads.add(load, magnitude, state, nodal, extras)
-        extras[self.layout.z] -= self._potentials.rate(state)
+        """… the load factor of the constant loads."""
+        links, border = self._border.share_rate(state)
         if self.elastic.shares:
-            nodal -= self.elastic.share_residuals()
-        return self.unknowns.pull(nodal, extras)
+            links -= self.elastic.share_residuals()
+        return self.unknowns.apply_transpose(links, border)
 
     def target_rate(self) -> PETSc.Vec:
-        """Right-hand side whose KKT solution is the rate of x with the controlled displacement (collective)."""
-        extras = np.zeros(self.layout.extras)
-        extras[self.layout.force] = -1.0
-        return self.unknowns.pull(np.zeros(self.layout.owned), extras)
+        """… the controlled displacement."""
+        border = np.zeros(self.blocks.border.size)
+        self.blocks.restrict_border(border).load[:] = -1.0
+        return self.unknowns.apply_transpose(np.zeros(self.numbering.rows.links.count), border)
 
     def motor_rate(self, state: State, direction: np.ndarray) -> PETSc.Vec:
-        """Right-hand side whose KKT solution is the rate of x with motor values along ``direction`` (collective)."""
-        extras = np.zeros(self.layout.extras)
-        rate, twist = self.joints.motor_rate(state.poses, state.motors, state.multipliers, direction)
-        extras[self.layout.multipliers], extras[self.layout.z] = rate, twist
-        return self.unknowns.pull(np.zeros(self.layout.owned), extras)
-
-    def nodal_forces(self) -> np.ndarray:
-        """∂E/∂u minus the loads on links of the last ``balance``, (owned displacements,)."""
-        return self._unbalanced.copy()
-
-    def work(self, nodal: np.ndarray, z: np.ndarray) -> float:
-        """What all forces of the last ``balance`` lack along velocities of owned nodes and of poses (collective).
-
-        Args:
-            nodal: (owned displacements,); those of interface nodes are their bodies'.
-            z: of the pose unknowns, (size,); keeps joints closed.
-        """
-        return self.layout.comm.allreduce(float(self._unbalanced @ nodal)) + float(self._unbalanced_poses @ z)
+        """… motor values along ``direction``, (connections,)."""
+        border = np.zeros(self.blocks.border.size)
+        poses, multipliers, _ = self.blocks.restrict_border(border)
+        multipliers[:], poses[:] = self.joints.motor_rate(state.poses, state.motors, state.multipliers, direction)
+        return self.unknowns.apply_transpose(np.zeros(self.numbering.rows.links.count), border)
 
     # -- pieces --------------------------------------------------------------------------------------------
 
     def _motion(self, state: State) -> float:
-        """Largest displacement from the drawn configuration over the mechanism's length, or rotation (collective)."""
+        """Largest displacement from the drawn configuration over the mechanism's length, or rotation."""
         z = self.joints.unknowns(state.poses) - self.joints.unknowns(self.joints.drawn)
         return self.size(Step(state.u, z, state.multipliers, state.force))
 
+    def _moments(self, nodal: np.ndarray) -> dict[int, np.ndarray]:
+        """Σ f_i ⊗ (X_i − c) of each interface body, from forces on owned nodes, (owned displacements,)."""
+        own = self.interfaces.moments(nodal.reshape(-1, self.numbering.per_node))
+        return self.comm.allreduce(own, op=_added)
 
-def _add_moments(a: dict[int, np.ndarray], b: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
+
+def _added(a: dict[int, np.ndarray], b: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
     """Sum of two ranks' moments; a rank may hold no node of some body."""
     return {body: a.get(body, 0.0) + b.get(body, 0.0) for body in sorted(a.keys() | b.keys())}

@@ -1,13 +1,13 @@
 """Cylindrical joint: two bodies slide along a common axis and turn about it."""
 
-from fenicsmech.joints.kind import JointKind
+from fenicsmech.joints.joint import JointKind
 
 
 class Cylindrical(JointKind):
     """(x_b − x_a) ⟂ e1_a, e2_a and e3_b ⟂ e1_a, e2_a."""
 
     name = "cylindrical"
-    bored = True
+    pin_along_axis = True
 
     def equations(self, a, b):
         apart = b.origin - a.origin

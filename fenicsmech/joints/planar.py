@@ -1,6 +1,6 @@
 """Planar joint: a plane of body b slides and turns on a plane of body a."""
 
-from fenicsmech.joints.kind import JointKind
+from fenicsmech.joints.joint import JointKind
 
 
 class PlanarJoint(JointKind):

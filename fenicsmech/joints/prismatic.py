@@ -1,6 +1,6 @@
 """Prismatic joint: two bodies slide along a common axis without turning."""
 
-from fenicsmech.joints.kind import JointKind
+from fenicsmech.joints.joint import JointKind
 
 
 class Prismatic(JointKind):
@@ -8,8 +8,9 @@ class Prismatic(JointKind):
 
     name = "prismatic"
     planar = True
-    sliding = True
     motorised = True
+    sliding = True
+    axis_in_plane = True
 
     def equations(self, a, b):
         apart = b.origin - a.origin
@@ -18,11 +19,8 @@ class Prismatic(JointKind):
     def planar_equations(self, a, b):
         return [(b.origin - a.origin).dot(a.normal), b.angle - a.angle]
 
-    def motor(self, a, b, value):
-        return (b.origin - a.origin).dot(a.e3) - value
-
-    def planar_motor(self, a, b, value):
-        return (b.origin - a.origin).dot(a.axis) - value
+    def coordinate(self, a, b):
+        return (b.origin - a.origin).dot(a.axis)
 
 
 PRISMATIC = Prismatic()

@@ -1,12 +1,13 @@
 """Spherical joint: two bodies share a point."""
 
-from fenicsmech.joints.kind import JointKind
+from fenicsmech.joints.joint import JointKind
 
 
 class Spherical(JointKind):
     """x_b = x_a."""
 
     name = "spherical"
+    shares_point = True
 
     def equations(self, a, b):
         return [*(b.origin - a.origin)]

@@ -1,12 +1,13 @@
 """Universal (Cardan) joint: two bodies share a point and the two arms of a cross."""
 
-from fenicsmech.joints.kind import JointKind
+from fenicsmech.joints.joint import JointKind
 
 
 class Universal(JointKind):
     """x_b = x_a and e1_a ⟂ e2_b: arm e1 turns in body a, arm e2 in body b; e3 is the shaft as drawn."""
 
     name = "universal"
+    shares_point = True
 
     def equations(self, a, b):
         return [*(b.origin - a.origin), a.e1.dot(b.e2)]

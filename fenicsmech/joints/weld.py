@@ -1,6 +1,6 @@
 """Weld: two bodies move as one."""
 
-from fenicsmech.joints.kind import JointKind
+from fenicsmech.joints.joint import JointKind
 
 
 class Weld(JointKind):
@@ -8,6 +8,8 @@ class Weld(JointKind):
 
     name = "weld"
     planar = True
+    shares_point = True
+    clamps = True
 
     def equations(self, a, b):
         return [*(b.origin - a.origin), a.e3.dot(b.e2), a.e1.dot(b.e3), a.e2.dot(b.e1)]

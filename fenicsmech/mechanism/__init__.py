@@ -1,26 +1,36 @@
-"""What the user describes, as pure data.
+"""The description of a mechanism, as pure data.
 
 - ``materials``: names and laws with their numbers
 - ``shapes``: strips, outlines, STEP parts, meshes; interface regions
-- ``parts``: links, joints, motors, forces, outputs
+- ``parts``: links, joints, motors, forces, outputs, and where they are
 - ``mechanism``: the builder that collects parts
-- ``scene``: effects and configurations; ``effect``: what effects have in common; ``units``: labels
-- ``places``: positions in a dimension, and which are one place
-- ``validation``: checks of the whole; ``checks``: checks of single values
+- ``scene``: effects, configurations and names of units
+- ``validation``: checks of the whole
 """
 
-from fenicsmech.mechanism.effect import Effect
 from fenicsmech.mechanism.materials import (
     ONYX,
     SMOOTH_SIL_950,
     Material,
 )
 from fenicsmech.mechanism.mechanism import Mechanism
-from fenicsmech.mechanism.parts import Drive, FlexibleLink, Force, Joint, Leader, Link, Motor, Output, RigidLink
-from fenicsmech.mechanism.places import in_dimension, mechanism_length, same_place
-from fenicsmech.mechanism.scene import DRAWN, Configuration, Scene
+from fenicsmech.mechanism.parts import (
+    Drive,
+    FlexibleLink,
+    Force,
+    Joint,
+    Leader,
+    Link,
+    Motor,
+    Output,
+    RigidLink,
+    in_dimension,
+    same_place,
+)
+from fenicsmech.mechanism.scene import DRAWN, Configuration, Effect, Scene, Units
 from fenicsmech.mechanism.shapes import (
     Arc,
+    Centreline,
     Disc,
     Line,
     MeshPart,
@@ -33,14 +43,14 @@ from fenicsmech.mechanism.shapes import (
     gmsh_mesh,
     outline,
     polygon,
-    step,
+    step_file,
     strip,
 )
-from fenicsmech.mechanism.units import Units
 from fenicsmech.mechanism.validation import validate
 
 __all__ = [
     "Arc",
+    "Centreline",
     "Configuration",
     "DRAWN",
     "Disc",
@@ -70,11 +80,10 @@ __all__ = [
     "Units",
     "gmsh_mesh",
     "in_dimension",
-    "mechanism_length",
     "outline",
     "polygon",
     "same_place",
-    "step",
+    "step_file",
     "strip",
     "validate",
 ]

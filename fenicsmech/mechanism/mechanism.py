@@ -1,7 +1,9 @@
-"""The mechanism as its designer describes it: links, joints, motors, forces and output points."""
+"""The mechanism: a builder that collects links, joints, motors, forces and output points."""
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Sequence
 
 from fenicsmech.checks import direction as unit
@@ -18,8 +20,8 @@ from fenicsmech.joints import (
     JointKind,
 )
 from fenicsmech.mechanism.materials import Material
-from fenicsmech.mechanism.parts import FlexibleLink, Force, Joint, Link, Motor, Output, RigidLink
-from fenicsmech.mechanism.shapes import Disc, Rectangle, Region, Shape
+from fenicsmech.mechanism.parts import FlexibleLink, Force, Joint, Link, Motor, Output, RigidLink, in_dimension
+from fenicsmech.mechanism.shapes import Disc, Rectangle, Region, Shape, Strip, end_clamp
 
 _Z = (0.0, 0.0, 1.0)
 
@@ -41,6 +43,19 @@ class Mechanism:
         self.motors: list[Motor] = []
         self.forces: list[Force] = []
         self.outputs: list[Output] = []
+
+    def __repr__(self) -> str:
+        return f"Mechanism({self.name!r}: {', '.join(self._counts()) or 'no parts'})"
+
+    def __str__(self) -> str:
+        parts = (*self.links, *self.joints, *self.motors, *self.forces, *self.outputs)
+        return "\n".join([repr(self), *(f"  {part!r}" for part in parts)])
+
+    @property
+    def length(self) -> float:
+        """Diagonal of the box around all joints, forces and outputs; 1 if it has no size."""
+        places = [in_dimension(part.at, 3) for part in (*self.joints, *self.forces, *self.outputs)]
+        return math.hypot(*(max(axis) - min(axis) for axis in zip(*places, strict=True))) or 1.0
 
     @property
     def flexible_links(self) -> list[FlexibleLink]:
@@ -66,7 +81,7 @@ class Mechanism:
             raise DescriptionError(
                 f"link {name!r}",
                 f"its shape is {shape!r}",
-                "Make one with strip(), polygon(), outline(), step() or gmsh_mesh()",
+                "Make one with strip(), polygon(), outline(), step_file() or gmsh_mesh()",
             )
         if not isinstance(material, Material):
             raise DescriptionError(
@@ -153,8 +168,29 @@ class Mechanism:
         """Joins two links firmly (a clamp, if one of them is flexible); options as in ``join``."""
         return self.join(WELD, a, b, at=at, **options)
 
+    def clamp(self, a: Link, strip: FlexibleLink, *, end: str, length: float, name: str | None = None) -> Joint:
+        """Welds link ``a`` to an end of a strip, which it holds over its whole width.
+
+        Args:
+            a: a link of this mechanism.
+            strip: a flexible link whose shape is a strip.
+            end: "start" or "end" of its centreline.
+            length: of the clamped piece, along the centreline; its inner face stands across the strip.
+            name: for messages; unique.
+
+        Raises:
+            DescriptionError: as ``join``; the link is no strip, or the clamp does not fit it.
+        """
+        part = f"{name or f'clamp {a.name}–{strip.name}'!r}"
+        if not isinstance(strip, FlexibleLink) or not isinstance(strip.shape, Strip):
+            raise DescriptionError(
+                part, f"link {strip.name!r} is no strip", "Use weld(…, at=…, region=Rectangle(…)) for other shapes"
+            )
+        at, region = end_clamp(strip.shape, end, length, part=part)
+        return self.weld(a, strip, at=at, region=region, name=name)
+
     def motor(self, joint: Joint, *, name: str | None = None) -> Motor:
-        """Adds a motor that prescribes the free coordinate of a revolute or prismatic ``joint``.
+        """Adds a motor that prescribes the free coordinate of ``joint``, as the angle of a revolute one.
 
         Raises:
             DescriptionError: the joint's kind takes no motor, it has one already, or it is not in the mechanism.
@@ -166,7 +202,9 @@ class Mechanism:
             raise DescriptionError(part, f"{joint.name!r} is not a joint of {self.name!r}", "Add the joint first")
         if not joint.kind.motorised:
             raise DescriptionError(
-                part, f"a {joint.kind.name} joint takes no motor", "Use a revolute or a prismatic joint"
+                part,
+                f"a {joint.kind.name} joint takes no motor",
+                "Use a joint with one free coordinate, as a revolute or a prismatic one",
             )
         if joint in {motor.joint for motor in self.motors}:
             raise DescriptionError(part, f"{joint.name!r} has a motor already", "Give each joint one motor")
@@ -181,6 +219,13 @@ class Mechanism:
     def output(self, *, on: Link, at: Sequence[float], direction: Sequence[float], name: str | None = None) -> Output:
         """Adds an output: the displacement along ``direction`` of the material point ``at`` of link ``on``."""
         return self._add_at_point(Output, self.outputs, on, at, direction, name)
+
+    def _counts(self) -> list[str]:
+        """How many parts there are of each sort, in words."""
+        sorts = [*("rigid link" if isinstance(link, RigidLink) else "flexible link" for link in self.links)]
+        sorts += [f"{joint.kind.name} joint" for joint in self.joints]
+        sorts += ["motor"] * len(self.motors) + ["force"] * len(self.forces) + ["output"] * len(self.outputs)
+        return [f"{count} {sort}{'s' if count > 1 else ''}" for sort, count in Counter(sorts).items()]
 
     def _add_at_point(
         self,

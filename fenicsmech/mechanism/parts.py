@@ -1,8 +1,9 @@
-"""Parts of a mechanism as plain data: links, joints, motors, forces and output points."""
+"""Parts of a mechanism as plain data: links, joints, motors, forces and output points, and where they are."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from fenicsmech.checks import finite
@@ -24,6 +25,9 @@ class RigidLink:
     name: str
     fixed: bool = False
 
+    def __repr__(self) -> str:
+        return f"RigidLink({self.name!r}{', fixed' if self.fixed else ''})"
+
 
 @dataclass(frozen=True)
 class FlexibleLink:
@@ -32,6 +36,9 @@ class FlexibleLink:
     name: str
     shape: Shape
     material: Material
+
+    def __repr__(self) -> str:
+        return f"FlexibleLink({self.name!r}: {type(self.shape).__name__} of {self.material.name})"
 
 
 Link = RigidLink | FlexibleLink
@@ -58,6 +65,9 @@ class Joint:
     regions: tuple[Region | None, Region | None]
     name: str
 
+    def __repr__(self) -> str:
+        return f"Joint({self.name!r}: {self.kind.name}, {self.a.name!r} to {self.b.name!r} at {_figures(self.at)})"
+
 
 @dataclass(frozen=True)
 class Motor:
@@ -65,6 +75,9 @@ class Motor:
 
     joint: Joint
     name: str
+
+    def __repr__(self) -> str:
+        return f"Motor({self.name!r} on {self.joint.name!r})"
 
 
 @dataclass(frozen=True)
@@ -92,6 +105,9 @@ class Drive:
             raise DescriptionError(part, "some of its motors turn and others slide", "Let it move one sort")
         object.__setattr__(self, "ratios", checked)
 
+    def __repr__(self) -> str:
+        return f"Drive({self.name!r}: {', '.join(f'{ratio:g} × {motor.name!r}' for motor, ratio in self.ratios)})"
+
     @property
     def sliding(self) -> bool:
         """Whether its motors slide."""
@@ -107,6 +123,9 @@ class Force:
     direction: Point
     name: str
 
+    def __repr__(self) -> str:
+        return f"Force({self.name!r} on {self.on.name!r} at {_figures(self.at)} along {_figures(self.direction)})"
+
 
 @dataclass(frozen=True)
 class Output:
@@ -117,6 +136,23 @@ class Output:
     direction: Point
     name: str
 
+    def __repr__(self) -> str:
+        return f"Output({self.name!r} on {self.on.name!r} at {_figures(self.at)} along {_figures(self.direction)})"
+
 
 Leader = Force | Motor | Drive
 """What may lead a curve that is followed."""
+
+
+def in_dimension(position: Sequence[float], dim: int) -> tuple[float, ...]:
+    """``position`` with ``dim`` coordinates; a missing z is 0."""
+    return (*position, 0.0)[:dim]
+
+
+def same_place(a: Sequence[float], b: Sequence[float], *, dim: int, length: float) -> bool:
+    """Whether two positions in a mechanism of size ``length`` differ by rounding only."""
+    return math.dist(in_dimension(a, dim), in_dimension(b, dim)) <= 1e-9 * length
+
+
+def _figures(vector: Sequence[float]) -> str:
+    return f"({', '.join(f'{x:g}' for x in vector)})"

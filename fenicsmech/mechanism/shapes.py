@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
+
+import numpy as np
+from scipy.integrate import fixed_quad
+from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq
 
 from fenicsmech.checks import finite, point, points, positive
 from fenicsmech.errors import DescriptionError
@@ -23,7 +29,8 @@ class Disc:
 class Rectangle:
     """Interface region of a clamp: a rectangle centred on the joint.
 
-    ``length`` runs along the direction at ``angle`` (rad) from x, ``width`` across it.
+    ``length`` runs along the direction at ``angle`` (rad) from x, ``width`` across it. At the end of a strip
+    ``Mechanism.clamp`` finds position, angle and width.
     """
 
     length: float
@@ -125,7 +132,7 @@ def outline(start: Sequence[float], segments: Sequence[Line | Arc], *, depth: fl
     return Outline(point("outline start", start, dimensions=(2,)), tuple(checked), positive("outline depth", depth))
 
 
-def step(path: str | Path, *, depth: float, section: float = 0.0) -> StepPart:
+def step_file(path: str | Path, *, depth: float, section: float = 0.0) -> StepPart:
     """The solid in the STEP file ``path``; ``depth`` and ``section`` serve the 2D models."""
     return StepPart(Path(path), positive("STEP depth", depth), finite("STEP section", section))
 
@@ -133,3 +140,143 @@ def step(path: str | Path, *, depth: float, section: float = 0.0) -> StepPart:
 def gmsh_mesh(path: str | Path, *, depth: float) -> MeshPart:
     """The mesh in the gmsh file ``path``; ``depth`` serves the 2D models."""
     return MeshPart(Path(path), positive("mesh depth", depth))
+
+
+class Centreline:
+    """The interpolating C² cubic spline c(s) through ``points``, with not-a-knot ends.
+
+    The parameter s runs along the chords: s₀ = 0, s_{k+1} = s_k + |p_{k+1} − p_k|. Two points give the straight
+    line, three the parabola.
+
+    Args:
+        points: (n, dim) with n ≥ 2; neighbours must differ.
+        part: what the curve belongs to, for messages.
+
+    Attributes:
+        knots: parameters s_k of the points, shape (n,).
+
+    Raises:
+        DescriptionError: two neighbouring points coincide.
+    """
+
+    def __init__(self, points: Sequence[Sequence[float]], *, part: str = "centreline") -> None:
+        points = np.asarray(points, dtype=float)
+        chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
+        if not np.all(chords > 0.0):
+            k = int(np.argmin(chords))
+            where = ", ".join(f"{c:g}" for c in points[k])
+            raise DescriptionError(part, f"points {k} and {k + 1} coincide at ({where})", "Remove one of them")
+        self.knots = np.concatenate([[0.0], np.cumsum(chords)])
+        self._curve = CubicSpline(self.knots, points, bc_type="not-a-knot")
+
+    @property
+    def end(self) -> float:
+        """The last parameter; the first is 0."""
+        return float(self.knots[-1])
+
+    @property
+    def length(self) -> float:
+        """Arc length ∫ |c′(s)| ds of the whole curve."""
+        return self.length_to(self.end)
+
+    def length_to(self, s: float) -> float:
+        """Arc length from the start to the parameter ``s``."""
+        ends = [*self.knots[self.knots < s], s]
+        return float(sum(fixed_quad(self._speed, a, b, n=20)[0] for a, b in pairwise(ends)))
+
+    def parameter_at(self, length: float) -> float:
+        """The parameter to which the curve is ``length`` long, from 0 up to that of the whole."""
+        return float(brentq(lambda s: self.length_to(s) - length, 0.0, self.end, xtol=1e-13 * self.end))
+
+    def evaluate(self, s: np.ndarray | float) -> np.ndarray:
+        """Points c(s), shape (*s.shape, dim)."""
+        return self._curve(s)
+
+    def tangent(self, s: np.ndarray | float) -> np.ndarray:
+        """Unit tangents c′/|c′|, shape (*s.shape, dim)."""
+        velocity = self._curve(s, 1)
+        return velocity / np.linalg.norm(velocity, axis=-1, keepdims=True)
+
+    def normal(self, s: np.ndarray | float) -> np.ndarray:
+        """Unit normals to the left of a planar centreline, shape (*s.shape, 2)."""
+        tangent = self.tangent(s)
+        return np.stack([-tangent[..., 1], tangent[..., 0]], axis=-1)
+
+    def curvature(self, s: np.ndarray | float) -> np.ndarray:
+        """Signed curvature det(c′, c″)/|c′|³ of a planar centreline, positive for a left turn, shape s.shape."""
+        velocity, bend = self._curve(s, 1), self._curve(s, 2)
+        cross = velocity[..., 0] * bend[..., 1] - velocity[..., 1] * bend[..., 0]
+        return cross / np.linalg.norm(velocity, axis=-1) ** 3
+
+    def samples(self, per_span: int) -> np.ndarray:
+        """Parameters that divide each span between neighbouring points evenly into ``per_span`` parts."""
+        spans = [np.linspace(a, b, per_span, endpoint=False) for a, b in zip(self.knots, self.knots[1:], strict=False)]
+        return np.concatenate([*spans, self.knots[-1:]])
+
+    def closest(self, point: Sequence[float]) -> float:
+        """Parameter of the point of the curve nearest to ``point``: (c(s) − p)·c′(s) = 0, or an end."""
+        s = self.samples(64)
+        nearest = int(np.argmin(np.linalg.norm(self.evaluate(s) - point, axis=1)))
+        low, high = s[max(nearest - 1, 0)], s[min(nearest + 1, len(s) - 1)]
+        # bisection on the sign of the slope of the distance: plain, and exact to the last digits
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            slope = np.dot(self.evaluate(middle) - point, self._curve(middle, 1))
+            low, high = (middle, high) if slope < 0.0 else (low, middle)
+        return min((0.0, 0.5 * (low + high), self.end), key=lambda t: np.linalg.norm(self.evaluate(t) - point))
+
+    def _speed(self, s: np.ndarray) -> np.ndarray:
+        return np.linalg.norm(self._curve(s, 1), axis=-1)
+
+
+def end_clamp(shape: Strip, end: str, length: float, *, part: str = "clamp") -> tuple[Point, Rectangle]:
+    """Where a clamp at an end of a strip is, and the region that it holds: all of the strip up to its inner face.
+
+    The inner face stands across the centreline where that is ``length`` away from the end. The rectangle is centred on
+    the end, aligned with the strip at the inner face, and wider than the strip.
+
+    Args:
+        shape: the strip.
+        end: "start" or "end" of its centreline.
+        length: of the clamped piece, along the centreline.
+        part: the clamp's name, for messages.
+
+    Raises:
+        DescriptionError: an argument makes no sense, or the strip bends so much that the rectangle would not hold the
+            piece, or more than it.
+    """
+    curve = Centreline(shape.centreline, part=f"centreline of {part}")
+    if end not in ("start", "end"):
+        raise DescriptionError(part, f"the end of the strip is {end!r}", "Give end='start' or end='end'")
+    length = positive(f"length of {part}", length)
+    if length >= curve.length:
+        raise DescriptionError(
+            part, f"its length {length:g} is not less than that of the strip, {curve.length:g}", "Give a shorter one"
+        )
+    last, inner, beyond, inward = (
+        (0.0, curve.parameter_at(length), curve.end, 1.0)
+        if end == "start"
+        else (curve.end, curve.parameter_at(curve.length - length), 0.0, -1.0)
+    )
+    centre, direction = curve.evaluate(last), curve.tangent(inner)
+    normal = np.array([-direction[1], direction[0]])
+
+    def sides(start: float, stop: float) -> tuple[np.ndarray, np.ndarray]:
+        """How far points of both sides of a piece are from the centre, along the strip at the face and across it."""
+        s = np.linspace(start, stop, 257)
+        offsets = 0.5 * shape.thickness * curve.normal(s)
+        points = np.concatenate([curve.evaluate(s) + offsets, curve.evaluate(s) - offsets]) - centre
+        return inward * (points @ direction), points @ normal
+
+    reach = inward * float((curve.evaluate(inner) - centre) @ direction)
+    along, across = sides(last, inner)
+    half_width = float(np.abs(across).max()) + 0.25 * shape.thickness
+    slack = 1e-6 * shape.thickness
+    holds_all = reach > 0.0 and np.all(np.abs(along) <= reach + slack)
+    along, across = sides(inner, beyond)
+    if not holds_all or np.any((np.abs(along) < reach - slack) & (np.abs(across) <= half_width)):
+        raise DescriptionError(
+            part, f"the strip bends too much for a clamp of the length {length:g}", "Make the clamp shorter"
+        )
+    angle = float(np.arctan2(direction[1], direction[0]))
+    return tuple(centre.tolist()), Rectangle(2.0 * reach, 2.0 * half_width, angle)

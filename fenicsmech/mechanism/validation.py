@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism.mechanism import Mechanism
-from fenicsmech.mechanism.parts import FlexibleLink, Joint, Link, RigidLink
-from fenicsmech.mechanism.places import mechanism_length, same_place
+from fenicsmech.mechanism.parts import FlexibleLink, Joint, Link, RigidLink, same_place
 from fenicsmech.mechanism.shapes import Region
 
 
@@ -73,14 +72,13 @@ def _check_forces(mechanism: Mechanism) -> None:
 
 
 def _check_interfaces(mechanism: Mechanism, dim: int) -> None:
-    length = mechanism_length(mechanism)
     found: list[tuple[FlexibleLink, Joint, Region]] = []
     for joint in mechanism.joints:
         for link, region in zip((joint.a, joint.b), joint.regions, strict=True):
             if not isinstance(link, FlexibleLink):
                 continue
             for owner, first, known in found:
-                same = owner == link and same_place(first.at, joint.at, dim=dim, length=length)
+                same = owner == link and same_place(first.at, joint.at, dim=dim, length=mechanism.length)
                 if same and known != region:
                     raise DescriptionError(
                         f"{joint.name!r}",
@@ -98,11 +96,11 @@ def _check_planar(mechanism: Mechanism) -> None:
                 part, f"a {joint.kind.name} joint does not exist in a planar model", "Use space='3d' or a planar joint"
             )
         out_of_plane = abs(joint.axis[2])
-        if joint.kind.sliding and out_of_plane > 1e-12:
+        if joint.kind.axis_in_plane and out_of_plane > 1e-12:
             raise DescriptionError(
                 part, f"its axis {joint.axis} leaves the plane", "Give an axis (x, y) or use space='3d'"
             )
-        if not joint.kind.sliding and out_of_plane < 1.0 - 1e-12:
+        if not joint.kind.axis_in_plane and out_of_plane < 1.0 - 1e-12:
             raise DescriptionError(
                 part, f"its axis {joint.axis} is not normal to the plane", "Leave it at (0, 0, 1) or use space='3d'"
             )

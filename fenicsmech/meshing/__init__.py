@@ -5,83 +5,82 @@ Ask for a mesh
     ``check_link``      what can be refused before anything is meshed
     ``InterfaceSite``   where a joint takes hold of the link
     ``LinkMesh``        points, cells, and which interface holds each cell (``FREE``: none)
-
-Ask for a file to print or to machine a link from
-    ``write_step``      the solid: smooth curves through the mesh's boundary, extruded, with ``PinHole``s
-    ``write_stl``       its surface
+    ``distribute``      the meshes of all links as one dolfinx mesh
 
 Geometry that other layers use too
-    ``Centreline``      the smooth curve of a strip
     ``radius_ratios``   shape quality of cells
     ``cell_measures``   signed areas and volumes of cells
     ``boundary_loops``  outline and holes of a plane mesh
     ``plan_of``         the plane mesh that an extruded one repeats
 
-One file per kind of link: ``strip`` (with ``strip_outline`` and ``strip_pins``), ``outline``, ``step``, ``mesh_file``.
-What is the same all through its depth is drawn and cut in the plane (``plan_view``, ``regions``, ``fragments``,
-``sizing``) and then extruded (``extrude``). ``mesh_checks`` says what every mesh must satisfy. What ``solid`` writes is
-the ``section`` between curves (``outline_curves``, ``smooth_outline``) from corner to corner (``corners``) of the
-``boundary``. ``gmsh_session`` is the only place that starts gmsh. Nothing here knows of finite elements or of parallel
-ranks.
+Each kind of link has its file: ``strip``, ``outline`` (with ``plane_curves``) and ``part_files``. It implements the
+functions of ``request``, which ``link_mesher`` calls before it checks what every mesh must satisfy. Links that are the
+same all through their depth are drawn in the plane, cut by their interfaces (``cutting``) and extruded (``planar``).
+Only ``gmsh_session`` starts gmsh, only ``distribute`` knows of finite elements and of parallel ranks.
 """
 
-from fenicsmech.meshing import mesh_file, outline, step, strip  # noqa: F401  (each registers its shape)
-from fenicsmech.meshing.boundary import boundary_loops
-from fenicsmech.meshing.bulge import bulge_field
-from fenicsmech.meshing.centreline import Centreline
-from fenicsmech.meshing.corners import corners_of
-from fenicsmech.meshing.curved_edges import CurvedEdges
-from fenicsmech.meshing.distribute import MechanismMesh, distribute
-from fenicsmech.meshing.extrude import extrude, extrude_half, layer_count
-from fenicsmech.meshing.gmsh_session import gmsh, gmsh_session
-from fenicsmech.meshing.interface_site import InterfaceSite, across
-from fenicsmech.meshing.link_mesh import FREE, LinkMesh, cell_measures
-from fenicsmech.meshing.link_mesher import check_link, mesh_link
-from fenicsmech.meshing.mesh_checks import count_pieces
-from fenicsmech.meshing.mid_plane import on_mid_plane
-from fenicsmech.meshing.outline_curves import CircleArc, sampled, start_of
-from fenicsmech.meshing.plan import plan_of
-from fenicsmech.meshing.planform import distance
-from fenicsmech.meshing.quality import radius_ratios
-from fenicsmech.meshing.section import PinHole
-from fenicsmech.meshing.sizing import LEAST_SEGMENTS, circle_segments
-from fenicsmech.meshing.smooth_outline import smooth_outline
-from fenicsmech.meshing.solid import write_step, write_stl
-from fenicsmech.meshing.thickness import typical_thickness
+from fenicsmech.meshing import outline, part_files, strip  # noqa: F401  (each registers its shapes)
+from fenicsmech.meshing.cutting import circle_segments
+from fenicsmech.meshing.distribute import MechanismMesh, bulge_field, distribute, on_mid_plane
+from fenicsmech.meshing.gmsh_session import gmsh, gmsh_session, muted_output
+from fenicsmech.meshing.link_mesh import (
+    FREE,
+    CurvedEdges,
+    LinkMesh,
+    boundary_loops,
+    cell_measures,
+    count_pieces,
+    radius_ratios,
+    shown,
+)
+from fenicsmech.meshing.link_mesher import check_link, mesh_link, typical_thickness
+from fenicsmech.meshing.planar import extrude, extrude_half, layer_count, plan_of
+from fenicsmech.meshing.plane_curves import (
+    CircleArc,
+    Curve,
+    distance,
+    draw_loop,
+    first_crossing,
+    inside,
+    line,
+    sampled,
+    start_of,
+)
+from fenicsmech.meshing.request import LEAST_SEGMENTS, InterfaceSite
 
 __all__ = [
-    "Centreline",
     "CircleArc",
+    "Curve",
     "CurvedEdges",
     "FREE",
     "InterfaceSite",
     "LEAST_SEGMENTS",
     "LinkMesh",
     "MechanismMesh",
-    "PinHole",
-    "across",
     "boundary_loops",
     "bulge_field",
     "cell_measures",
     "check_link",
     "circle_segments",
-    "corners_of",
     "count_pieces",
     "distance",
     "distribute",
+    "draw_loop",
     "extrude",
     "extrude_half",
+    "first_crossing",
     "gmsh",
     "gmsh_session",
+    "inside",
     "layer_count",
+    "line",
     "mesh_link",
+    "muted_output",
     "on_mid_plane",
     "plan_of",
     "radius_ratios",
     "sampled",
-    "smooth_outline",
+    "shown",
     "start_of",
     "typical_thickness",
-    "write_step",
-    "write_stl",
 ]

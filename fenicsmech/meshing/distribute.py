@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
+from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
-from fenicsmech.compat import cell_nodes, create_mesh, original_cells
-from fenicsmech.meshing.curved_edges import CurvedEdges
-from fenicsmech.meshing.link_mesh import LinkMesh
+from fenicsmech.compat import cell_dofs, cell_nodes, create_mesh, original_cells, original_nodes, vector_space
+from fenicsmech.meshing.link_mesh import CurvedEdges, LinkMesh
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class MechanismMesh:
 
 
 def distribute(comm: MPI.Comm, link_meshes: Sequence[LinkMesh] | None, *, root: int = 0) -> MechanismMesh:
-    """Joins ``link_meshes`` (given on ``root`` only) and distributes them over ``comm``.
+    """Join ``link_meshes`` (given on ``root`` only) and distribute them over ``comm``.
 
     Interfaces are numbered through, link after link.
     """
@@ -77,3 +78,24 @@ def _join(link_meshes: Sequence[LinkMesh]) -> tuple[np.ndarray, np.ndarray, np.n
         np.concatenate(interfaces),
         CurvedEdges(np.concatenate(ends), np.concatenate(bulges)),
     )
+
+
+def bulge_field(mesh: MechanismMesh) -> fem.Function | None:
+    """c of curved cells (see ``link_mesh``) as a quadratic vector field; None if all edges are straight."""
+    if not len(mesh.curved.ends):
+        return None
+    bulge = fem.Function(vector_space(mesh.mesh, 2), name="bulge")
+    dim = mesh.vertices.shape[1]
+    values, nodes = bulge.x.array.reshape(-1, dim), cell_dofs(bulge.function_space)
+    found = mesh.curved.of_cells(original_nodes(mesh.mesh)[cell_nodes(mesh.mesh)])
+    # edges of the reference simplex are numbered by the corners that they do not touch, from the last pair to the first
+    order = len(list(combinations(range(dim + 1), 2))) - 1 - np.arange(found.shape[1])
+    curved = np.flatnonzero(np.any(found != 0.0, axis=(1, 2)))
+    values[nodes[curved, dim + 1 :]] = found[curved][:, order]
+    return bulge
+
+
+def on_mid_plane(points: np.ndarray, comm: MPI.Comm) -> np.ndarray:
+    """Which of this rank's ``points`` (n, 3) of half links lie on their mid-plane, (n,)."""
+    height = comm.allreduce(float(points[:, 2].max(initial=0.0)), op=MPI.MAX)
+    return points[:, 2] <= 1e-9 * height  # but for rounding

@@ -1,7 +1,12 @@
-"""gmsh, started and stopped around one mesh, with every option that decides the result set explicitly."""
+"""gmsh, started and stopped around one mesh, with every option that decides the result set explicitly.
+
+No other module starts gmsh.
+"""
 
 from __future__ import annotations
 
+import ctypes
+import os
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -21,7 +26,7 @@ import gmsh  # noqa: E402
 
 _restore_interrupts(_handler)
 
-__all__ = ["gmsh", "gmsh_session"]
+__all__ = ["gmsh", "gmsh_session", "muted_output"]
 
 _OPTIONS = {
     "General.Terminal": 0,
@@ -77,3 +82,23 @@ def gmsh_session(part: str) -> Iterator[None]:
     finally:
         gmsh.finalize()
         _restore_interrupts(handler)
+
+
+@contextmanager
+def muted_output() -> Iterator[None]:
+    """Drop what libraries write to the standard output of this process inside the block.
+
+    Python's own output is not lost: what it has not passed on yet stays in its buffer.
+    """
+    # what C libraries have buffered belongs to the time before and after
+    flush = ctypes.CDLL(None).fflush
+    flush(None)
+    kept = os.dup(1)
+    try:
+        with open(os.devnull, "wb") as nowhere:
+            os.dup2(nowhere.fileno(), 1)
+        yield
+    finally:
+        flush(None)
+        os.dup2(kept, 1)
+        os.close(kept)

@@ -1,44 +1,43 @@
-"""Meshing strips: constant thickness along a centreline, with round eyes at the pins."""
+"""Meshing strips: constant thickness t along a centreline c(s), with round eyes at the pins.
+
+The sides are the curves c(s) ∓ n(s) t/2, n the unit normal. The link is the union of the strip between them and of a
+disc around each pin, whose radius is that of the interface or t/2, whichever is larger. Between the sides the strip
+ends flat, at a pin in the round of its eye.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from fenicsmech.errors import MeshingError
-from fenicsmech.mechanism import Disc, Strip
-from fenicsmech.meshing.centreline import Centreline
+from fenicsmech.mechanism import Centreline, Disc, Rectangle, Strip
+from fenicsmech.meshing.cutting import DimTag, circle_segments, gap_refinement, region_face
 from fenicsmech.meshing.gmsh_session import gmsh
-from fenicsmech.meshing.interface_site import InterfaceSite
-from fenicsmech.meshing.link_mesh import LinkMesh
-from fenicsmech.meshing.mesh_request import MeshRequest, check_shape, holds, mesh_shape
-from fenicsmech.meshing.plan_view import PlanView, mesh_plan_view
-from fenicsmech.meshing.regions import DimTag, region_face
-from fenicsmech.meshing.scaling import in_units_of
-from fenicsmech.meshing.strip_outline import Side, check_sides, strip_sides
-from fenicsmech.meshing.strip_pins import ON_CENTRELINE, StripPin
+from fenicsmech.meshing.link_mesh import LinkMesh, shown
+from fenicsmech.meshing.planar import PlaneDrawing, in_units_of, mesh_planar
+from fenicsmech.meshing.plane_curves import first_crossing
+from fenicsmech.meshing.request import InterfaceSite, MeshRequest, check_shape, holds, mesh_shape
+
+_ON_CENTRELINE = 1e-3  # of the thickness: what rounded coordinates may deviate
 
 
 @mesh_shape.register
 def _(shape: Strip, request: MeshRequest) -> LinkMesh:
     strip = in_units_of(shape, request.size)
-    return mesh_plan_view(request, shape.depth, lambda sites: _draw(strip, sites))
+    return mesh_planar(request, shape.depth, lambda sites: _draw(strip, sites))
 
 
 @check_shape.register
 def _(shape: Strip, request: MeshRequest) -> None:
     centreline = Centreline(shape.centreline, part=f"centreline of {request.part}")
-    check_sides(request.part, centreline, shape.thickness)
+    _check_sides(request.part, centreline, shape.thickness)
     for site in request.sites:
         _check_on_strip(centreline, shape.thickness, site, request)
-        if isinstance(site.region, Disc) and shape.thickness < (1.0 - ON_CENTRELINE) * site.region.radius:
-            raise MeshingError(
-                request.part_at(site),
-                f"the strip is thinner ({shape.thickness:g}) than its pin: the interface has radius "
-                f"{site.region.radius:g}, twice that of a pin",
-                "Make the strip at least as thick as the radius, or the radius smaller",
-            )
 
 
 @holds.register
@@ -50,7 +49,33 @@ def _(shape: Strip, request: MeshRequest, at: tuple[float, ...]) -> bool:
         if isinstance(site.region, Disc)
     ]
     beside = 0.5 * shape.thickness - math.dist(centreline.evaluate(centreline.closest(at[:2])), at[:2])
-    return max([beside, *eyes]) >= -ON_CENTRELINE * shape.thickness
+    return max([beside, *eyes]) >= -_ON_CENTRELINE * shape.thickness
+
+
+def _check_sides(part: str, centreline: Centreline, thickness: float) -> None:
+    """Refuse a strip whose sides are no proper outline.
+
+    Raises:
+        MeshingError: a side folds over where the centreline bends too sharply, or the outline crosses itself.
+    """
+    s = centreline.samples(32)
+    bend = np.abs(centreline.curvature(s))
+    sharpest = int(np.argmax(bend))
+    if bend[sharpest] * 0.5 * thickness >= 1.0:
+        raise MeshingError(
+            part,
+            f"the centreline bends with radius {1.0 / bend[sharpest]:g} near "
+            f"{shown(centreline.evaluate(s[sharpest]))}, which is not more than half the thickness {thickness:g}",
+            "Make the strip thinner or its centreline smoother",
+        )
+    right, left = (_parallel(centreline, s, offset * thickness) for offset in (-0.5, 0.5))
+    crossing = first_crossing(np.concatenate([right, left[::-1]]))
+    if crossing is not None:
+        raise MeshingError(
+            part,
+            f"the strip crosses itself near {shown(crossing)}",
+            "Lead the centreline apart there, or make the strip thinner",
+        )
 
 
 def _check_on_strip(centreline: Centreline, thickness: float, site: InterfaceSite, request: MeshRequest) -> None:
@@ -59,33 +84,158 @@ def _check_on_strip(centreline: Centreline, thickness: float, site: InterfaceSit
     Raises:
         MeshingError: it lies farther than half the thickness from the centreline, or beyond an end.
     """
-    tolerance = ON_CENTRELINE * thickness
+    tolerance = _ON_CENTRELINE * thickness
     s = centreline.closest(site.at[:2])
     away = np.asarray(site.at[:2]) - centreline.evaluate(s)
     beyond = abs(away @ centreline.tangent(s))
     if np.linalg.norm(away) > 0.5 * thickness + tolerance or beyond > tolerance:
-        x, y = site.at[:2]
         raise MeshingError(
             request.part_at(site),
-            f"the point ({x:g}, {y:g}) is not on the link: it is {np.linalg.norm(away):g} away from the "
+            f"the point {shown(site.at[:2])} is not on the link: it is {np.linalg.norm(away):g} away from the "
             f"centreline of a strip of thickness {thickness:g}",
             "Move the joint onto the centreline, or lead the centreline through the joint",
         )
 
 
-def _draw(strip: Strip, sites: tuple[InterfaceSite, ...]) -> PlanView:
+def clamp_defect(shape: Strip, site: InterfaceSite) -> tuple[str, str] | None:
+    """Why the rectangle of ``site`` does not hold the strip as a clamp across it would, with a remedy; None if it does.
+
+    A clamp's inner face, where the centreline leaves the rectangle, stands across the strip (to 1°, more than rounded
+    angles miss it by) and is at least as wide.
+    """
+    if not isinstance(site.region, Rectangle) or not site.is_planar:
+        return None
+    curve, halves = Centreline(shape.centreline), 0.5 * np.array([site.region.length, site.region.width])
+    c, s = math.cos(site.region.angle), math.sin(site.region.angle)
+    axes, centre = np.array([[c, s], [-s, c]]), site.centre[:2]
+
+    def inside(at: np.ndarray) -> np.ndarray:
+        return np.all(np.abs((curve.evaluate(at) - centre) @ axes.T) <= halves, axis=-1)
+
+    samples = curve.samples(64)
+    held = inside(samples)
+    for k in np.flatnonzero(held[1:] != held[:-1]):
+        kept, left = samples[[k, k + 1] if held[k] else [k + 1, k]]
+        for _ in range(50):
+            middle = 0.5 * (kept + left)
+            kept, left = (middle, left) if inside(middle) else (kept, middle)
+        place, normal = curve.evaluate(kept), 0.5 * shape.thickness * curve.normal(kept)
+        face = int(np.argmax(np.abs(axes @ (place - centre)) / halves))
+        turn = math.degrees(math.asin(min(1.0, abs(axes[face] @ normal) / (0.5 * shape.thickness))))
+        if turn > 1.0:
+            right = math.atan2(*curve.tangent(kept)[::-1]) + (0.5 * math.pi if face else 0.0)
+            return (
+                f"the face of its {site.region} near {shown(place)} is turned by {turn:.3g}° from across the strip",
+                f"Use Mechanism.clamp(…), or angle={right:.6g} (rad, from x)",
+            )
+        edges = np.array([place + normal, place - normal]) - centre
+        if np.abs(edges @ axes[1 - face]).max() < halves[1 - face] * (1.0 + 1e-6):
+            continue
+        return (
+            f"its {site.region} does not cover the width {shape.thickness:g} of the strip near {shown(place)}",
+            "Use Mechanism.clamp(…), or make it wider",
+        )
+    if not held.any():
+        return f"its {site.region} does not reach the centreline of the strip", "Use Mechanism.clamp(…), or move it"
+    return None
+
+
+@dataclass(frozen=True)
+class _Pin:
+    """A pin in a strip, in units of the element size.
+
+    Attributes:
+        site: the site, moved onto the centreline, and its disc to the strip's sides, if they miss by a hair.
+        half: half the strip's thickness.
+        inward: unit vector along the strip, away from its nearer end, shape (2,).
+        station: parameter of the centreline's point nearest to the pin.
+        offset: how far the pin lies left of the centreline.
+        to_end: distance from the nearer end of the centreline.
+    """
+
+    site: InterfaceSite
+    half: float
+    inward: np.ndarray
+    station: float
+    offset: float
+    to_end: float
+
+    @classmethod
+    def place(cls, site: InterfaceSite, centreline: Centreline, thickness: float) -> _Pin:
+        """The pin at ``site``, which has a disc, in the strip along ``centreline``."""
+        half, at = 0.5 * thickness, np.asarray(site.at[:2])
+        ends = {end: centreline.evaluate(end) for end in (0.0, centreline.end)}
+        nearer = min(ends, key=lambda end: np.linalg.norm(at - ends[end]))
+        s = nearer if np.linalg.norm(at - ends[nearer]) <= _ON_CENTRELINE * thickness else centreline.closest(at)
+        foot, normal = centreline.evaluate(s), centreline.normal(s)
+        offset = float((at - foot) @ normal)
+        if abs(offset) <= _ON_CENTRELINE * thickness:
+            at, offset = foot, 0.0
+        inward = centreline.tangent(s) * (1.0 if nearer == 0.0 else -1.0)
+        # the polygon that stands for a circle cannot tell radii apart that differ by less than a chord's height
+        # r (1 − cos(π/n)): what is thinner than that (and than 2 % of the strip) is no place for an element
+        radius = site.region.radius
+        height = radius * (1.0 - math.cos(math.pi / circle_segments(radius, 1.0)))
+        radius = half if abs(radius - half) <= min(height, 0.02 * half) else radius
+        placed = replace(site, at=(*at.tolist(), *site.at[2:]), region=Disc(radius))
+        return cls(placed, half, inward, s, offset, float(np.linalg.norm(at - ends[nearer])))
+
+    @property
+    def radius(self) -> float:
+        """Radius of the disc that the pin holds."""
+        return self.site.region.radius
+
+    @property
+    def corners(self) -> tuple[float, ...]:
+        """Angles (rad) at which the disc's outline has vertices.
+
+        Where the disc touches the sides, so that they share a vertex there; only towards the end if it crosses them.
+        """
+        outward = math.atan2(-self.inward[1], -self.inward[0])
+        return tuple(outward + k * 0.5 * math.pi for k in range(1 if self.radius > self.half else 4))
+
+    @property
+    def touches_sides(self) -> bool:
+        """Whether the disc, or an eye as wide as the strip, may touch the strip's sides along the way."""
+        return self.radius <= self.half and self.offset == 0.0
+
+    @property
+    def rounds_end(self) -> bool:
+        """Whether the eye is the round end of the strip, no wider than the strip."""
+        return self.radius <= self.half and self.to_end == 0.0
+
+    @property
+    def eye(self) -> InterfaceSite | None:
+        """The disc that the eye adds to the strip, if it adds any besides a round end."""
+        inside = self.offset == 0.0 and self.to_end >= self.half
+        if self.radius <= self.half and (self.rounds_end or inside):
+            return None
+        return replace(self.site, region=Disc(max(self.radius, self.half)))
+
+    @property
+    def refinements(self) -> list[str]:
+        """Element sizes, as gmsh expressions, for the narrow places between the disc and the link's edge."""
+        around_eye, beside = self.half - self.radius, self.half - abs(self.offset) - self.radius
+        both_ways = (self.inward, -self.inward)
+        gaps = [(around_eye, ())] if self.eye else []
+        gaps += [(beside, both_ways[:1] if self.rounds_end else both_ways)]
+        at = self.site.at[:2]
+        return [gap_refinement(at, gap, self.radius, widening) for gap, widening in gaps if gap > 0.0]
+
+
+def _draw(strip: Strip, sites: tuple[InterfaceSite, ...]) -> PlaneDrawing:
     """The strip and its eyes, all in units of the element size."""
     centreline = Centreline(strip.centreline)
     pins = {
-        number: StripPin.place(site, centreline, strip.thickness)
+        number: _Pin.place(site, centreline, strip.thickness)
         for number, site in enumerate(sites)
         if isinstance(site.region, Disc) and site.is_planar
     }
-    sides = strip_sides(centreline, strip.thickness, [pin.station for pin in pins.values() if pin.touches_sides])
+    breaks = [pin.station for pin in pins.values() if pin.touches_sides]
     rounded = {pin.station for pin in pins.values() if pin.rounds_end}
-    face = _face(centreline, *sides, rounded)
+    face = _face(centreline, strip.thickness, breaks, rounded)
     eyes = [region_face(pin.eye, corners=pin.corners) for pin in pins.values() if pin.eye]
-    return PlanView(
+    return PlaneDrawing(
         faces=gmsh.model.occ.fuse([face], eyes)[0] if eyes else [face],
         sites=tuple(pins[number].site if number in pins else site for number, site in enumerate(sites)),
         corners=tuple(pins[number].corners if number in pins else (0.0,) for number in range(len(sites))),
@@ -93,8 +243,11 @@ def _draw(strip: Strip, sites: tuple[InterfaceSite, ...]) -> PlanView:
     )
 
 
-def _face(centreline: Centreline, right: Side, left: Side, rounded: set[float]) -> DimTag:
-    """The strip between its sides, with round ends at the parameters ``rounded`` and flat ends elsewhere."""
+def _face(centreline: Centreline, thickness: float, breaks: Sequence[float], rounded: set[float]) -> DimTag:
+    """The strip as a face, its sides divided at the parameters ``breaks``, its ends round at those of ``rounded``."""
+    stations = np.unique(np.clip([0.0, *breaks, centreline.end], 0.0, centreline.end))
+    stations = stations[np.append(True, np.diff(stations) > 1e-6 * thickness)]
+    right, left = (_side(centreline, offset * thickness, stations) for offset in (-0.5, 0.5))
     rights, lefts = _points(right), _points(left)
     end = _end(centreline, centreline.end, right[-1][-1], (rights[-1][-1], lefts[-1][-1]), rounded)
     start = _end(centreline, 0.0, left[0][0], (lefts[0][0], rights[0][0]), rounded)
@@ -104,7 +257,41 @@ def _face(centreline: Centreline, right: Side, left: Side, rounded: set[float]) 
     return 2, occ.addPlaneSurface([occ.addCurveLoop([*up, *end, *down, *start])])
 
 
-def _points(side: Side) -> list[list[int]]:
+def _side(centreline: Centreline, offset: float, stations: np.ndarray) -> list[np.ndarray]:
+    """The curve parallel to a centreline, in pieces between the parameters ``stations``.
+
+    Returns:
+        Points (k, 2) of each piece: the ends of a straight line, or as many as the interpolating cubic spline through
+        them needs to follow the curve between them to 1e-6 of its distance from the centreline. Pieces share their
+        end points.
+    """
+    pairs = zip(stations[:-1], stations[1:], strict=True)
+    if (
+        np.max(np.abs(centreline.curvature(centreline.samples(32)))) * centreline.end < 1e-9
+    ):  # straight but for rounding
+        return [_parallel(centreline, np.array(pair), offset) for pair in pairs]
+    return [_curved_piece(centreline, offset, *pair) for pair in pairs]
+
+
+def _curved_piece(centreline: Centreline, offset: float, start: float, end: float) -> np.ndarray:
+    knots, margin = centreline.knots, 1e-6 * (end - start)
+    stations = np.concatenate([[start], knots[(knots > start + margin) & (knots < end - margin)], [end]])
+    spans = len(stations) - 1
+    for parts in (8, 16, 32, 64, 128):  # between two knots
+        s = np.interp(np.arange(2 * parts * spans + 1) / (2 * parts), np.arange(spans + 1), stations)
+        points = _parallel(centreline, s, offset)
+        error = np.linalg.norm(CubicSpline(s[::2], points[::2])(s[1::2]) - points[1::2], axis=1).max()
+        if error <= 1e-6 * 2.0 * abs(offset):
+            break
+    return points[::2]
+
+
+def _parallel(centreline: Centreline, s: np.ndarray, offset: float) -> np.ndarray:
+    """Points to the left of those at the parameters ``s`` by ``offset``."""
+    return centreline.evaluate(s) + offset * centreline.normal(s)
+
+
+def _points(side: Sequence[np.ndarray]) -> list[list[int]]:
     """The points of a side in the model, piece by piece; neighbouring pieces share one."""
     pieces: list[list[int]] = []
     for piece in side:
@@ -127,6 +314,6 @@ def _end(
         return [occ.addLine(*points)]
     middle = centreline.evaluate(station)
     x, y = corner - middle
-    # two quarter turns to the left: the ends of a half circle do not tell on which side it runs
+    # two quarter turns to the left: the ends of a half circle do not say on which side it runs
     tip, centre = occ.addPoint(*(middle + (-y, x)), 0.0), occ.addPoint(*middle, 0.0)
     return [occ.addCircleArc(points[0], centre, tip), occ.addCircleArc(tip, centre, points[1])]

@@ -1,37 +1,36 @@
-"""The mechanism as bodies and constraints: interfaces, points, assembly, mobility, redundancy.
+"""The mechanism as bodies and constraints: interfaces, points, assembly, mobility.
 
-- ``body``: rigid links and interface bodies
-- ``interfaces``: interface nodes of the mesh as functions of body poses, and the transposes of that map
-- ``interpolation``: the design field at the nodes of the displacement field
-- ``points``: material points: position, gradient and Hessian with respect to the state
-- ``system``: all joint constraints of a set of bodies: values, gradients, Hessians
-- ``build``: from the described mechanism to bodies and constraints
-- ``holding``: what springs add: potentials of poses that hold freedoms
+- ``constraints``: bodies that move rigidly, and all constraints between them: values, gradients, Hessians
+- ``linkage``: from the described mechanism to bodies and constraints; free coordinates of its joints
+- ``mobility``: motions that joints, motors and springs leave, and dependent constraints, by name
 - ``assembly``: the rigid assembly of a configuration
-- ``motions``: motions that joints leave to links that bend no further
-- ``mobility``: free directions left and dependent constraints, by name
+- ``interfaces``: interface nodes of the mesh as functions of body poses, and the design field at nodes
+- ``points``: material points: position, gradient and Hessian with respect to the state
 """
 
-from fenicsmech.multibody.assembly import Assembly, assemble, assemble_before_strain
-from fenicsmech.multibody.body import Body
-from fenicsmech.multibody.build import Linkage, build_linkage
-from fenicsmech.multibody.coordinate import JointCoordinate
-from fenicsmech.multibody.holding import Holding, free_motions
-from fenicsmech.multibody.interfaces import InterfaceMap
-from fenicsmech.multibody.interpolation import DesignAtNodes
-from fenicsmech.multibody.mobility import Freedom, count_freedom, is_held
-from fenicsmech.multibody.motions import Motion, stiff_motions
+from fenicsmech.multibody.assembly import Assembly, AssemblyOptions, assemble, assemble_before_strain
+from fenicsmech.multibody.constraints import Body, Connection, JointSystem
+from fenicsmech.multibody.interfaces import DesignAtNodes, InterfaceMap
+from fenicsmech.multibody.linkage import JointCoordinate, Linkage, build_linkage
+from fenicsmech.multibody.mobility import (
+    Freedom,
+    Motion,
+    SpringPotential,
+    count_freedom,
+    free_motions,
+    is_held,
+    stiff_motions,
+)
 from fenicsmech.multibody.points import BodyPoint, LinkPoint, MaterialPoint, body_point, link_point
-from fenicsmech.multibody.system import Connection, JointSystem
 
 __all__ = [
     "Assembly",
+    "AssemblyOptions",
     "Body",
     "BodyPoint",
     "Connection",
     "DesignAtNodes",
     "Freedom",
-    "Holding",
     "InterfaceMap",
     "JointCoordinate",
     "JointSystem",
@@ -39,6 +38,7 @@ __all__ = [
     "Linkage",
     "MaterialPoint",
     "Motion",
+    "SpringPotential",
     "assemble",
     "assemble_before_strain",
     "body_point",

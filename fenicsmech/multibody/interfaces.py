@@ -1,15 +1,19 @@
-"""Interface nodes as functions of body poses: u_i = t + (R − I)(X_i − c), X_i the node at rest.
+"""Nodes of the displacement field as functions of other unknowns.
 
-All nodes of the cells in an interface are eliminated from the unknowns; each follows the pose of its body. Where bodies
-move in the plane while the mesh is one half of the links in space, that is u_z = 0, as it is on the mid-plane z = 0.
+Interface nodes follow body poses, u_i = t + (R − I)(X_i − c), X_i the node at rest. All nodes of the cells in an
+interface are eliminated from the unknowns; each follows the pose of its body. Where bodies move in the plane while
+the mesh is one half of the links in space, that is u_z = 0, as it is on the mid-plane z = 0.
+
+Rest positions of all nodes follow the P1 design field d, d_i = Σ_k N_k(X_i) d_k.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from dolfinx import fem
+from scipy.sparse import csr_matrix
 
-from fenicsmech.compat import add_ghosts, cell_dofs
+from fenicsmech.compat import add_ghosts, cell_dofs, interpolation_matrix, owned_values
 from fenicsmech.joints import RigidSpace
 from fenicsmech.meshing import on_mid_plane
 
@@ -53,7 +57,7 @@ class InterfaceMap:
         self.unknown[self._mid_plane[: self.owned], space.dim :] = False
 
     def on(self, u: fem.Function) -> InterfaceMap:
-        """The same interfaces of a field of order 1, whose nodes lie on no curved edge but at its ends (collective)."""
+        """The same interfaces of a field of order 1, whose nodes lie on no curved edge but at its ends."""
         drawn = u.function_space.tabulate_dof_coordinates()
         return InterfaceMap(u, drawn, self._cell_body, self._centres, self.space)
 
@@ -98,3 +102,31 @@ class InterfaceMap:
             mine = nodes < self.owned
             moments[body] = forces[nodes[mine], : self.space.dim].T @ self.offsets[body][mine]
         return moments
+
+
+class DesignAtNodes:
+    """Interpolation of the vector P1 field ``d`` at the nodes of the Lagrange field ``u`` on the same mesh."""
+
+    def __init__(self, d: fem.Function, u: fem.Function) -> None:
+        coarse, fine = d.function_space, u.function_space
+        self._d, self._at_vertices, self._at_nodes = d, fem.Function(coarse), fem.Function(fine)
+        index, dim = coarse.dofmap.index_map, coarse.dofmap.index_map_bs
+        # every component alike
+        weights = interpolation_matrix(coarse, fine)[::dim]
+        vertices = index.local_to_global(np.arange(index.size_local + index.num_ghosts, dtype=np.int32))
+        order = np.argsort(vertices)
+        columns = order[np.searchsorted(vertices[order], weights.indices // dim)]
+        self._matrix = csr_matrix((weights.data, columns, weights.indptr), shape=(weights.shape[0], len(vertices)))
+
+    def values(self) -> np.ndarray:
+        """d at all local nodes of u, (nodes, dim)."""
+        dim = self._d.function_space.dofmap.index_map_bs
+        owned_values(self._at_nodes)[:] = (self._matrix @ self._d.x.array.reshape(-1, dim)).ravel()
+        self._at_nodes.x.scatter_forward()
+        return self._at_nodes.x.array.reshape(-1, dim).copy()
+
+    def transpose(self, nodal: np.ndarray) -> np.ndarray:
+        """Nᵀ ``nodal`` ((owned nodes of u, dim)), this rank's owned values on the space of d, flat."""
+        self._at_vertices.x.array[:] = (self._matrix.T @ nodal).ravel()
+        add_ghosts(self._at_vertices)
+        return owned_values(self._at_vertices).copy()

@@ -16,15 +16,13 @@ from dolfinx import fem
 from fenicsmech.errors import DescriptionError
 from fenicsmech.joints import RigidSpace
 
-_CORRECTIONS = 60  # of a point's place in curved cells; each halves its error at least
-
 
 class MaterialPoint(ABC):
     """A point that moves with the mechanism."""
 
     @abstractmethod
     def displacement(self, u: fem.Function, poses: np.ndarray) -> np.ndarray:
-        """Displacement from the drawn configuration, (dim,) (collective)."""
+        """Displacement from the drawn configuration, (dim,)."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +47,7 @@ class BodyPoint(MaterialPoint):
 
 @dataclass(frozen=True)
 class LinkPoint(MaterialPoint):
-    """A point in a cell of a flexible link, held by one rank.
+    """A point in a cell of a flexible link, in the cell of one rank.
 
     Attributes:
         owner: rank that holds the cell.
@@ -80,7 +78,7 @@ def body_point(position: np.ndarray, body: int, centre: np.ndarray, space: Rigid
 def link_point(
     part: str, position: np.ndarray, u: fem.Function, cells: np.ndarray, vertices: np.ndarray, bulges: np.ndarray
 ) -> LinkPoint:
-    """The point drawn at ``position`` on a flexible link (collective).
+    """The point drawn at ``position`` on a flexible link.
 
     Args:
         part: for messages.
@@ -125,7 +123,8 @@ def _barycentric(position: np.ndarray, vertices: np.ndarray, bulges: np.ndarray)
     inverse = np.linalg.inv((vertices[:, 1:] - vertices[:, :1]).transpose(0, 2, 1))
     i, j = np.transpose(list(combinations(range(vertices.shape[1]), 2)))
     straight, target = None, np.broadcast_to(position, (len(vertices), len(position)))
-    for _ in range(_CORRECTIONS if bulges.any() else 1):
+    # each of these corrections at least halves the error
+    for _ in range(60 if bulges.any() else 1):
         rest = np.einsum("kij,kj->ki", inverse, target - vertices[:, 0])
         straight = np.column_stack([1.0 - rest.sum(axis=1), rest])
         # far outside a cell its bulge means nothing

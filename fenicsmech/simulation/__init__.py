@@ -1,41 +1,29 @@
-"""What users run: a scene at some fidelity, and the curves it gives.
+"""Simulations of a scene, and the curves they give.
 
 - ``simulation``: the entry point, which computes curves
-- ``postprocessing``: what it tells of them
-- ``fidelity``, ``dial``: how finely it is computed, as given or as found by the accuracy asked for
-- ``discretisation``: a scene at one fidelity, with the discretised mechanism behind it (``link_meshes``, ``model``)
+- ``discretisation``: the meshed and compiled parts that simulations of several designs share
 - ``request``, ``curves``, ``tracer``: what a curve is asked for, and how it is traced
 - ``idle_balance``: whether loads balance along motions that deform no link
-- ``frame``, ``curve``: what comes out
-- ``leading``: what leads a curve, a force or a motor
+- ``leading``: a force or a motor that changes along a curve
 - ``until``, ``follower``, ``followed``: curves that are followed wherever they lead, and their events
-- ``buckling``, ``mode_shape``: buckling loads, buckling positions and soft modes of an equilibrium
-- ``goal``, ``estimates``, ``influence``: how wrong displacements and forces are, by an adjoint: of elements
-  (``goal_error`` by ``recovery``, ``pressure_error``), of plane stress (``depth_error``)
-- ``explanation``: what is simulated and left out, in words
-- ``friction``: how far friction in hinges holds a curve's load
 - ``unloaded``: where points are while motors move
-- ``snapshot``, ``picture``, ``export``: a state gathered, drawn, written
+- ``frame``, ``curve``: the results, and what can be asked of them
+- ``buckling``: buckling loads, buckling positions and soft modes of an equilibrium
+- ``friction``: how far friction in hinges holds a curve's load
+- ``explanation``: what is simulated and left out, in words
+- ``fields``, ``picture``: states gathered, written, drawn
 """
 
-from fenicsmech.simulation.buckling import BucklingLoad, BucklingPosition, SoftMode
+from fenicsmech.simulation.buckling import BucklingLoad, BucklingPosition, ModeShape, SoftMode
 from fenicsmech.simulation.curve import Curve
-from fenicsmech.simulation.dial import Dial, Outcome, Rung, Trial, corrections, family
-from fenicsmech.simulation.explanation import PLASTIC_WEIGHT, weight_influence
-from fenicsmech.simulation.fidelity import SPACES, check_scene, fits
+from fenicsmech.simulation.explanation import Explanation, ExplanationOptions, weight_influence
+from fenicsmech.simulation.fields import gather, rest_vertices
 from fenicsmech.simulation.followed import FollowedCurve, PathEvent
 from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.friction import PinFriction, friction_band
-from fenicsmech.simulation.goal import Goal
-from fenicsmech.simulation.influence import Equilibrium
-from fenicsmech.simulation.mode_shape import ModeShape
-from fenicsmech.simulation.model import MechanismModel
-from fenicsmech.simulation.picture import Draughtsman
-from fenicsmech.simulation.pressure_error import PressureError
-from fenicsmech.simulation.recovery import Recovery
+from fenicsmech.simulation.friction import PinFriction
+from fenicsmech.simulation.picture import MechanismPlotter
 from fenicsmech.simulation.request import CurveRequest, read_request
 from fenicsmech.simulation.simulation import Simulation
-from fenicsmech.simulation.snapshot import gather, rest_vertices
 from fenicsmech.simulation.until import Until
 
 __all__ = [
@@ -43,31 +31,17 @@ __all__ = [
     "BucklingPosition",
     "Curve",
     "CurveRequest",
-    "Dial",
-    "Draughtsman",
-    "Equilibrium",
+    "Explanation",
+    "ExplanationOptions",
     "FollowedCurve",
     "Frame",
-    "Goal",
-    "MechanismModel",
+    "MechanismPlotter",
     "ModeShape",
-    "Outcome",
-    "PLASTIC_WEIGHT",
     "PathEvent",
     "PinFriction",
-    "PressureError",
-    "Recovery",
-    "Rung",
-    "SPACES",
     "Simulation",
     "SoftMode",
-    "Trial",
     "Until",
-    "check_scene",
-    "corrections",
-    "family",
-    "fits",
-    "friction_band",
     "gather",
     "read_request",
     "rest_vertices",

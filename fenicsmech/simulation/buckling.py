@@ -5,27 +5,35 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from fenicsmech.equilibrium import (
-    IDLE_STIFFNESS,
-    ForceLead,
-    Iteration,
-    Lead,
-    Mode,
-    NotConverged,
-    critical_changes,
-    softest_modes,
-)
+import numpy as np
+
+from fenicsmech.equilibrium import Iteration, Lead, Mode, NotConverged, Step
 from fenicsmech.errors import EquilibriumError
-from fenicsmech.simulation.curve import Curve
+from fenicsmech.model import MechanismModel
 from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.leading import leading
-from fenicsmech.simulation.mode_shape import ModeShape, mode_shape
-from fenicsmech.simulation.model import MechanismModel
+
+
+@dataclass(frozen=True, eq=False)
+class ModeShape:
+    """A direction in which a mechanism moves.
+
+    Attributes:
+        link: name of the flexible link that moves most.
+        out_of_plane: fraction of its squared displacements that is across the plane of the mechanism, 0 … 1.
+        step: the direction itself, its largest displacement the mechanism's length (or one rad).
+    """
+
+    link: str
+    out_of_plane: float
+    step: Step
+
+    def __repr__(self) -> str:
+        return f"<ModeShape: {self.link!r} moves most, {self.out_of_plane:.0%} out of the plane>"
 
 
 @dataclass(frozen=True)
 class BucklingLoad:
-    """A magnitude of the controlled force at which the tangent is singular, and the mode."""
+    """A magnitude of the force that changes at which the tangent is singular, and the mode."""
 
     force: float
     mode: ModeShape
@@ -33,7 +41,7 @@ class BucklingLoad:
 
 @dataclass(frozen=True)
 class BucklingPosition:
-    """A position of the motors that lead at which the tangent is singular while they are held there, and the mode."""
+    """A position of the motors that move at which the tangent is singular while they are held there, and the mode."""
 
     position: float
     mode: ModeShape
@@ -47,48 +55,51 @@ class SoftMode:
     mode: ModeShape
 
 
-def buckling_loads(
-    model: MechanismModel, newton: Iteration, curve: Curve, frame: Frame, count: int
-) -> tuple[BucklingLoad, ...]:
-    """The ``count`` nearest buckling loads of ``frame`` (collective)."""
-    modes = _at(model, newton, curve, frame, count, ForceLead(), critical_changes)
-    return tuple(BucklingLoad(frame.force + mode.value, mode_shape(model, mode.step)) for mode in modes)
+def mode_shape(model: MechanismModel, step: Step) -> ModeShape:
+    """The direction ``step``, and what stands out in it."""
+    comm, links = model.mesh.mesh.comm, model.mechanism.flexible_links
+    # where half is meshed, nodes move in space and bodies in the plane; pressures come behind
+    dim = model.interfaces.block
+    squares = model.elastic.split(step.u)[0].reshape(-1, dim) ** 2
+    owners = model.node_link[: len(squares)]
+    sums = comm.allreduce(np.array([squares[owners == index].sum(axis=0) for index in range(len(links))]))
+    whole = float(sums.sum())
+    across = float(sums[:, 2].sum()) / whole if dim == 3 and whole > 0.0 else 0.0
+    return ModeShape(links[int(np.argmax(sums.sum(axis=1)))].name, across, step)
 
 
-def buckling_positions(
-    model: MechanismModel, newton: Iteration, curve: Curve, frame: Frame, count: int
-) -> tuple[BucklingPosition, ...]:
-    """The ``count`` nearest buckling positions of ``frame``, which motors led to (collective)."""
-    lead = leading(curve.part).lead(model.linkage.joints)
-    modes = _at(model, newton, curve, frame, count, lead, critical_changes)
-    return tuple(BucklingPosition(frame.displacement + mode.value, mode_shape(model, mode.step)) for mode in modes)
-
-
-def soft_modes(
-    model: MechanismModel, newton: Iteration, curve: Curve, frame: Frame, count: int
-) -> tuple[SoftMode, ...]:
-    """The ``count`` softest modes of ``frame`` under dead loads (collective)."""
-    modes = _at(model, newton, curve, frame, count, ForceLead(), softest_modes)
-    return tuple(SoftMode(mode.value, mode_shape(model, mode.step)) for mode in modes)
-
-
-def _at(
+def modes_at(
     model: MechanismModel,
     newton: Iteration,
-    curve: Curve,
-    frame: Frame,
-    count: int,
     lead: Lead,
+    frame: Frame,
     modes: Callable[..., list[Mode]],
-) -> list[Mode]:
-    floor = IDLE_STIFFNESS if curve.freedom.idle else 0.0
+    *,
+    count: int,
+    where: str,
+) -> list[tuple[float, ModeShape]]:
+    """The eigenvalue and the shape of ``count`` modes at a frame.
+
+    Args:
+        model: the discretised mechanism.
+        newton: the solver that found the frame.
+        lead: what changes.
+        frame: an equilibrium of the model.
+        modes: ``critical_changes`` or ``softest_modes``.
+        count: how many.
+        where: the curve and the frame, in words.
+
+    Raises:
+        EquilibriumError: the force or motor moves nothing, or the tangent is singular.
+    """
     with model.shaped(frame.design):
         try:
-            return modes(newton, lead, frame.state, floor=floor, count=count)
+            found = modes(newton, lead, frame.state, count=count)
+            return [(mode.value, mode_shape(model, mode.step)) for mode in found]
         except NotConverged as failure:
             raise EquilibriumError(
-                f"modes of {curve.part.name!r} in configuration {curve.configuration.name!r}",
-                f"they cannot be told at {leading(curve.part).up} {frame.force:g} ({failure.reason})",
-                "Choose another frame, or another part to lead",
+                f"modes of {where}",
+                f"they are not defined there ({failure.reason})",
+                "Choose another frame, or prescribe another part",
                 last=frame,
             ) from failure

@@ -1,94 +1,101 @@
-"""A load–displacement curve: the frames of one configuration under one changing force, or one moving motor."""
+"""A load–displacement curve: the frames of one configuration under a changing force or moving motor."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
+from fenicsmech.collective import on_one
+from fenicsmech.elasticity import PLANE_STRESS
+from fenicsmech.equilibrium import (
+    ForceLead,
+    Iteration,
+    Lead,
+    Mode,
+    Quantity,
+    critical_changes,
+    softest_modes,
+)
 from fenicsmech.errors import DescriptionError
-from fenicsmech.mechanism import Configuration, Drive, Force, Leader, Motor, Units
+from fenicsmech.estimates import AccuracyOptions, Equilibrium, ErrorKind
+from fenicsmech.files import write_csv
+from fenicsmech.mechanism import Configuration, Force, Joint, Leader, Output, Units
 from fenicsmech.multibody import Freedom
-from fenicsmech.report import CurveSeries, plot_curve, write_curve_csv
+from fenicsmech.plot import CurveSeries, Panel, Trace, draw_configurations, plot_curve
+from fenicsmech.simulation.buckling import BucklingLoad, BucklingPosition, ModeShape, SoftMode, modes_at
+from fenicsmech.simulation.discretisation import Discretisation
+from fenicsmech.simulation.explanation import Explanation, ExplanationOptions, explain
+from fenicsmech.simulation.fields import gather, write_xdmf
 from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.goal import Goal
+from fenicsmech.simulation.friction import PinFriction, friction_band
 from fenicsmech.simulation.leading import Axis, leading
+from fenicsmech.simulation.picture import MechanismPlotter
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Curve:
-    """Frames of one configuration.
+    """Frames of one configuration. What is asked of them later is computed at the rest shape that they belong to.
 
     Attributes:
-        part: the force that changes, or the motors that move.
+        part: the force that changes, or the motor or drive that moves.
         configuration: motor positions.
         freedom: mobility and redundancy of the assembled configuration.
         frames: one per sample, in the order asked for.
-        units: of the scene, for labels.
-        leads: whether this process writes files.
+        discretisation: what they were computed with.
         others: constant magnitudes of other forces.
-        goal: what the samples leave open: displacements, or forces where displacements were prescribed.
-        corrections: what ``displacements``, or ``forces`` where they are the goal, have more than the frames: estimates
-            of what finer elements and space would add. Only where the fidelity was chosen by an accuracy, else empty.
+        quantity: the unknown of the curve: displacements, or forces where displacements were prescribed or the curve
+            was followed.
     """
 
     part: Leader
     configuration: Configuration
     freedom: Freedom
     frames: tuple[Frame, ...]
-    units: Units
-    leads: bool
+    discretisation: Discretisation
     others: tuple[tuple[Force, float], ...] = ()
-    goal: Goal = Goal.DISPLACEMENT
-    corrections: tuple[float, ...] = ()
+    quantity: Quantity = Quantity.DISPLACEMENT
+    _errors: dict[tuple[ErrorKind, Output | None], np.ndarray] = field(default_factory=dict, init=False)
+
+    def __repr__(self) -> str:
+        (across, up), first, last = self.axes, self.frames[0], self.frames[-1]
+        unstable = int(np.sum(~self.stable))
+        return (
+            f"<{type(self).__name__} of {self.part.name!r}, {self.configuration.name}: {len(self.frames)} frames, "
+            f"{across.quantity} {across(first.displacement)} to {across(last.displacement)}, "
+            f"{up.quantity} {up(first.force)} to {up(last.force)}{f', {unstable} unstable' if unstable else ''}>"
+        )
+
+    # -- values of the frames ------------------------------------------------------------------------------------
 
     @property
-    def force_part(self) -> Force:
-        """The force that changes.
-
-        Raises:
-            DescriptionError: a motor leads the curve.
-        """
-        if not isinstance(self.part, Force):
-            raise DescriptionError(
-                f"curve of {self.part.name!r}", "no force leads it", "Ask this of a curve under a changing force"
-            )
-        return self.part
-
-    @property
-    def motor_part(self) -> Motor | Drive:
-        """The motor, or motors that move together, whose position changes.
-
-        Raises:
-            DescriptionError: a force leads the curve.
-        """
-        if isinstance(self.part, Force):
-            raise DescriptionError(
-                f"curve of {self.part.name!r}", "no motor leads it", "Ask this of a curve that follows a motor"
-            )
-        return self.part
+    def units(self) -> Units:
+        """Of the scene."""
+        return self.discretisation.scene.units
 
     @property
     def axes(self) -> tuple[Axis, Axis]:
-        """What lies across and up on plots."""
+        """Quantities and units across and up."""
         return leading(self.part).axes(self.units)
 
     @property
     def forces(self) -> np.ndarray:
-        """(frames,)."""
-        return self._corrected(Goal.FORCE, [frame.force for frame in self.frames])
+        """Forces or torques of the frames, (frames,)."""
+        return np.array([frame.force for frame in self.frames])
 
     @property
     def displacements(self) -> np.ndarray:
-        """(frames,)."""
-        return self._corrected(Goal.DISPLACEMENT, [frame.displacement for frame in self.frames])
+        """Displacements or positions of the frames, (frames,)."""
+        return np.array([frame.displacement for frame in self.frames])
 
     @property
-    def goals(self) -> np.ndarray:
-        """What the samples leave open, (frames,)."""
-        return self.forces if self.goal is Goal.FORCE else self.displacements
+    def values(self) -> np.ndarray:
+        """``displacements`` or ``forces``, whichever is the unknown ``quantity``, (frames,)."""
+        return self.forces if self.quantity is Quantity.FORCE else self.displacements
 
     @property
     def stable(self) -> np.ndarray:
@@ -99,18 +106,6 @@ class Curve:
     def jumped(self) -> np.ndarray:
         """Whether the mechanism snapped on the way to each frame, (frames,)."""
         return np.array([frame.jumped for frame in self.frames])
-
-    def series(self, label: str = "", *, colour: str | None = None, faint: bool = False) -> CurveSeries:
-        """The curve as a plot draws it, arguments as those of ``CurveSeries``."""
-        return CurveSeries(
-            self.displacements,
-            self.forces,
-            label=label,
-            stable=self.stable,
-            colour=colour,
-            faint=faint,
-            jumped=self.jumped,
-        )
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -128,9 +123,156 @@ class Curve:
             said.append(f"{name}: {unstable} of {len(self.frames)} equilibria are unstable under dead loads")
         return tuple(said)
 
+    # -- errors --------------------------------------------------------------------------------------------------
+
+    def error_estimates(self, *, output: Output | None = None) -> np.ndarray:
+        """What finer elements would add to ``values``, (frames,); computed once.
+
+        Args:
+            output: whose displacement is asked for instead, while what was prescribed stays as it is.
+
+        Raises:
+            DescriptionError: motors move along the curve.
+            EquilibriumError: the tangent of a frame is singular.
+        """
+        return self._estimated([ErrorKind.ELEMENTS], output)[0].copy()
+
+    def modelling_errors(self, *, output: Output | None = None) -> np.ndarray:
+        """What a simulation in space would add to plane stress, (frames,); arguments as those of ``error_estimates``.
+
+        Raises:
+            DescriptionError: motors move along the curve, or it is not in plane stress.
+            EquilibriumError: the tangent of a frame is singular.
+        """
+        return self._estimated([ErrorKind.PLANE_STRESS], output)[0].copy()
+
+    def errors_by_kind(self) -> tuple[np.ndarray, np.ndarray]:
+        """``error_estimates`` and ``modelling_errors``, from one adjoint per frame; the latter 0 in other models."""
+        if self.discretisation.fidelity.model is not PLANE_STRESS:
+            return self.error_estimates(), np.zeros(len(self.frames))
+        elements, plane_stress = self._estimated(list(ErrorKind), None)
+        return elements.copy(), plane_stress.copy()
+
+    @cached_property
+    def corrections(self) -> np.ndarray:
+        """Estimates of what finer elements and space would add to ``values``, (frames,); 0 where they are too large.
+
+        Raises as ``error_estimates``.
+        """
+        return AccuracyOptions().corrections(sum(self.errors_by_kind()), self.values)
+
+    @property
+    def corrected(self) -> np.ndarray:
+        """``values`` with their ``corrections``, (frames,). Raises as ``error_estimates``."""
+        return self.values + self.corrections
+
+    # -- stability, friction, assumptions ------------------------------------------------------------------------
+
+    def buckling_loads(self, *, frame: Frame | None = None, count: int = 3) -> tuple[BucklingLoad, ...]:
+        """Forces at which the equilibrium would stop being unique, from the tangent and its rate.
+
+        Exact for columns and others that hardly move before they buckle; else the better the nearer the frame is.
+
+        Args:
+            frame: one of the curve's; the last one by default.
+            count: how many, those nearest to the force of the frame, in both senses, nearest first.
+
+        Raises:
+            DescriptionError: motors move along the curve, or the frame is of another curve.
+            EquilibriumError: the force moves nothing, or the tangent is singular.
+        """
+        self._need_force()
+        at = self._chosen(frame)
+        found = self._modes(ForceLead(), critical_changes, at, count)
+        return tuple(BucklingLoad(at.force + value, mode) for value, mode in found)
+
+    def buckling_positions(self, *, frame: Frame | None = None, count: int = 3) -> tuple[BucklingPosition, ...]:
+        """Positions of the curve's motors at which the equilibrium would stop being unique.
+
+        Accuracy and arguments as of ``buckling_loads``.
+
+        Raises:
+            DescriptionError: a force changes along the curve, or the frame is of another curve.
+            EquilibriumError: the motors move nothing, or the tangent is singular.
+        """
+        if isinstance(self.part, Force):
+            raise DescriptionError(
+                f"curve of {self.part.name!r}", "no motor moves along it", "Ask this of a curve that follows a motor"
+            )
+        at, lead = self._chosen(frame), leading(self.part).lead(self.discretisation.linkage.joints)
+        found = self._modes(lead, critical_changes, at, count)
+        return tuple(BucklingPosition(at.displacement + value, mode) for value, mode in found)
+
+    def soft_modes(self, *, frame: Frame | None = None, count: int = 3) -> tuple[SoftMode, ...]:
+        """The directions in which an equilibrium is softest under dead loads, softest first.
+
+        Arguments and errors as those of ``buckling_loads``.
+        """
+        found = self._modes(ForceLead(), softest_modes, self._chosen(frame), count)
+        return tuple(SoftMode(value, mode) for value, mode in found)
+
+    def friction_band(self, pins: Mapping[Joint, PinFriction]) -> tuple[np.ndarray, np.ndarray]:
+        """Bounds of the force between which friction holds the mechanism, at every frame.
+
+        Turning angles are differences along the curve, of second order in the distance of its frames; ends of the curve
+        are less accurate than the rest. Only what a pin bears across its axis counts.
+
+        Args:
+            pins: friction of revolute joints.
+
+        Returns:
+            The lower and the upper bound, (frames,) each; infinite where the force's point does not move but pins turn.
+
+        Raises:
+            DescriptionError: the curve has one frame only or a frame twice, or a joint is not a hinge that turns.
+        """
+        return friction_band(self.frames, pins, self.discretisation.linkage)
+
+    def explain(self, *, tolerance: float = 0.01) -> Explanation:
+        """What is simulated and what is left out, with figures of the last frame where that may matter.
+
+        Args:
+            tolerance: relative change of the displacement from which something matters.
+
+        Raises:
+            DescriptionError: motors move along the curve, or the tolerance is not a positive number.
+            EquilibriumError: the tangent of the frame is singular.
+        """
+        options, frame = ExplanationOptions(tolerance=tolerance), self.frames[-1]
+        self._need_force()
+        return explain(
+            self.discretisation.model, self._newton, self.equilibrium(frame), frame, self.units, options=options
+        )
+
+    # -- pictures and files --------------------------------------------------------------------------------------
+
+    def von_mises(self, frame: Frame | None = None) -> np.ndarray | None:
+        """Von Mises stress at the midpoints of all cells, on rank 0; None elsewhere.
+
+        Args:
+            frame: one of the curve's; the last one by default.
+
+        Returns:
+            (cells,), numbered as in ``model.mesh.cells``.
+        """
+        snapshot = gather(self.discretisation.model, self._chosen(frame))
+        return None if snapshot is None else snapshot.von_mises
+
+    def series(self, label: str = "", *, colour: str | None = None, faint: bool = False) -> CurveSeries:
+        """The curve as a plot draws it, arguments as those of ``CurveSeries``."""
+        return CurveSeries(
+            self.displacements,
+            self.forces,
+            label=label,
+            stable=self.stable,
+            colour=colour,
+            faint=faint,
+            jumped=self.jumped,
+        )
+
     def plot(self, path: str | Path) -> None:
-        """Draws the curve as a PNG (rank 0)."""
-        if self.leads:
+        """Draws force over displacement as a PNG."""
+        if self._writes:
             across, up = self.axes
             plot_curve(
                 Path(path),
@@ -140,32 +282,119 @@ class Curve:
                 title=f"{self.part.name}, {self.configuration.name}",
             )
 
-    def write_csv(self, path: str | Path, *, errors: np.ndarray | None = None) -> None:
-        """Writes displacement, force, stability, energy and stress of every frame (rank 0).
+    def picture(
+        self, path: str | Path, *, stress: bool = True, traces: Sequence[Trace] = (), beside: Sequence[Curve] = ()
+    ) -> None:
+        """Draws the mechanism in the first and the last frame as a PNG.
 
         Args:
             path: the file.
-            errors: what finer elements would add to displacements, or to forces where displacements were prescribed
-                (``goal``), (frames,), for a column of their own.
+            stress: colour links by von Mises stress.
+            traces: paths of points to draw along.
+            beside: curves of other configurations to draw beside this one.
         """
-        length, force, stress = self.units.length, self.units.force, self.units.stress
-        if self.leads:
-            across, up = self.axes
-            columns = {
-                across.label: self.displacements,
-                up.label: self.forces,
-                "stable": self.stable,
-                "jumped": self.jumped,
-                f"strain energy [{force} {length}]": np.array([frame.strain_energy for frame in self.frames]),
-                f"max von Mises [{stress}]": np.array([frame.max_stress for frame in self.frames]),
-            }
-            unit = force if self.goal is Goal.FORCE else length
-            if self.corrections:
-                columns[f"correction within the {self.goal.value} [{unit}]"] = np.array(self.corrections)
-            if errors is not None:
-                columns[f"finer elements add to the {self.goal.value} [{unit}]"] = errors
-            write_curve_csv(Path(path), columns)
+        panels = [self.panel(stress=stress, traces=traces), *(curve.panel(stress=stress) for curve in beside)]
+        label = f"von Mises stress [{self.units.stress}]" if stress else ""
+        title = self.discretisation.scene.mechanism.name
+        on_one(
+            self.discretisation.comm,
+            lambda: draw_configurations(path, panels, title=title, colour_label=label, unit=self.units.length),
+        )
 
-    def _corrected(self, goal: Goal, values: list[float]) -> np.ndarray:
-        corrected = self.corrections and goal is self.goal
-        return np.array(values) + np.array(self.corrections) if corrected else np.array(values)
+    def panel(self, *, stress: bool = True, traces: Sequence[Trace] = ()) -> Panel | None:
+        """The picture of the first and the last frame, on rank 0; None elsewhere."""
+        model = self.discretisation.model
+        first, last = (gather(model, self.frames[k]) for k in (0, -1))
+        if first is None:
+            return None
+        plotter = MechanismPlotter(model.mechanism, model.linkage, model.mesh)
+        (across, up), end, arrows = self.axes, self.frames[-1], ()
+        if isinstance(self.part, Force):
+            arrows = (plotter.arrow(self.part, end.force, last, label=f"{end.force:g} {up.unit}"),)
+        return Panel(
+            plotter.shape(first, stress=False),
+            (plotter.shape(last, stress=stress),),
+            arrows,
+            tuple(traces),
+            f"{self.configuration.name}: {up(end.force)}, {across(end.displacement)}",
+        )
+
+    def write(self, path: str | Path) -> None:
+        """Writes displacement, stress and pressure fields of all frames as XDMF for ParaView.
+
+        Raises:
+            DescriptionError: the path does not end in .xdmf.
+            OSError: nothing can be written there.
+        """
+        write_xdmf(path, self.discretisation.model, self.frames)
+
+    def write_csv(self, path: str | Path, *, errors: bool = False) -> None:
+        """Writes displacement, force, stability, energy and stress of every frame, one row each.
+
+        Args:
+            path: the file.
+            errors: also ``error_estimates`` and ``corrected``, in columns of their own.
+        """
+        (across, up), length, force, stress = self.axes, self.units.length, self.units.force, self.units.stress
+        columns = {
+            across.label: self.displacements,
+            up.label: self.forces,
+            "stable": self.stable,
+            "jumped": self.jumped,
+            f"strain energy [{force} {length}]": np.array([frame.strain_energy for frame in self.frames]),
+            f"max von Mises [{stress}]": np.array([frame.max_stress for frame in self.frames]),
+        }
+        if errors:
+            name, unit = self.quantity.value, force if self.quantity is Quantity.FORCE else length
+            columns[f"finer elements add to the {name} [{unit}]"] = self.error_estimates()
+            columns[f"corrected {name} [{unit}]"] = self.corrected
+        if self._writes:
+            write_csv(Path(path), columns)
+
+    # -- what the above need -------------------------------------------------------------------------------------
+
+    def equilibrium(self, frame: Frame) -> Equilibrium:
+        """That of one of the frames, under what was prescribed. Local."""
+        return Equilibrium(frame.state, frame.design, self.quantity)
+
+    @property
+    def _writes(self) -> bool:
+        """Whether this process writes files."""
+        return self.discretisation.comm.rank == 0
+
+    @property
+    def _newton(self) -> Iteration:
+        return self.discretisation.newton(self.part, self.others)
+
+    def _need_force(self) -> None:
+        if not isinstance(self.part, Force):
+            raise DescriptionError(
+                f"curve of {self.part.name!r}",
+                "no force changes along it",
+                "Ask this of a curve under a changing force",
+            )
+
+    def _chosen(self, frame: Frame | None) -> Frame:
+        if frame is not None and frame not in self.frames:
+            raise DescriptionError(
+                f"curve of {self.part.name!r}", "the frame is one of another curve", "Choose from its frames"
+            )
+        return frame or self.frames[-1]
+
+    def _modes(
+        self, lead: Lead, modes: Callable[..., list[Mode]], frame: Frame, count: int
+    ) -> list[tuple[float, ModeShape]]:
+        where = f"{self.part.name!r} in configuration {self.configuration.name!r} at {self.axes[1](frame.force)}"
+        model = self.discretisation.model
+        return modes_at(model, self._newton, lead, frame, modes, count=count, where=where)
+
+    def _estimated(self, kinds: Sequence[ErrorKind], output: Output | None) -> list[np.ndarray]:
+        """Estimates of errors of each kind, (frames,) each; those not known yet from one adjoint per frame."""
+        self._need_force()
+        missing = [kind for kind in kinds if (kind, output) not in self._errors]
+        if missing:
+            estimates, point = self.discretisation.estimates, output and self.discretisation.model.point_load(output)
+            rows = [estimates.at(self._newton, self.equilibrium(frame), missing, point) for frame in self.frames]
+            for kind, column in zip(missing, np.array(rows).T, strict=True):
+                self._errors[kind, output] = column
+        return [self._errors[kind, output] for kind in kinds]

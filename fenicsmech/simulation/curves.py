@@ -4,44 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from fenicsmech.equilibrium import ArcSteps, EquilibriumSolver, Iteration, Predictor, Sense
+from fenicsmech.equilibrium import ArcSteps, Iteration, Quantity, Sense
 from fenicsmech.errors import DescriptionError
-from fenicsmech.mechanism import Force, Leader, Units
 from fenicsmech.multibody import Freedom, assemble_before_strain, count_freedom
+from fenicsmech.simulation.buckling import ModeShape
 from fenicsmech.simulation.curve import Curve
+from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.followed import FollowedCurve, PathEvent
 from fenicsmech.simulation.follower import Follower
 from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.goal import Goal
-from fenicsmech.simulation.leading import leading
-from fenicsmech.simulation.mode_shape import ModeShape
-from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.request import CurveRequest
 from fenicsmech.simulation.tracer import Tracer
 from fenicsmech.simulation.until import Until
 
 
 class Curves:
-    """Computes the curves of one model (all methods are collective).
+    """Computes curves at the present rest shape of a model.
 
     Args:
-        model: the discretised mechanism.
-        solver: how equilibria are found.
-        predictor: how the next equilibrium on a curve is guessed.
-        units: of the scene.
+        discretisation: of the scene.
     """
 
-    def __init__(self, model: MechanismModel, solver: EquilibriumSolver, predictor: Predictor, units: Units) -> None:
-        self._model, self._solver, self._predictor, self._units = model, solver, predictor, units
-        self._newtons: dict[tuple, Iteration] = {}
-
-    def newton(self, part: Leader, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
-        """The solver for what leads and some fixed forces, kept for all configurations."""
-        key, model = (part, others), self._model
-        if key not in self._newtons:
-            loads = tuple((model.point_load(other), float(magnitude)) for other, magnitude in others)
-            self._newtons[key] = self._solver.on(model.system(leading(part).load(model), loads))
-        return self._newtons[key]
+    def __init__(self, discretisation: Discretisation) -> None:
+        self._discretisation, self._model = discretisation, discretisation.model
 
     def trace(self, request: CurveRequest, watch: Callable[[int], None]) -> Curve:
         """The frames of all samples of a request; ``watch`` is called with the number of frames so far.
@@ -60,10 +45,9 @@ class Curves:
             request.configuration,
             freedom,
             tuple(frames),
-            units=self._units,
-            leads=self._model.mesh.mesh.comm.rank == 0,
+            self._discretisation,
             others=request.others,
-            goal=Goal.FORCE if request.controls[0].constrained else Goal.DISPLACEMENT,
+            quantity=Quantity.FORCE if request.controls[0].constrained else Quantity.DISPLACEMENT,
         )
 
     def follow(
@@ -106,14 +90,15 @@ class Curves:
         rigid = linkage.rigid
         motors = assembly.fraction * rigid.motor_values(request.configuration.position)
         freedom = count_freedom(rigid, assembly.poses, motors, holding)
-        newton = self.newton(request.part, request.others)
-        tracer = Tracer(self._model, newton, request, assembly=assembly, freedom=freedom, predictor=self._predictor)
+        newton = self._discretisation.newton(request.part, request.others)
+        tracer = Tracer(
+            self._model, newton, request, assembly=assembly, freedom=freedom, predictor=self._discretisation.predictor
+        )
         return tracer, newton, freedom
 
     def _follower(self, request: CurveRequest, until: Until, steps: ArcSteps | None) -> tuple[Follower, Freedom]:
         tracer, newton, freedom = self._tracer(request)
-        idle, steps = bool(freedom.idle), steps or ArcSteps()
-        return Follower(self._model, newton, request, tracer, until=until, steps=steps, idle=idle), freedom
+        return Follower(self._model, newton, request, tracer, until=until, steps=steps or ArcSteps()), freedom
 
     def _followed(self, request: CurveRequest, freedom: Freedom, follower: Follower) -> FollowedCurve:
         return FollowedCurve(
@@ -121,10 +106,9 @@ class Curves:
             request.configuration,
             freedom,
             tuple(follower.frames),
-            units=self._units,
-            leads=self._model.mesh.mesh.comm.rank == 0,
+            self._discretisation,
             others=request.others,
             # loads have limit points, where no displacement belongs to a slightly larger one
-            goal=Goal.FORCE,
+            quantity=Quantity.FORCE,
             events=tuple(follower.events),
         )

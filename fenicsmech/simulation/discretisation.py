@@ -8,18 +8,16 @@ from mpi4py import MPI
 
 from fenicsmech.clock import Clock
 from fenicsmech.collective import on_one
-from fenicsmech.equilibrium import EquilibriumSolver, Predictor
-from fenicsmech.mechanism import Scene
+from fenicsmech.equilibrium import EquilibriumSolver, Iteration, Predictor
+from fenicsmech.estimates import Estimates
+from fenicsmech.mechanism import Force, Leader, Scene
+from fenicsmech.model import Fidelity, MechanismModel, check_links, mesh_mechanism
 from fenicsmech.multibody import build_linkage
-from fenicsmech.simulation.curves import Curves
-from fenicsmech.simulation.estimates import Estimates
-from fenicsmech.simulation.fidelity import Fidelity
-from fenicsmech.simulation.link_meshes import check_links, mesh_mechanism
-from fenicsmech.simulation.model import MechanismModel
+from fenicsmech.simulation.leading import leading
 
 
 class Discretisation:
-    """What a simulation computes with.
+    """The meshed and compiled parts of simulations, which simulations of several designs share, and curves refer to.
 
     Args:
         scene: the mechanism and what acts on it.
@@ -49,6 +47,7 @@ class Discretisation:
         self.scene, self.fidelity, self.clock, self.comm = scene, fidelity, clock, comm
         self.solver, self.predictor = solver, predictor
         self.linkage = build_linkage(scene.mechanism, fidelity.model.mechanism_dim)
+        self._newtons: dict[tuple, Iteration] = {}
         on_one(comm, lambda: check_links(scene.mechanism, self.linkage, fidelity))
 
     def at(self, fidelity: Fidelity) -> Discretisation:
@@ -59,7 +58,7 @@ class Discretisation:
 
     @cached_property
     def model(self) -> MechanismModel:
-        """The meshed mechanism (collective)."""
+        """The meshed mechanism."""
         mechanism = self.scene.mechanism
         with self.clock.phase("mesh"):
             mesh = mesh_mechanism(self.comm, mechanism, self.linkage, self.fidelity)
@@ -67,11 +66,14 @@ class Discretisation:
             return MechanismModel(mechanism, self.linkage, mesh, self.fidelity, self.clock, self.scene.effects)
 
     @cached_property
-    def curves(self) -> Curves:
-        """What computes curves (collective)."""
-        return Curves(self.model, self.solver, self.predictor, self.scene.units)
-
-    @cached_property
     def estimates(self) -> Estimates:
-        """Error estimates at equilibria (collective)."""
-        return Estimates(self.model, self.curves.newton)
+        """Error estimates at equilibria."""
+        return Estimates(self.model)
+
+    def newton(self, part: Leader, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
+        """The solver for what changes and some constant forces, kept for all configurations."""
+        key = part, others
+        if key not in self._newtons:
+            loads = tuple((self.model.point_load(other), float(magnitude)) for other, magnitude in others)
+            self._newtons[key] = self.solver.on(self.model.system(leading(part).load(self.model), loads))
+        return self._newtons[key]

@@ -1,8 +1,9 @@
-"""What a simulation simulates and what it leaves out, in plain words, with figures where leaving it out may matter."""
+"""Assumptions of a simulation in plain words, with figures where what is left out may matter."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from math import hypot, pi
 
@@ -11,22 +12,36 @@ import ufl
 from dolfinx import fem
 from scipy.spatial import cKDTree
 
+from fenicsmech.checks import positive
 from fenicsmech.collective import from_one
 from fenicsmech.compat import compile_form
 from fenicsmech.effects import Gravity
+from fenicsmech.equilibrium import Iteration, Quantity
+from fenicsmech.estimates import Equilibrium, adjoint_at
 from fenicsmech.mechanism import FlexibleLink, Strip, Units
-from fenicsmech.simulation.curve import Curve
+from fenicsmech.model import MechanismModel
+from fenicsmech.simulation.fields import gather
 from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.goal import Goal
-from fenicsmech.simulation.influence import Equilibrium, influence
-from fenicsmech.simulation.model import MechanismModel
-from fenicsmech.simulation.snapshot import gather
 
-PLASTIC_WEIGHT = 1.2e-9 * 9810.0
-"""Weight per volume of plastics and silicones, N/mm³ (1.2 g/cm³)."""
 
-_LOCKS = {1: 0.40, 2: 0.48, 3: 0.49}  # ν from which pure displacement elements of an order lose accuracy
-_SLENDER = 0.2  # of the out-of-plane buckling load: from here a link deserves a simulation in space
+@dataclass(frozen=True)
+class ExplanationOptions:
+    """From where on something that is left out matters.
+
+    Attributes:
+        tolerance: relative change of the displacement.
+        weight: per volume, of plastics and silicones (1.2 g/cm³), N/mm³.
+        locking: Poisson's ratio from which displacement elements of an order lose accuracy.
+        slender: of the out-of-plane buckling load, from which a link deserves a simulation in space.
+    """
+
+    tolerance: float = 0.01
+    weight: float = 1.2e-9 * 9810.0
+    locking: Mapping[int, float] = field(default_factory=lambda: {1: 0.40, 2: 0.48, 3: 0.49})
+    slender: float = 0.2
+
+    def __post_init__(self) -> None:
+        positive("tolerance of an explanation", self.tolerance)
 
 
 @dataclass(frozen=True)
@@ -56,70 +71,75 @@ class Explanation:
         return "\n".join([*lines, *(f"  {'!' if h.matters else '-'} {h.what}: {h.text}" for h in self.left_out)])
 
 
-def simulated(model: MechanismModel, space: str, order: int) -> tuple[str, ...]:
-    """What is simulated, in plain words."""
-    mechanism = model.mechanism
+def explain(
+    model: MechanismModel, newton: Iteration, at: Equilibrium, frame: Frame, units: Units, options: ExplanationOptions
+) -> Explanation:
+    """What is simulated, and hints on what is left out, from one frame of a curve.
+
+    Args:
+        model, newton: the discretised mechanism, and the solver that found the frame.
+        at: the equilibrium of the frame.
+        frame: of the curve.
+        units: of the description; weights are only known in N and mm.
+        options: from where on something matters.
+
+    Raises:
+        EquilibriumError: the tangent of the frame is singular.
+    """
+    hints = [
+        _weight_hint(model, newton, at, frame, units, options),
+        _compressibility_hint(model, options.locking[model.elastic.order]),
+        _touching_hint(model, frame),
+    ]
+    if model.linkage.dim == 2:
+        hints.append(_buckling_hint(model, frame, options.slender))
+    return Explanation(_simulated(model), tuple(hint for hint in hints if hint is not None))
+
+
+def _simulated(model: MechanismModel) -> tuple[str, ...]:
+    mechanism, elastic = model.mechanism, model.elastic
     kinds = sorted({joint.kind.name for joint in mechanism.joints})
     links = ", ".join(
         f"{link.name} ({link.material.name}, {type(link.material.law).__name__})" for link in mechanism.flexible_links
     )
-    bulky = [link.name for link, own in zip(mechanism.flexible_links, model.mixed, strict=True) if own]
+    mixed = [link.name for link, own in zip(mechanism.flexible_links, model.mixed, strict=True) if own]
     items = [
-        f"flexible links in large deformation ({space}, order {order}): {links}",
+        f"flexible links in large deformation ({elastic.model.name}, order {elastic.order}): {links}",
         f"rigid links: {', '.join(link.name for link in mechanism.rigid_links)}",
         f"ideal joints, without play, friction or compliance: {', '.join(kinds)}",
         "forces that keep their direction, applied without inertia",
     ]
-    if bulky:
-        items.insert(1, f"u–p (mixed) formulation of {', '.join(bulky)}")
+    if mixed:
+        items.insert(1, f"pressure as an unknown (u–p elements) in {', '.join(mixed)}")
     return (*items, *(effect.explain() for effect in model.effects))
 
 
-def hints(model: MechanismModel, newton, curve: Curve, *, order: int, tolerance: float, units: Units) -> list[Hint]:
-    """Hints from the last frame of ``curve`` (collective).
-
-    Args:
-        model, newton: of the simulation, for the curve's forces.
-        curve: of this simulation.
-        order: degree of the displacement field.
-        tolerance: relative change of the displacement from which something matters.
-        units: of the description; weights are only known in N and mm.
-    """
-    frame = curve.frames[-1]
-    found = [
-        _weight_hint(model, newton, curve, frame, tolerance, units),
-        _compressibility_hint(model, order),
-        _touching_hint(model, frame),
-    ]
-    if model.linkage.dim == 2:
-        found.append(_buckling_hint(model, frame))
-    return [hint for hint in found if hint is not None]
-
-
-def _weight_hint(model, newton, curve: Curve, frame: Frame, tolerance: float, units: Units) -> Hint | None:
+def _weight_hint(
+    model: MechanismModel, newton: Iteration, at: Equilibrium, frame: Frame, units: Units, options: ExplanationOptions
+) -> Hint | None:
     if any(isinstance(effect, Gravity) for effect in model.effects):
         return None
     if (units.length, units.force) != ("mm", "N"):
         return Hint("weight", "list Gravity(…) with densities in your units to include it", False)
-    change = PLASTIC_WEIGHT * float(np.linalg.norm(weight_influence(model, newton, curve, frame)))
-    share = change / max(abs(frame.displacement), 1e-300)
+    change = options.weight * float(np.linalg.norm(weight_influence(model, newton, at)))
+    part = change / max(abs(frame.displacement), 1e-300)
     return Hint(
         "weight",
-        f"flexible links of 1.2 g/cm³ would move the point by at most {change:.2g} mm, {share:.2%} of its way; "
+        f"flexible links of 1.2 g/cm³ would move the point by at most {change:.2g} mm, {part:.2%} of its way; "
         "list Gravity(…) to include it (one form to compile, a few per cent of a frame)",
-        share > tolerance,
+        part > options.tolerance,
     )
 
 
-def weight_influence(model: MechanismModel, newton, curve: Curve, frame: Frame) -> np.ndarray:
-    """Derivative of the displacement by a weight per volume along each axis the mechanism moves in (collective).
+def weight_influence(model: MechanismModel, newton: Iteration, at: Equilibrium) -> np.ndarray:
+    """Derivative of the displacement by a weight per volume along each axis the mechanism moves in.
 
-    dQ/dw_k = z · ∫ e_k dV, z the adjoint of the displacement
+    dQ/dw_k = û · ∫ e_k dV, û the nodal adjoint of the displacement
     """
     elastic = model.elastic
-    at = replace(Equilibrium.on(curve, frame), goal=Goal.DISPLACEMENT)
-    with influence(model, newton, at) as adjoint:
-        z = elastic.split(adjoint.on(None))[0]
+    with model.shaped(at.design):
+        adjoint = adjoint_at(newton, replace(at, quantity=Quantity.DISPLACEMENT))
+        displacements = elastic.split(adjoint.nodal)[0]
         depths = [elastic.model.multiplier(link.shape.depth) for link in model.mechanism.flexible_links]
         v = ufl.TestFunction(elastic.u.function_space)
         depth = elastic.cellwise(depths) * ufl.det(elastic.rest_gradient)
@@ -128,24 +148,24 @@ def weight_influence(model: MechanismModel, newton, curve: Curve, frame: Frame) 
         slopes = []
         for axis in np.eye(elastic.model.dim)[: model.linkage.dim]:
             direction.value = axis
-            slopes.append(model.mesh.mesh.comm.allreduce(float(elastic.assembled(form) @ z)))
+            slopes.append(model.mesh.mesh.comm.allreduce(float(elastic.assembled(form) @ displacements)))
     return np.array(slopes)
 
 
-def _compressibility_hint(model: MechanismModel, order: int) -> Hint | None:
-    limit, links = _LOCKS[order], model.mechanism.flexible_links
+def _compressibility_hint(model: MechanismModel, limit: float) -> Hint | None:
+    elastic, links = model.elastic, model.mechanism.flexible_links
     stiff = [
         link.name
         for link, own in zip(links, model.mixed, strict=True)
-        if link.material.law.nu > limit and model.elastic.model.confined and not own
+        if link.material.law.nu > limit and elastic.model.confined and not own
     ]
     if not stiff:
         return None
-    remedy = "use order 2 or 3 with" if order == 1 else "use"
+    remedy = "use order 2 or 3 with" if elastic.order == 1 else "use"
     return Hint(
-        "u–p (mixed) formulation",
-        f"Poisson's ratio of {', '.join(stiff)} is above {limit:g}: elements of order {order} are too stiff there; "
-        f"{remedy} formulation=MixedFormulation(above={limit:g}), or compare two sizes",
+        "pressure as an unknown",
+        f"Poisson's ratio of {', '.join(stiff)} is above {limit:g}: elements of order {elastic.order} are too stiff "
+        f"there; {remedy} formulation=MixedFormulation(above={limit:g}), or compare two sizes",
         True,
     )
 
@@ -161,7 +181,7 @@ def _touching_hint(model: MechanismModel, frame: Frame) -> Hint:
 
 
 def _close_pairs(model: MechanismModel, frame: Frame) -> list[tuple[str, str]]:
-    """Names of links that come closer than half an element to each other and share no joint (collective)."""
+    """Names of links that come closer than half an element to each other and share no joint."""
     snapshot = gather(model, frame)
     mesh, links = model.mesh, model.mechanism.flexible_links
 
@@ -179,20 +199,20 @@ def _close_pairs(model: MechanismModel, frame: Frame) -> list[tuple[str, str]]:
     return from_one(mesh.comm, search)
 
 
-def _buckling_hint(model: MechanismModel, frame: Frame) -> Hint | None:
+def _buckling_hint(model: MechanismModel, frame: Frame, slender: float) -> Hint | None:
     """The largest compression of a strip between two joints over its Euler load out of the plane.
 
     N_cr = π² E I / L²,     I = h b³ / 12,     h in the plane, b the depth
     """
     worst = max((_slenderness(model, link, frame) for link in model.mechanism.flexible_links), default=(0.0, ""))
-    share, name = worst
+    part, name = worst
     if not name:
         return None
     return Hint(
         "bending out of the plane",
-        f"the compression of {name} is about {share:.2g} of what buckles it out of the plane"
-        + ("; use space='3d'" if share > _SLENDER else ""),
-        share > _SLENDER,
+        f"the compression of {name} is about {part:.2g} of what buckles it out of the plane"
+        + ("; use space='3d'" if part > slender else ""),
+        part > slender,
     )
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from fenicsmech.equilibrium import Critical, CriticalPoint
-from fenicsmech.report import CurveMark, CurveSeries
+from fenicsmech.plot import CurveMark, CurveSeries
+from fenicsmech.simulation.buckling import ModeShape
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.mode_shape import ModeShape
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ class PathEvent:
         return self.critical.modes
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class FollowedCurve(Curve):
     """Frames in the order of the path, however often it turns back.
 

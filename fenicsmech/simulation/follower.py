@@ -8,7 +8,6 @@ from dataclasses import replace
 from time import perf_counter
 
 from fenicsmech.equilibrium import (
-    IDLE_STIFFNESS,
     ArcLength,
     ArcSteps,
     Critical,
@@ -27,11 +26,11 @@ from fenicsmech.equilibrium import (
     null_space,
 )
 from fenicsmech.errors import EquilibriumError
+from fenicsmech.model import MechanismModel
+from fenicsmech.simulation.buckling import ModeShape, mode_shape
 from fenicsmech.simulation.followed import PathEvent
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.leading import leading
-from fenicsmech.simulation.mode_shape import ModeShape, mode_shape
-from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.request import CurveRequest
 from fenicsmech.simulation.tracer import Tracer
 from fenicsmech.simulation.until import Until
@@ -47,7 +46,6 @@ class Follower:
         tracer: of the same request.
         until: where the path ends.
         steps: how finely it is followed.
-        idle: whether the mechanism has freedoms without stiffness.
     """
 
     def __init__(
@@ -59,11 +57,9 @@ class Follower:
         *,
         until: Until,
         steps: ArcSteps,
-        idle: bool,
     ) -> None:
         self._model, self._newton, self._request, self._tracer = model, newton, request, tracer
         self._until, self._steps, self._lead = until, steps, leading(request.part).lead(model.linkage.joints)
-        self._floor = IDLE_STIFFNESS if idle else 0.0
         self.frames: list[Frame] = []
         self.events: list[PathEvent] = []
 
@@ -138,8 +134,8 @@ class Follower:
         (of_value, of_conjugate) = (until.travel, until.force) if lead.displaces else (until.force, until.travel)
         parameter = max((abs(target - p) for target in of_value), default=0.0)
         conjugate = max((abs(target - q) for target in of_conjugate), default=0.0)
-        metric = metric_at(self._newton, lead, state, floor=self._floor, parameter=parameter, conjugate=conjugate)
-        points = PathPoints(self._newton, lead, metric, floor=self._floor)
+        metric = metric_at(self._newton, lead, state, parameter=parameter, conjugate=conjugate)
+        points = PathPoints(self._newton, lead, metric)
         return ArcLength(points, steps=self._steps, conjugate_reference=conjugate or math.inf)
 
     def _finishes(self) -> list[Finish]:

@@ -11,19 +11,16 @@ Reactions are those without friction: bounds are of first order in μ. Source: C
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from fenicsmech.checks import positive
 from fenicsmech.errors import DescriptionError
-from fenicsmech.joints import REVOLUTE
 from fenicsmech.mechanism import Joint
 from fenicsmech.multibody import JointCoordinate, Linkage
-from fenicsmech.simulation.curve import Curve
-
-_SAME = 1e-8  # of the mechanism's length, or rad: frames closer than that differ by the tolerance of their equilibria
+from fenicsmech.simulation.frame import Frame
 
 
 @dataclass(frozen=True)
@@ -47,36 +44,22 @@ class PinFriction:
 
 
 def friction_band(
-    curve: Curve, pins: Mapping[Joint, PinFriction], *, linkage: Linkage
+    frames: Sequence[Frame], pins: Mapping[Joint, PinFriction], linkage: Linkage
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds of the force between which friction holds the mechanism, at every frame of a curve.
-
-    Turning angles are differences along the curve, of second order in the distance of its frames; ends of the curve
-    are less accurate than the rest. Only what a pin bears across its axis counts.
-
-    Args:
-        curve: equilibria without friction.
-        pins: friction of revolute joints.
-        linkage: of the simulation the curve is from.
-
-    Returns:
-        The lower and the upper bound, (frames,) each; infinite where the force's point does not move but pins turn.
-
-    Raises:
-        DescriptionError: the curve has one frame only or a frame twice, or a joint is no revolute joint that moves.
-    """
-    poses = [frame.state.poses for frame in curve.frames]
+    """Bounds of the force between which friction holds the mechanism, as ``Curve.friction_band``."""
+    poses = [frame.state.poses for frame in frames]
     if len(poses) < 2:
         raise DescriptionError("friction band", "the curve has one frame only", "Ask for two forces or more")
     angles, moments = [], []
     for joint, pin in pins.items():
-        if joint.kind != REVOLUTE or joint.name not in curve.frames[0].reactions:
+        is_hinge = joint.kind.motorised and not joint.kind.sliding
+        if not is_hinge or joint.name not in frames[0].reactions:
             raise DescriptionError(
-                "friction band", f"{joint.name!r} is no hinge of this curve that turns", "Name its revolute joints"
+                "friction band", f"{joint.name!r} is not a hinge of this curve that turns", "Name its revolute joints"
             )
         coordinate = JointCoordinate(linkage, joint)
         turned = np.array([coordinate.value(z) for z in poses])
-        forces = np.array([frame.reactions[joint.name].force for frame in curve.frames])
+        forces = np.array([frame.reactions[joint.name].force for frame in frames])
         if linkage.dim == 3:
             turned = np.unwrap(turned, period=4.0 * np.pi)
             first, axis = coordinate.bodies[0], np.array(joint.axis)
@@ -84,17 +67,18 @@ def friction_band(
             forces = forces - np.sum(forces * axes, axis=1, keepdims=True) * axes
         angles.append(turned)
         moments.append(pin.coefficient * pin.radius * np.linalg.norm(forces, axis=1))
-    arc = _arc(curve, linkage)
+    arc = _arc(frames, linkage)
     order = min(2, len(poses) - 1)
     loss = np.zeros_like(arc)
     for moment, turned in zip(moments, angles, strict=True):
         loss += moment * np.abs(np.gradient(turned, arc, edge_order=order))
-    speed = np.abs(np.gradient(curve.displacements, arc, edge_order=order))
+    speed = np.abs(np.gradient([frame.displacement for frame in frames], arc, edge_order=order))
     surplus = np.divide(loss, speed, out=np.where(loss > 0.0, np.inf, 0.0), where=speed > 0.0)
-    return curve.forces - surplus, curve.forces + surplus
+    held = np.array([frame.force for frame in frames])
+    return held - surplus, held + surplus
 
 
-def _arc(curve: Curve, linkage: Linkage) -> np.ndarray:
+def _arc(frames: Sequence[Frame], linkage: Linkage) -> np.ndarray:
     """How far all bodies and the force's point have gone, in lengths of the mechanism and rad, (frames,).
 
     Raises:
@@ -102,8 +86,9 @@ def _arc(curve: Curve, linkage: Linkage) -> np.ndarray:
     """
     space = linkage.joints.space
     scale = np.concatenate([np.full(space.dim, linkage.length), np.ones(space.rotation_size)])
-    motion = [np.append(frame.state.poses / scale, frame.displacement / linkage.length) for frame in curve.frames]
+    motion = [np.append(frame.state.poses / scale, frame.displacement / linkage.length) for frame in frames]
     steps = np.linalg.norm(np.diff(motion, axis=0), axis=1)
-    if not np.all(steps > _SAME):
+    # frames closer than that, in lengths of the mechanism or rad, differ by the tolerance of their equilibria
+    if not np.all(steps > 1e-8):
         raise DescriptionError("friction band", "two frames of the curve are the same", "Ask for different samples")
     return np.concatenate([[0.0], np.cumsum(steps)])

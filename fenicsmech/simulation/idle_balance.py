@@ -12,19 +12,19 @@ from collections.abc import Sequence
 import numpy as np
 from mpi4py import MPI
 
-from fenicsmech.equilibrium import EquilibriumSystem, State
+from fenicsmech.equilibrium import Residual, State
+from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import Motion, stiff_motions
-from fenicsmech.simulation.model import MechanismModel
 
 _ROUNDED = 1e-12  # of the work of each reaction: what is left of their sum, which vanishes
 
 
-def idle_imbalance(model: MechanismModel, system: EquilibriumSystem, state: State, loads: Sequence[float]) -> float:
+def idle_imbalance(model: MechanismModel, residual: Residual, state: State, loads: Sequence[float]) -> float:
     """Largest work along a motion that deforms no link, over loads times the velocity of what moves fastest.
 
     Args:
         model: the discretised mechanism.
-        system: its equations; the last ``balance`` was that of ``state``, which is loaded.
+        residual: at the state.
         state: an equilibrium.
         loads: magnitudes of all forces.
 
@@ -34,7 +34,8 @@ def idle_imbalance(model: MechanismModel, system: EquilibriumSystem, state: Stat
     size, worst, joints = sum(map(abs, loads)) + _weights(model, state), 0.0, model.linkage.joints
     parts = np.abs(state.multipliers) @ np.abs(joints.gradient(state.poses, state.motors))
     for motion in stiff_motions(model.linkage, state.poses, state.motors):
-        work = abs(system.work(_nodal(model, state, motion), motion.z))
+        lacking = model.mesh.mesh.comm.allreduce(float(residual.nodal @ _nodal(model, state, motion)))
+        work = abs(lacking + float(residual.rigid @ motion.z))
         rounding = _ROUNDED * float(parts @ np.abs(motion.z))
         worst = max(worst, (work - rounding) / motion.fastest(model.linkage.length))
     return worst / size if size > 0.0 else 0.0

@@ -9,8 +9,8 @@ import numpy as np
 
 from fenicsmech.equilibrium import ForceLead, Lead, MotorLead, PointLoad
 from fenicsmech.mechanism import Drive, Force, Leader, Motor, Units
+from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import JointSystem, body_point
-from fenicsmech.simulation.model import MechanismModel
 
 
 @dataclass(frozen=True)

@@ -9,41 +9,19 @@ import numpy as np
 from fenicsmech.mechanism import Force, Link, Mechanism, in_dimension
 from fenicsmech.meshing import MechanismMesh
 from fenicsmech.multibody import Linkage
-from fenicsmech.report import (
+from fenicsmech.plot import (
     Arrow,
     FlexibleShape,
     MechanismShape,
-    Panel,
     Pin,
     RigidShape,
-    Trace,
     plan_view,
     rigid_outline,
 )
-from fenicsmech.simulation.curve import Curve
-from fenicsmech.simulation.model import MechanismModel
-from fenicsmech.simulation.snapshot import Snapshot, gather
+from fenicsmech.simulation.fields import Snapshot
 
 
-def panel(model: MechanismModel, curve: Curve, *, stress: bool, traces: Sequence[Trace]) -> Panel | None:
-    """The picture of a curve's first and last frame, on rank 0; None elsewhere (collective)."""
-    first, last = (gather(model, curve.frames[k]) for k in (0, -1))
-    if first is None:
-        return None
-    pen = Draughtsman(model.mechanism, model.linkage, model.mesh)
-    (across, up), end, arrows = curve.axes, curve.frames[-1], ()
-    if isinstance(curve.part, Force):
-        arrows = (pen.arrow(curve.part, end.force, last, label=f"{end.force:g} {up.unit}"),)
-    return Panel(
-        pen.shape(first, stress=False),
-        (pen.shape(last, stress=stress),),
-        arrows,
-        tuple(traces),
-        f"{curve.configuration.name}: {up(end.force)}, {across(end.displacement)}",
-    )
-
-
-class Draughtsman:
+class MechanismPlotter:
     """Draws states of one mechanism, seen along z; the triangles are those of the undeformed mesh.
 
     Args:

@@ -2,46 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from copy import copy
+from typing import Protocol
 
 import numpy as np
 from mpi4py import MPI
 
-from fenicsmech.checks import positive
 from fenicsmech.clock import Clock
+from fenicsmech.collective import from_one
 from fenicsmech.effects import holding
-from fenicsmech.elasticity import (
-    Formulation,
-    MixedFormulation,
-    Quadrature,
-)
-from fenicsmech.equilibrium import (
-    ArcSteps,
-    EquilibriumSolver,
-    Hermite,
-    Predictor,
-    PrimalDualNewton,
-)
+from fenicsmech.elasticity import Formulation, MixedFormulation, Quadrature
+from fenicsmech.equilibrium import ArcSteps, EquilibriumSolver, Hermite, Iteration, Predictor, PrimalDualNewton
 from fenicsmech.errors import DescriptionError
+from fenicsmech.estimates import AccuracyControl, Choice, Estimates, FidelityLevel, LevelErrors
+from fenicsmech.log import Progress, Silent
 from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Leader, Mechanism, Output, Scene
-from fenicsmech.report import Progress, Silent
+from fenicsmech.meshing import radius_ratios
+from fenicsmech.model import Fidelity, MechanismModel, read_fidelity
+from fenicsmech.multibody import Linkage
+from fenicsmech.simulation.buckling import ModeShape
 from fenicsmech.simulation.curve import Curve
-from fenicsmech.simulation.dial import Choice, Dial, Outcome, Rung, corrections, refuse_beside_accuracy
+from fenicsmech.simulation.curves import Curves
 from fenicsmech.simulation.discretisation import Discretisation
-from fenicsmech.simulation.fidelity import read_fidelity
+from fenicsmech.simulation.fields import rest_vertices
 from fenicsmech.simulation.followed import FollowedCurve, PathEvent
-from fenicsmech.simulation.mode_shape import ModeShape
-from fenicsmech.simulation.postprocessing import Postprocessing
 from fenicsmech.simulation.request import CurveRequest, read_path, read_request
 from fenicsmech.simulation.unloaded import unloaded_positions
 from fenicsmech.simulation.until import Until, check_until
 
 
-class Simulation(Postprocessing):
+class RestShape(Protocol):
+    """A design that has a rest shape on any mesh of its mechanism."""
+
+    def rest_shape(self, simulation: Simulation) -> np.ndarray:
+        """This rank's values of the simulation's design field with ghosts, flat."""
+
+
+class Simulation:
     """Equilibria of a scene at one fidelity: the one given, or the cheapest that is accurate enough.
 
-    Nothing is meshed or compiled until the first curve; the description is checked at once (collective).
+    Nothing is meshed or compiled until the first curve; the description is checked at once.
 
     Args:
         scene: the mechanism and what acts on it.
@@ -49,11 +51,11 @@ class Simulation(Postprocessing):
             the plane; "plane-stress" or "plane-strain".
         order: degree of the displacement field, 1, 2 or 3; 2 by default.
         size: element size in the plane of the links, or one per flexible link.
-        accuracy: instead of all that says how finely: relative error allowed in the largest displacement of every
-            curve, or in the largest force where displacements are prescribed. ``load_displacement`` finds the cheapest
-            fidelity that is good enough with the estimates of its errors added, see ``choice`` and
-            ``Curve.corrections``; ``follow`` and ``branches`` compute at the one chosen last, and refuse before. With
-            links known from files only, ``size`` stands for their thickness.
+        accuracy: instead of space, order, layers, segments and quadrature: relative error allowed in the largest
+            displacement of every curve, or in the largest force where displacements are prescribed, once the estimates
+            of its errors are added (``Curve.corrected``). ``load_displacement`` finds the cheapest fidelity that is
+            good enough, see ``choice``; ``follow`` and ``branches`` compute at the one chosen last, and refuse before.
+            With links known from files only, ``size`` stands for their thickness.
         layers: of elements through the depth, or half of it where half is meshed; by default from depth and size.
         segments: of elements around pins, at least; 8 by default.
         quadrature: quadrature degree; the measured optimum by default.
@@ -62,6 +64,9 @@ class Simulation(Postprocessing):
         solver: how equilibria are found.
         predictor: how the next equilibrium on a curve is guessed.
         comm: processes that share the work.
+
+    Attributes:
+        choice: the fidelity that the accuracy asked for has led to; None before.
 
     Raises:
         DescriptionError: the scene cannot be simulated as described.
@@ -88,40 +93,46 @@ class Simulation(Postprocessing):
                 "formulation", f"it is {formulation!r}", "Give MixedFormulation() or DisplacementFormulation()"
             )
         formulation = formulation or MixedFormulation()
+        given = {"space": space, "order": order, "layers": layers, "segments": segments, "quadrature": quadrature}
+        self.scene, self.comm, self.clock = scene, comm, Clock()
         self.choice: Choice | None = None
-        self._dial: Dial | None = None
+        self._control: AccuracyControl | None = None
+        self._design: np.ndarray | None = None
         if accuracy is None:
-            fidelity = read_fidelity(
-                scene,
-                space=space,
-                order=order,
-                size=size,
-                quadrature=quadrature,
-                formulation=formulation,
-                layers=layers,
-                segments=segments,
-            )
+            fidelity = read_fidelity(scene, **given, size=size, formulation=formulation)
         else:
-            refuse_beside_accuracy(space=space, order=order, layers=layers, segments=segments, quadrature=quadrature)
-            self._dial = Dial(scene, positive("accuracy", accuracy), size, formulation)
-            fidelity = self._dial.fidelity(self._dial.rung)
+            _refuse_beside_accuracy(given)
+            self._control = AccuracyControl(scene, accuracy, size, formulation)
+            fidelity = self._control.fidelity(self._control.level)
         solver, predictor = solver or PrimalDualNewton(), predictor or Hermite()
-        super().__init__(Discretisation(scene, fidelity, solver=solver, predictor=predictor, clock=Clock(), comm=comm))
+        self._discretisation = Discretisation(
+            scene, fidelity, solver=solver, predictor=predictor, clock=self.clock, comm=comm
+        )
         self._described = _description(scene.mechanism)
+
+    def __repr__(self) -> str:
+        sizes = sorted(set(self.fidelity.sizes.values()))
+        size = f"{sizes[0]:.3g}" if len(sizes) == 1 else f"{sizes[0]:.3g} to {sizes[-1]:.3g}"
+        return (
+            f"<Simulation of {self.scene.mechanism.name!r}: {self.fidelity.model.name}, order {self.fidelity.order}, "
+            f"elements of {size} {self.scene.units.length}{', another design' if self._design is not None else ''}>"
+        )
+
+    # -- curves --------------------------------------------------------------------------------------------------
 
     def load_displacement(
         self,
-        force: Force,
+        part: Force,
         *,
         forces: Sequence[float] | None = None,
         displacements: Sequence[float] | None = None,
         configuration: Configuration = DRAWN,
         others: Mapping[Force, float] | None = None,
     ) -> Curve:
-        """The equilibria under a changing force (collective).
+        """The equilibria under a changing force.
 
         Args:
-            force: the force that changes.
+            part: the force that changes.
             forces: its magnitudes (load control), or
             displacements: displacements of its point along it (displacement control).
             configuration: motor positions.
@@ -135,27 +146,18 @@ class Simulation(Postprocessing):
         self._check_description()
         request = read_request(
             self.scene.mechanism,
-            force,
+            part,
             forces=forces,
             displacements=displacements,
             configuration=configuration,
             others=others,
         )
-        with Progress(len(request.controls), configuration.name) if self.comm.rank == 0 else Silent() as progress:
-            if self._dial is None:
-                self._last = self.trace(request, watch=progress.update)
-            else:
-                self.choice = self._dial.settle(lambda rung: self._outcome(rung, request, progress.update))
-        return self._last
-
-    def trace(self, request: CurveRequest, *, watch: Callable[[int], None] = lambda done: None) -> Curve:
-        """The curve of a checked request, as ``load_displacement`` without showing progress (collective).
-
-        Args:
-            request: what is asked for.
-            watch: called with the number of frames so far.
-        """
-        return self._discretisation.curves.trace(request, watch)
+        with self._progress(len(request.controls), configuration) as progress, self._shaped():
+            if self._control is None:
+                return self.trace(request, watch=progress.update)
+            curves: list[Curve] = []
+            self.choice = self._control.choose(lambda level: self._errors(level, request, progress.update, curves))
+            return curves[-1]
 
     def follow(
         self,
@@ -166,10 +168,11 @@ class Simulation(Postprocessing):
         others: Mapping[Force, float] | None = None,
         steps: ArcSteps | None = None,
     ) -> FollowedCurve:
-        """The whole curve under a changing force or a moving motor, past limit points and folds (collective).
+        """The whole curve under a changing force or a moving motor, past limit points and folds.
 
-        Starts in the configuration, without the force that leads, and goes towards the first displacement or position,
-        or else the first force, of ``until``. Across the curve of a motor lies its position, up its torque or force.
+        Starts in the configuration, without the force that changes, and goes towards the first displacement or
+        position, or else the first force, of ``until``. Across the curve of a motor lies its position, up its torque or
+        force.
 
         Args:
             part: the force that changes, or the motor that moves, or a ``Drive`` of several.
@@ -184,12 +187,11 @@ class Simulation(Postprocessing):
             EquilibriumError: the curve ends early; carries the frames before that.
         """
         self._check_description()
-        self._check_rung(part)
+        self._check_chosen(part)
         request = read_path(self.scene.mechanism, part, configuration=configuration, others=others)
         check_until(until, part)
-        with Progress(until.frames, configuration.name) if self.comm.rank == 0 else Silent() as progress:
-            self._last = self._discretisation.curves.follow(request, until, steps, progress.update)
-        return self._last
+        with self._progress(until.frames, configuration) as progress, self._shaped():
+            return Curves(self._discretisation).follow(request, until, steps, progress.update)
 
     def branches(
         self,
@@ -200,7 +202,7 @@ class Simulation(Postprocessing):
         steps: ArcSteps | None = None,
         mode: ModeShape | None = None,
     ) -> tuple[FollowedCurve, FollowedCurve]:
-        """The curve that crosses ``curve`` at a bifurcation, from there in both senses (collective).
+        """The curve that crosses ``curve`` at a bifurcation, from there in both senses, at the design of ``curve``.
 
         Args:
             curve: a followed curve.
@@ -211,12 +213,51 @@ class Simulation(Postprocessing):
                 to it where it has left ``curve`` is found.
 
         Raises:
-            DescriptionError: the event is no bifurcation of the curve, or the mode is missing or none of its.
+            DescriptionError: the event is not a bifurcation of the curve, the mode is missing or none of its, or the
+                curve was computed at another fidelity.
             EquilibriumError: the curve is not found, or ends early; carries the frames before that.
         """
         self._check_description()
         check_until(until, curve.part)
-        return self._discretisation.curves.branches(self._chosen(curve), event, until, steps, mode)
+        if curve.discretisation is not self._discretisation:
+            raise DescriptionError(
+                f"curve of {curve.part.name!r}",
+                "it was computed at another fidelity than this simulation has now",
+                "Ask the simulation that computed it, before an accuracy makes it go on to a finer mesh",
+            )
+        return Curves(self._discretisation).branches(curve, event, until, steps, mode)
+
+    def path(self, part: Force | Output, configurations: Sequence[Configuration]) -> np.ndarray:
+        """Where the unloaded point of a force or output is in each configuration, (configurations, dim).
+
+        Raises:
+            AssemblyError: one of the configurations does not assemble, or its motors strain the links.
+        """
+        return unloaded_positions(self.linkage, part, configurations, holding(self.scene.effects, self.linkage))
+
+    # -- others like this one ------------------------------------------------------------------------------------
+
+    def with_design(self, design: RestShape | np.ndarray) -> Simulation:
+        """The same scene at the same fidelity with links of another rest shape; mesh and compiled forms are shared.
+
+        Args:
+            design: the result of a design problem, or this rank's values of the design field with ghosts, flat.
+
+        Raises:
+            DescriptionError: the design is one of other links, or of another mesh.
+            ShapeError: cells of the mesh are inverted in this shape.
+        """
+        values = design if isinstance(design, np.ndarray) else design.rest_shape(self)
+        size = len(self.model.elastic.d.x.array)
+        if self.comm.allreduce(int(values.shape != (size,))):
+            raise DescriptionError(
+                f"design of {self.scene.mechanism.name!r}",
+                f"values of shape {values.shape} for a mesh with {size}",
+                "Give the design field of this simulation",
+            )
+        other = copy(self)
+        other._design, other._control = values.copy(), None
+        return other
 
     def on(self, comm: MPI.Comm) -> Simulation:
         """The same scene at the same fidelity for other processes, as drawn."""
@@ -234,13 +275,79 @@ class Simulation(Postprocessing):
             comm=comm,
         )
 
-    def path(self, part: Force | Output, configurations: Sequence[Configuration]) -> np.ndarray:
-        """Where the unloaded point of a force or output is in each configuration, (configurations, dim).
+    # -- what it computes with -----------------------------------------------------------------------------------
 
-        Raises:
-            AssemblyError: one of the configurations does not assemble, or its motors strain the links.
+    @property
+    def fidelity(self) -> Fidelity:
+        """How finely is computed."""
+        return self._discretisation.fidelity
+
+    @property
+    def linkage(self) -> Linkage:
+        """The mechanism's bodies and joints."""
+        return self._discretisation.linkage
+
+    @property
+    def model(self) -> MechanismModel:
+        """The meshed mechanism, which simulations of several designs share; as drawn unless it is being worked with."""
+        return self._discretisation.model
+
+    @property
+    def estimates(self) -> Estimates:
+        """Error estimates at equilibria of the present fidelity."""
+        return self._discretisation.estimates
+
+    @property
+    def setup_seconds(self) -> float:
+        """Seconds spent before the first frame: mesh, compiled forms, matrix patterns."""
+        return sum(self.clock.seconds.get(phase, 0.0) for phase in ("mesh", "setup", "compile"))
+
+    @property
+    def mesh_ratio_max(self) -> float:
+        """Largest ratio of circumradius to inradius among the cells of the rest shape."""
+        with self._shaped():
+            rest, dim = rest_vertices(self.model), self.fidelity.model.dim
+        return from_one(self.comm, lambda: dim / float(radius_ratios(rest, self.model.mesh.cells).min()))
+
+    def newton(self, part: Leader, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
+        """The solver for what changes and some constant forces, kept for all configurations."""
+        return self._discretisation.newton(part, others)
+
+    def trace(self, request: CurveRequest, *, watch: Callable[[int], None] = lambda done: None) -> Curve:
+        """The curve of a checked request at the present shape of ``model``, without showing progress.
+
+        Args:
+            request: what is asked for.
+            watch: called with the number of frames so far.
         """
-        return unloaded_positions(self.linkage, part, configurations, holding(self.scene.effects, self.linkage))
+        return Curves(self._discretisation).trace(request, watch)
+
+    @contextmanager
+    def _shaped(self) -> Iterator[None]:
+        """Gives the model the design of this simulation for a while."""
+        if self._design is None:
+            yield
+        else:
+            with self.model.shaped(self._design):
+                yield
+
+    def _progress(self, frames: int, configuration: Configuration) -> Progress | Silent:
+        return Progress(frames, configuration.name) if self.comm.rank == 0 else Silent()
+
+    def _errors(
+        self, level: FidelityLevel, request: CurveRequest, watch: Callable[[int], None], curves: list[Curve]
+    ) -> LevelErrors:
+        """Makes the curve of a fidelity level the only one of ``curves``; returns its largest value and errors."""
+        fidelity = self._control.fidelity(level)
+        if fidelity != self.fidelity:
+            # curves keep what they were computed with
+            self._discretisation, self.choice = self._discretisation.at(fidelity), None
+        curve = self.trace(request, watch=watch)
+        curves[:] = [curve]
+        elements, plane_stress = curve.errors_by_kind()
+        largest, model = int(np.argmax(np.abs(curve.values))), self.model
+        unknowns = model.rigid_dofs + model.flexible_dofs + model.pressure_dofs
+        return LevelErrors(*(float(values[largest]) for values in (curve.values, elements, plane_stress)), unknowns)
 
     def _check_description(self) -> None:
         """Refuses a mechanism that is not the one this simulation was made for."""
@@ -251,28 +358,25 @@ class Simulation(Postprocessing):
                 "Make a new Simulation",
             )
 
-    def _check_rung(self, part: Leader) -> None:
+    def _check_chosen(self, part: Leader) -> None:
         """Refuses to follow anything as long as the accuracy asked for has chosen nothing."""
-        if self._dial is not None and self.choice is None:
+        if self._control is not None and self.choice is None:
             raise DescriptionError(
                 f"curve of {part.name!r}",
                 "the accuracy asked for is settled by load_displacement, which was not called yet",
                 "Call it first, with forces of the size in question, or give space, order and size instead of accuracy",
             )
 
-    def _outcome(self, rung: Rung, request: CurveRequest, watch: Callable[[int], None]) -> Outcome:
-        """What a rung of the dial gives for a curve, and how wrong it may be (collective)."""
-        fidelity = self._dial.fidelity(rung)
-        if fidelity != self.fidelity:
-            # what was computed at another one stays with its curves, and is no answer at this one
-            self._discretisation = self._discretisation.at(fidelity)
-            self._last = self.choice = None
-        curve = self.trace(request, watch=watch)
-        elements, depth = self.estimates.elements_and_depth(curve)
-        values, largest = curve.goals, int(np.argmax(np.abs(curve.goals)))
-        self._last = replace(curve, corrections=corrections(elements + depth, values))
-        unknowns = self.model.rigid_dofs + self.model.flexible_dofs + self.model.pressure_dofs
-        return Outcome(float(values[largest]), float(elements[largest]), float(depth[largest]), unknowns)
+
+def _refuse_beside_accuracy(given: Mapping[str, object]) -> None:
+    """Refuses a fidelity beside an accuracy that is to choose it."""
+    for name, value in given.items():
+        if value is not None:
+            raise DescriptionError(
+                f"accuracy and {name}",
+                f"both are given, and {name}={value!r} would decide what accuracy is to choose",
+                f"Leave out {name}, or give {name} and size=… instead of an accuracy",
+            )
 
 
 def _description(mechanism: Mechanism) -> tuple[tuple, ...]:

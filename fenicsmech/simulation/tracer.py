@@ -10,6 +10,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenicsmech.equilibrium import (
+    ZERO_ENERGY_SHIFT,
     Control,
     Iteration,
     MotorControl,
@@ -24,11 +25,11 @@ from fenicsmech.equilibrium import (
     motor_torques,
 )
 from fenicsmech.errors import EquilibriumError
+from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import Assembly, BodyPoint, Freedom, free_motions, is_held
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.idle_balance import idle_imbalance
 from fenicsmech.simulation.leading import leading
-from fenicsmech.simulation.model import MechanismModel
 from fenicsmech.simulation.request import CurveRequest
 
 _UNBALANCED = 1e-4  # of the loads: what may be left along idle freedoms
@@ -80,7 +81,7 @@ class Tracer:
         self._state = state
         constrained = any(control.constrained for control in request.controls)
         start = self._system.load_displacement(state) if constrained else 0.0
-        self._path = Path(newton, state, start, predictor=predictor, idle=self._idle)
+        self._path = Path(newton, state, start, predictor=predictor)
 
     @property
     def origin(self) -> float:
@@ -114,11 +115,10 @@ class Tracer:
         )
 
     def _unbalanced(self, solution: Solution, control: Control) -> float:
-        """Share of the loads that idle freedoms do not balance in a state that is loaded (collective)."""
-        state, share = solution.state, solution.state.share
-        self._system.balance(state, control)
-        loads = [state.force, *(share * magnitude for _, magnitude in self._request.others)]
-        return idle_imbalance(self._model, self._system, state, loads)
+        """Part of the loads that idle freedoms do not balance in a state that is loaded (collective)."""
+        state = solution.state
+        loads = [state.force, *(state.share * magnitude for _, magnitude in self._request.others)]
+        return idle_imbalance(self._model, self._system.residual(state, control), state, loads)
 
     def _lost_in_rounding(self, control: Control, before: Sequence[Frame]) -> EquilibriumError:
         names = ", ".join(map(repr, self._freedom.mobile))
@@ -136,10 +136,11 @@ class Tracer:
         motors = self._joints.motor_values(configuration.position)
         constant = bool(self._request.others or self._model.effects)
         state = replace(self._model.assembled_state(assembly.poses, motors), share=0.0 if constant else 1.0)
+        state = replace(state, minimum_shift=ZERO_ENERGY_SHIFT if self._freedom.idle else 0.0)
         if assembly.fraction == 1.0:
             return state
         state = replace(state, motors=assembly.fraction * motors)
-        path = MotorPath(self._newton, state, assembly.fraction, predictor=self._predictor, idle=self._idle)
+        path = MotorPath(self._newton, state, assembly.fraction, predictor=self._predictor)
         # in space a motor's equation is periodic: steps must stay well below a half turn
         steps = int(np.ceil((1.0 - assembly.fraction) * self._joints.travel(motors) / _LARGEST_TURN))
         try:
@@ -158,7 +159,7 @@ class Tracer:
 
     def _under_constant_loads(self, state: State) -> State:
         """The configuration under the request's constant forces and the scene's effects, which grow together."""
-        path = Path(self._newton, replace(state, share=0.0), 0.0, predictor=self._predictor, idle=self._idle)
+        path = Path(self._newton, replace(state, share=0.0), 0.0, predictor=self._predictor)
         try:
             state = path.advance(ShareControl(1.0)).state
             self._leaps += path.leaps

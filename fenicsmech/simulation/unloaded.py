@@ -8,11 +8,11 @@ import numpy as np
 
 from fenicsmech.errors import AssemblyError
 from fenicsmech.mechanism import Configuration, Force, Output, in_dimension
-from fenicsmech.multibody import Holding, Linkage, assemble
+from fenicsmech.multibody import Linkage, SpringPotential, assemble
 
 
 def unloaded_positions(
-    linkage: Linkage, part: Force | Output, configurations: Sequence[Configuration], holding: Sequence[Holding]
+    linkage: Linkage, part: Force | Output, configurations: Sequence[Configuration], holding: Sequence[SpringPotential]
 ) -> np.ndarray:
     """Positions of the point of a force or output in each configuration, (configurations, dim).
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fenicsmech.report import check_summary
+from .summary import check_summary
 
 ROOT = Path(__file__).parents[2]
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fenicsmech.simulation import MechanismModel
+from fenicsmech.model import MechanismModel
 
 
 def design_field(model: MechanismModel, values: np.ndarray) -> np.ndarray:

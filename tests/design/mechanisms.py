@@ -14,7 +14,6 @@ from fenicsmech.design import (
     Regulariser,
     RestShape,
     TargetEquilibria,
-    bounds_of,
     shape_links,
     shape_request,
     split,
@@ -63,14 +62,16 @@ class Bench:
         """A design away from the initial one."""
         return self.rest.initial + change * self.direction(seed)
 
+    def field(self) -> np.ndarray:
+        """The design field that the model holds, this rank's values, flat."""
+        return self.simulation.model.elastic.d.x.array.copy()
+
 
 def bench(case: Case, simulation: fm.Simulation) -> Bench:
     """The parts of ``case`` in ``simulation`` (collective)."""
     mechanism, linkage, model = case.scene.mechanism, simulation.linkage, simulation.model
     shapes = shape_links(model.mesh, [shape_request(design, mechanism, linkage) for design in case.designs])
-    bounds = [bounds_of(design, shape.thickness) for design, shape in zip(case.designs, shapes, strict=True)]
-    rest = RestShape(model, shapes, [design.link.name for design in case.designs], bounds)
-    return Bench(simulation, rest, TargetEquilibria(simulation, case.targets))
+    return Bench(simulation, RestShape(model, shapes, case.designs), TargetEquilibria(simulation, case.targets))
 
 
 def objective(

@@ -12,7 +12,8 @@ from mpi4py import MPI
 import fenicsmech as fm
 from fenicsmech.compat import vector_space
 from fenicsmech.design import HandleOptimum, QualitySum, ShapeMap, ShapeRequest, shape_links
-from fenicsmech.meshing import Centreline, InterfaceSite, LinkMesh, MechanismMesh, distribute, mesh_link
+from fenicsmech.mechanism import Centreline
+from fenicsmech.meshing import InterfaceSite, LinkMesh, MechanismMesh, distribute, mesh_link
 
 THICKNESS, DEPTH, RADIUS, SIZE = 3.0, 5.0, 2.5, 2.0
 ARCH = ((0.0, 0.0), (20.0, 9.0), (40.0, 0.0))

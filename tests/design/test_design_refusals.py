@@ -7,7 +7,7 @@ import math
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.simulation import link_meshes
+from fenicsmech.model import model
 
 from .mechanisms import Case, bow, pinned_links, strained, truss
 from .refusal import refused
@@ -24,7 +24,7 @@ def nothing_is_meshed(monkeypatch):
     def meshed(*arguments, **options):
         raise AssertionError("a link was meshed")
 
-    monkeypatch.setattr(link_meshes, "mesh_link", meshed)
+    monkeypatch.setattr(model, "mesh_link", meshed)
 
 
 def test_no_link_may_change():

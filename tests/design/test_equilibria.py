@@ -52,7 +52,7 @@ def test_following_a_design_ends_where_its_loading_from_zero_ends(name):
     followed = both.equilibria.follow(known)
     assert_alike(followed, both.equilibria.trace())
     assert np.abs(displacements(followed) - displacements(known)).max() > 1e-3 * np.abs(displacements(known)).max()
-    assert np.array_equal(followed.design, both.rest.design())
+    assert np.array_equal(followed.design, both.field())
 
 
 @pytest.mark.parallel
@@ -123,11 +123,11 @@ def test_a_change_that_is_too_large_is_infeasible_and_leaves_the_design_in_place
     start = both.rest.place(both.rest.initial, None)
     known = both.equilibria.trace()
     both.rest.place(bulged(both), start)
-    design = both.rest.design()
+    design = both.field()
     both.simulation.newton(both.equilibria.targets[0].force_part).options = fm.PrimalDualNewton(iterations=2)
     with pytest.raises(Infeasible, match="no equilibrium at 0.1"):
         both.equilibria.follow(known)
-    assert np.array_equal(both.rest.design(), design)
+    assert np.array_equal(both.field(), design)
 
 
 def column(force: float) -> Case:
@@ -183,9 +183,9 @@ def test_gradients_do_not_disturb_the_design(name):
     both = made(name)
     both.rest.place(both.design(0.05), None)
     known = both.equilibria.trace()
-    before = both.rest.design()
+    before = both.field()
     first = both.equilibria.gradients(known)
-    assert np.array_equal(both.rest.design(), before)
+    assert np.array_equal(both.field(), before)
     assert both.equilibria.gradients(known) == pytest.approx(first, rel=1e-12)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.design import Adjoint, Infeasible, TargetEquilibria
+from fenicsmech.design import Infeasible, Sensitivity, TargetEquilibria
 
 from ..equilibrium.arch import RISE, SPAN, arch
 from ..oracles.dense import taylor_rates
@@ -29,7 +29,7 @@ def test_displacement_sensitivities_hold_close_to_a_limit_point(gap):
         return frame.displacement
 
     curve = simulation.load_displacement(push, forces=[0.0, 0.9 * force, force])
-    adjoint, outputs = Adjoint(model, simulation.newton(push)), [model.point_load(push)]
+    adjoint, outputs = Sensitivity(model, simulation.newton(push)), [model.point_load(push)]
     (loaded,) = adjoint.gradients(curve.frames[-1].state, outputs)
     (unloaded,) = adjoint.gradients(curve.frames[0].state, outputs)
     slope = float((loaded.design - unloaded.design) @ rise.ravel())

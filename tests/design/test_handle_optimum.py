@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fenicsmech.design import HandleOptimum, LinkDerivatives, LinkHandles, ShapeError, choose_sides, follow_spline
+from fenicsmech.design import HandleOptimum, LinkHandles, MapDerivatives, ShapeError, by_positions, follow_spline
 
 from ..oracles.dense import taylor_rates
 from .shapes import bench
@@ -21,7 +21,7 @@ def naive(both, p: np.ndarray) -> np.ndarray:
 def slopes(both, p: np.ndarray, theta: np.ndarray) -> np.ndarray:
     """∂S/∂θ."""
     both.shape.apply(p, theta)
-    return both.shape.pull(p, theta, both.quality.gradient())[1]
+    return both.shape.apply_transpose(p, theta, both.quality.gradient())[1]
 
 
 @each_dim
@@ -88,7 +88,7 @@ def test_total_gradient_agrees_with_differences_of_best_positions(dim, seed):
     both = bench(dim)
     placed = both.optimum.solve(both.design(0.2, seed))
     g = np.random.default_rng(seed).standard_normal((both.shape.owned, dim))
-    gradient = both.optimum.total_gradient(placed, *both.shape.pull(placed.p, placed.theta, g))
+    gradient = both.optimum.total_gradient(placed, *both.shape.apply_transpose(placed.p, placed.theta, g))
     direction = both.direction(seed + 20)
 
     def value(h: float) -> float:
@@ -98,8 +98,8 @@ def test_total_gradient_agrees_with_differences_of_best_positions(dim, seed):
     h = 1e-4
     difference = (value(h) - value(-h)) / (2 * h)
     assert gradient @ direction == pytest.approx(difference, rel=1e-5)
-    partial = both.shape.pull(placed.p, placed.theta, g)[0] @ direction
-    assert abs(partial - difference) > 1e-3 * abs(difference)  # the handles' share is not small
+    partial = both.shape.apply_transpose(placed.p, placed.theta, g)[0] @ direction
+    assert abs(partial - difference) > 1e-3 * abs(difference)  # the part of the handles is not small
 
 
 @pytest.mark.parallel
@@ -110,7 +110,7 @@ def test_total_gradient_passes_the_taylor_test_with_handles_that_follow(dim, sha
     comm, owned = both.mesh.mesh.comm, both.shape.owned
     placed = both.optimum.solve(both.design(0.2))
     g = np.random.default_rng(4).standard_normal(both.mesh.vertices.shape)[both.shape.original][:owned]
-    gradient = both.optimum.total_gradient(placed, *both.shape.pull(placed.p, placed.theta, g))
+    gradient = both.optimum.total_gradient(placed, *both.shape.apply_transpose(placed.p, placed.theta, g))
 
     def value(p: np.ndarray) -> float:
         near = both.optimum.solve(p, placed)
@@ -162,7 +162,7 @@ def test_a_handle_at_a_kink_is_held_or_goes_to_the_side_where_the_sum_falls(held
     slope = np.linalg.lstsq(np.array([after.ravel(), before.ravel()]), wanted, rcond=None)[0]
     gradient = np.zeros((3, 2, 3))
     gradient[1] = slope.reshape(2, 3)
-    sides = choose_sides(handles, p, theta, LinkDerivatives(gradient, np.zeros((3, 2, 3, 3, 2, 3))))
+    sides = by_positions(handles, p, theta, MapDerivatives(gradient, np.zeros((3, 2, 3, 3, 2, 3))))
     assert sides.free.tolist() == [True, not held, True]
     assert held or sides.segments[1] == 1
 
@@ -175,7 +175,7 @@ def test_optimum_and_its_derivative_do_not_depend_on_the_number_of_ranks(dim):
         both = bench(dim, shared=shared)
         placed = both.optimum.solve(both.design(0.2))
         whole = np.random.default_rng(3).standard_normal(both.mesh.vertices.shape)
-        pulled = both.shape.pull(placed.p, placed.theta, whole[both.shape.original])
+        pulled = both.shape.apply_transpose(placed.p, placed.theta, whole[both.shape.original])
         gradient = both.optimum.total_gradient(placed, *pulled)
         seen.append((placed.quality, placed.theta, gradient))
     assert seen[1][0] == pytest.approx(seen[0][0], rel=1e-12)

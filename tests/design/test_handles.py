@@ -87,7 +87,7 @@ def test_maps_pass_the_taylor_test_by_parameters_and_positions_together(link):
 def test_second_derivatives_of_the_maps(link):
     handles, p, theta = away(link)
     weights = np.random.default_rng(5).standard_normal((len(handles), 2, 3))
-    mixed, twice = handles.curvatures(p, theta, weights)
+    mixed, twice = handles.curvatures(p, theta, weights, segments=handles.segments(theta))
 
     def slope(q, x):
         return np.sum(weights * handles.gradients(q, x)[1], axis=(1, 2))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fenicsmech.design import DesignProgress, Evaluation, Iterate, LevenbergMarquardt, Quadratic, Reason, progress
+from fenicsmech.design import DesignProgress, Evaluation, Iterate, LevenbergMarquardt, Quadratic, Reason, run
 
 ERRORS = np.array([0.02, -0.25])
 
@@ -31,8 +31,8 @@ def shown(monkeypatch):
     """What is shown of promised reductions, one per iteration of ten seconds."""
     ticks = iter(range(0, 10000, 10))
     display = Display()
-    monkeypatch.setattr(progress, "perf_counter", lambda: float(next(ticks)))
-    monkeypatch.setattr(progress, "Progress", lambda *arguments: display)
+    monkeypatch.setattr(run, "perf_counter", lambda: float(next(ticks)))
+    monkeypatch.setattr(run, "Progress", lambda *arguments: display)
 
     def show(optimiser: LevenbergMarquardt, promises: list[float], last: Reason | None = None) -> list[str]:
         with DesignProgress(optimiser, leads=True) as design:

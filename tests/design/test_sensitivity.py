@@ -1,4 +1,4 @@
-"""Adjoint derivatives of displacements pass Taylor tests in the design field, the moduli and the force."""
+"""Sensitivity derivatives of displacements pass Taylor tests in the design field, the moduli and the force."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.design import Adjoint, Gradient
+from fenicsmech.design import Gradient, Sensitivity
 from fenicsmech.equilibrium import State
 
 from ..oracles.dense import taylor_rates
@@ -48,7 +48,7 @@ class Bench:
         self.turned = scene.configuration("turned", {motor: 0.3})
         self.simulation = fm.Simulation(scene, space=space, size=4.0, formulation=formulation, comm=comm)
         self.model = self.simulation.model
-        self.adjoint = Adjoint(self.model, self.simulation.newton(self.force))
+        self.adjoint = Sensitivity(self.model, self.simulation.newton(self.force))
         self.space = self.model.elastic.d.function_space
         self.owned = self.space.dofmap.index_map.size_local * self.space.dofmap.index_map_bs
 

@@ -65,6 +65,22 @@ def test_plane_and_space_have_the_same_shape():
 
 
 @pytest.mark.parallel
+def derivative(shape, p, theta, dp, dtheta) -> np.ndarray:
+    """∂d/∂p dp + ∂d/∂θ dθ, (nodes, dim)."""
+    changes = []
+    for link, *point, dp_link, dtheta_link in zip(
+        shape.shapes,
+        shape.parameters(p),
+        shape.positions(theta),
+        shape.parameters(dp),
+        shape.positions(dtheta),
+        strict=True,
+    ):
+        by_p, by_theta = link.handles.gradients(*point)
+        changes.append(by_p @ dp_link + by_theta * dtheta_link[:, None, None])
+    return shape.spread(changes)
+
+
 @each_dim
 @pytest.mark.parametrize("shared", [False, True], ids=["alone", "together"])
 def test_tangent_and_its_transpose_pass_the_taylor_test_away_from_the_initial_design(dim, shared):
@@ -77,9 +93,9 @@ def test_tangent_and_its_transpose_pass_the_taylor_test_away_from_the_initial_de
     def moved(h):
         return shape.field(p + h[0] * dp, theta + h[0] * dtheta)
 
-    pushed = shape.push(p, theta, dp, dtheta).ravel()
+    pushed = derivative(shape, p, theta, dp, dtheta).ravel()
     rates = taylor_rates(lambda h: moved(h).ravel(), [0.0], [1.0], pushed[:, None], steps)
-    by_p, by_theta = shape.pull(p, theta, g)
+    by_p, by_theta = shape.apply_transpose(p, theta, g)
     pulled = taylor_rates(
         lambda h: comm.allreduce(np.sum(moved(h)[: shape.owned] * g)),
         [0.0],
@@ -95,24 +111,24 @@ def test_tangent_and_its_transpose_pass_the_taylor_test_away_from_the_initial_de
 @pytest.mark.parallel
 @each_dim
 @pytest.mark.parametrize("shared", [False, True])
-def test_pull_is_the_transpose_of_push(dim, shared):
+def test_the_transpose_is_that_of_the_derivative(dim, shared):
     both = bench(dim, shared=shared)
     p, theta, shape = both.design(), both.positions(), both.shape
     g = field_like(both, 3)
     dp, dtheta = both.direction(4), np.random.default_rng(5).standard_normal(len(theta))
-    pushed = shape.push(p, theta, dp, dtheta)[: shape.owned]
-    by_p, by_theta = shape.pull(p, theta, g)
+    pushed = derivative(shape, p, theta, dp, dtheta)[: shape.owned]
+    by_p, by_theta = shape.apply_transpose(p, theta, g)
     assert by_p @ dp + by_theta @ dtheta == pytest.approx(
         both.mesh.mesh.comm.allreduce(np.sum(pushed * g[: shape.owned])), rel=1e-12
     )
 
 
-def test_several_fields_are_pulled_at_once():
+def test_the_transpose_takes_several_fields_at_once():
     both = bench(2)
     p, theta, g = both.design(), both.positions(), field_like(both, 3, (2, 3))
-    by_p, by_theta = both.shape.pull(p, theta, g)
+    by_p, by_theta = both.shape.apply_transpose(p, theta, g)
     for index in np.ndindex(2, 3):
-        one_p, one_theta = both.shape.pull(p, theta, g[index])
+        one_p, one_theta = both.shape.apply_transpose(p, theta, g[index])
         assert by_p[index] == pytest.approx(one_p, abs=1e-11)
         assert by_theta[index] == pytest.approx(one_theta, abs=1e-11)
 
@@ -126,6 +142,8 @@ def test_field_does_not_depend_on_the_number_of_ranks(dim):
     shared.shape.apply(shared.design(), shared.positions())
     values = shared.shape.design.x.array.reshape(-1, dim)
     assert values == pytest.approx(whole[shared.shape.original], abs=1e-12)
-    pulled = [both.shape.pull(both.design(), both.positions(), field_like(both, 1)) for both in (alone, shared)]
+    pulled = [
+        both.shape.apply_transpose(both.design(), both.positions(), field_like(both, 1)) for both in (alone, shared)
+    ]
     for one, other in zip(*pulled, strict=True):
         assert other == pytest.approx(one, rel=1e-10, abs=1e-10)

@@ -5,7 +5,7 @@ import pytest
 
 import fenicsmech as fm
 from fenicsmech.design import fit_spline
-from fenicsmech.meshing import Centreline
+from fenicsmech.mechanism import Centreline
 
 from ..simulation.demo_scenes import describe
 from .shapes import CENTRELINES, INTERIOR, JOINTS

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.design import Adjoint
+from fenicsmech.design import Sensitivity
 from fenicsmech.mechanism import Force
 
 from ..design.in_plane import design_field
@@ -24,5 +24,5 @@ def assert_design_gradient(simulation: fm.Simulation, push: Force, load: float) 
 
     slope = (solve_at(1e-3)[1] - solve_at(-1e-3)[1]) / 2e-3
     frame, _ = solve_at(0.0)
-    (gradient,) = Adjoint(model, simulation.newton(push)).gradients(frame.state, [model.point_load(push)])
+    (gradient,) = Sensitivity(model, simulation.newton(push)).gradients(frame.state, [model.point_load(push)])
     assert gradient.design @ direction[: len(gradient.design)] == pytest.approx(slope, rel=1e-5)

@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.design import Adjoint
+from fenicsmech.design import Sensitivity
 from fenicsmech.effects import Contact, Cylinder, HalfPlane
 
 from ..design.in_plane import design_field
@@ -100,7 +100,7 @@ def test_displacements_in_contact_are_differentiated_by_the_design_field(space, 
     slope = (_travel(case, solve(h)) - _travel(case, solve(-h))) / (2.0 * h)
     frame = solve(0.0)
     assert abs(case.measure(frame)[0][0]) > 0.3
-    adjoint = Adjoint(model, case.simulation.newton(case.force))
+    adjoint = Sensitivity(model, case.simulation.newton(case.force))
     (gradient,) = adjoint.gradients(frame.state, [model.point_load(case.force)])
     found = comm.allreduce(gradient.design @ direction[: len(gradient.design)])
     assert found == pytest.approx(slope, rel=1e-4)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.design import Adjoint
+from fenicsmech.design import Sensitivity
 from fenicsmech.effects import Gravity, Mass
 from fenicsmech.errors import DescriptionError
 
@@ -82,7 +82,7 @@ def test_derivatives_by_modulus_and_force_see_the_weight():
 
     newton = simulation.newton(push)
     _, state = displacement(2000.0)
-    (gradient,) = Adjoint(simulation.model, newton).gradients(state, [newton.system.controlled])
+    (gradient,) = Sensitivity(simulation.model, newton).gradients(state, [newton.system.controlled])
     slope = (displacement(2002.0)[0] - displacement(1998.0)[0]) / 4.0
     assert gradient.parameters["E"][0] == pytest.approx(slope, rel=1e-5)
 

@@ -17,7 +17,7 @@ from fenicsmech.mechanism import Arc
 from ..design.refusal import refused
 from ..elasticity.dirichlet_newton import solve
 from ..elasticity.single_link import components, distorted, interpolate, nodes, wave
-from ..report.grids import box, rectangle
+from ..plot.grids import box, rectangle
 from .design_slope import assert_design_gradient
 from .form_derivative import form_derivative
 from .pressed import POISSON, YOUNG, PressedBody

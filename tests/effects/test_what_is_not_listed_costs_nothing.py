@@ -8,7 +8,6 @@ import pytest
 
 import fenicsmech as fm
 from fenicsmech.elasticity import body
-from fenicsmech.equilibrium import potentials
 
 from ..simulation.refined import arch
 
@@ -28,15 +27,9 @@ class Counts:
 
 
 def counts(monkeypatch, space: str, effects=()) -> Counts:
-    compiled, made = [], []
+    compiled = []
     plain = body.compile_form
     monkeypatch.setattr(body, "compile_form", lambda form: compiled.append(form) or plain(form))
-    init = potentials.BodyPotentials.__init__
-    monkeypatch.setattr(
-        potentials.BodyPotentials,
-        "__init__",
-        lambda self, parts, joints: made.extend(parts) or init(self, parts, joints),
-    )
     scene, push, load = arch()
     scene = fm.Scene(scene.mechanism, effects=[effect(scene.mechanism) for effect in effects])
     simulation = fm.Simulation(scene, space=space, order=1, size=4.0)
@@ -50,7 +43,7 @@ def counts(monkeypatch, space: str, effects=()) -> Counts:
         len(energy.coefficients()),
         model.rigid_dofs + model.flexible_dofs + model.pressure_dofs,
         int(matrix.getInfo()["nz_used"]),
-        len(made),
+        len(model.potentials),
     )
 
 

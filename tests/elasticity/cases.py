@@ -11,7 +11,8 @@ from fenicsmech.laws import (
 )
 
 LAWS = (NeoHookean, LogarithmicNeoHookean, IsochoricNeoHookean, IsochoricSimoNeoHookean)
-CASES = tuple((model, law) for model in (SPATIAL, PLANE_STRAIN, PLANE_STRESS) for law in LAWS)
+# the plane stress of the others is found by a local solve, see test_new_law.py
+CASES = (*((model, law) for model in (SPATIAL, PLANE_STRAIN) for law in LAWS), (PLANE_STRESS, NeoHookean))
 
 
 def name(value) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from fenicsmech.elasticity import ElasticModel, Quadrature
 from fenicsmech.laws import IsochoricSimoNeoHookean
 
-from ..report.grids import box, rectangle
+from ..plot.grids import box, rectangle
 from .dirichlet_newton import solve
 from .end_load import end_load
 from .single_link import components, nodes, single_link

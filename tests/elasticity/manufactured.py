@@ -13,7 +13,7 @@ from fenicsmech.compat import compile_form
 from fenicsmech.elasticity import ElasticModel, Quadrature
 from fenicsmech.laws import NeoHookean
 
-from ..report.grids import box, rectangle
+from ..plot.grids import box, rectangle
 from .dirichlet_newton import solve
 from .single_link import components, interpolate, single_link
 

@@ -11,7 +11,7 @@ from fenicsmech.compat import cellwise_space, compile_expression, create_mesh, e
 from fenicsmech.elasticity import ElasticModel
 from fenicsmech.laws import Law
 
-from ..report.grids import rectangle
+from ..plot.grids import rectangle
 
 
 def pointwise(build: Callable, arguments: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from fenicsmech.elasticity import ElasticBody, ElasticModel, Quadrature
 from fenicsmech.laws import Law, NeoHookean
 from fenicsmech.mechanism import Material
 
-from ..report.grids import box, rectangle
+from ..plot.grids import box, rectangle
 
 
 def single_link(

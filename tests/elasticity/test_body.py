@@ -9,7 +9,7 @@ from fenicsmech.elasticity import PLANE_STRAIN, ElasticBody, Quadrature
 from fenicsmech.laws import IsochoricNeoHookean
 from fenicsmech.mechanism import Material
 
-from ..report.grids import rectangle
+from ..plot.grids import rectangle
 from . import textbook
 from .cases import each_case
 from .single_link import distorted, forces, interpolate, nodes, single_link, wave

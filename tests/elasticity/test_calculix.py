@@ -7,7 +7,7 @@ from fenicsmech.elasticity import SPATIAL, Quadrature
 from fenicsmech.laws import IsochoricNeoHookean
 
 from ..oracles import calculix
-from ..report.grids import box
+from ..plot.grids import box
 from .dirichlet_newton import solve
 from .end_load import end_load
 from .single_link import nodes, single_link

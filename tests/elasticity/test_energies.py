@@ -102,10 +102,9 @@ def test_material_squeezed_to_nothing_has_no_finite_energy(model, law):
     assert not np.isfinite(energies(model, law, H, 1.9, 0.475)).any()
 
 
-@each_law
-def test_plane_stress_leaves_nothing_across_the_plane(law):
+def test_plane_stress_leaves_nothing_across_the_plane():
     def build(E, nu, *entries):
-        return cauchy_stress(PLANE_STRESS, of_constants(law, E, nu), tensor(entries))[2, 2] / E
+        return cauchy_stress(PLANE_STRESS, of_constants(NeoHookean, E, nu), tensor(entries))[2, 2] / E
 
     for size in (1e-9, 1e-3, 0.5):
         stress = pointwise(build, arguments(random_gradients(2, size), 1.9, 0.475))

@@ -9,7 +9,7 @@ from fenicsmech.compat import compile_form
 from fenicsmech.elasticity import PLANE_STRAIN, SPATIAL
 from fenicsmech.laws import NeoHookean
 
-from ..report.grids import rectangle
+from ..plot.grids import rectangle
 from .even_stretch import free_stretch, stretch
 from .mixed_newton import solve
 from .single_link import components, distorted, interpolate, nodes, single_link

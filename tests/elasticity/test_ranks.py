@@ -8,7 +8,7 @@ from mpi4py import MPI
 from fenicsmech.compat import original_cells, owned_values
 from fenicsmech.elasticity import PLANE_STRESS, SPATIAL
 
-from ..report.grids import box, rectangle
+from ..plot.grids import box, rectangle
 from .cases import name
 from .single_link import interpolate, single_link, wave
 

@@ -99,5 +99,7 @@ def random_state(case: Crowded, system: EquilibriumSystem, *, seed: int = 5) -> 
     if model.elastic.pressure is not None:
         places = model.elastic.pressure.p.function_space.tabulate_dof_coordinates()[: len(carried.u) - len(wave)]
         u[len(wave) :] = np.where(model.elastic.pressure.unknown, np.cos(places @ np.array([0.3, 0.4, 0.5])), 0.0)
-    multipliers = system.unknowns.scale[system.layout.multipliers] * 0.1 * random.standard_normal(joints.rows)
+    multipliers = (
+        system.blocks.restrict_border(system.unknowns.scale).multipliers * 0.1 * random.standard_normal(joints.rows)
+    )
     return State(u, poses, multipliers, 1.3, motors)

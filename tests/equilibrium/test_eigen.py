@@ -15,7 +15,7 @@ from .struts import Hold, strut
 def test_buckling_load_of_a_strut_is_that_of_euler(hold):
     case = strut(hold)
     curve = case.simulation.load_displacement(case.push, forces=[0.0])
-    (found,) = case.simulation.buckling_loads(curve, count=1)
+    (found,) = curve.buckling_loads(count=1)
     assert found.force == pytest.approx(case.euler, rel=1e-3)
     assert found.mode.link == "beam" and found.mode.out_of_plane == 0.0
 
@@ -24,7 +24,7 @@ def test_buckling_load_of_a_strut_is_that_of_euler(hold):
 def test_higher_modes_and_redundant_joints(slides):
     case = column.column(slides=slides)
     curve = case.simulation.load_displacement(case.push, forces=[0.0])
-    found = case.simulation.buckling_loads(curve, count=3)
+    found = curve.buckling_loads(count=3)
     first = column.critical_load(0.5 * column.THICKNESS)
     assert [load.force / first for load in found] == pytest.approx([1.0, 4.0, 9.0], rel=1e-3)
 
@@ -34,7 +34,7 @@ def test_buckling_load_hardly_depends_on_the_load_it_is_asked_at():
     loads = [-0.5 * case.euler, 0.9 * case.euler, 1.1 * case.euler]
     curve = case.simulation.load_displacement(case.push, forces=loads)
     for frame in curve.frames:
-        (found,) = case.simulation.buckling_loads(curve, frame=frame, count=1)
+        (found,) = curve.buckling_loads(frame=frame, count=1)
         assert found.force == pytest.approx(case.euler, rel=1e-3)
 
 
@@ -44,7 +44,7 @@ def test_buckling_load_of_a_toggle_tends_to_its_limit_load():
     limit = curve.limit_points[0]
     errors = []
     for frame in curve.frames[: limit.index : 2]:
-        ahead = min(abs(load.force / limit.frame.force - 1.0) for load in case.simulation.buckling_loads(frame=frame))
+        ahead = min(abs(load.force / limit.frame.force - 1.0) for load in curve.buckling_loads(frame=frame))
         errors.append(ahead)
     assert np.all(np.diff(errors) < 0.0) and errors[-1] < 0.02
 
@@ -53,7 +53,7 @@ def test_softest_mode_vanishes_at_a_bifurcation_and_is_unstable_beyond():
     case = column.column()
     critical = column.critical_load(0.5 * column.THICKNESS)
     curve = case.simulation.load_displacement(case.push, forces=[0.0, 0.5 * critical, 0.99 * critical, 1.5 * critical])
-    stiffness = [case.simulation.soft_modes(curve, frame=frame, count=1)[0].stiffness for frame in curve.frames]
+    stiffness = [curve.soft_modes(frame=frame, count=1)[0].stiffness for frame in curve.frames]
     # the mode of a pinned column keeps its shape: μ = μ₀ (1 − P / P_cr)
     assert np.array(stiffness) / stiffness[0] == pytest.approx([1.0, 0.5, 0.01, -0.5], abs=2e-3)
 
@@ -70,7 +70,7 @@ def test_deep_strip_buckles_sideways_at_the_load_of_prandtl_and_michell():
     slender = 4.013 * np.sqrt(sideways * torsion) / length**2
     expected = slender / (1.0 - np.sqrt(warping / torsion) / length) ** 2
     expected /= np.sqrt((1.0 - sideways / upright) * (1.0 - torsion / upright))
-    pair = case.simulation.buckling_loads(curve, count=2)
+    pair = curve.buckling_loads(count=2)
     assert sorted(load.force for load in pair) == pytest.approx([-expected, expected], rel=0.03)
     assert all(load.mode.out_of_plane > 0.9 for load in pair)
 
@@ -81,7 +81,5 @@ def test_buckling_loads_are_the_same_on_any_number_of_ranks():
     curve = case.simulation.load_displacement(case.push, forces=[0.0])
     alone = strut(Hold.CLAMPED_CLAMPED)
     reference = alone.simulation.load_displacement(alone.push, forces=[0.0])
-    found = [load.force for load in case.simulation.buckling_loads(curve, count=3)]
-    assert found == pytest.approx(
-        [load.force for load in alone.simulation.buckling_loads(reference, count=3)], rel=1e-6
-    )
+    found = [load.force for load in curve.buckling_loads(count=3)]
+    assert found == pytest.approx([load.force for load in reference.buckling_loads(count=3)], rel=1e-6)

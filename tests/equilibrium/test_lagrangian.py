@@ -34,15 +34,16 @@ def shifted(system: EquilibriumSystem, state: State, x: np.ndarray) -> State:
 
 def largest_steps(system: EquilibriumSystem) -> np.ndarray:
     """How far each scaled unknown may go in finite differences: a small part of a cell, some degrees."""
-    layout, joints = system.layout, system.joints
-    poses = np.where(joints.pose_scale == 1.0, 0.03, 0.03 * SIZE) / system.unknowns.scale[layout.z]
-    rest = np.ones(joints.rows + 1)
-    return np.concatenate([np.full(len(layout.free), 0.03 * SIZE / system.unknowns.unit_u), poses, rest])
+    blocks, joints = system.blocks, system.joints
+    border = np.ones(blocks.border.size)
+    units = blocks.restrict_border(system.unknowns.scale).poses
+    blocks.restrict_border(border).poses[:] = np.where(joints.pose_scale == 1.0, 0.03, 0.03 * SIZE) / units
+    return blocks.join(np.full(blocks.links.count, 0.03 * SIZE / system.unknowns.unit_u), border)
 
 
 def sample(system: EquilibriumSystem, control: Control) -> np.ndarray:
     """The unknowns by which to differentiate: all, but in space only some of the displacements."""
-    parts = blocks(system)
+    parts = parts_of(system)
     displacements = parts["u"][:: {2: 1, 3: 8}[system.elastic.model.dim]]
     force = parts["f"] if control.constrained else []
     return np.concatenate([displacements, parts["z"], parts["λ"], force]).astype(int)
@@ -50,21 +51,21 @@ def sample(system: EquilibriumSystem, control: Control) -> np.ndarray:
 
 def scattered(system: EquilibriumSystem, columns: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Scaled unknowns that have ``values`` at ``columns`` and are zero elsewhere."""
-    x = np.zeros(system.layout.local_unknowns)
+    x = np.zeros(system.blocks.local)
     x[columns] = values
     return x
 
 
-def blocks(system: EquilibriumSystem) -> dict[str, np.ndarray]:
+def parts_of(system: EquilibriumSystem) -> dict[str, np.ndarray]:
     """Which unknowns are displacements, poses, multipliers, the force."""
-    ends = np.cumsum([len(system.layout.free), system.joints.size, system.joints.rows, 1])
-    return dict(zip(("u", "z", "λ", "f"), np.split(np.arange(ends[-1]), ends[:-1]), strict=True))
+    parts = system.blocks.restrict(np.arange(system.blocks.local))
+    return {"u": parts.nodes, "z": parts.poses, "λ": parts.multipliers, "f": parts.load}
 
 
 @pytest.mark.parametrize("kind", CONTROLS)
 @pytest.mark.parametrize("where", ["on_rigid", "on_flexible"])
 @pytest.mark.parametrize("space", SPACES)
-def test_balance_is_the_gradient_of_the_lagrangian(space, where, kind):
+def test_residual_is_the_gradient_of_the_lagrangian(space, where, kind):
     case = crowded(space)
     system = system_of(case, controlled=getattr(case, where))
     state, control = random_state(case, system), control_of(kind)
@@ -80,8 +81,8 @@ def test_balance_is_the_gradient_of_the_lagrangian(space, where, kind):
         lambda y: lagrangian(scattered(system, columns, y)), np.zeros(len(columns)), step=largest_steps(system)[columns]
     )
     system.load(state)
-    gradient = system.balance(state, control).vector.array
-    for name, unknowns in blocks(system).items():
+    gradient = system.residual(state, control).vector.array
+    for name, unknowns in parts_of(system).items():
         chosen = np.isin(columns, unknowns)
         scale = np.abs(expected[chosen]).max(initial=0.0)
         assert gradient[columns[chosen]] == pytest.approx(expected[chosen], abs=1e-7 * scale), name
@@ -92,20 +93,20 @@ def test_balance_is_the_gradient_of_the_lagrangian(space, where, kind):
 @pytest.mark.parametrize("kind", CONTROLS)
 @pytest.mark.parametrize("where", ["on_rigid", "on_flexible"])
 @pytest.mark.parametrize("space", SPACES)
-def test_kkt_matrix_is_the_derivative_of_the_balance(space, where, kind):
+def test_kkt_matrix_is_the_derivative_of_the_residual(space, where, kind):
     case = crowded(space)
     system = system_of(case, controlled=getattr(case, where))
     state, control = random_state(case, system), control_of(kind)
-    parts, columns = blocks(system), sample(system, control)
+    parts, columns = parts_of(system), sample(system, control)
 
-    def balance(y):
-        return system.balance(shifted(system, state, scattered(system, columns, y)), control).vector.array.copy()
+    def gradient_at(y):
+        return system.residual(shifted(system, state, scattered(system, columns, y)), control).vector.array.copy()
 
-    expected = np.zeros((system.layout.local_unknowns,) * 2)
-    expected[:, columns] = dense.jacobian(balance, np.zeros(len(columns)), step=largest_steps(system)[columns])
+    expected = np.zeros((system.blocks.local,) * 2)
+    expected[:, columns] = dense.jacobian(gradient_at, np.zeros(len(columns)), step=largest_steps(system)[columns])
     expected[parts["λ"], parts["λ"]] -= REGULARISATION
     system.load(state)
-    system.linearise(state, control, system.balance(state, control))
+    system.linearise(state, control, system.residual(state, control))
     matrix = system.kkt.matrix()
     matrix = matrix.getValues(range(matrix.size[0]), range(matrix.size[1]))
     for row, rows in parts.items():
@@ -124,7 +125,7 @@ def test_kkt_matrix_is_symmetric(space, kind):
     system = system_of(case, controlled=case.on_flexible)
     state, control = random_state(case, system), control_of(kind)
     system.load(state)
-    system.linearise(state, control, system.balance(state, control))
+    system.linearise(state, control, system.residual(state, control))
     matrix = system.kkt.matrix()
     matrix = matrix.getValues(range(matrix.size[0]), range(matrix.size[1]))
     assert np.abs(matrix - matrix.T).max() <= 1e-12 * np.abs(matrix).max()
@@ -136,10 +137,10 @@ def test_shift_raises_the_curvature_of_displacements_and_poses_alone(space):
     system = system_of(case, controlled=case.on_rigid)
     state, control = random_state(case, system), control_of(LoadControl)
     system.load(state)
-    system.linearise(state, control, system.balance(state, control))
+    system.linearise(state, control, system.residual(state, control))
     matrix = system.kkt.matrix()
     plain = matrix.getDiagonal().array.copy()
-    parts = blocks(system)
+    parts = parts_of(system)
     for amount in (0.25, 2.0, 0.0):
         system.kkt.shift(amount)  # from what was assembled, not on top of the last one
         change = matrix.getDiagonal().array - plain
@@ -151,26 +152,24 @@ def test_shift_raises_the_curvature_of_displacements_and_poses_alone(space):
 @pytest.mark.parametrize("kind", CONTROLS)
 @pytest.mark.parametrize("where", ["on_rigid", "on_flexible"])
 @pytest.mark.parametrize("space", SPACES)
-def test_kkt_matrix_times_a_direction_is_the_change_of_the_balance_on_any_number_of_ranks(space, where, kind):
+def test_kkt_matrix_times_a_direction_is_the_change_of_the_residual_on_any_number_of_ranks(space, where, kind):
     case = crowded(space, MPI.COMM_WORLD)
     system = system_of(case, controlled=getattr(case, where))
     state, control = random_state(case, system), control_of(kind)
     random = np.random.default_rng(MPI.COMM_WORLD.rank)
-    layout = system.layout
-    steps = largest_steps(system)[: layout.local_unknowns]
-    direction = random.uniform(-1.0, 1.0, layout.local_unknowns) * steps
-    if layout.last and not control.constrained:
-        direction[-1] = 0.0
+    direction = random.uniform(-1.0, 1.0, system.blocks.local) * largest_steps(system)
+    if not control.constrained:
+        system.blocks.restrict(direction).load[:] = 0.0
 
-    def balance(h):
-        return system.balance(shifted(system, state, h * direction), control).vector
+    def gradient_at(h):
+        return system.residual(shifted(system, state, h * direction), control).vector
 
     # D(h) = D + O(h²)
-    slopes = [(balance(h) - balance(-h)) / (2.0 * h) for h in (0.1, 0.05, 0.025)]
+    slopes = [(gradient_at(h) - gradient_at(-h)) / (2.0 * h) for h in (0.1, 0.05, 0.025)]
     finer = [(4.0 * b - a) / 3.0 for a, b in zip(slopes[:-1], slopes[1:], strict=True)]
     expected = (16.0 * finer[1] - finer[0]) / 15.0
     system.load(state)
-    system.linearise(state, control, system.balance(state, control))
+    system.linearise(state, control, system.residual(state, control))
     matrix = system.kkt.matrix()
     vector = matrix.createVecRight()
     vector.array[:] = direction
@@ -179,16 +178,15 @@ def test_kkt_matrix_times_a_direction_is_the_change_of_the_balance_on_any_number
 
 @pytest.mark.parallel
 @pytest.mark.parametrize("space", SPACES)
-def test_balance_is_the_same_on_any_number_of_ranks(space):
+def test_residual_is_the_same_on_any_number_of_ranks(space):
     values = []
     for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
         case = crowded(space, comm)
         system = system_of(case, controlled=case.on_flexible)
         state, control = random_state(case, system), control_of(DisplacementControl)
         system.load(state)
-        balance = system.balance(state, control)
-        extras = balance.vector.array[len(system.layout.free) :] if system.layout.last else None
-        extras = comm.bcast(extras, root=comm.size - 1)
-        values.append((system.potential(state, state.force), balance.norm, balance.forces, extras))
+        residual = system.residual(state, control)
+        border = system.blocks.gather_border(residual.vector.array)
+        values.append((system.potential(state, state.force), residual.norm, residual.forces, border))
     for alone, together in zip(*values, strict=True):
         assert together == pytest.approx(alone, rel=1e-11, abs=1e-11 * np.abs(alone).max())

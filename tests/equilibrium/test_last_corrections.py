@@ -41,8 +41,8 @@ def test_rates_at_the_equilibria_are_as_good_as_those_of_a_new_factor(space):
         solution = newton.solve(system.moved(state, solution_rate(newton, state).scaled(0.1)), control)
         state = solution.state
         system.load(state)
-        newton.factor(state, control, system.balance(state, control), 0.0)
-        rate = system.unknowns.step(newton.solve_linear(control.rate(system, state)))
+        at = newton.linearise(state, control)
+        rate = at.step(at.rate())
         off = system.size(rate + solution.tangent.scaled(-1.0)) / system.size(rate)
         assert off < newton.options.stale
         corrected += 0.0 < off
@@ -61,10 +61,8 @@ def test_rates_without_stale_factors_are_those_of_a_new_one():
 
 def solution_rate(newton, state):
     """The rate of a loaded equilibrium with the force, by a factor of its own."""
-    control = LoadControl(state.force)
-    newton.system.load(state)
-    newton.factor(state, control, newton.system.balance(state, control), 0.0)
-    return newton.system.unknowns.step(newton.solve_linear(control.rate(newton.system, state)))
+    at = newton.linearise(state, LoadControl(state.force))
+    return at.step(at.rate())
 
 
 @pytest.mark.parametrize("nearness", [1e-2, 1e-3, 1e-4])

@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.report import read_curve_csv
+from fenicsmech.files import read_csv
 
 from ..hard.buckling import LENGTH, euler
 from ..hard.buckling import column as hard_column
@@ -47,7 +47,7 @@ def test_jump_is_told_in_words_and_in_the_table(snapping, tmp_path):
     (remark,) = curve.remarks
     assert remark.startswith(f"as drawn: snaps after force {curve.forces[0]:.3g} N, to displacement 1.8 mm")
     curve.write_csv(tmp_path / "curve.csv")
-    assert read_curve_csv(tmp_path / "curve.csv")["jumped"].tolist() == [0.0, 1.0, 0.0]
+    assert read_csv(tmp_path / "curve.csv")["jumped"].tolist() == [0.0, 1.0, 0.0]
     assert curve.series().jumped.tolist() == [False, True, False]
     middle = simulation.load_displacement(push, displacements=[RISE])
     assert middle.remarks == ("as drawn: 1 of 1 equilibria are unstable under dead loads",)

@@ -24,7 +24,7 @@ class OneFreedom:
     def __init__(self) -> None:
         self.system, self.solved, self.softest = self, 0, 1.0
 
-    def solve(self, start: State, control: LoadControl, *, floor: float) -> Solution:
+    def solve(self, start: State, control: LoadControl) -> Solution:
         self.solved += 1
         if control.target > 1.0:
             raise NotConverged("no equilibrium", 25)
@@ -33,7 +33,7 @@ class OneFreedom:
         rate = math.inf if stiffness == 0.0 else 0.5 / stiffness
         tangent = Step(np.array([rate]), np.zeros(0), np.zeros(0), 1.0)
         state = State(np.array([1.0 - stiffness]), np.zeros((0, 1)), np.zeros(0), control.target, np.zeros(0))
-        return Solution(state, (0.0,), 4, 0, 0, tangent)
+        return Solution(state, (0.0,), 4, 0, 0, tangent, None)
 
     def size(self, step: Step) -> float:
         return float(np.abs(step.u).max())
@@ -55,7 +55,7 @@ def start() -> State:
 @pytest.mark.parametrize("beyond", BEYOND)
 def test_last_equilibrium_is_next_to_the_limit_load_and_has_lost_its_stiffness(beyond):
     freedom = OneFreedom()
-    path = Path(freedom, start(), 0.0, predictor=Hermite(), idle=False)
+    path = Path(freedom, start(), 0.0, predictor=Hermite())
     with pytest.raises(PathFailed) as failure:
         path.advance(LoadControl(beyond))
     assert 1.0 - RESOLUTION < failure.value.reached <= 1.0
@@ -65,7 +65,7 @@ def test_last_equilibrium_is_next_to_the_limit_load_and_has_lost_its_stiffness(b
 
 @pytest.mark.parametrize("beyond", BEYOND)
 def test_load_steps_after_the_first_tell_it_as_closely_and_a_load_on_the_way_back_is_reached(beyond):
-    path = Path(OneFreedom(), start(), 0.0, predictor=Hermite(), idle=False)
+    path = Path(OneFreedom(), start(), 0.0, predictor=Hermite())
     path.advance(LoadControl(0.5))
     with pytest.raises(PathFailed) as failure:
         path.advance(LoadControl(beyond))

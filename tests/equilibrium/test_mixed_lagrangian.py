@@ -25,14 +25,13 @@ def case_of(dim: int, comm: MPI.Comm):
 
 def unknowns(system, state, seed: int) -> np.ndarray:
     """Small scaled unknowns of this rank, each block of a size its kind bears."""
-    random = np.random.default_rng(seed + system.layout.comm.rank)
-    layout = system.layout
-    displacements = 0.01 / system.unknowns.unit_u * random.uniform(-1.0, 1.0, layout.free_displacements)
+    random, blocks = np.random.default_rng(seed + system.comm.rank), system.blocks
+    displacements = 0.01 / system.unknowns.unit_u * random.uniform(-1.0, 1.0, blocks.nodes.count)
     pressures = 0.3 / system.elastic.pressure_unit
-    pressures = pressures * random.uniform(-1.0, 1.0, len(layout.free) - layout.free_displacements)
-    extras = random.uniform(-1.0, 1.0, layout.extras)
-    extras[layout.z] *= 0.01 / system.unknowns.unit_u
-    return np.concatenate([displacements, pressures, *([extras] if layout.last else [])])
+    pressures = pressures * random.uniform(-1.0, 1.0, blocks.pressures.count)
+    border = random.uniform(-1.0, 1.0, blocks.border.size)
+    blocks.restrict_border(border).poses[:] *= 0.01 / system.unknowns.unit_u
+    return blocks.join(np.concatenate([displacements, pressures]), border)
 
 
 def extrapolated(value) -> np.ndarray:
@@ -44,9 +43,9 @@ def extrapolated(value) -> np.ndarray:
 
 @pytest.mark.parametrize("comm", COMMS.values(), ids=COMMS)
 @pytest.mark.parametrize("dim", [2, 3])
-def test_balance_and_kkt_matrix_are_derivatives_of_the_lagrangian(dim, comm):
+def test_residual_and_kkt_matrix_are_derivatives_of_the_lagrangian(dim, comm):
     system, state, control = case_of(dim, comm)
-    assert 0 < system.layout.pressures < comm.allreduce(len(system.elastic.pressure.unknown))
+    assert 0 < system.blocks.pressures.size < comm.allreduce(len(system.elastic.pressure.unknown))
     direction, weights = (unknowns(system, state, seed) for seed in (1, 2))
 
     def lagrangian(h):
@@ -54,11 +53,11 @@ def test_balance_and_kkt_matrix_are_derivatives_of_the_lagrangian(dim, comm):
         value = system.potential(moved, moved.force) + moved.force * control.target
         return value - moved.multipliers @ system.joints.value(moved.poses, moved.motors)
 
-    def balance(h):
-        return comm.allreduce(weights @ system.balance(shifted(system, state, h * direction), control).vector.array)
+    def gradient_at(h):
+        return comm.allreduce(weights @ system.residual(shifted(system, state, h * direction), control).vector.array)
 
     system.load(state)
-    at = system.balance(state, control)
+    at = system.residual(state, control)
     slope = comm.allreduce(at.vector.array @ direction)
     system.linearise(state, control, at)
     matrix = system.kkt.matrix()
@@ -67,49 +66,47 @@ def test_balance_and_kkt_matrix_are_derivatives_of_the_lagrangian(dim, comm):
     curvature = comm.allreduce(weights @ (matrix * vector).array)
     assert slope == pytest.approx(extrapolated(lagrangian), rel=1e-7)
     # the proximal term of the multipliers is in the matrix alone
-    multipliers = slice(len(system.layout.free) + system.joints.size, -1)
-    proximal = REGULARISATION * comm.allreduce(
-        weights[multipliers] @ direction[multipliers] if system.layout.last else 0.0
-    )
-    assert curvature == pytest.approx(extrapolated(balance) - proximal, rel=1e-8)
+    multipliers = system.blocks.multipliers.local
+    proximal = REGULARISATION * comm.allreduce(weights[multipliers] @ direction[multipliers])
+    assert curvature == pytest.approx(extrapolated(gradient_at) - proximal, rel=1e-8)
 
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_shift_leaves_pressures_alone(dim):
     system, state, control = case_of(dim, MPI.COMM_WORLD)
     system.load(state)
-    system.linearise(state, control, system.balance(state, control))
+    system.linearise(state, control, system.residual(state, control))
     matrix = system.kkt.matrix()
     plain = matrix.getDiagonal().array.copy()
     system.kkt.shift(0.25)
-    change, layout = matrix.getDiagonal().array - plain, system.layout
-    assert change[: layout.free_displacements] == pytest.approx(0.25, abs=1e-12)
-    assert not np.any(change[layout.free_displacements : len(layout.free)])
+    change = system.blocks.restrict(matrix.getDiagonal().array - plain)
+    assert change.nodes == pytest.approx(0.25, abs=1e-12)
+    assert not np.any(change.pressures)
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-def test_balance_is_the_same_on_any_number_of_ranks(dim):
+def test_residual_is_the_same_on_any_number_of_ranks(dim):
     values = []
     for comm in COMMS.values():
         system, state, control = case_of(dim, comm)
         system.load(state)
-        balance = system.balance(state, control)
-        values.append((system.potential(state, state.force), balance.norm, balance.forces, system.volume_violation()))
+        residual = system.residual(state, control)
+        values.append((system.potential(state, state.force), residual.norm, residual.forces, system.volume_violation()))
     assert values[1] == pytest.approx(values[0], rel=1e-11)
 
 
 def test_pressures_are_about_as_large_as_displacements_in_scaled_units():
     system, state, control = case_of(2, MPI.COMM_WORLD)
     system.load(state)
-    system.linearise(state, control, system.balance(state, control))
+    system.linearise(state, control, system.residual(state, control))
     matrix = system.kkt.matrix()
-    comm, layout = system.layout.comm, system.layout
+    comm, pressures = system.comm, system.blocks.pressures
     # how much of the pressures' rows lies at displacements: their coupling, about one per unit
     probe, rows = matrix.createVecRight(), []
     for seed in range(5):
         values = np.random.default_rng(seed + 10 * comm.rank).choice([-1.0, 1.0], len(probe.array))
-        values[layout.free_displacements :] = 0.0
+        values[pressures.local.start :] = 0.0
         probe.array[:] = values
-        rows.append((matrix * probe).array[layout.free_displacements : len(layout.free)])
-    squares = comm.allreduce(float(np.sum(np.square(rows)))) / 5.0 / layout.pressures
+        rows.append((matrix * probe).array[pressures.local])
+    squares = comm.allreduce(float(np.sum(np.square(rows)))) / 5.0 / pressures.size
     assert 0.1 < np.sqrt(squares) < 10.0

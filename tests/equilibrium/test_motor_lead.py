@@ -102,7 +102,7 @@ def test_position_at_which_a_motor_turns_back_is_told_the_better_the_nearer():
     turning = curve.turning_points[0]
     missed = []
     for index in (0, turning.index // 2, turning.index - 1):
-        found = simulation.buckling_positions(curve, frame=curve.frames[index], count=1)
+        found = curve.buckling_positions(frame=curve.frames[index], count=1)
         missed += [abs(point.position / turning.frame.displacement - 1.0) for point in found]
     assert len(missed) == 3 and missed[0] > missed[1] > missed[2] and missed[2] < 1e-2
 
@@ -118,7 +118,7 @@ def test_column_that_a_slide_shortens_buckles_at_its_euler_load():
     (event,) = curve.bifurcations
     assert event.frame.force == pytest.approx(-critical, rel=1e-2)
     # from rest, without a path: Euler's, and four times as far the next one
-    told = [point.position for point in simulation.buckling_positions(curve, frame=curve.frames[0], count=2)]
+    told = [point.position for point in curve.buckling_positions(frame=curve.frames[0], count=2)]
     assert told == pytest.approx([event.frame.displacement, 4.0 * event.frame.displacement], rel=1e-2)
     for branch in simulation.branches(curve, event, until=fm.Until(position=-1.0)):
         assert branch.displacements[-1] == pytest.approx(-1.0) and branch.stable[1:].all()
@@ -132,11 +132,11 @@ def test_curve_of_a_motor_is_labelled_with_its_own_units(tmp_path):
     curve.plot(tmp_path / "curve.png")
     curve.write_csv(tmp_path / "curve.csv")
     assert (tmp_path / "curve.csv").read_text().startswith("position [mm],force [N],stable,jumped,")
-    simulation.picture(tmp_path / "toggle.png")
+    curve.picture(tmp_path / "toggle.png")
     assert (tmp_path / "toggle.png").stat().st_size > 0
     case = four_bar(MPI.COMM_SELF)
     crank = case.simulation.scene.mechanism.motor(case.simulation.scene.mechanism.joints[0])
-    turned = fm.FollowedCurve(crank, curve.configuration, curve.freedom, curve.frames, units=curve.units, leads=True)
+    turned = fm.FollowedCurve(crank, curve.configuration, curve.freedom, curve.frames, curve.discretisation)
     assert [axis.label for axis in turned.axes] == ["angle [rad]", "torque [N mm]"]
 
 
@@ -150,12 +150,12 @@ def test_ends_and_questions_that_do_not_fit_a_motor_are_refused():
     with pytest.raises(fm.DescriptionError, match="not a motor"):
         simulation.follow(Motor(motor.joint, "another"), until=fm.Until(position=1.0))
     curve = simulation.follow(motor, until=fm.Until(position=-0.5))
-    for question in (simulation.error_estimates, simulation.buckling_loads):
-        with pytest.raises(fm.DescriptionError, match="no force leads it"):
-            question(curve)
-    with pytest.raises(fm.DescriptionError, match="no motor leads it"):
-        simulation.buckling_positions(simulation.load_displacement(push, forces=[0.0]))
-    assert simulation.soft_modes(curve, count=1)[0].stiffness > 0.0
+    for question in (curve.error_estimates, curve.buckling_loads, curve.explain):
+        with pytest.raises(fm.DescriptionError, match="no force changes along it"):
+            question()
+    with pytest.raises(fm.DescriptionError, match="no motor moves along it"):
+        simulation.load_displacement(push, forces=[0.0]).buckling_positions()
+    assert curve.soft_modes(count=1)[0].stiffness > 0.0
 
 
 def test_clamps_that_turn_together_lead_the_bow_over_the_fold_of_the_beam_and_back():

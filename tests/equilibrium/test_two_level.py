@@ -7,16 +7,13 @@ from petsc4py import PETSc
 
 import fenicsmech as fm
 from fenicsmech.equilibrium import (
-    AugmentedLagrangian,
     BySize,
     Direct,
     DisplacementControl,
     Factor,
     KktMatrix,
-    KktNewton,
     LoadControl,
     PrimalDualNewton,
-    Snes,
     TwoLevel,
     TwoLevelSolver,
 )
@@ -91,9 +88,9 @@ def test_inertia_and_solutions_are_those_of_the_factor_on_both_sides_of_buckling
     for load in (0.9, 0.99, 1.03, 1.3, 5.5, 10.0):
         state = system.moved(first, compression.scaled((load - 0.5) * EULER))
         control = LoadControl(load * EULER)
-        system.linearise(state, control, system.balance(state, control))
+        system.linearise(state, control, system.residual(state, control))
         matrix = system.kkt.matrix()
-        solver = solver or TwoLevelSolver(system)
+        solver = solver or TwoLevelSolver(system, TwoLevel())
         factor = Factor(matrix)
         assert factor.refactor() and solver.refactor()
         assert solver.inertia() == factor.inertia()
@@ -116,7 +113,7 @@ def test_stiffness_by_nodes_is_that_block_of_the_matrix():
     state = simulation.load_displacement(push, forces=[0.5 * EULER]).frames[0].state
     control = LoadControl(0.5 * EULER)
     system.load(state)
-    system.linearise(state, control, system.balance(state, control))
+    system.linearise(state, control, system.residual(state, control))
     matrix = system.kkt.matrix()
     for shift in (0.0, 0.3):
         system.kkt.shift(shift)
@@ -133,25 +130,24 @@ def test_columns_and_restrictions_are_those_of_the_matrix_shifted_and_softened()
     simulation, push = finger("3d", size=6.0, comm=MPI.COMM_WORLD)
     system = simulation.newton(push).system
     state = simulation.load_displacement(push, forces=[0.5]).frames[0].state
-    control, layout = DisplacementControl(0.2), system.layout
+    control = DisplacementControl(0.2)
     system.load(state)
-    random = np.random.default_rng(system.layout.comm.rank)
+    random = np.random.default_rng(system.comm.rank)
     mapped = restricted = None
     for softness, shift in ((None, 0.0), (None, 0.3), (0.02, 0.0), (0.02, 0.3), (None, 0.0)):
-        system.linearise(state, control, system.balance(state, control))
+        system.linearise(state, control, system.residual(state, control))
         if softness is not None:
             system.kkt.soften(softness, control)
         system.kkt.shift(shift)
         narrow = groups(system)
         mapped = system.unknowns.map.matMult(narrow, result=mapped)
         restricted = system.kkt.restricted(mapped, restricted)
-        columns = system.kkt.extra_columns()
+        columns = system.kkt.border_columns()
         matrix = system.kkt.matrix()  # last, so that it is not what the others take
         x, coarse = columns.createVecRight(), restricted.createVecRight()
         x.array_w[:], coarse.array_w[:] = (random.standard_normal(len(v.array)) for v in (x, coarse))
         whole = system.unknowns.zeros()
-        if layout.last:
-            whole.array_w[len(layout.free) :] = x.array_r
+        whole.array_w[system.blocks.border.local] = x.array_r
         assert (columns * x - matrix * whole).norm() <= 1e-12 * (columns * x).norm()
         expected = coarse.duplicate()
         narrow.multTranspose(matrix * (narrow * coarse), expected)
@@ -162,13 +158,11 @@ def groups(system):
     """P with one entry in each row: sums of ten unknowns."""
     local = system.unknowns.zeros().getLocalSize()
     owned = -(-local // 10)
-    first = (system.layout.comm.exscan(owned) or 0) + np.arange(local) // 10
-    total = system.layout.comm.allreduce(owned)
+    first = (system.comm.exscan(owned) or 0) + np.arange(local) // 10
+    total = system.comm.allreduce(owned)
     starts = np.arange(local + 1, dtype=PETSc.IntType)
-    size = [(local, system.layout.unknowns), (owned, total)]
-    return PETSc.Mat().createAIJ(
-        size, csr=(starts, first.astype(PETSc.IntType), np.ones(local)), comm=system.layout.comm
-    )
+    size = [(local, system.blocks.size), (owned, total)]
+    return PETSc.Mat().createAIJ(size, csr=(starts, first.astype(PETSc.IntType), np.ones(local)), comm=system.comm)
 
 
 def test_the_matrix_over_all_unknowns_is_never_formed(monkeypatch):
@@ -202,8 +196,8 @@ def test_iterations_do_not_grow_with_the_mesh():
         state = simulation.load_displacement(push, forces=[0.5 * EULER]).frames[0].state
         control = LoadControl(0.5 * EULER)
         system.load(state)
-        system.linearise(state, control, system.balance(state, control))
-        solver = TwoLevelSolver(system)
+        system.linearise(state, control, system.residual(state, control))
+        solver = TwoLevelSolver(system, TwoLevel())
         assert solver.refactor()
         right = system.force_rate(state)
         assert solver.solve(right, right.duplicate(), 1e-8)
@@ -216,7 +210,7 @@ def test_size_decides_unless_said_otherwise():
     system = simulation.newton(push).system
     state = simulation.load_displacement(push, forces=[0.0]).frames[0].state
     control = LoadControl(0.0)
-    system.linearise(state, control, system.balance(state, control))
+    system.linearise(state, control, system.residual(state, control))
     unknowns = system.kkt.matrix().getSize()[0]
     assert isinstance(BySize(limit=unknowns).solver(system), Factor)
     assert isinstance(BySize(limit=unknowns - 1).solver(system), TwoLevelSolver)
@@ -246,15 +240,6 @@ def test_nor_do_they_suit_pressures_and_mid_planes_which_the_factor_solves_at_an
     simulation, tip = tongue(TwoLevel(), **unsuited)
     with pytest.raises(fm.DescriptionError, match="TwoLevel"):
         simulation.load_displacement(tip, forces=[0.02])
-
-
-@pytest.mark.parametrize("solver", [AugmentedLagrangian, KktNewton, Snes])
-def test_other_solvers_take_two_levels_too(solver):
-    curves = []
-    for linear in (TwoLevel(), Direct()):
-        simulation, push = finger("3d", size=6.0, solver=solver(linear=linear))
-        curves.append(simulation.load_displacement(push, forces=[0.5, 1.0]))
-    same(*curves)
 
 
 def test_followed_paths_end_where_those_of_the_factor_do():

@@ -45,7 +45,7 @@ def of_joints(simulation: fm.Simulation, frame: fm.Frame) -> dict[Link, Wrench]:
 
 def of_load(simulation: fm.Simulation, curve: fm.Curve, frame: fm.Frame) -> Wrench:
     """The curve's force, at its moved point."""
-    load, model, dim = curve.force_part, simulation.model, simulation.linkage.dim
+    load, model, dim = curve.part, simulation.model, simulation.linkage.dim
     model.load(frame.state)
     moved = np.array(in_dimension(load.at, dim)) + model.point(load).displacement(model.elastic.u, frame.state.poses)
     return Wrench.at(moved, frame.force * np.array(in_dimension(load.direction, dim)))

@@ -125,7 +125,7 @@ def _edge(space: str, comm: MPI.Comm) -> Iterator[Check]:
     )
     said = ""
     try:
-        problem.apply(-3.0 * problem.initial)
+        problem.rest_shape(-3.0 * problem.initial)
     except fm.FenicsmechError as error:
         said = str(error)
     yield Fact("a design inside out is an error", "inverted" in said)

@@ -9,8 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.accuracy import Displacement, Rung
-from fenicsmech.elasticity import SPATIAL, Quadrature
+from fenicsmech.elasticity import Quadrature
 from fenicsmech.equilibrium import PrimalDualNewton
 
 from ..mechanism.parts import parts
@@ -59,8 +58,6 @@ def _fidelity(scene: fm.Scene, space: str, comm: MPI.Comm) -> dict[str, Callable
         "Newton's round-off": lambda x: simulated(solver=PrimalDualNewton(roundoff=x)),
         "Newton's neighbourhood": lambda x: simulated(solver=PrimalDualNewton(near=x)),
         "Newton's largest turn": lambda x: simulated(solver=PrimalDualNewton(largest_turn=x)),
-        "rung's factor": lambda x: Rung(SPATIAL, factor=x),
-        "rung's tolerance": lambda x: Rung(SPATIAL, tolerance=x),
         "Levenberg–Marquardt's tolerance": lambda x: fm.LevenbergMarquardt(tolerance=x),
         "Levenberg–Marquardt's damping": lambda x: fm.LevenbergMarquardt(damping=x),
         "BFGS's tolerance": lambda x: fm.BFGS(tolerance=x),
@@ -76,10 +73,10 @@ def _requests(simulation: fm.Simulation, push) -> dict[str, Callable[[float], ob
     def applied(x: float) -> None:
         design = problem.initial.copy()
         design[-1] = x
-        problem.apply(design)
+        problem.rest_shape(design)
 
     def explained(x: float) -> None:
-        simulation.explain(simulation.load_displacement(push, forces=[0.1]), tolerance=x)
+        simulation.load_displacement(push, forces=[0.1]).explain(tolerance=x)
 
     return {
         "force of a curve": lambda x: simulation.load_displacement(push, forces=[0.1, x]),
@@ -98,7 +95,6 @@ def _requests(simulation: fm.Simulation, push) -> dict[str, Callable[[float], ob
         "strength of the mesh quality": lambda x: fm.MeshQuality(strength=x),
         "force of an experiment": lambda x: fm.Experiment(simulation, push, [1.0, x], [1.0, 2.0]),
         "displacement of an experiment": lambda x: fm.Experiment(simulation, push, [1.0, 2.0], [1.0, x]),
-        "load of an accuracy study": lambda x: Displacement(push, x),
     }
 
 

@@ -16,7 +16,6 @@ from fenicsmech.joints import (
     SPHERICAL,
     UNIVERSAL,
     WELD,
-    Constraint,
     JointKind,
     RigidSpace,
     constraint,
@@ -122,6 +121,39 @@ def draw(space: RigidSpace, rng: np.random.Generator) -> Drawn:
     return Drawn(space, rng.standard_normal((2, space.dim)), triad)
 
 
-def compiled(case: Case, *, driven: bool = False) -> Constraint:
+class Compiled:
+    """The package's equations of a case, by z (2 pose_size,), anchors (2, dim), triad (dim, dim) and a motor's φ."""
+
+    def __init__(self, case: Case, driven: bool) -> None:
+        self._equations, self._driven = constraint(case.kind, case.dim, driven), driven
+        self.rows = self._equations.size
+
+    def value(self, *point) -> np.ndarray:
+        """C, (rows,)."""
+        return self._equations.value(*self._arguments(*point))
+
+    def gradient(self, z, *point) -> np.ndarray:
+        """∂C/∂z, (rows, 2 pose_size)."""
+        return self._equations.gradient(*self._arguments(z, *point))[:, : z.size]
+
+    def hessian(self, z, *point) -> np.ndarray:
+        """Σ λ_k ∂²C_k/∂z², (2 pose_size, 2 pose_size), λ last."""
+        return self._equations.hessian(*self._arguments(z, *point[:-1]), point[-1])[: z.size, : z.size]
+
+    def rate(self, *point) -> np.ndarray:
+        """∂C/∂φ, (rows,)."""
+        assert self._driven
+        return self._equations.gradient(*self._arguments(*point))[:, -1]
+
+    def twist(self, z, *point) -> np.ndarray:
+        """Σ λ_k ∂²C_k/∂z∂φ, (2 pose_size,), λ last."""
+        assert self._driven
+        return self._equations.hessian(*self._arguments(z, *point[:-1]), point[-1])[-1, : z.size]
+
+    def _arguments(self, z, anchors, triad, value) -> tuple[np.ndarray, np.ndarray]:
+        return np.append(z, value) if self._driven else z, np.concatenate([anchors.ravel(), triad.ravel()])
+
+
+def compiled(case: Case, *, driven: bool = False) -> Compiled:
     """The package's equations of ``case``."""
-    return constraint(case.kind, case.dim, driven)
+    return Compiled(case, driven)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fenicsmech.joints import PLANAR, SPATIAL, RigidSpace
+from fenicsmech.joints import RIGID_SPACES, RigidSpace
 
-SPACES = (PLANAR, SPATIAL)
+SPACES = PLANAR, SPATIAL = RIGID_SPACES[2], RIGID_SPACES[3]
 
 
 def turn(space: RigidSpace, omega: np.ndarray) -> Rotation:

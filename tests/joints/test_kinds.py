@@ -10,7 +10,6 @@ from fenicsmech.joints import (
     SPHERICAL,
     UNIVERSAL,
     WELD,
-    JointKind,
     constraint,
 )
 
@@ -51,16 +50,3 @@ def test_joint_without_a_free_coordinate_to_drive_takes_no_motor(kind, dim):
 
 def test_equations_are_compiled_once():
     assert constraint(REVOLUTE, 2, True) is constraint(REVOLUTE, 2, True)
-
-
-def test_a_new_joint_is_one_class():
-    class Pin(JointKind):
-        """A point of b on an axis of a."""
-
-        name = "pin in slot"
-
-        def equations(self, a, b):
-            apart = b.origin - a.origin
-            return [apart.dot(a.e1), apart.dot(a.e2)]
-
-    assert constraint(Pin(), 3, False).rows == 2

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from fenicsmech.joints import PLANAR, SPATIAL
-
-from .poses import SPACES, matrix, pose, random_pose, random_rotation, rotation_of, turn
+from .poses import PLANAR, SPACES, SPATIAL, matrix, pose, random_pose, random_rotation, rotation_of, turn
 from .taylor import STEPS, assert_derivative
 
 EVERY_SPACE = pytest.mark.parametrize("space", SPACES, ids=["planar", "spatial"])

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import sympy
 
-from fenicsmech.joints import PLANAR, RIGID_SPACES, SPATIAL
+from fenicsmech.joints import RIGID_SPACES
 
-from .poses import SPACES, matrix, pose, random_pose, rotation_of, turn
+from .poses import PLANAR, SPACES, SPATIAL, matrix, pose, random_pose, rotation_of, turn
 from .taylor import assert_derivative
 
 TINY = 1e-9

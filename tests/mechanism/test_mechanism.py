@@ -146,7 +146,7 @@ def test_motor_on_a_joint_that_takes_none_is_refused():
         lambda: p.mechanism.motor(ball),
         "motor 'motor of ball'",
         "a spherical joint takes no motor",
-        "Use a revolute or a prismatic joint",
+        "Use a joint with one free coordinate, as a revolute or a prismatic one",
     )
 
 

@@ -17,7 +17,7 @@ from fenicsmech.mechanism import (
     gmsh_mesh,
     outline,
     polygon,
-    step,
+    step_file,
     strip,
 )
 
@@ -49,7 +49,7 @@ COORDINATES = {
     "outline start": lambda p, x: outline((x, 0.0), [Line((1.0, 1.0))], depth=1.0),
     "outline segment end": lambda p, x: outline((0.0, 0.0), [Line((1.0, x))], depth=1.0),
     "outline arc": lambda p, x: outline((0.0, 0.0), [Arc((x, 1.0), (1.0, 1.0))], depth=1.0),
-    "STEP section": lambda p, x: step("part.step", depth=1.0, section=x),
+    "STEP section": lambda p, x: step_file("part.step", depth=1.0, section=x),
     "Poisson's ratio of material 'clay'": lambda p, x: Material("clay", 1.0, x),
 }
 SIZES = {
@@ -61,7 +61,7 @@ SIZES = {
     "strip depth": lambda p, x: strip(TRIANGLE, thickness=1.0, depth=x),
     "polygon depth": lambda p, x: polygon(TRIANGLE, depth=x),
     "outline depth": lambda p, x: outline((0.0, 0.0), [Line((1.0, 1.0))], depth=x),
-    "STEP depth": lambda p, x: step("part.step", depth=x),
+    "STEP depth": lambda p, x: step_file("part.step", depth=x),
     "mesh depth": lambda p, x: gmsh_mesh("part.msh", depth=x),
     "Young's modulus of material 'clay'": lambda p, x: Material("clay", x, 0.3),
 }

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fenicsmech.errors import MeshingError
-from fenicsmech.mechanism import step
+from fenicsmech.mechanism import step_file
 from fenicsmech.meshing import LinkMesh, boundary_loops, cell_measures, mesh_link
 
 from .bent_links import link
@@ -29,7 +29,7 @@ def triangles(points, cells):
 
 
 def test_a_part_with_two_holes_has_three_loops_and_their_areas_add_up():
-    mesh = mesh_link("part", step(PART, depth=10.0), dim=2, size=1.0)
+    mesh = mesh_link("part", step_file(PART, depth=10.0), dim=2, size=1.0)
     loops = boundary_loops("part", mesh)
     areas = [area(mesh.points[loop]) for loop in loops]
     assert areas[0] > 0.0 and max(areas[1:]) < 0.0 and len(loops) == 3

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from fenicsmech.mechanism import Arc, Disc, Line, outline, strip
 from fenicsmech.meshing import CurvedEdges, InterfaceSite, LinkMesh, cell_measures, extrude, extrude_half, mesh_link
 
-from ..report.grids import box, rectangle
+from ..plot.grids import box, rectangle
 from .curved_measure import least_jacobian, measure
 
 LENGTH, THICKNESS, DEPTH = 20.0, 4.0, 3.0

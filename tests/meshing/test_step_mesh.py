@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import quad
 
 from fenicsmech.errors import DescriptionError
-from fenicsmech.mechanism import Disc, step
+from fenicsmech.mechanism import Disc, step_file
 from fenicsmech.meshing import InterfaceSite, cell_measures, gmsh, gmsh_session, mesh_link, radius_ratios
 
 PART = Path(__file__).parents[2] / "meshes" / "curved_link.step"
@@ -28,7 +28,7 @@ PLAN_AREA = BAND + 2.0 * (EYE - shared_area())
 
 @pytest.mark.parametrize("section", [-5.0, 0.0, 3.3, 5.0])
 def test_a_section_has_the_area_of_the_part_even_in_its_faces(section):
-    mesh = mesh_link("part", step(PART, depth=10.0, section=section), SITES, dim=2, size=0.8)
+    mesh = mesh_link("part", step_file(PART, depth=10.0, section=section), SITES, dim=2, size=0.8)
     measures = cell_measures(mesh.points, mesh.cells)
     assert mesh.dim == 2 and np.all(measures > 0.0)
     assert measures.sum() == pytest.approx(PLAN_AREA, rel=4e-3)
@@ -36,7 +36,7 @@ def test_a_section_has_the_area_of_the_part_even_in_its_faces(section):
 
 
 def test_the_solid_has_its_volume():
-    mesh = mesh_link("part", step(PART, depth=10.0), SITES, dim=3, size=1.5)
+    mesh = mesh_link("part", step_file(PART, depth=10.0), SITES, dim=3, size=1.5)
     volumes = cell_measures(mesh.points, mesh.cells)
     assert mesh.dim == 3 and np.all(volumes > 0.0)
     assert volumes.sum() == pytest.approx(10.0 * PLAN_AREA, rel=1e-2)
@@ -51,7 +51,7 @@ def test_half_of_the_solid_stands_on_its_mid_plane_wherever_it_was_drawn(height,
         gmsh.model.occ.translate(gmsh.model.occ.getEntities(3), 0.0, 0.0, height)
         gmsh.model.occ.synchronize()
         gmsh.write(str(tmp_path / "moved.step"))
-    mesh = mesh_link("part", step(tmp_path / "moved.step", depth=10.0), SITES, dim=3, size=1.5, half=True)
+    mesh = mesh_link("part", step_file(tmp_path / "moved.step", depth=10.0), SITES, dim=3, size=1.5, half=True)
     volumes = cell_measures(mesh.points, mesh.cells)
     assert np.all(volumes > 0.0)
     assert volumes.sum() == pytest.approx(5.0 * PLAN_AREA, rel=1e-2)
@@ -71,17 +71,17 @@ def test_a_solid_with_a_boss_or_a_bump_on_one_side_has_no_half(radius, tmp_path)
         occ.synchronize()
         gmsh.write(str(tmp_path / "boss.step"))
     with pytest.raises(DescriptionError, match="not symmetric"):
-        mesh_link("plate", step(tmp_path / "boss.step", depth=4.0), dim=3, size=2.0, half=True)
+        mesh_link("plate", step_file(tmp_path / "boss.step", depth=4.0), dim=3, size=2.0, half=True)
 
 
 def test_the_element_size_is_met_in_the_solid():
-    mesh = mesh_link("part", step(PART, depth=10.0), dim=3, size=2.0)
+    mesh = mesh_link("part", step_file(PART, depth=10.0), dim=3, size=2.0)
     edges = np.linalg.norm(mesh.points[mesh.cells] - mesh.points[np.roll(mesh.cells, 1, axis=1)], axis=2)
     assert 1.4 < np.median(edges) < 2.4
 
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_the_same_part_gives_the_same_arrays(dim):
-    one, other = (mesh_link("part", step(PART, depth=10.0), SITES, dim=dim, size=2.0) for _ in range(2))
+    one, other = (mesh_link("part", step_file(PART, depth=10.0), SITES, dim=dim, size=2.0) for _ in range(2))
     assert np.array_equal(one.points, other.points) and np.array_equal(one.cells, other.cells)
     assert np.array_equal(one.interface, other.interface)

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from fenicsmech.mechanism import Disc, Rectangle, strip
-from fenicsmech.meshing import FREE, Centreline, InterfaceSite, cell_measures, mesh_link, radius_ratios
+from fenicsmech.mechanism import Centreline, Disc, Rectangle, strip
+from fenicsmech.meshing import FREE, InterfaceSite, cell_measures, mesh_link, radius_ratios
 
 STRAIGHT = [(0.0, 0.0), (40.0, 0.0)]
 BENT = [(0.0, 0.0), (18.0, 34.0), (40.0, 60.0)]
@@ -50,6 +50,26 @@ def test_eyes_add_the_part_of_their_disc_beyond_the_strip(ratio):
     segments = 2.0 * math.pi * radius / size
     missing = 2.0 * math.pi * radius**2 * (2.0 * math.pi**2 / 3.0) / segments**2  # of two inscribed polygons
     assert exact - 1.1 * missing < area(mesh) < exact
+
+
+@pytest.mark.parametrize("half", [None, False, True])
+@pytest.mark.parametrize("thickness", [2.5, 1.0, 0.3])
+@pytest.mark.parametrize("points", [STRAIGHT, BENT, WAVY])
+def test_eyes_much_wider_than_the_strip_are_discs_around_their_pins(points, thickness, half):
+    radius, size, depth = 3.0, 0.6, 2.0
+    sites = pins(points[0], on_curve(points, 0.5), points[-1], radius=radius)
+    space = {"dim": 2} if half is None else {"dim": 3, "half": half}
+    mesh = mesh_link("link", strip(points, thickness=thickness, depth=depth), sites, size=size, **space)
+    height = 1.0 if half is None else depth * (0.5 if half else 1.0)
+    for number, site in enumerate(sites):
+        held = mesh.cells_of(number)
+        assert np.linalg.norm(mesh.points[np.unique(held), :2] - site.at, axis=1).max() == pytest.approx(radius)
+        segments = math.ceil(2.0 * math.pi * radius / size)
+        polygon = 0.5 * segments * radius**2 * math.sin(2.0 * math.pi / segments)
+        assert cell_measures(mesh.points, held).sum() == pytest.approx(height * polygon, rel=2e-3)
+    # two ends and two sides of the middle reach from the rims: what is left of the strip is flexible
+    free = thickness * (Centreline(points).length - 4.0 * radius)
+    assert cell_measures(mesh.points, mesh.cells_of(FREE)).sum() == pytest.approx(height * free, rel=0.02)
 
 
 @pytest.mark.parametrize("ratio", [0.5, 1.0])

@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from fenicsmech.compat import create_mesh, original_cells, vector_space
 
-from ..report.grids import box, rectangle
+from ..plot.grids import box, rectangle
 
 
 @dataclass(frozen=True)

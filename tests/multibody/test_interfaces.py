@@ -5,9 +5,9 @@ import pytest
 from mpi4py import MPI
 from scipy.spatial.transform import Rotation
 
-from fenicsmech.joints import PLANAR, SPATIAL
 from fenicsmech.multibody import InterfaceMap
 
+from ..joints.poses import PLANAR, SPATIAL
 from ..oracles.dense import jacobian
 from .shared_mesh import barycentric, shared_mesh
 

@@ -21,7 +21,7 @@ def zoo(dim: int) -> JointSystem:
     links = [m.rigid("ground", fixed=True)]
     for kind in (kind for kind in SPATIAL_KINDS if dim == 3 or kind.planar):
         links.append(m.rigid(f"after {kind.name}"))
-        axis = rng.standard_normal(3) if dim == 3 else (1.0, 2.0) if kind.sliding else (0.0, 0.0, 1.0)
+        axis = rng.standard_normal(3) if dim == 3 else (1.0, 2.0) if kind.axis_in_plane else (0.0, 0.0, 1.0)
         joint = m.join(kind, *links[-2:], at=rng.uniform(0.0, 30.0, dim), axis=axis)
         if kind.motorised:
             m.motor(joint)
@@ -101,7 +101,7 @@ def test_pulls_of_all_connections_and_norms_add_up_to_the_whole(system):
         pull = system.space.norm_gradient(poses[body]).T @ multipliers[norm]
         for k, connection in enumerate(system.connections):
             if body in (connection.a, connection.b):
-                pull = pull + system.pull(k, body, poses, motors, multipliers)
+                pull = pull + system.generalised_force(k, body, poses, motors, multipliers)
         assert pull == pytest.approx(total[system.columns[body]], abs=1e-12)
 
 
@@ -111,7 +111,7 @@ def test_joint_pulls_on_both_of_its_bodies_in_balance(system):
     multipliers = np.random.default_rng(2).standard_normal(system.rows)
     dim = system.space.dim
     for k, c in enumerate(system.connections):
-        on_a, on_b = (system.pull(k, body, system.drawn, motors, multipliers) for body in (c.a, c.b))
+        on_a, on_b = (system.generalised_force(k, body, system.drawn, motors, multipliers) for body in (c.a, c.b))
         assert on_a[:dim] == pytest.approx(-on_b[:dim], abs=1e-13)
         # moments about the origin, from those about the centres
         total = np.zeros(2 * dim - 3)

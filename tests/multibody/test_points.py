@@ -5,9 +5,9 @@ import pytest
 from mpi4py import MPI
 
 from fenicsmech.errors import DescriptionError
-from fenicsmech.joints import PLANAR, SPATIAL
 from fenicsmech.multibody import body_point, link_point
 
+from ..joints.poses import PLANAR, SPATIAL
 from ..oracles.dense import jacobian
 from .shared_mesh import shared_mesh
 

@@ -6,7 +6,7 @@ import numpy as np
 
 import fenicsmech as fm
 from fenicsmech.meshing import CurvedEdges, LinkMesh
-from fenicsmech.simulation import link_meshes
+from fenicsmech.model import model
 
 
 def quartered(mesh: LinkMesh) -> LinkMesh:
@@ -29,7 +29,7 @@ def quartered(mesh: LinkMesh) -> LinkMesh:
 
 def refine(monkeypatch, levels: int) -> None:
     """Makes the simulations made from now on use meshes refined ``levels`` times."""
-    plain = link_meshes.mesh_links
+    plain = model.mesh_links
 
     def mesh_links(*arguments):
         meshes = plain(*arguments)
@@ -37,7 +37,7 @@ def refine(monkeypatch, levels: int) -> None:
             meshes = [quartered(mesh) for mesh in meshes]
         return meshes
 
-    monkeypatch.setattr(link_meshes, "mesh_links", mesh_links)
+    monkeypatch.setattr(model, "mesh_links", mesh_links)
 
 
 def cantilever() -> tuple[fm.Scene, object, float]:

@@ -208,8 +208,8 @@ def test_force_configuration_and_samples_of_the_wrong_kind(truss):
 
 def test_field_file_of_another_kind_is_refused_and_leaves_nothing(truss, tmp_path):
     simulation, push, _ = truss
-    simulation.load_displacement(push, forces=[0.1])
-    refused("x.vtu", lambda: simulation.write(tmp_path / "x.vtu"))
+    curve = simulation.load_displacement(push, forces=[0.1])
+    refused("x.vtu", lambda: curve.write(tmp_path / "x.vtu"))
     assert not list(tmp_path.iterdir())
 
 

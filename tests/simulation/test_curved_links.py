@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 import fenicsmech as fm
 from fenicsmech.mechanism import Force, Output
 from fenicsmech.meshing import MechanismMesh
-from fenicsmech.simulation import MechanismModel
+from fenicsmech.model import MechanismModel
 
 INNER, OUTER, DEPTH = 12.0, 16.0, 6.0
 MIDDLE = 0.5 * (INNER + OUTER)

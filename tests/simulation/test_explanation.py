@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.simulation import PLASTIC_WEIGHT, weight_influence
+from fenicsmech.simulation import ExplanationOptions, weight_influence
 
 from .demo_scenes import describe
 
@@ -22,9 +22,9 @@ def test_hint_on_weight_is_what_gravity_does(space):
     scene, push = describe("claw")
     simulation = fm.Simulation(scene, space=space, size=4.0)
     curve = simulation.load_displacement(push, forces=[2.0])
-    influence = weight_influence(simulation.model, simulation.newton(push), curve, curve.frames[-1])
+    influence = weight_influence(simulation.model, simulation.newton(push), curve.equilibrium(curve.frames[-1]))
     direction = influence / np.linalg.norm(influence)
-    density = 1e-2 * PLASTIC_WEIGHT  # light enough to be linear
+    density = 1e-2 * ExplanationOptions().weight  # light enough to be linear
     weighed = fm.Scene(scene.mechanism, effects=[fm.Gravity(tuple(direction), {fm.ONYX: density})])
     heavy = fm.Simulation(weighed, space=space, size=4.0).load_displacement(push, forces=[2.0])
     change = heavy.displacements[0] - curve.displacements[0]
@@ -35,8 +35,8 @@ def test_weight_matters_to_the_soft_finger_and_not_to_the_stiff_claw():
     for name, force, matters in (("truss", 0.4, True), ("claw", 10.0, False)):
         scene, push = describe(name)
         simulation = fm.Simulation(scene, space="plane-stress", size=4.0)
-        simulation.load_displacement(push, forces=[force])
-        assert hint(simulation.explain(), "weight").matters is matters
+        curve = simulation.load_displacement(push, forces=[force])
+        assert hint(curve.explain(), "weight").matters is matters
 
 
 def test_hint_on_weight_knows_all_forces_that_act():
@@ -53,7 +53,7 @@ def test_hint_on_weight_knows_all_forces_that_act():
     weighed = fm.Scene(rig, effects=[fm.Gravity((0, -1e-3 * 9810.0), {link.material: 1.2e-9})])
     heavy = fm.Simulation(weighed, space="plane-stress", size=2.0)
     sunk = heavy.load_displacement(push, forces=[0.01], others={pull: 0.3}).displacements[0] - curve.displacements[0]
-    told = float(hint(simulation.explain(), "weight").text.split("at most ")[1].split()[0])
+    told = float(hint(curve.explain(), "weight").text.split("at most ")[1].split()[0])
     assert told == pytest.approx(abs(1e3 * sunk), rel=0.1)
 
 
@@ -61,8 +61,8 @@ def test_effects_that_are_listed_are_named_and_not_hinted_at():
     scene, push = describe("truss")
     gravity = fm.Gravity((0, -9810), {fm.SMOOTH_SIL_950: 1.2e-9})
     simulation = fm.Simulation(fm.Scene(scene.mechanism, effects=[gravity]), space="plane-stress", size=4.0)
-    simulation.load_displacement(push, forces=[0.1])
-    explanation = simulation.explain()
+    curve = simulation.load_displacement(push, forces=[0.1])
+    explanation = curve.explain()
     assert "weight of Smooth-Sil 950" in explanation.simulated
     assert hint(explanation, "weight") is None
     assert "Simulated:" in str(explanation)
@@ -86,8 +86,8 @@ def test_compression_is_compared_with_the_load_that_buckles_a_link_out_of_the_pl
     critical = np.pi**2 * 2000.0 * 6.0 * 4.0**3 / 12.0 / 60.0**2
     for share in (0.05, 0.5):
         simulation, push = pinned(stiff)
-        simulation.load_displacement(push, forces=[share * critical])
-        found = hint(simulation.explain(), "bending out of the plane")
+        curve = simulation.load_displacement(push, forces=[share * critical])
+        found = hint(curve.explain(), "bending out of the plane")
         assert f"about {share:.2g} " in found.text
         assert found.matters is (share > 0.2)
 
@@ -108,11 +108,11 @@ def test_nearly_incompressible_links_have_a_pressure_or_are_pointed_out(
     poisson, space, order, formulation, hinted, pressed
 ):
     simulation, push = pinned(fm.Material("rubber", 2.0, poisson), space=space, order=order, formulation=formulation)
-    simulation.load_displacement(push, forces=[0.01])
-    explanation, what = simulation.explain(), "u–p (mixed) formulation"
+    curve = simulation.load_displacement(push, forces=[0.01])
+    explanation, what = curve.explain(), "pressure as an unknown"
     found = hint(explanation, what)
     assert (found is not None and found.matters) == hinted
-    assert (f"{what} in strut" in explanation.simulated) == pressed
+    assert (f"{what} (u–p elements) in strut" in explanation.simulated) == pressed
 
 
 def test_links_that_cross_are_pointed_out():
@@ -125,5 +125,5 @@ def test_links_that_cross_are_pointed_out():
         rig.revolute(link, end, at=stop, radius=2.0)
     push = rig.force(on=end, at=(40, 15), direction=(1, 0))
     simulation = fm.Simulation(fm.Scene(rig), space="plane-stress", size=3.0)
-    simulation.load_displacement(push, forces=[1.0])
-    assert "one and other" in hint(simulation.explain(), "contact between links").text
+    curve = simulation.load_displacement(push, forces=[1.0])
+    assert "one and other" in hint(curve.explain(), "contact between links").text

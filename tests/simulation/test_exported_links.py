@@ -7,7 +7,8 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.meshing import PinHole, gmsh, gmsh_session, write_step
+from fenicsmech.export import PinHole, write_step
+from fenicsmech.meshing import gmsh, gmsh_session
 
 from ..meshing.bent_links import CURVED, DEPTH, LENGTH, RADIUS, STRAIGHT, THICKNESS, bent, bent_point, link
 
@@ -44,7 +45,7 @@ def test_a_strip_written_and_read_bends_as_it_did(holes, tmp_path):
     pins = CURVED[0], CURVED[-1]
     write_step(tmp_path / "link.step", link(1.0), depth=DEPTH, pins=holes)
     drawn = curve(fm.strip(CURVED, thickness=THICKNESS, depth=DEPTH), pins, size=1.0)
-    again = curve(fm.step(tmp_path / "link.step", depth=DEPTH), pins, size=1.0)
+    again = curve(fm.step_file(tmp_path / "link.step", depth=DEPTH), pins, size=1.0)
     assert np.abs(drawn).min() > 0.2
     assert again == pytest.approx(drawn, rel=5e-3)
 
@@ -54,5 +55,5 @@ def test_a_new_shape_written_and_read_bends_as_its_mesh_did(tmp_path):
     mesh = bent(link(1.0, points=STRAIGHT))
     write_step(tmp_path / "link.step", mesh, depth=DEPTH)
     designed = curve(saved(mesh, tmp_path / "link.msh"), pins, size=1.0)
-    again = curve(fm.step(tmp_path / "link.step", depth=DEPTH), pins, size=1.0)
+    again = curve(fm.step_file(tmp_path / "link.step", depth=DEPTH), pins, size=1.0)
     assert again == pytest.approx(designed, rel=5e-3)

@@ -9,10 +9,11 @@ from dolfinx.io import XDMFFile
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.report import Trace, read_curve_csv
+from fenicsmech.files import read_csv
+from fenicsmech.plot import Trace
 from fenicsmech.simulation import gather
 
-from ..report.png import png_size, share_of_colour
+from ..plot.png import png_size, share_of_colour
 from .demo_scenes import describe
 
 pytestmark = pytest.mark.parallel
@@ -42,7 +43,7 @@ def names(folder: Path) -> set[str]:
 def test_fields_are_written_as_a_time_series_over_the_force(space, shared_tmp_path):
     simulation, curve = claw(space)
     path = shared_tmp_path / "new folder" / "claw.xdmf"
-    simulation.write(path)
+    curve.write(path)
     assert names(path.parent) == {"claw.xdmf", "claw.h5"}
 
     tree = ElementTree.parse(path)
@@ -69,19 +70,19 @@ def test_fields_are_written_as_a_time_series_over_the_force(space, shared_tmp_pa
 
 
 def test_where_nothing_can_be_written_all_ranks_say_so(shared_tmp_path):
-    simulation, _ = claw("plane-stress")
+    _, curve = claw("plane-stress")
     if COMM.rank == 0:
         (shared_tmp_path / "no folder").touch()
     with pytest.raises(OSError, match="no folder"):
-        simulation.write(shared_tmp_path / "no folder" / "claw.xdmf")
+        curve.write(shared_tmp_path / "no folder" / "claw.xdmf")
 
 
 def test_files_of_an_earlier_run_are_replaced(shared_tmp_path):
     simulation, curve = claw("plane-stress")
-    other = simulation.load_displacement(curve.force_part, forces=[1.0])
+    other = simulation.load_displacement(curve.part, forces=[1.0])
     path = shared_tmp_path / "claw.xdmf"
-    simulation.write(path, curve)
-    simulation.write(path)  # the last one computed
+    curve.write(path)
+    other.write(path)
     COMM.Barrier()
     times = {float(time.get("Value")) for time in ElementTree.parse(path).iter("Time")}
     assert times == set(other.forces)
@@ -93,12 +94,11 @@ def test_picture_shows_links_rigid_and_flexible(space, shared_tmp_path):
     simulation, curve = claw(space)
     (motor,) = simulation.scene.mechanism.motors
     turn = [simulation.scene.configuration(f"{angle}", {motor: angle}) for angle in (-0.2, 0.0, 0.2)]
-    path = simulation.path(curve.force_part, turn)
-    assert path[1] == pytest.approx(curve.force_part.at if space != "3d" else (*curve.force_part.at, 0.0), abs=1e-9)
-    simulation.picture(shared_tmp_path / "claw.png")
-    simulation.picture(
-        shared_tmp_path / "plain.png", curve, stress=False, traces=[Trace(path[:, :2], "tip", path[1:2, :2])]
-    )
+    path = simulation.path(curve.part, turn)
+    assert path[1] == pytest.approx(curve.part.at if space != "3d" else (*curve.part.at, 0.0), abs=1e-9)
+    curve.picture(shared_tmp_path / "claw.png")
+    traces = [Trace(path[:, :2], "tip", path[1:2, :2])]
+    curve.picture(shared_tmp_path / "plain.png", stress=False, traces=traces, beside=[curve])
     assert names(shared_tmp_path) == {"claw.png", "plain.png"}
     for name in ("claw.png", "plain.png"):
         width, height = png_size(shared_tmp_path / name)
@@ -113,7 +113,7 @@ def test_curve_is_drawn_and_tabulated(shared_tmp_path):
     curve.write_csv(shared_tmp_path / "curve.csv")
     assert names(shared_tmp_path) == {"curve.png", "curve.csv"}
     assert min(png_size(shared_tmp_path / "curve.png")) > 300
-    table = read_curve_csv(shared_tmp_path / "curve.csv")
+    table = read_csv(shared_tmp_path / "curve.csv")
     assert table["force [N]"] == pytest.approx(FORCES, abs=0.0)
     assert table["displacement [mm]"] == pytest.approx(curve.displacements, abs=0.0)
     assert table["stable"] == pytest.approx([1.0, 1.0, 1.0])
@@ -121,19 +121,10 @@ def test_curve_is_drawn_and_tabulated(shared_tmp_path):
     assert table["max von Mises [MPa]"] == pytest.approx([frame.max_stress for frame in curve.frames], abs=0.0)
 
 
-def test_nothing_can_be_drawn_or_written_before_a_curve_is_computed(shared_tmp_path):
-    scene, _ = describe("truss")
-    simulation = fm.Simulation(scene, space="plane-stress", size=4.0, comm=COMM)
-    for action in (simulation.write, simulation.picture):
-        with pytest.raises(fm.DescriptionError, match="load_displacement first"):
-            action(shared_tmp_path / "nothing")
-    assert names(shared_tmp_path) == set()
-
-
 @pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
 def test_stress_field_peaks_at_the_largest_stress_of_the_frame_and_vanishes_in_interfaces(space):
     simulation, curve = claw(space)
-    stress = simulation.von_mises(curve.frames[-1])
+    stress = curve.von_mises(curve.frames[-1])
     assert (stress is None) == (COMM.rank > 0)
     if stress is not None:
         mesh = simulation.model.mesh

@@ -38,8 +38,6 @@ def test_what_does_not_say_where_to_end_is_refused():
     case = toggle.toggle(stilt_modulus=STIFF)
     with pytest.raises(fm.DescriptionError, match="does not say where"):
         case.simulation.follow(case.push, until=12.0)
-    with pytest.raises(fm.DescriptionError, match="no curve was computed"):
-        case.simulation.buckling_loads()
 
 
 def test_curve_that_cannot_be_followed_says_how_far_it_came():
@@ -50,6 +48,23 @@ def test_curve_that_cannot_be_followed_says_how_far_it_came():
     assert caught.value.frames and caught.value.last is caught.value.frames[-1]
 
 
+def test_branches_of_a_curve_of_another_fidelity_are_refused():
+    here, there = (toggle.toggle(stilt_modulus=STIFF).simulation for _ in range(2))
+    (push,) = here.scene.mechanism.forces
+    curve = here.follow(push, until=fm.Until(displacement=0.5))
+    with pytest.raises(fm.DescriptionError, match="another fidelity"):
+        there.branches(curve, None, until=fm.Until(displacement=1.0))
+
+
+def test_curve_and_frames_are_told_in_words():
+    case = toggle.toggle(stilt_modulus=STIFF)
+    curve = case.simulation.follow(case.push, until=fm.Until(displacement=0.5))
+    assert repr(curve).startswith(f"<FollowedCurve of {case.push.name!r}, as drawn: {len(curve.frames)} frames, ")
+    assert "displacement 0 mm to 0.5 mm" in repr(curve)
+    with pytest.raises(fm.DescriptionError, match="another curve"):
+        curve.soft_modes(frame=case.simulation.load_displacement(case.push, forces=[0.0]).frames[0])
+
+
 def test_followed_curve_is_drawn_and_written_like_others(tmp_path):
     case = toggle.toggle(stilt_modulus=STIFF)
     curve = case.simulation.follow(case.push, until=fm.Until(displacement=12.0))
@@ -58,7 +73,7 @@ def test_followed_curve_is_drawn_and_written_like_others(tmp_path):
     assert [mark.force for mark in marks] == pytest.approx([event.frame.force for event in curve.events])
     curve.plot(tmp_path / "curve.png")
     curve.write_csv(tmp_path / "curve.csv")
-    case.simulation.picture(tmp_path / "toggle.png")
+    curve.picture(tmp_path / "toggle.png")
     assert all((tmp_path / name).stat().st_size > 0 for name in ("curve.png", "curve.csv", "toggle.png"))
     assert curve.frames[3].iterations >= 2 and curve.frames[3].seconds > 0.0
 
@@ -80,7 +95,5 @@ def test_constant_forces_act_along_the_whole_path():
     assert both.forces + 0.25 == pytest.approx(toggle.force(sunk), abs=1e-8)
     # the tangent is that of both forces together
     near = both.frames[both.limit_points[0].index - 1]
-    ahead = min(
-        abs(load.force - both.limit_points[0].frame.force) for load in case.simulation.buckling_loads(both, frame=near)
-    )
+    ahead = min(abs(load.force - both.limit_points[0].frame.force) for load in both.buckling_loads(frame=near))
     assert ahead < 0.05 * toggle.force(2.1)

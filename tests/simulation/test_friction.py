@@ -7,7 +7,7 @@ import pytest
 
 import fenicsmech as fm
 from fenicsmech.effects import JointSpring
-from fenicsmech.simulation import PinFriction, friction_band
+from fenicsmech.simulation import PinFriction
 
 from ..effects.levers import ARM, TILTED, UPRIGHT, lever
 
@@ -26,7 +26,7 @@ def test_band_of_a_lever_on_a_torsion_spring(space, frame, swapped):
         lambda hinge: [JointSpring(hinge, STIFFNESS)], space=space, pushed=pushed, frame=frame, swapped=swapped
     )
     curve = case.simulation.load_displacement(case.force, forces=forces)
-    lower, upper = friction_band(curve, {case.joint: PIN}, linkage=case.simulation.linkage)
+    lower, upper = curve.friction_band({case.joint: PIN})
     surplus = 0.2 * 3.0 * forces / (ARM * np.sin(pushed - angles))
     assert upper - forces == pytest.approx(surplus, rel=2e-2)
     assert (upper - forces)[1:-1] == pytest.approx(surplus[1:-1], rel=5e-3)
@@ -40,7 +40,7 @@ def test_band_converges_with_the_distance_of_frames_however_they_are_spaced():
         forces = STIFFNESS * angles / (ARM * np.cos(angles))
         case = lever(lambda hinge: [JointSpring(hinge, STIFFNESS)])
         curve = case.simulation.load_displacement(case.force, forces=forces)
-        _, upper = friction_band(curve, {case.joint: PIN}, linkage=case.simulation.linkage)
+        _, upper = curve.friction_band({case.joint: PIN})
         exact = 0.2 * 3.0 * forces / (ARM * np.cos(angles))
         errors.append(np.abs((upper - forces - exact) / exact).max())
     assert errors[-1] < 5e-3
@@ -68,24 +68,24 @@ def parallelogram() -> tuple[fm.Simulation, fm.mechanism.Force, list]:
 def test_pins_take_their_parts_of_the_load_one_by_one():
     simulation, push, pins = parallelogram()
     curve = simulation.load_displacement(push, displacements=[1.0, 2.0, 3.0])
-    bands = [friction_band(curve, {pin: PIN}, linkage=simulation.linkage)[1] - curve.forces for pin in pins]
-    _, upper = friction_band(curve, dict.fromkeys(pins, PIN), linkage=simulation.linkage)
+    bands = [curve.friction_band({pin: PIN})[1] - curve.forces for pin in pins]
+    _, upper = curve.friction_band(dict.fromkeys(pins, PIN))
     assert np.all(np.array(bands) >= 0.0)
     assert upper - curve.forces == pytest.approx(sum(bands), rel=1e-12)
-    assert friction_band(curve, {}, linkage=simulation.linkage)[0] == pytest.approx(curve.forces)
+    assert curve.friction_band({})[0] == pytest.approx(curve.forces)
 
 
 def test_bands_without_meaning_are_refused():
     case = lever(lambda hinge: [JointSpring(hinge, STIFFNESS)])
-    linkage, mechanism = case.simulation.linkage, case.simulation.scene.mechanism
+    mechanism = case.simulation.scene.mechanism
     one = case.simulation.load_displacement(case.force, forces=[1.0])
     with pytest.raises(fm.DescriptionError, match="one frame"):
-        friction_band(one, {case.joint: PIN}, linkage=linkage)
+        one.friction_band({case.joint: PIN})
     twice = case.simulation.load_displacement(case.force, forces=[1.0, 1.0])
     with pytest.raises(fm.DescriptionError, match="the same"):
-        friction_band(twice, {case.joint: PIN}, linkage=linkage)
+        twice.friction_band({case.joint: PIN})
     weld = next(joint for joint in mechanism.joints if joint != case.joint)
-    with pytest.raises(fm.DescriptionError, match="no hinge"):
-        friction_band(twice, {weld: PIN}, linkage=linkage)
+    with pytest.raises(fm.DescriptionError, match="not a hinge"):
+        twice.friction_band({weld: PIN})
     with pytest.raises(fm.DescriptionError, match="not positive"):
         PinFriction(0.0, 1.0)

@@ -53,8 +53,7 @@ def test_curves_of_one_simulation_give_their_memory_back():
     simulation, curve = simulate(space="3d", size=3.0)
 
     def run() -> None:
-        simulation.load_displacement(curve.force_part, forces=[0.05])
-        simulation.error_estimates()
+        simulation.load_displacement(curve.part, forces=[0.05]).error_estimates()
 
     assert growth(run, before=2, times=4) < 0.8
 
@@ -69,16 +68,16 @@ def test_designs_give_their_memory_back():
     assert growth(run, before=1, times=2) < 4.0
 
 
-def test_nothing_but_its_owner_keeps_a_simulation():
+def test_nothing_but_its_owner_and_its_curves_keeps_a_simulation():
     """No cycle of references waits for Python's collector, which counts objects and not their size."""
     gc.collect()
     gc.disable()
     try:
         simulation, curve = simulate(space="plane-stress", size=3.0)
-        simulation.error_estimates()
-        model, system = simulation.model, simulation.newton(curve.force_part).system
+        curve.error_estimates()
+        model, system = simulation.model, simulation.newton(curve.part).system
         gone = [weakref.ref(thing) for thing in (simulation, model, model.elastic, system)]
-        del simulation, model, system
+        del simulation, curve, model, system
         assert [thing() for thing in gone] == [None] * len(gone)
     finally:
         gc.enable()

@@ -50,17 +50,17 @@ def test_nothing_is_added_where_no_link_is_bulky(space):
         simulation, push = arm(materials, space=space, formulation=formulation)
         system = simulation.newton(push).system
         elastic = simulation.model.elastic
-        hat = system.kkt.hat
+        extended = system.kkt.extended
         found.append(
             (
                 elastic.energy_ufl.signature(),
-                hat.size,
-                hat.getInfo()["nz_used"],
-                hat.getBlockSize(),
-                system.layout.block,
+                extended.size,
+                extended.getInfo()["nz_used"],
+                extended.getBlockSize(),
+                system.numbering.block,
             )
         )
-        assert elastic.pressure is None and simulation.model.pressure_dofs == system.layout.pressures == 0
+        assert elastic.pressure is None and simulation.model.pressure_dofs == system.blocks.pressures.size == 0
         assert len(elastic.fields) == 1
     assert found[0] == found[1]
 
@@ -74,7 +74,7 @@ def test_results_are_the_same_on_any_number_of_ranks(space):
         inner = simulation.scene.mechanism.forces[1]
         curves.append(simulation.load_displacement(push, forces=[0.005, 0.02], others={inner: 0.01}))
         simulation.load_displacement(inner, displacements=[1.0])
-        errors.append(simulation.error_estimates(curves[-1]))
+        errors.append(curves[-1].error_estimates())
     assert_alike(*curves)
     assert errors[1] == pytest.approx(errors[0], rel=1e-5)
     assert all(frame.stable for frame in curves[0].frames)
@@ -110,9 +110,9 @@ def test_wherever_the_limit_is_set_compressible_links_bend_alike():
 @pytest.mark.parallel
 def test_pressure_is_written(shared_tmp_path):
     simulation, push = arm(comm=MPI.COMM_WORLD)
-    simulation.load_displacement(push, forces=[0.0, 0.02])
+    curve = simulation.load_displacement(push, forces=[0.0, 0.02])
     path = shared_tmp_path / "arm.xdmf"
-    simulation.write(path)
+    curve.write(path)
     names = {attribute.get("Name") for attribute in ElementTree.parse(path).iter("Attribute")}
     assert names == {"displacement", "von Mises stress", "pressure"}
     with XDMFFile(MPI.COMM_WORLD, str(path), "r") as file:

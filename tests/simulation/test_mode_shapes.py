@@ -33,10 +33,10 @@ def test_column_buckles_in_the_plane_at_its_euler_load(space, poisson, pressed):
     euler = np.pi**2 * stiffness * DEPTH * THICKNESS**3 / 12.0 / LENGTH**2
     scene, push = column(fm.Material("soft", 100.0, poisson))
     simulation = fm.Simulation(scene, space=space, size=2.0, comm=MPI.COMM_WORLD)
-    simulation.load_displacement(push, forces=[0.2 * euler])
+    curve = simulation.load_displacement(push, forces=[0.2 * euler])
     assert (simulation.model.pressure_dofs > 0) is pressed
-    (load,) = simulation.buckling_loads(count=1)
+    (load,) = curve.buckling_loads(count=1)
     assert load.force == pytest.approx(euler, rel=0.03)
     assert load.mode.link == "strut"
     assert load.mode.out_of_plane < 1e-3
-    assert simulation.soft_modes(count=1)[0].mode.link == "strut"
+    assert curve.soft_modes(count=1)[0].mode.link == "strut"

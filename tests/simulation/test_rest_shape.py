@@ -104,9 +104,9 @@ def test_frames_keep_the_shape_they_were_computed_with(space):
     simulation, push, turned = crane(space)
     simulation.model.reshape(wave(simulation, 2.0))
     curve = simulation.load_displacement(push, forces=[2.0], configuration=turned)
-    before = simulation.von_mises(curve.frames[0]), gather(simulation.model, curve.frames[0])
+    before = curve.von_mises(curve.frames[0]), gather(simulation.model, curve.frames[0])
     simulation.model.reshape(wave(simulation, -3.0))
-    after = simulation.von_mises(curve.frames[0]), gather(simulation.model, curve.frames[0])
+    after = curve.von_mises(curve.frames[0]), gather(simulation.model, curve.frames[0])
     assert np.array_equal(simulation.model.elastic.d.x.array, wave(simulation, -3.0))
     if simulation.comm.rank == 0:
         assert after[0] == pytest.approx(before[0], rel=1e-12)
@@ -124,7 +124,7 @@ def test_files_show_a_frame_in_its_own_shape_and_leave_the_mesh_alone(shared_tmp
     simulation.model.reshape(wave(simulation, -3.0))
     geometry = simulation.model.mesh.mesh.geometry.x
     drawn = geometry.copy()
-    simulation.write(shared_tmp_path / "crane.xdmf", curve)
+    curve.write(shared_tmp_path / "crane.xdmf")
     assert np.array_equal(geometry, drawn)
     simulation.comm.barrier()
     with simulation.model.shaped(curve.frames[0].design):
@@ -158,3 +158,28 @@ def test_the_same_scene_on_other_processes_has_its_drawn_shape_and_the_same_fide
     assert alone.comm.size == 1
     again = alone.load_displacement(push, forces=[2.0], configuration=turned)
     assert again.displacements == pytest.approx(curve.displacements, rel=1e-9)
+
+
+@pytest.mark.parallel
+@each_space
+def test_simulation_of_another_design_leaves_the_first_one_as_it_is(space):
+    simulation, push, turned = crane(space)
+    request = {"forces": [2.0], "configuration": turned}
+    drawn = simulation.load_displacement(push, **request)
+    other = simulation.with_design(wave(simulation, 2.0))
+    curve = other.load_displacement(push, **request)
+    assert not simulation.model.elastic.d.x.array.any()
+    assert simulation.load_displacement(push, **request).displacements == pytest.approx(drawn.displacements, rel=1e-8)
+    assert abs(curve.displacements[0] / drawn.displacements[0] - 1.0) > 1e-3
+    with simulation.model.shaped(wave(simulation, 2.0)):
+        assert simulation.load_displacement(push, **request).displacements == pytest.approx(curve.displacements)
+    # both curves are asked about their own design
+    assert drawn.error_estimates() == pytest.approx(drawn.error_estimates())
+    assert curve.error_estimates() != pytest.approx(drawn.error_estimates(), rel=1e-3)
+    assert "another design" in repr(other) and "another design" not in repr(simulation)
+
+
+def test_design_of_another_mesh_is_refused():
+    simulation, _, _ = crane("plane-stress")
+    with pytest.raises(fm.DescriptionError, match="design field"):
+        simulation.with_design(np.zeros(3))

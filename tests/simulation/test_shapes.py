@@ -36,7 +36,7 @@ def arc(n: int = 41) -> list[tuple[float, float]]:
 
 def test_section_of_a_cad_part_bends_like_the_strip_it_was_drawn_as():
     # both are rigid within 4 mm of the pins; the holes lie inside
-    part = fm.step(MESHES / "curved_link.step", depth=10.0)
+    part = fm.step_file(MESHES / "curved_link.step", depth=10.0)
     same = fm.strip(arc(), thickness=3.0, depth=10.0)
     options = {"space": "plane-stress", "size": 0.75}
     drawn = pulled(part, radius=3.5, **options)
@@ -44,7 +44,7 @@ def test_section_of_a_cad_part_bends_like_the_strip_it_was_drawn_as():
 
 
 def test_solid_cad_part_lies_between_plane_stress_and_plane_strain():
-    part = fm.step(MESHES / "curved_link.step", depth=10.0)
+    part = fm.step_file(MESHES / "curved_link.step", depth=10.0)
     stress, strain = (pulled(part, radius=3.5, space=s, size=1.0) for s in ("plane-stress", "plane-strain"))
     solid = pulled(part, radius=3.5, space="3d", size=2.5)
     assert strain < solid < stress

@@ -11,10 +11,10 @@ from fenicsmech.simulation import follower
 from ..equilibrium.column import EULER, column
 
 ASKED = {
-    "buckling loads": lambda simulation: simulation.buckling_loads(),
-    "soft modes": lambda simulation: simulation.soft_modes(),
-    "error estimates": lambda simulation: simulation.error_estimates(),
-    "explanation": lambda simulation: simulation.explain(),
+    "buckling loads": lambda curve: curve.buckling_loads(),
+    "soft modes": lambda curve: curve.soft_modes(),
+    "error estimates": lambda curve: curve.error_estimates(),
+    "explanation": lambda curve: curve.explain(),
 }
 
 
@@ -26,11 +26,11 @@ def failing(*arguments, **options):
 @pytest.mark.parametrize("ask", ASKED.values(), ids=ASKED)
 def test_questions_about_a_singular_equilibrium_are_answered_in_words(ask, monkeypatch):
     case = column()
-    case.simulation.load_displacement(case.push, forces=[0.1 * EULER])
+    curve = case.simulation.load_displacement(case.push, forces=[0.1 * EULER])
     design = case.simulation.model.elastic.d.x.array.copy()
-    monkeypatch.setattr(Newton, "factor", failing)
+    monkeypatch.setattr(Newton, "linearise", failing)
     with pytest.raises(fm.EquilibriumError, match="cannot be factored"):
-        ask(case.simulation)
+        ask(curve)
     assert (case.simulation.model.elastic.d.x.array == design).all()
 
 
@@ -47,9 +47,9 @@ def test_force_that_joints_hold_has_no_buckling_load_and_no_path():
     case = column()
     mechanism = case.simulation.scene.mechanism
     across = mechanism.force(on=case.push.on, at=case.push.at, direction=(0, 1), name="across")
-    case.simulation.load_displacement(across, forces=[EULER])
+    curve = case.simulation.load_displacement(across, forces=[EULER])
     with pytest.raises(fm.EquilibriumError, match="moves nothing"):
-        case.simulation.buckling_loads()
+        curve.buckling_loads()
     with pytest.raises(fm.EquilibriumError, match="moves nothing"):
         case.simulation.follow(across, until=fm.Until(force=EULER))
 

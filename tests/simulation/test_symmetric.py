@@ -101,7 +101,7 @@ def test_half_and_mirrored_mesh_give_the_same_frames(build, order, size, forces,
         simulation = simulate(scene, space, order=order, size=size)
         configuration = scene.configuration("turned", dict.fromkeys(scene.mechanism.motors, position))
         curves.append(simulation.load_displacement(push, forces=forces, configuration=configuration))
-        estimates.append(simulation.error_estimates())
+        estimates.append(curves[-1].error_estimates())
     for whole, half in zip(*(curve.frames for curve in curves), strict=True):
         assert_alike(whole, half)
     assert estimates[1] == pytest.approx(estimates[0], rel=1e-4)  # projections are solved to 1e-8
@@ -159,7 +159,7 @@ def test_layers_of_odd_number_change_the_curve_by_less_than_finer_elements_would
         scene, push = describe("truss")
         simulation = simulate(scene, space, size=3.0)
         curve = simulation.load_displacement(push, forces=[0.05, 0.1])
-        values.append((curve.displacements, simulation.error_estimates()))
+        values.append((curve.displacements, curve.error_estimates()))
     (whole, estimate), (half, _) = values
     assert np.all(np.abs(half - whole) < np.abs(estimate))
 
@@ -193,8 +193,8 @@ def test_buckling_in_the_plane_is_seen_and_buckling_out_of_it_is_not():
     assert verdicts[1.0, HALF] == [0, 0, 1]
     assert verdicts[1.0, WHOLE] == [0, 1]
     simulation, push, euler = column(HALF, depth=1.0)
-    simulation.load_displacement(push, forces=[0.4 * euler])
-    (hint,) = (hint for hint in simulation.explain().left_out if hint.what == "bending out of the plane")
+    curve = simulation.load_displacement(push, forces=[0.4 * euler])
+    (hint,) = (hint for hint in curve.explain().left_out if hint.what == "bending out of the plane")
     assert hint.matters
 
 
@@ -254,10 +254,10 @@ def from_file(shape) -> tuple[fm.Scene, Force]:
 def test_half_of_a_step_part_moves_as_the_whole_does_but_for_the_mesh():
     values = []
     for space in (WHOLE, HALF):
-        scene, push = from_file(fm.step(MESHES / "curved_link.step", depth=10.0))
+        scene, push = from_file(fm.step_file(MESHES / "curved_link.step", depth=10.0))
         simulation = simulate(scene, space, size=3.0)
         curve = simulation.load_displacement(push, forces=[5.0])
-        values.append((curve.displacements[0], simulation.error_estimates()[0], simulation.model.flexible_dofs))
+        values.append((curve.displacements[0], curve.error_estimates()[0], simulation.model.flexible_dofs))
     (whole, error, size), (half, _, half_size) = values
     assert abs(half - whole) < abs(error)
     assert half_size < 0.75 * size

@@ -24,9 +24,6 @@ from fenicsmech.design.optimisers.problem import (
     Start,
 )
 
-_ARMIJO = 1e-4
-_HALVINGS = 30
-
 
 @dataclass(frozen=True)
 class BFGS(Optimiser):
@@ -34,12 +31,20 @@ class BFGS(Optimiser):
 
     What it expects hangs on an approximate Hessian: a tolerance that is not small ends it far from a minimum.
 
+    Attributes:
+        iterations: most of them.
+        tolerance: least reduction worth a step, over O.
+        armijo: part of the decrease that the slope promises which a step must bring.
+        halvings: of a step, at most.
+
     Raises:
         DescriptionError: the tolerance is not a positive number.
     """
 
     iterations: int = 300
     tolerance: float = 1e-6
+    armijo: float = 1e-4
+    halvings: int = 30
 
     def __post_init__(self) -> None:
         positive("tolerance of BFGS", self.tolerance)
@@ -74,12 +79,14 @@ class BFGS(Optimiser):
         self, problem: LeastSquaresProblem, here: Evaluation, step: np.ndarray
     ) -> tuple[Evaluation | None, int]:
         slope, length = float(here.gradient @ step), 1.0
-        for tried in range(1, _HALVINGS + 1):
+        for tried in range(1, self.halvings + 1):
             try:
-                return problem.evaluate(here.parameters + length * step, here.value + _ARMIJO * length * slope), tried
+                return problem.evaluate(
+                    here.parameters + length * step, here.value + self.armijo * length * slope
+                ), tried
             except Infeasible:
                 length *= 0.5
-        return None, _HALVINGS
+        return None, self.halvings
 
 
 def _iterate(

@@ -4,16 +4,22 @@ Only the residuals r are made linear; the regulariser R, barriers included, ente
 
     s = argmin ½ |r + J s|² + R(p + s) + ½ μ |s / ℓ|²,     ℓ the lengths of the parameters.
 
-A step is accepted if it lowers O by a share of what this model promises; μ falls after good steps and grows after bad
+A step is accepted if it lowers O by a part of what this model promises; μ falls after good steps and grows after bad
 or infeasible ones. Sources: Nocedal & Wright, Numerical Optimization (doi:10.1007/978-0-387-40065-5), chapter 10; for
 the composite model: Fletcher, Practical Methods of Optimization (doi:10.1002/9781118723203), chapter 14.
+
+Residuals have errors e_k, those of the finite elements. It is enough if the undamped step s would change no residual by
+more than a tenth of its error, and O by no more than the errors do:
+
+    |J s|_k ≤ φ e_k  for all k,     O(p) − min O ≤ Σ (|r_k| e_k + ½ e_k²),     φ = 0.1.
+
+So results move by less than their errors when the minimisation goes on, regularisers included: they are part of O.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -27,15 +33,8 @@ from fenicsmech.design.optimisers.problem import (
     Reason,
     Start,
     TooHigh,
+    exact,
 )
-from fenicsmech.design.optimisers.resolution import Resolution
-
-_POOR, _GOOD = 0.1, 0.75  # actual over promised reduction: below, the step is refused; above, damping falls
-_REFUSALS = 20
-_STALLS = 3
-_LEAST = 1e-9  # μ, so that parameters without influence stay where they are
-_INNER = 50
-_TOLERANCE = 5e-3
 
 
 @dataclass(frozen=True)
@@ -44,9 +43,16 @@ class LevenbergMarquardt(Optimiser):
 
     Attributes:
         iterations: most of them.
-        tolerance: least reduction worth a step, over O. By default 0.005, or earlier where the finite elements cannot
-            tell, see ``resolution``.
+        tolerance: least reduction worth a step, over O. By default 0.005, or earlier where the errors of the finite
+            elements hide what is left to gain.
         damping: μ at the start.
+        least_damping: μ at least, so that parameters without influence stay where they are.
+        poor, good: actual over promised reduction; below the first a step is refused, above the second damping falls.
+        refusals: most steps refused in a row.
+        stalls: steps in a row that gain less than ``tolerance`` of O, after which it ends.
+        resolved: φ, the part of a residual's error that the step to the minimum may change it by.
+        again: errors are estimated again once this part of what was left to gain remains: the design has changed, and
+            its errors with it.
 
     Raises:
         DescriptionError: tolerance or damping is not a positive number.
@@ -55,6 +61,13 @@ class LevenbergMarquardt(Optimiser):
     iterations: int = 60
     tolerance: float | None = None
     damping: float = 1e-2
+    least_damping: float = 1e-9
+    poor: float = 0.1
+    good: float = 0.75
+    refusals: int = 20
+    stalls: int = 3
+    resolved: float = 0.1
+    again: float = 0.1
 
     def __post_init__(self) -> None:
         positive("tolerance of Levenberg–Marquardt", self.least_promise)
@@ -62,17 +75,17 @@ class LevenbergMarquardt(Optimiser):
 
     @property
     def least_promise(self) -> float:
-        return _TOLERANCE if self.tolerance is None else self.tolerance
+        return 5e-3 if self.tolerance is None else self.tolerance
 
     def minimise(self, problem: LeastSquaresProblem, start: Start, *, watch: Callable[[Iterate], None]) -> Iterate:
         here, metric = problem.evaluate(start.parameters), 1.0 / problem.lengths**2
-        memory = _Memory(self.damping, 0) if start.memory is None else _Memory.of(start.memory)
-        last = _iterate(start.number, start.evaluations + 1, here, memory, metric)
+        memory = (self.damping, 0) if start.memory is None else start.memory
+        last = self._iterate(start.number, start.evaluations + 1, here, memory, metric)
         watch(last)
-        resolution = Resolution(last)
+        resolution = Resolution(self, last)
         while last.reason is None:
             undecided = self.tolerance is None and last.promise > self.least_promise
-            if undecided and resolution.reached(last, partial(_undamped, last.evaluation, metric)):
+            if undecided and resolution.reached(last, metric):
                 last = replace(last, reason=Reason.RESOLVED)
             else:
                 last = self._advance(problem, last, metric)
@@ -80,17 +93,16 @@ class LevenbergMarquardt(Optimiser):
         return last
 
     def _advance(self, problem: LeastSquaresProblem, last: Iterate, metric: np.ndarray) -> Iterate:
-        here, memory, evaluations = last.evaluation, _Memory.of(last.memory), last.evaluations
-        damping = memory.damping
-        if last.promise <= self.least_promise or memory.stalls >= _STALLS:
+        here, (damping, stalls), evaluations = last.evaluation, last.memory, last.evaluations
+        if last.promise <= self.least_promise or stalls >= self.stalls:
             return replace(last, reason=Reason.CONVERGED)
-        for _ in range(_REFUSALS):
+        for _ in range(self.refusals):
             there, promised = _step(here, damping, metric)
             if promised <= 0.0:
                 break  # damped to a standstill
             evaluations += 1
             try:
-                new = problem.evaluate(there, here.value - _POOR * promised)
+                new = problem.evaluate(there, here.value - self.poor * promised)
             except TooHigh:
                 damping *= 4.0
                 continue
@@ -98,34 +110,31 @@ class LevenbergMarquardt(Optimiser):
                 damping *= 10.0
                 continue
             gain, number = here.value - new.value, last.number + 1
-            if gain > _GOOD * promised:
-                damping = max(damping / 5.0, _LEAST)
-            stalls = memory.stalls + 1 if gain < self.least_promise * here.value else 0
+            if gain > self.good * promised:
+                damping = max(damping / 5.0, self.least_damping)
+            stalls = stalls + 1 if gain < self.least_promise * here.value else 0
             reason = Reason.ITERATIONS if number >= self.iterations else None
-            return _iterate(number, evaluations, new, _Memory(damping, stalls), metric, reason)
+            return self._iterate(number, evaluations, new, (damping, stalls), metric, reason)
         return replace(last, evaluations=evaluations, reason=Reason.NO_DESCENT)
 
-
-@dataclass(frozen=True)
-class _Memory:
-    """μ, and how many steps in a row gained next to nothing."""
-
-    damping: float
-    stalls: int
-
-    @staticmethod
-    def of(numbers: np.ndarray) -> _Memory:
-        return _Memory(float(numbers[0]), int(numbers[1]))
-
-    @property
-    def numbers(self) -> np.ndarray:
-        return np.array([self.damping, self.stalls])
+    def _iterate(
+        self,
+        number: int,
+        evaluations: int,
+        evaluation: Evaluation,
+        memory: tuple[float, int] | np.ndarray,
+        metric: np.ndarray,
+        reason: Reason | None = None,
+    ) -> Iterate:
+        """With the reduction that the undamped step promises; memory: μ, and how many steps gained next to nothing."""
+        promise = _step(evaluation, self.least_damping, metric)[1] / max(evaluation.value, 1e-30)
+        return Iterate(number, evaluations, evaluation, np.array(memory, dtype=float), promise, reason)
 
 
 def _step(here: Evaluation, damping: float, metric: np.ndarray) -> tuple[np.ndarray, float]:
     """The minimum p + s of the damped model by Newton's method, and the reduction that the model promises there."""
     p, value = here.parameters, here.value
-    for _ in range(_INNER):
+    for _ in range(50):
         model, away = here.model(p), p - here.parameters
         gradient = model.gradient + damping * metric * away
         newton = np.linalg.solve(model.curvature + np.diag(damping * metric), -gradient)
@@ -146,19 +155,33 @@ def _step(here: Evaluation, damping: float, metric: np.ndarray) -> tuple[np.ndar
     return p, here.value - here.model(p).value
 
 
-def _undamped(here: Evaluation, metric: np.ndarray) -> np.ndarray:
-    """s without damping."""
-    return _step(here, _LEAST, metric)[0] - here.parameters
+class Resolution:
+    """Whether errors hide what is left to gain; they are estimated a few times on the way from ``start``."""
+
+    def __init__(self, options: LevenbergMarquardt, start: Iterate) -> None:
+        self._options, self._errors, self._estimated = options, exact(), None
+        self._below = options.again * _gain(start)
+
+    def reached(self, last: Iterate, metric: np.ndarray) -> bool:
+        """Whether the best point so far, ``last``, is as near to the minimum as errors let one see."""
+        if _gain(last) < self._below:
+            self._estimate(last)
+        if self._hidden(last, metric) and self._estimated is not last.evaluation:
+            self._estimate(last)
+        return self._hidden(last, metric)
+
+    def _estimate(self, last: Iterate) -> None:
+        self._errors, self._estimated = last.evaluation.errors(), last.evaluation
+        self._below = self._options.again * _gain(last)
+
+    def _hidden(self, last: Iterate, metric: np.ndarray) -> bool:
+        here = last.evaluation
+        if _gain(last) > np.sum(np.abs(here.residuals) * self._errors + 0.5 * self._errors**2):
+            return False
+        s = _step(here, self._options.least_damping, metric)[0] - here.parameters
+        return bool(np.all(np.abs(here.jacobian @ s) <= self._options.resolved * self._errors))
 
 
-def _iterate(
-    number: int,
-    evaluations: int,
-    evaluation: Evaluation,
-    memory: _Memory,
-    metric: np.ndarray,
-    reason: Reason | None = None,
-) -> Iterate:
-    """With the reduction that the undamped step promises."""
-    promise = _step(evaluation, _LEAST, metric)[1] / max(evaluation.value, 1e-30)
-    return Iterate(number, evaluations, evaluation, memory.numbers, promise, reason)
+def _gain(last: Iterate) -> float:
+    """O(p) − min O, as promised."""
+    return last.promise * last.evaluation.value

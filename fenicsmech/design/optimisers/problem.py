@@ -1,4 +1,7 @@
-"""What optimisers minimise, what they return, and why they stop."""
+"""The least-squares problem that optimisers solve, and the history of a run.
+
+O(p) = ½ |r(p)|² + R(p)
+"""
 
 from __future__ import annotations
 
@@ -47,7 +50,7 @@ def exact() -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """O(p) = ½ |r|² + R and its derivatives at one point.
+    """O(p) and its derivatives at one point.
 
     Attributes:
         parameters: p, (n,).
@@ -108,7 +111,7 @@ class LeastSquaresProblem(Protocol):
 
 
 class Reason(Enum):
-    """Why a minimisation ended; the value is what to tell the user."""
+    """Why a minimisation ended; the value says it in words."""
 
     CONVERGED = "the gradient vanishes or the objective no longer falls: a minimum was found"
     RESOLVED = "what is left to gain is small beside the error of the elements: refine them, or give a tolerance"
@@ -117,7 +120,7 @@ class Reason(Enum):
 
     @property
     def converged(self) -> bool:
-        """Whether a minimum was found, as far as it can be told."""
+        """Whether a minimum was found, as far as errors let one see."""
         return self in (Reason.CONVERGED, Reason.RESOLVED)
 
 
@@ -128,7 +131,7 @@ class Start:
     Attributes:
         parameters: p, (n,).
         number, evaluations: iterations and objective evaluations so far.
-        memory: what the optimiser had learnt, from ``Iterate.memory``; None at the very start.
+        memory: what the optimiser has found out, from ``Iterate.memory``; None at the very start.
     """
 
     parameters: np.ndarray
@@ -145,7 +148,7 @@ class Iterate:
         number: iterations so far.
         evaluations: objective evaluations so far, infeasible ones included.
         evaluation: the best point.
-        memory: what the optimiser has learnt, to go on with.
+        memory: what the optimiser has found out, to go on with.
         promise: the reduction that is still expected, over the objective; inf if that is not known.
         reason: None while it goes on.
     """

@@ -93,7 +93,7 @@ def test_an_old_estimate_alone_does_not_end_it():
         here = Evaluation(np.zeros(1), r, np.eye(1), lambda p: Quadratic.zero(1), lambda: next(errors))
         return Iterate(0, 1, here, np.zeros(0), 1.0, None)
 
-    resolution = Resolution(at(0.2))
+    resolution = Resolution(LevenbergMarquardt(), at(0.2))
     for residual, reached in (
         (0.11, False),  # no estimate yet
         (0.06, False),  # more than a tenth of an error
@@ -101,5 +101,5 @@ def test_an_old_estimate_alone_does_not_end_it():
         (0.02, False),
         (0.01, True),  # by a new one, since far less is to gain than when errors were estimated last
     ):
-        assert resolution.reached(at(residual), lambda r=residual: np.array([-r])) == reached
+        assert resolution.reached(at(residual), np.ones(1)) == reached
     assert next(errors, None) is None

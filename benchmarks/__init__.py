@@ -1,0 +1,20 @@
+"""Benchmarks: they measure fenicsmech from outside and print their tables with machine and commit.
+
+    OPENBLAS_NUM_THREADS=1 python3 -m benchmarks.NAME [--write]        from the project's root
+
+====================  ==========================================================================================
+``solvers``           the default solver of equilibria beside others, on hard cases
+``work_precision``    accuracy and time of fidelity levels, with their Pareto front
+``accuracy_control``  ``Simulation(scene, accuracy=…)`` beside an exhaustive search
+``large``             conjugate gradients beside the factor on fine meshes (and ``schur``: algebraic multigrid)
+``stopping``          time saved by ending Newton's iteration and an optimisation early
+``performance``       each choice in the solver, one at a time
+``effects``           the time that each effect takes
+``optimisers``        Levenberg–Marquardt beside BFGS
+``frames``            seconds per load step of the demos' mechanisms
+``walk``              two calls whose files are counted
+====================  ==========================================================================================
+
+``--write`` leaves the table in docs/tables/NAME.md. ``mechanisms`` holds the scenes, those of the demos, and ``table``
+what all benchmarks share.
+"""

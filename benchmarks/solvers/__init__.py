@@ -1,0 +1,12 @@
+"""Other solvers of equilibria, to compare the default one with: they implement ``EquilibriumSolver`` from outside.
+
+- ``augmented_lagrangian``: the method of the article, by Nocedal and Wright
+- ``kkt_newton``: Newton's method on the KKT equations, nothing else
+- ``snes``: the same with PETSc's line searches and trust region
+"""
+
+from .augmented_lagrangian import AugmentedLagrangian
+from .kkt_newton import KKTNewton
+from .snes import SNES, Globalisation
+
+__all__ = ["SNES", "AugmentedLagrangian", "Globalisation", "KKTNewton"]

@@ -1,0 +1,400 @@
+"""The handle positions that make the mesh best: min over θ of S(θ, p) = Σ_e ρ(e), and how they follow p.
+
+Links do not have cells in common, so S is a sum of functions of the θ of one link each. Newton's method with exact
+Hessians minimises them together, with a line search for each that refuses inverted cells. By the implicit function
+theorem
+
+    dθ/dp = −S_θθ⁻¹ S_θp     (0 for handles held at a kink of the spline).
+
+The spline's tangent has a kink at interior control points, and so has S as a function of t where a handle slides over
+one. A handle there moves to the side on which S falls, and is held if S rises to both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from petsc4py import PETSc
+from scipy.linalg import cho_factor, cho_solve
+from scipy.sparse import csr_matrix
+
+from fenicsmech.design.shape.handles import LinkHandles
+from fenicsmech.design.shape.quality import QualitySum
+from fenicsmech.design.shape.shape_map import ShapeMap
+from fenicsmech.errors import FenicsmechError
+from fenicsmech.log import logger
+
+_log = logger(__name__)
+
+
+class ShapeError(FenicsmechError):
+    """A design has no rest shape without inverted cells."""
+
+
+@dataclass(frozen=True)
+class HandleOptions:
+    """Numbers of the search for the best handle positions.
+
+    Attributes:
+        iterations: most Newton iterations; designs near by take two or three.
+        settled: predicted decrease of S, relative, after which one last step is taken: smaller ones are rounding.
+        armijo: part of the decrease that the slope promises which a step must bring.
+        shortest: fraction of a step at which the search of a link ends without one.
+        halvings: of a change of p that inverts cells.
+        turn: largest turn of a joint in one step, rad.
+        kept: part of the gap to the next handle that one step must leave.
+        flattest: least eigenvalue of the Hessian in a step, relative to the largest.
+    """
+
+    iterations: int = 60
+    settled: float = 1e-10
+    armijo: float = 1e-4
+    shortest: float = 1e-8
+    halvings: int = 4
+    turn: float = 0.5
+    kept: float = 0.2
+    flattest: float = 1e-8
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """The best handle positions of a design.
+
+    Attributes:
+        p: the design, (parameters,).
+        theta: its handle positions, (handles,).
+        quality: Σ_e ρ(e) of the links that change.
+        iterations: Newton iterations.
+    """
+
+    p: np.ndarray
+    theta: np.ndarray
+    quality: float = np.inf
+    iterations: int = 0
+
+
+class HandleOptimum:
+    """Best handle positions as a function of the design.
+
+    All methods leave the design field at the placement that they return or were given.
+
+    Args:
+        shape_map: from design and handle positions to the field.
+        quality: Σρ in this field.
+        options: numbers of the search.
+    """
+
+    def __init__(self, shape_map: ShapeMap, quality: QualitySum, options: HandleOptions | None = None) -> None:
+        self._map, self._quality, self._options = shape_map, quality, options or HandleOptions()
+        self._handles = [shape.handles for shape in shape_map.shapes]
+        self._reducer: _MomentHessian | None = None
+        self._known: tuple[Placement | None, list[PositionDerivatives]] = (None, [])
+
+    def solve(self, p: np.ndarray, start: Placement | None = None) -> Placement:
+        """The best handle positions for design ``p``.
+
+        Args:
+            p: the design, (parameters,).
+            start: placement of a design near by; that of the initial mesh by default.
+
+        Raises:
+            ShapeError: cells stay inverted however the handles are placed.
+        """
+        start = start or Placement(self._map.initial, self._map.initial_theta)
+        return self._solve(np.array(p, dtype=float), start, self._options.halvings)
+
+    def total_gradient(self, placement: Placement, by_p: np.ndarray, by_theta: np.ndarray) -> np.ndarray:
+        """dO/dp = ∂O/∂p + ∂O/∂θ dθ/dp, (…, parameters).
+
+        Args:
+            placement: from ``solve``.
+            by_p, by_theta: ∂O/∂p (…, parameters) and ∂O/∂θ (…, handles), as from ``ShapeMap.apply_transpose``.
+        """
+        links = zip(self._second_derivatives(placement), self._map.positions(by_theta), strict=True)
+        followed = [cho_solve(link.factor, slope[..., link.free].T).T @ link.mixed for link, slope in links]
+        return by_p - np.concatenate(followed, axis=-1)
+
+    def _solve(self, p: np.ndarray, start: Placement, halvings: int) -> Placement:
+        theta = self._first_guess(p, start)
+        if theta is not None:
+            return self._minimise(p, theta)
+        if halvings == 0:
+            raise ShapeError("rest shape", "cells are inverted however the handles are placed", "Change it by less")
+        halfway = self._solve(0.5 * (start.p + p), start, halvings - 1)
+        return self._solve(p, halfway, halvings - 1)
+
+    def _first_guess(self, p: np.ndarray, start: Placement) -> np.ndarray | None:
+        """The best of a few positions for each link; None if all of them invert cells of a link."""
+        following = [follow_spline(h, q) for h, q in zip(self._handles, self._map.parameters(p), strict=True)]
+        guesses = [self._map.positions(start.theta), following]
+        if self._known[0] is start:  # θ + dθ/dp Δp
+            tangent = self._map.positions(start.theta.copy())
+            changes = self._map.parameters(p - start.p)
+            for theta, link, change in zip(tangent, self._known[1], changes, strict=True):
+                theta[link.free] -= cho_solve(link.factor, link.mixed @ change)
+            guesses.append(tangent)
+        sums = np.array([self._sums(p, guess) for guess in guesses])
+        if not np.all(np.isfinite(sums.min(axis=0))):
+            return None
+        return np.concatenate([guesses[choice][link] for link, choice in enumerate(np.argmin(sums, axis=0))])
+
+    def _minimise(self, p: np.ndarray, theta: np.ndarray) -> Placement:
+        parts, positions = self._map.parameters(p), self._map.positions(theta)
+        sums, moving, iterations = self._sums(p, positions), set(range(len(positions))), 0
+        while moving and iterations < self._options.iterations:
+            iterations += 1
+            steps, derivatives = {}, self._derivatives(p, positions)
+            for link in sorted(moving):
+                step = _newton_step(
+                    self._handles[link], parts[link], positions[link], derivatives[link], self._options.flattest
+                )
+                if step.predicted > self._options.settled * sums[link]:
+                    steps[link] = step
+                else:
+                    # the decrease drowns in rounding, the improvement of θ does not
+                    positions[link] = step.position(positions[link], 1.0)
+                    moving.remove(link)
+            if steps:
+                positions, sums, stuck = self._search(p, positions, sums, steps)
+                moving -= stuck
+        if moving:
+            _log.warning("handle positions did not settle in %d iterations", iterations)
+        placed = Placement(p, np.concatenate(positions), float(sums.sum()), iterations)
+        self._map.apply(p, placed.theta)
+        return placed
+
+    def _search(
+        self, p: np.ndarray, positions: list[np.ndarray], sums: np.ndarray, steps: dict[int, _Step]
+    ) -> tuple[list[np.ndarray], np.ndarray, set[int]]:
+        """Positions and sums after a step of each link in ``steps``, and the links that found no lower sum."""
+        lengths = {link: step.longest(positions[link], self._options) for link, step in steps.items()}
+        pending, stuck, trial = set(steps), set(), list(positions)
+        while pending:
+            for link in pending:
+                trial[link] = steps[link].position(positions[link], lengths[link])
+            new = self._sums(p, trial)
+            for link in sorted(pending):
+                wanted = self._options.armijo * steps[link].slope @ (trial[link] - positions[link])
+                if new[link] <= sums[link] + wanted:
+                    pending.remove(link)
+                elif lengths[link] < self._options.shortest:
+                    trial[link] = positions[link]
+                    pending.remove(link)
+                    stuck.add(link)
+                lengths[link] *= 0.5
+        return trial, np.where([link in stuck for link in range(len(trial))], sums, new), stuck
+
+    def _sums(self, p: np.ndarray, positions: Sequence[np.ndarray]) -> np.ndarray:
+        """Σρ of each link that changes, inf if cells are inverted or handles out of order, (links,)."""
+        mesh = self._map.mesh
+        self._map.apply(p, np.concatenate(positions))
+        topology = mesh.mesh.topology
+        owned = topology.index_map(topology.dim).size_local
+        per_link = np.bincount(
+            mesh.link[:owned], self._quality.cell_values()[:owned], minlength=mesh.link_of_cell.max() + 1
+        )
+        (per_link,) = self._map.sum_over_ranks([per_link])
+        sums = per_link[[shape.link for shape in self._map.shapes]]
+        # between its ends, handles follow each other along the spline
+        pairs = zip(self._handles, positions, strict=True)
+        ordered = np.array([np.all(np.diff(_along(handles, theta)) > 0.0) for handles, theta in pairs])
+        return np.where(np.isnan(sums) | ~ordered, np.inf, sums)
+
+    def _derivatives(self, p: np.ndarray, positions: Sequence[np.ndarray]) -> list[MapDerivatives]:
+        """Derivatives of S by the maps of the handles, per link."""
+        self._map.apply(p, np.concatenate(positions))
+        hessian = self._quality.hessian()
+        if self._reducer is None:
+            self._reducer = _MomentHessian(self._map, hessian)
+        moments = self._map.moments(self._quality.gradient())
+        return [MapDerivatives(g, H) for g, H in zip(moments, self._reducer.reduce(hessian), strict=True)]
+
+    def _second_derivatives(self, placement: Placement) -> list[PositionDerivatives]:
+        """S_θθ and S_θp of each link at ``placement``; those of the last one are kept."""
+        if self._known[0] is not placement:
+            parts, positions = self._map.parameters(placement.p), self._map.positions(placement.theta)
+            links = zip(self._handles, parts, positions, self._derivatives(placement.p, positions), strict=True)
+            self._known = placement, [by_positions(*link) for link in links]
+        return self._known[1]
+
+
+# -- derivatives of S for one link, and steps ------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class MapDerivatives:
+    """Derivatives of S by the maps of a link's handles.
+
+    Attributes:
+        gradient: ∂S/∂T, (n, 2, 3).
+        hessian: ∂²S/∂T∂T, (n, 2, 3, n, 2, 3).
+    """
+
+    gradient: np.ndarray
+    hessian: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class PositionDerivatives:
+    """Derivatives of S by the positions of a link's free handles, to the side to which each of them moves.
+
+    Attributes:
+        segments: the segment of the spline each handle moves in, (n,).
+        free: which handles move, (n,).
+        slope: S_θ, (f,).
+        bend: S_θθ, (f, f).
+        mixed: S_θp, (f, parameters).
+    """
+
+    segments: np.ndarray
+    free: np.ndarray
+    slope: np.ndarray
+    bend: np.ndarray
+    mixed: np.ndarray
+
+    @cached_property
+    def factor(self) -> tuple[np.ndarray, bool]:
+        """The Cholesky factor of S_θθ at a minimum."""
+        return cho_factor(self.bend)
+
+
+def by_positions(handles: LinkHandles, p: np.ndarray, theta: np.ndarray, by_T: MapDerivatives) -> PositionDerivatives:
+    """Derivatives of S by θ, from those by the maps; at a control point to the side to which S falls.
+
+    S_θ = S_T · T_θ,     S_θθ = T_θ · S_TT · T_θ + S_T · T_θθ,     S_θp alike.
+    """
+    segments = after = handles.segments(theta)
+    free = handles.slides | handles.turns
+    at_kink = handles.slides & (theta == after)
+    if np.any(at_kink):
+        before = np.where(at_kink, after - 1, after)
+        forward, backward = (
+            np.sum(by_T.gradient * handles.gradients(p, theta, segments=side)[1], axis=(1, 2))
+            for side in (after, before)
+        )
+        segments = np.where(at_kink & (forward >= 0.0), before, after)
+        free &= ~(at_kink & (forward >= 0.0) & (backward <= 0.0))
+    by_p, by_theta = handles.gradients(p, theta, segments=segments)
+    mixed, twice = handles.curvatures(p, theta, by_T.gradient, segments=segments)
+    slope = np.einsum("jak,jak->j", by_T.gradient, by_theta)[free]
+    rows = np.einsum("jak,jakmbl->jmbl", by_theta, by_T.hessian)[free]
+    bend = np.einsum("jmbl,mbl->jm", rows, by_theta)[:, free] + np.diag(twice[free])
+    mixed = np.einsum("jmbl,mblp->jp", rows, by_p) + mixed[free]
+    return PositionDerivatives(segments, free, slope, 0.5 * (bend + bend.T), mixed)
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """A step of the handles of one link.
+
+    Attributes:
+        handles: the handles.
+        step: change of θ, (n,).
+        slope: S_θ, 0 for handles that do not move, (n,).
+        segments: the segment each handle stays in, (n,).
+    """
+
+    handles: LinkHandles
+    step: np.ndarray
+    slope: np.ndarray
+    segments: np.ndarray
+
+    @property
+    def predicted(self) -> float:
+        """The decrease of S that the quadratic model predicts."""
+        return -0.5 * float(self.slope @ self.step)
+
+    def position(self, theta: np.ndarray, fraction: float) -> np.ndarray:
+        """θ after a ``fraction`` of the step; a handle that would leave its segment stops at the control point."""
+        moved = theta + fraction * self.step
+        return np.where(self.handles.slides, np.clip(moved, self.segments, self.segments + 1), moved)
+
+    def longest(self, theta: np.ndarray, options: HandleOptions) -> float:
+        """The largest fraction, up to 1, that keeps handles in order and turns joints moderately."""
+        slides = self.handles.slides
+        turn = np.abs(self.step[~slides]).max(initial=0.0)
+        gaps, closing = np.diff(_along(self.handles, theta)), -np.diff(np.where(slides, self.step, 0.0))
+        limits = (1.0 - options.kept) * gaps[closing > 0.0] / closing[closing > 0.0]
+        return min(1.0, options.turn / max(turn, options.turn), limits.min(initial=1.0))
+
+
+def _newton_step(
+    handles: LinkHandles, p: np.ndarray, theta: np.ndarray, by_T: MapDerivatives, flattest: float
+) -> _Step:
+    """Newton's step −|S_θθ|⁻¹ S_θ, with the eigenvalues of the Hessian made positive."""
+    by_theta = by_positions(handles, p, theta, by_T)
+    values, vectors = np.linalg.eigh(by_theta.bend)
+    values = np.maximum(np.abs(values), flattest * np.abs(values).max(initial=0.0))
+    step, slope = np.zeros(len(handles)), np.zeros(len(handles))
+    step[by_theta.free] = -vectors @ (vectors.T @ by_theta.slope / values)
+    slope[by_theta.free] = by_theta.slope
+    return _Step(handles, step, slope, by_theta.segments)
+
+
+def follow_spline(handles: LinkHandles, p: np.ndarray) -> np.ndarray:
+    """θ with joints turned like the tangent of the spline there, and all other handles at their initial t."""
+    tangents = (handles.spline.derivative(q, handles.t)[:, :2] for q in (handles.spline.initial, p))
+    before, now = (np.arctan2(tangent[:, 1], tangent[:, 0]) for tangent in tangents)
+    turn = np.remainder(now - before + np.pi, 2.0 * np.pi) - np.pi
+    return np.where(handles.slides, handles.t, np.where(handles.turns, turn, 0.0))
+
+
+def _along(handles: LinkHandles, theta: np.ndarray) -> np.ndarray:
+    """Spline parameters of all handles, joints too."""
+    return np.where(handles.slides, theta, handles.t)
+
+
+class _MomentHessian:
+    """The Hessian H of a sum over cells, seen by the maps of the handles: ∂²/∂T_j∂T_k = Σ_il r_ij ⊗ H_il ⊗ r_lk.
+
+    Vertices that all handles move alike (those on one column of an extruded link) are added up first, which leaves
+    little to multiply.
+
+    Args:
+        shape_map: the map from handles to the field.
+        hessian: a matrix with the pattern of all that will be reduced.
+    """
+
+    def __init__(self, shape_map: ShapeMap, hessian: PETSc.Mat) -> None:
+        self._map = shape_map
+        # class of each vertex of the whole mesh, −1 where no handle moves it; two unknowns (x, y) per class
+        classes = np.full(len(shape_map.mesh.vertices), -1)
+        self._arms, self._unknowns, first = [], [], 0
+        for vertices, reach in zip(shape_map.vertices, shape_map.reach, strict=True):
+            rows, inverse = np.unique(reach.reshape(len(reach), -1), axis=0, return_inverse=True)
+            classes[vertices] = first + inverse.ravel()
+            # ∂d/∂T of every class from its r, (2 classes, 6 handles)
+            arms = np.zeros((len(rows), 2, reach.shape[1], 2, 3))
+            arms[:, 0, :, 0] = arms[:, 1, :, 1] = rows.reshape(-1, *reach.shape[1:])
+            self._arms.append(arms.reshape(2 * len(rows), -1))
+            self._unknowns.append(slice(2 * first, 2 * (first + len(rows))))
+            first += len(rows)
+        self._find_slots(hessian, classes, 2 * first)
+
+    def reduce(self, hessian: PETSc.Mat) -> list[np.ndarray]:
+        """∂²/∂T∂T per link, (handles, 2, 3, handles, 2, 3)."""
+        values = hessian.getValuesCSR()[2][self._kept]
+        self._sum.data = np.bincount(self._slots, weights=values, minlength=self._sum.nnz)
+        blocks = []
+        for mine, arms in zip(self._unknowns, self._arms, strict=True):
+            handles = arms.shape[1] // 6
+            block = arms.T @ (self._sum[mine, mine] @ arms)
+            blocks.append(block.reshape(handles, 2, 3, handles, 2, 3))
+        return self._map.sum_over_ranks(blocks)
+
+    def _find_slots(self, hessian: PETSc.Mat, classes: np.ndarray, size: int) -> None:
+        """Where each entry of the owned rows goes in the matrix between classes."""
+        dim = self._map.mesh.vertices.shape[1]
+        original = self._map.original[: self._map.owned]
+        starts, columns, _ = hessian.getValuesCSR()
+        rows = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+        # the global numbering runs through the owned nodes, rank after rank
+        everywhere = np.concatenate(hessian.comm.tompi4py().allgather(original))
+        row_class, column_class = classes[original[rows // dim]], classes[everywhere[columns // dim]]
+        self._kept = (rows % dim < 2) & (columns % dim < 2) & (row_class >= 0) & (column_class >= 0)
+        keys = (2 * row_class + rows % dim) * size + 2 * column_class + columns % dim
+        used, self._slots = np.unique(keys[self._kept], return_inverse=True)
+        self._sum = csr_matrix((np.zeros(len(used)), np.divmod(used, size)), shape=(size, size))

@@ -1,0 +1,264 @@
+"""How links change their shape: from spline parameters and handle positions to the design field, and back.
+
+    d_i = Σ_j w_ij T_j(p, θ_j) (X_i − X_j, 1) = Σ_j T_j r_ij,     d linear in the maps T_j (2 × 3) of the handles.
+
+The transpose takes a field g to the moments ∂/∂T_j = Σ_i g_i ⊗ r_ij of each handle, and from there to ∂/∂p and ∂/∂θ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+
+from fenicsmech.collective import from_one
+from fenicsmech.compat import cell_dofs, cell_nodes, original_cells, original_nodes
+from fenicsmech.design.shape.handles import BETWEEN, LinkHandles
+from fenicsmech.design.shape.spline import SplineFit, fit_spline
+from fenicsmech.design.shape.weights import handle_weights, pierced
+from fenicsmech.errors import DescriptionError
+from fenicsmech.mechanism import Centreline
+from fenicsmech.meshing import FREE, LinkMesh, MechanismMesh, cell_measures, plan_of
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeRequest:
+    """How the shape of one link may change.
+
+    Attributes:
+        link: index of the flexible link.
+        name: its name, for messages.
+        centreline: what its spline follows.
+        joints: positions of its interfaces, in the order of the mesh, (sites, 2).
+        turns: whether each interface may turn about its joint; a clamp may not, (sites,).
+        interior: control points between each joint and the next along the centreline, (sites − 1,).
+        thickness: in the plane, where δ = 1; None: the mean width of the link.
+        spacing: arc length between handles; None: the mean width of the link.
+    """
+
+    link: int
+    name: str
+    centreline: Centreline
+    joints: tuple[tuple[float, float], ...]
+    turns: tuple[bool, ...]
+    interior: tuple[int, ...]
+    thickness: float | None = None
+    spacing: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class LinkShape:
+    """The handles of one link and what they move.
+
+    Attributes:
+        link: index of the flexible link.
+        handles: its handles.
+        weights: of each handle at each vertex of the link, (n, handles).
+        thickness: in the plane, where δ = 1.
+    """
+
+    link: int
+    handles: LinkHandles
+    weights: np.ndarray
+    thickness: float
+
+
+def shape_link(mesh: LinkMesh, request: ShapeRequest) -> LinkShape:
+    """Spline, handles and weights of one link.
+
+    Raises:
+        DescriptionError: the spline does not fit the link.
+    """
+    part = f"link {request.name!r}"
+    fit = fit_spline(request.centreline, request.joints, request.interior, part=f"spline of {part}")
+    width = _mean_width(mesh, request.centreline.length)
+    handles = _place_handles(mesh, fit, spacing=request.spacing or width, turns=request.turns, part=part)
+    weights = handle_weights(mesh, handles, part=part)
+    return LinkShape(request.link, handles, weights, request.thickness or width)
+
+
+def shape_links(mesh: MechanismMesh, requests: Sequence[ShapeRequest]) -> list[LinkShape]:
+    """The shapes of some links, computed on the first rank and the same on all; errors too."""
+    links = gather_links(mesh)
+    return from_one(mesh.mesh.comm, lambda: [shape_link(links[request.link], request) for request in requests])
+
+
+def gather_links(mesh: MechanismMesh, vertices: np.ndarray | None = None) -> list[LinkMesh]:
+    """The mesh of every flexible link with its own numbering of interfaces, on every rank.
+
+    Args:
+        mesh: the mechanism's mesh.
+        vertices: where its vertices are, (vertices, dim); as drawn by default.
+    """
+    points = mesh.vertices if vertices is None else vertices
+    interface = np.full(len(mesh.cells), FREE)
+    topology = mesh.mesh.topology
+    owned = topology.index_map(topology.dim).size_local
+    for cells, numbers in mesh.mesh.comm.allgather((original_cells(mesh.mesh)[:owned], mesh.interface[:owned])):
+        interface[cells] = numbers
+    links = []
+    for link in range(mesh.link_of_cell.max() + 1):
+        mine = mesh.link_of_cell == link
+        numbers = interface[mine]
+        numbers[numbers != FREE] -= numbers[numbers != FREE].min(initial=np.iinfo(int).max)
+        links.append(LinkMesh.from_cells(points, mesh.cells[mine].copy(), numbers))
+    return links
+
+
+def _place_handles(mesh: LinkMesh, fit: SplineFit, *, spacing: float, turns: Sequence[bool], part: str) -> LinkHandles:
+    """The handles of one link: at its joints, and at regular arc lengths of the spline between them.
+
+    Intermediary handles in or next to an interface are left out.
+
+    Args:
+        mesh: the link's mesh.
+        fit: its spline; sites are the interfaces of ``mesh``.
+        spacing: arc length between handles, adjusted so that it divides each span between joints evenly.
+        turns: whether each site may turn, (sites,).
+        part: the link, for messages.
+
+    Raises:
+        DescriptionError: the spline leaves the link.
+    """
+    spline, plan = fit.spline, plan_of(mesh).mesh
+    samples = np.linspace(0.0, spline.segments, 1000 * spline.segments + 1)
+    curve = spline.evaluate(spline.initial, samples)[:, :2]
+    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
+    held = plan.points[np.unique(plan.cells[plan.interface != FREE])][:, :2]
+
+    joints = np.flatnonzero(spline.is_joint).astype(float)
+    t, site = [joints[0]], [fit.sites[0]]
+    for start, end, end_site in zip(joints, joints[1:], fit.sites[1:], strict=False):
+        a, b = np.interp([start, end], samples, arc)
+        parts = max(2, round((b - a) / spacing))
+        between = np.interp(np.linspace(a, b, parts + 1)[1:-1], arc, samples)
+        for candidate, at in zip(between, spline.evaluate(spline.initial, between)[:, :2], strict=True):
+            cells, _ = pierced(plan, at)
+            if len(cells) == 0:
+                where = ", ".join(f"{c:g}" for c in at)
+                raise DescriptionError(
+                    f"spline of {part}", f"it leaves the link at ({where})", "Give a centreline inside the link"
+                )
+            # a quarter of the spacing away from interfaces
+            clear = np.linalg.norm(held - at, axis=1).min() > 0.25 * (b - a) / parts
+            if clear and np.all(plan.interface[cells] == FREE):
+                t.append(candidate)
+                site.append(BETWEEN)
+        t.append(end)
+        site.append(end_site)
+    site = np.array(site)
+    return LinkHandles(spline, np.array(t), site, (site != BETWEEN) & np.array(turns)[site])
+
+
+def _mean_width(mesh: LinkMesh, length: float) -> float:
+    """Area of the link in the plane over the length of its centreline."""
+    plan = plan_of(mesh).mesh
+    size = np.abs(cell_measures(plan.points, plan.cells)).sum()
+    return size / length if plan.dim == 2 else size / length / np.ptp(plan.points[:, 2])
+
+
+class ShapeMap:
+    """The shape of some links as a function of parameters p and handle positions θ, both link after link.
+
+    Fields are arrays (local nodes, dim), nodes as in ``design.x.array``, ghosts last. Everything else is the same on
+    all ranks. Links without a shape keep d = 0.
+
+    Args:
+        mesh: the mechanism's mesh.
+        design: the design field d, vector P1.
+        shapes: the links that change, the same on all ranks.
+
+    Attributes:
+        owned: number of owned nodes.
+        original: vertex of the whole mesh of every local node, (nodes,).
+        vertices: per link, its vertices in the whole mesh, (n,).
+        reach: per link, r_ij at ``vertices``, (n, handles, 3).
+        initial, initial_theta: p (parameters,) and θ (handles,) of the initial design.
+    """
+
+    def __init__(self, mesh: MechanismMesh, design: fem.Function, shapes: Sequence[LinkShape]) -> None:
+        self.mesh, self.design, self.shapes = mesh, design, tuple(shapes)
+        self.original = _original_vertices(design)
+        self.owned = design.function_space.dofmap.index_map.size_local
+        self.vertices = [np.unique(mesh.cells[mesh.link_of_cell == shape.link]) for shape in shapes]
+        self.reach = [_reach(mesh.vertices[v], shape) for v, shape in zip(self.vertices, shapes, strict=True)]
+        self._nodes, self._local_reach = [], []
+        for vertices, reach in zip(self.vertices, self.reach, strict=True):
+            nodes = np.flatnonzero(np.isin(self.original, vertices))
+            self._nodes.append(nodes)
+            self._local_reach.append(reach[np.searchsorted(vertices, self.original[nodes])])
+        handles = [shape.handles for shape in shapes]
+        self.initial = np.concatenate([h.spline.initial for h in handles])
+        self.initial_theta = np.concatenate([h.initial for h in handles])
+        self._p_ends = np.cumsum([h.spline.size for h in handles])[:-1]
+        self._theta_ends = np.cumsum([len(h) for h in handles])[:-1]
+
+    def parameters(self, p: np.ndarray) -> list[np.ndarray]:
+        """``p`` (…, parameters) link by link."""
+        return np.split(p, self._p_ends, axis=-1)
+
+    def positions(self, theta: np.ndarray) -> list[np.ndarray]:
+        """``theta`` (…, handles) link by link."""
+        return np.split(theta, self._theta_ends, axis=-1)
+
+    def field(self, p: np.ndarray, theta: np.ndarray) -> np.ndarray:
+        """d, (nodes, dim)."""
+        return self.spread([shape.handles.transforms(*point) for shape, *point in self._links(p, theta)])
+
+    def apply(self, p: np.ndarray, theta: np.ndarray) -> None:
+        """Makes the design field hold d(p, θ)."""
+        self.design.x.array[:] = self.field(p, theta).ravel()
+
+    def apply_transpose(self, p: np.ndarray, theta: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The transpose of the derivatives of the field: g · ∂d/∂p (…, parameters) and g · ∂d/∂θ (…, handles).
+
+        g: (…, nodes or owned nodes, dim), of which the owned nodes count; summed over all ranks.
+        """
+        by_p, by_theta = [], []
+        for (shape, *point), moments in zip(self._links(p, theta), self.moments(g), strict=True):
+            p_slope, theta_slope = shape.handles.gradients(*point)
+            by_p.append(np.einsum("...jak,jakp->...p", moments, p_slope))
+            by_theta.append(np.einsum("...jak,jak->...j", moments, theta_slope))
+        return np.concatenate(by_p, axis=-1), np.concatenate(by_theta, axis=-1)
+
+    def spread(self, transforms: Sequence[np.ndarray]) -> np.ndarray:
+        """Σ_j T_j r_ij from the maps of each link's handles, (nodes, dim)."""
+        d = np.zeros((len(self.original), self.mesh.vertices.shape[1]))
+        for nodes, reach, T in zip(self._nodes, self._local_reach, transforms, strict=True):
+            d[nodes, :2] = np.einsum("ijk,jak->ia", reach, T, optimize=True)
+        return d
+
+    def moments(self, g: np.ndarray) -> list[np.ndarray]:
+        """The transpose of ``spread``: Σ_i g_i ⊗ r_ij of each handle, per link (…, handles, 2, 3), over all ranks."""
+        parts = []
+        for nodes, reach in zip(self._nodes, self._local_reach, strict=True):
+            mine = nodes < self.owned
+            parts.append(np.einsum("...ia,ijk->...jak", g[..., nodes[mine], :2], reach[mine]))
+        return self.sum_over_ranks(parts)
+
+    def sum_over_ranks(self, parts: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """The sums over all ranks of arrays of any shapes, in one message."""
+        total = np.concatenate([part.ravel() for part in parts])
+        self.mesh.mesh.comm.Allreduce(MPI.IN_PLACE, total)
+        ends = np.cumsum([part.size for part in parts])[:-1]
+        return [piece.reshape(part.shape) for piece, part in zip(np.split(total, ends), parts, strict=True)]
+
+    def _links(self, p: np.ndarray, theta: np.ndarray):
+        return zip(self.shapes, self.parameters(p), self.positions(theta), strict=True)
+
+
+def _reach(points: np.ndarray, shape: LinkShape) -> np.ndarray:
+    """r_ij = w_ij (X_i − X_j, 1), (n, handles, 3)."""
+    arms = points[:, None, :2] - shape.handles.centre
+    return shape.weights[..., None] * np.concatenate([arms, np.ones((*arms.shape[:2], 1))], axis=2)
+
+
+def _original_vertices(design: fem.Function) -> np.ndarray:
+    """The vertex of the whole mesh of every local node of a P1 field, (nodes,)."""
+    V = design.function_space
+    original = np.empty(len(design.x.array) // V.dofmap.index_map_bs, dtype=np.int64)
+    original[cell_dofs(V)] = cell_nodes(V.mesh)
+    return original_nodes(V.mesh)[original]

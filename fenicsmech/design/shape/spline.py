@@ -1,0 +1,270 @@
+"""Centreline and thickness of a link as a cubic Hermite spline of its design parameters; samples of it; the first one.
+
+With control points C_k (position P_k and tangent M_k, three components each) and t = k + τ, 0 ≤ τ ≤ 1,
+
+    (x, y, δ)(p, t) = h₀₀(τ) P_k + h₁₀(τ) M_k + h₀₁(τ) P_{k+1} + h₁₁(τ) M_{k+1}.
+
+The parameters p are the tangents at joints, and position and tangent at all other control points: a joint stays where
+it is and keeps its thickness. The curve is linear in p.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+
+import numpy as np
+import sympy
+from numpy.polynomial.polynomial import polyder
+
+from fenicsmech.errors import DescriptionError
+from fenicsmech.mechanism import Centreline
+from fenicsmech.symbolic import SmoothFunction, derive
+
+# h₀₀ (P_k), h₁₀ (M_k), h₀₁ (P_{k+1}), h₁₁ (M_{k+1}) in powers of τ, and their derivatives
+_HERMITE = np.array([[1.0, 0.0, -3.0, 2.0], [0.0, 1.0, -2.0, 1.0], [0.0, 0.0, 3.0, -2.0], [0.0, 0.0, -1.0, 1.0]])
+_DERIVATIVES = [polyder(_HERMITE, order, axis=1) for order in range(5)]
+
+
+@dataclass(frozen=True, eq=False)
+class LinkSpline:
+    """The spline of one link.
+
+    Attributes:
+        controls: initial control points, (n, 2, 3): position and tangent, each (x, y, δ).
+        is_joint: which control points are joints, (n,).
+    """
+
+    controls: np.ndarray
+    is_joint: np.ndarray
+
+    @property
+    def segments(self) -> int:
+        """Number of cubic segments; t runs from 0 to this."""
+        return len(self.controls) - 1
+
+    @property
+    def size(self) -> int:
+        """Number of parameters."""
+        return len(self.entries)
+
+    @cached_property
+    def entries(self) -> np.ndarray:
+        """Which of ``controls.ravel()`` the parameters are, (size,)."""
+        free = np.ones(self.controls.shape, dtype=bool)
+        free[self.is_joint, 0] = False
+        return np.flatnonzero(free)
+
+    @property
+    def initial(self) -> np.ndarray:
+        """Initial parameters, (size,)."""
+        return self.controls.ravel()[self.entries]
+
+    @property
+    def is_thickness(self) -> np.ndarray:
+        """Which parameters belong to δ; the others are lengths, (size,)."""
+        return self.entries % 3 == 2
+
+    def controls_at(self, p: np.ndarray) -> np.ndarray:
+        """The control points for parameters ``p`` (size,), (n, 2, 3)."""
+        controls = self.controls.copy()
+        controls.ravel()[self.entries] = p
+        return controls
+
+    def evaluate(self, p: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """(x, y, δ) at ``t`` (m,), (m, 3)."""
+        return self.basis(t) @ self.controls_at(p).reshape(-1, 3)
+
+    def derivative(self, p: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """d(x, y, δ)/dt at ``t`` (m,), (m, 3); at a control point both segments agree."""
+        return self.basis(t, order=1) @ self.controls_at(p).reshape(-1, 3)
+
+    def gradient(self, t: np.ndarray, *, order: int = 0, segments: np.ndarray | None = None) -> np.ndarray:
+        """∂/∂p of (x, y, δ), differentiated ``order`` times by t, at ``t`` (m,), (m, 3, size); the same for all p."""
+        rows, component = np.divmod(self.entries, 3)
+        gradient = np.zeros((len(t), 3, self.size))
+        gradient[:, component, np.arange(self.size)] = self.basis(t, order=order, segments=segments)[:, rows]
+        return gradient
+
+    def segments_of(self, t: np.ndarray) -> np.ndarray:
+        """The segment of each ``t`` (m,), the later one at a control point, (m,)."""
+        return np.clip(np.floor(t).astype(int), 0, self.segments - 1)
+
+    def basis(self, t: np.ndarray, *, order: int = 0, segments: np.ndarray | None = None) -> np.ndarray:
+        """Weights of P_0, M_0, P_1, M_1, … in the curve, differentiated ``order`` times by t, at ``t`` (m,), (m, 2n).
+
+        segments: the segment of each t; at a control point one of two cubics is meant.
+        """
+        segments = self.segments_of(t) if segments is None else segments
+        weights = np.zeros((len(t), 2 * len(self.controls)))
+        columns = 2 * segments[:, None] + np.arange(4)
+        coefficients = _DERIVATIVES[order]
+        powers = (t - segments)[:, None] ** np.arange(coefficients.shape[1])
+        weights[np.arange(len(t))[:, None], columns] = powers @ coefficients.T
+        return weights
+
+
+class SplineSamples:
+    """Samples of one spline, uniform in t: the thickness δ, and the curvature ratio of three consecutive points,
+
+        r = h / R = (|a| + |b|) (a × b) / (|a| |b| |a + b|),
+
+    h the mean length of the segments a, b between them, R their circumradius, with the sign of the bend, which keeps r
+    smooth. δ and the points are linear in p. The default of 500 samples is the paper's (section VI-A).
+    """
+
+    def __init__(self, spline: LinkSpline, *, count: int = 500) -> None:
+        self.t = np.linspace(0.0, spline.segments, count)
+        self._gradient = spline.gradient(self.t)
+        self._fixed = spline.evaluate(np.zeros(spline.size), self.t)
+
+    @property
+    def thickness_gradient(self) -> np.ndarray:
+        """∂δ/∂p, the same for all p, (count, size)."""
+        return self._gradient[:, 2]
+
+    def thickness(self, p: np.ndarray) -> np.ndarray:
+        """δ, (count,)."""
+        return self._fixed[:, 2] + self._gradient[:, 2] @ p
+
+    def curvature(self, p: np.ndarray) -> np.ndarray:
+        """r, signed, at the inner samples, (count − 2,)."""
+        return _ratio().value(*self._triples(p, slice(None)))[:, 0]
+
+    def curvature_gradient(self, p: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+        """∂r/∂p at some of the inner samples, a mask (count − 2,), (chosen, size)."""
+        moves = np.concatenate([self._gradient[k : len(self.t) - 2 + k, :2][chosen] for k in range(3)], axis=1)
+        return np.einsum("nc,ncp->np", _ratio().gradient(*self._triples(p, chosen))[:, 0], moves)
+
+    def _triples(self, p: np.ndarray, chosen: np.ndarray | slice) -> tuple[np.ndarray, np.ndarray]:
+        """Three consecutive points around the chosen inner samples, (chosen, 6), and no constants."""
+        points = self._fixed[:, :2] + self._gradient[:, :2] @ p
+        triples = np.concatenate([points[k : len(points) - 2 + k][chosen] for k in range(3)], axis=1)
+        return triples, np.empty((len(triples), 0))
+
+
+@cache
+def _ratio() -> SmoothFunction:
+    """r by the coordinates of three points."""
+    coordinates = sympy.symbols("px py qx qy sx sy", real=True)
+    p, q, s = (sympy.Matrix(coordinates[k : k + 2]) for k in (0, 2, 4))
+    a, b = q - p, s - q
+    lengths = [sympy.sqrt(v.dot(v)) for v in (a, b, a + b)]
+    ratio = (lengths[0] + lengths[1]) * (a[0] * b[1] - a[1] * b[0]) / (lengths[0] * lengths[1] * lengths[2])
+    return derive([ratio], coordinates, [], many=True)
+
+
+@dataclass(frozen=True, eq=False)
+class SplineFit:
+    """A spline and how well it follows its centreline.
+
+    Attributes:
+        spline: the spline.
+        sites: index among the given joints of each joint control point, in order along the curve.
+        deviation: largest distance from the spline to the centreline.
+    """
+
+    spline: LinkSpline
+    sites: tuple[int, ...]
+    deviation: float
+
+
+def fit_spline(
+    centreline: Centreline, joints: Sequence[Sequence[float]], interior: Sequence[int], *, part: str = "spline"
+) -> SplineFit:
+    """The spline along ``centreline`` with control points at ``joints`` and evenly spaced ones between them.
+
+    The tangents minimise the distance across the curve,
+
+        Σ_k (n_k · (x(t_k) − c_k))² + ε² (τ_k · (x(t_k) − c_k))²,
+
+    with c_k the foot point of x(t_k) on the centreline, τ_k and n_k its tangent and normal, and a small ε that keeps
+    the samples from running along the curve. Foot points and tangents are improved in turn.
+
+    Args:
+        centreline: the curve to follow.
+        joints: positions of the link's joints, (n, 2), in any order.
+        interior: number of control points between each joint and the next along the curve, (n − 1,).
+        part: what the spline belongs to, for messages.
+
+    Raises:
+        DescriptionError: fewer than two joints, two joints at one place of the curve, or ``interior`` does not match.
+    """
+    joints = np.asarray(joints, dtype=float)
+    if len(joints) < 2:
+        raise DescriptionError(part, f"the link has {len(joints)} joint", "Only links with two joints or more have one")
+    if len(interior) != len(joints) - 1 or any(count < 0 for count in interior):
+        raise DescriptionError(
+            part,
+            f"interior control points {tuple(interior)} do not match {len(joints)} joints",
+            f"Give {len(joints) - 1} numbers from 0 up, one per span between joints",
+        )
+    curve = _ArcLength(centreline)
+    arcs = np.array([curve.arc(joint) for joint in joints])
+    order = np.argsort(arcs)
+    arcs = arcs[order]
+    if np.any(np.diff(arcs) <= 1e-9 * curve.length):
+        raise DescriptionError(part, "two joints are at one place of the centreline", "Move one of them")
+
+    knots, is_joint = [arcs[0]], [True]
+    for start, end, count in zip(arcs, arcs[1:], interior, strict=False):
+        knots += np.linspace(start, end, count + 2)[1:].tolist()
+        is_joint += [False] * count + [True]
+    is_joint = np.array(is_joint)
+    positions = curve.point(np.array(knots))
+    positions[is_joint] = joints[order]
+
+    controls = np.zeros((len(knots), 2, 3))
+    controls[:, 0, :2], controls[:, 0, 2] = positions, 1.0
+    spline, each = LinkSpline(controls, is_joint), 32  # samples per segment
+    t = np.arange(0.5, spline.segments * each) / each
+    feet = np.interp(t, np.arange(len(knots)), knots)
+    for _ in range(40):  # the deviation has settled after a few
+        controls[:, 1, :2] = _fit_tangents(spline.basis(t), positions, curve, feet)
+        samples = spline.evaluate(spline.initial, t)[:, :2]
+        feet = curve.foot(samples, feet)
+    deviation = np.linalg.norm(samples - curve.point(feet), axis=1).max()
+    return SplineFit(spline, tuple(order.tolist()), float(deviation))
+
+
+def _fit_tangents(basis: np.ndarray, positions: np.ndarray, curve: _ArcLength, feet: np.ndarray) -> np.ndarray:
+    """The tangents (n, 2) that minimise the weighted distances from the samples to the points ``feet``."""
+    gap = basis[:, ::2] @ positions - curve.point(feet)
+    along = curve.tangent(feet)
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    rows, rhs = [], []
+    for direction, weight in ((across, 1.0), (along, 0.1)):  # ε = 0.1
+        rows.append(weight * (direction[:, None, :] * basis[:, 1::2, None]).reshape(len(feet), -1))
+        rhs.append(-weight * np.sum(direction * gap, axis=1))
+    return np.linalg.lstsq(np.concatenate(rows), np.concatenate(rhs), rcond=None)[0].reshape(-1, 2)
+
+
+class _ArcLength:
+    """A centreline by its arc length a, from a fine table."""
+
+    def __init__(self, centreline: Centreline) -> None:
+        self._curve = centreline
+        self._s = centreline.samples(1000)
+        chords = np.linalg.norm(np.diff(centreline.evaluate(self._s), axis=0), axis=1)
+        self._a = np.concatenate([[0.0], np.cumsum(chords)])
+
+    @property
+    def length(self) -> float:
+        return float(self._a[-1])
+
+    def arc(self, point: np.ndarray) -> float:
+        return float(np.interp(self._curve.closest(point), self._s, self._a))
+
+    def point(self, a: np.ndarray) -> np.ndarray:
+        return self._curve.evaluate(np.interp(a, self._a, self._s))
+
+    def tangent(self, a: np.ndarray) -> np.ndarray:
+        return self._curve.tangent(np.interp(a, self._a, self._s))
+
+    def foot(self, points: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """Arc lengths of the points of the curve nearest to ``points`` (m, 2), from guesses ``a`` (m,)."""
+        for _ in range(3):
+            step = np.sum((points - self.point(a)) * self.tangent(a), axis=1)
+            a = np.clip(a + step, 0.0, self.length)
+        return a

@@ -1,0 +1,234 @@
+"""Bounded biharmonic weights: how much each handle of a link moves each vertex of its mesh.
+
+    min Σ_j ½ w_jᵀ (L M⁻¹ L + c D) w_j    with  0 ≤ w ≤ 1,  Σ_j w_j = 1,
+    w_j = 1 at handle j and on the whole interface that it holds, 0 on those of all others,
+
+L, M: stiffness and lumped mass of linear elements, D = ∫ ∂N_i/∂z ∂N_k/∂z, c = 1000 / depth². The weights of an extruded
+link are sought on its plan, so that they do not change through its depth at all; D serves other solids. Handles between
+joints are vertices of the mesh: the cells that hold them are split there. A. Jacobson, I. Baran, J. Popović,
+O. Sorkine: Bounded biharmonic weights for real-time deformation (doi:10.1145/1964921.1964973).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from petsc4py import PETSc
+from scipy.sparse import coo_matrix, csr_matrix, diags, identity, kron
+
+from fenicsmech.design.shape.handles import BETWEEN, LinkHandles
+from fenicsmech.errors import FenicsmechError
+from fenicsmech.meshing import FREE, LinkMesh, cell_measures, plan_of
+
+
+def handle_weights(mesh: LinkMesh, handles: LinkHandles, *, part: str = "link") -> np.ndarray:
+    """The weights of all handles at the vertices of ``mesh``, (n, handles).
+
+    Args:
+        mesh: the link's mesh.
+        handles: its handles; intermediary ones must lie in free cells.
+        part: the link's name, for messages.
+
+    Raises:
+        FenicsmechError: the weights could not be computed.
+    """
+    plan = plan_of(mesh)
+    expanded, holder = _expand(plan.mesh, handles)
+    Q, free = _energy(expanded), holder == BETWEEN
+    weights = (holder[:, None] == np.arange(len(handles))).astype(float)
+    weights[free] = solve_partition(Q[free][:, free], Q[free][:, ~free] @ weights[~free], part=part)
+    # the solver keeps to bounds and sum up to its tolerance
+    weights = np.maximum(weights, 0.0)
+    weights /= weights.sum(axis=1, keepdims=True)
+    return weights[plan.column]
+
+
+def _expand(mesh: LinkMesh, handles: LinkHandles) -> tuple[LinkMesh, np.ndarray]:
+    """``mesh`` with intermediary handles as further vertices, and the handle that holds each vertex or none."""
+    held: list[tuple[int, np.ndarray | int]] = []
+    for index, (site, centre) in enumerate(zip(handles.site, handles.centre, strict=True)):
+        if site != BETWEEN:
+            held.append((index, np.unique(mesh.cells_of(site))))
+            continue
+        for point in pierced(mesh, centre)[1]:
+            mesh, vertex = insert(mesh, point)
+            held.append((index, vertex))
+    holder = np.full(len(mesh.points), BETWEEN)
+    for index, vertices in held:
+        holder[vertices] = index
+    return mesh, holder
+
+
+def _energy(mesh: LinkMesh) -> csr_matrix:
+    """L M⁻¹ L + c D."""
+    L = stiffness(mesh)
+    Q = L @ diags(1.0 / lumped_mass(mesh)) @ L
+    if mesh.dim == 3:
+        depth = np.ptp(mesh.points[:, 2])
+        Q = Q + 1000.0 / depth**2 * stiffness(mesh, axis=2)
+    return csr_matrix(Q)
+
+
+_INSIDE = 1e-9  # barycentric coordinates above minus this are inside: rounding
+
+
+def pierced(mesh: LinkMesh, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where the line along z through ``at`` (2,) runs in the mesh.
+
+    Returns:
+        The cells that it pierces, (k,), and a point of it inside each, (k, dim); a triangle holds the point itself.
+    """
+    if mesh.dim == 2:
+        coordinates = _barycentric(mesh, at)
+        inside = coordinates.min(axis=1) >= -_INSIDE
+        cell = np.flatnonzero(inside)[:1]
+        return cell, np.tile(at, (len(cell), 1))
+    # λ(z) = λ(0) + z (λ(1) − λ(0)) ≥ 0 holds between the latest entry and the first exit
+    start = _barycentric(mesh, np.append(at, 0.0))
+    rise = _barycentric(mesh, np.append(at, 1.0)) - start
+    with np.errstate(divide="ignore", invalid="ignore"):
+        crossing = -start / rise
+    enter = np.where(rise > 0.0, crossing, np.where((rise < 0.0) | (start >= -_INSIDE), -np.inf, np.inf)).max(axis=1)
+    leave = np.where(rise < 0.0, crossing, np.inf).min(axis=1)
+    height = np.ptp(mesh.points[mesh.cells, 2], axis=1)
+    cells = np.flatnonzero(leave - enter > 0.05 * height)  # the line cuts no mere corner
+    return cells, np.column_stack([np.tile(at, (len(cells), 1)), 0.5 * (enter + leave)[cells]])
+
+
+def insert(mesh: LinkMesh, at: np.ndarray) -> tuple[LinkMesh, int]:
+    """``mesh`` with a vertex at the point ``at`` (dim,), which must be in a free cell, and the number of that vertex.
+
+    The vertex splits the cell, or an edge or face that it is close to with all cells around it; or a vertex close to
+    it moves there. Of these, the way that leaves the largest smallest cell is taken. Interfaces are not touched.
+    """
+    cells = mesh.cells
+    coordinates = _barycentric(mesh, at)
+    home = int(np.argmax(coordinates.min(axis=1)))
+    nearest = np.argsort(coordinates[home])[::-1]
+    least = np.count_nonzero(coordinates[home] > 0.05)  # below, the point is close to the opposite face
+    ways = []
+    for count in range(least, len(nearest) + 1):
+        near = cells[home][nearest[:count]]
+        around = np.isin(cells, near).sum(axis=1) == count
+        if np.all(mesh.interface[around] == FREE):
+            ways.append(_move(mesh, near[0], at) if count == 1 else _split(mesh, near, around, at))
+    return max(ways, key=_smallest_cell)
+
+
+def _smallest_cell(way: tuple[LinkMesh, int]) -> float:
+    """The least volume among the cells at the new vertex."""
+    mesh, vertex = way
+    return float(cell_measures(mesh.points, mesh.cells[np.any(mesh.cells == vertex, axis=1)]).min())
+
+
+def _move(mesh: LinkMesh, vertex: int, at: np.ndarray) -> tuple[LinkMesh, int]:
+    points = mesh.points.copy()
+    points[vertex] = at
+    return LinkMesh(points, mesh.cells, mesh.interface), int(vertex)
+
+
+def _split(mesh: LinkMesh, near: np.ndarray, around: np.ndarray, at: np.ndarray) -> tuple[LinkMesh, int]:
+    """Each cell ``around`` the vertices ``near`` becomes one cell per such vertex, with the new vertex in its place."""
+    vertex = len(mesh.points)
+    parts = [np.where(mesh.cells[around] == old, vertex, mesh.cells[around]) for old in near]
+    cells = np.concatenate([mesh.cells[~around], *parts])
+    interface = np.concatenate([mesh.interface[~around], np.full(len(cells) - np.sum(~around), FREE)])
+    return LinkMesh(np.vstack([mesh.points, at]), cells, interface), vertex
+
+
+def _barycentric(mesh: LinkMesh, at: np.ndarray) -> np.ndarray:
+    """Barycentric coordinates of a point (dim,) in every cell, (m, dim + 1)."""
+    corners = mesh.points[mesh.cells]
+    edges = (corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1)
+    inner = np.linalg.solve(edges, (at - corners[:, 0])[..., None])[..., 0]
+    return np.column_stack([1.0 - inner.sum(axis=1), inner])
+
+
+def lumped_mass(mesh: LinkMesh) -> np.ndarray:
+    """∫ N_i dx, (n,)."""
+    corner = np.abs(cell_measures(mesh.points, mesh.cells)) / (mesh.dim + 1)
+    return np.bincount(mesh.cells.ravel(), np.repeat(corner, mesh.dim + 1), minlength=len(mesh.points))
+
+
+def stiffness(mesh: LinkMesh, *, axis: int | None = None) -> csr_matrix:
+    """∫ ∇N_i · ∇N_j dx, (n, n); with the derivatives along one coordinate ``axis`` only if given."""
+    corners = mesh.points[mesh.cells]
+    edges = corners[:, 1:] - corners[:, :1]
+    # rows of inverse(edges)ᵀ are ∇N_1 … ∇N_dim
+    inner = np.linalg.inv(edges).transpose(0, 2, 1)
+    gradients = np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)
+    if axis is not None:
+        gradients = gradients[..., [axis]]
+    local = np.abs(cell_measures(mesh.points, mesh.cells))[:, None, None] * gradients @ gradients.transpose(0, 2, 1)
+    k, count = mesh.cells.shape[1], len(mesh.points)
+    rows, columns = np.repeat(mesh.cells, k, axis=1), np.tile(mesh.cells, (1, k))
+    return csr_matrix(coo_matrix((local.ravel(), (rows.ravel(), columns.ravel())), shape=(count, count)))
+
+
+def solve_partition(
+    Q: csr_matrix, c: np.ndarray, *, part: str, penalty: float = 3.0, tolerance: float = 1e-9, rounds: int = 100
+) -> np.ndarray:
+    """The bounded weights that sum to one and minimise a quadratic energy, by PETSc/TAO, (n, k).
+
+        min  Σ_j ½ w_jᵀ Q w_j + c_jᵀ w_j   over w ≥ 0 with Σ_j w_j = 1
+
+    by the method of multipliers: the trust-region Newton method TRON minimises, within the bounds,
+
+        Σ_j (½ w_jᵀ Q w_j + c_jᵀ w_j) + λᵀ s + κ/2 sᵀ D s,     s = Σ_j w_j − 1,  D = diag Q,
+
+    and then λ ← λ + κ D s. Every round shrinks s by a factor that does not depend on the mesh.
+
+    Args:
+        Q: symmetric positive definite, (n, n), sparse.
+        c: linear terms, (n, k).
+        part: what the weights belong to, for messages.
+        penalty: κ; larger ones save rounds, but their minimisations take longer.
+        tolerance: largest |s| accepted; TRON minimises a hundred times closer.
+        rounds: most updates of λ.
+
+    Raises:
+        FenicsmechError: the multipliers did not converge.
+    """
+    n, k = c.shape
+    scale = Q.diagonal().mean()
+    Q, c = Q / scale, c / scale
+    stiff = penalty * Q.diagonal()
+    # unknowns weight by weight, vertex by vertex: w_11, w_12, …, w_1k, w_21, …
+    hessian = csr_matrix(kron(Q, identity(k)) + kron(diags(stiff), np.ones((k, k))))
+    hessian.sort_indices()
+    H = PETSc.Mat().createAIJ(hessian.shape, csr=(hessian.indptr, hessian.indices, hessian.data), comm=PETSc.COMM_SELF)
+    linear = H.createVecRight()
+
+    def objective(tao: PETSc.TAO, w: PETSc.Vec, gradient: PETSc.Vec) -> float:
+        H.mult(w, gradient)
+        value = 0.5 * w.dot(gradient) + linear.dot(w)
+        gradient.axpy(1.0, linear)
+        return value
+
+    w, lower, upper, slope = (H.createVecRight() for _ in range(4))
+    w.set(1.0 / k)
+    upper.set(PETSc.INFINITY)
+    tao = PETSc.TAO().create(PETSc.COMM_SELF)
+    tao.setType(PETSc.TAO.Type.TRON)
+    tao.setObjectiveGradient(objective, slope)
+    tao.setHessian(lambda *_: None, H)
+    tao.setVariableBounds((lower, upper))
+    tao.setTolerances(gatol=1e-2 * tolerance, grtol=0.0, gttol=0.0)
+    tao.getKSP().getPC().setType(PETSc.PC.Type.ICC)
+    tao.setSolution(w)
+
+    multipliers = np.zeros(n)
+    try:
+        for _ in range(rounds):
+            linear.array[:] = (c + (multipliers - stiff)[:, None]).ravel()
+            tao.solve()
+            excess = w.array.reshape(n, k).sum(axis=1) - 1.0
+            multipliers += stiff * excess
+            if np.abs(excess).max() < tolerance:
+                return w.array.reshape(n, k).copy()
+    finally:
+        # at once: PETSc forgets what the functions of a solver hold if the solver itself was queued
+        for thing in (tao, w, lower, upper, slope, linear, H):
+            thing.destroy()
+    raise FenicsmechError(
+        part, f"the weights of its handles add up to 1 ± {np.abs(excess).max():.1e} only", "Use fewer handles"
+    )

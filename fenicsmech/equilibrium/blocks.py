@@ -1,0 +1,188 @@
+"""The blocks of the equilibrium system, and where each unknown stands in it.
+
+Nodes of links, poses of bodies, multipliers of joints and the controlled load are unknowns of one symmetric matrix:
+
+                 nodes  pressures │ poses  multipliers  load
+    nodes       ⎡  K      Gᵀ      │  Kᵀ_zu      0       −a_u ⎤      K     tangent of the links at their free nodes
+    pressures   ⎢  G      −M      │  G_z        0        0   ⎥      G, M  volume and compliance of links in u–p form
+                ⎢─────────────────┼──────────────────────────⎥
+    poses       ⎢ K_zu    Gᵀ_z    │   B        −Aᵀ      −a_z ⎥      B     curvature of rigid motions, A = ∂C/∂z
+    multipliers ⎢  0       0      │  −A       −ε − c     0   ⎥      c, ε  compliance of joints, regularisation
+    load        ⎣ −a_uᵀ    0      │ −a_zᵀ       0        0   ⎦      a     direction of the load at its point
+
+It is 2 × 2 blocks: links (thousands of unknowns, sparse, distributed) and the border (dozens, on the last rank). Nodes
+on interfaces are functions of the poses of their bodies, which couples both: K_zu, G_z and a part of B come from the
+links. Where the load is given instead of the displacement of its point, the load's row is −f alone.
+
+All blocks stand in one matrix, factored as LDLᵀ: by Sylvester's law its pivots have the signs of the eigenvalues, and
+at a stable equilibrium as many of these are negative as there are pressures, multipliers and the load (Gould,
+doi:10.1007/BF02592103). The factor that solves for a step decides on stability at no extra cost. Elimination of the
+nodes would leave a Schur complement of the border, in which small stiffnesses are differences of large ones.
+
+Every block is a named index set, enough for PETSc's fieldsplit preconditioners:
+
+    pc.setFieldSplitIS(("links", blocks.links.index_set()), ("border", blocks.border.index_set()))
+
+Two vectors have these blocks: the scaled unknowns x, and the rows of the extended matrix K̂ (see ``kkt``), which holds
+nodes on interfaces too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from fenicsmech.elasticity import PressureField
+from fenicsmech.multibody import InterfaceMap, JointSystem
+
+
+@dataclass(frozen=True)
+class Block:
+    """Unknowns of one kind.
+
+    Attributes:
+        local: where those of this rank stand among its values of a vector.
+        first: global number of the first of them; on ranks that hold none of the border, of the border's first ones.
+        size: number on all ranks.
+        comm: the processes.
+    """
+
+    local: slice
+    first: int
+    size: int
+    comm: MPI.Comm
+
+    @property
+    def count(self) -> int:
+        """Number on this rank. Local."""
+        return self.local.stop - self.local.start
+
+    def index_set(self) -> PETSc.IS:
+        """Global numbers of those of each rank."""
+        return PETSc.IS().createStride(self.count, self.first, 1, comm=self.comm)
+
+
+class Parts(NamedTuple):
+    """The values of each block."""
+
+    nodes: np.ndarray
+    pressures: np.ndarray
+    poses: np.ndarray
+    multipliers: np.ndarray
+    load: np.ndarray
+
+
+class Border(NamedTuple):
+    """The values of each block of the border."""
+
+    poses: np.ndarray
+    multipliers: np.ndarray
+    load: np.ndarray
+
+
+class Blocks:
+    """Named index sets of a distributed vector: links, rank by rank, then the border on the last rank.
+
+    Args:
+        comm: the processes.
+        nodes, pressures: numbers on this rank.
+        poses, multipliers: numbers on all ranks.
+        padding: values after the border that belong to no block.
+
+    Attributes:
+        nodes, pressures, poses, multipliers, load: the blocks.
+        links: nodes and pressures.
+        border: poses, multipliers and load.
+        local, size: lengths of the vector, on this rank and on all.
+        last: whether this rank holds the border.
+    """
+
+    def __init__(
+        self, comm: MPI.Comm, *, nodes: int, pressures: int, poses: int, multipliers: int, padding: int = 0
+    ) -> None:
+        self.comm, self.last = comm, comm.rank == comm.size - 1
+        here, first = nodes + pressures, comm.exscan(nodes + pressures) or 0
+        totals = comm.allreduce(np.array([nodes, pressures]))
+        start, border = int(totals.sum()), poses + multipliers + 1
+
+        def on_last(begin: int, size: int) -> Block:
+            held = slice(here + begin, here + begin + size) if self.last else slice(here, here)
+            return Block(held, start + begin, size, comm)
+
+        self.nodes = Block(slice(0, nodes), first, int(totals[0]), comm)
+        self.pressures = Block(slice(nodes, here), first + nodes, int(totals[1]), comm)
+        self.links = Block(slice(0, here), first, start, comm)
+        self.poses, self.multipliers = on_last(0, poses), on_last(poses, multipliers)
+        self.load, self.border = on_last(border - 1, 1), on_last(0, border)
+        self.local = here + (border + padding if self.last else 0)
+        self.size = start + border + padding
+
+    def restrict(self, values: np.ndarray) -> Parts:
+        """Views of this rank's ``values`` by block. Local."""
+        blocks = (self.nodes, self.pressures, self.poses, self.multipliers, self.load)
+        return Parts(*(values[block.local] for block in blocks))
+
+    def restrict_border(self, border: np.ndarray) -> Border:
+        """Views of the values of a whole ``border``, (border,), by block. Local."""
+        return Border(*np.split(border, [self.poses.size, self.poses.size + self.multipliers.size]))
+
+    def join(self, links: np.ndarray, border: np.ndarray) -> np.ndarray:
+        """This rank's values from those of its ``links`` and of the whole ``border``, known to all ranks. Local."""
+        values = np.zeros(self.local)
+        values[self.links.local] = links
+        values[self.border.local] = border[: self.border.count]
+        return values
+
+    def gather_border(self, values: np.ndarray) -> np.ndarray:
+        """The values of the border on every rank, (border,), from those of each rank."""
+        return self.comm.bcast(values[self.border.local] if self.last else None, root=self.comm.size - 1)
+
+
+class Numbering:
+    """Which degrees of freedom are unknowns, and where they stand.
+
+    Args:
+        comm: the processes that share the links.
+        interfaces: interface nodes as functions of poses.
+        joints: the constraints.
+        pressure: of links in u–p form, if there are any.
+
+    Attributes:
+        rows: blocks of the rows of K̂: all finite-element degrees of freedom of each rank, and the border.
+        unknowns: blocks of the scaled unknowns x: the free ones, and the border.
+        free: rows of this rank's links that are unknowns, (unknowns.links.count,).
+        per_node: displacements per node.
+        block: rows of K̂ come in blocks of this size.
+        whole_nodes: whether all components of every node with an unknown are unknowns, and there are no pressures.
+        first_node: global number of this rank's first node.
+    """
+
+    def __init__(
+        self, comm: MPI.Comm, interfaces: InterfaceMap, joints: JointSystem, pressure: PressureField | None = None
+    ) -> None:
+        self.per_node = self.block = interfaces.block
+        nodes, pressures = interfaces.owned * interfaces.block, 0
+        self.free = np.flatnonzero(interfaces.unknown)
+        displacements = len(self.free)
+        if pressure is not None:
+            pressures, self.block = len(pressure.unknown), 1
+            self.free = np.concatenate([self.free, nodes + np.flatnonzero(pressure.unknown)])
+        whole = pressure is None and np.all(interfaces.unknown.all(axis=1) == interfaces.unknown.any(axis=1))
+        self.whole_nodes = comm.allreduce(int(not whole)) == 0
+        border = {"poses": joints.size, "multipliers": joints.rows}
+        padding = -(sum(border.values()) + 1) % self.block
+        self.rows = Blocks(comm, nodes=nodes, pressures=pressures, **border, padding=padding)
+        self.unknowns = Blocks(comm, nodes=displacements, pressures=len(self.free) - displacements, **border)
+        # first node of every rank, and the pressures that stand before its displacements
+        ends = np.cumsum(comm.allgather(interfaces.owned))
+        self.first_node, self._starts = int(ends[comm.rank] - interfaces.owned), ends[:-1]
+        self._before = np.concatenate([[0], np.cumsum(comm.allgather(pressures))[:-1]])
+
+    def rows_of(self, nodes: np.ndarray) -> np.ndarray:
+        """Rows of K̂ of the displacements of ``nodes``, numbered over all ranks, (nodes · per_node,). Local."""
+        rank = np.searchsorted(self._starts, nodes, side="right")
+        return (self.per_node * nodes[:, None] + self._before[rank][:, None] + np.arange(self.per_node)).ravel()

@@ -1,0 +1,397 @@
+"""The KKT system without a factor of it: conjugate gradients between linear and higher-order displacements.
+
+P holds the linear displacements and the whole border,
+
+    P = D⁻¹ N G₁,     KKT₁ = Pᵀ KKT P,
+
+with G₁ the map ∂u/∂(s, λ, f) of linear elements, interfaces included, N their values at the nodes of the displacement,
+D the units of the unknowns. KKT₁ has an eighth of the unknowns or less, and is factored. What is left,
+
+    W = {x : Pᵀ KKT x = 0},     In(KKT) = In(KKT₁) + In(KKT on W),
+
+holds every constraint exactly, has no multipliers, and KKT is positive definite on it but for modes that linear
+elements are too stiff to show. Conjugate gradients stay in W if the smoother S is followed by the coarse correction:
+
+    x ← P KKT₁⁻¹ Pᵀ b,     then with the preconditioner  (I − P KKT₁⁻¹ Pᵀ KKT) S.
+
+S is a polynomial of the stiffness A of free nodes that damps what varies from node to node, PETSc's Chebyshev
+iteration: with D the 3 × 3 (2 × 2 in the plane) diagonal blocks of A and λ the largest eigenvalue of D⁻¹A,
+
+    S = q(D⁻¹A) D⁻¹,     1 − t q(t) = T_m((θ − t)/δ) / T_m(θ/δ),     θ, δ = (b ± a)/2,  a = ratio · b,  b ≥ λ:
+
+errors with eigenvalues in [a, b] shrink alike. S is symmetric, positive definite even if A is not.
+
+Directions p of conjugate gradients are conjugate, so that the number of negative pᵀ KKT p is that of the negative
+eigenvalues they have met. For the inertia they start from random vectors, until one meets none in the complement of
+those found: what was found is certain, that there is no more is as likely as the iteration has converged.
+
+Sources: Tang, Nabben, Vuik & Erlangga on the preconditioner, A-DEF2 (doi:10.1007/s10915-009-9272-6); Adams et al. on
+the smoother (doi:10.1016/S0021-9991(03)00194-3); Haynsworth (doi:10.1016/0024-3795(68)90050-5) on the inertia.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+from scipy.sparse import csr_matrix
+
+from fenicsmech.compat import interpolation_matrix
+from fenicsmech.equilibrium.blocks import Numbering
+from fenicsmech.equilibrium.linear.direct import Direct, Factor, Inertia, LinearMethod, LinearSolver
+from fenicsmech.equilibrium.system import EquilibriumSystem
+from fenicsmech.equilibrium.unknowns import UnknownMap
+from fenicsmech.errors import DescriptionError
+
+
+@dataclass(frozen=True, kw_only=True)
+class TwoLevel(LinearMethod):
+    """Conjugate gradients over a factor for linear displacements.
+
+    Attributes:
+        degree: m of the smoother, products with A that one application takes, plus one.
+        ratio: a/b of the smoother; both measured on the claw, whose curve takes least time with these.
+        safety: b over the estimate of λ, which is one from below: single bad cells are seen late.
+        iterations: most conjugate gradients of one solve; more say that the coarse level does not suit.
+        probe: relative energy down to which a random start is followed for the inertia.
+        roundoff: of the solution, in units of the mean stiffness: residuals below are rounding.
+    """
+
+    degree: int = 8
+    ratio: float = 0.03
+    safety: float = 1.3
+    iterations: int = 300
+    probe: float = 1e-6
+    roundoff: float = 1e-15
+
+    @staticmethod
+    def suits(system: EquilibriumSystem) -> bool:
+        """Whether displacements have a level below them, all components of free nodes are unknown, pressures none."""
+        return system.elastic.order > 1 and system.numbering.whole_nodes
+
+    def solver(self, system):
+        if not self.suits(system):
+            raise DescriptionError(
+                "linear solver TwoLevel",
+                "it needs displacements of order 2 or 3, all components of a node unknown, and no pressures",
+                "Use order=2, or Direct()",
+            )
+        return TwoLevelSolver(system, self)
+
+
+@dataclass(frozen=True)
+class BySize(LinearMethod):
+    """Two levels beyond so many unknowns, in space and where they suit; the factor otherwise.
+
+    In the plane a factor costs little at any size. Where two levels do not suit (order 1, the u–p formulation, the
+    nodes of a mid-plane) the factor is all there is. In space, whole curves of a claw with their stability cost as much
+    either way at 64,000 unknowns of order 2 and 110,000 of order 3; two levels take a third of the memory
+    (demos/large.py).
+
+    Attributes:
+        limit: unknowns.
+    """
+
+    limit: int = 80_000
+
+    def solver(self, system):
+        large = system.blocks.size > self.limit and system.joints.space.dim == 3 and TwoLevel.suits(system)
+        return (TwoLevel() if large else Direct()).solver(system)
+
+
+@dataclass(frozen=True)
+class Direction:
+    """p with KKT p and pᵀ KKT p."""
+
+    p: PETSc.Vec
+    image: PETSc.Vec
+    curvature: float
+
+
+class TwoLevelSolver(LinearSolver):
+    """Solves with the KKT matrix of ``system`` and counts its inertia.
+
+    Args:
+        system: with displacements of order 2 or more; refactor after changing its KKT matrix.
+        options: limits of the iterations.
+
+    Attributes:
+        iterations: of each solve so far.
+        probes: iterations spent on each inertia so far.
+    """
+
+    def __init__(self, system: EquilibriumSystem, options: TwoLevel) -> None:
+        self._system, self._options = system, options
+        self._coarse = CoarseLevel(system)
+        self._smoother = _chebyshev(system.comm, options)
+        self._nodes, self._rest = system.blocks.nodes.index_set(), system.blocks.border.index_set()
+        self._stiffness: PETSc.Mat | None = None
+        self._border: PETSc.Mat | None = None
+        self._corner: PETSc.Mat | None = None
+        # petsc4py destroys what it creates late: nothing is created per iteration
+        self._work, self._residual, self._z, self._image, self._p, self._q = (system.unknowns.zeros() for _ in range(6))
+        self._nodal: tuple[PETSc.Vec, PETSc.Vec] | None = None
+        self._met = 0
+        self.iterations: list[int] = []
+        self.probes: list[int] = []
+
+    def refactor(self) -> bool:
+        """Takes the KKT matrix's current values; whether that could be done."""
+        if self._stiffness is not None:
+            self._stiffness.destroy()
+        self._stiffness = self._system.kkt.nodal_stiffness()
+        columns = self._system.kkt.border_columns()
+        self._border = columns.createSubMatrix(self._nodes, None, self._border)
+        self._corner = columns.createSubMatrix(self._rest, None, self._corner)
+        if self._nodal is None:
+            self._nodal, self._bordering = self._stiffness.createVecs(), self._corner.createVecs()
+        self._smoother.setOperators(self._stiffness)
+        self._smoother.setUp()
+        return self._coarse.update()
+
+    @property
+    def memory(self) -> float:
+        """Bytes of the factor of KKT₁ and of the blocked stiffness, on all ranks."""
+        blocks = self._stiffness.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"]
+        size = self._stiffness.getBlockSize() ** 2
+        return self._coarse.memory + blocks * (8.0 + 4.0 / size)
+
+    def solve(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float) -> bool:
+        """Solves with the matrix last refactored; False if that takes too many iterations.
+
+        Args:
+            right: right-hand side.
+            solution: where the solution goes.
+            tolerance: of the energy norm of the error, relative to that of the error after one coarse correction.
+        """
+        self._start(right, solution)
+        return self._iterate(solution, tolerance)
+
+    def solve_and_count(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float) -> Inertia | None:
+        """``solve`` and ``inertia`` in one: a solve that starts from a random guess is a probe; None if not solved."""
+        self._start(right, solution)
+        error = abs(self._smooth(self._residual))
+        self._randomise(self._work)
+        self._smooth(self._work)
+        self._project(())
+        curvature = self._z.dot(self._image)
+        if curvature > 0.0:
+            # as much of it as of the error there is, in energy
+            factor = math.sqrt(error / curvature)
+            solution.axpy(factor, self._z)
+            self._residual.axpy(-factor, self._image)
+        if not self._iterate(solution, min(tolerance, self._options.probe)):
+            return None
+        return self.inertia() if self._met or curvature <= 0.0 else self._coarse.inertia()
+
+    def _start(self, right: PETSc.Vec, solution: PETSc.Vec) -> None:
+        """P KKT₁⁻¹ Pᵀ b and its residual."""
+        self._coarse.correction(right, solution)
+        self._multiply(solution, self._residual)
+        self._residual.aypx(-1.0, right)
+
+    def _iterate(self, solution: PETSc.Vec, tolerance: float) -> bool:
+        """Conjugate gradients from a ``solution`` with its residual; whether they reach the ``tolerance``."""
+        least, iterations, self._met = self._options.roundoff * solution.norm(), 0, 0
+        for energy, direction in self._conjugate(self._residual, tolerance, least=least):
+            if iterations == self._options.iterations:
+                return False
+            iterations += 1
+            solution.axpy(energy / direction.curvature, direction.p)
+            # later ones may be copies of the first: long recurrences forget what they were conjugate to
+            self._met = max(self._met, int(direction.curvature < 0.0))
+        self.iterations.append(iterations)
+        return True
+
+    def known_inertia(self) -> Inertia:
+        """What is certain after the last solve: the coarse level's, and one more if it met a negative curvature."""
+        coarse = self._coarse.inertia()
+        return Inertia(coarse.negative + self._met, coarse.zero)
+
+    def inertia(self) -> Inertia:
+        """Of the matrix last refactored."""
+        coarse, found, spent = self._coarse.inertia(), [], 0
+        while True:
+            direction, iterations = self._probe(found)
+            spent += iterations
+            if direction is None:
+                break
+            found.append(direction)
+        self.probes.append(spent)
+        return Inertia(coarse.negative + len(found), coarse.zero)
+
+    def _probe(self, found: list[Direction]) -> tuple[Direction | None, int]:
+        """A direction of negative curvature conjugate to those ``found``, None if there seems to be none."""
+        r, iterations, options = self._residual, 0, self._options
+        self._randomise(r)
+        self._coarse.correction(r, self._work)
+        self._multiply(self._work, self._image)
+        r.axpy(-1.0, self._image)
+        for known in found:
+            r.axpy(-known.p.dot(r) / known.curvature, known.image)
+        for iterations, (_, direction) in zip(
+            range(options.iterations), self._conjugate(r, options.probe, found), strict=False
+        ):
+            if direction.curvature < 0.0:
+                return Direction(direction.p.copy(), direction.image.copy(), direction.curvature), iterations
+        return None, iterations
+
+    def _conjugate(
+        self, r: PETSc.Vec, tolerance: float, found: Sequence[Direction] = (), *, least: float = 0.0
+    ) -> Iterator[tuple[float, Direction]]:
+        """Conjugate directions for a residual r with Pᵀ r = 0: its energy rᵀ z, and where to go on.
+
+        They end when the energy is ``least``² or has fallen by ``tolerance``². One is good until the next is asked for.
+        """
+        z, image, p, q = self._z, self._image, self._p, self._q
+        p.set(0.0)
+        q.set(0.0)
+        before, least = math.inf, least**2
+        # rᵀ S r is the same but for what rounding leaves in Pᵀ r: if that ends here, no projection is needed
+        while not abs(self._smooth(r)) <= least:
+            self._project(found)
+            energy = r.dot(z)
+            if before == math.inf:
+                least = max(tolerance**2 * abs(energy), least)
+            if abs(energy) <= least:
+                break
+            p.aypx(energy / before, z)
+            q.aypx(energy / before, image)
+            curvature = p.dot(q)
+            yield energy, Direction(p, q, curvature)
+            r.axpy(-energy / curvature, q)
+            before = energy
+
+    def _smooth(self, r: PETSc.Vec) -> float:
+        """z = S r, and rᵀ z."""
+        z = self._z
+        rough, smooth = self._nodal
+        count = rough.getLocalSize()
+        rough.array_w[:] = r.array_r[:count]
+        self._smoother.solve(rough, smooth)
+        z.array_w[:count], z.array_w[count:] = smooth.array_r, 0.0
+        return r.dot(z)
+
+    def _project(self, found: Sequence[Direction]) -> None:
+        """Makes z conjugate to P and to the directions ``found``, and its image KKT z."""
+        z, image = self._z, self._image
+        self._multiply(z, image)
+        self._coarse.correction(image, self._work)
+        z.axpy(-1.0, self._work)
+        self._multiply(z, image)
+        for known in found:
+            factor = -known.image.dot(z) / known.curvature
+            z.axpy(factor, known.p)
+            image.axpy(factor, known.image)
+
+    def _multiply(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """y = KKT x by its blocks."""
+        nodes, rows = self._nodal
+        rest, sums = self._bordering
+        count = nodes.getLocalSize()
+        nodes.array_w[:], rest.array_w[:] = x.array_r[:count], x.array_r[count:]
+        self._stiffness.mult(nodes, rows)
+        self._border.multAdd(rest, rows, rows)
+        self._corner.mult(rest, sums)
+        self._border.multTransposeAdd(nodes, sums, sums)
+        y.array_w[:count], y.array_w[count:] = rows.array_r, sums.array_r
+
+    def _randomise(self, r: PETSc.Vec) -> None:
+        """Makes r random forces on free nodes."""
+        count = self._nodal[0].getLocalSize()
+        r.array_w[:count] = np.random.default_rng(self._system.comm.rank).standard_normal(count)
+        r.array_w[count:] = 0.0
+
+
+def _chebyshev(comm: MPI.Comm, options: TwoLevel) -> PETSc.KSP:
+    """The smoother S."""
+    prefix = "fenicsmech_smoother_"
+    database = PETSc.Options(prefix)
+    database["ksp_chebyshev_esteig"] = f"0,{options.ratio * options.safety},0,{options.safety}"
+    smoother = PETSc.KSP().create(comm)
+    smoother.setOptionsPrefix(prefix)
+    smoother.setType(PETSc.KSP.Type.CHEBYSHEV)
+    smoother.setNormType(PETSc.KSP.NormType.NONE)
+    smoother.setTolerances(max_it=options.degree)
+    smoother.getPC().setType("pbjacobi")
+    smoother.setFromOptions()
+    return smoother
+
+
+class CoarseLevel:
+    """P and the factor of KKT₁.
+
+    Args:
+        system: whose KKT matrix it is.
+    """
+
+    def __init__(self, system: EquilibriumSystem) -> None:
+        self._system = system
+        linear = fem.Function(system.elastic.d.function_space)
+        self._interfaces = system.interfaces.on(linear)
+        numbering = Numbering(system.comm, self._interfaces, system.joints)
+        units = np.full(len(numbering.free), system.unknowns.unit_u)
+        self._map = UnknownMap(numbering, self._interfaces, system.joints, units, system.unknowns.scale)
+        self._values = _values_at_nodes(system, numbering)
+        self._prolongation: PETSc.Mat | None = None
+        self._mapped: PETSc.Mat | None = None
+        self._matrix: PETSc.Mat | None = None
+        self._factor: Factor | None = None
+
+    def update(self) -> bool:
+        """Takes the values of the KKT matrix; whether KKT₁ could be factored."""
+        system, unknowns = self._system, self._system.unknowns
+        self._interfaces.reshape(system.elastic.d.x.array.reshape(-1, system.joints.space.dim))
+        self._map.turn(unknowns.poses)
+        self._prolongation = self._values.matMult(self._map.matrix, result=self._prolongation)
+        self._mapped = unknowns.map.matMult(self._prolongation, result=self._mapped)
+        self._matrix = system.kkt.restricted(self._mapped, self._matrix)
+        if self._factor is None:
+            self._factor = Factor(self._matrix)
+            self._right, self._solution = self._matrix.createVecs()
+        return self._factor.refactor()
+
+    def inertia(self) -> Inertia:
+        """Of KKT₁."""
+        return self._factor.inertia()
+
+    @property
+    def memory(self) -> float:
+        """Bytes the factorisation took, on all ranks."""
+        return self._factor.memory
+
+    def correction(self, r: PETSc.Vec, x: PETSc.Vec) -> None:
+        """x = P KKT₁⁻¹ Pᵀ r."""
+        self._prolongation.multTranspose(r, self._right)
+        self._factor.solve(self._right, self._solution)
+        self._prolongation.mult(self._solution, x)
+
+
+def _values_at_nodes(system: EquilibriumSystem, coarse: Numbering) -> PETSc.Mat:
+    """D⁻¹ N: unknowns from displacements at vertices and the border."""
+    blocks, elastic = system.blocks, system.elastic
+    weights = interpolation_matrix(elastic.d.function_space, elastic.u.function_space)[system.numbering.free].tocoo()
+    # then the identity of the border
+    border = np.arange(blocks.border.count)
+    rows = [weights.row, blocks.border.local.start + border]
+    columns = [weights.col, coarse.rows.border.first + border]
+    values = [weights.data, np.ones(len(border))]
+    local = csr_matrix(
+        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))),
+        shape=(blocks.local, coarse.rows.size),
+    )
+    local.sort_indices()
+    matrix = PETSc.Mat().createAIJ(
+        [(blocks.local, blocks.size), (coarse.rows.local, coarse.rows.size)],
+        csr=(local.indptr.astype(PETSc.IntType), local.indices.astype(PETSc.IntType), local.data),
+        comm=system.comm,
+    )
+    units = system.unknowns.zeros()
+    units.array_w[:] = 1.0 / system.unknowns.units
+    matrix.diagonalScale(units)
+    return matrix

@@ -1,0 +1,36 @@
+"""How far results are from those of infinitely fine elements, or of a model in space.
+
+- ``estimates``: goal-oriented error estimates at equilibria
+- ``element_error``: of elements, by ``recovery`` of gradients
+- ``plane_stress_error``: of plane stress
+- ``accuracy_control``: the cheapest fidelity whose estimated error is small enough
+"""
+
+from fenicsmech.estimates.accuracy_control import (
+    AccuracyControl,
+    AccuracyOptions,
+    Choice,
+    FidelityLevel,
+    LevelErrors,
+    Trial,
+    fidelity_levels,
+)
+from fenicsmech.estimates.estimates import Calibration, Equilibrium, ErrorKind, Estimates, adjoint_at
+from fenicsmech.estimates.recovery import PressureError, Recovery
+
+__all__ = [
+    "AccuracyControl",
+    "AccuracyOptions",
+    "Calibration",
+    "Choice",
+    "Equilibrium",
+    "ErrorKind",
+    "Estimates",
+    "FidelityLevel",
+    "LevelErrors",
+    "PressureError",
+    "Recovery",
+    "Trial",
+    "adjoint_at",
+    "fidelity_levels",
+]

@@ -1,0 +1,13 @@
+"""Links as files to print or to machine: smooth curves through the mesh's boundary, extruded.
+
+``write_step``      the solid, with ``PinHole``s
+``write_stl``       its surface
+``smooth_outline``  the curves through a closed polygon
+
+``solid`` writes the section of a link between curves from corner to corner of its boundary (``smooth_outline``).
+"""
+
+from fenicsmech.export.smooth_outline import corners_of, smooth_outline
+from fenicsmech.export.solid import PinHole, write_step, write_stl
+
+__all__ = ["PinHole", "corners_of", "smooth_outline", "write_step", "write_stl"]

@@ -1,0 +1,235 @@
+"""Links to make: their meshes, smoothed and extruded, as solids in STEP files and as surfaces in STL files.
+
+Both files describe the same body: the curves through the boundary vertices of the link's plan, minus the holes of its
+pins, between z = −depth/2 and z = depth/2.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from fenicsmech.checks import point, positive
+from fenicsmech.errors import MeshingError
+from fenicsmech.export.smooth_outline import smooth_outline
+from fenicsmech.files import atomic_write
+from fenicsmech.meshing import (
+    CircleArc,
+    Curve,
+    LinkMesh,
+    boundary_loops,
+    cell_measures,
+    distance,
+    draw_loop,
+    first_crossing,
+    gmsh,
+    gmsh_session,
+    inside,
+    line,
+    muted_output,
+    plan_of,
+    sampled,
+    shown,
+)
+
+
+@dataclass(frozen=True)
+class PinHole:
+    """A hole for a pin along z, all through a link.
+
+    Attributes:
+        centre: x and y of its axis.
+        diameter: of the hole.
+    """
+
+    centre: tuple[float, float]
+    diameter: float
+
+
+def write_step(
+    path: str | Path, mesh: LinkMesh, *, depth: float, pins: Sequence[PinHole] = (), name: str | None = None
+) -> None:
+    """Write a link as one solid in a STEP file.
+
+    Its edges are B-spline curves through all boundary vertices of the mesh, divided at true corners, and straight
+    lines and arcs of circles where the vertices are exactly on these; holes of pins are cylinders. Call it on one
+    process only. The file appears complete or not at all.
+
+    Args:
+        path: the file; missing parent folders are created.
+        mesh: the whole link, in mm (the unit of the file): triangles, or tetrahedra in layers along z.
+        depth: extent along z, symmetric about z = 0.
+        pins: holes to be left for pins.
+        name: the link's name, for messages; None: that of the file.
+
+    Raises:
+        MeshingError: cells are turned over, the outline crosses itself, the tetrahedra do not stand in layers or have
+            another depth, a pin hole leaves the link or meets another, or gmsh cannot make the solid.
+        DescriptionError: the depth, or a pin's centre or diameter, makes no sense.
+        OSError: the file cannot be written.
+    """
+    name = name or Path(path).stem
+    depth = positive(f"depth, link {name!r}", depth)
+    loops = _section(name, mesh, depth, pins)
+    with gmsh_session(f"link {name!r}"):
+        _extrude(loops, depth)
+        content = _written("step")
+    with atomic_write(path, binary=True) as target:
+        target.write(content)
+
+
+def write_stl(
+    path: str | Path,
+    mesh: LinkMesh,
+    *,
+    depth: float,
+    pins: Sequence[PinHole] = (),
+    tolerance: float = 0.01,
+    name: str | None = None,
+) -> None:
+    """Write the closed surface of a link as a binary STL file; arguments and errors as for ``write_step``.
+
+    Args:
+        tolerance: how far its facets may deviate from the solid in the STEP file.
+    """
+    name = name or Path(path).stem
+    depth, tolerance = (
+        positive(f"{what}, link {name!r}", value) for what, value in (("depth", depth), ("tolerance", tolerance))
+    )
+    polygons = [sampled(loop, tolerance) for loop in _section(name, mesh, depth, pins)]
+    with gmsh_session(f"link {name!r}"):
+        gmsh.option.setNumber("Mesh.Binary", 1)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 2.0 * math.hypot(*np.ptp(polygons[0], axis=0)))  # no edge is divided
+        gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
+        solid = _extrude([_edges(polygon) for polygon in polygons], depth, layers=[1])
+        gmsh.model.mesh.setOutwardOrientation(solid)
+        gmsh.model.mesh.generate(2)
+        content = _written("stl")
+    with atomic_write(path, binary=True) as target:
+        target.write(f"link {name}, lengths in mm".encode("ascii", "replace")[:80].ljust(80) + content[80:])
+
+
+def _extrude(loops: Sequence[Sequence[Curve]], depth: float, layers: Sequence[int] = ()) -> int:
+    """The solid between ``loops``, the outline first, from z = −depth/2 to z = depth/2 in the current gmsh model."""
+    occ = gmsh.model.occ
+    face = 2, occ.addPlaneSurface([draw_loop(loop, -0.5 * depth) for loop in loops])
+    entities = occ.extrude([face], 0.0, 0.0, depth, numElements=layers)
+    occ.synchronize()
+    return next(tag for dim, tag in entities if dim == 3)
+
+
+def _edges(polygon: np.ndarray) -> list[Curve]:
+    return [line(*ends) for ends in zip(polygon, np.roll(polygon, -1, axis=0), strict=True)]
+
+
+def _written(kind: str) -> bytes:
+    """The current gmsh model as the content of a file."""
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / f"link.{kind}"
+        with muted_output():  # OpenCASCADE reports there, whatever gmsh's options say
+            gmsh.write(str(file))
+        return file.read_bytes()
+
+
+def _section(name: str, mesh: LinkMesh, depth: float, pins: Sequence[PinHole]) -> list[list[Curve]]:
+    """The section of the link ``mesh`` along z, smooth where the mesh stands for smooth curves.
+
+    Args:
+        name: the link's name, for messages.
+        mesh: triangles, or tetrahedra in layers along z.
+        depth: the link's extent along z.
+        pins: holes to be drilled; a narrower one that the mesh has around the same axis gives way.
+
+    Returns:
+        Closed loops of curves: the outline, the mesh's own holes, and the circles of the pins, inside the outline and
+        apart from each other and from the others.
+
+    Raises:
+        MeshingError: cells are turned over, the outline crosses itself, the tetrahedra do not stand in layers or have
+            another depth, or a pin hole leaves the link or meets another.
+        DescriptionError: a number makes no sense.
+    """
+    link = f"link {name!r}"
+    plan = _plan(link, mesh, depth)
+    loops = [smooth_outline(plan.points[loop]) for loop in boundary_loops(link, plan)]
+    polygons = [sampled(loop, 1e-5 * float(np.ptp(plan.points, axis=0).max())) for loop in loops]
+    _check_simple(link, polygons)
+    pins = tuple(_checked(link, pin) for pin in pins)
+    kept = [0, *(k for k in range(1, len(loops)) if not any(_drills(pin, polygons[k]) for pin in pins))]
+    for number, pin in enumerate(pins):
+        _check_room(link, pin, [polygons[k] for k in kept], pins[:number])
+    circles = [[CircleArc(np.array(pin.centre), 0.5 * pin.diameter, 0.0, 2.0 * math.pi)] for pin in pins]
+    return [*(loops[k] for k in kept), *circles]
+
+
+def _plan(link: str, mesh: LinkMesh, depth: float) -> LinkMesh:
+    """The triangles of the section."""
+    flat = np.count_nonzero(cell_measures(mesh.points, mesh.cells) <= 0.0)
+    if flat:
+        raise MeshingError(
+            link,
+            f"{flat} of its {len(mesh.cells)} cells are turned over",
+            "Choose a design that deforms the mesh less",
+        )
+    if mesh.dim == 2:
+        return mesh
+    plan = plan_of(mesh).mesh
+    if plan.dim == 3:
+        raise MeshingError(
+            link,
+            "its tetrahedra do not stand in layers along z, so it has no section to extrude",
+            "Mesh it with the axes of all its joints along z, or in the plane",
+        )
+    meshed = float(np.ptp(mesh.points[:, 2]))
+    if not math.isclose(meshed, depth, rel_tol=1e-6):
+        raise MeshingError(
+            link, f"the mesh is {meshed:g} deep, not {depth:g}", "Give the depth that the link was meshed with"
+        )
+    return plan
+
+
+def _check_simple(link: str, polygons: Sequence[np.ndarray]) -> None:
+    """Refuse loops that cross themselves, and holes that reach beyond the outline."""
+    outline, *holes = polygons
+    crossings = [first_crossing(polygon) for polygon in polygons]
+    crossings += [corner for hole in holes for corner in hole if not inside(outline, corner)]
+    where = next((at for at in crossings if at is not None), None)
+    if where is not None:
+        raise MeshingError(
+            link, f"its outline crosses itself near {shown(where)}", "Choose a design that does not run into itself"
+        )
+
+
+def _checked(link: str, pin: PinHole) -> PinHole:
+    part = f"pin hole of {link}"
+    return PinHole(point(f"centre, {part}", pin.centre, dimensions=(2,)), positive(f"diameter, {part}", pin.diameter))
+
+
+def _drills(pin: PinHole, hole: np.ndarray) -> bool:
+    """Whether nothing is left of a hole of the mesh, up to 0.1 % wider than the pin's, once that is drilled."""
+    reach = np.linalg.norm(hole - pin.centre, axis=1).max()
+    return bool(inside(hole, np.array(pin.centre)) and reach <= 1.001 * 0.5 * pin.diameter)
+
+
+def _check_room(link: str, pin: PinHole, polygons: Sequence[np.ndarray], others: Sequence[PinHole]) -> None:
+    """Refuse a pin hole that the link does not surround."""
+    centre, radius = np.array(pin.centre), 0.5 * pin.diameter
+    part = f"pin hole at {shown(centre)} in {link}"
+    outline, *holes = polygons
+    room = min(distance(polygon, centre) for polygon in polygons)
+    if not inside(outline, centre) or any(inside(hole, centre) and distance(hole, centre) > radius for hole in holes):
+        raise MeshingError(part, "its centre is not on the link", "Leave it out, or give the joint's place")
+    if room <= radius:
+        raise MeshingError(
+            part,
+            f"its diameter {pin.diameter:g} is too large: the link's edge is {room:g} away from its centre",
+            f"Choose a pin of less than {2.0 * room:g} in diameter, or a link that is wider there",
+        )
+    for other in others:
+        if math.dist(other.centre, pin.centre) <= radius + 0.5 * other.diameter:
+            raise MeshingError(part, f"it meets the one at {shown(other.centre)}", "Choose thinner pins")

@@ -1,0 +1,153 @@
+"""Files that appear complete or not at all: text and bytes, plain data as JSON, columns of numbers as CSV."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import os
+import secrets
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fenicsmech.checks import finite, real_array
+from fenicsmech.errors import DescriptionError
+
+
+@contextmanager
+def atomic_write(path: str | Path, *, binary: bool = False) -> Iterator[IO]:
+    """Open ``path`` for writing; it is replaced only when the block ends without an error.
+
+    The data go to a hidden file in the same folder, reach the disk, and then take the name in one step:
+    an interrupted run leaves the old file untouched and nothing beside it.
+
+    Args:
+        path: the file; missing parent folders are created.
+        binary: bytes instead of UTF-8 text.
+
+    Yields:
+        the open file.
+
+    Raises:
+        OSError: the folder or the file cannot be written.
+    """
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    temporary = target.with_name(f".{target.name}.{secrets.token_hex(6)}.tmp")
+    # not mkstemp: its files are private (0600), results should follow the user's umask
+    descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+    try:
+        if binary:
+            file = os.fdopen(descriptor, "wb")
+        else:
+            file = os.fdopen(descriptor, "w", encoding="utf-8", newline="\n")
+        with file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(temporary, target)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def write_json(path: str | Path, data: Mapping[str, object]) -> None:
+    """Write ``data`` as JSON, keys in the order given, indented by two.
+
+    Args:
+        path: the file.
+        data: mappings, sequences, arrays, numbers, words, flags, None and paths, nested at will.
+
+    Raises:
+        DescriptionError: a number is not finite, or a value has no JSON form; the message says where.
+    """
+    text = json.dumps(_plain("", data), indent=2, ensure_ascii=False, allow_nan=False)
+    with atomic_write(path) as file:
+        file.write(text + "\n")
+
+
+def _plain(key: str, value: object) -> object:
+    """``value`` in JSON's own types; ``key`` is its place, for messages."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            raise _error(key, f"the value is {value}", "Use None for what is not known")
+        return value
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, Mapping):
+        for name in value:
+            if not isinstance(name, str):
+                raise _error(key, f"the key {name!r} is not a word", "Use words as keys")
+        return {name: _plain(f"{key}.{name}" if key else name, item) for name, item in value.items()}
+    if isinstance(value, Sequence) and not isinstance(value, bytes | bytearray):
+        return [_plain(f"{key}[{index}]", item) for index, item in enumerate(value)]
+    raise _error(key, f"{type(value).__name__} has no JSON form", "Convert it to numbers, words, lists or mappings")
+
+
+def _error(key: str, problem: str, remedy: str) -> DescriptionError:
+    return DescriptionError(f"entry '{key}' of a file" if key else "the data of a file", problem, remedy)
+
+
+def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> None:
+    """Write columns of numbers under their headers; floats keep every digit.
+
+    Args:
+        path: the CSV file.
+        columns: header with unit ("force [N]") to (n,) values; flags become 0 and 1.
+
+    Raises:
+        DescriptionError: no column, columns of different length, or a value that is not finite.
+    """
+    if not columns:
+        raise DescriptionError(f"table '{path}'", "there is no column", "Give at least one")
+    rows = None
+    checked = []
+    for header, values in columns.items():
+        column = real_array(f"column '{header}' of '{path}'", values, rows)
+        rows = len(column)
+        exact = np.asarray(values)
+        checked.append(exact.astype(int) if exact.dtype.kind in "bui" else column)
+    with atomic_write(path) as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(zip(*(column.tolist() for column in checked), strict=True))
+
+
+def read_csv(path: str | Path) -> dict[str, NDArray[np.float64]]:
+    """Read what :func:`write_csv` writes, or a spreadsheet's export of the same form.
+
+    Blank lines and lines that start with # are skipped.
+
+    Returns:
+        header to (n,) values, in the order of the file.
+
+    Raises:
+        DescriptionError: no header, a repeated header, a row of another length, or a field that is no finite number.
+        OSError: the file cannot be read.
+    """
+    with open(path, encoding="utf-8-sig", newline="") as file:  # -sig: spreadsheets put a byte-order mark first
+        reader = csv.reader(file)
+        lines = [(reader.line_num, row) for row in reader]
+    rows = [(line, row) for line, row in lines if "".join(row).strip() and not row[0].lstrip().startswith("#")]
+    if not rows:
+        raise DescriptionError(f"table '{path}'", "it is empty", "Start it with a line of headers")
+    headers = [header.strip() for header in rows[0][1]]
+    if len(set(headers)) < len(headers) or "" in headers:
+        raise DescriptionError(f"table '{path}'", f"the headers are {headers}", "Give each column its own name")
+    values = np.empty((len(rows) - 1, len(headers)))
+    for index, (line, row) in enumerate(rows[1:]):
+        if len(row) != len(headers):
+            raise DescriptionError(
+                f"table '{path}', line {line}", f"{len(row)} fields for {len(headers)} columns", "Complete the line"
+            )
+        values[index] = [finite(f"table '{path}', line {line}", field) for field in row]
+    return {header: values[:, k].copy() for k, header in enumerate(headers)}

@@ -1,0 +1,182 @@
+"""A joint: equations between a marker on body a and a marker on body b, from which all its numbers are derived.
+
+With the poses z = (z_a, z_b) of both bodies and the value φ of a motor,
+
+    C(z, φ) = 0,    A = ∂C/∂(z, φ),    Σ_k λ_k ∂²C_k/∂(z, φ)².
+
+Both markers coincide in the drawn configuration. Equations are written so that the derivative of a motor
+equation with respect to the joint's free coordinate is one: its multiplier is then the motor's force or torque.
+
+A new joint is one subclass of ``JointKind`` and its instance:
+
+    class PinInSlot(JointKind):
+        name = "pin in slot"
+        planar = motorised = sliding = axis_in_plane = True
+
+        def equations(self, a, b):
+            apart = b.origin - a.origin
+            return [apart.dot(a.e1), apart.dot(a.e2)]
+
+        def planar_equations(self, a, b):
+            return [(b.origin - a.origin).dot(a.normal)]
+
+        def coordinate(self, a, b):
+            return (b.origin - a.origin).dot(a.axis)
+
+    mechanism.join(PinInSlot(), yoke, crank, at=(3, 0), axis=(0, 1))
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cache
+
+import sympy
+
+from fenicsmech.joints.rotations import RIGID_SPACES
+from fenicsmech.symbolic import SmoothFunction, derive
+
+
+@dataclass(frozen=True)
+class PlanarMarker:
+    """A joint on one body of a planar model.
+
+    Attributes:
+        origin: displacement of its origin from where it was drawn.
+        axis, normal: unit vectors: the joint's axis if that lies in the plane, else x; and a quarter turn from it.
+        angle: by which the body has turned.
+    """
+
+    origin: sympy.Matrix
+    axis: sympy.Matrix
+    normal: sympy.Matrix
+    angle: sympy.Expr
+
+    def angle_to(self, other: PlanarMarker) -> sympy.Expr:
+        """The angle from this marker to the other; it counts full turns."""
+        return other.angle - self.angle
+
+
+@dataclass(frozen=True)
+class SpatialMarker:
+    """A joint on one body in space.
+
+    Attributes:
+        origin: displacement of its origin from where it was drawn.
+        e1, e2, e3: triad; e3 is the joint's axis.
+        drawn_axis: e3 as drawn.
+        quaternion: rotation of the body, (w, v) with v of shape (3, 1).
+    """
+
+    origin: sympy.Matrix
+    e1: sympy.Matrix
+    e2: sympy.Matrix
+    e3: sympy.Matrix
+    drawn_axis: sympy.Matrix
+    quaternion: tuple[sympy.Expr, sympy.Matrix]
+
+    @property
+    def axis(self) -> sympy.Matrix:
+        """e3, as a planar marker calls it."""
+        return self.e3
+
+    def angle_to(self, other: SpatialMarker) -> sympy.Expr:
+        """The angle about e3 from this marker to the other, φ = 2 atan2(e3 · v, w) with (w, v) = q̄_a q_b.
+
+        The half angle makes φ smooth for |φ| < 2π; at ±2π it jumps by 4π. If e3 of both markers differ, φ is the
+        twist about e3.
+        """
+        (wa, va), (wb, vb) = self.quaternion, other.quaternion
+        return 2 * sympy.atan2((wa * vb - wb * va - va.cross(vb)).dot(self.drawn_axis), wa * wb + va.dot(vb))
+
+
+class JointKind(ABC):
+    """A joint between two bodies: all that the package knows of it.
+
+    Attributes:
+        name: what users call it.
+        planar: whether it exists in planar models, with ``planar_equations``.
+        motorised: whether it has one free coordinate, ``coordinate``, for motors and springs.
+        sliding: whether that coordinate is a length, scaled by the mechanism's length; otherwise it is an angle.
+        axis_in_plane: whether its axis lies in the plane of a planar model; otherwise it is normal to the plane.
+        pin_along_axis: whether it holds flexible links by a pin along its axis; otherwise along z.
+        shares_point: whether its first equations are x_b − x_a = 0.
+        clamps: whether it clamps flexible links: design keeps the direction they have there.
+    """
+
+    name: str
+    planar: bool = False
+    motorised: bool = False
+    sliding: bool = False
+    axis_in_plane: bool = False
+    pin_along_axis: bool = False
+    shares_point: bool = False
+    clamps: bool = False
+
+    def __repr__(self) -> str:
+        return f"<{self.name} joint>"
+
+    @abstractmethod
+    def equations(self, a: SpatialMarker, b: SpatialMarker) -> list[sympy.Expr]:
+        """C in space."""
+
+    def planar_equations(self, a: PlanarMarker, b: PlanarMarker) -> list[sympy.Expr]:
+        """C in the plane (only for joints with ``planar``)."""
+        raise NotImplementedError(f"a {self.name} joint has no planar form")
+
+    def coordinate(self, a: SpatialMarker | PlanarMarker, b: SpatialMarker | PlanarMarker) -> sympy.Expr:
+        """The free coordinate φ, zero as drawn (only for joints with ``motorised``)."""
+        raise NotImplementedError(f"a {self.name} joint takes no motor")
+
+    def motor(self, a: SpatialMarker, b: SpatialMarker, value: sympy.Symbol) -> sympy.Expr:
+        """Motor equation in space."""
+        return self.coordinate(a, b) - value
+
+    def planar_motor(self, a: PlanarMarker, b: PlanarMarker, value: sympy.Symbol) -> sympy.Expr:
+        """Motor equation in the plane."""
+        return self.coordinate(a, b) - value
+
+
+@cache
+def constraint(kind: JointKind, dim: int, driven: bool) -> SmoothFunction:
+    """The equations C of ``kind`` in ``dim`` dimensions, with that of its motor last if ``driven``.
+
+    Variables are the poses z_a and z_b and, if ``driven``, φ, (2 pose_size,) or (2 pose_size + 1,). Constants are the
+    joint's position minus the centres of both bodies and the rows of its triad, all as drawn, (2 dim + dim²,).
+    """
+    poses, constants, a, b = _markers(dim)
+    equations = kind.equations(a, b) if dim == 3 else kind.planar_equations(a, b)
+    if not driven:
+        return derive(equations, poses, constants)
+    value = sympy.Symbol("phi", real=True)
+    motor = kind.motor(a, b, value) if dim == 3 else kind.planar_motor(a, b, value)
+    return derive([*equations, motor], (*poses, value), constants)
+
+
+@cache
+def free_coordinate(kind: JointKind, dim: int) -> SmoothFunction:
+    """The free coordinate φ of ``kind``, (1,); variables and constants are those of a ``constraint`` without motor."""
+    poses, constants, a, b = _markers(dim)
+    return derive([kind.coordinate(a, b)], poses, constants)
+
+
+def _markers(dim: int):
+    """Symbols of both poses and of the constants, and the markers on both bodies."""
+    space = RIGID_SPACES[dim]
+    poses = sympy.symbols(f"z0:{2 * space.pose_size}", real=True)
+    constants = sympy.symbols(f"c0:{2 * dim + dim * dim}", real=True)
+    triad = sympy.Matrix(dim, dim, constants[2 * dim :])
+
+    def marker(z: list[sympy.Symbol], anchor: tuple[sympy.Symbol, ...]):
+        rotation = space.symbolic_rotation(z[dim:])
+        # both origins are counted from where the joint was drawn, which needs R − I only
+        origin = sympy.Matrix(z[:dim]) + (rotation - sympy.eye(dim)) * sympy.Matrix(anchor)
+        vectors = [rotation * triad[k, :].T for k in range(dim)]
+        if dim == 2:
+            return PlanarMarker(origin, *vectors, angle=z[2])
+        return SpatialMarker(origin, *vectors, drawn_axis=triad[2, :].T, quaternion=(z[3], sympy.Matrix(z[4:])))
+
+    a = marker(list(poses[: space.pose_size]), constants[:dim])
+    b = marker(list(poses[space.pose_size :]), constants[dim : 2 * dim])
+    return poses, constants, a, b

@@ -1,0 +1,203 @@
+"""Links read from files: solids from STEP files, or sections through them, and meshes from gmsh files."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from fenicsmech.errors import DescriptionError, MeshingError
+from fenicsmech.mechanism import MeshPart, StepPart
+from fenicsmech.meshing.cutting import DimTag, mesh_fragments, mesh_nodes, region_face, region_prism
+from fenicsmech.meshing.gmsh_session import gmsh, gmsh_session
+from fenicsmech.meshing.link_mesh import FREE, LinkMesh
+from fenicsmech.meshing.request import MeshRequest, check_shape, mesh_shape
+
+_TOLERANCE = 1e-6  # of the extent of a mesh from a file, whose coordinates are rounded
+
+
+@check_shape.register
+def _(shape: StepPart, request: MeshRequest) -> None:
+    _require_header(shape.path, "ISO-10303-21", kind="STEP file", part=request.part)
+
+
+@check_shape.register
+def _(shape: MeshPart, request: MeshRequest) -> None:
+    if request.half:
+        raise DescriptionError(
+            request.part,
+            "a mesh file does not say whether its cells are symmetric about a mid-plane",
+            "Use space='3d', or give the link as a strip, an outline or a STEP file",
+        )
+    _require_header(shape.path, "$MeshFormat", kind="gmsh mesh file", part=request.part)
+
+
+def _require_header(path: Path, header: str, *, kind: str, part: str) -> None:
+    """Make sure that ``path`` is a file of the right kind before gmsh guesses what to do with it.
+
+    Args:
+        path: the file.
+        header: text with which such files begin.
+        kind: what the file should be, for messages.
+        part: the link, for messages.
+
+    Raises:
+        MeshingError: the file cannot be read, or begins otherwise.
+    """
+    try:
+        with open(path, "rb") as file:
+            start = file.read(len(header) + 64).lstrip()
+    except OSError as failure:
+        raise MeshingError(
+            part, f"the {kind} {str(path)!r} cannot be read ({failure.strerror})", "Check the path"
+        ) from failure
+    if not start.startswith(header.encode()):
+        raise MeshingError(
+            part, f"{str(path)!r} is not a {kind}: it does not begin with {header!r}", f"Give the path of a {kind}"
+        )
+
+
+@mesh_shape.register
+def _(shape: StepPart, request: MeshRequest) -> LinkMesh:
+    mesh = {2: _mesh_section, 3: _mesh_solid}[request.dim]
+    with gmsh_session(request.part):
+        return mesh(shape, _only_solid(shape.path, request), request)
+
+
+def _only_solid(path: Path, request: MeshRequest) -> DimTag:
+    """The one solid of the file, in mm.
+
+    Raises:
+        MeshingError: there is none, or more than one.
+    """
+    solids = [entity for entity in gmsh.model.occ.importShapes(str(path), format="step") if entity[0] == 3]
+    if len(solids) != 1:
+        raise MeshingError(
+            request.part,
+            f"the STEP file {str(path)!r} holds {len(solids) or 'no'} solids",
+            "Export exactly one solid body per link",
+        )
+    return solids[0]
+
+
+def _mesh_solid(shape: StepPart, solid: DimTag, request: MeshRequest) -> LinkMesh:
+    solids = _upper_half(shape, solid, request) if request.half else [solid]
+    cutters = [region_prism(site, solids) for site in request.sites]
+    mesh = mesh_fragments(request, solids, cutters, size=request.size, sites=request.sites)
+    if not request.half:
+        return mesh
+    points = mesh.points.copy()
+    points[points[:, 2] < 1e-9 * points[:, 2].max(), 2] = 0.0  # the mid-plane, but for rounding
+    return replace(mesh, points=points)
+
+
+def _upper_half(shape: StepPart, solid: DimTag, request: MeshRequest) -> list[DimTag]:
+    """What of the solid lies above its centroid, which comes to lie at z = 0.
+
+    The halves are mirror images if their volumes, centroids and moments of inertia agree.
+
+    Raises:
+        DescriptionError: they are not.
+    """
+    occ = gmsh.model.occ
+    x, y, bottom, right, far, top = occ.getBoundingBox(*solid)
+    width, breadth, height = right - x, far - y, top - bottom
+    occ.translate([solid], 0.0, 0.0, -occ.getCenterOfMass(*solid)[2])
+    above = 3, occ.addBox(x - width, y - breadth, 0.0, 3.0 * width, 3.0 * breadth, height)
+    upper = occ.intersect([solid], [above], removeObject=False, removeTool=False)[0]
+    lower = occ.cut([solid], [above])[0]
+    halves = [_moments(upper, 1.0), _moments(lower, -1.0)]
+    occ.remove(lower, recursive=True)
+    # to 1e-6: modellers round
+    if not all(np.abs(a - b).max() <= 1e-6 * np.abs(a).max() for a, b in zip(*halves, strict=True)):
+        raise DescriptionError(
+            request.part,
+            f"the solid in {str(shape.path)!r} is not symmetric about its mid-plane",
+            "Use space='3d'",
+        )
+    return upper
+
+
+def _moments(solids: list[DimTag], side: float) -> list[np.ndarray]:
+    """Volume, centroid and moments of inertia about it, mirrored at z = 0 where ``side`` is −1."""
+    occ = gmsh.model.occ
+    mirror = np.array([1.0, 1.0, side])
+    volumes = np.array([occ.getMass(*solid) for solid in solids])
+    centroids = np.array([occ.getCenterOfMass(*solid) for solid in solids]) * mirror
+    inertias = sum(np.reshape(occ.getMatrixOfInertia(*solid), (3, 3)) for solid in solids) * np.outer(mirror, mirror)
+    return [volumes.sum(), volumes @ centroids / volumes.sum(), inertias]
+
+
+def _mesh_section(shape: StepPart, solid: DimTag, request: MeshRequest) -> LinkMesh:
+    """Mesh the section with the plane z = ``shape.section``.
+
+    Raises:
+        MeshingError: the plane misses the solid.
+    """
+    occ = gmsh.model.occ
+    x, y, bottom, right, far, top = occ.getBoundingBox(*solid)
+    width, breadth = right - x, far - y
+    plane = 2, occ.addRectangle(x - width, y - breadth, shape.section, 3.0 * width, 3.0 * breadth)
+    faces = occ.intersect([plane], [solid])[0]
+    if not faces:
+        raise MeshingError(
+            request.part,
+            f"the section z = {shape.section:g} misses the solid in {str(shape.path)!r}, "
+            f"which lies between z = {bottom:g} and {top:g} mm",
+            "Choose a section in between",
+        )
+    cutters = [region_face(site, height=shape.section) for site in request.sites]
+    return mesh_fragments(request, faces, cutters, size=request.size, sites=request.sites)
+
+
+@mesh_shape.register
+def _(shape: MeshPart, request: MeshRequest) -> LinkMesh:
+    with gmsh_session(request.part):
+        gmsh.merge(str(shape.path))
+        points, cells = _read(shape, request)
+    return LinkMesh.from_cells(points, cells, _interface(points, cells, request))
+
+
+def _read(shape: MeshPart, request: MeshRequest) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n, dim) and simplices (m, dim + 1) of the current gmsh model.
+
+    Raises:
+        MeshingError: there are cells of another kind, or none; the mesh of a plane model is not in the plane.
+    """
+    dim = request.dim
+    family, plural = {2: ("Triangle", "triangles"), 3: ("Tetrahedron", "tetrahedra")}[dim]
+    kinds = {dimension: gmsh.model.mesh.getElements(dimension) for dimension in range(dim, 4)}
+    present = [gmsh.model.mesh.getElementProperties(kind)[0] for types, _, _ in kinds.values() for kind in types]
+    if not present or not all(name.startswith(family) for name in present):
+        raise MeshingError(
+            request.part,
+            f"the mesh file {str(shape.path)!r} holds {', '.join(present) or 'no cells'}, not {plural} only",
+            f"Save a mesh of {plural} for a {dim}D model",
+        )
+    points, row_of = mesh_nodes()
+    cells = []
+    for kind, nodes in zip(kinds[dim][0], kinds[dim][2], strict=True):
+        per_cell = gmsh.model.mesh.getElementProperties(kind)[3]
+        # the corners come first; the nodes on edges and faces of curved cells are left out
+        cells.append(row_of[nodes.astype(np.int64)].reshape(-1, per_cell)[:, : dim + 1])
+    cells = np.concatenate(cells)
+    heights = points[np.unique(cells), dim:]
+    if heights.size and np.ptp(heights) > _TOLERANCE * np.ptp(points):
+        raise MeshingError(
+            request.part,
+            f"the mesh in {str(shape.path)!r} extends from z = {heights.min():g} to {heights.max():g} in a 2D model",
+            "Save a mesh in a plane z = constant",
+        )
+    return points[:, :dim], cells
+
+
+def _interface(points: np.ndarray, cells: np.ndarray, request: MeshRequest) -> np.ndarray:
+    """For each cell the site whose region contains all its corners, or FREE."""
+    tolerance = _TOLERANCE * float(np.ptp(points[np.unique(cells)], axis=0).max())
+    inside = np.array([site.contains(points, tolerance)[cells].all(axis=1) for site in request.sites], dtype=bool)
+    inside = inside.reshape(-1, len(cells))
+    shared = np.flatnonzero(inside.sum(axis=0) > 1)
+    if len(shared):
+        raise request.overlap(*np.flatnonzero(inside[:, shared[0]])[:2])
+    return np.select(list(inside), list(range(len(inside))), FREE) if len(inside) else np.full(len(cells), FREE)

@@ -1,0 +1,223 @@
+"""Plots of load–displacement curves, as in the field's papers: displacement across, force up."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex, to_rgb
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from fenicsmech.checks import real_array
+from fenicsmech.errors import DescriptionError
+from fenicsmech.plot.style import INK, MUTED, PALETTE, house_style, new_figure, open_frame, save_png
+
+_DASHES = (0, (3.0, 1.6))  # of unstable parts
+_DOTS = (0, (1.0, 1.6))  # of jumps
+_MARKERS = ("s", "^", "X", "P", "v", "*")  # of the kinds of marks, in the order of their names
+
+
+@dataclass(frozen=True)
+class CurveMark:
+    """A point of a curve that stands out, and what it is: marks of one kind look alike."""
+
+    displacement: float
+    force: float
+    kind: str
+
+
+@dataclass(frozen=True, eq=False)
+class CurveSeries:
+    """One curve of a plot.
+
+    Args:
+        displacement: (n,) abscissae.
+        force: (n,) ordinates.
+        label: its name in the legend.
+        stable: (n,) whether each equilibrium is stable; None: all are.
+        jumped: (n,) whether what is drawn snapped on the way to each sample; None: it never did.
+        joined: draw the line through the samples; False for measurements.
+        colour: a matplotlib colour; None takes the next of the palette.
+        faint: draw it thin and light behind the others, as what was before.
+        marks: points that stand out.
+
+    Raises:
+        DescriptionError: the arrays differ in length or are not finite.
+    """
+
+    displacement: NDArray[np.float64]
+    force: NDArray[np.float64]
+    label: str = ""
+    stable: NDArray[np.bool_] | None = None
+    joined: bool = True
+    colour: str | None = None
+    faint: bool = False
+    marks: tuple[CurveMark, ...] = ()
+    jumped: NDArray[np.bool_] | None = None
+
+    def __post_init__(self) -> None:
+        part = f"curve '{self.label}'"
+        displacement = real_array(f"displacements of {part}", self.displacement, None)
+        force = real_array(f"forces of {part}", self.force, len(displacement))
+        stable = np.ones(len(force), bool) if self.stable is None else np.array(self.stable, dtype=bool)
+        jumped = np.zeros(len(force), bool) if self.jumped is None else np.array(self.jumped, dtype=bool)
+        for what, flags in (("stability", stable), ("jumps", jumped)):
+            if flags.shape != force.shape:
+                raise DescriptionError(
+                    f"{what} of {part}", f"{flags.size} flags for {force.size} samples", "Give one flag per sample"
+                )
+        checked = {"displacement": displacement, "force": force, "stable": stable, "jumped": jumped}
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
+
+
+@dataclass(frozen=True)
+class CurveTarget:
+    """A point the curve shall pass through; ``colour`` None draws it in ink."""
+
+    displacement: float
+    force: float
+    colour: str | None = None
+
+    def __post_init__(self) -> None:
+        real_array("displacement and force of a target", (self.displacement, self.force), 2)
+
+
+def plot_curve(
+    path: str | Path,
+    series: Sequence[CurveSeries],
+    *,
+    targets: Sequence[CurveTarget] = (),
+    xlabel: str = "displacement [mm]",
+    ylabel: str = "force [N]",
+    title: str = "",
+) -> None:
+    """Draw load–displacement curves: displacement across, force up, as in the field's papers.
+
+    Stable parts are solid, unstable parts dashed, jumps dotted arrows, samples dots, targets open diamonds. For curves
+    before and after a change, give both the same colour and make the first faint; curves that share a label appear once
+    in the legend, in grey if their colours differ.
+
+    Args:
+        path: the PNG file.
+        series: the curves, drawn in this order, faint ones behind.
+        targets: points the curves shall pass through; equal ones are drawn around each other.
+        xlabel, ylabel: quantity and unit of the axes.
+        title: a line above the plot.
+
+    Raises:
+        DescriptionError: the name does not end in .png.
+    """
+    with house_style():
+        figure = new_figure(6.4, 4.4)
+        figure.set_layout_engine("constrained")
+        axes = figure.add_subplot()
+        for index, curve in enumerate(series):
+            _draw_series(axes, curve, _colour(curve, index))
+        _draw_targets(axes, targets)
+        _draw_marks(axes, series)
+        axes.margins(0.05)
+        axes.axhline(0.0, color="#bbbbbb", lw=0.8, zorder=0.5)
+        axes.axvline(0.0, color="#bbbbbb", lw=0.8, zorder=0.5)
+        axes.grid(True)
+        open_frame(axes)
+        axes.set(xlabel=xlabel, ylabel=ylabel)
+        axes.set_title(title, loc="left")
+        _draw_legend(axes, series, targets)
+        save_png(figure, path)
+
+
+def _colour(curve: CurveSeries, index: int) -> str:
+    return curve.colour or PALETTE[index % len(PALETTE)]
+
+
+def _line_style(colour: str, *, faint: bool) -> tuple[str, float, float]:
+    """Colour and width of the line, and size of the dots on it."""
+    if not faint:
+        return colour, 2.0, 4.5
+    return to_hex(1.0 - 0.45 * (1.0 - np.array(to_rgb(colour)))), 1.4, 3.2
+
+
+def _draw_series(axes: Axes, curve: CurveSeries, colour: str) -> None:
+    x, y, stable = curve.displacement, curve.force, curve.stable
+    colour, width, size = _line_style(colour, faint=curve.faint)
+    behind = 1.0 if curve.faint else 0.0
+    if curve.joined:
+        # a step is stable when both its ends are, and no equilibria lie along a jump
+        solid, leap = stable[:-1] & stable[1:], curve.jumped[1:]
+        for part, style in ((solid & ~leap, "-"), (~solid & ~leap, _DASHES)):
+            # breaking the line with NaN keeps one artist per style
+            runs = [np.array([[np.nan, np.nan]])]
+            edges = np.flatnonzero(np.diff(np.concatenate(([0], part.astype(int), [0]))))
+            for start, stop in edges.reshape(-1, 2):
+                runs += [np.column_stack((x[start : stop + 1], y[start : stop + 1])), runs[0]]
+            line = np.concatenate(runs)
+            axes.plot(line[:, 0], line[:, 1], ls=style, color=colour, lw=width, zorder=3 - behind)
+        for index in np.flatnonzero(leap):
+            start, end = np.array([x[index], y[index]]), np.array([x[index + 1], y[index + 1]])
+            axes.plot(*np.array([start, end]).T, ls=_DOTS, color=colour, lw=0.7 * width, zorder=3 - behind)
+            tip = {"arrowstyle": "-|>", "shrinkA": 0.0, "shrinkB": 3.0, "color": colour, "lw": 0.7 * width}
+            axes.annotate("", xy=end, xytext=end - 0.1 * (end - start), arrowprops=tip, zorder=3 - behind)
+    size = size if len(x) <= 40 else 0.55 * size
+    for part, face in ((stable, colour), (~stable, "white")):
+        axes.plot(x[part], y[part], "o", ms=size, mfc=face, mec=colour, mew=1.0, zorder=4 - 1.5 * behind)
+
+
+def _draw_targets(axes: Axes, targets: Sequence[CurveTarget]) -> None:
+    seen: Counter[tuple[float, float]] = Counter()
+    for target in targets:
+        place = target.displacement, target.force
+        size = 8.0 + 5.0 * seen[place]
+        seen[place] += 1
+        axes.plot(*place, "D", ms=size, mfc="none", mec=target.colour or INK, mew=1.5, clip_on=False, zorder=5)
+
+
+def _markers(series: Sequence[CurveSeries]) -> dict[str, str]:
+    """The marker of each kind of marks."""
+    kinds = sorted({mark.kind for curve in series for mark in curve.marks})
+    return {kind: _MARKERS[index % len(_MARKERS)] for index, kind in enumerate(kinds)}
+
+
+def _draw_marks(axes: Axes, series: Sequence[CurveSeries]) -> None:
+    markers = _markers(series)
+    for curve in series:
+        for mark in curve.marks:
+            place = mark.displacement, mark.force
+            axes.plot(*place, markers[mark.kind], ms=8.0, mfc="white", mec=INK, mew=1.5, zorder=6)
+
+
+def _draw_legend(axes: Axes, series: Sequence[CurveSeries], targets: Sequence[CurveTarget]) -> None:
+    same: dict[str, list[tuple[CurveSeries, str]]] = {}  # curves and colours of each label
+    for index, curve in enumerate(series):
+        if curve.label:
+            same.setdefault(curve.label, []).append((curve, _colour(curve, index)))
+    handles = []
+    for label, group in same.items():
+        curve = group[0][0]
+        colour, width, size = _line_style(_common([colour for _, colour in group]), faint=curve.faint)
+        handles.append(
+            Line2D([], [], color=colour, label=label, lw=width if curve.joined else 0.0, marker="o", ms=size)
+        )
+    if any(curve.joined and not curve.stable.all() for curve in series):
+        handles.append(
+            Line2D([], [], color=MUTED, ls=_DASHES, lw=2.0, marker="o", ms=4.5, mfc="white", label="unstable")
+        )
+    if any(curve.joined and curve.jumped.any() for curve in series):
+        handles.append(Line2D([], [], color=MUTED, ls=_DOTS, lw=1.4, marker=">", markevery=(1, 1), ms=5, label="jump"))
+    for kind, marker in _markers(series).items():
+        handles.append(Line2D([], [], lw=0, marker=marker, ms=8, mfc="white", mec=INK, mew=1.5, label=kind))
+    if targets:
+        colour = _common([target.colour or INK for target in targets])
+        handles.append(Line2D([], [], lw=0, marker="D", ms=8, mfc="none", mec=colour, mew=1.5, label="target"))
+    if handles:
+        axes.legend(handles=handles, loc="best", framealpha=0.9, edgecolor="none", handlelength=2.8)
+
+
+def _common(colours: Sequence[str]) -> str:
+    """The colour they share, or grey."""
+    return colours[0] if len(set(colours)) == 1 else MUTED

@@ -1,0 +1,158 @@
+"""Fields of frames: gathered on one process for pictures, or written as an XDMF time series for ParaView."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+
+from fenicsmech.collective import from_one, on_one
+from fenicsmech.compat import (
+    cell_dofs,
+    cell_nodes,
+    cellwise_space,
+    original_cells,
+    original_nodes,
+    scalar_space,
+    vector_space,
+    write_series,
+)
+from fenicsmech.errors import DescriptionError
+from fenicsmech.model import MechanismModel
+from fenicsmech.simulation.frame import Frame
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Fields of one frame on the whole mesh, and the poses of all bodies.
+
+    Attributes:
+        rest: vertices of the unloaded links, (vertices, dim).
+        displacement: from there, (vertices, dim).
+        von_mises: at the midpoints of the mesh's cells, (cells,).
+        poses: (bodies, pose_size).
+    """
+
+    rest: np.ndarray
+    displacement: np.ndarray
+    von_mises: np.ndarray
+    poses: np.ndarray
+
+
+def at_vertices(model: MechanismModel, field: fem.Function) -> np.ndarray:
+    """Values of a Lagrange field (d, u or p) at this rank's geometry nodes, (nodes, components)."""
+    mesh, dim, components = model.mesh.mesh, model.elastic.model.dim, field.function_space.dofmap.index_map_bs
+    values = field.x.array.reshape(-1, components)
+    vertices = np.zeros((len(mesh.geometry.x), components))
+    # the first DOFs of a Lagrange cell are its vertices, in the order of the geometry
+    vertices[cell_nodes(mesh)] = values[cell_dofs(field.function_space)[:, : dim + 1]]
+    return vertices
+
+
+def rest_vertices(model: MechanismModel) -> np.ndarray | None:
+    """Vertices of the present rest shape on rank 0, (vertices, dim); None elsewhere."""
+    mesh = model.mesh
+    parts = mesh.mesh.comm.gather((original_nodes(mesh.mesh), at_vertices(model, model.elastic.d)), root=0)
+    if parts is None:
+        return None
+    rest = mesh.vertices.copy()
+    for nodes, design in parts:
+        rest[nodes] = mesh.vertices[nodes] + design
+    return rest
+
+
+def gather(model: MechanismModel, frame: Frame) -> Snapshot | None:
+    """The snapshot of ``frame``, on rank 0; None elsewhere."""
+    mesh = model.mesh
+    own = mesh.mesh.topology.index_map(mesh.mesh.topology.dim).size_local
+    with model.shaped(frame.design):
+        model.load(frame.state)
+        rest = rest_vertices(model)
+        parts = mesh.mesh.comm.gather(
+            (
+                original_nodes(mesh.mesh),
+                at_vertices(model, model.elastic.u),
+                original_cells(mesh.mesh)[:own],
+                model.elastic.von_mises()[:own],
+            ),
+            root=0,
+        )
+    if parts is None:
+        return None
+    displacement, stress = np.zeros_like(mesh.vertices), np.zeros(len(mesh.cells))
+    for nodes, u, cells, values in parts:
+        displacement[nodes] = u
+        stress[cells] = values
+    return Snapshot(rest, displacement, stress, frame.state.poses)
+
+
+def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame]) -> None:
+    """Writes vertex displacements and von Mises stress of ``frames`` of one design; time is the force.
+
+    And pressures at vertices, where elements are mixed: zero in all other links. The files appear when they
+    are complete.
+
+    Raises:
+        DescriptionError: the path does not end in .xdmf.
+        OSError: nothing can be written there.
+    """
+    path = Path(path)
+    if path.suffix != ".xdmf":
+        raise DescriptionError(f"file {str(path)!r}", "only XDMF is written", "Give a name that ends in .xdmf")
+    comm = model.mesh.mesh.comm
+    displacement = fem.Function(vector_space(model.mesh.mesh, 1))
+    stress = fem.Function(cellwise_space(model.mesh.mesh))
+    fields = {"displacement": displacement, "von Mises stress": stress}
+    nodal = {displacement: model.elastic.u}
+    if model.elastic.pressure is not None:
+        fields["pressure"] = fem.Function(scalar_space(model.mesh.mesh, 1))
+        nodal[fields["pressure"]] = model.elastic.pressure.p
+
+    def update(index: int) -> None:
+        with model.shaped(frames[index].design):
+            model.load(frames[index].state)
+            for written, field in nodal.items():
+                vertices = at_vertices(model, field)
+                values = written.x.array.reshape(-1, vertices.shape[1])
+                values[cell_dofs(written.function_space)] = vertices[cell_nodes(model.mesh.mesh)]
+            von_mises = model.elastic.von_mises()
+            stress.x.array[: len(von_mises)] = von_mises
+
+    folder = from_one(comm, lambda: _folder_beside(path))
+    forces = np.array([frame.force for frame in frames])
+    with _mesh_of(model, frames[0].design) as mesh:
+        write_series(folder / path.name, mesh, fields, forces, update, comm)
+    comm.barrier()  # all have closed the file
+    on_one(comm, lambda: _move_up(folder, path))
+
+
+def _folder_beside(path: Path) -> Path:
+    """A new folder next to ``path``."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.stem}-"))
+
+
+def _move_up(folder: Path, path: Path) -> None:
+    """Both files out of ``folder``, the heavy data first: the light file that names it must never point at nothing."""
+    for suffix in (".h5", ".xdmf"):
+        os.replace(folder / path.with_suffix(suffix).name, path.with_suffix(suffix))
+    folder.rmdir()
+
+
+@contextmanager
+def _mesh_of(model: MechanismModel, design: np.ndarray) -> Iterator[dmesh.Mesh]:
+    """The mesh with its nodes where ``design`` puts them: files show the links at rest."""
+    mesh, drawn = model.mesh.mesh, model.mesh.mesh.geometry.x.copy()
+    with model.shaped(design):
+        mesh.geometry.x[:, : model.elastic.model.dim] += at_vertices(model, model.elastic.d)
+    try:
+        yield mesh
+    finally:
+        mesh.geometry.x[:] = drawn

@@ -1,0 +1,96 @@
+"""Functions given by formulae: derivatives are derived symbolically, and all is compiled to Python once.
+
+f(x; c) ∈ Rᵐ,     ∂f_k/∂x_i,     Σ_k w_k ∂²f_k/∂x_i∂x_j     with variables x ∈ Rⁿ and constants c.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import sympy
+
+
+@dataclass(frozen=True)
+class SmoothFunction:
+    """A compiled function f of n variables with m components.
+
+    Every function takes the variables (n,) and the constants (k,). Where ``derive`` was asked for many points at once,
+    every array has one axis more, the first, of the points.
+
+    Attributes:
+        size: m.
+        value: f, (m,).
+        gradient: ∂f/∂x, (m, n).
+        hessian: takes weights w (m,) last; Σ_k w_k ∂²f_k/∂x², (n, n).
+    """
+
+    size: int
+    value: Callable[..., np.ndarray]
+    gradient: Callable[..., np.ndarray]
+    hessian: Callable[..., np.ndarray]
+
+
+def derive(
+    formulae: Sequence[sympy.Expr],
+    variables: Sequence[sympy.Symbol],
+    constants: Sequence[sympy.Symbol],
+    *,
+    many: bool = False,
+) -> SmoothFunction:
+    """Compiles ``formulae``, their gradients and their Hessians.
+
+    Args:
+        formulae: f, one expression per component.
+        variables: x; symbols are not called x0, x1, …, which common subexpressions are.
+        constants: c.
+        many: whether the function is for many points at once; it is fastest for one point otherwise.
+    """
+    n, m = len(variables), len(formulae)
+    weights = sympy.symbols(f"w0:{m}", real=True)
+    gradient = [[sympy.diff(f, x) for x in variables] for f in formulae]
+    weighted = [sum((w * row[i] for w, row in zip(weights, gradient, strict=True)), sympy.S.Zero) for i in range(n)]
+    rows, columns = np.tril_indices(n)
+    lower = [sympy.diff(weighted[i], variables[j]) for i, j in zip(rows, columns, strict=True)]
+    place = np.empty((n, n), dtype=int)
+    place[rows, columns] = place[columns, rows] = np.arange(len(rows))
+
+    compiled = _at_many_points if many else _at_one_point
+    triangle = compiled(lower, (variables, constants, weights), (len(rows),))
+    return SmoothFunction(
+        size=m,
+        value=compiled(list(formulae), (variables, constants), (m,)),
+        gradient=compiled([entry for row in gradient for entry in row], (variables, constants), (m, n)),
+        hessian=lambda *point: triangle(*point)[..., place],
+    )
+
+
+def _at_one_point(expressions: list[sympy.Expr], arguments: tuple, shape: tuple[int, ...]) -> Callable[..., np.ndarray]:
+    # plain floats are several times faster than arrays of no dimension
+    formula = _lambdify(arguments, expressions, "math")
+
+    def evaluate(*point: np.ndarray) -> np.ndarray:
+        return np.array(formula(*[numbers.tolist() for numbers in point]), dtype=float).reshape(shape)
+
+    return evaluate
+
+
+def _at_many_points(
+    expressions: list[sympy.Expr], arguments: tuple, shape: tuple[int, ...]
+) -> Callable[..., np.ndarray]:
+    formula = _lambdify(arguments, expressions, "numpy")
+
+    def evaluate(*points: np.ndarray) -> np.ndarray:
+        values = np.empty((len(expressions), len(points[0])))
+        for row, value in zip(values, formula(*(numbers.T for numbers in points)), strict=True):
+            row[:] = value
+        return values.T.reshape(-1, *shape)
+
+    return evaluate
+
+
+def _lambdify(arguments: tuple, expressions: list[sympy.Expr], module: str) -> Callable[..., list]:
+    # lambdify prints what it is given into a docstring: half of its time unless subexpressions are taken out before
+    common, reduced = sympy.cse(expressions, list=False)
+    return sympy.lambdify(arguments, reduced, module, cse=lambda _: (common, reduced))

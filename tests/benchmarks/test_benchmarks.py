@@ -1,0 +1,85 @@
+"""Every benchmark runs, prints its table with machine and commit, and its numbers are the physics'."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from benchmarks.table import format_table, publish
+
+ROOT = Path(__file__).parents[2]
+
+
+def printed(name: str, *options: str) -> list[list[str]]:
+    """The cells of the tables that a benchmark prints, run as a user does."""
+    command = [sys.executable, "-m", f"benchmarks.{name}", *options]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "Commit " in done.stdout
+    return [[cell.strip() for cell in line.split("|")[1:-1]] for line in done.stdout.splitlines() if "|" in line]
+
+
+def test_a_written_table_is_what_was_printed(tmp_path, capsys):
+    publish("sizes", format_table(["h", "n"], [[1.0, 2]]), write=True, folder=tmp_path)
+    assert (tmp_path / "sizes.md").read_text() == capsys.readouterr().out.rstrip("\n") + "\n"
+
+
+def test_curves_of_the_drawn_mechanisms():
+    rows = {row[0]: row for row in printed("frames", "--space", "plane-stress", "--size", "0.8")}
+    expected = {"truss": 1.7555, "claw": 11.907, "klann": 11.562}  # mm
+    for name, displacement in expected.items():
+        assert float(rows[name][2]) == pytest.approx(displacement, rel=0.005)
+
+
+def test_effects_move_the_finger_and_none_moves_nothing():
+    rows = {row[0]: row for row in printed("effects", "--space", "plane-stress", "--size", "3")}
+    moved = {name: float(row[-1]) for name, row in list(rows.items())[2:]}
+    assert moved.pop("none") == moved.pop("none, again") == 0.0
+    assert moved["joint spring"] < 0.0 < moved["joint compliance"]
+    assert moved["contact"] < 0.0
+    assert all(value != 0.0 for value in moved.values())
+
+
+def test_both_optimisers_reach_the_targets_of_the_truss():
+    for row in printed("optimisers", "truss")[2:]:
+        assert float(row[6]) < 1.0 and row[-1] == "yes"
+
+
+@pytest.mark.slow
+def test_accuracy_control_keeps_its_promise_on_the_truss():
+    *_, row = printed("accuracy_control", "truss", "--accuracy", "0.05", "--repeats", "1")
+    asked, bound, error = (float(row[column].rstrip("%")) for column in (1, 3, 4))
+    assert error <= asked and bound <= asked
+
+
+def test_stopping_early_moves_less_than_the_elements_err():
+    table = printed("stopping", "--mechanisms", "truss", "--size", "3", "--repeats", "1")
+    moved = [float(row[-1]) for row in table if row[0] == "truss" and len(row) == 5]
+    assert len(moved) == 5 and max(moved) < 0.1
+
+
+@pytest.mark.slow
+def test_predictors_and_quadratures_give_the_same_displacement():
+    table = printed("performance", "--space", "plane-stress", "--size", "3")
+    shifts = {row[0]: abs(float(row[-1])) for row in table if len(row) == 6 and row[-1][-4:-2] in ("e-", "e+")}
+    assert max(shift for name, shift in shifts.items() if name.startswith("predictor")) < 1e-7
+    assert max(shift for name, shift in shifts.items() if name.startswith("quadrature")) < 1e-2
+
+
+def test_what_takes_too_long_is_stopped_and_said_so():
+    *_, row = printed("solvers", "truss, whole load at once", "--limit", "0")
+    assert row[1:] and set(row[1:]) == {"stopped after 0 s"}
+
+
+@pytest.mark.slow
+def test_two_levels_the_factor_and_algebraic_multigrid_agree():
+    table = printed("large", "--sizes", "6", "--compare")
+    curves = next(row for row in table if len(row) == 8 and row[0].isdigit())
+    assert float(curves[-1]) <= 1e-8
+    systems = {row[1]: row for row in table if row[1:] and not row[1][:1].isdigit()}
+    for multigrid in ("GAMG", "BoomerAMG"):
+        # the Schur complement is a difference of much larger terms
+        assert float(systems[multigrid][-1]) <= 1e-5
