@@ -18,7 +18,7 @@ class Material:
         law: any law, instead of E and nu.
 
     Raises:
-        DescriptionError: E ≤ 0, ν outside (−1, 0.5), or not numbers; both a law and numbers, or neither.
+        DescriptionError: E ≤ 0, ν outside (−1, 0.5), or not numbers; a law and numbers are given, or neither.
     """
 
     name: str
@@ -27,8 +27,6 @@ class Material:
     def __init__(self, name: str, E: float | None = None, nu: float | None = None, *, law: Law | None = None) -> None:
         part = f"material {name!r}"
         if law is None:
-            if E is None or nu is None:
-                raise DescriptionError(part, "it has no law", "Give E and nu, or a law, as law=NeoHookean(E, nu)")
             law = NeoHookean(*elastic_constants(part, E, nu))
         elif E is not None or nu is not None:
             raise DescriptionError(part, "it has a law and numbers", f"Give them to the law, {type(law).__name__}(…)")
