@@ -16,9 +16,10 @@ from mpi4py import MPI
 import fenicsmech as fm
 from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRESS
 from fenicsmech.estimates import AccuracyControl, fidelity_levels
+from fenicsmech.report import format_table
 
 from .mechanisms import NAMES, mechanism
-from .table import command, format_table, publish
+from .table import command, publish
 
 ACCURACIES = (0.05, 0.01, 0.002)
 

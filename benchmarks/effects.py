@@ -9,9 +9,10 @@ the bare scene measured again at the end), and how far the effect moves the fing
 from statistics import median
 
 import fenicsmech as fm
+from fenicsmech.report import format_table
 
 from .mechanisms import mechanism
-from .table import command, format_table, publish
+from .table import command, publish
 
 WRIST, HIP = (28, 92), (56, 88)  # joints of the claw
 

@@ -12,9 +12,10 @@ from statistics import median
 from mpi4py import MPI
 
 import fenicsmech as fm
+from fenicsmech.report import format_table
 
 from .mechanisms import NAMES, mechanism
-from .table import command, format_table, publish
+from .table import command, publish
 
 HEADERS = ("mechanism", "unknowns", "last displacement [mm]", "iterations", "s per frame", "peak memory [MB]")
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import importlib
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import fenicsmech as fm
 from fenicsmech.mechanism import Force
@@ -55,11 +53,7 @@ class Case:
 
 def mechanism(name: str) -> Case:
     """The case ``name``, one of NAMES."""
-    sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
-    try:
-        module = importlib.import_module(name)
-    finally:
-        sys.path.pop(0)
-    scene, force, *others = module.describe()
-    task = module.task(scene, force, *others)
-    return Case(scene, force, task.loads, task.configurations, task.designs, task.targets, module.SIZE)
+    module = importlib.import_module(f"demos.{name}")
+    scene, force, configurations = module.describe()
+    wanted = module.wanted(scene, force, configurations)
+    return Case(scene, force, module.FORCES, configurations, **wanted, size=module.SIZE)

@@ -6,9 +6,10 @@ Plane stress, one table: iterations, objective evaluations, seconds, worst targe
 """
 
 import fenicsmech as fm
+from fenicsmech.report import format_table
 
 from .mechanisms import NAMES, mechanism
-from .table import command, format_table, publish
+from .table import command, publish
 
 HEADERS = (
     "mechanism",

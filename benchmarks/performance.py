@@ -16,11 +16,13 @@ from time import perf_counter
 from petsc4py import PETSc
 
 import fenicsmech as fm
+from fenicsmech.continuation import Constant, Hermite, Tangent
 from fenicsmech.elasticity import Quadrature
-from fenicsmech.equilibrium import Constant, Factor, Hermite, LoadControl, Tangent
+from fenicsmech.equilibrium import Factor, LoadControl
+from fenicsmech.report import format_table
 
 from .mechanisms import mechanism
-from .table import ROOT, command, format_table, publish
+from .table import ROOT, command, publish
 
 REFERENCE_BLAS = [Path("/usr/lib/x86_64-linux-gnu/blas"), Path("/usr/lib/x86_64-linux-gnu/lapack")]
 

@@ -14,13 +14,14 @@ from time import process_time
 import numpy as np
 
 import fenicsmech as fm
+from fenicsmech.report import format_table
 
 from .mechanisms import NAMES, mechanism
-from .table import command, format_table, publish
+from .table import command, publish
 
 STRICT = "1e-10, a factor for each correction"
 WAYS = {
-    STRICT: {"tolerance": 1e-10, "stale": 0.0},
+    STRICT: {"tolerance": 1e-10, "reuse_factor": 0.0},
     "1e-10, last corrections with the factor at hand": {"tolerance": 1e-10},
     "1e-9, the same (default)": {},
     "1e-6, the same": {"tolerance": 1e-6},

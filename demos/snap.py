@@ -5,15 +5,13 @@
 Both curves are followed past their limit points. Pushed directly the force falls and rises again; behind the spring the
 curve folds back over itself, so that even a held finger feels the switch jump: load_displacement holds it at one
 position after the other, and tells where. A motor in the crank's hinge turns the switch over without a jump; its torque
-is drawn over its angle. Leaves curve.png, crank.png and the pictures.
+is drawn over its angle. Leaves curve.png, crank.png and the pictures. The geometry is this project's own.
 """
 
 import argparse
 from pathlib import Path
 
 import fenicsmech as fm
-from benchmarks.table import format_table
-from fenicsmech.plot import plot_curve
 
 PIVOT, KNEE, PIN, ROOT = (0, 0), (25, 8), (50, 0), (50, -40)
 HEAD, BOW = (25, 68), (45, 38)  # the finger's end of the spring, and the middle of its bow
@@ -43,12 +41,12 @@ def describe(sprung):
 
 
 def main():
+    fm.mpi_abort_on_error()
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--size", type=float, default=1.0, metavar="MM", help="element size")
     parser.add_argument("--out", type=Path, default=Path("results/snap"), metavar="DIR")
     options = parser.parse_args()
-    options.out.mkdir(parents=True, exist_ok=True)
-    series, rows = [], []
+    series = []
     for sprung, label in ((False, "pushed directly"), (True, "through a spring")):
         scene, finger, _ = describe(sprung)
         sim = fm.Simulation(scene, space="plane-stress", size=options.size)
@@ -56,12 +54,11 @@ def main():
         series.append(curve.series(label))
         for event in curve.events:
             frame = event.frame
-            rows.append([label, event.kind.value, frame.displacement, frame.force])
-        sim.picture(options.out / f"{scene.mechanism.name.replace(' ', '-')}.png", curve)
+            print(f"{label}: {event.kind.value} at {frame.displacement:.4g} mm, {frame.force:.4g} N")
+        curve.picture(options.out / f"{scene.mechanism.name.replace(' ', '-')}.png")
     held = sim.load_displacement(finger, displacements=HELD)
     series.append(held.series("held behind the spring"))
-    plot_curve(options.out / "curve.png", series, title="bistable switch")
-    print(format_table(["switch", "event", "displacement [mm]", "force [N]"], rows))
+    fm.plot_curve(options.out / "curve.png", series, title="bistable switch")
     print(*held.remarks, sep="\n")
     scene, _, hinge = describe(sprung=False)
     motor = scene.mechanism.motor(hinge, name="crank")

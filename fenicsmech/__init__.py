@@ -6,6 +6,7 @@ Describe a mechanism (``Mechanism``), say what acts on it (``Scene``) and how fi
 """
 
 from fenicsmech.collective import mpi_abort_on_error
+from fenicsmech.continuation import ArcSteps, Critical
 from fenicsmech.design import (
     BFGS,
     DesignProblem,
@@ -35,11 +36,10 @@ from fenicsmech.effects import (
 )
 from fenicsmech.elasticity import DisplacementFormulation, MixedFormulation
 from fenicsmech.equilibrium import (
-    ArcSteps,
-    Critical,
     PrimalDualNewton,
 )
 from fenicsmech.errors import AssemblyError, DescriptionError, EquilibriumError, FenicsmechError, MeshingError
+from fenicsmech.files import read_csv
 from fenicsmech.joints import JointKind, PlanarMarker, SpatialMarker
 from fenicsmech.laws import (
     IsochoricNeoHookean,
@@ -72,6 +72,9 @@ from fenicsmech.mechanism import (
     step_file,
     strip,
 )
+from fenicsmech.model import SPACES
+from fenicsmech.plot import CurveSeries, Trace, plot_curve
+from fenicsmech.report import Design, Report, write_report
 from fenicsmech.simulation import (
     BucklingLoad,
     BucklingPosition,
@@ -92,12 +95,15 @@ __all__ = [
     "DRAWN",
     "ONYX",
     "SMOOTH_SIL_950",
+    "SPACES",
     "Arc",
     "AssemblyError",
     "BFGS",
     "Configuration",
     "Curve",
+    "CurveSeries",
     "DescriptionError",
+    "Design",
     "DesignProblem",
     "DesignResult",
     "Disc",
@@ -127,6 +133,7 @@ __all__ = [
     "PosePotential",
     "PrimalDualNewton",
     "Rectangle",
+    "Report",
     "Scene",
     "ShapeBounds",
     "Simulation",
@@ -135,15 +142,19 @@ __all__ = [
     "StayClose",
     "Strain",
     "Target",
+    "Trace",
     "Units",
     "Volumetric",
     "fit_modulus",
     "gmsh_mesh",
     "mpi_abort_on_error",
     "outline",
+    "plot_curve",
     "polygon",
+    "read_csv",
     "step_file",
     "strip",
+    "write_report",
     "Contact",
     "Cylinder",
     "HalfPlane",

@@ -35,10 +35,12 @@ LAYERS = (
     "elasticity",
     "effects",
     "equilibrium",
+    "continuation",
     "model",
     "estimates",
     "simulation",
     "design",
+    "report",
 )
 
 # Libraries that belong to a few layers only: descriptions and joints know no elements, only one layer makes meshes,

@@ -18,15 +18,16 @@ import numpy as np
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.equilibrium import EquilibriumSolver, Iteration, LoadControl, NotConverged, Solution
+from fenicsmech.equilibrium import EquilibriumPoint, EquilibriumSolver, Iteration, LoadControl, NotConverged
+from fenicsmech.report import format_table
 
 from ..mechanisms import mechanism
-from ..table import command, format_table, publish
+from ..table import command, publish
 from . import SNES, AugmentedLagrangian, Globalisation, KKTNewton
 
 SOLVERS = {
     "default": fm.PrimalDualNewton(),
-    "without mixed stress": fm.PrimalDualNewton(mixed_stress=False, allowance=4),
+    "without mixed stress": fm.PrimalDualNewton(mixed_stress=False, watchdog=4),
     "augmented Lagrangian": AugmentedLagrangian(),
     "KKT Newton": KKTNewton(),
     "with backtracking": KKTNewton(backtracking=True),
@@ -67,7 +68,7 @@ class Counted(EquilibriumSolver):
         iteration = self.solver.on(system)
         solve = iteration.solve
 
-        def counted(*arguments, **options) -> Solution:
+        def counted(*arguments, **options) -> EquilibriumPoint:
             if perf_counter() > self.count.deadline:
                 raise Stopped
             try:

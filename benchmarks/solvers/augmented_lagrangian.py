@@ -30,12 +30,12 @@ import numpy as np
 from fenicsmech.equilibrium import (
     Border,
     Control,
+    EquilibriumPoint,
     EquilibriumSolver,
     EquilibriumSystem,
     Iteration,
     NotConverged,
     Residual,
-    Solution,
     State,
     Step,
 )
@@ -78,9 +78,9 @@ class AugmentedLagrangianIteration(Iteration):
 
     options: AugmentedLagrangian
 
-    def solve(self, start: State, control: Control) -> Solution:
+    def iterate(self, start: State, control: Control) -> EquilibriumPoint:
         system, options, floor = self.system, self.options, start.minimum_shift
-        state = self._begin(start, control)
+        state = start
         penalty = options.penalty
         omega, eta = 1.0 / penalty, penalty**-0.1
         shift, residuals, before, best = floor, [], math.inf, None
@@ -92,8 +92,8 @@ class AugmentedLagrangianIteration(Iteration):
             # λ⁺ = λ − μ C(s) holds the rounding of C, μ times
             noise = penalty * options.roundoff * system.unknowns.unit
             if self.converged(residual, before, noise=noise) and iteration > 0:
-                self._factor_true(current, control, residual, iteration)
-                return self._accept(self._normalised(current), control, residual, residuals, iteration)
+                self.linearise(current, control, residual, iterations=iteration)
+                return self.accept(self._normalised(current), control, residual, residuals, iteration)
             if best is None or residual.norm < best[1].norm:
                 best = current, residual
             if iteration == options.iterations:
@@ -114,9 +114,9 @@ class AugmentedLagrangianIteration(Iteration):
             try:
                 state = self._search(state, control, step, descent, gradient, 1.0 / penalty, iteration)
             except NotConverged as failure:
-                return self._bear(self._normalised(best[0]), best[1], control, residuals, failure)
-        failure = self._spent(residuals, options.iterations)
-        return self._bear(self._normalised(best[0]), best[1], control, residuals, failure)
+                return self.accept_best(self._normalised(best[0]), best[1], control, residuals, failure)
+        failure = self.exhausted(residuals, options.iterations)
+        return self.accept_best(self._normalised(best[0]), best[1], control, residuals, failure)
 
     def _normalised(self, state: State) -> State:
         """``state`` with quaternions of unit length."""
@@ -167,8 +167,8 @@ class AugmentedLagrangianIteration(Iteration):
         right.array_w[system.blocks.multipliers.local.start :] = 0.0
         shift, following = floor, max(_LEAST_SHIFT, last / 3.0)
         for _ in range(20):
-            x = self._solution(right, self._accuracy(residual)) if self._refactor(shift) else None
-            if x is not None and self._descends():
+            x = self.try_solve(right, self.step_accuracy(residual)) if self.factor(shift) else None
+            if x is not None and self.descends():
                 break
             shift, following = following, 8.0 * following
         else:

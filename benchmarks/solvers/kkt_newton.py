@@ -14,12 +14,12 @@ from dataclasses import dataclass
 
 from fenicsmech.equilibrium import (
     Control,
+    EquilibriumPoint,
     EquilibriumSolver,
     EquilibriumSystem,
     Iteration,
     NotConverged,
     Residual,
-    Solution,
     State,
     Step,
 )
@@ -49,9 +49,9 @@ class KKTIteration(Iteration):
 
     options: KKTNewton
 
-    def solve(self, start: State, control: Control) -> Solution:
+    def iterate(self, start: State, control: Control) -> EquilibriumPoint:
         system, options = self.system, self.options
-        state = self._begin(start, control)
+        state = start
         residual, residuals, before = system.residual(state, control), [], math.inf
         best = state, residual
         for iteration in range(options.iterations + 1):
@@ -59,11 +59,11 @@ class KKTIteration(Iteration):
             if not math.isfinite(residuals[-1]):
                 raise NotConverged("the residual overflows", iteration)
             if self.converged(residual, before) and iteration > 0:
-                return self._accept(state, control, residual, residuals, iteration)
+                return self.accept(state, control, residual, residuals, iteration)
             if iteration == options.iterations:
                 break
-            self._factor_true(state, control, residual, iteration)
-            x = self._solution(residual.vector, self._accuracy(residual))
+            self.linearise(state, control, residual, iterations=iteration)
+            x = self.try_solve(residual.vector, self.step_accuracy(residual))
             if x is None:
                 raise NotConverged("the linear solver stalled", iteration)
             x.scale(-1.0)
@@ -71,10 +71,10 @@ class KKTIteration(Iteration):
             try:
                 state, residual = self._advance(state, control, system.unknowns.step(x), residual, iteration)
             except NotConverged as failure:
-                return self._bear(*best, control, residuals, failure)
+                return self.accept_best(*best, control, residuals, failure)
             if residual.norm < best[1].norm:
                 best = state, residual
-        return self._bear(*best, control, residuals, self._spent(residuals, options.iterations))
+        return self.accept_best(*best, control, residuals, self.exhausted(residuals, options.iterations))
 
     def _advance(
         self, state: State, control: Control, step: Step, residual: Residual, iteration: int

@@ -15,11 +15,11 @@ from petsc4py import PETSc
 
 from fenicsmech.equilibrium import (
     Control,
+    EquilibriumPoint,
     EquilibriumSolver,
     EquilibriumSystem,
     Iteration,
     NotConverged,
-    Solution,
     State,
 )
 
@@ -62,13 +62,12 @@ class SNESIteration(Iteration):
 
     options: SNES
 
-    def solve(self, start: State, control: Control) -> Solution:
-        start = self._begin(start, control)
+    def iterate(self, start: State, control: Control) -> EquilibriumPoint:
         equations = _Equations(self, start, control)
         if self.converged(equations.residual):  # there is nothing that a line search could lower
             equations.test(None, 0, (0.0, 0.0, equations.residual.norm))
             equations.setUp(None)
-            return self._accept(start, control, equations.residual, equations.residuals, 1)
+            return self.accept(start, control, equations.residual, equations.residuals, 1)
         x = equations.residual.vector.duplicate()
         snes = self._create(equations)
         snes.solve(None, x)
@@ -77,9 +76,9 @@ class SNESIteration(Iteration):
         if not equations.evaluate(x):
             raise NotConverged("elements are inverted", iterations)
         if equations.factored and self.converged(equations.residual):
-            return self._accept(equations.state, control, equations.residual, equations.residuals, iterations)
+            return self.accept(equations.state, control, equations.residual, equations.residuals, iterations)
         failure = NotConverged(f"SNES stops: {_REASONS.get(reason, f'reason {reason}')}", iterations)
-        return self._bear(equations.state, equations.residual, control, equations.residuals, failure)
+        return self.accept_best(equations.state, equations.residual, control, equations.residuals, failure)
 
     def _create(self, equations: _Equations) -> PETSc.SNES:
         system, chosen = self.system, self.options.globalisation
@@ -160,11 +159,11 @@ class _Equations:
         return PETSc.SNES.ConvergedReason.ITERATING
 
     def setUp(self, pc: PETSc.PC) -> None:
-        self.factored = self._iteration._refactor(self._base.minimum_shift)
+        self.factored = self._iteration.factor(self._base.minimum_shift)
 
     def apply(self, pc: PETSc.PC, right: PETSc.Vec, x: PETSc.Vec) -> None:
-        accuracy = self._iteration._accuracy(self.residual)
-        solution = self._iteration._solution(right, accuracy) if self.factored else None
+        accuracy = self._iteration.step_accuracy(self.residual)
+        solution = self._iteration.try_solve(right, accuracy) if self.factored else None
         if solution is None:
             x.set(math.nan)
         else:

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from fenicsmech.files import atomic_write
+from fenicsmech.report import format_table
 
-from ..table import format_table
 from .measurement import Measurement
 from .plot import ModellingError, WorkSeries, pareto_front, plot_work_precision
 from .study import Study

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from characterize import FILES, TRUE
-from samples import bending_test, of_modulus
+from characterise import FILES, TRUE, bending_test, onyx
 
 import fenicsmech as fm
 from fenicsmech.files import write_csv
@@ -24,7 +23,7 @@ SEED = 20
 def main():
     random = np.random.default_rng(SEED)
     for thickness, name in FILES.items():
-        scene, push = bending_test(thickness, of_modulus(TRUE))
+        scene, push = bending_test(thickness, onyx(TRUE))
         sim = fm.Simulation(scene, space="3d", order=3, size=1.6)
         forces = np.round(np.linspace(0.0, LARGEST[thickness], READINGS + 1)[1:], 4)
         exact = sim.load_displacement(push, forces=list(forces)).displacements

@@ -172,7 +172,7 @@ class TargetEquilibria:
         """The equilibrium without force and without effects, from one without force."""
         newton = self._newtons[target.force_part]
         try:
-            return newton.solve(replace(state, share=0.0), LoadControl(0.0)).state
+            return newton.solve(replace(state, load_factor=0.0), LoadControl(0.0)).state
         except NotConverged as failure:
             raise Infeasible(f"no equilibrium without loads ({failure.reason})") from failure
 

@@ -16,7 +16,7 @@ import numpy as np
 from fenicsmech.effects import PosePotential
 from fenicsmech.elasticity import ElasticBody
 from fenicsmech.equilibrium.blocks import Numbering
-from fenicsmech.equilibrium.control import Control
+from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadControl
 from fenicsmech.equilibrium.state import State
 from fenicsmech.multibody import BodyPoint, JointSystem, LinkPoint, MaterialPoint
 
@@ -77,7 +77,7 @@ class BorderTerms:
     def work(self, state: State, force: float) -> float:
         """Σ f_k (a_k · u_k) + f (a · u_P) with ``force`` for f."""
         constant = sum(magnitude * self.travel(load, state) for load, magnitude in self._constant)
-        return force * self.travel(self._controlled, state) + state.share * constant
+        return force * self.travel(self._controlled, state) + state.load_factor * constant
 
     def pose_potential(self, state: State) -> float:
         """V. Local."""
@@ -91,7 +91,7 @@ class BorderTerms:
 
     def loads(self, state: State) -> list[tuple[PointLoad, float]]:
         """All loads with their magnitudes at ``state``. Local."""
-        return [(self._controlled, state.force), *((load, state.share * size) for load, size in self._constant)]
+        return [(self._controlled, state.force), *((load, state.load_factor * size) for load, size in self._constant)]
 
     def load_forces(self, loads: Iterable[tuple[PointLoad, float]], state: State) -> tuple[np.ndarray, np.ndarray]:
         """Σ magnitude · ∂(a · u_P) over ``loads``. Local."""
@@ -116,7 +116,7 @@ class BorderTerms:
             _add(total, places, _factor(potential, state) * potential.gradient(state.poses))
         return total
 
-    def share_rate(self, state: State) -> tuple[np.ndarray, np.ndarray]:
+    def load_factor_rate(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """−∂²L_b/∂(u, z)∂σ. Local."""
         links, border = self.load_forces(self._constant, state)
         weights = np.zeros(self._joints.size)
@@ -171,25 +171,12 @@ class BorderTerms:
 
     def pattern(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Where ``entries`` may put something, as (global rows, global columns). Local."""
-        joints, rows = self._joints, self._numbering.rows
-        z, multipliers, load = rows.poses.first, rows.multipliers.first, np.array([rows.load.first])
-        drawn, still = joints.drawn, np.zeros(len(joints.connections))
-        for columns in joints.columns.values():
-            yield z + columns, z + columns
-        for one, other, _ in joints.hessian_blocks(drawn, still, np.zeros(joints.rows)):
-            yield z + one, z + other
-        for _, places in self._potentials:
-            for _, columns in places:
-                for _, other_columns in places:
-                    yield z + columns, z + other_columns
-        for constraints, columns, _ in joints.gradient_blocks(drawn, still):
-            yield multipliers + constraints, z + columns
-            yield z + columns, multipliers + constraints
-        for row in range(multipliers, multipliers + joints.rows):
-            yield np.array([row]), np.array([row])
-        yield load, load
-        yield load, self._loaded()
-        yield self._loaded(), load
+        joints, dim = self._joints, self._joints.space.dim
+        drawn = State(np.zeros(0), joints.drawn, np.zeros(joints.rows), 0.0, np.zeros(len(joints.connections)))
+        moments = {body: np.zeros((dim, dim)) for body in joints.columns}
+        for control in (LoadControl(0.0), DisplacementControl(0.0)):
+            for rows, columns, _ in self.entries(drawn, control, moments, np.zeros(joints.rows + 1)):
+                yield rows, columns
 
     def _travel_row(self, state: State) -> np.ndarray:
         """∂(a · u_P) of the controlled load by the unknowns in rows ``_loaded``, (1, n)."""
@@ -220,7 +207,7 @@ class BorderTerms:
 
 def _factor(potential: PosePotential, state: State) -> float:
     """The load factor that a potential counts with."""
-    return 1.0 if potential.holds else state.share
+    return 1.0 if potential.holds else state.load_factor
 
 
 def _add(total: np.ndarray, places: list[tuple[slice, np.ndarray]], gradient: np.ndarray) -> None:

@@ -1,40 +1,55 @@
-"""What is led along a path of equilibria: a force, the displacement of its point, motors, or constant loads.
+"""Controls: what is prescribed at an equilibrium, one value v each.
 
 The magnitude f of the controlled force is always an unknown. Its equation is
 
-    constrained:  −(a · u_P − target) = 0, with f the multiplier,      otherwise:  f given.
+    constrained:  −(a · u_P − v) = 0, with f the multiplier,      otherwise:  f given.
+
+The rate of the scaled unknowns x with v solves K x′ = r. What works with v is its conjugate q:
+
+    control         v                                  q
+    load            force f                            displacement a · u_P of its point
+    displacement    a · u_P                            f
+    motors          φ, the motors standing at φ d      what they exert, Σ d λ
+    load factor     σ of the constant loads            their work
+
+A path may turn back in v and in q. Its arc length s is a control as well,
+
+    ⟨n, y − y₀⟩ = s,      y the state with the value v of the control that is followed,
+
+whose equation takes the place of the one that prescribes v; any control that leaves K regular serves for solves with K:
+v is held, or q where that changes more (Rheinboldt & Burkardt, doi:10.1145/357456.357460), so that limit points of the
+other do no harm. See ``solver`` for the bordering, which needs no row of the matrix. Sources: Riks
+(doi:10.1016/0020-7683(79)90081-7), Crisfield (doi:10.1016/0045-7949(81)90108-5).
 """
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Self
 
 import numpy as np
 from petsc4py import PETSc
 
-from fenicsmech.equilibrium.state import State
+from fenicsmech.equilibrium.state import State, Step
 
 
-class Rates(Protocol):
-    """Right-hand sides whose KKT solutions are rates of the scaled unknowns x (collective)."""
+@dataclass(frozen=True)
+class Stability:
+    """Numbers of directions in which the energy has a maximum.
 
-    def force_rate(self, state: State) -> PETSc.Vec:
-        """With the controlled force."""
+    Attributes:
+        under_load: while the force and all motors are held.
+        under_displacement: while the displacement of the force's point is held, and all motors are.
+    """
 
-    def target_rate(self) -> PETSc.Vec:
-        """With the displacement of its point."""
-
-    def share_rate(self, state: State) -> PETSc.Vec:
-        """With the share of the constant loads that acts."""
-
-    def motor_rate(self, state: State, direction: np.ndarray) -> PETSc.Vec:
-        """With motor values along ``direction`` (per connection)."""
+    under_load: int
+    under_displacement: int
 
 
 class Control(ABC):
-    """One value, ``target``, that equilibria are asked for.
+    """A value that is prescribed.
 
     Attributes:
         target: the value.
@@ -42,47 +57,90 @@ class Control(ABC):
     """
 
     target: float
-    constrained: bool
+    constrained = False
+
+    def at(self, target: float) -> Self:
+        """The same control with another target."""
+        return replace(self, target=target)
 
     @abstractmethod
-    def at(self, target: float) -> Control:
-        """The same control with another target."""
+    def value(self, system, state: State) -> float:
+        """v of a state that the ``EquilibriumSystem`` has loaded."""
 
     @abstractmethod
     def prepare(self, state: State) -> State:
-        """``state`` with the quantities the control prescribes."""
+        """``state`` with what the control prescribes directly."""
 
     @abstractmethod
-    def rate(self, system: Rates, state: State) -> PETSc.Vec:
-        """Right-hand side whose KKT solution is the rate of x with the target (collective)."""
+    def rate(self, system, state: State) -> PETSc.Vec:
+        """r: right-hand side whose solution is the rate of x with the target."""
+
+    def tangent(self, step: Step) -> Step:
+        """The rate of the whole state with the target, from the ``step`` that solves for its unknowns."""
+        return step
+
+    def conjugate_rate(self, system, right: PETSc.Vec, x: PETSc.Vec, tangent: Step) -> float:
+        """q′ with the target: r · x′ for a conjugate −∂L/∂v."""
+        return right.dot(x)
+
+    def stability(self, excess: int, conjugate_rate: float) -> Stability:
+        """From the number of negative eigenvalues beyond those of a stable equilibrium under this control."""
+        return Stability(max(excess, 0), max(excess, 0))
 
 
 @dataclass(frozen=True)
 class LoadControl(Control):
     """The force has magnitude ``target``."""
 
-    target: float
-    constrained = False
+    target: float = 0.0
 
-    def at(self, target):
-        return LoadControl(target)
+    def value(self, system, state):
+        return state.force
 
     def prepare(self, state):
         return replace(state, force=self.target)
 
     def rate(self, system, state):
-        return system.force_rate(state)
+        return system.travel_gradient(system.controlled, state)
+
+    def tangent(self, step):
+        return replace(step, force=1.0)
+
+    def stability(self, excess, conjugate_rate):
+        # a point that moves back as the force grows: holding it takes one unstable mode away
+        return Stability(max(excess, 0), max(excess - int(conjugate_rate < 0.0), 0))
+
+    # -- of a path that is followed by its force ----------------------------------------------------------------------
+
+    displaces = False
+
+    @property
+    def opposite(self) -> DisplacementControl:
+        """The control of the conjugate."""
+        return DisplacementControl()
+
+    def change(self, step: Step) -> float:
+        """That of the value in a change of state."""
+        return step.force
+
+    def conjugate(self, system, state: State) -> float:
+        """q of a loaded state."""
+        return system.load_displacement(state)
+
+    def moves(self, system, tangent: Step) -> bool:
+        """Whether anything moves; ideal joints have a compliance of 1e-8 of the mean, which is none."""
+        return system.size(tangent) > 1e-6 * system.joints.length / system.unknowns.unit**2
 
 
 @dataclass(frozen=True)
 class DisplacementControl(Control):
     """The force makes its point move by ``target`` along its direction."""
 
-    target: float
+    target: float = 0.0
     constrained = True
 
-    def at(self, target):
-        return DisplacementControl(target)
+    def value(self, system, state):
+        return system.load_displacement(state)
 
     def prepare(self, state):
         return state
@@ -90,37 +148,162 @@ class DisplacementControl(Control):
     def rate(self, system, state):
         return system.target_rate()
 
+    def conjugate_rate(self, system, right, x, tangent):
+        return tangent.force
+
+    def stability(self, excess, conjugate_rate):
+        # x′ = −K⁻¹ e, and e · K⁻¹ e < 0 exactly if removing the control's row e leaves stability as it is
+        return Stability(max(excess + int(conjugate_rate <= 0.0), 0), max(excess, 0))
+
 
 @dataclass(frozen=True, eq=False)
 class MotorControl(Control):
-    """Motors stand at ``target`` · ``motors`` (values per connection) while the force keeps its magnitude."""
+    """Motors stand at ``target`` · ``direction`` and the others where they are; the force keeps its magnitude.
+
+    Attributes:
+        direction: d, motor values per unit of the target, (connections,).
+    """
 
     target: float
-    motors: np.ndarray
-    constrained = False
+    direction: np.ndarray
 
-    def at(self, target):
-        return MotorControl(target, self.motors)
+    def value(self, system, state):
+        return self._along(state.motors)
 
     def prepare(self, state):
-        return replace(state, motors=self.target * self.motors)
+        return replace(state, motors=np.where(self.direction, self.target * self.direction, state.motors))
 
     def rate(self, system, state):
-        return system.motor_rate(state, self.motors)
+        return system.motor_rate(state, self.direction)
+
+    def tangent(self, step):
+        return replace(step, motors=self.direction)
+
+    def conjugate_rate(self, system, right, x, tangent):
+        return self._exerted(system, tangent.multipliers)
+
+    # -- of a path that is followed by its motors ---------------------------------------------------------------------
+
+    displaces = True
+    opposite = None
+
+    def change(self, step: Step) -> float:
+        """That of the value in a change of state."""
+        return self._along(step.motors)
+
+    def conjugate(self, system, state: State) -> float:
+        """q of a loaded state."""
+        return self._exerted(system, state.multipliers)
+
+    def moves(self, system, tangent: Step) -> bool:
+        """Whether anything moves."""
+        return system.size(tangent) > 0.0
+
+    def _along(self, motors: np.ndarray) -> float:
+        return float(np.sum(self.direction * motors) / np.sum(self.direction**2))
+
+    def _exerted(self, system, multipliers: np.ndarray) -> float:
+        """Σ d λ of the motors' equations."""
+        joints = system.joints
+        driven = [(k, joints.motor_rows[c.motor]) for k, c in enumerate(joints.connections) if c.motor is not None]
+        return float(sum(self.direction[k] * multipliers[row] for k, row in driven))
 
 
 @dataclass(frozen=True)
-class ShareControl(Control):
-    """The share ``target`` of the constant loads acts."""
+class LoadFactorControl(Control):
+    """Constant loads and effects act with the factor ``target``."""
 
-    target: float
-    constrained = False
+    target: float = 0.0
 
-    def at(self, target):
-        return ShareControl(target)
+    def value(self, system, state):
+        return state.load_factor
 
     def prepare(self, state):
-        return replace(state, share=self.target)
+        return replace(state, load_factor=self.target)
 
     def rate(self, system, state):
-        return system.share_rate(state)
+        return system.load_factor_rate(state)
+
+    def tangent(self, step):
+        return replace(step, load_factor=1.0)
+
+
+@dataclass(frozen=True)
+class ArcMetric:
+    """⟨a, b⟩ of changes of state: mean squares of motion and of the followed value, each over its reference.
+
+    Attributes:
+        system: whose unknowns are compared.
+        followed: the control whose value counts.
+        motion: reference of displacement over the mechanism's length, and of rotation.
+        value: reference of the value.
+        conjugate: reference of its conjugate; infinite where that does not change with the value.
+    """
+
+    system: object
+    followed: LoadControl | MotorControl
+    motion: float
+    value: float
+    conjugate: float
+
+    def dot(self, a: Step, b: Step) -> float:
+        """⟨a, b⟩."""
+        values = self.followed.change(a) * self.followed.change(b)
+        return mean_product(self.system, a, b) / self.motion**2 + values / self.value**2
+
+    def norm(self, a: Step) -> float:
+        """√⟨a, a⟩."""
+        return math.sqrt(self.dot(a, a))
+
+    def unit(self, a: Step) -> Step:
+        """``a`` scaled to norm one."""
+        return a.scaled(1.0 / self.norm(a))
+
+
+def mean_product(system, a: Step, b: Step) -> float:
+    """Mean product of two motions of free nodes and bodies, displacements over the mechanism's length."""
+    comm, joints = system.comm, system.joints
+    free = system.numbering.free[system.blocks.nodes.local]
+    own = np.array([float(a.u[free] @ b.u[free]) / joints.length**2, float(len(free))])
+    nodes, count = comm.allreduce(own)
+    bodies = float(np.sum(a.z * b.z / joints.pose_scale**2))
+    return nodes / max(count, 1.0) + bodies / max(len(a.z), 1)
+
+
+@dataclass(frozen=True, eq=False)
+class ArcLengthControl(Control):
+    """The state lies in a plane across a path: ⟨n, y − y₀⟩ = ``target``.
+
+    Attributes:
+        metric: ⟨·, ·⟩.
+        origin: y₀.
+        normal: n; the path's tangent is oriented along it.
+        held: the control that solves for corrections: that of the followed value, or of its conjugate.
+    """
+
+    target: float
+    metric: ArcMetric
+    origin: State
+    normal: Step
+    held: LoadControl | DisplacementControl | MotorControl
+    constrained = True
+
+    def value(self, system, state):
+        return self.metric.dot(self.normal, system.difference(state, self.origin))
+
+    def prepare(self, state):
+        return state
+
+    def rate(self, system, state):
+        return self.held.rate(system, state)
+
+    def hold(self, system, state: State) -> Control:
+        """``held`` at the value it has in a loaded state."""
+        return self.held.at(self.held.value(system, state))
+
+    def onto(self, system, state: State, correction: Step, rate: Step) -> Step:
+        """``correction`` + τ ``rate``, which leads from ``state`` into the plane."""
+        # the value that the correction itself changes is left to the next iteration
+        off = system.difference(state, self.origin) + replace(correction, force=0.0)
+        gap = self.metric.dot(self.normal, off) - self.target
+        return correction + rate.scaled(-gap / self.metric.dot(self.normal, rate))

@@ -15,7 +15,7 @@ found and reported as such. Merit of a step: the augmented Lagrangian
 and at the new pressures p, with ½ ρ_m |∂E/∂p|² beside it.
 
 Slender links bend at far smaller forces than they stretch, so a good step may raise every merit for a few
-iterations: steps are taken in full while an allowance lasts, then the iteration returns to its best state and
+iterations: steps are taken in full as long as a watchdog allows, then the iteration returns to its best state and
 searches the line. For the same reason ∇²L holds, far from equilibrium, the stress that the last step solved for
 instead of the one its displacements led to (``elasticity.mixed_stress``): iterations halve, and steps ten times as
 long converge.
@@ -41,7 +41,7 @@ from petsc4py import PETSc
 
 from fenicsmech.checks import positive
 from fenicsmech.equilibrium.control import Control
-from fenicsmech.equilibrium.solver import EquilibriumSolver, Iteration, NotConverged, Solution
+from fenicsmech.equilibrium.solver import EquilibriumPoint, EquilibriumSolver, Iteration, NotConverged
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 from fenicsmech.log import logger
@@ -58,30 +58,30 @@ class PrimalDualNewton(EquilibriumSolver):
         near: residual over the forces below which any equilibrium, unstable ones too, is converged to; farther
             off, steps descend.
         iterations: most iterations.
-        allowance: iterations in a row that may fail to improve on the best residual.
+        watchdog: iterations in a row that may fail to improve on the best residual.
         mixed_stress: whether tangents, as long as the residual is large, hold the stress that the last step solved
             for instead of the one it led to.
         largest_turn: largest rotation (rad), or displacement over the mechanism's length, of one step.
-        stale: relative error of the last factor, told by how fast corrections with it shrink, up to which it serves
-            for them, for stability and for the tangent of the path; above, and always with 0, factors are made anew.
+        reuse_factor: relative error of the last factor, which shows in how fast corrections with it shrink, up to which
+            it serves for them, for stability and for the tangent of the path; above, and with 0, K is factored anew.
 
     Raises:
-        DescriptionError: a limit is not a positive number, or ``stale`` is negative.
+        DescriptionError: a limit is not a positive number, or ``reuse_factor`` is negative.
     """
 
     near: float = 1e-2
     iterations: int = 25
-    allowance: int = 12
+    watchdog: int = 12
     mixed_stress: bool = True
     largest_turn: float = 0.5
-    stale: float = 1e-3
+    reuse_factor: float = 1e-3
 
     def __post_init__(self) -> None:
         super().__post_init__()
         for limit in ("near", "largest_turn"):
             positive(f"Newton's {limit}", getattr(self, limit))
-        if self.stale != 0.0:
-            positive("Newton's stale", self.stale)
+        if self.reuse_factor != 0.0:
+            positive("Newton's reuse_factor", self.reuse_factor)
 
     def on(self, system: EquilibriumSystem) -> Newton:
         return Newton(system, self)
@@ -92,18 +92,17 @@ class Newton(Iteration):
 
     options: PrimalDualNewton
 
-    def solve(self, start: State, control: Control) -> Solution:
+    def iterate(self, start: State, control: Control) -> EquilibriumPoint:
         system, options, least = self.system, self.options, start.minimum_shift
-        start = self._begin(start, control)
         state, residual = start, system.residual(start, control)
         best, spent, careful, passed, missed = (state, residual), 0, False, None, None
         residuals, shift, trusted, mixed, norm = [], least, True, False, math.inf
         for iteration in range(options.iterations + 1):
             residuals.append(self.relative(residual))
             if self.converged(residual, norm) and iteration > 0:
-                if mixed or shift > least or options.stale == 0.0:  # stability is of the true matrix
-                    self._factor_true(state, control, residual, iteration)
-                return self._accept(state, control, residual, residuals, iteration)
+                if mixed or shift > least or options.reuse_factor == 0.0:  # stability is of the true matrix
+                    self.linearise(state, control, residual, iterations=iteration)
+                return self.accept(state, control, residual, residuals, iteration)
             if iteration == options.iterations:
                 break
             near = trusted and residuals[-1] < options.near
@@ -120,7 +119,7 @@ class Newton(Iteration):
             try:
                 state, residual, length = advance(state, control, step, residual, iteration)
             except NotConverged as failure:
-                return self._bear(*best, control, residuals, failure)
+                return self.accept_best(*best, control, residuals, failure)
             # a pressure of its own is a stress that the step solves for already
             passed = (before, length * motion) if options.mixed_stress and not system.blocks.pressures.size else None
             if near and residual.norm > norm and not self.converged(residual, norm):
@@ -137,11 +136,11 @@ class Newton(Iteration):
                 best, spent = (state, residual), 0
             else:
                 spent += 1
-            if spent > options.allowance and not careful:
+            if spent > options.watchdog and not careful:
                 state, careful, passed = best[0], True, None
                 system.load(state)
                 residual = system.residual(state, control)
-        return self._bear(*best, control, residuals, self._spent(residuals, options.iterations))
+        return self.accept_best(*best, control, residuals, self.exhausted(residuals, options.iterations))
 
     def _direction(
         self, residual: Residual, least: float, *, last: float, any_inertia: bool
@@ -152,8 +151,8 @@ class Newton(Iteration):
         """
         shift, following = least, max(_LEAST_SHIFT, last / 3.0)
         for _ in range(20):
-            x = self._solution(residual.vector, self._accuracy(residual)) if self._refactor(shift) else None
-            if x is not None and (any_inertia or self._descends()):
+            x = self.try_solve(residual.vector, self.step_accuracy(residual)) if self.factor(shift) else None
+            if x is not None and (any_inertia or self.descends()):
                 break
             shift, following = following, 8.0 * following
         else:
@@ -179,13 +178,13 @@ class Newton(Iteration):
         """
         system, size = self.system, self.system.size(step)
         while not self.converged(residual, before):
-            x = self._solution(residual.vector, self._accuracy(residual))
+            x = self.try_solve(residual.vector, self.step_accuracy(residual))
             if x is None:
                 break
             x.scale(-1.0)
             correction = system.unknowns.step(x)
             length = system.size(correction)
-            if not length <= self.options.stale * size:
+            if not length <= self.options.reuse_factor * size:
                 break
             following = system.moved(state, correction)
             found = system.residual(following, control)

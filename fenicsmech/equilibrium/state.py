@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,7 +22,7 @@ class State:
         multipliers: λ, one per constraint row, on every rank.
         force: magnitude f of the controlled force.
         motors: motor value per connection.
-        share: how much of the constant loads acts, 0 … 1.
+        load_factor: part of the constant loads and effects that acts, 0 … 1.
         minimum_shift: least shift δ of the tangent, which zero-energy modes need, in units of the mean stiffness.
     """
 
@@ -31,56 +31,52 @@ class State:
     multipliers: np.ndarray
     force: float
     motors: np.ndarray
-    share: float = 1.0
+    load_factor: float = 1.0
     minimum_shift: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """A change of state; ``z`` are the poses of the free bodies, flat."""
+    """A change of state; ``z`` are the poses of the free bodies, flat.
+
+    Solves give the unknowns u, z, λ and f; motors and load factor change where a control prescribes them.
+    """
 
     u: np.ndarray
     z: np.ndarray
     multipliers: np.ndarray
     force: float
+    motors: np.ndarray | float = 0.0
+    load_factor: float = 0.0
 
     def scaled(self, factor: float) -> Step:
         """``factor`` times this step."""
-        return Step(factor * self.u, factor * self.z, factor * self.multipliers, factor * self.force)
+        return Step(*(factor * values for values in vars(self).values()))
+
+    def __add__(self, other: Step) -> Step:
+        return Step(*(a + b for a, b in zip(vars(self).values(), vars(other).values(), strict=True)))
 
     def slower(self, other: Step) -> Step:
-        """For every coordinate the smaller change of the two."""
+        """This step with the smaller change of the two for every displacement and pose."""
 
         def smaller(one: np.ndarray, two: np.ndarray) -> np.ndarray:
             return np.where(np.abs(one) < np.abs(two), one, two)
 
-        return Step(
-            smaller(self.u, other.u),
-            smaller(self.z, other.z),
-            smaller(self.multipliers, other.multipliers),
-            float(smaller(self.force, other.force)),
-        )
+        return replace(self, u=smaller(self.u, other.u), z=smaller(self.z, other.z))
 
     def beyond(self, steps: Sequence[Step]) -> Step:
-        """How far every coordinate lies outside the span of those of ``steps``."""
+        """This step with how far every displacement and pose lies outside the span of those of ``steps``."""
 
         def outside(value: np.ndarray, others: list[np.ndarray]) -> np.ndarray:
             return value - np.clip(value, np.minimum.reduce(others), np.maximum.reduce(others))
 
-        return Step(
-            outside(self.u, [step.u for step in steps]),
-            outside(self.z, [step.z for step in steps]),
-            outside(self.multipliers, [step.multipliers for step in steps]),
-            float(outside(self.force, [step.force for step in steps])),
-        )
-
-    def __add__(self, other: Step) -> Step:
-        return Step(self.u + other.u, self.z + other.z, self.multipliers + other.multipliers, self.force + other.force)
+        u, z = outside(self.u, [step.u for step in steps]), outside(self.z, [step.z for step in steps])
+        return replace(self, u=u, z=z)
 
 
 def load_fields(elastic: ElasticBody, interfaces: InterfaceMap, state: State) -> None:
     """Makes the fields of ``elastic`` hold ``state``, with interface nodes on their bodies."""
     elastic.take(state.u)
-    elastic.share.value = state.share
+    elastic.share.value = state.load_factor
     elastic.update()
     interfaces.place(state.poses)

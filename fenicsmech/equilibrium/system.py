@@ -141,6 +141,8 @@ class EquilibriumSystem:
             poses=poses,
             multipliers=state.multipliers + step.multipliers,
             force=state.force + step.force,
+            motors=state.motors + step.motors,
+            load_factor=state.load_factor + step.load_factor,
         )
         self.load(moved)
         return replace(moved, u=self.elastic.values())
@@ -165,6 +167,8 @@ class EquilibriumSystem:
             self.joints.unknowns(later.poses) - self.joints.unknowns(earlier.poses),
             later.multipliers - earlier.multipliers,
             later.force - earlier.force,
+            later.motors - earlier.motors,
+            later.load_factor - earlier.load_factor,
         )
 
     def independent(self, step: Step) -> Step:
@@ -272,17 +276,13 @@ class EquilibriumSystem:
 
     # -- right-hand sides whose KKT solutions are rates of x with … -------------------------------------------
 
-    def force_rate(self, state: State) -> PETSc.Vec:
-        """… the controlled force."""
-        return self.travel_gradient(self.controlled, state)
-
     def travel_gradient(self, load: PointLoad, state: State) -> PETSc.Vec:
         """… the magnitude of a load: Gᵀ ∂(a · u_P), the gradient of its travel by x."""
         return self.unknowns.apply_transpose(*self._border.load_forces([(load, 1.0)], state))
 
-    def share_rate(self, state: State) -> PETSc.Vec:
+    def load_factor_rate(self, state: State) -> PETSc.Vec:
         """… the load factor of the constant loads."""
-        links, border = self._border.share_rate(state)
+        links, border = self._border.load_factor_rate(state)
         if self.elastic.shares:
             links -= self.elastic.share_residuals()
         return self.unknowns.apply_transpose(links, border)

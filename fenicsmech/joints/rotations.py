@@ -119,6 +119,7 @@ class PlanarSpace(RigidSpace):
     rotation_size = 1
     freedoms = 3
     identity = np.zeros(3)
+    identity.setflags(write=False)
     _quarter_turn = np.array([[0.0, -1.0], [1.0, 0.0]])
 
     def rotation_increment(self, pose):
@@ -163,6 +164,7 @@ class SpatialSpace(RigidSpace):
     rotation_size = 4
     freedoms = 6
     identity = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    identity.setflags(write=False)
     _hessian = _quaternion_hessian()
 
     def rotation_increment(self, pose):

@@ -115,9 +115,12 @@ class Mechanism:
             name: for messages; unique.
 
         Raises:
-            DescriptionError: a link is not in the mechanism or joined with itself, a flexible link lacks an
-                interface, the interface is no region or given twice, numbers are not finite, or the name is taken.
+            DescriptionError: ``kind`` is not a joint kind, a link is not in the mechanism or joined with itself, a
+                flexible link lacks an interface, the interface is not a region or given twice, numbers are not
+                finite, or the name is taken.
         """
+        if not isinstance(kind, JointKind):
+            raise DescriptionError("joint", f"{kind!r} is not a joint kind", "Give an instance of a JointKind")
         for link in (a, b):
             self._check_member(f"{name or f'{kind.name} joint'!r}", link)
         given, name = name, name or f"{kind.name} joint {a.name}–{b.name}"
@@ -274,4 +277,4 @@ def _interface(part: str, radius: float | None, region: Region | None) -> Region
                 positive(f"width of the interface of {part}", width),
                 finite(f"angle of the interface of {part}", angle),
             )
-    raise DescriptionError(part, f"{region!r} is no interface region", "Give region=Disc(…) or region=Rectangle(…)")
+    raise DescriptionError(part, f"{region!r} is not an interface region", "Give region=Disc(…) or region=Rectangle(…)")

@@ -124,7 +124,7 @@ class Scene:
     ``units`` name the units of the description in plots and tables.
 
     Raises:
-        DescriptionError: ``mechanism`` is none, or something listed under ``effects`` is no effect.
+        DescriptionError: ``mechanism`` is not a mechanism, or something listed under ``effects`` is not an effect.
     """
 
     mechanism: Mechanism

@@ -15,12 +15,7 @@ def validate(mechanism: Mechanism, dim: int) -> None:
         DescriptionError: no ground, an unconnected link, no load path to ground, a force on a fixed link, a joint
             or direction that does not exist in the plane, two interfaces of different shape at one place of a link.
     """
-    if not mechanism.links:
-        raise DescriptionError(
-            f"mechanism {mechanism.name!r}", "it has no links", "Add links with rigid() and flexible()"
-        )
     _check_ground(mechanism)
-    _check_connections(mechanism)
     _check_forces(mechanism)
     _check_interfaces(mechanism, dim)
     if dim == 2:
@@ -28,30 +23,24 @@ def validate(mechanism: Mechanism, dim: int) -> None:
 
 
 def _check_ground(mechanism: Mechanism) -> None:
-    if not any(isinstance(link, RigidLink) and link.fixed for link in mechanism.links):
+    part = f"mechanism {mechanism.name!r}"
+    if not mechanism.links:
+        raise DescriptionError(part, "it has no links", "Add links with rigid() and flexible()")
+    grounded: set[Link] = {link for link in mechanism.rigid_links if link.fixed}
+    if not grounded:
         raise DescriptionError(
-            f"mechanism {mechanism.name!r}",
+            part,
             "no link is fixed, so no load has a path to ground",
             "Make one rigid link the ground: rigid(name, fixed=True)",
         )
-
-
-def _check_connections(mechanism: Mechanism) -> None:
-    neighbours: dict[Link, set[Link]] = {link: set() for link in mechanism.links}
-    for joint in mechanism.joints:
-        neighbours[joint.a].add(joint.b)
-        neighbours[joint.b].add(joint.a)
-    for link, others in neighbours.items():
-        if not others and not (isinstance(link, RigidLink) and link.fixed):
+    pairs = [{joint.a, joint.b} for joint in mechanism.joints]
+    for link in mechanism.links:
+        if link not in grounded.union(*pairs):
             raise DescriptionError(
                 f"link {link.name!r}", "it is not connected: no joint holds it", "Join it to another link or remove it"
             )
-    grounded = {link for link in mechanism.links if isinstance(link, RigidLink) and link.fixed}
-    frontier = list(grounded)
-    while frontier:
-        new = neighbours[frontier.pop()] - grounded
-        grounded |= new
-        frontier.extend(new)
+    while reached := [pair for pair in pairs if pair & grounded and pair - grounded]:
+        grounded = grounded.union(*reached)
     adrift = [link.name for link in mechanism.links if link not in grounded]
     if adrift:
         raise DescriptionError(

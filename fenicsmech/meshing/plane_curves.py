@@ -124,20 +124,26 @@ def _draw(curve: Curve, ends: tuple[int, int], height: float) -> list[int]:
 
 def first_crossing(polygon: np.ndarray) -> np.ndarray | None:
     """A point where two edges of the closed ``polygon`` ((n, 2)) that are not neighbours meet, or None."""
-    edge = np.roll(polygon, -1, axis=0) - polygon
-    between = polygon[None, :] - polygon[:, None]
-    # p_i + t e_i = p_j + u e_j for all pairs at once; edges in line with each other do not cross
-    sine, lengths = _cross(edge[:, None], edge[None, :]), np.linalg.norm(edge, axis=1)
-    sine[np.abs(sine) <= 1e-10 * lengths[:, None] * lengths[None, :]] = np.nan
-    t, u = _cross(between, edge[None, :]) / sine, _cross(between, edge[:, None]) / sine
-    number = np.arange(len(polygon))
-    apart = np.abs(number[:, None] - number[None, :])
-    strangers = (apart > 1) & (apart < len(polygon) - 1)
-    meetings = np.argwhere(strangers & (t >= 0.0) & (t <= 1.0) & (u >= 0.0) & (u <= 1.0))
+    count, edge = len(polygon), np.roll(polygon, -1, axis=0) - polygon
+    ends = np.stack([polygon, polygon + edge])
+    # sweep along the longer side of the polygon: only edges that overlap there can meet
+    sweep = ends[..., int(np.argmax(np.ptp(polygon, axis=0)))]
+    order = np.argsort(sweep.min(axis=0))
+    behind = np.searchsorted(sweep.min(axis=0)[order], sweep.max(axis=0)[order], side="right") - np.arange(count) - 1
+    first = np.repeat(np.arange(count), behind)
+    second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(behind) - behind, behind)
+    i, j = np.sort([order[first], order[second]], axis=0)
+    strangers = (j - i > 1) & (j - i < count - 1)
+    i, j = i[strangers], j[strangers]
+    # p_i + t e_i = p_j + u e_j; edges in line with each other do not cross
+    between, sine, lengths = polygon[j] - polygon[i], _cross(edge[i], edge[j]), np.linalg.norm(edge, axis=1)
+    sine[np.abs(sine) <= 1e-10 * lengths[i] * lengths[j]] = np.nan
+    t, u = _cross(between, edge[j]) / sine, _cross(between, edge[i]) / sine
+    meetings = np.flatnonzero((t >= 0.0) & (t <= 1.0) & (u >= 0.0) & (u <= 1.0))
     if not len(meetings):
         return None
-    i, j = meetings[0]
-    return polygon[i] + t[i, j] * edge[i]
+    k = min(meetings, key=lambda k: (i[k], j[k]))
+    return polygon[i[k]] + t[k] * edge[i[k]]
 
 
 def inside(polygon: np.ndarray, point: np.ndarray) -> bool:

@@ -97,7 +97,7 @@ class MechanismModel:
 
     @property
     def flexible_dofs(self) -> int:
-        """Displacements of the flexible links that are unknown, interfaces and mid-planes excluded (collective)."""
+        """Displacements of the flexible links that are unknown, interfaces and mid-planes excluded."""
         return self.mesh.mesh.comm.allreduce(int(np.sum(self.interfaces.unknown)))
 
     @property
@@ -130,7 +130,7 @@ class MechanismModel:
             self.reshape(before)
 
     def carry(self, state: State, design: np.ndarray) -> State:
-        """Reshapes the links and guesses the equilibrium there from the one at the present shape (collective)."""
+        """Reshapes the links and guesses the equilibrium there from the one at the present shape."""
         self.load(state)
         carried = self.elastic.carried(design - self.elastic.d.x.array)
         self.reshape(design)
@@ -138,11 +138,11 @@ class MechanismModel:
         return replace(state, u=np.concatenate([carried[: len(displacements)], *pressures]))
 
     def load(self, state: State) -> None:
-        """Makes the finite-element fields hold ``state`` (collective)."""
+        """Makes the finite-element fields hold ``state``."""
         load_fields(self.elastic, self.interfaces, state)
 
     def point(self, part: Force | Output) -> MaterialPoint:
-        """The material point of a force or output (collective)."""
+        """The material point of a force or output."""
         if not isinstance(part.on, FlexibleLink):
             at = np.array(in_dimension(part.at, self.linkage.dim))
             body = self.linkage.body_of(part.on)
@@ -157,7 +157,7 @@ class MechanismModel:
         return link_point(f"{part.name!r}", at, self.elastic.u, cells, corners, self._bulges(cells))
 
     def point_load(self, force: Force | Output) -> PointLoad:
-        """The point load of a force, or of a unit force along an output (collective)."""
+        """The point load of a force, or of a unit force along an output."""
         if force not in self._point_loads:
             dim = self.elastic.model.dim if isinstance(force.on, FlexibleLink) else self.linkage.dim
             direction = np.array(in_dimension(force.direction, dim))
@@ -165,12 +165,12 @@ class MechanismModel:
         return self._point_loads[force]
 
     def travel(self, part: Force | Output, state: State) -> float:
-        """How far the point of a force or output has moved along its direction in the loaded ``state`` (collective)."""
+        """How far the point of a force or output has moved along its direction in the loaded ``state``."""
         load = self.point_load(part)
         return float(load.direction @ load.point.displacement(self.elastic.u, state.poses))
 
     def system(self, controlled: PointLoad, loads: tuple[tuple[PointLoad, float], ...]) -> EquilibriumSystem:
-        """The equilibrium equations with one controlled and several fixed loads (collective)."""
+        """The equilibrium equations with one controlled and several fixed loads."""
         return EquilibriumSystem(
             self.elastic,
             self.interfaces,
@@ -184,7 +184,7 @@ class MechanismModel:
         )
 
     def assembled_state(self, poses: np.ndarray, motors: np.ndarray) -> State:
-        """The state of a rigid assembly: every flexible link carried along by its first interface (collective)."""
+        """The state of a rigid assembly: every flexible link carried along by its first interface."""
         dim, owned = self.linkage.dim, self.interfaces.owned
         positions = self.elastic.drawn_nodes[:owned, :dim] + self.design_nodes.values()[:owned, :dim]
         u = np.zeros((owned, self.interfaces.block))
@@ -275,5 +275,5 @@ def interface_sites(linkage: Linkage, link: FlexibleLink) -> list[InterfaceSite]
 
 
 def mesh_mechanism(comm: MPI.Comm, mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> MechanismMesh:
-    """Meshes on rank 0 and distributes; an error there is raised on all ranks (collective)."""
+    """Meshes on rank 0 and distributes; an error there is raised on all ranks."""
     return distribute(comm, on_one(comm, lambda: mesh_links(mechanism, linkage, fidelity)))

@@ -67,14 +67,14 @@ class Freedom:
     Attributes:
         mobility: number of free directions left.
         mobile: names of the links that can move.
-        idle: names of the links that move in zero-energy modes, which wind up no spring; empty if springs hold all.
+        zero_energy: names of the links that move in zero-energy modes; empty if springs hold all.
         redundancy: number of dependent constraint equations.
         redundant: names of the joints whose equations depend on each other.
     """
 
     mobility: int
     mobile: tuple[str, ...]
-    idle: tuple[str, ...]
+    zero_energy: tuple[str, ...]
     redundancy: int
     redundant: tuple[str, ...]
 
@@ -124,7 +124,7 @@ def count_freedom(
     return Freedom(
         mobility=system.size - rank,
         mobile=_moving(system, right[rank:]),
-        idle=_moving(system, modes[:, flat].T @ free.motions),
+        zero_energy=_moving(system, modes[:, flat].T @ free.motions),
         redundancy=system.rows - rank,
         redundant=tuple(dict.fromkeys(np.array(system.row_names)[_takes_part(dependent)].tolist())),
     )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 from dolfinx import fem
@@ -47,7 +47,7 @@ class BodyPoint(MaterialPoint):
 
 @dataclass(frozen=True)
 class LinkPoint(MaterialPoint):
-    """A point in a cell of a flexible link, in the cell of one rank.
+    """A point in a cell of a flexible link, which one rank owns.
 
     Attributes:
         owner: rank that holds the cell.
@@ -93,29 +93,21 @@ def link_point(
     """
     comm = u.function_space.mesh.comm
     dim = len(position)
-    best = (-np.inf, comm.rank, 0, np.zeros(dim + 1))
-    if len(cells):
-        barycentric = _barycentric(position, vertices, bulges)
-        inside = barycentric.min(axis=1)
-        winner = int(np.argmax(inside))
-        best = (float(inside[winner]), comm.rank, int(cells[winner]), barycentric[winner])
-    deepest = max(comm.allgather(best), key=lambda found: (found[0], -found[1]))
-    if deepest[0] < -0.01:
+    barycentric = _barycentric(position, vertices, bulges) if len(cells) else np.full((1, dim + 1), -np.inf)
+    k = int(np.argmax(barycentric.min(axis=1)))  # the cell that the point lies deepest in
+    depth, owner = max((depth, -rank) for rank, depth in enumerate(comm.allgather(float(barycentric[k].min()))))
+    owner = -owner
+    if depth < -0.01:
         raise DescriptionError(
             part, f"the point {tuple(map(float, position))} is not on the link", "Move it onto the link"
         )
-    _, owner, cell, barycentric = deepest
-    found = None
+    found, nodes = None, np.zeros(0, dtype=np.int32)
     if comm.rank == owner:
         V = u.function_space
-        nodes = V.dofmap.cell_dofs(cell)
-        weights = _lagrange(
-            np.asarray(barycentric), V.tabulate_dof_coordinates()[nodes, :dim], vertices[cells == cell][0]
-        )
+        nodes = V.dofmap.cell_dofs(cells[k])
+        weights = _lagrange(barycentric[k], V.tabulate_dof_coordinates()[nodes, :dim], vertices[k])
         found = (V.dofmap.index_map.local_to_global(nodes.astype(np.int32)), weights)
-    global_nodes, weights = comm.bcast(found, root=owner)
-    local = nodes if comm.rank == owner else np.zeros(0, dtype=np.int32)
-    return LinkPoint(owner, local, global_nodes, weights)
+    return LinkPoint(owner, nodes, *comm.bcast(found, root=owner))
 
 
 def _barycentric(position: np.ndarray, vertices: np.ndarray, bulges: np.ndarray) -> np.ndarray:
@@ -138,12 +130,6 @@ def _lagrange(at: np.ndarray, nodes: np.ndarray, corners: np.ndarray) -> np.ndar
     inverse = np.linalg.inv(np.vstack([corners.T, np.ones(len(corners))]))
     barycentric = (inverse @ np.vstack([nodes.T, np.ones(len(nodes))])).T
     order = {len(at): 1, len(at) * (len(at) + 1) // 2: 2}.get(len(nodes), 3)
-    powers = _monomials(len(at), order)
+    powers = np.array([powers for powers in product(range(order + 1), repeat=len(at)) if sum(powers) == order])
     vandermonde = np.array([np.prod(point**powers, axis=1) for point in barycentric])
     return np.linalg.solve(vandermonde.T, np.prod(at**powers, axis=1))
-
-
-def _monomials(variables: int, order: int) -> np.ndarray:
-    """Exponents of all monomials of degree ``order`` in ``variables`` barycentric coordinates."""
-    grid = np.stack(np.meshgrid(*[np.arange(order + 1)] * variables, indexing="ij"), axis=-1).reshape(-1, variables)
-    return grid[grid.sum(axis=1) == order]

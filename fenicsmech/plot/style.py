@@ -11,11 +11,12 @@ from functools import cache
 from pathlib import Path
 
 import matplotlib
+import numpy as np
 from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
+from matplotlib.patches import Circle, Rectangle
 from numpy.typing import ArrayLike
 
 from fenicsmech.errors import DescriptionError
@@ -146,8 +147,12 @@ def open_frame(axes: Axes) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def draw_pin(axes: Axes, at: ArrayLike, radius: float) -> None:
-    """Draw a revolute joint at ``at`` (2,): a ring with a dot, over everything but arrows and labels."""
+def draw_pin(axes: Axes, at: ArrayLike, radius: float, *, welded: bool = False) -> None:
+    """Draw a joint at ``at`` (2,): a ring with a dot or, of a weld, a square; over all but arrows and labels."""
+    if welded:
+        side = 1.4 * radius
+        axes.add_patch(Rectangle(np.subtract(at, 0.5 * side), side, side, fc=INK, ec="white", lw=1.0, zorder=6))
+        return
     axes.add_patch(Circle(at, radius, fc="white", ec=INK, lw=1.0, zorder=6))
     axes.add_patch(Circle(at, 0.35 * radius, fc=INK, ec="none", zorder=6))
 

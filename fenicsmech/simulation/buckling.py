@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenicsmech.equilibrium import Iteration, Lead, Mode, NotConverged, Step
+from fenicsmech.continuation import Mode
+from fenicsmech.equilibrium import Iteration, LoadControl, MotorControl, NotConverged, Step
 from fenicsmech.errors import EquilibriumError
 from fenicsmech.model import MechanismModel
 from fenicsmech.simulation.frame import Frame
@@ -71,7 +72,7 @@ def mode_shape(model: MechanismModel, step: Step) -> ModeShape:
 def modes_at(
     model: MechanismModel,
     newton: Iteration,
-    lead: Lead,
+    held: LoadControl | MotorControl,
     frame: Frame,
     modes: Callable[..., list[Mode]],
     *,
@@ -83,7 +84,7 @@ def modes_at(
     Args:
         model: the discretised mechanism.
         newton: the solver that found the frame.
-        lead: what changes.
+        held: the control whose value changes.
         frame: an equilibrium of the model.
         modes: ``critical_changes`` or ``softest_modes``.
         count: how many.
@@ -94,7 +95,7 @@ def modes_at(
     """
     with model.shaped(frame.design):
         try:
-            found = modes(newton, lead, frame.state, count=count)
+            found = modes(newton, held, frame.state, count=count)
             return [(mode.value, mode_shape(model, mode.step)) for mode in found]
         except NotConverged as failure:
             raise EquilibriumError(

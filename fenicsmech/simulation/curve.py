@@ -11,16 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from fenicsmech.collective import on_one
+from fenicsmech.continuation import Mode, critical_changes, softest_modes
 from fenicsmech.elasticity import PLANE_STRESS
-from fenicsmech.equilibrium import (
-    ForceLead,
-    Iteration,
-    Lead,
-    Mode,
-    Quantity,
-    critical_changes,
-    softest_modes,
-)
+from fenicsmech.equilibrium import Iteration, LoadControl, MotorControl, Quantity
 from fenicsmech.errors import DescriptionError
 from fenicsmech.estimates import AccuracyOptions, Equilibrium, ErrorKind
 from fenicsmech.files import write_csv
@@ -33,8 +26,8 @@ from fenicsmech.simulation.explanation import Explanation, ExplanationOptions, e
 from fenicsmech.simulation.fields import gather, write_xdmf
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.friction import PinFriction, friction_band
-from fenicsmech.simulation.leading import Axis, leading
 from fenicsmech.simulation.picture import MechanismPlotter
+from fenicsmech.simulation.request import Axis, axes, followed_control
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -80,7 +73,7 @@ class Curve:
     @property
     def axes(self) -> tuple[Axis, Axis]:
         """Quantities and units across and up."""
-        return leading(self.part).axes(self.units)
+        return axes(self.part, self.units)
 
     @property
     def forces(self) -> np.ndarray:
@@ -183,7 +176,7 @@ class Curve:
         """
         self._need_force()
         at = self._chosen(frame)
-        found = self._modes(ForceLead(), critical_changes, at, count)
+        found = self._modes(LoadControl(), critical_changes, at, count)
         return tuple(BucklingLoad(at.force + value, mode) for value, mode in found)
 
     def buckling_positions(self, *, frame: Frame | None = None, count: int = 3) -> tuple[BucklingPosition, ...]:
@@ -199,8 +192,8 @@ class Curve:
             raise DescriptionError(
                 f"curve of {self.part.name!r}", "no motor moves along it", "Ask this of a curve that follows a motor"
             )
-        at, lead = self._chosen(frame), leading(self.part).lead(self.discretisation.linkage.joints)
-        found = self._modes(lead, critical_changes, at, count)
+        at, held = self._chosen(frame), followed_control(self.part, self.discretisation.linkage.joints)
+        found = self._modes(held, critical_changes, at, count)
         return tuple(BucklingPosition(at.displacement + value, mode) for value, mode in found)
 
     def soft_modes(self, *, frame: Frame | None = None, count: int = 3) -> tuple[SoftMode, ...]:
@@ -208,7 +201,7 @@ class Curve:
 
         Arguments and errors as those of ``buckling_loads``.
         """
-        found = self._modes(ForceLead(), softest_modes, self._chosen(frame), count)
+        found = self._modes(LoadControl(), softest_modes, self._chosen(frame), count)
         return tuple(SoftMode(value, mode) for value, mode in found)
 
     def friction_band(self, pins: Mapping[Joint, PinFriction]) -> tuple[np.ndarray, np.ndarray]:
@@ -382,11 +375,11 @@ class Curve:
         return frame or self.frames[-1]
 
     def _modes(
-        self, lead: Lead, modes: Callable[..., list[Mode]], frame: Frame, count: int
+        self, held: LoadControl | MotorControl, modes: Callable[..., list[Mode]], frame: Frame, count: int
     ) -> list[tuple[float, ModeShape]]:
         where = f"{self.part.name!r} in configuration {self.configuration.name!r} at {self.axes[1](frame.force)}"
         model = self.discretisation.model
-        return modes_at(model, self._newton, lead, frame, modes, count=count, where=where)
+        return modes_at(model, self._newton, held, frame, modes, count=count, where=where)
 
     def _estimated(self, kinds: Sequence[ErrorKind], output: Output | None) -> list[np.ndarray]:
         """Estimates of errors of each kind, (frames,) each; those not known yet from one adjoint per frame."""

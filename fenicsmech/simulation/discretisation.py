@@ -8,12 +8,13 @@ from mpi4py import MPI
 
 from fenicsmech.clock import Clock
 from fenicsmech.collective import on_one
-from fenicsmech.equilibrium import EquilibriumSolver, Iteration, Predictor
+from fenicsmech.continuation import Predictor
+from fenicsmech.equilibrium import EquilibriumSolver, Iteration
 from fenicsmech.estimates import Estimates
 from fenicsmech.mechanism import Force, Leader, Scene
 from fenicsmech.model import Fidelity, MechanismModel, check_links, mesh_mechanism
 from fenicsmech.multibody import build_linkage
-from fenicsmech.simulation.leading import leading
+from fenicsmech.simulation.request import controlled_load
 
 
 class Discretisation:
@@ -38,7 +39,6 @@ class Discretisation:
         self,
         scene: Scene,
         fidelity: Fidelity,
-        *,
         solver: EquilibriumSolver,
         predictor: Predictor,
         clock: Clock,
@@ -50,11 +50,9 @@ class Discretisation:
         self._newtons: dict[tuple, Iteration] = {}
         on_one(comm, lambda: check_links(scene.mechanism, self.linkage, fidelity))
 
-    def at(self, fidelity: Fidelity) -> Discretisation:
-        """The same scene at another fidelity, with nothing meshed yet."""
-        return Discretisation(
-            self.scene, fidelity, solver=self.solver, predictor=self.predictor, clock=self.clock, comm=self.comm
-        )
+    def at(self, fidelity: Fidelity, clock: Clock, comm: MPI.Comm) -> Discretisation:
+        """The same scene at another fidelity or on other processes, with nothing meshed yet."""
+        return Discretisation(self.scene, fidelity, self.solver, self.predictor, clock, comm)
 
     @cached_property
     def model(self) -> MechanismModel:
@@ -75,5 +73,5 @@ class Discretisation:
         key = part, others
         if key not in self._newtons:
             loads = tuple((self.model.point_load(other), float(magnitude)) for other, magnitude in others)
-            self._newtons[key] = self.solver.on(self.model.system(leading(part).load(self.model), loads))
+            self._newtons[key] = self.solver.on(self.model.system(controlled_load(part, self.model), loads))
         return self._newtons[key]

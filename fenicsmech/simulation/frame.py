@@ -13,11 +13,11 @@ from fenicsmech.mechanism import Motor, Output
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """An equilibrium and what was measured in it.
+    """An equilibrium and what was measured in it; prints its figures, not its arrays.
 
     Attributes:
-        force: magnitude of the force that leads, or what the motor that leads exerts.
-        displacement: of the force's point along it, from the assembled configuration, or the motor's position, from
+        force: magnitude of the prescribed force, or what the prescribed motors exert.
+        displacement: of the force's point along it, from the assembled configuration, or the motors' position, from
             the drawing.
         stable: whether small disturbances die out under dead loads.
         jumped: whether the mechanism snapped on the way from the frame before: the path turns back there, and this
@@ -54,3 +54,10 @@ class Frame:
     phases: Mapping[str, float]
     state: State
     design: np.ndarray
+
+    def __repr__(self) -> str:
+        figures = [f"force {self.force:.6g}", f"displacement {self.displacement:.6g}"]
+        figures += [f"{part.name} {value:.6g}" for part, value in (*self.outputs.items(), *self.motors.items())]
+        figures += [f"strain energy {self.strain_energy:.4g}", f"stress {self.max_stress:.4g}"]
+        figures += ["stable" if self.stable else f"{self.unstable_modes} unstable modes"] + ["snapped"] * self.jumped
+        return f"<Frame: {', '.join(figures)}>"

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fenicsmech.joints import WELD
 from fenicsmech.mechanism import Force, Link, Mechanism, in_dimension
 from fenicsmech.meshing import MechanismMesh
 from fenicsmech.multibody import Linkage
@@ -75,7 +76,7 @@ class MechanismPlotter:
             body = self._linkage.bodies[connection.a]
             offset = np.array(connection.at) - np.array(body.centre)
             moved = np.array(connection.at) + self._linkage.joints.space.displace(poses[connection.a], offset[None])[0]
-            pins.append(Pin(moved[:2]))
+            pins.append(Pin(moved[:2], welded=connection.kind is WELD))
         return tuple(pins)
 
     def _visible(self, index: int) -> tuple[np.ndarray, np.ndarray]:

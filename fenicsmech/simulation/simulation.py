@@ -12,9 +12,10 @@ from mpi4py import MPI
 
 from fenicsmech.clock import Clock
 from fenicsmech.collective import from_one
+from fenicsmech.continuation import ArcSteps, Hermite, Predictor
 from fenicsmech.effects import holding
 from fenicsmech.elasticity import Formulation, MixedFormulation, Quadrature
-from fenicsmech.equilibrium import ArcSteps, EquilibriumSolver, Hermite, Iteration, Predictor, PrimalDualNewton
+from fenicsmech.equilibrium import EquilibriumSolver, Iteration, PrimalDualNewton
 from fenicsmech.errors import DescriptionError
 from fenicsmech.estimates import AccuracyControl, Choice, Estimates, FidelityLevel, LevelErrors
 from fenicsmech.log import Progress, Silent
@@ -24,13 +25,11 @@ from fenicsmech.model import Fidelity, MechanismModel, read_fidelity
 from fenicsmech.multibody import Linkage
 from fenicsmech.simulation.buckling import ModeShape
 from fenicsmech.simulation.curve import Curve
-from fenicsmech.simulation.curves import Curves
 from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.fields import rest_vertices
-from fenicsmech.simulation.followed import FollowedCurve, PathEvent
-from fenicsmech.simulation.request import CurveRequest, read_path, read_request
-from fenicsmech.simulation.unloaded import unloaded_positions
-from fenicsmech.simulation.until import Until, check_until
+from fenicsmech.simulation.following import FollowedCurve, PathEvent, branches, follow
+from fenicsmech.simulation.request import CurveRequest, Until, check_until, read_path, read_request
+from fenicsmech.simulation.tracing import CurveTracer, unloaded_positions
 
 
 class RestShape(Protocol):
@@ -105,9 +104,7 @@ class Simulation:
             self._control = AccuracyControl(scene, accuracy, size, formulation)
             fidelity = self._control.fidelity(self._control.level)
         solver, predictor = solver or PrimalDualNewton(), predictor or Hermite()
-        self._discretisation = Discretisation(
-            scene, fidelity, solver=solver, predictor=predictor, clock=self.clock, comm=comm
-        )
+        self._discretisation = Discretisation(scene, fidelity, solver, predictor, self.clock, comm)
         self._described = _description(scene.mechanism)
 
     def __repr__(self) -> str:
@@ -152,7 +149,7 @@ class Simulation:
             configuration=configuration,
             others=others,
         )
-        with self._progress(len(request.controls), configuration) as progress, self._shaped():
+        with self._progress(len(request.controls), configuration) as progress:
             if self._control is None:
                 return self.trace(request, watch=progress.update)
             curves: list[Curve] = []
@@ -188,10 +185,9 @@ class Simulation:
         """
         self._check_description()
         self._check_chosen(part)
-        request = read_path(self.scene.mechanism, part, configuration=configuration, others=others)
-        check_until(until, part)
+        request = read_path(self.scene.mechanism, part, until=until, configuration=configuration, others=others)
         with self._progress(until.frames, configuration) as progress, self._shaped():
-            return Curves(self._discretisation).follow(request, until, steps, progress.update)
+            return follow(self._discretisation, request, until, steps or ArcSteps(), progress.update)
 
     def branches(
         self,
@@ -225,7 +221,7 @@ class Simulation:
                 "it was computed at another fidelity than this simulation has now",
                 "Ask the simulation that computed it, before an accuracy makes it go on to a finer mesh",
             )
-        return Curves(self._discretisation).branches(curve, event, until, steps, mode)
+        return branches(curve, event, until, steps or ArcSteps(), mode)
 
     def path(self, part: Force | Output, configurations: Sequence[Configuration]) -> np.ndarray:
         """Where the unloaded point of a force or output is in each configuration, (configurations, dim).
@@ -261,19 +257,10 @@ class Simulation:
 
     def on(self, comm: MPI.Comm) -> Simulation:
         """The same scene at the same fidelity for other processes, as drawn."""
-        return Simulation(
-            self.scene,
-            space=self.fidelity.model.name,
-            order=self.fidelity.order,
-            size=self.fidelity.sizes,
-            quadrature=self.fidelity.quadrature,
-            layers=self.fidelity.layers,
-            segments=self.fidelity.segments,
-            formulation=self.fidelity.formulation,
-            solver=self._discretisation.solver,
-            predictor=self._discretisation.predictor,
-            comm=comm,
-        )
+        other = copy(self)
+        other.comm, other.clock, other._control, other._design = comm, Clock(), None, None
+        other._discretisation = self._discretisation.at(self.fidelity, other.clock, comm)
+        return other
 
     # -- what it computes with -----------------------------------------------------------------------------------
 
@@ -314,13 +301,14 @@ class Simulation:
         return self._discretisation.newton(part, others)
 
     def trace(self, request: CurveRequest, *, watch: Callable[[int], None] = lambda done: None) -> Curve:
-        """The curve of a checked request at the present shape of ``model``, without showing progress.
+        """The curve of a checked request, as ``load_displacement`` without showing progress.
 
         Args:
             request: what is asked for.
             watch: called with the number of frames so far.
         """
-        return Curves(self._discretisation).trace(request, watch)
+        with self._shaped():
+            return CurveTracer(self._discretisation, request).curve(watch)
 
     @contextmanager
     def _shaped(self) -> Iterator[None]:
@@ -341,7 +329,7 @@ class Simulation:
         fidelity = self._control.fidelity(level)
         if fidelity != self.fidelity:
             # curves keep what they were computed with
-            self._discretisation, self.choice = self._discretisation.at(fidelity), None
+            self._discretisation, self.choice = self._discretisation.at(fidelity, self.clock, self.comm), None
         curve = self.trace(request, watch=watch)
         curves[:] = [curve]
         elements, plane_stress = curve.errors_by_kind()

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.table import format_table, publish
+from benchmarks.table import publish
+from fenicsmech.report import format_table
 
 ROOT = Path(__file__).parents[2]
 

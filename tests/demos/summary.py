@@ -37,7 +37,7 @@ def or_none(rule: Callable[[object], bool]) -> Callable[[object], bool]:
 
 # a mapping holds keys, a list the schema of its items, a function the test of a value
 SCHEMA: Schema = {
-    "demo": word,
+    "mechanism": word,
     "space": word,
     "order": count,
     "ranks": count,

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
 import fenicsmech as fm
-from fenicsmech.equilibrium import PathPoints
+from fenicsmech.continuation import ArcLengthTracer
 
 from .column import DEPTH, EULER, LENGTH, THICKNESS, YOUNG, Column, column, critical_load
 
@@ -68,7 +68,7 @@ def test_second_branch_is_found_where_it_crosses():
 @pytest.mark.parametrize("size, most", [(THICKNESS, 3), (0.7 * THICKNESS, 10)])
 def test_bifurcation_is_located_by_few_equilibria_to_the_accuracy_of_the_eigenvalue(size, most, monkeypatch):
     # the finer mesh is not symmetric: it turns the bifurcation into two paths that pass each other
-    solved, between = [], PathPoints.between
+    solved, between = [], ArcLengthTracer.between
 
     def counted(*arguments):
         solved.append(1)
@@ -77,7 +77,7 @@ def test_bifurcation_is_located_by_few_equilibria_to_the_accuracy_of_the_eigenva
     case = column(size=size)
     near = case.simulation.load_displacement(case.push, forces=[0.9 * CRITICAL])
     loads = [load.force for load in near.buckling_loads(count=1)]
-    monkeypatch.setattr(PathPoints, "between", counted)
+    monkeypatch.setattr(ArcLengthTracer, "between", counted)
     steps = fm.ArcSteps(largest=0.2)
     curve = case.simulation.follow(case.push, until=fm.Until(force=1.1 * EULER, frames=50), steps=steps)
     (event,) = curve.bifurcations

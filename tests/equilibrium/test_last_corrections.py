@@ -13,7 +13,7 @@ from .finger import finger
 
 STIFF = 200.0  # MPa of the toggle's stilt: the force's point follows the toggle
 LOADS = {"plane-stress": [0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0], "3d": [0.5, 1.0, 1.5, 2.0, 3.0]}
-ALWAYS_ANEW = fm.PrimalDualNewton(stale=0.0)
+ALWAYS_ANEW = fm.PrimalDualNewton(reuse_factor=0.0)
 
 
 @pytest.mark.parametrize("space", LOADS)
@@ -44,12 +44,12 @@ def test_rates_at_the_equilibria_are_as_good_as_those_of_a_new_factor(space):
         at = newton.linearise(state, control)
         rate = at.step(at.rate())
         off = system.size(rate + solution.tangent.scaled(-1.0)) / system.size(rate)
-        assert off < newton.options.stale
+        assert off < newton.options.reuse_factor
         corrected += 0.0 < off
     assert corrected  # a tangent of the equilibrium itself would have no error at all
 
 
-def test_rates_without_stale_factors_are_those_of_a_new_one():
+def test_rates_without_reused_factors_are_those_of_a_new_one():
     simulation, push = finger("plane-stress", solver=ALWAYS_ANEW)
     newton = simulation.newton(push)
     start = simulation.load_displacement(push, forces=[1.0]).frames[0].state

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.equilibrium import Hermite, LoadControl, NotConverged, Path, PathFailed, Solution, State, Step
+from fenicsmech.continuation import Hermite, LoadStepper, LoadStepsFailed
+from fenicsmech.equilibrium import EquilibriumPoint, LoadControl, NotConverged, Stability, State, Step
 
 from . import toggle
 from .finger import finger
@@ -19,12 +20,12 @@ RESOLUTION = 2.0 / 1024.0  # of it
 
 
 class OneFreedom:
-    """A path with a limit load of one, p = 1 − (1 − y)², in closed form: what solvers and systems do for ``Path``."""
+    """A path with a limit load of one, p = 1 − (1 − y)², in closed form, as ``LoadStepper`` sees it."""
 
     def __init__(self) -> None:
         self.system, self.solved, self.softest = self, 0, 1.0
 
-    def solve(self, start: State, control: LoadControl) -> Solution:
+    def solve(self, start: State, control: LoadControl) -> EquilibriumPoint:
         self.solved += 1
         if control.target > 1.0:
             raise NotConverged("no equilibrium", 25)
@@ -33,7 +34,7 @@ class OneFreedom:
         rate = math.inf if stiffness == 0.0 else 0.5 / stiffness
         tangent = Step(np.array([rate]), np.zeros(0), np.zeros(0), 1.0)
         state = State(np.array([1.0 - stiffness]), np.zeros((0, 1)), np.zeros(0), control.target, np.zeros(0))
-        return Solution(state, (0.0,), 4, 0, 0, tangent, None)
+        return EquilibriumPoint(state, control, tangent, rate, Stability(0, 0), 4, (0.0,), None)
 
     def size(self, step: Step) -> float:
         return float(np.abs(step.u).max())
@@ -55,8 +56,8 @@ def start() -> State:
 @pytest.mark.parametrize("beyond", BEYOND)
 def test_last_equilibrium_is_next_to_the_limit_load_and_has_lost_its_stiffness(beyond):
     freedom = OneFreedom()
-    path = Path(freedom, start(), 0.0, predictor=Hermite())
-    with pytest.raises(PathFailed) as failure:
+    path = LoadStepper(freedom, start(), LoadControl(), predictor=Hermite())
+    with pytest.raises(LoadStepsFailed) as failure:
         path.advance(LoadControl(beyond))
     assert 1.0 - RESOLUTION < failure.value.reached <= 1.0
     assert freedom.softest < math.sqrt(RESOLUTION)
@@ -65,9 +66,9 @@ def test_last_equilibrium_is_next_to_the_limit_load_and_has_lost_its_stiffness(b
 
 @pytest.mark.parametrize("beyond", BEYOND)
 def test_load_steps_after_the_first_tell_it_as_closely_and_a_load_on_the_way_back_is_reached(beyond):
-    path = Path(OneFreedom(), start(), 0.0, predictor=Hermite())
+    path = LoadStepper(OneFreedom(), start(), LoadControl(), predictor=Hermite())
     path.advance(LoadControl(0.5))
-    with pytest.raises(PathFailed) as failure:
+    with pytest.raises(LoadStepsFailed) as failure:
         path.advance(LoadControl(beyond))
     assert 1.0 - RESOLUTION < failure.value.reached <= 1.0
     assert path.advance(LoadControl(-0.5)).state.force == -0.5
@@ -90,7 +91,7 @@ def test_steps_of_a_led_force_and_of_constant_loads_do_not_depend_on_what_is_out
             simulation.load_displacement(push, forces=[load])
         with pytest.raises(fm.EquilibriumError, match="constant loads") as constant:
             simulation.load_displacement(push, forces=[0.0], others={other: load})
-        share = constant.value.last.state.share
+        share = constant.value.last.state.load_factor
         assert f"beyond {100.0 * share:.3g}% of them" in str(constant.value)
         reached += [led.value.last.force, share * load]
     assert reached == pytest.approx([reached[0]] * 4, rel=1e-6)

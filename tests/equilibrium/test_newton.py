@@ -5,7 +5,8 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.equilibrium import Constant, Hermite, LoadControl, Tangent
+from fenicsmech.continuation import Constant, Hermite, Tangent
+from fenicsmech.equilibrium import LoadControl
 
 from ..simulation.clamped import cantilever
 from .finger import RUBBER, finger

@@ -94,7 +94,7 @@ def test_inertia_and_solutions_are_those_of_the_factor_on_both_sides_of_buckling
         factor = Factor(matrix)
         assert factor.refactor() and solver.refactor()
         assert solver.inertia() == factor.inertia()
-        right = system.force_rate(state)
+        right = system.travel_gradient(system.controlled, state)
         exact, found = right.duplicate(), right.duplicate()
         factor.solve(right, exact)
         assert solver.solve(right, found, 1e-10)
@@ -199,7 +199,7 @@ def test_iterations_do_not_grow_with_the_mesh():
         system.linearise(state, control, system.residual(state, control))
         solver = TwoLevelSolver(system, TwoLevel())
         assert solver.refactor()
-        right = system.force_rate(state)
+        right = system.travel_gradient(system.controlled, state)
         assert solver.solve(right, right.duplicate(), 1e-8)
         counts.append(solver.iterations[-1])
     assert counts[1] <= counts[0] <= 60

@@ -127,8 +127,8 @@ def test_estimate_falls_with_the_mesh_and_vanishes_without_load():
 
 def test_estimate_takes_half_of_the_factors_of_its_frame_at_most(monkeypatch):
     simulation, push, forces = grasping()
-    factored, refactor = [], Iteration._refactor
-    monkeypatch.setattr(Iteration, "_refactor", lambda *args: factored.append(1) or refactor(*args))
+    factored, refactor = [], Iteration.factor
+    monkeypatch.setattr(Iteration, "factor", lambda *args: factored.append(1) or refactor(*args))
     curve = simulation.load_displacement(push, forces=forces)
     frames = len(factored)
     curve.error_estimates()

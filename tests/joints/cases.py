@@ -145,7 +145,7 @@ class Compiled:
         assert self._driven
         return self._equations.gradient(*self._arguments(*point))[:, -1]
 
-    def twist(self, z, *point) -> np.ndarray:
+    def force_rate(self, z, *point) -> np.ndarray:
         """Σ λ_k ∂²C_k/∂z∂φ, (2 pose_size,), λ last."""
         assert self._driven
         return self._equations.hessian(*self._arguments(z, *point[:-1]), point[-1])[-1, : z.size]

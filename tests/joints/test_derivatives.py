@@ -58,17 +58,17 @@ def test_motor_rate_passes_the_taylor_test(case, seed):
 
 @EVERY_MOTOR
 @SEEDS
-def test_twist_passes_the_taylor_test(case, seed):
+def test_force_rate_passes_the_taylor_test(case, seed):
     rng = np.random.default_rng(seed)
     c, (z, drawn, value) = compiled(case, driven=True), anywhere(case, rng)
     multipliers = rng.standard_normal(c.rows)
-    twist = c.twist(z, drawn.anchors, drawn.triad, value, multipliers)
-    assert twist.shape == z.shape
+    force_rate = c.force_rate(z, drawn.anchors, drawn.triad, value, multipliers)
+    assert force_rate.shape == z.shape
 
-    def pull(v):
+    def weighted(v):
         return c.gradient(z, drawn.anchors, drawn.triad, float(v[0])).T @ multipliers
 
-    assert_derivative(pull, np.array([value]), twist[:, None], rng)
+    assert_derivative(weighted, np.array([value]), force_rate[:, None], rng)
 
 
 @EVERY_JOINT

@@ -40,12 +40,12 @@ def test_displacement_hessian_passes_the_taylor_test(space, seed):
     rng = np.random.default_rng(seed)
     z, offsets, forces = random_pose(space, rng), *rng.standard_normal((2, 4, space.dim))
 
-    def pull(y):
+    def weighted(y):
         return np.einsum("ni,nia->a", forces, space.displacement_gradient(y, offsets))
 
     curvature = space.displacement_hessian(z, forces.T @ offsets)
     assert np.array_equal(curvature, curvature.T)
-    assert_derivative(pull, z, curvature, rng)
+    assert_derivative(weighted, z, curvature, rng)
 
 
 @EVERY_SPACE

@@ -54,7 +54,7 @@ def test_second_load_of_a_name_is_refused(kind):
     )
 
 
-def test_joints_between_the_same_links_are_told_apart_by_their_place():
+def test_joints_between_the_same_links_differ_by_their_place():
     m = Mechanism("clamp")
     a, b = m.rigid("a", fixed=True), m.rigid("b")
     names = [m.weld(a, b, at=at).name for at in ((0.0, 0.0), (1.0, 0.0))]
@@ -77,6 +77,16 @@ def test_joint_of_a_link_with_itself_is_refused():
         "'knot'",
         "link 'crank' is joined with itself",
         "Name two different links",
+    )
+
+
+def test_joint_kind_that_is_none_is_refused():
+    p = parts()
+    assert_refused(
+        lambda: p.mechanism.join("hinge", p.base, p.crank, at=(0.0, 0.0)),
+        "joint",
+        "'hinge' is not a joint kind",
+        "Give an instance of a JointKind",
     )
 
 
@@ -127,7 +137,7 @@ def test_interface_that_is_no_region_is_refused():
     assert_refused(
         lambda: p.mechanism.weld(p.crank, p.rod, at=(40.0, 0.0), region=2.0, name="clamp"),
         "'clamp'",
-        "2.0 is no interface region",
+        "2.0 is not an interface region",
         "Give region=Disc(…) or region=Rectangle(…)",
     )
 

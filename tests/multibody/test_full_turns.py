@@ -1,4 +1,4 @@
-"""Motors turn as often as they are told to, and the mechanism comes back to where it was drawn."""
+"""Motors turn any number of times, and the mechanism comes back to where it was drawn."""
 
 import numpy as np
 import pytest

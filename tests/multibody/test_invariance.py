@@ -116,7 +116,7 @@ def test_reaching_a_position_in_one_go_or_by_a_turn_more_is_the_same(dim):
         assert found == pytest.approx(once[name], abs=1e-12 * CRANK_ROCKER.coupler)
 
 
-def test_idle_spin_is_left_alone():
+def test_spin_without_effect_is_left_alone():
     # of all positions of a rod that may spin, the assembly takes the one nearest to where it came from
     machine = two_ball_rod()
     linkage = machine.linkage(3)

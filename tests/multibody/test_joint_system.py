@@ -65,7 +65,7 @@ def test_gradient_is_the_dense_jacobian(system):
     assert system.gradient(poses, motors) == pytest.approx(expected, abs=1e-8)
 
 
-def test_hessian_blocks_add_up_to_the_dense_jacobian_of_the_pull(system):
+def test_hessian_blocks_add_up_to_the_dense_jacobian_of_the_force(system):
     poses, motors, multipliers = anywhere(system)
     z = system.unknowns(poses)
     expected = dense.jacobian(lambda y: system.gradient(put(system, poses, y), motors).T @ multipliers, z)
@@ -79,33 +79,33 @@ def test_hessian_blocks_add_up_to_the_dense_jacobian_of_the_pull(system):
 def test_motor_rate_is_the_derivative_by_the_motor_values(system):
     poses, motors, multipliers = anywhere(system)
     direction = np.random.default_rng(1).standard_normal(len(motors))
-    rate, twist = system.motor_rate(poses, motors, multipliers, direction)
+    rate, force_rate = system.motor_rate(poses, motors, multipliers, direction)
     of_values = dense.jacobian(lambda phi: system.value(poses, phi), motors)
-    of_pull = dense.jacobian(lambda phi: system.gradient(poses, phi).T @ multipliers, motors)
+    of_force = dense.jacobian(lambda phi: system.gradient(poses, phi).T @ multipliers, motors)
     assert rate == pytest.approx(of_values @ direction, abs=1e-9)
-    assert twist == pytest.approx(of_pull @ direction, abs=1e-9)
+    assert force_rate == pytest.approx(of_force @ direction, abs=1e-9)
 
 
 def test_joints_without_motor_have_no_motor_rate(system):
     direction = np.where([c.motor is None for c in system.connections], 1.0, 0.0)
-    rate, twist = system.motor_rate(*anywhere(system), direction)
+    rate, force_rate = system.motor_rate(*anywhere(system), direction)
     assert not np.any(rate)
-    assert not np.any(twist)
+    assert not np.any(force_rate)
 
 
-def test_pulls_of_all_connections_and_norms_add_up_to_the_whole(system):
+def test_forces_of_all_connections_and_norms_add_up_to_the_whole(system):
     poses, motors, multipliers = anywhere(system)
     total = system.gradient(poses, motors).T @ multipliers
     for body in system.free_bodies:
         norm = [k for k, name in enumerate(system.row_names) if name == f"norm of {system.bodies[body].name}"]
-        pull = system.space.norm_gradient(poses[body]).T @ multipliers[norm]
+        wrench = system.space.norm_gradient(poses[body]).T @ multipliers[norm]
         for k, connection in enumerate(system.connections):
             if body in (connection.a, connection.b):
-                pull = pull + system.generalised_force(k, body, poses, motors, multipliers)
-        assert pull == pytest.approx(total[system.columns[body]], abs=1e-12)
+                wrench = wrench + system.generalised_force(k, body, poses, motors, multipliers)
+        assert wrench == pytest.approx(total[system.columns[body]], abs=1e-12)
 
 
-def test_joint_pulls_on_both_of_its_bodies_in_balance(system):
+def test_joint_acts_on_both_of_its_bodies_in_balance(system):
     # action and reaction: a joint does no work while its bodies move together
     motors = np.zeros(len(system.connections))
     multipliers = np.random.default_rng(2).standard_normal(system.rows)
@@ -115,10 +115,10 @@ def test_joint_pulls_on_both_of_its_bodies_in_balance(system):
         assert on_a[:dim] == pytest.approx(-on_b[:dim], abs=1e-13)
         # moments about the origin, from those about the centres
         total = np.zeros(2 * dim - 3)
-        for body, pull in ((c.a, on_a), (c.b, on_b)):
-            arm, force = ([*v, 0.0][:3] for v in (system.bodies[body].centre, pull[:dim]))
+        for body, wrench in ((c.a, on_a), (c.b, on_b)):
+            arm, force = ([*v, 0.0][:3] for v in (system.bodies[body].centre, wrench[:dim]))
             moment = np.cross(arm, force)[-total.size :]
-            total = total + system.space.turns(system.space.identity).T @ pull[dim:] + moment
+            total = total + system.space.turns(system.space.identity).T @ wrench[dim:] + moment
         assert total == pytest.approx(np.zeros(2 * dim - 3), abs=1e-12 * system.length)
 
 

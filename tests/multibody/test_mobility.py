@@ -80,7 +80,7 @@ def test_rod_between_two_balls_spins_about_itself():
     assert freedom_as_drawn(two_ball_rod(driven=False), 3).mobility == 2
 
 
-def test_idle_spin_does_not_stop_the_assembly():
+def test_spin_without_effect_does_not_stop_the_assembly():
     machine = two_ball_rod()
     linkage = machine.linkage(3)
     poses = machine.drive(linkage, 0.5).poses

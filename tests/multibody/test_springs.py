@@ -1,4 +1,4 @@
-"""Freedoms that motors leave go where springs want them; what no spring holds stays idle."""
+"""Freedoms that motors leave go where springs want them; what no spring holds moves without energy."""
 
 import numpy as np
 import pytest
@@ -50,17 +50,17 @@ def test_springs_share_a_turn_as_their_stiffness_says():
 
 
 @pytest.mark.parametrize("stiffness", [1e3, 1e-12])
-def test_what_springs_hold_is_not_idle_however_soft_they_are(stiffness):
+def test_what_springs_hold_is_held_however_soft_they_are(stiffness):
     mechanism, (shoulder, elbow, wrist) = arm()
     linkage = build_linkage(mechanism, 2)
     still, drawn = np.zeros(3), linkage.rigid.drawn
 
-    def idle(*joints: Joint) -> tuple[int, tuple[str, ...]]:
+    def loose(*joints: Joint) -> tuple[int, tuple[str, ...]]:
         springs = holding([JointSpring(joint, stiffness) for joint in joints], linkage)
         freedom = count_freedom(linkage.rigid, drawn, still, springs)
-        return freedom.mobility, freedom.idle
+        return freedom.mobility, freedom.zero_energy
 
-    assert idle() == (3, ("upper", "fore", "hand"))
-    assert idle(shoulder) == (3, ("fore", "hand"))
-    assert idle(shoulder, elbow) == (3, ("hand",))
-    assert idle(shoulder, elbow, wrist) == (3, ())
+    assert loose() == (3, ("upper", "fore", "hand"))
+    assert loose(shoulder) == (3, ("fore", "hand"))
+    assert loose(shoulder, elbow) == (3, ("hand",))
+    assert loose(shoulder, elbow, wrist) == (3, ())

@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.equilibrium import Newton, NotConverged, PathPoints
-from fenicsmech.simulation import follower
+from fenicsmech.continuation import ArcLengthTracer
+from fenicsmech.equilibrium import Newton, NotConverged
+from fenicsmech.simulation import following
 
 from ..equilibrium.column import EULER, column
 
@@ -36,7 +37,7 @@ def test_questions_about_a_singular_equilibrium_are_answered_in_words(ask, monke
 
 def test_curve_ends_with_its_frames_where_the_modes_of_a_bifurcation_are_not_found(monkeypatch):
     case = column()
-    monkeypatch.setattr(follower, "null_space", failing)
+    monkeypatch.setattr(following, "null_space", failing)
     with pytest.raises(fm.EquilibriumError, match="cannot be followed beyond") as caught:
         case.simulation.follow(case.push, until=fm.Until(force=1.1 * EULER))
     assert 0.5 * EULER < caught.value.last.force < 1.1 * EULER
@@ -58,7 +59,7 @@ def test_force_that_joints_hold_has_no_buckling_load_and_no_path():
 def test_curve_that_does_not_end_where_it_should_says_so(found, monkeypatch, caplog):
     case = column()
     if not found:
-        monkeypatch.setattr(PathPoints, "between", failing)
+        monkeypatch.setattr(ArcLengthTracer, "between", failing)
     curve = case.simulation.follow(case.push, until=fm.Until(force=0.333 * EULER))
     assert (abs(curve.forces[-1] / (0.333 * EULER) - 1.0) < 1e-9) == found
     assert ("the path ends at" in caplog.text) != found

@@ -22,7 +22,7 @@ def traced(name: str, space: str, **options) -> tuple[fm.Simulation, fm.Curve]:
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_displacements_move_by_a_small_fraction_of_their_estimated_error_when_newton_goes_on(name, space):
     simulation, curve = traced(name, space)
-    _, strict = traced(name, space, tolerance=1e-13, stale=0.0)
+    _, strict = traced(name, space, tolerance=1e-13, reuse_factor=0.0)
     moved = np.abs(curve.displacements - strict.displacements)
     assert np.all(moved <= SHARE * np.abs(curve.error_estimates()))
     assert sum(f.iterations for f in curve.frames) < sum(f.iterations for f in strict.frames)

@@ -85,7 +85,7 @@ def immobile(blueprint: Blueprint, built: Built, frame: fm.Frame) -> bool:
 
 def at_limit(blueprint: Blueprint, built: Built, frame: fm.Frame) -> bool:
     """Whether the last equilibrium has all but lost the stiffness of its softest mode, that of the unloaded scene."""
-    share = frame.state.share
+    share = frame.state.load_factor
     loaded = Potential.of(_scaled(blueprint, share), built.simulation)
     unloaded = Potential.of(_scaled(blueprint, 0.0), built.simulation)
     drawn = built.simulation.linkage.joints.drawn

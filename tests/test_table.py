@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from benchmarks.table import format_table
 from fenicsmech.errors import DescriptionError
+from fenicsmech.report import format_table
 
 
 def test_numbers_stand_right_and_words_left():

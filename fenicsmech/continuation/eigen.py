@@ -25,15 +25,15 @@ import numpy as np
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
-from fenicsmech.equilibrium.lead import Heading, Lead
-from fenicsmech.equilibrium.solver import Iteration, NotConverged
-from fenicsmech.equilibrium.state import State, Step
-from fenicsmech.equilibrium.system import EquilibriumSystem
-
-_FIRST, _SECOND = 1e-5, 1e-3  # of the mechanism's length, or rad: half the spans of the differences for K′ and K″
-_UNIT = 1e-2  # likewise: the change that eigenvalues are measured in
-_TOLERANCE = 1e-10  # relative, of eigenvalues
-_REAL = 1e-6  # imaginary over absolute value of an eigenvalue that rounding made complex
+from fenicsmech.equilibrium import (
+    EquilibriumSystem,
+    Iteration,
+    LoadControl,
+    MotorControl,
+    NotConverged,
+    State,
+    Step,
+)
 
 
 @dataclass(frozen=True)
@@ -44,13 +44,13 @@ class Mode:
     step: Step
 
 
-def softest_modes(newton: Iteration, lead: Lead, state: State, *, count: int) -> list[Mode]:
-    """The ``count`` modes with the stiffnesses μ nearest to zero while the lead is held, nearest first (collective).
+def softest_modes(solver: Iteration, held: LoadControl | MotorControl, state: State, *, count: int) -> list[Mode]:
+    """The ``count`` modes with the stiffnesses μ nearest to zero under the control ``held``, nearest first.
 
     Stiffnesses are in units of the mean stiffness of the links; negative ones are unstable.
     """
-    at = newton.linearise(state, lead.holding(state))
-    mask = newton.system.unknowns.coordinates_mask()
+    at = solver.linearise(state, held.at(held.value(solver.system, state)))
+    mask = solver.system.unknowns.coordinates_mask()
     own = len(mask.array_r)
 
     def apply(x: np.ndarray, y: np.ndarray) -> None:
@@ -58,39 +58,41 @@ def softest_modes(newton: Iteration, lead: Lead, state: State, *, count: int) ->
         right.array_w[:] = mask.array_r * x
         y[:] = at.solve(right).array_r
 
-    return _largest(newton.system, own, lambda x: x, apply, count)
+    return _largest(solver.system, own, lambda x: x, apply, count)
 
 
-def critical_changes(newton: Iteration, lead: Lead, state: State, *, count: int) -> list[Mode]:
-    """The ``count`` changes Δ of the lead's parameter that make the tangent singular, nearest first (collective).
+def critical_changes(solver: Iteration, held: LoadControl | MotorControl, state: State, *, count: int) -> list[Mode]:
+    """The ``count`` changes Δ of a control's value that make the tangent singular, nearest first.
 
     Both senses count. Exact to second order in Δ.
 
     Raises:
-        NotConverged: the parameter moves nothing.
+        NotConverged: the value moves nothing.
     """
-    system = newton.system
-    control = lead.holding(state)
-    x = newton.linearise(state, control).rate()
-    rate = lead.heading(system.unknowns.step(x), control)
-    if not lead.moves(system, rate):
-        raise NotConverged("it moves nothing", 0)
-    size = system.size(rate.step)
-    unit = _UNIT / size
-    later, earlier = (_tangent(newton, lead, state, rate.scaled(sign * _FIRST / size)) for sign in (1.0, -1.0))
-    first = _combined([(0.5 * unit * size / _FIRST, later), (-0.5 * unit * size / _FIRST, earlier)])
-    at = newton.linearise(state, control)
+    system = solver.system
+    control = held.at(held.value(system, state))
+    x = solver.linearise(state, control).rate()
+    rate = control.tangent(system.unknowns.step(x))
+    if not held.moves(system, rate):
+        raise NotConverged("it moves nothing")
+    size = system.size(rate)
+    unit = 1e-2 / size  # the change that eigenvalues are measured in; motions in lengths of the mechanism, or rad
+    amount = 1e-5 / size
+    later, earlier = (_tangent(solver, control, system.moved(state, rate.scaled(t))) for t in (amount, -amount))
+    first = _combined([(0.5 * unit / amount, later), (-0.5 * unit / amount, earlier)])
+    at = solver.linearise(state, control)
     bend = x.duplicate()
     first.mult(x, bend)
     bend.scale(-1.0 / unit)
-    bend = Heading(system.unknowns.step(at.solve(bend)), 0.0)
-    amount = _SECOND / size
+    bend = at.step(at.solve(bend))
+    amount = 1e-3 / size
     later, here, earlier = (
-        _tangent(newton, lead, state, rate.scaled(t) + bend.scaled(0.5 * t * t)) for t in (amount, 0.0, -amount)
+        _tangent(solver, control, system.moved(state, rate.scaled(t) + bend.scaled(0.5 * t * t)))
+        for t in (amount, 0.0, -amount)
     )
     weight = 0.5 * (unit / amount) ** 2
     second = _combined([(weight, later), (-2.0 * weight, here), (weight, earlier)])
-    at = newton.linearise(state, control)
+    at = solver.linearise(state, control)
     own = len(x.array_r)
 
     def apply(x: np.ndarray, y: np.ndarray) -> None:
@@ -105,12 +107,10 @@ def critical_changes(newton: Iteration, lead: Lead, state: State, *, count: int)
     return [Mode(unit * mode.value, mode.step) for mode in values]
 
 
-def _tangent(newton: Iteration, lead: Lead, state: State, change: Heading) -> PETSc.Mat:
-    """A copy of K after a change of state."""
-    moved = lead.moved(newton.system, state, change)
-    control = lead.holding(moved)
-    newton.system.linearise(moved, control, newton.system.residual(moved, control))
-    return newton.system.kkt.matrix().copy()
+def _tangent(solver: Iteration, control: LoadControl | MotorControl, state: State) -> PETSc.Mat:
+    """A copy of K at a loaded state."""
+    solver.system.linearise(state, control, solver.system.residual(state, control))
+    return solver.system.kkt.matrix().copy()
 
 
 def _combined(terms: Sequence[tuple[float, PETSc.Mat]]) -> PETSc.Mat:
@@ -139,7 +139,7 @@ def _largest(
     apply: Callable[[np.ndarray, np.ndarray], None],
     count: int,
 ) -> list[Mode]:
-    """Modes with the values 1 / θ, θ the ``count`` real eigenvalues of a map that are largest in size (collective).
+    """Modes with the values 1 / θ, θ the ``count`` real eigenvalues of a map that are largest in size.
 
     Args:
         system: whose scaled unknowns are the ``part`` of an eigenvector.
@@ -157,12 +157,12 @@ def _largest(
     solver.setWhichEigenpairs(SLEPc.EPS.Which.LARGEST_MAGNITUDE)
     wanted = count + 2  # a pair may be complex
     solver.setDimensions(nev=wanted, ncv=min(total, 2 * wanted + 20))
-    solver.setTolerances(tol=_TOLERANCE, max_it=200)
+    solver.setTolerances(tol=1e-10, max_it=200)
     solver.solve()
     modes, vector, shape = [], operator.createVecRight(), system.unknowns.control_row()
     for index in range(solver.getConverged()):
         theta = solver.getEigenpair(index, vector)
-        if theta != 0.0 and abs(theta.imag) <= _REAL * abs(theta):
+        if theta != 0.0 and abs(theta.imag) <= 1e-6 * abs(theta):  # rounding may make a real one complex
             shape.array_w[:] = part(vector.array_r)
             step = system.unknowns.step(shape)
             largest = system.size(step)

@@ -1,0 +1,44 @@
+"""Paths of equilibria: predicted, corrected by an equilibrium solver, accepted.
+
+- ``load_steps``: natural continuation, past dead centres of motors too
+- ``arc_length``: arc-length continuation, past limit points and folds
+- ``critical``: limit points, turning points and bifurcations, and the paths that cross there
+- ``eigen``: the softest modes of a tangent, and buckling loads
+"""
+
+from fenicsmech.continuation.arc_length import ArcLengthTracer, ArcSteps, Finish
+from fenicsmech.continuation.critical import Critical, CriticalPoint, Sense, crossing, locate, null_space
+from fenicsmech.continuation.eigen import Mode, critical_changes, softest_modes
+from fenicsmech.continuation.load_steps import (
+    Constant,
+    Hermite,
+    LoadStepper,
+    LoadSteps,
+    LoadStepsFailed,
+    MotorStepper,
+    Predictor,
+    Tangent,
+)
+
+__all__ = [
+    "ArcLengthTracer",
+    "ArcSteps",
+    "Constant",
+    "Critical",
+    "CriticalPoint",
+    "Finish",
+    "Hermite",
+    "LoadStepper",
+    "LoadSteps",
+    "LoadStepsFailed",
+    "Mode",
+    "MotorStepper",
+    "Predictor",
+    "Sense",
+    "Tangent",
+    "critical_changes",
+    "crossing",
+    "locate",
+    "null_space",
+    "softest_modes",
+]

@@ -1,0 +1,297 @@
+"""Arc-length continuation: steps along a path that may turn back in load and in displacement.
+
+An equilibrium is predicted along the tangent and its curvature, corrected in a plane across the path, and accepted if
+the path turns little enough; steps are as long as its curvature allows. With the tangents y′ by arc length at the last
+two points and the step h,
+
+    y = y₁ + h y₁′ + ½ h² (y₁′ − y₀′) / |y₁ − y₀|,      ⟨y₁′, y₂ − y⟩ = 0.
+
+Sources: Riks (doi:10.1016/0020-7683(79)90081-7), Crisfield (doi:10.1016/0045-7949(81)90108-5).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from fenicsmech.checks import positive
+from fenicsmech.equilibrium import (
+    ArcLengthControl,
+    ArcMetric,
+    EquilibriumPoint,
+    Iteration,
+    LoadControl,
+    MotorControl,
+    NotConverged,
+    State,
+    Step,
+    mean_product,
+)
+from fenicsmech.errors import DescriptionError
+from fenicsmech.log import logger
+
+_log = logger(__name__)
+
+
+@dataclass(frozen=True)
+class ArcSteps:
+    """How finely a path is followed.
+
+    Attributes:
+        first: length of the first step; 1 is as far as ``until`` would be if the mechanism were linear.
+        largest: the longest step, likewise, in force and in the displacement of its point.
+        smallest: the shortest step, likewise; where even that fails the path ends with an error.
+        motion: how far a step may move anything, in lengths of the mechanism or rad.
+        tolerance: how closely limit points and bifurcations are located, as a part of the step they lie in.
+        turn: angle between the tangents at both ends of a step that is as long as it should be, rad.
+        largest_turn: the same from which a step is taken again, shorter: it is a jump to another branch, or cuts off a
+            bend.
+        iterations: of a step as long as it should be; the last one only judges the stability.
+
+    Raises:
+        DescriptionError: a length is not positive, or the tolerance not between 0 and 1.
+    """
+
+    first: float = 0.02
+    largest: float = 0.05
+    smallest: float = 1e-6
+    motion: float = 0.1
+    tolerance: float = 1e-4
+    turn: float = 0.25
+    largest_turn: float = 0.9
+    iterations: int = 5
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            positive(f"{name} of arc-length steps", value)
+        if not self.tolerance < 1.0:
+            raise DescriptionError(
+                "tolerance of arc-length steps", f"{self.tolerance:g} is not below 1", "Give a part of a step, as 1e-4"
+            )
+
+
+@dataclass(frozen=True)
+class Finish:
+    """A value of some quantity at which a path ends.
+
+    Attributes:
+        value: of the quantity at a point.
+        rate: of the quantity along the path at a point.
+        target: where the path ends.
+        scale: of the quantity.
+    """
+
+    value: Callable[[EquilibriumPoint], float]
+    rate: Callable[[EquilibriumPoint], float]
+    target: float
+    scale: float
+
+    def passed(self, before: EquilibriumPoint, after: EquilibriumPoint) -> bool:
+        """Whether the target lies between two neighbouring points."""
+        a, b = self.value(before) - self.target, self.value(after) - self.target
+        return a * b < 0.0 or (b == 0.0 and a != 0.0)
+
+
+class ArcLengthTracer:
+    """Steps along the path through one equilibrium.
+
+    Distances are in units of what a linear mechanism would do until it is where the path shall lead.
+
+    Args:
+        solver: of the equilibria.
+        followed: the control whose value the path is followed by.
+        state: an equilibrium that sets the units.
+        steps: how fine the steps are.
+        value: change of the followed value that is of interest, or
+        conjugate: change of its conjugate; of two, the one that is reached first.
+
+    Attributes:
+        start: the point at ``state``; the followed value grows along its tangent.
+        metric: what distances are measured in.
+        length: of the next step.
+
+    Raises:
+        NotConverged: the followed value moves nothing, or the tangent is singular.
+    """
+
+    def __init__(
+        self,
+        solver: Iteration,
+        followed: LoadControl | MotorControl,
+        state: State,
+        *,
+        steps: ArcSteps,
+        value: float | None,
+        conjugate: float | None,
+    ) -> None:
+        self.solver, self.system, self.followed, self.steps = solver, solver.system, followed, steps
+        self._conjugate_reference = conjugate or math.inf
+        self.length = steps.first
+        self._before: EquilibriumPoint | None = None
+        at = solver.linearise(state, followed.at(followed.value(self.system, state)))
+        point = at.point((solver.relative(at.residual),), 0)
+        speed, motion = abs(point.conjugate_rate), math.sqrt(mean_product(self.system, point.tangent, point.tangent))
+        if not followed.moves(self.system, point.tangent) or not (followed.displaces or value or speed > 0.0):
+            raise NotConverged("it moves nothing")
+        reach = min(abs(value) if value else math.inf, abs(conjugate) / speed if conjugate and speed else math.inf)
+        if math.isinf(reach):
+            reach = 0.01 / motion  # of the mechanism's length, or rad: of interest if nothing else is said
+        self.metric = ArcMetric(self.system, followed, reach * motion, reach, reach * speed or math.inf)
+        self.start = point.scaled(1.0 / self.metric.norm(point.tangent))
+
+    # -- points ------------------------------------------------------------------------------------------------
+
+    def value(self, point: EquilibriumPoint) -> float:
+        """The followed value."""
+        return self.followed.value(self.system, point.state)
+
+    def value_rate(self, point: EquilibriumPoint) -> float:
+        """That along the path."""
+        return self.followed.change(point.tangent)
+
+    def correct(self, guess: State, normal: Step, near: EquilibriumPoint) -> EquilibriumPoint:
+        """The equilibrium in the plane through ``guess`` across ``normal``, its tangent not against that.
+
+        Args:
+            guess: a state near it.
+            normal: across which the plane stands.
+            near: an equilibrium nearby, which decides what is held.
+
+        Raises:
+            NotConverged: there is none near.
+        """
+        return self.solver.solve(guess, ArcLengthControl(0.0, self.metric, guess, normal, self.held(near)))
+
+    def held(self, near: EquilibriumPoint):
+        """The control that leaves K regular: whichever value changes more along the path at ``near``."""
+        conjugate = abs(near.conjugate_rate) / self.metric.conjugate
+        if self.followed.opposite and conjugate > abs(self.value_rate(near)) / self.metric.value:
+            return self.followed.opposite
+        return self.followed
+
+    def chord(self, start: EquilibriumPoint, end: EquilibriumPoint) -> Step:
+        """From ``start`` to ``end``."""
+        return self.system.difference(end.state, start.state)
+
+    def along(self, start: EquilibriumPoint, end: EquilibriumPoint) -> float:
+        """How far ``end`` lies ahead of ``start`` along the tangent there."""
+        return self.metric.dot(start.tangent, self.chord(start, end))
+
+    def between(self, start: EquilibriumPoint, end: EquilibriumPoint, distance: float) -> EquilibriumPoint:
+        """The equilibrium ``distance`` ahead of ``start``, which lies before ``end`` on the same piece of the path.
+
+        It is predicted on the cubic through both ends, with the rates by the distance,
+
+            y = y₀ + t² (3 − 2 t) (y₁ − y₀) + w t (1 − t)² y₀′ − w t² (1 − t) y₁′.
+
+        Raises:
+            NotConverged: the cubic does not lead there.
+        """
+        width = self.along(start, end)
+        t = distance / width
+        slope = self.metric.dot(start.tangent, end.tangent)
+        ahead = (
+            self.chord(start, end).scaled(t * t * (3.0 - 2.0 * t))
+            + start.tangent.scaled(width * t * (1.0 - t) ** 2)
+            + end.tangent.scaled(-width * t * t * (1.0 - t) / slope)
+        )
+        return self.correct(self.system.moved(start.state, ahead), start.tangent, start)
+
+    # -- steps -------------------------------------------------------------------------------------------------
+
+    def advance(self, point: EquilibriumPoint) -> EquilibriumPoint:
+        """The next point of the path, as far ahead as its curvature allows.
+
+        Raises:
+            NotConverged: not even the shortest step succeeded.
+        """
+        steps, longest = self.steps, self._longest(point)
+        self.length = min(self.length, longest)
+        while True:
+            reason = "the path bends too sharply, or another one is too near"
+            try:
+                found = self.correct(self._guess(point), point.tangent, point)
+                turn = self._turn(point, found)
+                _log.debug("arc %.2e: turn %.2f, %d iterations", self.length, turn, found.iterations)
+                if turn <= steps.largest_turn:
+                    ease = min(steps.turn / max(turn, 1e-12), math.sqrt(steps.iterations / found.iterations))
+                    self.length *= min(max(ease, 0.5), 2.0)
+                    self._before = point
+                    return found
+            except NotConverged as failure:
+                reason = str(failure)
+            self.length *= 0.5
+            if self.length < steps.smallest * min(longest / steps.largest, 1.0):
+                raise NotConverged(reason)
+
+    def follow(
+        self, start: EquilibriumPoint, finishes: Sequence[Finish], *, most: int
+    ) -> Iterator[tuple[EquilibriumPoint, EquilibriumPoint]]:
+        """Both ends of each step along the path from ``start`` until a finish is passed, or of ``most`` steps.
+
+        Raises:
+            NotConverged: the path cannot be followed further.
+        """
+        point = start
+        for _ in range(most):
+            following = self.advance(point)
+            ends = [self._end(point, following, finish) for finish in finishes if finish.passed(point, following)]
+            if ends:
+                following = min(ends, key=lambda end: self.along(point, end))
+            yield point, following
+            if ends:
+                return
+            point = following
+
+    def _guess(self, point: EquilibriumPoint) -> State:
+        """Along the tangent, and along the curvature if that bends it little."""
+        ahead, before = point.tangent.scaled(self.length), self._before
+        if before is not None:
+            width = self.metric.norm(self.chord(before, point))
+            bend = point.tangent + before.tangent.scaled(-1.0)
+            if width > 0.0 and self.length * self.metric.norm(bend) <= 2.0 * self.steps.turn * width:
+                ahead = ahead + bend.scaled(0.5 * self.length**2 / width)
+        return self.system.moved(point.state, ahead)
+
+    def _longest(self, point: EquilibriumPoint) -> float:
+        """The arc that changes neither the value nor its conjugate nor anything's place too much."""
+        rates = (
+            abs(self.value_rate(point)) / (self.steps.largest * self.metric.value),
+            abs(point.conjugate_rate) / (self.steps.largest * self._conjugate_reference),
+            self.system.size(point.tangent) / self.steps.motion,
+        )
+        return 1.0 / max(rates)
+
+    def _turn(self, a: EquilibriumPoint, b: EquilibriumPoint) -> float:
+        """Largest angle between the tangents at both points and the chord."""
+        chord, dot = self.metric.unit(self.chord(a, b)), self.metric.dot
+        cosine = min(dot(a.tangent, b.tangent), dot(a.tangent, chord), dot(chord, b.tangent))
+        return math.acos(min(max(cosine, -1.0), 1.0))
+
+    def _end(self, before: EquilibriumPoint, after: EquilibriumPoint, finish: Finish) -> EquilibriumPoint:
+        """Where the path has the finish's value, by Newton's method within the step; as near as can be got to it.
+
+        That is within 1e-10 of the finish's scale and 1e-8 of the change over the step.
+        """
+        width = self.along(before, after)
+        low, high = 0.0, width
+        change = finish.value(after) - finish.value(before)
+        near, rising = min(1e-10 * finish.scale, 1e-8 * abs(change)), change > 0.0
+        distance, best = width, after
+        for _ in range(30):
+            gap = finish.value(best) - finish.target
+            if abs(gap) <= near:
+                break
+            low, high = (low, distance) if (gap > 0.0) == rising else (distance, high)
+            slope = finish.rate(best) / self.metric.dot(before.tangent, best.tangent)
+            wanted = distance - gap / slope if slope else low
+            distance = wanted if low < wanted < high else 0.5 * (low + high)
+            try:
+                best = self.between(before, after, distance)
+            except NotConverged:
+                break
+        reached = finish.value(best)
+        if abs(reached - finish.target) > 1e-6 * abs(change):
+            _log.warning("the path ends at %g, not at %g: no equilibrium was found there", reached, finish.target)
+        return best

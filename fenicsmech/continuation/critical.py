@@ -1,0 +1,268 @@
+"""Limit points, turning points and bifurcations of a path, and the paths that cross at bifurcations.
+
+What a step across each of them changes, with n unstable modes, the rates v̇ of the followed value and q̇ of its
+conjugate:
+
+    limit point     force's rate changes sign           a dead load has an extremum and snaps from here
+    turning point   displacement's rate changes sign    so has a held point, or a motor
+    bifurcation     n changes otherwise                 other paths cross this one
+
+n changes by one where v̇ changes sign. Located is the root of the line through the rates or, at a bifurcation, through
+the stiffness μ of the softest mode on either side; the inertia judges on which side of it an equilibrium lies, until
+what changes is known closely enough and single. μ comes from inverse iteration with the factor of K at hand,
+
+    y = K⁻¹ M φ,    μ = (y · M φ) / (y · M y),    φ ← y / √(y · M y),
+
+M the identity of the coordinates s and 0 for multipliers and force; it is an eigenvalue of K under the constraints,
+with an error of second order in that of φ. Near a bifurcation μ is by far the smallest of all, and one iteration does.
+
+The path that crosses at a simple bifurcation y_b is entered along the null vector φ of K, made orthogonal to the path,
+and looked for in the plane across φ: that meets the new path but, near the bifurcation, not the old one,
+
+    y = y_b ± ε φ,    ⟨φ, y − y_b⟩ = ± ε.
+
+Source of the latter: Wagner & Wriggers (doi:10.1108/eb023727).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from fenicsmech.continuation.arc_length import ArcLengthTracer
+from fenicsmech.continuation.eigen import softest_modes
+from fenicsmech.equilibrium import EquilibriumPoint, EquilibriumSystem, Linearisation, NotConverged, Step
+from fenicsmech.log import logger
+
+_log = logger(__name__)
+
+
+class Critical(Enum):
+    """What a critical point of a path is."""
+
+    LIMIT = "limit point"
+    TURNING = "turning point"
+    BIFURCATION = "bifurcation"
+
+
+class Sense(Enum):
+    """Along the null vector, or against it."""
+
+    ALONG = 1.0
+    AGAINST = -1.0
+
+
+@dataclass(frozen=True)
+class CriticalPoint:
+    """A critical point of a path.
+
+    Attributes:
+        kind: what it is.
+        point: the equilibrium nearest to it that was found.
+        value: the followed value there. Where the mesh turns a bifurcation into two paths that pass each other, no
+            equilibrium is near it, but the line through the stiffnesses on either side has its root where they would
+            cross.
+        modes: by how many the unstable modes change there.
+        course: the direction of the path over the step in which it lies. The tangent in the point itself is no measure
+            of it: rounding and the asymmetry of meshes let it lean towards the paths that cross.
+    """
+
+    kind: Critical
+    point: EquilibriumPoint
+    value: float
+    modes: int
+    course: Step
+
+
+def locate(path: ArcLengthTracer, before: EquilibriumPoint, after: EquilibriumPoint) -> list[CriticalPoint]:
+    """All critical points between two neighbouring points of a path, in its order."""
+    if not _changes(path, before, after):
+        return []
+    piece = _Piece(path, before, after)
+    return _search(piece, *piece.ends(), path.steps.tolerance * piece.width)
+
+
+def null_space(path: ArcLengthTracer, critical: CriticalPoint) -> list[Step]:
+    """A basis of the tangent's null space at a bifurcation, largest displacements the mechanism's length.
+
+    As many vectors as modes change their stability there.
+    """
+    modes = softest_modes(path.solver, path.followed, critical.point.state, count=critical.modes)
+    return [mode.step for mode in modes]
+
+
+def crossing(path: ArcLengthTracer, critical: CriticalPoint, mode: Step, sense: Sense) -> EquilibriumPoint:
+    """The first point of the path that crosses at ``critical``, with the null vector ``mode``.
+
+    Steps of ``path`` go on from there.
+
+    Raises:
+        NotConverged: there is none near.
+    """
+    metric, point = path.metric, critical.point
+    course = metric.unit(critical.course)
+    across = mode + course.scaled(-metric.dot(mode, course))
+    across = metric.unit(across).scaled(sense.value)
+    size = 0.02 / path.system.size(across)  # ε, of the mechanism's length, or rad
+    for _ in range(8):
+        try:
+            found = path.correct(path.system.moved(point.state, across.scaled(size)), across, point)
+        except NotConverged:
+            size *= 0.5
+            continue
+        path.length = metric.norm(path.chord(point, found))
+        return found
+    raise NotConverged("no path was found across the bifurcation")
+
+
+@dataclass(frozen=True)
+class _Sample:
+    """A point of a piece: how far along it lies, and the stiffness of its softest mode."""
+
+    distance: float
+    point: EquilibriumPoint
+    stiffness: float
+
+
+class _Piece:
+    """A step of the path."""
+
+    def __init__(self, path: ArcLengthTracer, before: EquilibriumPoint, after: EquilibriumPoint) -> None:
+        self.path, self.before, self.after = path, before, after
+        self.width = path.along(before, after)
+        self.course = path.metric.unit(path.chord(before, after))
+        self._mode = _SoftestMode(path.system)
+
+    def ends(self) -> tuple[_Sample, _Sample]:
+        """Both ends."""
+        samples, held = [], self.path.held(self.before)
+        for distance, point in ((0.0, self.before), (self.width, self.after)):
+            self.path.system.load(point.state)
+            control = held.at(held.value(self.path.system, point.state))
+            at = self.path.solver.linearise(point.state, control)
+            samples.append(_Sample(distance, point, self._mode.stiffness(at)))
+        return samples[0], samples[1]
+
+    def at(self, distance: float) -> _Sample:
+        """The equilibrium on the way, unless it strays off it by more than the way gone.
+
+        Meshes without a column's symmetry turn its bifurcation into two paths that pass each other closely; what turns
+        off from one to the other there is none of this path's points.
+        """
+        point, metric = self.path.between(self.before, self.after, distance), self.path.metric
+        chord = self.path.chord(self.before, point)
+        ahead = metric.dot(chord, self.course)
+        if metric.norm(chord + self.course.scaled(-ahead)) > ahead:
+            raise NotConverged("it strays off the path", point.iterations)
+        return _Sample(distance, point, self._mode.stiffness(point.linearisation))
+
+
+class _SoftestMode:
+    """The softest mode, kept from one state of a path to the next."""
+
+    def __init__(self, system: EquilibriumSystem) -> None:
+        self._mask = system.unknowns.coordinates_mask()
+        self._mode = self._mask.duplicate()
+        # without symmetry, so that it has something of every mode in it
+        self._mode.array_w[:] = np.random.default_rng(system.comm.rank).standard_normal(self._mode.local_size)
+
+    def stiffness(self, at: Linearisation) -> float:
+        """μ of a tangent, to a relative change of 1e-3.
+
+        Twelve iterations at most: where two modes are as soft as each other, any of them will do.
+        """
+        mask, mode, before = self._mask, self._mode, math.inf
+        right = mask.duplicate()
+        for _ in range(12):
+            right.pointwiseMult(mask, mode)
+            right.normalize()
+            mode = at.solve(right)
+            product = mode.dot(right)
+            masked = mask.duplicate()
+            masked.pointwiseMult(mask, mode)
+            value = product / masked.norm() ** 2
+            if abs(value - before) <= 1e-3 * abs(value):
+                break
+            before = value
+        self._mode = mode
+        return value
+
+
+def _search(piece: _Piece, low: _Sample, high: _Sample, tolerance: float) -> list[CriticalPoint]:
+    """The critical points between two samples of ``piece``.
+
+    Looked at is not the root but 0.4 tolerances beside it, so that both sides of it become known; eight times farther
+    off where there was no equilibrium to be found.
+    """
+    path, least, before = piece.path, 0.4 * tolerance, None
+    while (width := high.distance - low.distance) > tolerance and least < width:
+        root = _root(path, low, high)
+        aside = least if before is None else max(least, abs(root - before))  # it is no nearer to where it will be
+        before = root
+        middle = 0.5 * (low.distance + high.distance)
+        # on the side of the farther end, and within the ends
+        beside = min(root + aside, middle) if root < middle else max(root - aside, middle)
+        try:
+            between = piece.at(beside)
+        except NotConverged as failure:
+            _log.debug("no equilibrium on the way to a critical point: %s", failure)
+            least *= 8.0
+            continue
+        left, right = _changes(path, low.point, between.point), _changes(path, between.point, high.point)
+        if left and right:
+            return _search(piece, low, between, tolerance) + _search(piece, between, high, tolerance)
+        low, high = (low, between) if left else (between, high)
+    return _classified(piece, low, high)
+
+
+def _root(path: ArcLengthTracer, low: _Sample, high: _Sample) -> float:
+    """Where the line through what changes sign vanishes; the middle if nothing does."""
+    pairs = [(rate(path, low.point), rate(path, high.point)) for rate in (_value_rate, _conjugate_rate)]
+    for first, second in (*pairs, (low.stiffness, high.stiffness)):
+        if first * second < 0.0:
+            return low.distance + (high.distance - low.distance) * first / (first - second)
+    return 0.5 * (low.distance + high.distance)
+
+
+def _value_rate(path: ArcLengthTracer, point: EquilibriumPoint) -> float:
+    """v̇ over its reference, without rounding."""
+    rate = path.value_rate(point) / path.metric.value
+    return rate if abs(rate) > 1e-9 else 0.0
+
+
+def _conjugate_rate(path: ArcLengthTracer, point: EquilibriumPoint) -> float:
+    """q̇ of a displacement, likewise; what motors exert may have any number of extrema without harm."""
+    rate = 0.0 if path.followed.displaces else point.conjugate_rate / path.metric.conjugate
+    return rate if abs(rate) > 1e-9 else 0.0
+
+
+def _changes(path: ArcLengthTracer, a: EquilibriumPoint, b: EquilibriumPoint) -> bool:
+    return (
+        a.unstable_modes != b.unstable_modes
+        or _value_rate(path, a) * _value_rate(path, b) < 0.0
+        or _conjugate_rate(path, a) * _conjugate_rate(path, b) < 0.0
+    )
+
+
+def _classified(piece: _Piece, low: _Sample, high: _Sample) -> list[CriticalPoint]:
+    """What lies between two samples that are as good as one."""
+    path, course, a, b = piece.path, piece.course, low.point, high.point
+    found, modes = [], abs(b.unstable_modes - a.unstable_modes)
+    if _value_rate(path, a) * _value_rate(path, b) < 0.0:
+        nearer = min(a, b, key=lambda point: abs(path.value_rate(point)))
+        kind = Critical.TURNING if path.followed.displaces else Critical.LIMIT
+        found.append(CriticalPoint(kind, nearer, path.value(nearer), 1, course))
+        modes = abs(modes - 1)
+    if modes:
+        nearer = min(low, high, key=lambda sample: abs(sample.stiffness)).point
+        value, p, q = path.value(nearer), path.value(a), path.value(b)
+        if low.stiffness * high.stiffness < 0.0:
+            value = p + (q - p) * low.stiffness / (low.stiffness - high.stiffness)
+        found.append(CriticalPoint(Critical.BIFURCATION, nearer, value, modes, course))
+    if _conjugate_rate(path, a) * _conjugate_rate(path, b) < 0.0:
+        nearer = min(a, b, key=lambda point: abs(point.conjugate_rate))
+        found.append(CriticalPoint(Critical.TURNING, nearer, path.value(nearer), 0, course))
+    return found
