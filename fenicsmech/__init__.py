@@ -74,7 +74,7 @@ from fenicsmech.mechanism import (
 )
 from fenicsmech.model import SPACES
 from fenicsmech.plot import CurveSeries, Trace, plot_curve
-from fenicsmech.report import Design, Report, write_report
+from fenicsmech.report import Optimisation, Report, write_report
 from fenicsmech.simulation import (
     BucklingLoad,
     BucklingPosition,
@@ -103,7 +103,6 @@ __all__ = [
     "Curve",
     "CurveSeries",
     "DescriptionError",
-    "Design",
     "DesignProblem",
     "DesignResult",
     "Disc",
@@ -128,6 +127,7 @@ __all__ = [
     "MeshQuality",
     "MeshingError",
     "MixedFormulation",
+    "Optimisation",
     "ModulusFit",
     "NeoHookean",
     "PosePotential",
