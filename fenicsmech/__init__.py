@@ -65,7 +65,7 @@ from fenicsmech.mechanism import (
 )
 from fenicsmech.model import SPACES
 from fenicsmech.plot import CurveSeries, Trace, plot_curve
-from fenicsmech.report import Design, Report, write_report
+from fenicsmech.report import Optimisation, Report, write_report
 from fenicsmech.simulation import (
     BucklingLoad,
     BucklingPosition,
@@ -94,7 +94,6 @@ __all__ = [
     "Curve",
     "CurveSeries",
     "DescriptionError",
-    "Design",
     "DesignProblem",
     "DesignResult",
     "Disc",
@@ -116,6 +115,7 @@ __all__ = [
     "MeshQuality",
     "MeshingError",
     "Mixed",
+    "Optimisation",
     "ModulusFit",
     "NeoHookean",
     "PrimalDualNewton",

@@ -25,7 +25,7 @@ from fenicsmech.design.optimisers.problem import (
     TooHigh,
 )
 from fenicsmech.design.regularisers import MeshQuality, Model, Regulariser, ShapeBounds, StayClose
-from fenicsmech.design.rest_shape import DesignedLink, RestShape
+from fenicsmech.design.rest_shape import DesignedLink, ParametricShape
 from fenicsmech.design.result import DesignResult, LinkDesign, TargetResult
 from fenicsmech.design.run import Checkpoint, DesignProgress, minimise_together
 from fenicsmech.design.sensitivity import Gradient, Sensitivity
@@ -75,7 +75,7 @@ __all__ = [
     "Reason",
     "Regulariser",
     "Resolution",
-    "RestShape",
+    "ParametricShape",
     "ShapeBounds",
     "ShapeError",
     "ShapeMap",

@@ -24,7 +24,7 @@ from fenicsmech.design.objective import Group, Objective, group_count, objective
 from fenicsmech.design.optimisers.levenberg_marquardt import LevenbergMarquardt
 from fenicsmech.design.optimisers.problem import Infeasible, Iterate, Optimiser, Start
 from fenicsmech.design.regularisers import MeshQuality, Regulariser, ShapeBounds, StayClose
-from fenicsmech.design.rest_shape import RestShape
+from fenicsmech.design.rest_shape import ParametricShape
 from fenicsmech.design.result import (
     DesignResult,
     draw_links,
@@ -34,7 +34,7 @@ from fenicsmech.design.result import (
     write_solids,
 )
 from fenicsmech.design.run import Checkpoint, DesignProgress, Optimum, fingerprint, minimise_together
-from fenicsmech.design.shape.handle_optimum import Placement
+from fenicsmech.design.shape.handle_optimum import HandlePlacement
 from fenicsmech.design.shape.shape_map import LinkShape, shape_links
 from fenicsmech.errors import DescriptionError, EquilibriumError
 from fenicsmech.meshing import LinkMesh
@@ -189,7 +189,7 @@ class DesignProblem:
 
     # -- steps of ``optimise`` -------------------------------------------------------------------------------
 
-    def _beginning(self, start: DesignResult | None, saved: Checkpoint | None) -> tuple[Start, Placement | None]:
+    def _beginning(self, start: DesignResult | None, saved: Checkpoint | None) -> tuple[Start, HandlePlacement | None]:
         """Where to start, and the handles there if they are known: from ``saved`` if its file exists."""
         parameters, near = (self.initial, None) if start is None else self._given(start)
         begin = Start(parameters)
@@ -198,7 +198,7 @@ class DesignProblem:
         return begin, near
 
     def _minimise(
-        self, optimiser: Optimiser, begin: Start, near: Placement | None, saved: Checkpoint | None
+        self, optimiser: Optimiser, begin: Start, near: HandlePlacement | None, saved: Checkpoint | None
     ) -> tuple[tuple[float, float], Optimum]:
         """The objective of the drawn and of the best design, and how the minimisation ended."""
         _, objective = self._team
@@ -237,8 +237,8 @@ class DesignProblem:
             return shape_links(mesh, self._requests)
 
     @cached_property
-    def _rest(self) -> RestShape:
-        return RestShape(self.simulation.model, self._shapes, self.designs)
+    def _rest(self) -> ParametricShape:
+        return ParametricShape(self.simulation.model, self._shapes, self.designs)
 
     @cached_property
     def _team(self) -> tuple[Group, Objective]:
@@ -248,20 +248,20 @@ class DesignProblem:
             group, simulation = split(self.simulation.comm, len(self.targets)), self.simulation
             if group.comm is not simulation.comm:
                 simulation = simulation.on(group.comm)
-                rest = RestShape(simulation.model, self._shapes, self.designs)
+                rest = ParametricShape(simulation.model, self._shapes, self.designs)
             equilibria = TargetEquilibria(simulation, [self.targets[k] for k in group.mine])
             objective = Objective(
                 rest, equilibria, targets=self.targets, regulariser=self._regulariser, group=group, clock=self._clock
             )
         return group, objective
 
-    def _meshes(self, given: tuple[np.ndarray, Placement | None]) -> list[LinkMesh] | None:
+    def _meshes(self, given: tuple[np.ndarray, HandlePlacement | None]) -> list[LinkMesh] | None:
         """Meshes of the links that may change on the first process, None elsewhere."""
         model = self.simulation.model
         with model.shaped(self._rest.field(*given)):
             return rest_meshes(self.simulation, [design.link for design in self.designs])
 
-    def _given(self, design: DesignResult | np.ndarray) -> tuple[np.ndarray, Placement | None]:
+    def _given(self, design: DesignResult | np.ndarray) -> tuple[np.ndarray, HandlePlacement | None]:
         """Parameters of a design, and its handle positions if it is a result.
 
         Raises:

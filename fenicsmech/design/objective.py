@@ -21,8 +21,8 @@ from fenicsmech.design.description import Target
 from fenicsmech.design.equilibria import Known, TargetEquilibria
 from fenicsmech.design.optimisers.problem import Evaluation, Infeasible, TooHigh
 from fenicsmech.design.regularisers import Model, Regulariser
-from fenicsmech.design.rest_shape import RestShape
-from fenicsmech.design.shape.handle_optimum import Placement, ShapeError
+from fenicsmech.design.rest_shape import ParametricShape
+from fenicsmech.design.shape.handle_optimum import HandlePlacement, ShapeError
 
 _PARTS = MPI.Comm.Create_keyval()  # of a communicator: its parts by their number, made once
 
@@ -32,7 +32,7 @@ class _Base:
     """The best design so far, from which others are reached."""
 
     value: float
-    placement: Placement
+    placement: HandlePlacement
     known: Known
 
 
@@ -54,7 +54,7 @@ class Objective:
 
     def __init__(
         self,
-        rest: RestShape,
+        rest: ParametricShape,
         equilibria: TargetEquilibria,
         *,
         targets: Sequence[Target],
@@ -67,16 +67,16 @@ class Objective:
         self._root_weights = np.sqrt([target.weight for target in targets])
         self._scale = target_scales(targets) / self._root_weights
         self._base: _Base | None = None
-        self._near: Placement | None = None
+        self._near: HandlePlacement | None = None
         self.lengths, self._clock = rest.lengths, clock
         self.reached = np.full(len(targets), np.nan)
 
     @property
-    def placement(self) -> Placement | None:
+    def placement(self) -> HandlePlacement | None:
         """Handle positions of the best design so far."""
         return self._base and self._base.placement
 
-    def begin(self, near: Placement | None) -> None:
+    def begin(self, near: HandlePlacement | None) -> None:
         """Starts afresh: the next evaluation finds its equilibria from zero load, its handles near ``near``."""
         self._base, self._near = None, near
 
@@ -146,8 +146,8 @@ class Objective:
     def _displacements(self, known: Known) -> np.ndarray:
         return self._gathered(np.array([[sample.displacement] for sample in known.samples]))[:, 0]
 
-    def _solve(self, parameters: np.ndarray, base: _Base | None) -> tuple[Placement, Model, Known]:
-        """Placement, model of R and this group's equilibria, followed from those of ``base`` if there is one."""
+    def _solve(self, parameters: np.ndarray, base: _Base | None) -> tuple[HandlePlacement, Model, Known]:
+        """HandlePlacement, model of R and this group's equilibria, followed from those of ``base`` if there is one."""
         with self._clock.phase("handles"):
             try:
                 placement = self._rest.place(parameters, base.placement if base else self._near)

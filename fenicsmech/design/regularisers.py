@@ -13,8 +13,8 @@ import numpy as np
 
 from fenicsmech.checks import finite, positive
 from fenicsmech.design.optimisers.problem import Quadratic
-from fenicsmech.design.rest_shape import DesignedLink, RestShape
-from fenicsmech.design.shape.handle_optimum import Placement
+from fenicsmech.design.rest_shape import DesignedLink, ParametricShape
+from fenicsmech.design.shape.handle_optimum import HandlePlacement
 from fenicsmech.design.shape.quality import Barrier
 
 Model = Callable[[np.ndarray], Quadratic]
@@ -24,14 +24,14 @@ class Regulariser(ABC):
     """A term R(p) of the objective."""
 
     @abstractmethod
-    def around(self, rest: RestShape, placement: Placement) -> Model:
+    def around(self, rest: ParametricShape, placement: HandlePlacement) -> Model:
         """R near the design that ``rest`` holds, placed as in ``placement``.
 
         The model needs no mesh: it is R itself where R is a function of the splines alone, and else agrees with R and
         its gradient at the design.
         """
 
-    def active(self, rest: RestShape, placement: Placement) -> tuple[str, ...]:
+    def active(self, rest: ParametricShape, placement: HandlePlacement) -> tuple[str, ...]:
         """The bounds that hold the design back, in words."""
         return ()
 

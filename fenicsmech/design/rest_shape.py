@@ -12,7 +12,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenicsmech.design.description import Bounds, SplineDesign, shape_request
-from fenicsmech.design.shape.handle_optimum import HandleOptimum, Placement
+from fenicsmech.design.shape.handle_optimum import HandleOptimum, HandlePlacement
 from fenicsmech.design.shape.quality import Barrier, QualitySum
 from fenicsmech.design.shape.shape_map import LinkShape, ShapeMap, shape_links
 from fenicsmech.design.shape.spline import LinkSpline, SplineSamples
@@ -41,7 +41,7 @@ class DesignedLink:
     bounds: Bounds
 
 
-class RestShape:
+class ParametricShape:
     """The rest shape of one model.
 
     Args:
@@ -74,22 +74,22 @@ class RestShape:
         self.lengths = np.concatenate([np.where(s.spline.is_thickness, 1.0, s.thickness) for s in self.links])
 
     @staticmethod
-    def of(simulation: Simulation, designs: Sequence[SplineDesign]) -> RestShape:
+    def of(simulation: Simulation, designs: Sequence[SplineDesign]) -> ParametricShape:
         """That of a simulation, handles and weights computed on its mesh."""
         requests = [shape_request(design, simulation.scene.mechanism, simulation.linkage) for design in designs]
-        return RestShape(simulation.model, shape_links(simulation.model.mesh, requests), designs)
+        return ParametricShape(simulation.model, shape_links(simulation.model.mesh, requests), designs)
 
-    def known(self, p: np.ndarray, theta: np.ndarray) -> Placement | None:
+    def known(self, p: np.ndarray, theta: np.ndarray) -> HandlePlacement | None:
         """A placement to start from, for handle positions found before; None if there are as many handles no more."""
         if theta.shape != self._map.initial_theta.shape:
             return None
-        return Placement(p, theta)
+        return HandlePlacement(p, theta)
 
-    def handles(self, placement: Placement) -> list[np.ndarray]:
+    def handles(self, placement: HandlePlacement) -> list[np.ndarray]:
         """Positions of the handles of each link."""
         return self._map.positions(placement.theta)
 
-    def place(self, p: np.ndarray, near: Placement | None) -> Placement:
+    def place(self, p: np.ndarray, near: HandlePlacement | None) -> HandlePlacement:
         """Gives the links the shape of design ``p``, handles placed at their best.
 
         Args:
@@ -103,14 +103,14 @@ class RestShape:
         self._model.reshape(self._model.elastic.d.x.array)
         return placement
 
-    def field(self, p: np.ndarray, near: Placement | None) -> np.ndarray:
+    def field(self, p: np.ndarray, near: HandlePlacement | None) -> np.ndarray:
         """This rank's values of the design field for ``p``, ghosts last, flat; the links keep the shape they have."""
         before = self._model.elastic.d.x.array.copy()
         with self._model.shaped(before):
             self.place(p, near)
             return self._model.elastic.d.x.array.copy()
 
-    def gradient(self, placement: Placement, nodal: np.ndarray) -> np.ndarray:
+    def gradient(self, placement: HandlePlacement, nodal: np.ndarray) -> np.ndarray:
         """dO/dp (…, parameters) from ∂O/∂d (…, owned values) of the design placed as in ``placement``."""
         fields = nodal.reshape(*nodal.shape[:-1], self._map.owned, -1)
         by_p, by_theta = self._map.apply_transpose(placement.p, placement.theta, fields)
@@ -121,7 +121,7 @@ class RestShape:
         worst = float(self._ratio.cell_values().max(initial=0.0))
         return self._model.mesh.mesh.comm.allreduce(worst, op=MPI.MAX)
 
-    def quality_penalty(self, barrier: Barrier, placement: Placement) -> tuple[float, np.ndarray]:
+    def quality_penalty(self, barrier: Barrier, placement: HandlePlacement) -> tuple[float, np.ndarray]:
         """Σ_e β(ρ_e) of the present rest shape, and its derivative by p."""
         if barrier not in self._penalties:
             self._penalties[barrier] = QualitySum(self._model.elastic.d, barrier.symbolic)

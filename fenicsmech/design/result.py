@@ -14,8 +14,8 @@ from fenicsmech.design.description import SplineDesign, Target
 from fenicsmech.design.equilibria import TargetEquilibria
 from fenicsmech.design.objective import target_errors, target_scales
 from fenicsmech.design.optimisers.problem import Infeasible
-from fenicsmech.design.rest_shape import DesignedLink, RestShape
-from fenicsmech.design.shape.handle_optimum import Placement
+from fenicsmech.design.rest_shape import DesignedLink, ParametricShape
+from fenicsmech.design.shape.handle_optimum import HandlePlacement
 from fenicsmech.design.shape.shape_map import gather_links
 from fenicsmech.errors import DescriptionError
 from fenicsmech.export import PinHole, write_step, write_stl
@@ -121,6 +121,13 @@ class DesignResult:
     processes: int
     groups: int
 
+    def __str__(self) -> str:
+        reached = (
+            f"  {t.force_name!r} of {t.force:g}, {t.configuration}: {t.reached:.4g} of {t.wanted:.4g} ({t.error:+.2%})"
+            for t in self.targets
+        )
+        return "\n".join([f"design of {self.mechanism!r} after {self.iterations} iterations: {self.reason}", *reached])
+
     @property
     def worst_error(self) -> float:
         """Largest relative error among the targets."""
@@ -151,7 +158,7 @@ class DesignResult:
                     f"{simulation.scene.mechanism.name!r} has no flexible link {own.name!r}",
                     "Give a simulation of the same mechanism",
                 )
-        rest = RestShape.of(
+        rest = ParametricShape.of(
             simulation,
             [SplineDesign(links[own.name], len(own.controls) - 1, centreline=own.centreline) for own in self.links],
         )
@@ -245,7 +252,9 @@ def verified_targets(
     return results, same
 
 
-def link_designs(rest: RestShape, wanted: Sequence[SplineDesign], placement: Placement) -> tuple[LinkDesign, ...]:
+def link_designs(
+    rest: ParametricShape, wanted: Sequence[SplineDesign], placement: HandlePlacement
+) -> tuple[LinkDesign, ...]:
     """The shapes of all links at a placement."""
     designs = []
     for link, design, handles in zip(rest.links, wanted, rest.handles(placement), strict=True):
@@ -302,7 +311,7 @@ def draw_links(
         old, new = (_outline(change, meshes[k], p[change.place]) for p, meshes in (before, after))
         joints = np.array([linkage.bodies[i].centre[:2] for i in linkage.interfaces[link]])
         shapes.append(DesignShape(link.name, old, new, joints))
-    rigid = MechanismPlotter(scene.mechanism, linkage, simulation.model.mesh).rigid(assemble(linkage, DRAWN).poses)
+    rigid = MechanismPlotter(simulation.model).rigid(assemble(linkage, DRAWN).poses)
     draw_designs(path, shapes, rigid=rigid, unit=scene.units.length, title=f"{scene.mechanism.name}: links")
 
 

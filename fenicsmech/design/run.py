@@ -22,7 +22,7 @@ from fenicsmech.design.description import Target
 from fenicsmech.design.objective import Objective
 from fenicsmech.design.optimisers.problem import Evaluation, Infeasible, Iterate, Optimiser, Reason, Start
 from fenicsmech.design.regularisers import Regulariser
-from fenicsmech.design.rest_shape import RestShape
+from fenicsmech.design.rest_shape import ParametricShape
 from fenicsmech.errors import DescriptionError
 from fenicsmech.files import atomic_write
 from fenicsmech.log import Progress, Silent
@@ -177,7 +177,7 @@ class Checkpoint:
 
 def fingerprint(
     simulation: Simulation,
-    rest: RestShape,
+    rest: ParametricShape,
     targets: Sequence[Target],
     regulariser: Regulariser,
     optimiser: Optimiser,

@@ -16,7 +16,7 @@ import numpy as np
 from fenicsmech.effects import PosePotential
 from fenicsmech.elasticity import ElasticBody
 from fenicsmech.equilibrium.blocks import Numbering
-from fenicsmech.equilibrium.control import Control
+from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadControl
 from fenicsmech.equilibrium.state import State
 from fenicsmech.multibody import BodyPoint, JointSystem, LinkPoint, MaterialPoint
 
@@ -171,25 +171,12 @@ class BorderTerms:
 
     def pattern(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Where ``entries`` may put something, as (global rows, global columns). Local."""
-        joints, rows = self._joints, self._numbering.rows
-        z, multipliers, load = rows.poses.first, rows.multipliers.first, np.array([rows.load.first])
-        drawn, still = joints.drawn, np.zeros(len(joints.connections))
-        for columns in joints.columns.values():
-            yield z + columns, z + columns
-        for one, other, _ in joints.hessian_blocks(drawn, still, np.zeros(joints.rows)):
-            yield z + one, z + other
-        for _, places in self._potentials:
-            for _, columns in places:
-                for _, other_columns in places:
-                    yield z + columns, z + other_columns
-        for constraints, columns, _ in joints.gradient_blocks(drawn, still):
-            yield multipliers + constraints, z + columns
-            yield z + columns, multipliers + constraints
-        for row in range(multipliers, multipliers + joints.rows):
-            yield np.array([row]), np.array([row])
-        yield load, load
-        yield load, self._loaded()
-        yield self._loaded(), load
+        joints, dim = self._joints, self._joints.space.dim
+        drawn = State(np.zeros(0), joints.drawn, np.zeros(joints.rows), 0.0, np.zeros(len(joints.connections)))
+        moments = {body: np.zeros((dim, dim)) for body in joints.columns}
+        for control in (LoadControl(0.0), DisplacementControl(0.0)):
+            for rows, columns, _ in self.entries(drawn, control, moments, np.zeros(joints.rows + 1)):
+                yield rows, columns
 
     def _travel_row(self, state: State) -> np.ndarray:
         """∂(a · u_P) of the controlled load by the unknowns in rows ``_loaded``, (1, n)."""

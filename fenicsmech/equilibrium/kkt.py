@@ -191,29 +191,22 @@ def create_extended_matrix(
     starts, columns, values = fem.getValuesCSR()
     lgmap = fem.getLGMap()
     fem.destroy()  # large, and not needed any more
-    rows = numbering.rows
 
-    wanted: dict[int, list[np.ndarray]] = {}
-    for block_rows, block_columns in pattern:
-        own = block_rows - rows.links.first
-        for row in own[(own >= 0) & (own < rows.local)]:
-            wanted.setdefault(int(row), []).append(block_columns)
+    rows, shape = numbering.rows, (numbering.rows.local, numbering.rows.size)
     # rows of the border are empty so far
-    starts = np.concatenate([starts, np.full(rows.local - rows.links.count, starts[-1])]).astype(int)
-    places, added, counts = [], [], np.zeros(rows.local, dtype=int)
-    for row in sorted(wanted):
-        there = columns[starts[row] : starts[row + 1]]
-        new = np.setdiff1d(np.concatenate(wanted[row]), there)
-        places.append(starts[row] + np.searchsorted(there, new))
-        added.append(new)
-        counts[row] = len(new)
-    if wanted:
-        columns = np.insert(columns, np.concatenate(places), np.concatenate(added))
-        values = np.insert(values, np.concatenate(places), 0.0)
-    starts += np.concatenate([[0], np.cumsum(counts)])
+    starts = np.concatenate([starts, np.full(rows.local - rows.links.count, starts[-1])])
+    places = np.hstack([np.stack(np.meshgrid(*block, indexing="ij")).reshape(2, -1) for block in pattern])
+    own = places[:, (places[0] >= rows.links.first) & (places[0] < rows.links.first + rows.local)]
+    own[0] -= rows.links.first
+    # entries of the border count 2, those of finite elements 1: odd sums are where the values are
+    structure = csr_matrix((np.ones(len(values), dtype=int), columns, starts), shape)
+    structure += csr_matrix((np.full(own.shape[1], 2), own), shape)
+    structure.sort_indices()
+    filled = np.zeros(structure.nnz)
+    filled[structure.data % 2 == 1] = values
 
     size = numbering.block
-    blocks = csr_matrix((values, columns, starts), shape=(rows.local, rows.size)).tobsr((size, size))
+    blocks = csr_matrix((filled, structure.indices, structure.indptr), shape).tobsr((size, size))
     matrix = PETSc.Mat().createBAIJ(
         [(rows.local, rows.size), (rows.local, rows.size)],
         size,

@@ -10,8 +10,8 @@ fields of the gradient's degree (at least 1), see ``recovery``,
     ∇e ≈ c (G(∇u_h) − ∇u_h),
 
 where only one half of the links is meshed with G₁₃ = G₂₃ = G₃₁ = G₃₂ = 0 on the mid-plane, as symmetry has it. Where
-links have a pressure of their own, Π(F, p) takes the place of W, and the other second derivatives follow, with the
-errors e_p of p and e_q of its adjoint q (``recovery``):
+elements are mixed, Π(F, p) takes the place of W, and the other second derivatives follow, with the errors
+e_p of p and e_q of its adjoint q (``recovery``):
 
     + ∫ e_p ∂²Π/∂p∂F : ∇e_z + e_q ∂²Π/∂p∂F : ∇e_u + e_p ∂²Π/∂p² e_q dV.
 

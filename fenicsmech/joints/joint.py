@@ -57,6 +57,10 @@ class PlanarMarker:
         """The angle from this marker to the other; it counts full turns."""
         return other.angle - self.angle
 
+    def angle_beyond(self, other: PlanarMarker, value: sympy.Expr) -> sympy.Expr:
+        """The angle from this marker to the other less ``value``."""
+        return self.angle_to(other) - value
+
 
 @dataclass(frozen=True)
 class SpatialMarker:
@@ -89,6 +93,10 @@ class SpatialMarker:
         """
         (wa, va), (wb, vb) = self.quaternion, other.quaternion
         return 2 * sympy.atan2((wa * vb - wb * va - va.cross(vb)).dot(self.drawn_axis), wa * wb + va.dot(vb))
+
+    def angle_beyond(self, other: SpatialMarker, value: sympy.Expr) -> sympy.Expr:
+        """sin(φ − ``value``) where e3 of both markers agree: smooth, and zero for any number of turns."""
+        return other.e1.dot(sympy.cos(value) * self.e2 - sympy.sin(value) * self.e1)
 
 
 class JointKind(ABC):
@@ -129,12 +137,10 @@ class JointKind(ABC):
         """The free coordinate φ, zero as drawn (only for joints with ``motorised``)."""
         raise NotImplementedError(f"a {self.name} joint takes no motor")
 
-    def motor(self, a: SpatialMarker, b: SpatialMarker, value: sympy.Symbol) -> sympy.Expr:
-        """Motor equation in space."""
-        return self.coordinate(a, b) - value
-
-    def planar_motor(self, a: PlanarMarker, b: PlanarMarker, value: sympy.Symbol) -> sympy.Expr:
-        """Motor equation in the plane."""
+    def motor(
+        self, a: SpatialMarker | PlanarMarker, b: SpatialMarker | PlanarMarker, value: sympy.Symbol
+    ) -> sympy.Expr:
+        """Motor equation, by default φ − ``value``."""
         return self.coordinate(a, b) - value
 
 
@@ -150,8 +156,7 @@ def constraint(kind: JointKind, dim: int, driven: bool) -> SmoothFunction:
     if not driven:
         return derive(equations, poses, constants)
     value = sympy.Symbol("phi", real=True)
-    motor = kind.motor(a, b, value) if dim == 3 else kind.planar_motor(a, b, value)
-    return derive([*equations, motor], (*poses, value), constants)
+    return derive([*equations, kind.motor(a, b, value)], (*poses, value), constants)
 
 
 @cache

@@ -1,7 +1,5 @@
 """Revolute joint: two bodies share a point and an axis, and turn about it."""
 
-import sympy
-
 from fenicsmech.joints.joint import JointKind
 
 
@@ -24,8 +22,7 @@ class Revolute(JointKind):
         return a.angle_to(b)
 
     def motor(self, a, b, value):
-        # holds for any number of turns
-        return b.e1.dot(sympy.cos(value) * a.e2 - sympy.sin(value) * a.e1)
+        return a.angle_beyond(b, value)
 
 
 REVOLUTE = Revolute()

@@ -1,7 +1,7 @@
 """The description of a mechanism, as pure data.
 
 - ``materials``: elastic constants and strain-energy laws
-- ``shapes``: strips, outlines, STEP parts, meshes; interface regions
+- ``shapes``: strips and their centrelines, outlines, STEP parts, meshes; interface regions, clamps
 - ``parts``: links, joints, motors, forces, outputs, and where they are
 - ``mechanism``: the builder that collects parts
 - ``scene``: effects, configurations and names of units

@@ -115,29 +115,25 @@ class Drive:
 
 
 @dataclass(frozen=True)
-class Force:
+class _AtPoint:
+    """A direction at a material point of a link."""
+
+    on: Link
+    at: Point
+    direction: Point
+    name: str
+
+    def __repr__(self) -> str:
+        sort, at, direction = type(self).__name__, _figures(self.at), _figures(self.direction)
+        return f"{sort}({self.name!r} on {self.on.name!r} at {at} along {direction})"
+
+
+class Force(_AtPoint):
     """A dead force along ``direction`` (unit vector) at the material point ``at`` of link ``on``."""
 
-    on: Link
-    at: Point
-    direction: Point
-    name: str
 
-    def __repr__(self) -> str:
-        return f"Force({self.name!r} on {self.on.name!r} at {_figures(self.at)} along {_figures(self.direction)})"
-
-
-@dataclass(frozen=True)
-class Output:
+class Output(_AtPoint):
     """The displacement of the material point ``at`` of link ``on`` along ``direction`` (unit vector)."""
-
-    on: Link
-    at: Point
-    direction: Point
-    name: str
-
-    def __repr__(self) -> str:
-        return f"Output({self.name!r} on {self.on.name!r} at {_figures(self.at)} along {_figures(self.direction)})"
 
 
 Leader = Force | Motor | Drive

@@ -161,7 +161,7 @@ def _pin_refinements(sites: Sequence[InterfaceSite], size: float, segments: int)
     for site in sites:
         if isinstance(site.region, Disc) and (longest := 2.0 * math.pi * site.region.radius / segments) < size:
             distance = _distance_from_axis(site)
-            # a hair below the longest segment, which gmsh would round up
+            # just below the longest segment, whose number gmsh rounds
             fine = 0.999 * longest
             expressions.append(f"{fine!r} + {GRADING.growth} * max(0, {distance} - {site.region.radius!r})")
     return expressions

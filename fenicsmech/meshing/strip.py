@@ -145,7 +145,7 @@ class _Pin:
     """A pin in a strip, in units of the element size.
 
     Attributes:
-        site: the site, moved onto the centreline, and its disc to the strip's sides, if they miss by a hair.
+        site: the site, moved onto the centreline, and its disc to the strip's sides, where it almost meets them.
         half: half the strip's thickness.
         inward: unit vector along the strip, away from its nearer end, shape (2,).
         station: parameter of the centreline's point nearest to the pin.
@@ -172,8 +172,8 @@ class _Pin:
         if abs(offset) <= _ON_CENTRELINE * thickness:
             at, offset = foot, 0.0
         inward = centreline.tangent(s) * (1.0 if nearer == 0.0 else -1.0)
-        # the polygon that stands for a circle cannot tell radii apart that differ by less than a chord's height
-        # r (1 − cos(π/n)): what is thinner than that (and than 2 % of the strip) is no place for an element
+        # the polygon that stands for a circle does not resolve differences of the radius below a chord's height
+        # r (1 − cos(π/n)): an element does not fit into what is thinner than that, and than 2 % of the strip
         radius = site.region.radius
         height = radius * (1.0 - math.cos(math.pi / circle_segments(radius, 1.0)))
         radius = half if abs(radius - half) <= min(height, 0.02 * half) else radius

@@ -32,7 +32,7 @@ class Fidelity:
         order: degree of the displacement field.
         sizes: element size per flexible link.
         quadrature: quadrature degree.
-        formulation: which links have the pressure as an unknown of its own.
+        formulation: which links have the pressure as an unknown.
         layers: through the depth, or through half of it where half is meshed; None: chosen from depth and size.
         segments: around a pin, at least.
     """

@@ -43,7 +43,7 @@ class MechanismModel:
         design_nodes: the design field at the nodes of the displacement.
         node_link: index of the flexible link of every local node.
         clock: where time goes.
-        with_pressure: whether each flexible link has the pressure as an unknown of its own.
+        with_pressure: whether each flexible link has the u–p (mixed) formulation.
         effects: what acts beside links, joints and forces.
         potentials: potentials of body poses.
         holding: those of springs, which act from the start.
@@ -250,40 +250,30 @@ def check_links(mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> N
     """Refuses links, joints and points that cannot be right, before anything is meshed."""
     for link in mechanism.flexible_links:
         points = {part.name: part.at for part in (*mechanism.forces, *mechanism.outputs) if part.on == link}
-        sites = interface_sites(linkage, link)
-        asked = _asked(link, fidelity)
-        check_link(link.name, link.shape, sites, points, **asked)
+        sites, options = _mesh_request(link, linkage, fidelity)
+        check_link(link.name, link.shape, sites, points, **options)
 
 
 def mesh_links(mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> list[LinkMesh]:
-    """The mesh of every flexible link, on the calling rank."""
-    return [
-        mesh_link(link.name, link.shape, interface_sites(linkage, link), **_asked(link, fidelity))
-        for link in mechanism.flexible_links
-    ]
-
-
-def _asked(link: FlexibleLink, fidelity: Fidelity) -> dict:
-    """What is asked of the mesh of ``link``."""
-    return {
-        "dim": fidelity.model.dim,
-        "size": fidelity.sizes[link],
-        "layers": fidelity.layers,
-        "segments": fidelity.segments,
-        "half": fidelity.model.symmetric,
-    }
-
-
-def interface_sites(linkage: Linkage, link: FlexibleLink) -> list[InterfaceSite]:
-    """Where joints hold ``link``."""
-    sites = []
-    for body in (linkage.bodies[i] for i in linkage.interfaces[link]):
-        # a pin along z holds its link at whatever height the link is
-        at = body.centre[:2] if body.axis[2] == 1.0 else body.centre
-        sites.append(InterfaceSite(at, body.region, body.axis, body.name))
-    return sites
+    """The mesh of every flexible link. Local."""
+    meshes = []
+    for link in mechanism.flexible_links:
+        sites, options = _mesh_request(link, linkage, fidelity)
+        meshes.append(mesh_link(link.name, link.shape, sites, **options))
+    return meshes
 
 
 def mesh_mechanism(comm: MPI.Comm, mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> MechanismMesh:
     """Meshes on rank 0 and distributes; an error there is raised on all ranks."""
     return distribute(comm, on_one(comm, lambda: mesh_links(mechanism, linkage, fidelity)))
+
+
+def _mesh_request(link: FlexibleLink, linkage: Linkage, fidelity: Fidelity) -> tuple[list[InterfaceSite], dict]:
+    """Where joints hold ``link``, and how finely it is meshed."""
+    bodies = [linkage.bodies[index] for index in linkage.interfaces[link]]
+    # a pin along z holds its link at whatever height the link is
+    ats = [body.centre[:2] if body.axis[2] == 1.0 else body.centre for body in bodies]
+    sites = [InterfaceSite(at, body.region, body.axis, body.name) for at, body in zip(ats, bodies, strict=True)]
+    size, half = fidelity.sizes[link], fidelity.model.symmetric
+    options = {"layers": fidelity.layers, "segments": fidelity.segments}
+    return sites, {"dim": fidelity.model.dim, "size": size, "half": half, **options}

@@ -66,7 +66,9 @@ def draw_designs(
         raise DescriptionError(f"picture '{path}'", "there is nothing to draw", "Give at least one link")
     thicknesses = [_thickness_line(design, unit) for design in designs]
     with house_style():
-        handles, subtitle = _handles(designs), _subtitle(designs, thicknesses)
+        handles, subtitle = _handles(designs), ""
+        if len(designs) == 1:  # several have name and thickness beside their details
+            subtitle = ": ".join(words for words in (designs[0].name, thicknesses[0]) if words)
         layout = lay_out_designs(
             designs,
             captions=[
@@ -78,34 +80,30 @@ def draw_designs(
             subtitle=text_size(subtitle, **TITLE)[0],
         )
         _draw_in_place(layout, designs, rigid, unit, subtitle)
-        if layout.details is None:
-            _draw_dimensions_in_place(layout, designs[0])
-        else:
-            _draw_names(layout, designs)
+        if layout.details is not None:
             _draw_details(layout, designs, thicknesses, unit)
         layout.page.write(title, handles)
         save_png(layout.page.figure, path)
 
 
-def _subtitle(designs: Sequence[DesignShape], thicknesses: Sequence[str]) -> str:
-    """Name and thickness of a link that is alone; several have them beside their details."""
-    if len(designs) > 1:
-        return ""
-    name, line = designs[0].name, thicknesses[0]
-    return f"{name}: {line}" if name and line else name
-
-
 def _draw_in_place(
     layout: DesignLayout, designs: Sequence[DesignShape], rigid: Sequence[RigidShape], unit: str, subtitle: str
 ) -> None:
-    """All links where they are in the mechanism, the rigid ones behind."""
+    """All links where they are in the mechanism, the rigid ones behind, with dimensions if there is one, else names."""
+    axes, scale, alone = layout.place, layout.place_scale, layout.details is None
     for shape in rigid:
-        layout.place.add_patch(Polygon(shape.outline, closed=True, fc=_RIGID, ec=_RIGID_RIM, lw=0.8, zorder=1.5))
+        axes.add_patch(Polygon(shape.outline, closed=True, fc=_RIGID, ec=_RIGID_RIM, lw=0.8, zorder=1.5))
     for design in designs:
-        _draw_link(layout.place, design, IN_PLACE, layout.place_scale, detailed=layout.details is None)
-    layout.place.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]")
-    layout.place.set_title(subtitle, loc="left")
-    layout.place.grid(True, color="#ededed")
+        _draw_link(axes, design, IN_PLACE, scale, detailed=alone)
+    axes.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]")
+    axes.set_title(subtitle, loc="left")
+    axes.grid(True, color="#ededed")
+    labels = Labels(axes, [shape for design in designs for shape in _shapes(design, IN_PLACE)])
+    for design in designs:
+        if alone:
+            _draw_dimensions(labels, axes, design, IN_PLACE, scale)
+        else:
+            labels.add(design.name, _beside(design), **NAME)
 
 
 def _draw_link(axes: Axes, design: DesignShape, view: View, scale: float, *, detailed: bool) -> None:
@@ -127,21 +125,8 @@ def _path(outline: LinkOutline, view: View) -> Outline:
     loops = []
     for index, loop in enumerate(outline.loops):
         points = view(loop)
-        x, y = points.T
-        counter_clockwise = x @ np.roll(y, -1) > y @ np.roll(x, -1)
-        loops.append(points if counter_clockwise == (index == 0) else points[::-1])
+        loops.append(points if _counter_clockwise(points) == (index == 0) else points[::-1])
     return path_of(loops)
-
-
-def _draw_dimensions_in_place(layout: DesignLayout, design: DesignShape) -> None:
-    labels = Labels(layout.place, _shapes(design, IN_PLACE))
-    _draw_dimensions(labels, layout.place, design, IN_PLACE, layout.place_scale)
-
-
-def _draw_names(layout: DesignLayout, designs: Sequence[DesignShape]) -> None:
-    labels = Labels(layout.place, [shape for design in designs for shape in _shapes(design, IN_PLACE)])
-    for design in designs:
-        labels.add(design.name, _beside(design), **NAME)
 
 
 def _draw_details(layout: DesignLayout, designs: Sequence[DesignShape], thicknesses: Sequence[str], unit: str) -> None:
@@ -156,6 +141,11 @@ def _draw_details(layout: DesignLayout, designs: Sequence[DesignShape], thicknes
     _draw_scale_bar(axes, layout.details_scale, unit)
 
 
+def _counter_clockwise(loop: NDArray[np.float64]) -> bool:
+    x, y = loop.T
+    return bool(x @ np.roll(y, -1) > y @ np.roll(x, -1))
+
+
 def _shapes(design: DesignShape, view: View) -> list[NDArray[np.float64]]:
     return [view(loop) for loop in (*design.before.loops, *design.after.loops)]
 
@@ -165,9 +155,7 @@ def _beside(design: DesignShape) -> list[Spot]:
     loop = design.after.loops[0]
     along = _unit(np.roll(loop, -1, axis=0) - np.roll(loop, 1, axis=0))
     normals = np.column_stack((along[:, 1], -along[:, 0]))
-    x, y = loop.T
-    if x @ np.roll(y, -1) < y @ np.roll(x, -1):
-        normals = -normals
+    normals = normals if _counter_clockwise(loop) else -normals
     picked = np.arange(0, len(loop), max(1, len(loop) // 80))
     if len(design.joints):
         away = np.min([np.hypot(*(loop[picked] - joint).T) for joint in design.joints], axis=0)

@@ -118,7 +118,7 @@ def _draw_panel(axes: Axes, panel: Panel, layout: MechanismLayout, norm: Normali
     for flexible in state.flexible:
         _draw_flexible(axes, flexible, norm)
     for pin in state.pins:
-        draw_pin(axes, pin.at, pin.radius or 0.014 * layout.size)
+        draw_pin(axes, pin.at, pin.radius or 0.014 * layout.size, welded=pin.welded)
     for index, trace in enumerate(panel.traces):
         colour = _trace_colour(index)
         axes.plot(*trace.points.T, color=colour, lw=1.4, zorder=5)

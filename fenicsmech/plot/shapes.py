@@ -70,10 +70,14 @@ class RigidShape:
 
 @dataclass(frozen=True, eq=False)
 class Pin:
-    """A revolute joint at ``at`` (2,); ``radius`` None draws it in a size that suits the picture."""
+    """A joint at ``at`` (2,): a ring with a dot, a square where it is ``welded``.
+
+    ``radius`` None draws it in a size that suits the picture.
+    """
 
     at: Reals
     radius: float | None = None
+    welded: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "at", real_array("position of a pin", self.at, 2))

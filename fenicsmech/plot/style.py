@@ -11,11 +11,12 @@ from functools import cache
 from pathlib import Path
 
 import matplotlib
+import numpy as np
 from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
+from matplotlib.patches import Circle, Rectangle
 from numpy.typing import ArrayLike
 
 from fenicsmech.errors import DescriptionError
@@ -48,7 +49,7 @@ class Lengths:
         gap: between panels that share an axis.
         bar, bar_room: width of a colour bar, and of all that it needs.
         key: line and gap of one entry of a legend.
-        arrow_share: length of the longest arrow, relative to the mechanism's diagonal.
+        longest_arrow: relative to the mechanism's diagonal.
         details: largest width and height of all links laid down, unless they would be smaller than in place.
         details_gap: between the mechanism and the links laid down, and between these.
         details_padding: air around a mechanism whose links have names beside them.
@@ -74,7 +75,7 @@ class Lengths:
     bar: float = 0.14
     bar_room: float = 1.1
     key: float = 0.6
-    arrow_share: float = 0.17
+    longest_arrow: float = 0.17
     details: tuple[float, float] = (5.6, 6.4)
     details_gap: float = 0.4
     details_padding: float = 0.4
@@ -146,8 +147,12 @@ def open_frame(axes: Axes) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def draw_pin(axes: Axes, at: ArrayLike, radius: float) -> None:
-    """Draw a revolute joint at ``at`` (2,): a ring with a dot, over everything but arrows and labels."""
+def draw_pin(axes: Axes, at: ArrayLike, radius: float, *, welded: bool = False) -> None:
+    """Draw a joint at ``at`` (2,): a ring with a dot or, of a weld, a square; over all but arrows and labels."""
+    if welded:
+        side = 1.4 * radius
+        axes.add_patch(Rectangle(np.subtract(at, 0.5 * side), side, side, fc=INK, ec="white", lw=1.0, zorder=6))
+        return
     axes.add_patch(Circle(at, radius, fc="white", ec=INK, lw=1.0, zorder=6))
     axes.add_patch(Circle(at, 0.35 * radius, fc=INK, ec="none", zorder=6))
 

@@ -300,7 +300,7 @@ class Curve:
         first, last = (gather(model, self.frames[k]) for k in (0, -1))
         if first is None:
             return None
-        plotter = MechanismPlotter(model.mechanism, model.linkage, model.mesh)
+        plotter = MechanismPlotter(model)
         (across, up), end, arrows = self.axes, self.frames[-1], ()
         if isinstance(self.part, Force):
             arrows = (plotter.arrow(self.part, end.force, last, label=f"{end.force:g} {up.unit}"),)

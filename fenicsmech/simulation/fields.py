@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 from dolfinx import fem
-from dolfinx import mesh as dmesh
 
 from fenicsmech.collective import from_one, on_one
 from fenicsmech.compat import (
@@ -94,10 +93,9 @@ def gather(model: MechanismModel, frame: Frame) -> Snapshot | None:
 
 
 def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame]) -> None:
-    """Writes vertex displacements and von Mises stress of ``frames`` of one design; time is the force.
+    """Writes vertex displacements, von Mises stress and pressure of ``frames`` of one design; time is the force.
 
-    And pressures at vertices, where elements are mixed: zero in all other links. The files appear when they
-    are complete.
+    There are pressures where elements are mixed, zero in all other links. The files appear when they are complete.
 
     Raises:
         DescriptionError: the path does not end in .xdmf.
@@ -106,31 +104,33 @@ def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame])
     path = Path(path)
     if path.suffix != ".xdmf":
         raise DescriptionError(f"file {str(path)!r}", "only XDMF is written", "Give a name that ends in .xdmf")
-    comm = model.mesh.mesh.comm
-    displacement = fem.Function(vector_space(model.mesh.mesh, 1))
-    stress = fem.Function(cellwise_space(model.mesh.mesh))
-    fields = {"displacement": displacement, "von Mises stress": stress}
-    nodal = {displacement: model.elastic.u}
-    if model.elastic.pressure is not None:
-        fields["pressure"] = fem.Function(scalar_space(model.mesh.mesh, 1))
-        nodal[fields["pressure"]] = model.elastic.pressure.p
+    elastic, mesh, comm = model.elastic, model.mesh.mesh, model.mesh.mesh.comm
+    stress, nodal = fem.Function(cellwise_space(mesh)), {"displacement": fem.Function(vector_space(mesh, 1))}
+    if elastic.pressure is not None:
+        nodal["pressure"] = fem.Function(scalar_space(mesh, 1))
 
     def update(index: int) -> None:
         with model.shaped(frames[index].design):
             model.load(frames[index].state)
-            for written, field in nodal.items():
+            for written, field in zip(nodal.values(), elastic.fields, strict=True):
                 vertices = at_vertices(model, field)
                 values = written.x.array.reshape(-1, vertices.shape[1])
-                values[cell_dofs(written.function_space)] = vertices[cell_nodes(model.mesh.mesh)]
-            von_mises = model.elastic.von_mises()
+                values[cell_dofs(written.function_space)] = vertices[cell_nodes(mesh)]
+            von_mises = elastic.von_mises()
             stress.x.array[: len(von_mises)] = von_mises
+
+    def move_up() -> None:
+        """The heavy data first: the light file that names it must never point at nothing."""
+        for suffix in (".h5", ".xdmf"):
+            os.replace(folder / path.with_suffix(suffix).name, path.with_suffix(suffix))
+        folder.rmdir()
 
     folder = from_one(comm, lambda: _folder_beside(path))
     forces = np.array([frame.force for frame in frames])
-    with _mesh_of(model, frames[0].design) as mesh:
-        write_series(folder / path.name, mesh, fields, forces, update, comm)
+    with _at_rest(model, frames[0].design):
+        write_series(folder / path.name, mesh, {**nodal, "von Mises stress": stress}, forces, update, comm)
     comm.barrier()  # all have closed the file
-    on_one(comm, lambda: _move_up(folder, path))
+    on_one(comm, move_up)
 
 
 def _folder_beside(path: Path) -> Path:
@@ -139,20 +139,14 @@ def _folder_beside(path: Path) -> Path:
     return Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.stem}-"))
 
 
-def _move_up(folder: Path, path: Path) -> None:
-    """Both files out of ``folder``, the heavy data first: the light file that names it must never point at nothing."""
-    for suffix in (".h5", ".xdmf"):
-        os.replace(folder / path.with_suffix(suffix).name, path.with_suffix(suffix))
-    folder.rmdir()
-
-
 @contextmanager
-def _mesh_of(model: MechanismModel, design: np.ndarray) -> Iterator[dmesh.Mesh]:
-    """The mesh with its nodes where ``design`` puts them: files show the links at rest."""
-    mesh, drawn = model.mesh.mesh, model.mesh.mesh.geometry.x.copy()
+def _at_rest(model: MechanismModel, design: np.ndarray) -> Iterator[None]:
+    """Moves the nodes of the mesh to where ``design`` puts them for a while: files show the links at rest."""
+    x = model.mesh.mesh.geometry.x
+    drawn = x.copy()
     with model.shaped(design):
-        mesh.geometry.x[:, : model.elastic.model.dim] += at_vertices(model, model.elastic.d)
+        x[:, : model.elastic.model.dim] += at_vertices(model, model.elastic.d)
     try:
-        yield mesh
+        yield
     finally:
-        mesh.geometry.x[:] = drawn
+        x[:] = drawn

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fenicsmech.mechanism import Force, Link, Mechanism, in_dimension
-from fenicsmech.meshing import MechanismMesh
-from fenicsmech.multibody import Linkage
+from fenicsmech.joints import WELD
+from fenicsmech.mechanism import Force, Link, in_dimension
+from fenicsmech.model import MechanismModel
 from fenicsmech.plot import (
     Arrow,
     FlexibleShape,
@@ -25,15 +25,13 @@ class MechanismPlotter:
     """Draws states of one mechanism, seen along z; the triangles are those of the undeformed mesh.
 
     Args:
-        mechanism: what is drawn.
-        linkage: its bodies.
-        mesh: its mesh.
+        model: of the mechanism.
     """
 
-    def __init__(self, mechanism: Mechanism, linkage: Linkage, mesh: MechanismMesh) -> None:
-        self._mechanism, self._linkage, self._mesh = mechanism, linkage, mesh
-        self._width = 0.03 * linkage.length
-        self._faces = [self._visible(index) for index in range(len(mechanism.flexible_links))]
+    def __init__(self, model: MechanismModel) -> None:
+        self._mechanism, self._linkage, self._mesh = model.mechanism, model.linkage, model.mesh
+        self._width = 0.03 * model.linkage.length
+        self._faces = [self._visible(index) for index in range(len(model.mechanism.flexible_links))]
 
     def shape(self, snapshot: Snapshot, *, stress: bool) -> MechanismShape:
         """The mechanism in the state of ``snapshot``, links coloured by von Mises stress if asked for."""
@@ -58,10 +56,7 @@ class MechanismPlotter:
 
     def position(self, link: Link, at: Sequence[float], poses: np.ndarray) -> np.ndarray:
         """Where the point drawn at ``at`` of ``link`` is, (2,); of a flexible link, carried by its first interface."""
-        body = self._linkage.body_of(link)
-        drawn = np.array(in_dimension(tuple(at), self._linkage.dim))
-        offset = drawn - np.array(self._linkage.bodies[body].centre)
-        return (drawn + self._linkage.joints.space.displace(poses[body], offset[None])[0])[:2]
+        return self._moved(self._linkage.body_of(link), in_dimension(tuple(at), self._linkage.dim), poses)
 
     def _places(self, link: Link, poses: np.ndarray) -> np.ndarray:
         """Current positions of the joints, forces and outputs of a rigid link, (k, 2)."""
@@ -70,13 +65,15 @@ class MechanismPlotter:
         return np.array([self.position(link, at, poses) for at in (*joints, *points)])
 
     def _pins(self, poses: np.ndarray) -> tuple[Pin, ...]:
-        pins = []
-        for connection in self._linkage.joints.connections:
-            body = self._linkage.bodies[connection.a]
-            offset = np.array(connection.at) - np.array(body.centre)
-            moved = np.array(connection.at) + self._linkage.joints.space.displace(poses[connection.a], offset[None])[0]
-            pins.append(Pin(moved[:2]))
-        return tuple(pins)
+        return tuple(
+            Pin(self._moved(each.a, each.at, poses), welded=each.kind is WELD)
+            for each in self._linkage.joints.connections
+        )
+
+    def _moved(self, body: int, at: Sequence[float], poses: np.ndarray) -> np.ndarray:
+        """Where the point drawn at ``at`` of a body is, (2,)."""
+        offset = np.array(at) - np.array(self._linkage.bodies[body].centre)
+        return (np.array(at) + self._linkage.joints.space.displace(poses[body], offset[None])[0])[:2]
 
     def _visible(self, index: int) -> tuple[np.ndarray, np.ndarray]:
         """Triangles of a link seen from above, and the cell each belongs to."""

@@ -11,8 +11,8 @@ from mpi4py import MPI
 import fenicsmech as fm
 from fenicsmech.design import (
     Objective,
+    ParametricShape,
     Regulariser,
-    RestShape,
     TargetEquilibria,
     shape_links,
     shape_request,
@@ -51,7 +51,7 @@ class Bench:
     """Rest shape and targets' equilibria of one simulation."""
 
     simulation: fm.Simulation
-    rest: RestShape
+    rest: ParametricShape
     equilibria: TargetEquilibria = field(repr=False)
 
     def direction(self, seed: int) -> np.ndarray:
@@ -71,7 +71,7 @@ def bench(case: Case, simulation: fm.Simulation) -> Bench:
     """The parts of ``case`` in ``simulation`` (collective)."""
     mechanism, linkage, model = case.scene.mechanism, simulation.linkage, simulation.model
     shapes = shape_links(model.mesh, [shape_request(design, mechanism, linkage) for design in case.designs])
-    return Bench(simulation, RestShape(model, shapes, case.designs), TargetEquilibria(simulation, case.targets))
+    return Bench(simulation, ParametricShape(model, shapes, case.designs), TargetEquilibria(simulation, case.targets))
 
 
 def objective(

@@ -126,3 +126,9 @@ def test_files_whose_parts_lack_something_are_refused(tmp_path, part):
     path.write_text(json.dumps(data))
     with pytest.raises(fm.DescriptionError, match="incomplete"):
         DesignResult.load(path)
+
+
+def test_a_result_prints_how_far_each_target_is_reached():
+    first, *rows = str(RESULT).splitlines()
+    assert "'Zange “ß”' after 7 iterations: a minimum was found" in first
+    assert rows == ["  'push' of 0.1, as drawn: 1.99 of 2 (-0.50%)", "  'push' of 0.4, geöffnet: 0.02 of 0 (+10.00%)"]

@@ -4,7 +4,7 @@ from matplotlib.colors import to_rgb
 
 from fenicsmech.errors import DescriptionError
 from fenicsmech.files import read_csv, write_csv
-from fenicsmech.plot import PALETTE, CurveSeries, CurveTarget, curve, plot_curve
+from fenicsmech.plot import PALETTE, CurveSeries, CurveTarget, plot_curve
 
 from .png import png_size, share_of_colour
 
@@ -15,7 +15,7 @@ X = np.linspace(0.0, 20.0, 9)
 def drawn(monkeypatch):
     """The figures that are drawn from now on."""
     figures = []
-    monkeypatch.setattr(curve, "save_png", lambda figure, path: figures.append(figure))
+    monkeypatch.setattr("fenicsmech.plot.curve.save_png", lambda figure, path: figures.append(figure))
     return figures
 
 

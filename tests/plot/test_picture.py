@@ -193,3 +193,11 @@ def test_an_empty_picture_and_limits_in_the_wrong_order_are_refused(tmp_path):
             tmp_path / "none.png", undeformed=mechanism(values=np.ones(240)), colour_limits=(2.0, 1.0)
         )  # fmt: skip
     assert not list(tmp_path.iterdir())
+
+
+def test_a_weld_is_drawn_as_a_square_without_a_ring(tmp_path):
+    dark, shares = (51, 51, 51), []
+    for welded in (False, True):
+        draw_mechanism(tmp_path / "joint.png", undeformed=MechanismShape(pins=(Pin((3.0, 4.0), 1.0, welded),)))
+        shares.append(share_of_colour(tmp_path / "joint.png", dark))
+    assert shares[1] > 3.0 * shares[0]

@@ -60,7 +60,7 @@ class HandleOptions:
 
 
 @dataclass(frozen=True, eq=False)
-class Placement:
+class HandlePlacement:
     """The best handle positions of a design.
 
     Attributes:
@@ -91,9 +91,9 @@ class HandleOptimum:
         self._map, self._quality, self._options = shape_map, quality, options or HandleOptions()
         self._handles = [shape.handles for shape in shape_map.shapes]
         self._reducer: _MomentHessian | None = None
-        self._known: tuple[Placement | None, list[PositionDerivatives]] = (None, [])
+        self._known: tuple[HandlePlacement | None, list[PositionDerivatives]] = (None, [])
 
-    def solve(self, p: np.ndarray, start: Placement | None = None) -> Placement:
+    def solve(self, p: np.ndarray, start: HandlePlacement | None = None) -> HandlePlacement:
         """The best handle positions for design ``p``.
 
         Args:
@@ -103,10 +103,10 @@ class HandleOptimum:
         Raises:
             ShapeError: cells stay inverted however the handles are placed.
         """
-        start = start or Placement(self._map.initial, self._map.initial_theta)
+        start = start or HandlePlacement(self._map.initial, self._map.initial_theta)
         return self._solve(np.array(p, dtype=float), start, self._options.halvings)
 
-    def total_gradient(self, placement: Placement, by_p: np.ndarray, by_theta: np.ndarray) -> np.ndarray:
+    def total_gradient(self, placement: HandlePlacement, by_p: np.ndarray, by_theta: np.ndarray) -> np.ndarray:
         """dO/dp = ∂O/∂p + ∂O/∂θ dθ/dp, (…, parameters).
 
         Args:
@@ -117,7 +117,7 @@ class HandleOptimum:
         followed = [cho_solve(link.factor, slope[..., link.free].T).T @ link.mixed for link, slope in links]
         return by_p - np.concatenate(followed, axis=-1)
 
-    def _solve(self, p: np.ndarray, start: Placement, halvings: int) -> Placement:
+    def _solve(self, p: np.ndarray, start: HandlePlacement, halvings: int) -> HandlePlacement:
         theta = self._first_guess(p, start)
         if theta is not None:
             return self._minimise(p, theta)
@@ -126,7 +126,7 @@ class HandleOptimum:
         halfway = self._solve(0.5 * (start.p + p), start, halvings - 1)
         return self._solve(p, halfway, halvings - 1)
 
-    def _first_guess(self, p: np.ndarray, start: Placement) -> np.ndarray | None:
+    def _first_guess(self, p: np.ndarray, start: HandlePlacement) -> np.ndarray | None:
         """The best of a few positions for each link; None if all of them invert cells of a link."""
         following = [follow_spline(h, q) for h, q in zip(self._handles, self._map.parameters(p), strict=True)]
         guesses = [self._map.positions(start.theta), following]
@@ -141,43 +141,49 @@ class HandleOptimum:
             return None
         return np.concatenate([guesses[choice][link] for link, choice in enumerate(np.argmin(sums, axis=0))])
 
-    def _minimise(self, p: np.ndarray, theta: np.ndarray) -> Placement:
-        parts, positions = self._map.parameters(p), self._map.positions(theta)
+    def _minimise(self, p: np.ndarray, theta: np.ndarray) -> HandlePlacement:
+        positions = self._map.positions(theta)
         sums, moving, iterations = self._sums(p, positions), set(range(len(positions))), 0
         while moving and iterations < self._options.iterations:
             iterations += 1
-            steps, derivatives = {}, self._derivatives(p, positions)
-            for link in sorted(moving):
-                step = _newton_step(
-                    self._handles[link], parts[link], positions[link], derivatives[link], self._options.flattest
-                )
-                if step.predicted > self._options.settled * sums[link]:
-                    steps[link] = step
+            steps = {}
+            for link, by_theta in enumerate(self._by_positions(p, positions)):
+                if link not in moving:
+                    continue
+                step = by_theta.newton_step(self._options.flattest)
+                if -0.5 * by_theta.slope @ step[by_theta.free] > self._options.settled * sums[link]:
+                    steps[link] = by_theta, step
                 else:
                     # the decrease drowns in rounding, the improvement of θ does not
-                    positions[link] = step.position(positions[link], 1.0)
+                    positions[link] = by_theta.moved(positions[link], step)
                     moving.remove(link)
             if steps:
                 positions, sums, stuck = self._search(p, positions, sums, steps)
                 moving -= stuck
         if moving:
             _log.warning("handle positions did not settle in %d iterations", iterations)
-        placed = Placement(p, np.concatenate(positions), float(sums.sum()), iterations)
+        placed = HandlePlacement(p, np.concatenate(positions), float(sums.sum()), iterations)
         self._map.apply(p, placed.theta)
         return placed
 
     def _search(
-        self, p: np.ndarray, positions: list[np.ndarray], sums: np.ndarray, steps: dict[int, _Step]
+        self,
+        p: np.ndarray,
+        positions: list[np.ndarray],
+        sums: np.ndarray,
+        steps: dict[int, tuple[PositionDerivatives, np.ndarray]],
     ) -> tuple[list[np.ndarray], np.ndarray, set[int]]:
         """Positions and sums after a step of each link in ``steps``, and the links that found no lower sum."""
-        lengths = {link: step.longest(positions[link], self._options) for link, step in steps.items()}
+        lengths = {link: by.longest(positions[link], step, self._options) for link, (by, step) in steps.items()}
         pending, stuck, trial = set(steps), set(), list(positions)
         while pending:
             for link in pending:
-                trial[link] = steps[link].position(positions[link], lengths[link])
+                by_theta, step = steps[link]
+                trial[link] = by_theta.moved(positions[link], lengths[link] * step)
             new = self._sums(p, trial)
             for link in sorted(pending):
-                wanted = self._options.armijo * steps[link].slope @ (trial[link] - positions[link])
+                by_theta, _ = steps[link]
+                wanted = self._options.armijo * by_theta.slope @ (trial[link] - positions[link])[by_theta.free]
                 if new[link] <= sums[link] + wanted:
                     pending.remove(link)
                 elif lengths[link] < self._options.shortest:
@@ -203,21 +209,20 @@ class HandleOptimum:
         ordered = np.array([np.all(np.diff(_along(handles, theta)) > 0.0) for handles, theta in pairs])
         return np.where(np.isnan(sums) | ~ordered, np.inf, sums)
 
-    def _derivatives(self, p: np.ndarray, positions: Sequence[np.ndarray]) -> list[MapDerivatives]:
-        """Derivatives of S by the maps of the handles, per link."""
+    def _by_positions(self, p: np.ndarray, positions: Sequence[np.ndarray]) -> list[PositionDerivatives]:
+        """Derivatives of S by the positions of the handles, per link."""
         self._map.apply(p, np.concatenate(positions))
         hessian = self._quality.hessian()
         if self._reducer is None:
             self._reducer = _MomentHessian(self._map, hessian)
-        moments = self._map.moments(self._quality.gradient())
-        return [MapDerivatives(g, H) for g, H in zip(moments, self._reducer.reduce(hessian), strict=True)]
+        by_T = map(MapDerivatives, self._map.moments(self._quality.gradient()), self._reducer.reduce(hessian))
+        links = zip(self._handles, self._map.parameters(p), positions, by_T, strict=True)
+        return [by_positions(*link) for link in links]
 
-    def _second_derivatives(self, placement: Placement) -> list[PositionDerivatives]:
+    def _second_derivatives(self, placement: HandlePlacement) -> list[PositionDerivatives]:
         """S_θθ and S_θp of each link at ``placement``; those of the last one are kept."""
         if self._known[0] is not placement:
-            parts, positions = self._map.parameters(placement.p), self._map.positions(placement.theta)
-            links = zip(self._handles, parts, positions, self._derivatives(placement.p, positions), strict=True)
-            self._known = placement, [by_positions(*link) for link in links]
+            self._known = placement, self._by_positions(placement.p, self._map.positions(placement.theta))
         return self._known[1]
 
 
@@ -242,13 +247,15 @@ class PositionDerivatives:
     """Derivatives of S by the positions of a link's free handles, to the side to which each of them moves.
 
     Attributes:
-        segments: the segment of the spline each handle moves in, (n,).
-        free: which handles move, (n,).
+        handles: all handles of the link.
+        segments: the segment of the spline each of them stays in, (n,).
+        free: which of them move, (n,).
         slope: S_θ, (f,).
         bend: S_θθ, (f, f).
         mixed: S_θp, (f, parameters).
     """
 
+    handles: LinkHandles
     segments: np.ndarray
     free: np.ndarray
     slope: np.ndarray
@@ -259,6 +266,27 @@ class PositionDerivatives:
     def factor(self) -> tuple[np.ndarray, bool]:
         """The Cholesky factor of S_θθ at a minimum."""
         return cho_factor(self.bend)
+
+    def newton_step(self, flattest: float) -> np.ndarray:
+        """−|S_θθ|⁻¹ S_θ, with the eigenvalues of the Hessian made positive, (n,)."""
+        values, vectors = np.linalg.eigh(self.bend)
+        values = np.maximum(np.abs(values), flattest * np.abs(values).max(initial=0.0))
+        step = np.zeros(len(self.handles))
+        step[self.free] = -vectors @ (vectors.T @ self.slope / values)
+        return step
+
+    def moved(self, theta: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """θ after a step; a handle that would leave its segment stops at the control point."""
+        slides, after = self.handles.slides, theta + step
+        return np.where(slides, np.clip(after, self.segments, self.segments + 1), after)
+
+    def longest(self, theta: np.ndarray, step: np.ndarray, options: HandleOptions) -> float:
+        """The largest fraction of a step, up to 1, that keeps handles in order and turns joints moderately."""
+        slides = self.handles.slides
+        turn = np.abs(step[~slides]).max(initial=0.0)
+        gaps, closing = np.diff(_along(self.handles, theta)), -np.diff(np.where(slides, step, 0.0))
+        limits = (1.0 - options.kept) * gaps[closing > 0.0] / closing[closing > 0.0]
+        return min(1.0, options.turn / max(turn, options.turn), limits.min(initial=1.0))
 
 
 def by_positions(handles: LinkHandles, p: np.ndarray, theta: np.ndarray, by_T: MapDerivatives) -> PositionDerivatives:
@@ -283,55 +311,7 @@ def by_positions(handles: LinkHandles, p: np.ndarray, theta: np.ndarray, by_T: M
     rows = np.einsum("jak,jakmbl->jmbl", by_theta, by_T.hessian)[free]
     bend = np.einsum("jmbl,mbl->jm", rows, by_theta)[:, free] + np.diag(twice[free])
     mixed = np.einsum("jmbl,mblp->jp", rows, by_p) + mixed[free]
-    return PositionDerivatives(segments, free, slope, 0.5 * (bend + bend.T), mixed)
-
-
-@dataclass(frozen=True, eq=False)
-class _Step:
-    """A step of the handles of one link.
-
-    Attributes:
-        handles: the handles.
-        step: change of θ, (n,).
-        slope: S_θ, 0 for handles that do not move, (n,).
-        segments: the segment each handle stays in, (n,).
-    """
-
-    handles: LinkHandles
-    step: np.ndarray
-    slope: np.ndarray
-    segments: np.ndarray
-
-    @property
-    def predicted(self) -> float:
-        """The decrease of S that the quadratic model predicts."""
-        return -0.5 * float(self.slope @ self.step)
-
-    def position(self, theta: np.ndarray, fraction: float) -> np.ndarray:
-        """θ after a ``fraction`` of the step; a handle that would leave its segment stops at the control point."""
-        moved = theta + fraction * self.step
-        return np.where(self.handles.slides, np.clip(moved, self.segments, self.segments + 1), moved)
-
-    def longest(self, theta: np.ndarray, options: HandleOptions) -> float:
-        """The largest fraction, up to 1, that keeps handles in order and turns joints moderately."""
-        slides = self.handles.slides
-        turn = np.abs(self.step[~slides]).max(initial=0.0)
-        gaps, closing = np.diff(_along(self.handles, theta)), -np.diff(np.where(slides, self.step, 0.0))
-        limits = (1.0 - options.kept) * gaps[closing > 0.0] / closing[closing > 0.0]
-        return min(1.0, options.turn / max(turn, options.turn), limits.min(initial=1.0))
-
-
-def _newton_step(
-    handles: LinkHandles, p: np.ndarray, theta: np.ndarray, by_T: MapDerivatives, flattest: float
-) -> _Step:
-    """Newton's step −|S_θθ|⁻¹ S_θ, with the eigenvalues of the Hessian made positive."""
-    by_theta = by_positions(handles, p, theta, by_T)
-    values, vectors = np.linalg.eigh(by_theta.bend)
-    values = np.maximum(np.abs(values), flattest * np.abs(values).max(initial=0.0))
-    step, slope = np.zeros(len(handles)), np.zeros(len(handles))
-    step[by_theta.free] = -vectors @ (vectors.T @ by_theta.slope / values)
-    slope[by_theta.free] = by_theta.slope
-    return _Step(handles, step, slope, by_theta.segments)
+    return PositionDerivatives(handles, segments, free, slope, 0.5 * (bend + bend.T), mixed)
 
 
 def follow_spline(handles: LinkHandles, p: np.ndarray) -> np.ndarray:

@@ -85,8 +85,7 @@ class QualitySum:
 
     def gradient(self) -> np.ndarray:
         """∂/∂d at the owned nodes, (owned nodes, dim)."""
-        total = fem.Function(self.design.function_space)
-        return assemble_vector(self._gradient_form, total).reshape(-1, self._mesh.geometry.dim).copy()
+        return assemble_vector(*self._gradient).reshape(-1, self._mesh.geometry.dim).copy()
 
     def hessian(self) -> PETSc.Mat:
         """∂²/∂d²; overwritten by the next call."""
@@ -107,8 +106,9 @@ class QualitySum:
         return compile_form(self._sum)
 
     @cached_property
-    def _gradient_form(self):
-        return compile_form(ufl.derivative(self._sum, self.design))
+    def _gradient(self) -> tuple[fem.Form, fem.Function]:
+        """The form of the gradient, and where it is assembled: functions are costly to make on several ranks."""
+        return compile_form(ufl.derivative(self._sum, self.design)), fem.Function(self.design.function_space)
 
     @cached_property
     def _hessian_form(self):

@@ -129,10 +129,11 @@ class TwoLevelSolver(LinearSolver):
         self._system, self._options = system, options
         self._coarse = CoarseLevel(system)
         self._smoother = _chebyshev(system.comm, options)
-        self._nodes, self._rest = system.blocks.nodes.index_set(), system.blocks.border.index_set()
+        self._sets = system.blocks.nodes.index_set(), system.blocks.border.index_set()
         self._stiffness: PETSc.Mat | None = None
         self._border: PETSc.Mat | None = None
         self._corner: PETSc.Mat | None = None
+        self._matrix: PETSc.Mat | None = None
         # petsc4py destroys what it creates late: nothing is created per iteration
         self._work, self._residual, self._z, self._image, self._p, self._q = (system.unknowns.zeros() for _ in range(6))
         self._nodal: tuple[PETSc.Vec, PETSc.Vec] | None = None
@@ -142,14 +143,19 @@ class TwoLevelSolver(LinearSolver):
 
     def refactor(self) -> bool:
         """Takes the KKT matrix's current values; whether that could be done."""
-        if self._stiffness is not None:
+        if self._matrix is not None:
+            self._matrix.destroy()
             self._stiffness.destroy()
-        self._stiffness = self._system.kkt.nodal_stiffness()
-        columns = self._system.kkt.border_columns()
-        self._border = columns.createSubMatrix(self._nodes, None, self._border)
-        self._corner = columns.createSubMatrix(self._rest, None, self._corner)
+        self._stiffness, columns = self._system.kkt.nodal_stiffness(), self._system.kkt.border_columns()
+        if not math.isfinite(self._stiffness.norm()):
+            return False
+        nodes, border = self._sets
+        self._border = columns.createSubMatrix(nodes, None, self._border)
+        self._corner = columns.createSubMatrix(border, None, self._corner)
         if self._nodal is None:
-            self._nodal, self._bordering = self._stiffness.createVecs(), self._corner.createVecs()
+            self._nodal, self._transposed = self._stiffness.createVecs(), PETSc.Mat().createTranspose(self._border)
+        blocks = [[self._stiffness, self._border], [self._transposed, self._corner]]
+        self._matrix = PETSc.Mat().createNest(blocks, self._sets, self._sets, comm=self._system.comm)
         self._smoother.setOperators(self._stiffness)
         self._smoother.setUp()
         return self._coarse.update()
@@ -159,7 +165,7 @@ class TwoLevelSolver(LinearSolver):
         """Bytes of the factor of KKT₁ and of the blocked stiffness, on all ranks."""
         blocks = self._stiffness.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"]
         size = self._stiffness.getBlockSize() ** 2
-        return self._coarse.memory + blocks * (8.0 + 4.0 / size)
+        return self._coarse.factor.memory + blocks * (8.0 + 4.0 / size)
 
     def solve(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float) -> bool:
         """Solves with the matrix last refactored; False if that takes too many iterations.
@@ -187,12 +193,12 @@ class TwoLevelSolver(LinearSolver):
             self._residual.axpy(-factor, self._image)
         if not self._iterate(solution, min(tolerance, self._options.probe)):
             return None
-        return self.inertia() if self._met or curvature <= 0.0 else self._coarse.inertia()
+        return self.inertia() if self._met or curvature <= 0.0 else self._coarse.factor.inertia()
 
     def _start(self, right: PETSc.Vec, solution: PETSc.Vec) -> None:
         """P KKT₁⁻¹ Pᵀ b and its residual."""
         self._coarse.correction(right, solution)
-        self._multiply(solution, self._residual)
+        self._matrix.mult(solution, self._residual)
         self._residual.aypx(-1.0, right)
 
     def _iterate(self, solution: PETSc.Vec, tolerance: float) -> bool:
@@ -210,12 +216,12 @@ class TwoLevelSolver(LinearSolver):
 
     def known_inertia(self) -> Inertia:
         """What is certain after the last solve: the coarse level's, and one more if it met a negative curvature."""
-        coarse = self._coarse.inertia()
+        coarse = self._coarse.factor.inertia()
         return Inertia(coarse.negative + self._met, coarse.zero)
 
     def inertia(self) -> Inertia:
         """Of the matrix last refactored."""
-        coarse, found, spent = self._coarse.inertia(), [], 0
+        coarse, found, spent = self._coarse.factor.inertia(), [], 0
         while True:
             direction, iterations = self._probe(found)
             spent += iterations
@@ -230,7 +236,7 @@ class TwoLevelSolver(LinearSolver):
         r, iterations, options = self._residual, 0, self._options
         self._randomise(r)
         self._coarse.correction(r, self._work)
-        self._multiply(self._work, self._image)
+        self._matrix.mult(self._work, self._image)
         r.axpy(-1.0, self._image)
         for known in found:
             r.axpy(-known.p.dot(r) / known.curvature, known.image)
@@ -269,43 +275,30 @@ class TwoLevelSolver(LinearSolver):
 
     def _smooth(self, r: PETSc.Vec) -> float:
         """z = S r, and rᵀ z."""
-        z = self._z
-        rough, smooth = self._nodal
-        count = rough.getLocalSize()
-        rough.array_w[:] = r.array_r[:count]
+        nodes, (rough, smooth), z = self._system.blocks.nodes.local, self._nodal, self._z
+        rough.array_w[:] = r.array_r[nodes]
         self._smoother.solve(rough, smooth)
-        z.array_w[:count], z.array_w[count:] = smooth.array_r, 0.0
+        z.set(0.0)
+        z.array_w[nodes] = smooth.array_r
         return r.dot(z)
 
     def _project(self, found: Sequence[Direction]) -> None:
         """Makes z conjugate to P and to the directions ``found``, and its image KKT z."""
         z, image = self._z, self._image
-        self._multiply(z, image)
+        self._matrix.mult(z, image)
         self._coarse.correction(image, self._work)
         z.axpy(-1.0, self._work)
-        self._multiply(z, image)
+        self._matrix.mult(z, image)
         for known in found:
             factor = -known.image.dot(z) / known.curvature
             z.axpy(factor, known.p)
             image.axpy(factor, known.image)
 
-    def _multiply(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """y = KKT x by its blocks."""
-        nodes, rows = self._nodal
-        rest, sums = self._bordering
-        count = nodes.getLocalSize()
-        nodes.array_w[:], rest.array_w[:] = x.array_r[:count], x.array_r[count:]
-        self._stiffness.mult(nodes, rows)
-        self._border.multAdd(rest, rows, rows)
-        self._corner.mult(rest, sums)
-        self._border.multTransposeAdd(nodes, sums, sums)
-        y.array_w[:count], y.array_w[count:] = rows.array_r, sums.array_r
-
     def _randomise(self, r: PETSc.Vec) -> None:
         """Makes r random forces on free nodes."""
-        count = self._nodal[0].getLocalSize()
-        r.array_w[:count] = np.random.default_rng(self._system.comm.rank).standard_normal(count)
-        r.array_w[count:] = 0.0
+        nodes = self._system.blocks.nodes
+        r.set(0.0)
+        r.array_w[nodes.local] = np.random.default_rng(nodes.comm.rank).standard_normal(nodes.count)
 
 
 def _chebyshev(comm: MPI.Comm, options: TwoLevel) -> PETSc.KSP:
@@ -341,7 +334,7 @@ class CoarseLevel:
         self._prolongation: PETSc.Mat | None = None
         self._mapped: PETSc.Mat | None = None
         self._matrix: PETSc.Mat | None = None
-        self._factor: Factor | None = None
+        self.factor: Factor | None = None
 
     def update(self) -> bool:
         """Takes the values of the KKT matrix; whether KKT₁ could be factored."""
@@ -351,24 +344,15 @@ class CoarseLevel:
         self._prolongation = self._values.matMult(self._map.matrix, result=self._prolongation)
         self._mapped = unknowns.map.matMult(self._prolongation, result=self._mapped)
         self._matrix = system.kkt.restricted(self._mapped, self._matrix)
-        if self._factor is None:
-            self._factor = Factor(self._matrix)
+        if self.factor is None:
+            self.factor = Factor(self._matrix)
             self._right, self._solution = self._matrix.createVecs()
-        return self._factor.refactor()
-
-    def inertia(self) -> Inertia:
-        """Of KKT₁."""
-        return self._factor.inertia()
-
-    @property
-    def memory(self) -> float:
-        """Bytes the factorisation took, on all ranks."""
-        return self._factor.memory
+        return self.factor.refactor()
 
     def correction(self, r: PETSc.Vec, x: PETSc.Vec) -> None:
         """x = P KKT₁⁻¹ Pᵀ r."""
         self._prolongation.multTranspose(r, self._right)
-        self._factor.solve(self._right, self._solution)
+        self.factor.solve(self._right, self._solution)
         self._prolongation.mult(self._solution, x)
 
 
