@@ -106,7 +106,7 @@ def lay_out(panels: Sequence[Panel], *, colour_bar: bool, heading: str, legend: 
         low, high = low - 0.5, high + 0.5
     size = float(np.hypot(*(high - low)))
     strongest = max((float(np.hypot(*a.vector)) for panel in panels for a in panel.arrows), default=0.0)
-    arrow_scale = LENGTHS.arrow_share * size / strongest if strongest > 0.0 else 0.0
+    arrow_scale = LENGTHS.longest_arrow * size / strongest if strongest > 0.0 else 0.0
 
     widest = min(LENGTHS.panel[0], LENGTHS.row / len(panels))
     low, high, scale = _limits(panels, low, high, arrow_scale, (widest, LENGTHS.panel[1]))

@@ -49,7 +49,7 @@ class Lengths:
         gap: between panels that share an axis.
         bar, bar_room: width of a colour bar, and of all that it needs.
         key: line and gap of one entry of a legend.
-        arrow_share: length of the longest arrow, relative to the mechanism's diagonal.
+        longest_arrow: relative to the mechanism's diagonal.
         details: largest width and height of all links laid down, unless they would be smaller than in place.
         details_gap: between the mechanism and the links laid down, and between these.
         details_padding: air around a mechanism whose links have names beside them.
@@ -75,7 +75,7 @@ class Lengths:
     bar: float = 0.14
     bar_room: float = 1.1
     key: float = 0.6
-    arrow_share: float = 0.17
+    longest_arrow: float = 0.17
     details: tuple[float, float] = (5.6, 6.4)
     details_gap: float = 0.4
     details_padding: float = 0.4

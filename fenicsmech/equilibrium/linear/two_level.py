@@ -152,10 +152,10 @@ class TwoLevelSolver(LinearSolver):
         nodes, border = self._sets
         self._border = columns.createSubMatrix(nodes, None, self._border)
         self._corner = columns.createSubMatrix(border, None, self._corner)
-        blocks = [[self._stiffness, self._border], [PETSc.Mat().createTranspose(self._border), self._corner]]
-        self._matrix = PETSc.Mat().createNest(blocks, self._sets, self._sets, comm=self._system.comm)
         if self._nodal is None:
-            self._nodal = self._stiffness.createVecs()
+            self._nodal, self._transposed = self._stiffness.createVecs(), PETSc.Mat().createTranspose(self._border)
+        blocks = [[self._stiffness, self._border], [self._transposed, self._corner]]
+        self._matrix = PETSc.Mat().createNest(blocks, self._sets, self._sets, comm=self._system.comm)
         self._smoother.setOperators(self._stiffness)
         self._smoother.setUp()
         return self._coarse.update()
