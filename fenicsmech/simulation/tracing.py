@@ -20,6 +20,7 @@ from fenicsmech.equilibrium import (
     Control,
     DisplacementControl,
     EquilibriumPoint,
+    LoadControl,
     LoadFactorControl,
     MotorControl,
     Quantity,
@@ -88,7 +89,7 @@ class CurveTracer:
             state = self._under_constant_loads(state)
             self._system.load(state)
         self._state = state
-        control = DisplacementControl() if any(c.constrained for c in request.controls) else self.followed
+        control = DisplacementControl() if any(c.constrained for c in request.controls) else LoadControl()
         self._path = LoadStepper(self.solver, state, control, predictor=discretisation.predictor)
 
     def curve(self, watch: Callable[[int], None]) -> Curve:

@@ -10,10 +10,10 @@ from scipy.optimize import brentq, minimize_scalar
 import fenicsmech as fm
 from fenicsmech.mechanism import Motor, Output
 
+from ..equilibrium import column, toggle
+from ..equilibrium.bistable import COUPLER, RISE, RUN, forces, four_bar
+from ..equilibrium.bow import bow
 from ..hard import turned_ends
-from . import column, toggle
-from .bistable import COUPLER, RISE, RUN, forces, four_bar
-from .bow import bow
 
 SOFT = 0.075  # MPa of the toggle's stilt: its head turns back while the toggle snaps
 

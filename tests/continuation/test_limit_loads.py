@@ -12,8 +12,8 @@ import fenicsmech as fm
 from fenicsmech.continuation import Hermite, LoadStepper, LoadStepsFailed
 from fenicsmech.equilibrium import EquilibriumPoint, LoadControl, NotConverged, Stability, State, Step
 
-from . import toggle
-from .finger import finger
+from ..equilibrium import toggle
+from ..equilibrium.finger import finger
 
 BEYOND = [1.01, 3.0, 100.0, 1e4, 1e5]  # times the limit load
 RESOLUTION = 2.0 / 1024.0  # of it

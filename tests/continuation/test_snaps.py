@@ -1,4 +1,4 @@
-"""Load steps that leap over a fold say so, however long they are; those that do not, do not."""
+"""Load steps that snap over a fold say so, however long they are; those that do not, do not."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from mpi4py import MPI
 import fenicsmech as fm
 from fenicsmech.files import read_csv
 
+from ..equilibrium import toggle
+from ..equilibrium.arch import RISE, arch
+from ..equilibrium.bow import bow
+from ..equilibrium.finger import finger
 from ..hard.buckling import LENGTH, euler
 from ..hard.buckling import column as hard_column
-from . import toggle
-from .arch import RISE, arch
-from .bow import bow
-from .finger import finger
 
 
 @pytest.fixture(scope="module")
