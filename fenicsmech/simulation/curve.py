@@ -13,14 +13,14 @@ import numpy as np
 from fenicsmech.collective import on_one
 from fenicsmech.continuation import Mode, critical_changes, softest_modes
 from fenicsmech.elasticity import PLANE_STRESS
-from fenicsmech.equilibrium import Iteration, LoadControl, MotorControl, Quantity
-from fenicsmech.errors import DescriptionError
+from fenicsmech.equilibrium import Iteration, LoadControl, MotorControl, NotConverged, Quantity
+from fenicsmech.errors import DescriptionError, EquilibriumError
 from fenicsmech.estimates import AccuracyOptions, Equilibrium, ErrorKind
 from fenicsmech.files import write_csv
 from fenicsmech.mechanism import Configuration, Force, Joint, Leader, Output, Units
 from fenicsmech.multibody import Freedom
 from fenicsmech.plot import CurveSeries, Panel, Trace, draw_configurations, plot_curve
-from fenicsmech.simulation.buckling import BucklingLoad, BucklingPosition, ModeShape, SoftMode, modes_at
+from fenicsmech.simulation.buckling import BucklingLoad, BucklingPosition, ModeShape, SoftMode, mode_shape
 from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.explanation import Explanation, ExplanationOptions, explain
 from fenicsmech.simulation.fields import gather, write_xdmf
@@ -377,9 +377,20 @@ class Curve:
     def _modes(
         self, held: LoadControl | MotorControl, modes: Callable[..., list[Mode]], frame: Frame, count: int
     ) -> list[tuple[float, ModeShape]]:
-        where = f"{self.part.name!r} in configuration {self.configuration.name!r} at {self.axes[1](frame.force)}"
+        """Eigenvalues and shapes of modes at a frame while ``held`` changes."""
         model = self.discretisation.model
-        return modes_at(model, self._newton, held, frame, modes, count=count, where=where)
+        with model.shaped(frame.design):
+            try:
+                found = modes(self._newton, held, frame.state, count=count)
+                return [(mode.value, mode_shape(model, mode.step)) for mode in found]
+            except NotConverged as failure:
+                where = f"{self.part.name!r} in configuration {self.configuration.name!r}"
+                raise EquilibriumError(
+                    f"modes of {where} at {self.axes[1](frame.force)}",
+                    f"they are not defined there ({failure.reason})",
+                    "Choose another frame, or prescribe another part",
+                    last=frame,
+                ) from failure
 
     def _estimated(self, kinds: Sequence[ErrorKind], output: Output | None) -> list[np.ndarray]:
         """Estimates of errors of each kind, (frames,) each; those not known yet from one adjoint per frame."""
