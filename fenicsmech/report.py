@@ -216,7 +216,7 @@ def _frames(curves: Sequence[Curve]) -> list[dict]:
             "seconds": frame.seconds,
             "iterations": frame.iterations,
             "stable": frame.stable,
-            "jumped": frame.jumped,
+            "snapped_through": frame.snapped_through,
             "mobility": curve.freedom.mobility,
             "redundancy": curve.freedom.redundancy,
             "strain_energy": frame.strain_energy,
