@@ -17,7 +17,7 @@ PACKAGE = Path(__file__).parents[1] / ROOT
 LAYERS = (
     "errors",
     "checks",
-    "symbolic",
+    "polygons",
     "log",
     "clock",
     "symbolic",

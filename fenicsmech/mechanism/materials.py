@@ -1,4 +1,4 @@
-"""Materials: elastic constants and the name of a strain energy; the energies themselves are in ``elasticity``."""
+"""Materials: elastic constants and strain-energy laws; ``elasticity`` evaluates the energies."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fenicsmech.errors import DescriptionError
 
 
 class EnergyLaw:
-    """Which strain energy density W(F) a material has. Laws carry no numbers: E and ν are the material's."""
+    """A strain energy density W(F), in terms of E and ν of the material."""
 
 
 @dataclass(frozen=True)

@@ -13,18 +13,17 @@ from fenicsmech.mechanism.parts import Motor
 
 
 class Effect(ABC):
-    """Something that acts on a mechanism beside its links, joints and forces.
+    """An influence on a mechanism beside its links, joints and forces, described by a frozen dataclass.
 
-    An effect is described by a frozen dataclass. What it does to equilibria it says in the terms of the ``effects``
-    layer, one file per effect.
+    The ``effects`` layer implements its potential, one file per effect.
     """
 
     @abstractmethod
     def check(self, mechanism: Mechanism, dim: int) -> None:
-        """Refuses what makes no sense for ``mechanism`` in ``dim`` dimensions.
+        """Checks that the effect applies to ``mechanism`` in ``dim`` dimensions.
 
         Raises:
-            DescriptionError: saying which part, and the remedy.
+            DescriptionError: it does not.
         """
 
     @abstractmethod
@@ -43,7 +42,7 @@ class Units:
 
 @dataclass(frozen=True)
 class Configuration:
-    """Motor positions that stay as they are while loads are applied.
+    """Motor positions that stay fixed while loads are applied.
 
     Attributes:
         name: for messages, plots and tables.
@@ -78,9 +77,7 @@ DRAWN = Configuration("as drawn")
 
 @dataclass(frozen=True)
 class Scene:
-    """A mechanism and what is simulated of its surroundings: nothing that is not listed in ``effects``.
-
-    ``units`` name the units of the description in plots and tables.
+    """A mechanism and the ``effects`` that act on it; ``units`` name the units of plots and tables.
 
     Raises:
         DescriptionError: ``mechanism`` is not a mechanism, or something listed under ``effects`` is not an effect.
@@ -96,9 +93,7 @@ class Scene:
             raise DescriptionError("scene", f"{self.mechanism!r} is not a mechanism", "Pass a Mechanism")
         for effect in self.effects:
             if not isinstance(effect, Effect):
-                raise DescriptionError(
-                    "scene", f"{effect!r} is not an effect", "List effects, as Gravity(…); links, joints and forces act"
-                )
+                raise DescriptionError("scene", f"{effect!r} is not an effect", "List effects only, as Gravity(…)")
 
     def __repr__(self) -> str:
         effects = "; ".join(effect.explain() for effect in self.effects)

@@ -111,7 +111,7 @@ def test_the_unstable_part_is_dashed(tmp_path):
 
 def test_a_jump_is_a_dotted_arrow_with_an_entry_of_its_own(tmp_path, drawn):
     jumped = np.arange(len(X)) == 4
-    for flags in (None, jumped):
+    for flags in (~jumped & jumped, jumped):
         plot_curve(tmp_path / "a.png", [CurveSeries(X, X, "pushed", jumped=flags)])
     whole, broken = (figure.axes[0] for figure in drawn)
     assert [text.get_text() for text in broken.get_legend().get_texts()] == ["pushed", "jump"]
