@@ -87,9 +87,9 @@ test-slow: install-test ## the tests marked `slow`
 N := 1000
 SEED := 0
 
-random-scenes: install-test ## N random scenes from SEED on (1000, 0), each checked independently; prints a table
+random-scenes: install-test ## N random scenes from SEED on (1000, 0), each checked independently; its table in docs/tables/
 	$(call heading,random scenes)
-	OPENBLAS_NUM_THREADS=1 $(PYTHON) -m tests.hard.random_scenes --count $(N) --seed $(SEED)
+	OPENBLAS_NUM_THREADS=1 $(PYTHON) -m tests.hard.random_scenes --count $(N) --seed $(SEED) --write
 
 random-scenes-check: install-test ## the first hundred of them, afresh
 	$(call heading,a hundred random scenes)
@@ -125,8 +125,8 @@ $(DEMOS:%=demo-quick-%): demo-quick-%: install
 	$(call heading,demo $*)
 	$(PYTHON) demos/$*.py --quick --out results/quick/$*
 
-hard-cases: install-test ## every case of tests/hard/, slow ones too, as the table in README.md
-	$(PYTHON) -m tests.hard
+hard-cases: install-test ## every case of tests/hard/, slow ones too, its table in docs/tables/
+	$(PYTHON) -m tests.hard --write
 
 # The tables that pages of the documentation include; `make bench` measures one, `make tables` all (hours).
 BENCHMARKS := solvers work_precision accuracy_control large stopping performance effects optimisers

@@ -37,7 +37,7 @@ class Case:
 
     def at(self, level):
         """A simulation at a fidelity level."""
-        fidelity = AccuracyControl(self.scene, 1.0, None, fm.Mixed()).fidelity(level)
+        fidelity = AccuracyControl(self.scene, 1.0, None, fm.MixedFormulation()).fidelity(level)
         return fm.Simulation(
             self.scene,
             space=fidelity.model.name,

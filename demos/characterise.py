@@ -19,9 +19,9 @@ FILES = {1.0: "onyx-1mm.csv", 2.0: "onyx-2mm.csv"}  # thickness, mm
 GUESS, TRUE = 1000.0, 1770.0  # MPa: where the fit starts, and the modulus of the data that come with the demo
 
 
-def onyx(youngs_modulus):
+def onyx(E):
     """Onyx with another Young's modulus."""
-    return replace(fm.ONYX, youngs_modulus=youngs_modulus)
+    return replace(fm.ONYX, law=replace(fm.ONYX.law, E=E))
 
 
 def bending_test(thickness, material):

@@ -82,8 +82,8 @@ def main():
     result = problem.optimise(start=start, **saved)
     sim = sim.with_design(result)
     after = sim.load_displacement(grasp, forces=FORCES)
-    design = fm.Design(problem, result, before=[before], start=start, pin_diameter=PIN)
-    fm.write_report(options.out, sim, [after], design=design).show()
+    found = fm.Optimisation(problem, result, before=[before], start=start, pin_diameter=PIN)
+    fm.write_report(options.out, sim, [after], optimisation=found).show()
 
 
 if __name__ == "__main__":

@@ -102,8 +102,8 @@ def main():
     result = problem.optimise(start=start, **saved)
     sim = sim.with_design(result)
     after = [sim.load_displacement(lift, forces=FORCES, configuration=place) for place in stroke]
-    design = fm.Design(problem, result, before=before, start=start, pin_diameter=PIN)
-    fm.write_report(options.out, sim, after, design=design).show()
+    found = fm.Optimisation(problem, result, before=before, start=start, pin_diameter=PIN)
+    fm.write_report(options.out, sim, after, optimisation=found).show()
 
     motor = scene.mechanism.motors[0]
     turn = [scene.configuration(f"turned by {angle} deg", {motor: radians(angle)}) for angle in range(0, 361, 4)]

@@ -28,17 +28,29 @@ from fenicsmech.effects import (
     HalfPlane,
     JointCompliance,
     JointSpring,
+    LinkFields,
     Mass,
+    PosePotential,
     Pressure,
     Prestrain,
 )
-from fenicsmech.elasticity import Displacement, Mixed
+from fenicsmech.elasticity import DisplacementFormulation, MixedFormulation
 from fenicsmech.equilibrium import (
     PrimalDualNewton,
 )
 from fenicsmech.errors import AssemblyError, DescriptionError, EquilibriumError, FenicsmechError, MeshingError
 from fenicsmech.files import read_csv
 from fenicsmech.joints import JointKind, PlanarMarker, SpatialMarker
+from fenicsmech.laws import (
+    IsochoricNeoHookean,
+    IsochoricSimoNeoHookean,
+    Law,
+    LogarithmicNeoHookean,
+    NeoHookean,
+    SplitLaw,
+    Strain,
+    Volumetric,
+)
 from fenicsmech.mechanism import (
     DRAWN,
     ONYX,
@@ -47,13 +59,10 @@ from fenicsmech.mechanism import (
     Configuration,
     Disc,
     Drive,
-    IsochoricNeoHookean,
-    IsochoricSimoNeoHookean,
+    Effect,
     Line,
-    LogarithmicNeoHookean,
     Material,
     Mechanism,
-    NeoHookean,
     Rectangle,
     Scene,
     Units,
@@ -65,7 +74,7 @@ from fenicsmech.mechanism import (
 )
 from fenicsmech.model import SPACES
 from fenicsmech.plot import CurveSeries, Trace, plot_curve
-from fenicsmech.report import Design, Report, write_report
+from fenicsmech.report import Optimisation, Report, write_report
 from fenicsmech.simulation import (
     BucklingLoad,
     BucklingPosition,
@@ -94,12 +103,12 @@ __all__ = [
     "Curve",
     "CurveSeries",
     "DescriptionError",
-    "Design",
     "DesignProblem",
     "DesignResult",
     "Disc",
-    "Displacement",
+    "DisplacementFormulation",
     "Drive",
+    "Effect",
     "EquilibriumError",
     "Experiment",
     "FenicsmechError",
@@ -108,16 +117,20 @@ __all__ = [
     "IsochoricNeoHookean",
     "IsochoricSimoNeoHookean",
     "LevenbergMarquardt",
+    "Law",
     "Line",
+    "LinkFields",
     "LogarithmicNeoHookean",
     "Mass",
     "Material",
     "Mechanism",
     "MeshQuality",
     "MeshingError",
-    "Mixed",
+    "MixedFormulation",
+    "Optimisation",
     "ModulusFit",
     "NeoHookean",
+    "PosePotential",
     "PrimalDualNewton",
     "Rectangle",
     "Report",
@@ -125,10 +138,13 @@ __all__ = [
     "ShapeBounds",
     "Simulation",
     "SplineDesign",
+    "SplitLaw",
     "StayClose",
+    "Strain",
     "Target",
     "Trace",
     "Units",
+    "Volumetric",
     "fit_modulus",
     "gmsh_mesh",
     "mpi_abort_on_error",

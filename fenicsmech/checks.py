@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from fenicsmech.errors import DescriptionError
 
 
-def finite(part: str, value: float | str) -> float:
+def finite(part: str, value: Any) -> float:
     """``value`` as a float.
 
     Raises:
@@ -26,7 +27,7 @@ def finite(part: str, value: float | str) -> float:
     return number
 
 
-def positive(part: str, value: float) -> float:
+def positive(part: str, value: Any) -> float:
     """``value`` as a float greater than zero.
 
     Raises:

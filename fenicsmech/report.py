@@ -56,7 +56,7 @@ class Report:
 
 
 @dataclass(frozen=True)
-class Design:
+class Optimisation:
     """The optimisation that a report is about.
 
     Attributes:
@@ -75,7 +75,7 @@ class Design:
 
 
 def write_report(
-    folder: str | Path, simulation: Simulation, curves: Sequence[Curve], *, design: Design | None = None
+    folder: str | Path, simulation: Simulation, curves: Sequence[Curve], *, optimisation: Optimisation | None = None
 ) -> Report:
     """Writes the files listed above.
 
@@ -83,7 +83,7 @@ def write_report(
         folder: created if it does not exist.
         simulation: of the curves, with the optimised shapes after an optimisation.
         curves: one per configuration, at least one of them with a loaded equilibrium.
-        design: the optimisation, if there was one.
+        optimisation: the one that the simulation's shapes are of, if there was one.
 
     Returns:
         the figures.
@@ -101,17 +101,17 @@ def write_report(
     for curve, path in zip(curves, paths, strict=True):
         curve.write(folder / f"deformed{path}.xdmf")
         curve.write_csv(folder / f"curve{path}.csv", errors=True)
-    if design is not None:
-        design.problem.picture(folder / "links.png", design.result)
-        design.problem.export(folder / "links", design.result, pin_diameter=design.pin_diameter)
-    summary = _summarise(simulation, curves, design)
+    if optimisation is not None:
+        optimisation.problem.picture(folder / "links.png", optimisation.result)
+        optimisation.problem.export(folder / "links", optimisation.result, pin_diameter=optimisation.pin_diameter)
+    summary = _summarise(simulation, curves, optimisation)
 
     def write() -> None:
         label = f"von Mises stress [{units.stress}]"
         draw_configurations(folder / "mechanism.png", panels, title=name, colour_label=label, unit=units.length)
-        _plot(folder / "curve.png", name, curves, design)
-        if design is not None:
-            design.result.save(folder / "design.json")
+        _plot(folder / "curve.png", name, curves, optimisation)
+        if optimisation is not None:
+            optimisation.result.save(folder / "design.json")
         write_json(folder / "summary.json", summary)
 
     on_one(comm, write)
@@ -122,25 +122,25 @@ def _suffixed(curve: Curve, curves: Sequence[Curve]) -> str:
     return f"-{curve.configuration.name.replace(' ', '-')}" if len(curves) > 1 else ""
 
 
-def _plot(path: Path, name: str, curves: Sequence[Curve], design: Design | None) -> None:
+def _plot(path: Path, name: str, curves: Sequence[Curve], optimisation: Optimisation | None) -> None:
     """The curves, with those of the drawn design and the targets if there was an optimisation."""
     colours = dict(zip([curve.configuration for curve in curves], PALETTE * len(curves), strict=False))
-    before, targets = (design.before, design.problem.targets) if design else ((), ())
+    before, targets = (optimisation.before, optimisation.problem.targets) if optimisation else ((), ())
     series = [curve.series("initial design", colour=colours[curve.configuration], faint=True) for curve in before]
     for curve in curves:
-        label = "optimised" if design is not None and len(curves) == 1 else curve.configuration.name
+        label = "optimised" if optimisation is not None and len(curves) == 1 else curve.configuration.name
         series.append(curve.series(label, colour=colours[curve.configuration]))
     wanted = [CurveTarget(t.displacement, t.force, colours.get(t.configuration)) for t in targets]
     across, up = curves[0].axes
-    title = name if design else f"{name}: initial design"
+    title = name if optimisation else f"{name}: initial design"
     plot_curve(path, series, targets=wanted, xlabel=across.label, ylabel=up.label, title=title)
 
 
 # -- figures ---------------------------------------------------------------------------------------------------------
 
 
-def _summarise(sim: Simulation, curves: Sequence[Curve], design: Design | None) -> dict:
-    result = None if design is None else design.result
+def _summarise(sim: Simulation, curves: Sequence[Curve], optimisation: Optimisation | None) -> dict:
+    result = None if optimisation is None else optimisation.result
     errors = np.concatenate([curve.error_estimates() for curve in curves])
     summary = {
         "mechanism": sim.scene.mechanism.name,
@@ -158,7 +158,7 @@ def _summarise(sim: Simulation, curves: Sequence[Curve], design: Design | None) 
         "seconds": {
             "setup": sim.setup_seconds,
             "frame_median": median(frame.seconds for frame in _loaded(curves)),
-            "optimise": None if design is None else _seconds(design),
+            "optimise": None if optimisation is None else _seconds(optimisation),
             "phases": sim.clock.seconds,
         },
         "iterations": sum(frame.iterations for frame in _loaded(curves)) if result is None else result.iterations,
@@ -170,17 +170,17 @@ def _summarise(sim: Simulation, curves: Sequence[Curve], design: Design | None) 
         "remarks": [remark for curve in curves for remark in curve.remarks],
         "peak_memory_mb": sim.comm.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, op=MPI.MAX) / 1024.0,
     }
-    return summary if design is None else summary | _summarise_design(design)
+    return summary if optimisation is None else summary | _summarise_design(optimisation)
 
 
-def _seconds(design: Design) -> float:
+def _seconds(optimisation: Optimisation) -> float:
     """The time of an optimisation, with that of the cheaper one before."""
-    return design.result.seconds + (design.start.seconds if design.start else 0.0)
+    return optimisation.result.seconds + (optimisation.start.seconds if optimisation.start else 0.0)
 
 
-def _summarise_design(design: Design) -> dict[str, object]:
+def _summarise_design(optimisation: Optimisation) -> dict[str, object]:
     """The figures of an optimisation."""
-    result = design.result
+    result = optimisation.result
     figures = {
         "targets": [
             {
@@ -199,10 +199,10 @@ def _summarise_design(design: Design) -> dict[str, object]:
         "active_bounds": result.active,
         "ended": result.reason,
         "optimise_phases": result.phases,
-        "initial_frames": _frames(design.before),
+        "initial_frames": _frames(optimisation.before),
     }
-    if design.start is not None:
-        start = design.start
+    if optimisation.start is not None:
+        start = optimisation.start
         figures["start"] = {
             "seconds": start.seconds,
             "iterations": start.iterations,
@@ -222,7 +222,7 @@ def _frames(curves: Sequence[Curve]) -> list[dict]:
             "seconds": frame.seconds,
             "iterations": frame.iterations,
             "stable": frame.stable,
-            "jumped": frame.jumped,
+            "snapped_through": frame.snapped_through,
             "mobility": curve.freedom.mobility,
             "redundancy": curve.freedom.redundancy,
             "strain_energy": frame.strain_energy,

@@ -17,6 +17,7 @@ PACKAGE = Path(__file__).parents[1] / ROOT
 LAYERS = (
     "errors",
     "checks",
+    "laws",
     "polygons",
     "log",
     "clock",

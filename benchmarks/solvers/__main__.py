@@ -251,7 +251,7 @@ def cases():
         "column past buckling": curve(strut, push, size=2.0, forces=[f * euler for f in (0.5, 0.9, 1.1, 1.5)]),
         "stiffness contrast 1e6": curve(*contrast(), size=3.0, forces=[0.002, 0.005, 0.01]),
         "redundant loop, 3D": curve(*four_bar(hinged), space="3d", order=1, size=4.0, forces=[2.0, 5.0]),
-        "idle spin, 3D": curve(*four_bar(balled), space="3d", order=1, size=4.0, forces=[2.0, 5.0]),
+        "free spin, 3D": curve(*four_bar(balled), space="3d", order=1, size=4.0, forces=[2.0, 5.0]),
         "arch through its limit point": curve(bow, crown, size=1.0, displacements=travel),
         "silicone stretched threefold": curve(*rubber_band(), size=2.0, displacements=[15.0, 30.0, 60.0]),
     }

@@ -68,7 +68,7 @@ class AugmentedLagrangian(EquilibriumSolver):
                 "solver",
                 "the augmented Lagrangian method minimises, and links have pressures of their own, in which the energy "
                 "has a maximum",
-                "Give formulation=Displacement(), or use PrimalDualNewton()",
+                "Give formulation=DisplacementFormulation(), or use PrimalDualNewton()",
             )
         return AugmentedLagrangianIteration(system, self)
 

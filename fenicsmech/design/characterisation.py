@@ -117,7 +117,7 @@ def fit_modulus(experiments: Sequence[Experiment], material: Material) -> Modulu
         raise DescriptionError(
             f"modulus of {material.name!r}", f"{readings} reading(s)", "Give two or more: an interval needs them"
         )
-    log_modulus, iterations, step = float(np.log(material.youngs_modulus)), 0, np.inf
+    log_modulus, iterations, step = float(np.log(material.law.parameters["E"])), 0, np.inf
     while True:
         curves, residuals, slopes = zip(*(rig.compare(np.exp(log_modulus)) for rig in rigs), strict=True)
         scaled = np.concatenate([r / rig.range for r, rig in zip(residuals, rigs, strict=True)])
@@ -161,14 +161,14 @@ class _Rig:
         """The curve at ``modulus`` E, u − ū (n,) and ∂u/∂ln E (n,)."""
         simulation, part = self._simulation, self._request.part
         model, newton = simulation.model, simulation.newton(part)
-        model.set_youngs_modulus(self._links, modulus)
+        model.set_parameter(self._links, "E", modulus)
         curve = simulation.trace(self._request)
         adjoint = Sensitivity(model, newton)
         slopes, travels = {}, {}
         for frame in curve.frames:
             (gradient,) = adjoint.gradients(frame.state, [newton.system.controlled])
             travels[frame.force] = frame.displacement
-            slopes[frame.force] = modulus * float(gradient.youngs_moduli[self._links].sum())
+            slopes[frame.force] = modulus * float(gradient.parameters["E"][self._links].sum())
         forces = self._experiment.forces.tolist()
         reached = np.array([travels[force] for force in forces])
         return curve, reached - self._experiment.displacements, np.array([slopes[force] for force in forces])

@@ -38,13 +38,12 @@ class Gradient:
 
     Attributes:
         design: with respect to the design field, this rank's owned P1 values, flat.
-        youngs_moduli, poissons_ratios: with respect to each link's constants, (links,).
+        parameters: with respect to the parameters of the links' laws, by name, (links,).
         force: with respect to the controlled force.
     """
 
     design: np.ndarray
-    youngs_moduli: np.ndarray
-    poissons_ratios: np.ndarray
+    parameters: dict[str, np.ndarray]
     force: float
 
 
@@ -72,8 +71,7 @@ class Sensitivity:
         moved = self._model.design_nodes.transpose(self._interface_terms(at, adjoint.poses, stiff))
         return Gradient(
             design=-(self._assemble("design") + moved),
-            youngs_moduli=-self._per_link("youngs_modulus"),
-            poissons_ratios=-self._per_link("poissons_ratio"),
+            parameters={name: -self._per_link(name) for name in self._model.elastic.parameters},
             force=adjoint.x.dot(at.travel_gradient(self._newton.system.controlled)),
         )
 
@@ -96,12 +94,7 @@ class Sensitivity:
     def _forms(self) -> dict[str, tuple[fem.Form, fem.Function]]:
         """r · û, differentiated by design, displacement and moduli, and where each derivative is assembled."""
         elastic = self._model.elastic
-        fields = {
-            "design": elastic.d,
-            "displacement": elastic.u,
-            "youngs_modulus": elastic.youngs_modulus,
-            "poissons_ratio": elastic.poissons_ratio,
-        }
+        fields = {"design": elastic.d, "displacement": elastic.u, **elastic.parameters}
         weighted = zip(elastic.fields, self._weights, strict=True)
         first, *more = (ufl.derivative(elastic.energy_ufl, field, weight) for field, weight in weighted)
         work = sum(more, start=first)

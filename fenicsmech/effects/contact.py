@@ -14,20 +14,20 @@ from dataclasses import dataclass
 import numpy as np
 import ufl
 from dolfinx import fem
+from mpi4py import MPI
 
 from fenicsmech.checks import points, positive
+from fenicsmech.compat import assemble_vector, compile_form
+from fenicsmech.effects.energies import LinkFields, PosePotential
 from fenicsmech.effects.faces import Faces
 from fenicsmech.effects.obstacles import Obstacle
-from fenicsmech.effects.protocol import BodyEffect, LinkEffect, LinkFields, PosePotential
 from fenicsmech.errors import DescriptionError
 from fenicsmech.joints import RigidSpace
-from fenicsmech.mechanism import FlexibleLink, Link, RigidLink, in_dimension
-
-_STIFFNESS = 0.1  # of the outermost layer of elements; ten times more costs slender links several times the iterations
+from fenicsmech.mechanism import Effect, FlexibleLink, Link, RigidLink, in_dimension
 
 
 @dataclass(frozen=True)
-class Contact(LinkEffect, BodyEffect):
+class Contact(Effect):
     """A link and an obstacle that cannot pass through each other.
 
     Attributes:
@@ -71,8 +71,7 @@ class Contact(LinkEffect, BodyEffect):
                 raise DescriptionError(part, "a flexible link touches anywhere", "Leave points out")
 
     def check(self, mechanism, dim):
-        if self.link not in mechanism.links:
-            raise DescriptionError("contact", f"{self.link!r} is no link of {mechanism.name!r}", "Leave it out")
+        super().check(mechanism, dim)
         self.obstacle.check(dim)
 
     def explain(self):
@@ -82,7 +81,7 @@ class Contact(LinkEffect, BodyEffect):
     def faces(self):
         return (Faces(self.link),) if isinstance(self.link, FlexibleLink) else ()
 
-    def energy(self, fields):
+    def link_energy(self, fields):
         if not isinstance(self.link, FlexibleLink):
             return None
         depth = fields.model.multiplier(self.link.shape.depth)
@@ -101,9 +100,10 @@ class Contact(LinkEffect, BodyEffect):
         if self.stiffness is not None:
             return fem.Constant(fields.mesh, self.stiffness)
         height = fields.dim * ufl.CellVolume(fields.mesh) / ufl.FacetArea(fields.mesh)
-        return fem.Constant(fields.mesh, _STIFFNESS * self.link.material.youngs_modulus) / height
+        # ten times more costs slender links several times the iterations
+        return fem.Constant(fields.mesh, 0.1 * self.link.material.law.E) / height
 
-    def potentials(self, linkage):
+    def pose_potentials(self, linkage):
         if not isinstance(self.link, RigidLink):
             return []
         body = linkage.body_of(self.link)
@@ -144,3 +144,34 @@ class _Points(PosePotential):
 
     def _motion(self, poses: np.ndarray, offsets: np.ndarray) -> np.ndarray:
         return self._space.displacement_gradient(poses[self.bodies[0]], offsets)
+
+
+class ContactGauge:
+    """Measures the contact of a flexible link in the state that its fields hold.
+
+    Args:
+        contact: of a flexible link.
+        fields: of a simulation whose scene lists ``contact``.
+    """
+
+    def __init__(self, contact: Contact, fields: LinkFields) -> None:
+        self._obstacle, self._fields = contact.obstacle, fields
+        self._form = compile_form(-ufl.derivative(contact.link_energy(fields), fields.u))
+        facets = fields.boundaries[Faces(contact.link)].facets
+        V = fields.u.function_space
+        self._design, self._forces = fem.Function(V), fem.Function(V)
+        self._nodes = fem.locate_dofs_topological(V, fields.dim - 1, facets)
+
+    def force(self) -> np.ndarray:
+        """What the obstacle exerts on the link, (dim,)."""
+        # shape functions sum up to one: so do nodal forces to the resultant
+        force = assemble_vector(self._form, self._forces).reshape(-1, self._fields.dim).sum(axis=0)
+        return self._fields.mesh.comm.allreduce(force, op=MPI.SUM)
+
+    def gap(self) -> float:
+        """The smallest gap at nodes of the link's boundary; where negative, the largest penetration."""
+        fields = self._fields
+        self._design.interpolate(fields.body.d)
+        moved = fields.body.drawn_nodes + (self._design.x.array + fields.u.x.array).reshape(-1, fields.dim)
+        gaps = self._obstacle.gap(moved[self._nodes])
+        return fields.mesh.comm.allreduce(float(gaps.min(initial=np.inf)), op=MPI.MIN)

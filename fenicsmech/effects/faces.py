@@ -53,7 +53,7 @@ class Boundary:
     measures: tuple[ufl.Measure, ...]
 
     def is_closed(self, comm: MPI.Comm) -> bool:
-        """Whether the facets of all ranks together, with their mirror images, have no rim (collective)."""
+        """Whether the facets of all ranks together, with their mirror images, have no rim."""
         rims, joined = Counter(), set()
         for found, mirrored in comm.allgather((self.corners, self.joined)):
             joined.update(found[mirrored].tolist())
@@ -70,7 +70,7 @@ def find_boundaries(
     *,
     half: bool = False,
 ) -> dict[Faces, Boundary]:
-    """Where each of ``faces`` is (collective).
+    """Where each of ``faces`` is.
 
     Args:
         mesh: the mesh of all links.
@@ -121,7 +121,7 @@ def find_boundaries(
 
 
 def _asked_together(comm: MPI.Comm, where: Callable[[np.ndarray], np.ndarray], places: np.ndarray) -> np.ndarray:
-    """``where`` at this rank's ``places``; it sees those of all ranks, as it may compare them (collective)."""
+    """``where`` at this rank's ``places``; it sees those of all ranks, as it may compare them."""
     everywhere = comm.allgather(places)
     before = sum(len(others) for others in everywhere[: comm.rank])
     return np.asarray(where(np.concatenate(everywhere)), dtype=bool)[before : before + len(places)]

@@ -12,10 +12,10 @@ import numpy as np
 import ufl
 
 from fenicsmech.checks import point, positive
-from fenicsmech.effects.protocol import BodyEffect, LinkEffect, PosePotential
+from fenicsmech.effects.energies import PosePotential
 from fenicsmech.errors import DescriptionError
 from fenicsmech.joints import RigidSpace
-from fenicsmech.mechanism import Material, RigidLink, in_dimension
+from fenicsmech.mechanism import Effect, Material, RigidLink, in_dimension
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Mass:
 
 
 @dataclass(frozen=True, eq=False)
-class Gravity(LinkEffect, BodyEffect):
+class Gravity(Effect):
     """Weight of all links whose density or mass is given.
 
     Attributes:
@@ -81,7 +81,7 @@ class Gravity(LinkEffect, BodyEffect):
         heavy = [material.name for material in self.densities] + [link.name for link in self.masses]
         return f"weight of {', '.join(heavy)}"
 
-    def energy(self, fields):
+    def link_energy(self, fields):
         if not self.densities:
             return None
         g = ufl.as_vector(in_dimension(self.acceleration, fields.dim))
@@ -93,7 +93,7 @@ class Gravity(LinkEffect, BodyEffect):
         )
         return fields.integral(-density * ufl.dot(g, fields.u), degree=fields.order)
 
-    def potentials(self, linkage):
+    def pose_potentials(self, linkage):
         g, space = np.array(in_dimension(self.acceleration, linkage.dim)), linkage.joints.space
         found = []
         for link, mass in self.masses.items():

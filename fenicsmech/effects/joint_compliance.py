@@ -12,13 +12,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fenicsmech.checks import positive
-from fenicsmech.effects.protocol import JointSoftening
 from fenicsmech.errors import DescriptionError
-from fenicsmech.mechanism import Joint
+from fenicsmech.mechanism import Effect, Joint
 
 
 @dataclass(frozen=True)
-class JointCompliance(JointSoftening):
+class JointCompliance(Effect):
     """A joint whose links share a point gives way there, alike in all directions; its axis stays aligned.
 
     Two compliances of one joint act in series. What is stored in the joint is not part of a frame's strain energy.
@@ -38,14 +37,10 @@ class JointCompliance(JointSoftening):
         object.__setattr__(self, "compliance", positive(f"compliance of {self.joint.name!r}", self.compliance))
 
     def check(self, mechanism, dim):
-        name = f"compliance of {self.joint.name!r}"
-        if self.joint not in mechanism.joints:
-            raise DescriptionError(
-                name, f"{self.joint.name!r} is no joint of {mechanism.name!r}", "Name a joint of the mechanism"
-            )
+        super().check(mechanism, dim)
         if not self.joint.kind.shares_point:
             raise DescriptionError(
-                name,
+                f"compliance of {self.joint.name!r}",
                 f"the links of a {self.joint.kind.name} joint share no point",
                 "Soften revolute, spherical, universal or weld joints",
             )
@@ -53,6 +48,6 @@ class JointCompliance(JointSoftening):
     def explain(self):
         return f"compliance {self.compliance:g} of {self.joint.name!r}"
 
-    def compliances(self, linkage):
+    def soften(self, linkage):
         rows = [row for row, name in enumerate(linkage.joints.row_names) if name == self.joint.name]
         return dict.fromkeys(rows[: linkage.dim], self.compliance)

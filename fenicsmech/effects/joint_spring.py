@@ -14,14 +14,14 @@ from math import pi
 import numpy as np
 
 from fenicsmech.checks import finite, positive
-from fenicsmech.effects.protocol import BodyEffect, PosePotential
+from fenicsmech.effects.energies import PosePotential
 from fenicsmech.errors import DescriptionError
-from fenicsmech.mechanism import Joint
+from fenicsmech.mechanism import Effect, Joint
 from fenicsmech.multibody import JointCoordinate
 
 
 @dataclass(frozen=True)
-class JointSpring(BodyEffect):
+class JointSpring(Effect):
     """A torsion spring on a revolute joint, or a spring along a prismatic one.
 
     The coordinate φ is that of a motor: the angle (rad) or travel of the joint's second link, zero as drawn. In the
@@ -45,10 +45,7 @@ class JointSpring(BodyEffect):
         object.__setattr__(self, "rest", finite(f"rest position of {self._name}", self.rest))
 
     def check(self, mechanism, dim):
-        if self.joint not in mechanism.joints:
-            raise DescriptionError(
-                self._name, f"{self.joint.name!r} is no joint of {mechanism.name!r}", "Name a joint of the mechanism"
-            )
+        super().check(mechanism, dim)
         if not self.joint.kind.motorised:
             raise DescriptionError(
                 self._name,
@@ -66,7 +63,7 @@ class JointSpring(BodyEffect):
         relaxed = f", relaxed at {self.rest:g}" if self.rest else ""
         return f"spring of stiffness {self.stiffness:g} in {self.joint.name!r}{relaxed}"
 
-    def potentials(self, linkage):
+    def pose_potentials(self, linkage):
         coordinate = JointCoordinate(linkage, self.joint)
         preload = [_Preload(coordinate, self.stiffness * self.rest)] if self.rest else []
         return [_Stiffness(coordinate, self.stiffness), *preload]

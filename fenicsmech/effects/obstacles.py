@@ -14,8 +14,6 @@ from fenicsmech.checks import direction, point, positive
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import in_dimension
 
-_CORE = 0.25  # of the radius: what gets deeper into a cylinder might leave it on the other side
-
 
 class Obstacle(ABC):
     """Something rigid that stands still.
@@ -127,7 +125,7 @@ class Cylinder(Obstacle):
 
     @property
     def core(self):
-        return _CORE * self.radius
+        return 0.25 * self.radius  # what gets deeper might leave on the other side
 
     def check(self, dim):
         pass

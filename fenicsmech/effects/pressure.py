@@ -25,13 +25,12 @@ from dolfinx import fem
 
 from fenicsmech.checks import finite, point
 from fenicsmech.effects.faces import Faces
-from fenicsmech.effects.protocol import LinkEffect
 from fenicsmech.errors import DescriptionError
-from fenicsmech.mechanism import FlexibleLink, in_dimension
+from fenicsmech.mechanism import Effect, FlexibleLink, in_dimension
 
 
 @dataclass(frozen=True)
-class Pressure(LinkEffect):
+class Pressure(Effect):
     """A fluid that presses on a flexible link.
 
     Attributes:
@@ -59,10 +58,6 @@ class Pressure(LinkEffect):
         if self.about is not None:
             object.__setattr__(self, "about", point(f"centre of the pressure on {self.link.name!r}", self.about))
 
-    def check(self, mechanism, dim):
-        if self.link not in mechanism.flexible_links:
-            raise DescriptionError("pressure", f"{self.link!r} is no link of {mechanism.name!r}", "Leave it out")
-
     def explain(self):
         part = "the whole boundary" if self.where is None else "part of the boundary"
         return f"pressure of {self.pressure:g} on {part} of {self.link.name}"
@@ -71,7 +66,7 @@ class Pressure(LinkEffect):
     def faces(self):
         return (Faces(self.link, self.where),)
 
-    def energy(self, fields):
+    def link_energy(self, fields):
         (faces,) = self.faces
         if self.about is None and not fields.boundaries[faces].is_closed(fields.mesh.comm):
             raise DescriptionError(

@@ -10,14 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fenicsmech.checks import direction, positive
-from fenicsmech.effects.protocol import RestStretch
 from fenicsmech.elasticity import PLANE_STRAIN, Stretch
 from fenicsmech.errors import DescriptionError
-from fenicsmech.mechanism import FlexibleLink, in_dimension
+from fenicsmech.mechanism import Effect, FlexibleLink, in_dimension
 
 
 @dataclass(frozen=True)
-class Prestrain(RestStretch):
+class Prestrain(Effect):
     """A flexible link whose strain-free state is stretched; its interfaces stay as they are.
 
     Attributes:
@@ -41,8 +40,7 @@ class Prestrain(RestStretch):
             object.__setattr__(self, "along", direction(f"direction of prestrain of {self.link.name!r}", self.along))
 
     def check(self, mechanism, dim):
-        if self.link not in mechanism.flexible_links:
-            raise DescriptionError("prestrain", f"{self.link!r} is no link of {mechanism.name!r}", "Leave it out")
+        super().check(mechanism, dim)
         if dim == 2 and self.along is not None and in_dimension(self.along, 3)[2] != 0.0:
             raise DescriptionError(
                 "prestrain",
@@ -54,7 +52,7 @@ class Prestrain(RestStretch):
         where = "in all directions" if self.along is None else f"along {self.along}"
         return f"prestrain of {self.link.name}, {self.stretch:g} times as long {where} without strain"
 
-    def stretches(self, model):
+    def growth(self, model):
         if self.along is None and model is PLANE_STRAIN:
             raise DescriptionError(
                 f"prestrain of {self.link.name!r}",

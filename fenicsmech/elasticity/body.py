@@ -5,8 +5,8 @@ With the rest shape X = X₀ + c + d and the gradient H = F − I of ``fields``,
     E(u, d) = ∫ W(H) det(∇X) b dX₀,
 
 b the depth of a planar link; in space 1, or 2 where only one half is meshed. Interface cells move rigidly and store no
-energy: they are left out. Where links have a pressure p of their own, Π(H, p) of ``mixed`` takes the place of W, and E
-has a saddle there: a minimum in u, a maximum in p.
+energy: they are left out. In links in the u–p formulation Π(H, p) takes the place of W, and E has a saddle there: a
+minimum in u, a maximum in p.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from numbers import Integral
 
 import numpy as np
 import ufl
@@ -29,23 +30,41 @@ from fenicsmech.compat import (
     create_block_matrix,
     evaluate_expression,
 )
-from fenicsmech.elasticity.energies import density
-from fenicsmech.elasticity.fields import BodyFields
-from fenicsmech.elasticity.growth import UNSTRETCHED, Growth, Stretch
-from fenicsmech.elasticity.mixed import mixed_density
-from fenicsmech.elasticity.models import ElasticModel
-from fenicsmech.elasticity.quadrature import Quadrature
-from fenicsmech.elasticity.stress import cauchy_stress, von_mises
-from fenicsmech.mechanism import EnergyLaw, Material
+from fenicsmech.elasticity.fields import BodyFields, Growth, Stretch
+from fenicsmech.elasticity.models import ElasticModel, cauchy_stress
+from fenicsmech.errors import DescriptionError
+from fenicsmech.laws import Law
+from fenicsmech.mechanism import Material
+
+
+@dataclass(frozen=True)
+class Quadrature:
+    """Degree of the quadrature over cells.
+
+    Raises:
+        DescriptionError: it is not a whole number of at least 1.
+    """
+
+    degree: int
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.degree, Integral) or self.degree < 1:
+            raise DescriptionError("quadrature", f"degree {self.degree!r}", "Give a whole number of at least 1")
+
+    @staticmethod
+    def for_order(order: int, dim: int) -> Quadrature:
+        """The cheapest degree whose error lies well below the discretisation error (measured), by order of u."""
+        return Quadrature({1: 1, 2: 3 if dim == 3 else 4}.get(order, 2 * order))
 
 
 @dataclass(frozen=True)
 class _Term:
-    """The cells of one law, all with a pressure of their own or all without."""
+    """The cells of one kind of law, all in the u–p formulation or none; parameters of the law are fields."""
 
-    law: EnergyLaw
+    law: Law
     mixed: bool
     dx: ufl.Measure
+    cells: np.ndarray
 
 
 class ElasticBody(BodyFields):
@@ -58,7 +77,7 @@ class ElasticBody(BodyFields):
         quadrature: explicit degree; never UFL's estimate.
         effects: energies beside the elastic one, as functions of this body; none costs nothing.
         stretches: of the strain-free state of each link, None where it is as drawn; none costs nothing.
-        with_pressure: whether each link has a pressure of its own; none costs nothing.
+        mixed: whether each link is in the u–p formulation; none costs nothing.
 
     Attributes:
         dx: measure of all cells, interfaces included.
@@ -78,9 +97,9 @@ class ElasticBody(BodyFields):
         effects: Sequence[Callable[[ElasticBody], ufl.Form | None]] = (),
         stretches: Sequence[Stretch | None] = (),
         bulge: fem.Function | None = None,
-        with_pressure: Sequence[bool] = (),
+        mixed: Sequence[bool] = (),
     ) -> None:
-        mixed = tuple(with_pressure) or (False,) * len(materials)
+        mixed = tuple(mixed) or (False,) * len(materials)
         cells = np.flatnonzero(free).astype(np.int32)
         super().__init__(
             mesh,
@@ -93,110 +112,100 @@ class ElasticBody(BodyFields):
             pressed=cells[np.array(mixed)[link[cells]]] if any(mixed) else None,
         )
         self._effects = tuple(effects)
-        kinds = [(m.law, own) for m, own in zip(materials, mixed, strict=True)]
-        terms = sorted(set(kinds), key=repr)
-        term_of_cell = np.array([terms.index(kind) for kind in kinds])[link]
-        tags = dmesh.meshtags(mesh, mesh.topology.dim, cells, term_of_cell[cells].astype(np.int32))
-        measure = ufl.Measure("dx", domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": quadrature.degree})
-        self.dx = measure
         self._growth = None
         if any(stretches):
-            known = [stretch or UNSTRETCHED for stretch in stretches]
-            self._growth = Growth(known, self.cellwise, free=free, dim=model.dim, share=self.share)
-        self._terms = [_Term(law, own, measure(tag)) for tag, (law, own) in enumerate(terms)]
-        self._term_cells = [np.flatnonzero(term_of_cell == tag).astype(np.int32) for tag in range(len(terms))]
+            self._growth = Growth(stretches, self.cellwise, free=free, dim=model.dim, share=self.share)
+        kinds = [(str(type(m.law)), *m.law.parameters, own) for m, own in zip(materials, mixed, strict=True)]
+        known = sorted(set(kinds), key=str)
+        kind_of_cell = np.array([known.index(kind) for kind in kinds])[link]
+        tags = dmesh.meshtags(mesh, mesh.topology.dim, cells, kind_of_cell[cells].astype(np.int32))
+        self.dx = ufl.Measure("dx", domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": quadrature.degree})
+        self._terms = []
+        for tag, kind in enumerate(known):
+            first = kinds.index(kind)
+            law = materials[first].law.with_parameters(self.parameters)
+            where = np.flatnonzero(kind_of_cell == tag).astype(np.int32)
+            self._terms.append(_Term(law, mixed[first], self.dx(tag), where))
 
     @cached_property
     def energy_ufl(self) -> ufl.Form:
         """E(u, d), the energy of effects included, symbolic; everything else is a derivative of it."""
-        if self.effects_ufl is None:
-            return self._strain_ufl
-        return self._strain_ufl + self.share * self.effects_ufl
+        return self._strain_ufl if self.effects_ufl is None else self._strain_ufl + self.share * self.effects_ufl
 
     @cached_property
     def effects_ufl(self) -> ufl.Form | None:
         """The energy of all effects, None if there are none."""
         terms = [term for effect in self._effects if (term := effect(self)) is not None]
-        return sum(terms[1:], start=terms[0]) if terms else None
+        return _sum(terms) if terms else None
 
     @cached_property
     def _strain_ufl(self) -> ufl.Form:
-        volume = self._volume
-        terms = [self._density(term, self._strain) * volume * term.dx for term in self._terms]
-        return sum(terms[1:], start=terms[0])
+        return _sum(density * dx for density, dx in self.densities(self.gradient(self.u)))
 
     @cached_property
-    def residual_ufl(self) -> ufl.Form:
-        """∂E/∂u in direction of a test function."""
-        return ufl.derivative(self.energy_ufl, self.u)
+    def _residuals_ufl(self) -> list[ufl.Form]:
+        """∂E/∂u and, where there is p, ∂E/∂p in directions of test functions."""
+        return [ufl.derivative(self.energy_ufl, field) for field in self.fields]
 
     @cached_property
     def energy_form(self):
         return compile_form(self.energy_ufl)
 
     @cached_property
-    def residual_form(self):
-        return compile_form(self.residual_ufl)
+    def residual_forms(self) -> list:
+        """∂E/∂(u, p), field by field."""
+        return [compile_form(residual) for residual in self._residuals_ufl]
 
     @cached_property
-    def tangent_form(self):
-        return compile_form(ufl.derivative(self.residual_ufl, self.u))
-
-    @cached_property
-    def tangent_blocks(self) -> list[list]:
-        """∂²E/∂(u, p)², where links have a pressure of their own."""
-        by_p, u, p = self._pressure_ufl, self.u, self.pressure.p
-        return [
-            [self.tangent_form, compile_form(ufl.derivative(self.residual_ufl, p))],
-            [compile_form(ufl.derivative(by_p, u)), compile_form(ufl.derivative(by_p, p))],
-        ]
+    def tangent_forms(self) -> list[list]:
+        """∂²E/∂(u, p)², block by block."""
+        return [[compile_form(ufl.derivative(row, field)) for field in self.fields] for row in self._residuals_ufl]
 
     def compile(self) -> None:
-        """Compiles what equilibria need (collective)."""
-        _ = self.energy_form, self.residual_form, self.tangent_form
-        if self.pressure is not None:
-            _ = self._pressure_form, self.tangent_blocks
+        """Compiles what equilibria need."""
+        _ = self.energy_form, self.residual_forms, self.tangent_forms
 
     def free(self, degree: int) -> ufl.Measure:
         """The measure of all cells that can deform, with quadrature of ``degree``."""
-        metadata = {"quadrature_degree": degree}
-        first, *others = [term.dx(metadata=metadata) for term in self._terms]
-        return sum(others, start=first)
-
-    def contraction_energy(self, weight, *, degree: int) -> ufl.Form:
-        """½ ∫ w E (F₃₃ − 1)² dV with a scalar field w, of links in plane stress."""
-        terms = []
-        for term in self._terms:
-            contraction = self.model.contraction(term.law, self._strain, self.moduli)
-            density_ = 0.5 * weight * self.youngs_modulus * contraction**2
-            terms.append(density_ * self._volume * term.dx(metadata={"quadrature_degree": degree}))
-        return sum(terms[1:], start=terms[0])
+        return _sum(term.dx(metadata={"quadrature_degree": degree}) for term in self._terms)
 
     def densities(self, H) -> list[tuple]:
         """Elastic energy per volume of the mesh at the gradient H on the rest shape, and where it holds, per law."""
-        elastic = H if self._growth is None else self._growth.elastic(H)
-        return [(self._density(term, elastic) * self._volume, term.dx) for term in self._terms]
+        return [(self._density(term, self._elastic(H)) * self._volume, term.dx) for term in self._terms]
+
+    def contraction_energy(self, weight, *, degree: int) -> ufl.Form:
+        """½ ∫ w E (F₃₃ − 1)² dV with a scalar field w, of links in plane stress."""
+        H, terms = self._elastic(self.gradient(self.u)), []
+        for term in self._terms:
+            density = 0.5 * weight * term.law.E * self.model.contraction(term.law, H) ** 2
+            terms.append(density * self._volume * term.dx(metadata={"quadrature_degree": degree}))
+        return _sum(terms)
 
     def curvature(self, A, B, *, degree: int) -> ufl.Form:
         """∫ A : ∂²W/∂F∂F : B dV at the present fields, for gradients A, B on the rest shape."""
         i, j, k, m = ufl.indices(4)
-        H = ufl.variable(self.gradient(self.u))
-        elastic = H if self._growth is None else self._growth.elastic(H)
-        terms = []
-        for term in self._terms:
-            C = ufl.diff(ufl.diff(self._density(term, elastic), H), H)
-            product = A[i, j] * C[i, j, k, m] * B[k, m] * self._volume
-            terms.append(product * term.dx(metadata={"quadrature_degree": degree}))
-        return sum(terms[1:], start=terms[0])
+        H, terms = ufl.variable(self.gradient(self.u)), []
+        for density, dx in self.densities(H):
+            C = ufl.diff(ufl.diff(density, H), H)
+            terms.append(A[i, j] * C[i, j, k, m] * B[k, m] * dx(metadata={"quadrature_degree": degree}))
+        return _sum(terms)
 
     def energy(self) -> float:
-        """E at the current fields, of the whole mesh (collective); NaN where J ≤ 0."""
+        """E at the current fields, of the whole mesh; NaN where J ≤ 0."""
         return float(self.mesh.comm.allreduce(fem.assemble_scalar(self.energy_form)))
 
     def strain_energy(self) -> float:
-        """The elastic part of E (collective)."""
+        """The elastic part of E."""
         form = self.energy_form if self.effects_ufl is None else self._strain_form
         return float(self.mesh.comm.allreduce(fem.assemble_scalar(form)))
+
+    def residuals(self) -> np.ndarray:
+        """∂E/∂(u, p) at this rank's owned values, those of u first, flat."""
+        return np.concatenate([assemble_vector(*pair) for pair in zip(self.residual_forms, self._sums, strict=True)])
+
+    def assembled(self, form) -> np.ndarray:
+        """A compiled linear form on the space of u, this rank's owned values, flat."""
+        return assemble_vector(form, self._sums[0]).copy()
 
     @property
     def shares(self) -> bool:
@@ -204,76 +213,59 @@ class ElasticBody(BodyFields):
         return self.effects_ufl is not None or self._growth is not None
 
     def share_residuals(self) -> np.ndarray:
-        """The derivative of ``residuals`` by the share (collective)."""
-        by_u = self.assembled(self._share_form)
-        if self.pressure is None:
-            return by_u
-        by_p = np.zeros(len(self.pressure.unknown))
-        if self._growth is not None:
-            by_p = assemble_vector(self._pressure_share_form, self._sums[1])
-        return np.concatenate([by_u, by_p])
-
-    def residuals(self) -> np.ndarray:
-        """∂E/∂(u, p) at this rank's owned values, those of u first, flat (collective)."""
-        by_u = self.assembled(self.residual_form)
-        if self.pressure is None:
-            return by_u
-        return np.concatenate([by_u, assemble_vector(self._pressure_form, self._sums[1])])
-
-    def assembled(self, form) -> np.ndarray:
-        """A compiled linear form on the space of u, this rank's owned values, flat (collective)."""
-        return assemble_vector(form, self._sums[0]).copy()
+        """The derivative of ``residuals`` by the share."""
+        found = np.zeros(sum(map(len, self.split(self.values()))))
+        for part, form, work in zip(self.split(found), self._share_forms, self._sums, strict=False):
+            part[:] = assemble_vector(form, work)
+        return found
 
     def create_tangent(self) -> PETSc.Mat:
-        """An empty matrix for ``tangent``: per rank, the owned values of u, then those of p (collective)."""
+        """An empty matrix for ``tangent``: per rank, the owned values of u, then those of p."""
         if self.pressure is None:
-            return fem.petsc.create_matrix(self.tangent_form)
-        return create_block_matrix(self.tangent_blocks)
+            return fem.petsc.create_matrix(self.tangent_forms[0][0])
+        return create_block_matrix(self.tangent_forms)
 
     def tangent(self, matrix: PETSc.Mat) -> None:
-        """Adds ∂²E/∂(u, p)² into ``matrix`` (collective; leaves it unassembled)."""
+        """Adds ∂²E/∂(u, p)² into ``matrix`` and leaves it unassembled."""
         if self.pressure is None:
-            fem.petsc.assemble_matrix(matrix, self.tangent_form)
+            fem.petsc.assemble_matrix(matrix, self.tangent_forms[0][0])
         else:
-            add_blocks(matrix, self.tangent_blocks)
+            add_blocks(matrix, self.tangent_forms)
 
     @cached_property
     def pressure_unit(self) -> float:
-        """√(n / ∫ dV/μ) over the n unknowns of p, in whose units p is as large as u in an energy (collective).
+        """√(n / ∫ dV/μ) over the n unknowns of p, in whose units p is as large as u in an energy.
 
         Volumes resist with p² / μ per volume once shear has done what it can.
         """
-        first, *others = [self._volume / self.moduli.mu * term.dx for term in self._terms if term.mixed]
-        volume = fem.assemble_scalar(compile_form(sum(others, start=first)))
-        return float(np.sqrt(self.pressure.count / self.mesh.comm.allreduce(volume)))
+        mixed = [term for term in self._terms if term.mixed]
+        form = _sum(self._volume * 2 * (1 + term.law.nu) / term.law.E * term.dx for term in mixed)
+        volume = self.mesh.comm.allreduce(fem.assemble_scalar(compile_form(form)))
+        return float(np.sqrt(self.pressure.count / volume))
 
     def von_mises(self) -> np.ndarray:
-        """Von Mises stress at the midpoint of each local cell, (cells,)."""
-        values = np.zeros(sum(map(len, self._term_cells)))
-        for expression, cells in zip(self._stresses, self._term_cells, strict=True):
-            values[cells] = evaluate_expression(expression, self.mesh, cells)[:, 0]
+        """Von Mises stress √(3/2 dev σ : dev σ) at the midpoint of each local cell, (cells,)."""
+        values = np.zeros(sum(len(term.cells) for term in self._terms))
+        for expression, term in zip(self._stresses, self._terms, strict=True):
+            values[term.cells] = evaluate_expression(expression, self.mesh, term.cells)[:, 0]
         return values
 
     @cached_property
     def _stresses(self) -> list[fem.Expression]:
         """The compiled von Mises stress at cell midpoints, per law."""
-        midpoint = np.full((1, self.model.dim), 1.0 / (self.model.dim + 1))
-        # no pressure in it: von Mises stress does not see any
-        stresses = [von_mises(cauchy_stress(self.model, term.law, self._strain, self.moduli)) for term in self._terms]
-        return [compile_expression(stress, midpoint, self.mesh.comm) for stress in stresses]
+        midpoint, H = np.full((1, self.model.dim), 1.0 / (self.model.dim + 1)), self._elastic(self.gradient(self.u))
+        # without p, which no deviator sees
+        stresses = [ufl.dev(cauchy_stress(self.model, term.law, H)) for term in self._terms]
+        return [compile_expression(ufl.sqrt(1.5 * ufl.inner(s, s)), midpoint, self.mesh.comm) for s in stresses]
 
-    @property
-    def _strain(self):
-        """H of the displacement; its elastic part where links have grown."""
-        H = self.gradient(self.u)
+    def _elastic(self, H):
+        """The elastic part of H."""
         return H if self._growth is None else self._growth.elastic(H)
 
     def _density(self, term: _Term, H):
-        """W, or Π, of the elastic strain H."""
-        strain = self.model.strain(term.law, H, self.moduli)
-        if term.mixed:
-            return mixed_density(term.law, strain, self.moduli, self.pressure.p)
-        return density(term.law, strain, self.moduli)
+        """W, or Π, of the elastic gradient H."""
+        strain = self.model.strain(term.law, H)
+        return term.law.mixed_energy(strain, self.pressure.p) if term.mixed else term.law.energy(strain)
 
     @property
     def _volume(self):
@@ -281,31 +273,26 @@ class ElasticBody(BodyFields):
         volume = ufl.det(self.rest_gradient) * self.model.multiplier(self.depth)
         return volume if self._growth is None else volume * self._growth.volume
 
-    @property
-    def _pressure_ufl(self) -> ufl.Form:
-        """∂E/∂p in direction of a test function."""
-        return ufl.derivative(self._strain_ufl, self.pressure.p)
-
-    @cached_property
-    def _pressure_form(self):
-        return compile_form(self._pressure_ufl)
-
-    @cached_property
-    def _pressure_share_form(self):
-        return compile_form(ufl.derivative(ufl.diff(self._strain_ufl, self._growth.share), self.pressure.p))
-
     @cached_property
     def _strain_form(self):
         return compile_form(self._strain_ufl)
 
     @cached_property
-    def _share_form(self):
+    def _share_forms(self) -> list:
+        """The derivatives of ``residual_forms`` by the share; only growth has one of ∂E/∂p."""
         terms = [self.effects_ufl] if self.effects_ufl is not None else []
         if self._growth is not None:
             terms.append(ufl.diff(self._strain_ufl, self._growth.share))
-        return compile_form(ufl.derivative(sum(terms[1:], start=terms[0]), self.u))
+        concerned = self.fields if self._growth is not None else [self.u]
+        return [compile_form(ufl.derivative(_sum(terms), field)) for field in concerned]
 
     @cached_property
     def _sums(self) -> list[fem.Function]:
         """Where vectors on the spaces of ``fields`` are assembled."""
         return [fem.Function(field.function_space) for field in self.fields]
+
+
+def _sum(terms):
+    """The sum of forms or measures, which have no zero to start from."""
+    first, *others = terms
+    return sum(others, start=first)

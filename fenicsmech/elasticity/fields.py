@@ -1,14 +1,23 @@
-"""The fields of all flexible links on the fixed reference mesh: shape, displacement, pressure, moduli.
+"""The fields of all flexible links on the fixed reference mesh: shape, displacement, pressure, parameters, growth.
 
 With reference coordinates X₀ of straight cells, the bulge c that curves them along the drawn outline, design d, rest
 shape X = X₀ + c + d and displacement u from the rest shape:
 
     H = F − I = ∇u (∇X)⁻¹,     ∇X = I + ∇c + ∇d.
+
+Links whose strain-free state is not the one drawn have grown by F_p, and only F_e of F = F_e F_p strains the material:
+
+    F_p = I + s (λ − 1) N,     N = e ⊗ e or I,
+    H_e = F_e − I = H + Γ + H Γ,     Γ = F_p⁻¹ − I = −s (λ − 1) / (1 + s (λ − 1)) N,
+
+and W counts per strain-free volume, det F_p times the drawn one: (1 + s (λ − 1)) to the power of 1 or 3. s is the load
+factor of effects.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -18,9 +27,8 @@ from dolfinx import mesh as dmesh
 from petsc4py import PETSc
 
 from fenicsmech.compat import cellwise_space, compile_expression, interpolation_points, owned_values, vector_space
+from fenicsmech.elasticity.formulation import PressureField
 from fenicsmech.elasticity.models import ElasticModel
-from fenicsmech.elasticity.pressure import PressureField
-from fenicsmech.elasticity.strain import Moduli
 from fenicsmech.mechanism import Material
 
 
@@ -35,14 +43,15 @@ class BodyFields:
         model: 3D, whole or half, plane strain or plane stress.
         order: degree of the displacement field.
         bulge: c, by which curved cells differ from straight ones; None if all are straight.
-        pressed: local cells whose pressure is an unknown of its own; None if there are none on any rank.
+        pressed: local cells in the u–p formulation; None if there are none on any rank.
 
     Attributes:
         u: displacement field, vector P_order.
         d: design field, vector P1.
         bulge: c, vector P2, or None.
-        pressure: of the links that have one of their own, P_(order − 1); None if no link has.
-        youngs_modulus, poissons_ratio, depth: per cell.
+        pressure: of the links in the u–p formulation, P_(order − 1); None if no link is.
+        parameters: of the links' laws by name, each with one value per cell; changing them needs no compiling.
+        depth: one value per cell.
         share: how much of the effects acts.
     """
 
@@ -61,8 +70,11 @@ class BodyFields:
         self.mesh, self.model, self.order, self.bulge, self._link = mesh, model, order, bulge, link
         self.u = fem.Function(vector_space(mesh, order), name="displacement")
         self.d = fem.Function(vector_space(mesh, 1), name="design")
-        self.youngs_modulus = self.cellwise([m.youngs_modulus for m in materials])
-        self.poissons_ratio = self.cellwise([m.poissons_ratio for m in materials])
+        numbers = [material.law.parameters for material in materials]
+        self.parameters = {
+            name: self.cellwise([known.get(name, 0.0) for known in numbers])
+            for name in dict.fromkeys(name for known in numbers for name in known)
+        }
         self.depth = self.cellwise(depths)
         self.pressure = None if pressed is None else PressureField(mesh, order - 1, pressed)
         self.share = fem.Constant(mesh, PETSc.ScalarType(1.0))
@@ -72,11 +84,6 @@ class BodyFields:
         function = fem.Function(cellwise_space(self.mesh))
         function.x.array[: len(self._link)] = np.asarray(per_link, dtype=float)[self._link]
         return function
-
-    @property
-    def moduli(self) -> Moduli:
-        """Of each cell, symbolic."""
-        return Moduli(self.youngs_modulus, self.poissons_ratio)
 
     def gradient(self, field):
         """H = ∇field (∇X)⁻¹, the gradient of a field on the rest shape, symbolic."""
@@ -144,7 +151,7 @@ class BodyFields:
         return self.u.x.array + self._carried.x.array
 
     def update(self) -> None:
-        """Makes ghost values of u and p agree with their owners (collective)."""
+        """Makes ghost values of u and p agree with their owners."""
         for field in self.fields:
             field.x.scatter_forward()
 
@@ -161,3 +168,57 @@ class BodyFields:
         """H δ at the nodes of u."""
         V = self.u.function_space
         return compile_expression(ufl.dot(self.gradient(self.u), self._change), interpolation_points(V), self.mesh.comm)
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """How much longer a link is without strain than drawn.
+
+    Attributes:
+        ratio: λ.
+        along: e, a unit vector of the drawn link, (dim,); None for all directions.
+    """
+
+    ratio: float
+    along: tuple[float, ...] | None
+
+
+class Growth:
+    """F_p, one value per cell.
+
+    Args:
+        stretches: of each link; None where it is as drawn.
+        cellwise: makes a field with one value per cell from one value per link, (links,).
+        free: whether each local cell can deform; the others do not grow, (cells,).
+        dim: of the model; planar ones are free to grow in depth.
+        share: s, as a constant.
+    """
+
+    def __init__(
+        self,
+        stretches: Sequence[Stretch | None],
+        cellwise: Callable[[Sequence[float]], fem.Function],
+        *,
+        free: np.ndarray,
+        dim: int,
+        share: fem.Constant,
+    ) -> None:
+        stretches = [stretch or Stretch(1.0, None) for stretch in stretches]
+        self.share = ufl.variable(share)
+        self._excess = cellwise([stretch.ratio - 1.0 for stretch in stretches])
+        self._excess.x.array[np.flatnonzero(~free)] = 0.0
+        self._power = cellwise([3.0 if stretch.along is None else 1.0 for stretch in stretches])
+        tensors = np.array([np.eye(dim) if s.along is None else np.outer(s.along, s.along) for s in stretches])
+        parts = {(i, j): cellwise(tensors[:, i, j]) for i in range(dim) for j in range(i, dim)}
+        self._tensor = ufl.as_matrix([[parts[min(i, j), max(i, j)] for j in range(dim)] for i in range(dim)])
+
+    def elastic(self, H):
+        """H_e in UFL."""
+        grown = self.share * self._excess
+        inverse = -grown / (1 + grown) * self._tensor
+        return H + inverse + ufl.dot(H, inverse)
+
+    @property
+    def volume(self):
+        """det F_p in UFL, the growth of depth included."""
+        return (1 + self.share * self._excess) ** self._power

@@ -44,17 +44,17 @@ class MixedStress:
         self._stiffness = compile_form(sum(stiffness[1:], start=stiffness[0]))
 
     def follow(self, before: np.ndarray, motion: np.ndarray) -> None:
-        """Takes the displacements u before the step, and the step δu, of this rank's owned nodes, flat (collective)."""
+        """Takes the displacements u before the step, and the step δu, of this rank's owned nodes, flat."""
         for field, values in ((self._before, before), (self._motion, motion)):
             owned_values(field)[:] = values
             field.x.scatter_forward()
 
     def forces(self) -> np.ndarray:
-        """∫ F ΔS : ∇v dV, this rank's owned values, flat (collective)."""
+        """∫ F ΔS : ∇v dV, this rank's owned values, flat."""
         return self._body.assembled(self._forces)
 
     def tangent(self, matrix: PETSc.Mat) -> None:
-        """Adds ∫ ∇v ΔS : ∇w dV into ``matrix`` (collective; leaves it unassembled)."""
+        """Adds ∫ ∇v ΔS : ∇w dV into ``matrix`` and leaves it unassembled."""
         fem.petsc.assemble_matrix(matrix, self._stiffness)
 
     def _stresses(self, u: fem.Function):

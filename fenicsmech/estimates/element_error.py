@@ -48,7 +48,7 @@ class ElementError:
 
     def __init__(self, model: MechanismModel, calibration: Mapping[int, float], mixed: Mapping[int, float]) -> None:
         self._model, elastic, order = model, model.elastic, model.elastic.order
-        self._squares = [(mixed if own else calibration)[order] for own in model.with_pressure]
+        self._squares = [(mixed if own else calibration)[order] for own in model.mixed]
         names = ("adjoint", "adjoint_pressure")
         self._adjoint = [
             fem.Function(field.function_space, name=name) for field, name in zip(elastic.fields, names, strict=False)

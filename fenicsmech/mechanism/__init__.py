@@ -1,6 +1,6 @@
 """The description of a mechanism, as pure data.
 
-- ``materials``: elastic constants and strain-energy laws
+- ``materials``: names and laws with their numbers
 - ``shapes``: strips and their centrelines, outlines, STEP parts, meshes; interface regions, clamps
 - ``parts``: links, joints, motors, forces, outputs, and their positions
 - ``mechanism``: the builder that collects parts
@@ -11,12 +11,7 @@
 from fenicsmech.mechanism.materials import (
     ONYX,
     SMOOTH_SIL_950,
-    EnergyLaw,
-    IsochoricNeoHookean,
-    IsochoricSimoNeoHookean,
-    LogarithmicNeoHookean,
     Material,
-    NeoHookean,
 )
 from fenicsmech.mechanism.mechanism import Mechanism
 from fenicsmech.mechanism.parts import (
@@ -61,21 +56,16 @@ __all__ = [
     "Disc",
     "Drive",
     "Effect",
-    "EnergyLaw",
     "FlexibleLink",
     "Force",
-    "IsochoricNeoHookean",
-    "IsochoricSimoNeoHookean",
     "Joint",
     "Leader",
     "Line",
     "Link",
-    "LogarithmicNeoHookean",
     "Material",
     "Mechanism",
     "MeshPart",
     "Motor",
-    "NeoHookean",
     "ONYX",
     "Outline",
     "Output",

@@ -1,66 +1,39 @@
-"""Materials: elastic constants and strain-energy laws; ``elasticity`` evaluates the energies."""
+"""Materials: a name and a law with its numbers."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fenicsmech.checks import finite, positive
 from fenicsmech.errors import DescriptionError
+from fenicsmech.laws import Law, NeoHookean, elastic_constants
 
 
-class EnergyLaw:
-    """A strain energy density W(F), in terms of E and ν of the material."""
-
-
-@dataclass(frozen=True)
-class NeoHookean(EnergyLaw):
-    """W = μ/2 (tr FᵀF − 3 − 2 ln J) + λ/4 (J² − 1 − 2 ln J) (Simo); has a closed plane-stress form."""
-
-
-@dataclass(frozen=True)
-class LogarithmicNeoHookean(EnergyLaw):
-    """W = μ/2 (tr FᵀF − 3 − 2 ln J) + λ/2 (ln J)²."""
-
-
-@dataclass(frozen=True)
-class IsochoricNeoHookean(EnergyLaw):
-    """W = μ/2 (J^(−2/3) tr FᵀF − 3) + κ/2 (J − 1)² (CalculiX and others)."""
-
-
-@dataclass(frozen=True)
-class IsochoricSimoNeoHookean(EnergyLaw):
-    """W = μ/2 (J^(−2/3) tr FᵀF − 3) + κ/4 (J² − 1 − 2 ln J) (deal.II and others)."""
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class Material:
-    """An isotropic hyperelastic material.
+    """A hyperelastic material: ``Material("PLA", 2000.0, 0.35)`` or ``Material("rubber", law=Yeoh(…))``.
 
-    Attributes:
+    Args:
         name: for messages.
-        youngs_modulus: E at small strain, force per area.
-        poissons_ratio: ν at small strain.
-        law: the strain energy.
+        E, nu: Young's modulus (force per area) and Poisson's ratio of the law ``NeoHookean(E, nu)``.
+        law: any law, instead of E and nu.
 
     Raises:
-        DescriptionError: E ≤ 0, ν outside (−1, 0.5), or not numbers.
+        DescriptionError: E ≤ 0, ν outside (−1, 0.5), or not numbers; a law and numbers are given, or neither.
     """
 
     name: str
-    youngs_modulus: float
-    poissons_ratio: float
-    law: EnergyLaw = NeoHookean()
+    law: Law
 
-    def __post_init__(self) -> None:
-        part = f"material {self.name!r}"
-        young = positive(f"Young's modulus of {part}", self.youngs_modulus)
-        if not isinstance(self.law, EnergyLaw):
-            raise DescriptionError(part, f"its law is {self.law!r}", "Give a law, as NeoHookean()")
-        nu = finite(f"Poisson's ratio of {part}", self.poissons_ratio)
-        if not -1.0 < nu < 0.5:
-            raise DescriptionError(part, f"Poisson's ratio is {nu:g}", "Give a value between −1 and 0.5, both excluded")
-        object.__setattr__(self, "youngs_modulus", young)
-        object.__setattr__(self, "poissons_ratio", nu)
+    def __init__(self, name: str, E: float | None = None, nu: float | None = None, *, law: Law | None = None) -> None:
+        part = f"material {name!r}"
+        if law is None:
+            law = NeoHookean(*elastic_constants(part, E, nu))
+        elif E is not None or nu is not None:
+            raise DescriptionError(part, "it has a law and numbers", f"Give them to the law, {type(law).__name__}(…)")
+        if not isinstance(law, Law):
+            raise DescriptionError(part, f"its law is {law!r}", "Give a law with its numbers, as NeoHookean(E, nu)")
+        object.__setattr__(self, "name", name)
+        object.__setattr__(self, "law", law)
 
 
 ONYX = Material("Onyx", 1770.0, 0.42)

@@ -1,34 +1,77 @@
-"""The scene of a mechanism: the effects simulated, its configurations, and names of units."""
+"""The scene of a mechanism: the effects simulated, its configurations, and names of units.
+
+Effects add to the potential energy
+
+    Π = E_int + s · (Σ link energies + Σ pose potentials) + Σ potentials that hold − loads.
+
+The load factor s grows from 0 to 1 before the controlled force does, as that of the constant loads. What holds the
+mechanism, as the stiffness of a spring does, acts from the start: without it equilibria on the way need not exist.
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from fenicsmech.checks import finite
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism.mechanism import Mechanism
-from fenicsmech.mechanism.parts import Motor
+from fenicsmech.mechanism.parts import Joint, Link, Motor
 
 
+@dataclass(frozen=True)
 class Effect(ABC):
-    """An influence on a mechanism beside its links, joints and forces, described by a frozen dataclass.
+    """An influence on a mechanism; a frozen dataclass derived from this one, in a file of its own.
 
-    The ``effects`` layer implements its potential, one file per effect.
+    It overrides the hooks that it needs. Each is nothing by default and then adds no form, no unknown and no entry of a
+    matrix. The arguments of hooks are objects of the layers above.
+
+    Attributes:
+        faces: ``Faces``, the parts of links' boundaries that ``link_energy`` integrates over.
     """
 
-    @abstractmethod
-    def check(self, mechanism: Mechanism, dim: int) -> None:
-        """Checks that the effect applies to ``mechanism`` in ``dim`` dimensions.
-
-        Raises:
-            DescriptionError: it does not.
-        """
+    faces = ()
 
     @abstractmethod
     def explain(self) -> str:
         """The effect in one plain sentence without a full stop."""
+
+    def check(self, mechanism: Mechanism, dim: int) -> None:
+        """Checks that the effect applies to ``mechanism`` in ``dim`` dimensions; by default, that its parts exist.
+
+        Raises:
+            DescriptionError: it does not.
+        """
+        for field in fields(self):
+            part = getattr(self, field.name)
+            if isinstance(part, Link | Joint) and part not in (*mechanism.links, *mechanism.joints):
+                kind = "joint" if isinstance(part, Joint) else "link"
+                raise DescriptionError(
+                    f"effect {type(self).__name__}",
+                    f"{part.name!r} is not a {kind} of {mechanism.name!r}",
+                    f"Name a {kind} of the mechanism",
+                )
+
+    def link_energy(self, fields):
+        """A potential energy of flexible links in UFL, a form in the ``LinkFields``; None if no link is concerned."""
+        return None
+
+    def pose_potentials(self, linkage):
+        """A sequence of ``PosePotential``, potentials of the poses of bodies of the ``Linkage``."""
+        return ()
+
+    def soften(self, linkage):
+        """Compliances c ≥ 0 by row of ``linkage.joints``, whose equation becomes C + c λ = 0; those of effects add."""
+        return {}
+
+    def growth(self, model):
+        """The ``Stretch`` by flexible link by which it is longer or shorter without strain than drawn.
+
+        Raises:
+            DescriptionError: the ``ElasticModel`` does not support it.
+        """
+        return {}
 
 
 @dataclass(frozen=True)

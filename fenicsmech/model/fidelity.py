@@ -32,7 +32,7 @@ class Fidelity:
         order: degree of the displacement field.
         sizes: element size per flexible link.
         quadrature: quadrature degree.
-        formulation: which links have the pressure as an unknown.
+        formulation: which links are in the u–p (mixed) formulation.
         layers: through the depth, or through half of it where half is meshed; None: chosen from depth and size.
         segments: around a pin, at least.
     """
@@ -89,8 +89,6 @@ def check_scene(scene: Scene, model: ElasticModel) -> None:
         raise DescriptionError(
             f"mechanism {mechanism.name!r}", "no link is flexible: nothing would bend", "Add one with flexible()"
         )
-    for link in mechanism.flexible_links:
-        model.check(link.name, link.material)
     for effect in scene.effects:
         effect.check(mechanism, model.mechanism_dim)
 

@@ -14,7 +14,7 @@ from mpi4py import MPI
 from fenicsmech.clock import Clock
 from fenicsmech.collective import on_one
 from fenicsmech.compat import cell_dofs, cell_nodes, original_nodes
-from fenicsmech.effects import BodyEffect, JointSoftening, LinkEffect, LinkFields, RestStretch, find_boundaries, holding
+from fenicsmech.effects import LinkFields, find_boundaries
 from fenicsmech.elasticity import ElasticBody, ElasticModel, Stretch
 from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State, load_fields
 from fenicsmech.errors import DescriptionError
@@ -43,7 +43,7 @@ class MechanismModel:
         design_nodes: the design field at the nodes of the displacement.
         node_link: index of the flexible link of every local node.
         clock: where time goes.
-        with_pressure: whether each flexible link has the u–p (mixed) formulation.
+        mixed: whether each flexible link is in the u–p formulation.
         effects: what acts beside links, joints and forces.
         potentials: potentials of body poses.
         holding: those of springs, which act from the start.
@@ -61,11 +61,8 @@ class MechanismModel:
         self.mechanism, self.linkage, self.mesh, self.clock = mechanism, linkage, mesh, clock
         self.effects = tuple(effects)
         links = mechanism.flexible_links
-        self.with_pressure = fidelity.formulation.with_pressure(
-            [link.material for link in links], fidelity.model, fidelity.order
-        )
-        link_effects = [effect for effect in effects if isinstance(effect, LinkEffect)]
-        faces = [part for effect in link_effects for part in effect.faces]
+        self.mixed = fidelity.formulation.mixed([link.material for link in links], fidelity.model, fidelity.order)
+        faces = [part for effect in effects for part in effect.faces]
         self._boundaries = find_boundaries(mesh.mesh, links, mesh.link, faces, half=fidelity.model.symmetric)
         self.elastic = ElasticBody(
             mesh.mesh,
@@ -76,24 +73,18 @@ class MechanismModel:
             model=fidelity.model,
             order=fidelity.order,
             quadrature=fidelity.quadrature,
-            effects=[partial(self._link_energy, effect) for effect in link_effects],
+            effects=[partial(self._link_energy, effect) for effect in effects],
             stretches=_stretches(links, fidelity.model, effects),
             # only fields of the bulge's degree can move curved cells rigidly
             bulge=bulge_field(mesh) if fidelity.order > 1 else None,
-            with_pressure=self.with_pressure,
+            mixed=self.mixed,
         )
-        self.potentials = [
-            potential
-            for effect in effects
-            if isinstance(effect, BodyEffect)
-            for potential in effect.potentials(linkage)
-        ]
-        self.holding = holding(effects, linkage)
+        self.potentials = [potential for effect in effects for potential in effect.pose_potentials(linkage)]
+        self.holding = tuple(potential for potential in self.potentials if potential.holds)
         self._compliances: dict[int, float] = {}
         for effect in effects:
-            if isinstance(effect, JointSoftening):
-                for row, compliance in effect.compliances(linkage).items():
-                    self._compliances[row] = self._compliances.get(row, 0.0) + compliance
+            for row, compliance in effect.soften(linkage).items():
+                self._compliances[row] = self._compliances.get(row, 0.0) + compliance
         first = len(mechanism.rigid_links)
         cell_body = np.where(mesh.interface >= 0, mesh.interface + first, -1)
         centres = np.array([body.centre for body in linkage.bodies])
@@ -124,9 +115,9 @@ class MechanismModel:
         self.elastic.d.x.array[:] = design
         self.interfaces.reshape(self.design_nodes.values())
 
-    def set_youngs_modulus(self, links: np.ndarray, modulus: float) -> None:
-        """Gives the links in a mask (links,) another Young's modulus."""
-        self.elastic.youngs_modulus.x.array[np.flatnonzero(links[self.mesh.link])] = modulus
+    def set_parameter(self, links: np.ndarray, name: str, value: float) -> None:
+        """Gives the links in a mask (links,) another value of a parameter of their law, as "E". Local."""
+        self.elastic.parameters[name].x.array[np.flatnonzero(links[self.mesh.link])] = value
 
     @contextmanager
     def shaped(self, design: np.ndarray) -> Iterator[None]:
@@ -213,9 +204,9 @@ class MechanismModel:
     def _fields(self, body: ElasticBody) -> LinkFields:
         return LinkFields(tuple(self.mechanism.flexible_links), body, self._boundaries)
 
-    def _link_energy(self, effect: LinkEffect, body: ElasticBody) -> ufl.Form | None:
+    def _link_energy(self, effect: Effect, body: ElasticBody) -> ufl.Form | None:
         """The energy of an effect in the fields of ``body``."""
-        return effect.energy(self._fields(body))
+        return effect.link_energy(self._fields(body))
 
     def _bulges(self, cells: np.ndarray) -> np.ndarray:
         """Bulges of the edges of local ``cells``, as the displacement field sees them, (cells, pairs, dim)."""
@@ -238,11 +229,10 @@ def _stretches(links: Sequence[FlexibleLink], model: ElasticModel, effects: Sequ
     """
     found: dict[FlexibleLink, Stretch] = {}
     for effect in effects:
-        if isinstance(effect, RestStretch):
-            for link, stretch in effect.stretches(model).items():
-                if link in found:
-                    raise DescriptionError(f"link {link.name!r}", "it is prestrained twice", "Leave one out")
-                found[link] = stretch
+        for link, stretch in effect.growth(model).items():
+            if link in found:
+                raise DescriptionError(f"link {link.name!r}", "it is prestrained twice", "Leave one out")
+            found[link] = stretch
     return [found.get(link) for link in links]
 
 

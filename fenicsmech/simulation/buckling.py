@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from fenicsmech.continuation import Mode
-from fenicsmech.equilibrium import Iteration, LoadControl, MotorControl, NotConverged, Step
-from fenicsmech.errors import EquilibriumError
+from fenicsmech.equilibrium import Step
 from fenicsmech.model import MechanismModel
-from fenicsmech.simulation.frame import Frame
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,40 +63,3 @@ def mode_shape(model: MechanismModel, step: Step) -> ModeShape:
     whole = float(sums.sum())
     across = float(sums[:, 2].sum()) / whole if dim == 3 and whole > 0.0 else 0.0
     return ModeShape(links[int(np.argmax(sums.sum(axis=1)))].name, across, step)
-
-
-def modes_at(
-    model: MechanismModel,
-    newton: Iteration,
-    held: LoadControl | MotorControl,
-    frame: Frame,
-    modes: Callable[..., list[Mode]],
-    *,
-    count: int,
-    where: str,
-) -> list[tuple[float, ModeShape]]:
-    """The eigenvalue and the shape of ``count`` modes at a frame.
-
-    Args:
-        model: the discretised mechanism.
-        newton: the solver that found the frame.
-        held: the control whose value changes.
-        frame: an equilibrium of the model.
-        modes: ``critical_changes`` or ``softest_modes``.
-        count: how many.
-        where: the curve and the frame, in words.
-
-    Raises:
-        EquilibriumError: the force or motor moves nothing, or the tangent is singular.
-    """
-    with model.shaped(frame.design):
-        try:
-            found = modes(newton, held, frame.state, count=count)
-            return [(mode.value, mode_shape(model, mode.step)) for mode in found]
-        except NotConverged as failure:
-            raise EquilibriumError(
-                f"modes of {where}",
-                f"they are not defined there ({failure.reason})",
-                "Choose another frame, or prescribe another part",
-                last=frame,
-            ) from failure

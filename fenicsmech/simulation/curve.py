@@ -13,14 +13,14 @@ import numpy as np
 from fenicsmech.collective import on_one
 from fenicsmech.continuation import Mode, critical_changes, softest_modes
 from fenicsmech.elasticity import PLANE_STRESS
-from fenicsmech.equilibrium import Iteration, LoadControl, MotorControl, Quantity
-from fenicsmech.errors import DescriptionError
+from fenicsmech.equilibrium import Iteration, LoadControl, MotorControl, NotConverged, Quantity
+from fenicsmech.errors import DescriptionError, EquilibriumError
 from fenicsmech.estimates import AccuracyOptions, Equilibrium, ErrorKind
 from fenicsmech.files import write_csv
 from fenicsmech.mechanism import Configuration, Force, Joint, Leader, Output, Units
 from fenicsmech.multibody import Freedom
 from fenicsmech.plot import CurveSeries, Panel, Trace, draw_configurations, plot_curve
-from fenicsmech.simulation.buckling import BucklingLoad, BucklingPosition, ModeShape, SoftMode, modes_at
+from fenicsmech.simulation.buckling import BucklingLoad, BucklingPosition, ModeShape, SoftMode, mode_shape
 from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.explanation import Explanation, ExplanationOptions, explain
 from fenicsmech.simulation.fields import gather, write_xdmf
@@ -96,16 +96,16 @@ class Curve:
         return np.array([frame.stable for frame in self.frames])
 
     @property
-    def jumped(self) -> np.ndarray:
+    def snapped_through(self) -> np.ndarray:
         """Whether the mechanism snapped on the way to each frame, (frames,)."""
-        return np.array([frame.jumped for frame in self.frames])
+        return np.array([frame.snapped_through for frame in self.frames])
 
     @property
     def remarks(self) -> tuple[str, ...]:
         """Where the mechanism snapped and which equilibria are unstable, a sentence each."""
         (across, up), name, said = self.axes, self.configuration.name, []
         for before, after in pairwise((None, *self.frames)):
-            if after.jumped:
+            if after.snapped_through:
                 since = "on the way there" if before is None else f"after {up.quantity} {up(before.force)}"
                 said.append(
                     f"{name}: snaps {since}, to {across.quantity} {across(after.displacement)} at {up.quantity} "
@@ -260,7 +260,7 @@ class Curve:
             stable=self.stable,
             colour=colour,
             faint=faint,
-            jumped=self.jumped,
+            snapped_through=self.snapped_through,
         )
 
     def plot(self, path: str | Path) -> None:
@@ -333,7 +333,7 @@ class Curve:
             across.label: self.displacements,
             up.label: self.forces,
             "stable": self.stable,
-            "jumped": self.jumped,
+            "snapped_through": self.snapped_through,
             f"strain energy [{force} {length}]": np.array([frame.strain_energy for frame in self.frames]),
             f"max von Mises [{stress}]": np.array([frame.max_stress for frame in self.frames]),
         }
@@ -377,9 +377,20 @@ class Curve:
     def _modes(
         self, held: LoadControl | MotorControl, modes: Callable[..., list[Mode]], frame: Frame, count: int
     ) -> list[tuple[float, ModeShape]]:
-        where = f"{self.part.name!r} in configuration {self.configuration.name!r} at {self.axes[1](frame.force)}"
+        """Eigenvalues and shapes of modes at a frame while ``held`` changes."""
         model = self.discretisation.model
-        return modes_at(model, self._newton, held, frame, modes, count=count, where=where)
+        with model.shaped(frame.design):
+            try:
+                found = modes(self._newton, held, frame.state, count=count)
+                return [(mode.value, mode_shape(model, mode.step)) for mode in found]
+            except NotConverged as failure:
+                where = f"{self.part.name!r} in configuration {self.configuration.name!r}"
+                raise EquilibriumError(
+                    f"modes of {where} at {self.axes[1](frame.force)}",
+                    f"they are not defined there ({failure.reason})",
+                    "Choose another frame, or prescribe another part",
+                    last=frame,
+                ) from failure
 
     def _estimated(self, kinds: Sequence[ErrorKind], output: Output | None) -> list[np.ndarray]:
         """Estimates of errors of each kind, (frames,) each; those not known yet from one adjoint per frame."""

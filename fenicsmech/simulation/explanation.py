@@ -102,7 +102,7 @@ def _simulated(model: MechanismModel) -> tuple[str, ...]:
     links = ", ".join(
         f"{link.name} ({link.material.name}, {type(link.material.law).__name__})" for link in mechanism.flexible_links
     )
-    mixed = [link.name for link, own in zip(mechanism.flexible_links, model.with_pressure, strict=True) if own]
+    mixed = [link.name for link, own in zip(mechanism.flexible_links, model.mixed, strict=True) if own]
     items = [
         f"flexible links in large deformation ({elastic.model.name}, order {elastic.order}): {links}",
         f"rigid links: {', '.join(link.name for link in mechanism.rigid_links)}",
@@ -156,8 +156,8 @@ def _compressibility_hint(model: MechanismModel, limit: float) -> Hint | None:
     elastic, links = model.elastic, model.mechanism.flexible_links
     stiff = [
         link.name
-        for link, own in zip(links, model.with_pressure, strict=True)
-        if link.material.poissons_ratio > limit and elastic.model.confined and not own
+        for link, own in zip(links, model.mixed, strict=True)
+        if link.material.law.nu > limit and elastic.model.confined and not own
     ]
     if not stiff:
         return None
@@ -165,7 +165,7 @@ def _compressibility_hint(model: MechanismModel, limit: float) -> Hint | None:
     return Hint(
         "pressure as an unknown",
         f"Poisson's ratio of {', '.join(stiff)} is above {limit:g}: elements of order {elastic.order} are too stiff "
-        f"there; {remedy} formulation=Mixed(above={limit:g}), or compare two sizes",
+        f"there; {remedy} formulation=MixedFormulation(above={limit:g}), or compare two sizes",
         True,
     )
 
@@ -224,5 +224,5 @@ def _slenderness(model: MechanismModel, link: FlexibleLink, frame: Frame) -> tup
     length = hypot(*(last - first))
     forces = [frame.reactions[joint.name].force[:2] for joint in joints if joint.name in frame.reactions]
     load = max((float(np.linalg.norm(force)) for force in forces), default=0.0)
-    critical = pi**2 * link.material.youngs_modulus * link.shape.thickness * link.shape.depth**3 / 12.0 / length**2
+    critical = pi**2 * link.material.law.E * link.shape.thickness * link.shape.depth**3 / 12.0 / length**2
     return load / critical, link.name

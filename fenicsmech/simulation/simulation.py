@@ -14,7 +14,7 @@ from fenicsmech.clock import Clock
 from fenicsmech.collective import from_one
 from fenicsmech.continuation import ArcSteps, Hermite, Predictor
 from fenicsmech.effects import holding
-from fenicsmech.elasticity import Formulation, Mixed, Quadrature
+from fenicsmech.elasticity import Formulation, MixedFormulation, Quadrature
 from fenicsmech.equilibrium import EquilibriumSolver, Iteration, PrimalDualNewton
 from fenicsmech.errors import DescriptionError
 from fenicsmech.estimates import AccuracyControl, Choice, Estimates, FidelityLevel, LevelErrors
@@ -58,7 +58,8 @@ class Simulation:
         layers: of elements through the depth, or half of it where half is meshed; by default from depth and size.
         segments: of elements around pins, at least; 8 by default.
         quadrature: quadrature degree; the measured optimum by default.
-        formulation: ``Mixed()`` gives nearly incompressible links the pressure as an unknown; ``Displacement()`` none.
+        formulation: ``MixedFormulation()``: pressures are unknowns in nearly incompressible links;
+            ``DisplacementFormulation()``: in none.
         solver: how equilibria are found.
         predictor: how the next equilibrium on a curve is guessed.
         comm: processes that share the work.
@@ -87,8 +88,10 @@ class Simulation:
         comm: MPI.Comm = MPI.COMM_WORLD,
     ) -> None:
         if formulation is not None and not isinstance(formulation, Formulation):
-            raise DescriptionError("formulation", f"it is {formulation!r}", "Give Mixed() or Displacement()")
-        formulation = formulation or Mixed()
+            raise DescriptionError(
+                "formulation", f"it is {formulation!r}", "Give MixedFormulation() or DisplacementFormulation()"
+            )
+        formulation = formulation or MixedFormulation()
         given = {"space": space, "order": order, "layers": layers, "segments": segments, "quadrature": quadrature}
         self.scene, self.comm, self.clock = scene, comm, Clock()
         self.choice: Choice | None = None

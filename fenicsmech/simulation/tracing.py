@@ -20,6 +20,7 @@ from fenicsmech.equilibrium import (
     Control,
     DisplacementControl,
     EquilibriumPoint,
+    LoadControl,
     LoadFactorControl,
     MotorControl,
     Quantity,
@@ -88,7 +89,7 @@ class CurveTracer:
             state = self._under_constant_loads(state)
             self._system.load(state)
         self._state = state
-        control = DisplacementControl() if any(c.constrained for c in request.controls) else self.followed
+        control = DisplacementControl() if any(c.constrained for c in request.controls) else LoadControl()
         self._path = LoadStepper(self.solver, state, control, predictor=discretisation.predictor)
 
     def curve(self, watch: Callable[[int], None]) -> Curve:
@@ -130,10 +131,10 @@ class CurveTracer:
             names = ", ".join(map(repr, self.freedom.mobile))
             problem = f"at force {control.target:g} where {names} come to rest is lost in the rounding of stiff links"
             raise self._error(self.request.where, problem, before[-1] if before else None, before)
-        jumped, self._snaps = self._snaps + path.snaps > snaps, 0
+        snapped_through, self._snaps = self._snaps + path.snaps > snaps, 0
         return replace(
             record,
-            jumped=jumped,
+            snapped_through=snapped_through,
             iterations=path.iterations - iterations,
             seconds=perf_counter() - start,
             phases=clock.since(seconds),
@@ -151,7 +152,7 @@ class CurveTracer:
                 force=force,
                 displacement=displacement - self.origin,
                 stable=point.unstable_modes == 0,
-                jumped=False,
+                snapped_through=False,
                 unstable_modes=point.unstable_modes,
                 stable_under_control=point.unstable_under_control == 0,
                 strain_energy=model.elastic.strain_energy(),

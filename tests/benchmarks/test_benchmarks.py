@@ -44,6 +44,7 @@ def test_effects_move_the_finger_and_none_moves_nothing():
     assert all(value != 0.0 for value in moved.values())
 
 
+@pytest.mark.slow
 def test_both_optimisers_reach_the_targets_of_the_truss():
     for row in printed("optimisers", "truss")[2:]:
         assert float(row[6]) < 1.0 and row[-1] == "yes"
@@ -56,6 +57,7 @@ def test_accuracy_control_keeps_its_promise_on_the_truss():
     assert error <= asked and bound <= asked
 
 
+@pytest.mark.slow
 def test_stopping_early_moves_less_than_the_elements_err():
     table = printed("stopping", "--mechanisms", "truss", "--size", "3", "--repeats", "1")
     moved = [float(row[-1]) for row in table if row[0] == "truss" and len(row) == 5]

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import pytest
 
 import fenicsmech as fm
@@ -33,9 +35,12 @@ def test_names_say_what_sets_a_level_apart():
     assert FidelityLevel(SPATIAL, 3, 4.0, quadrature=5, tolerance=1e-4).name == "3D P3 h×4, degree 5, tol 1e-4"
 
 
-def test_a_model_without_a_form_for_the_material_is_left_out():
-    models = {level.model for level in fidelity_levels(cantilever(law=fm.LogarithmicNeoHookean()).scene)}
-    assert models == {None, PLANE_STRAIN, MID_PLANE_SYMMETRIC, SPATIAL}
+def test_a_model_without_a_form_for_an_effect_is_left_out():
+    scene = cantilever().scene
+    (beam,) = scene.mechanism.flexible_links
+    weight = fm.Gravity((0.0, 0.0, -1.0), {beam.material: 1e-9})
+    levels = fidelity_levels(replace(scene, effects=[weight]))
+    assert {level.model for level in levels} == {None, SPATIAL}
 
 
 def test_a_load_that_moves_nothing_is_refused():

@@ -12,7 +12,7 @@ from fenicsmech.design import Experiment, fit_modulus
 from fenicsmech.errors import DescriptionError
 
 TRUE = fm.Material("nylon", 1500.0, 0.4)
-GUESS = replace(TRUE, youngs_modulus=600.0)
+GUESS = replace(TRUE, law=replace(TRUE.law, E=600.0))
 FORCES = (0.1, 0.3, 0.5, 0.7)
 
 

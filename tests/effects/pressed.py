@@ -51,7 +51,7 @@ class PressedBody:
             model=model,
             order=order,
             quadrature=Quadrature.for_order(order, model.dim),
-            effects=[lambda body: self.effect.energy(self.fields_of(body))],
+            effects=[lambda body: self.effect.link_energy(self.fields_of(body))],
         )
         self._found, self._link = found, link
 

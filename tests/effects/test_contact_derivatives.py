@@ -37,7 +37,7 @@ def strip(space: str, obstacle, order: int) -> tuple[Contact, object]:
 @pytest.mark.parametrize("space, order", [("plane-stress", 1), ("plane-stress", 2), ("3d", 2)])
 def test_energy_and_its_gradient_are_differentiated_by_state_and_design(space, order, obstacle):
     contact, fields = strip(space, OBSTACLES[obstacle], order)
-    energy = contact.energy(fields)
+    energy = contact.link_energy(fields)
     work = fem.Function(fields.u.function_space)
     interpolate(work, wave(fields.dim, 1.0, seed=5))
     assert fem.assemble_scalar(compile_form(energy)) > 0.0
@@ -61,7 +61,7 @@ def test_points_of_rigid_links_have_exact_gradients_and_hessians(dim, obstacle):
     linkage = build_linkage(mechanism, dim)
     # the last point stays clear of the obstacle
     contact = Contact(arm, OBSTACLES[obstacle], 7.0, points=[(8.5, -1.2), (9.8, -1.3), (9.0, 3.0)])
-    (potential,) = contact.potentials(linkage)
+    (potential,) = contact.pose_potentials(linkage)
     (body,) = potential.bodies
     poses = np.tile(linkage.joints.space.identity, (len(linkage.bodies), 1))
     poses[body] += np.random.default_rng(1).uniform(-0.03, 0.03, poses.shape[1])

@@ -35,7 +35,7 @@ def spring(dim: int, kind: str, *, rest: float = 0.3):
     )
     joint = getattr(mechanism, kind)(a, b, at=(1, 2), **({} if axis is None else {"axis": axis}))
     linkage = build_linkage(mechanism, dim)
-    return _Sum(JointSpring(joint, STIFFNESS, rest).potentials(linkage)), linkage, joint
+    return _Sum(JointSpring(joint, STIFFNESS, rest).pose_potentials(linkage)), linkage, joint
 
 
 class _Sum:

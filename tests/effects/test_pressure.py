@@ -33,7 +33,7 @@ def test_virtual_work_on_a_closed_boundary_is_that_of_the_deformed_normals(dim, 
     fields, work = pressed.fields, fem.Function(pressed.body.u.function_space)
     for field, size, seed in ((fields.body.d, 0.2, 1), (fields.u, 0.2, 2), (work, 1.0, 3)):
         interpolate(field, wave(dim, size, seed=seed))
-    found = fem.assemble_scalar(compile_form(ufl.derivative(pressed.effect.energy(fields), fields.u, work)))
+    found = fem.assemble_scalar(compile_form(ufl.derivative(pressed.effect.link_energy(fields), fields.u, work)))
     (part,) = pressed.effect.faces
     expected = 0.7 * fem.assemble_scalar(compile_form(fields.flux(work, part, degree=6)))
     assert found == pytest.approx(expected, rel=1e-12)
@@ -46,7 +46,7 @@ def test_energy_and_its_gradient_are_differentiated_by_state_and_design(dim, whe
     fields, work = pressed.fields, fem.Function(pressed.body.u.function_space)
     for field, size, seed in ((fields.body.d, 0.2, 1), (fields.u, 0.2, 2), (work, 1.0, 3)):
         interpolate(field, wave(dim, size, seed=seed))
-    energy = pressed.effect.energy(fields)
+    energy = pressed.effect.link_energy(fields)
     for form in (energy, ufl.derivative(energy, fields.u, work)):
         for field in (fields.u, fields.body.d):
             rates = form_derivative(form, field, size=0.1, seed=4).rates

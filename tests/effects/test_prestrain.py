@@ -21,7 +21,7 @@ from .form_derivative import form_derivative
 SPACES = ["plane-stress", "plane-strain", "3d"]
 LENGTH, THICKNESS, DEPTH, BLOCK = 40.0, 2.0, 3.0, 2.0
 NYLON = fm.Material("nylon", 2000.0, 0.0)
-RUBBER = fm.Material("rubber", 2000.0, 0.4999)  # has a pressure of its own
+RUBBER = fm.Material("rubber", 2000.0, 0.4999)  # in the u–p formulation
 
 
 def bar(

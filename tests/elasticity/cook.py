@@ -10,7 +10,7 @@ its middle plane to one of its faces: the whole one could buckle.
 import numpy as np
 
 from fenicsmech.elasticity import ElasticModel, Quadrature
-from fenicsmech.mechanism import IsochoricSimoNeoHookean
+from fenicsmech.laws import IsochoricSimoNeoHookean
 
 from ..plot.grids import box, rectangle
 from .dirichlet_newton import solve
@@ -38,7 +38,7 @@ def upward_displacement(
     body = single_link(
         *panel(count, model.dim),
         model=model,
-        law=IsochoricSimoNeoHookean(),
+        law=IsochoricSimoNeoHookean,
         order=order,
         young=2.0 * SHEAR_MODULUS * (1.0 + POISSON),
         poisson=POISSON,

@@ -1,4 +1,4 @@
-"""Newton's method for an elastic body with or without a pressure of its own, some displacements prescribed.
+"""Newton's method for an elastic body, u–p or in displacements alone, some displacements prescribed.
 
 Every rank holds the whole matrix, in the order of ranks, and solves the same system.
 """

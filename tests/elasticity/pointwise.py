@@ -8,8 +8,8 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from fenicsmech.compat import cellwise_space, compile_expression, create_mesh, evaluate_expression
-from fenicsmech.elasticity import ElasticModel, Moduli, density
-from fenicsmech.mechanism import EnergyLaw
+from fenicsmech.elasticity import ElasticModel
+from fenicsmech.laws import Law
 
 from ..plot.grids import rectangle
 
@@ -26,14 +26,19 @@ def pointwise(build: Callable, arguments: np.ndarray) -> np.ndarray:
     return evaluate_expression(expression, mesh, np.arange(len(arguments), dtype=np.int32))
 
 
-def energies(model: ElasticModel, law: EnergyLaw, H: np.ndarray, young, poisson) -> np.ndarray:
+def energies(model: ElasticModel, law: type[Law], H: np.ndarray, young, poisson) -> np.ndarray:
     """W of each H (n, dim, dim), (n,); one or n values of Young's modulus and Poisson's ratio."""
 
-    def build(youngs_modulus, poissons_ratio, *entries):
-        moduli = Moduli(youngs_modulus, poissons_ratio)
-        return density(law, model.strain(law, tensor(entries), moduli), moduli)
+    def build(E, nu, *entries):
+        material = of_constants(law, E, nu)
+        return material.energy(model.strain(material, tensor(entries)))
 
     return pointwise(build, arguments(H, young, poisson))[:, 0]
+
+
+def of_constants(law: type[Law], E, nu) -> Law:
+    """A law of two constants, which may be UFL expressions."""
+    return law(1.0, 0.0).with_parameters({"E": E, "nu": nu})
 
 
 def arguments(H: np.ndarray, young, poisson) -> np.ndarray:

@@ -8,7 +8,8 @@ from mpi4py import MPI
 
 from fenicsmech.compat import create_mesh
 from fenicsmech.elasticity import ElasticBody, ElasticModel, Quadrature
-from fenicsmech.mechanism import EnergyLaw, Material, NeoHookean
+from fenicsmech.laws import Law, NeoHookean
+from fenicsmech.mechanism import Material
 
 from ..plot.grids import box, rectangle
 
@@ -18,13 +19,13 @@ def single_link(
     cells: np.ndarray,
     *,
     model: ElasticModel,
-    law: EnergyLaw | None = None,
+    law: type[Law] | None = None,
     order: int = 2,
     young: float = 1.9,
     poisson: float = 0.4,
     depth: float = 1.0,
     quadrature: Quadrature | None = None,
-    with_pressure: bool = False,
+    mixed: bool = False,
     comm: MPI.Comm = MPI.COMM_SELF,
 ) -> ElasticBody:
     """The mesh (points, cells), the same on every rank of ``comm``, as one link that deforms everywhere."""
@@ -37,12 +38,12 @@ def single_link(
         mesh,
         link=np.zeros(count, dtype=int),
         free=np.ones(count, dtype=bool),
-        materials=[Material("test", young, poisson, law or NeoHookean())],
+        materials=[Material("test", law=(law or NeoHookean)(young, poisson))],
         depths=[depth],
         model=model,
         order=order,
         quadrature=quadrature or Quadrature.for_order(order, model.dim),
-        with_pressure=[with_pressure],
+        mixed=[mixed],
     )
 
 
@@ -74,12 +75,12 @@ def rest_shape(body: ElasticBody) -> np.ndarray:
 
 def forces(body: ElasticBody) -> np.ndarray:
     """∂E/∂u, as u.x.array; on one rank."""
-    return body.assembled(body.residual_form)
+    return body.assembled(body.residual_forms[0])
 
 
 def tangent(body: ElasticBody) -> np.ndarray:
     """∂²E/∂u², dense; on one rank."""
-    matrix = fem.petsc.create_matrix(body.tangent_form)
+    matrix = fem.petsc.create_matrix(body.tangent_forms[0][0])
     body.tangent(matrix)
     matrix.assemble()
     values = matrix[:, :]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from fenicsmech.elasticity import ElasticModel, Quadrature
-from fenicsmech.mechanism import EnergyLaw, NeoHookean
+from fenicsmech.laws import Law, NeoHookean
 
 from ..plot.grids import box, rectangle
 from .dirichlet_newton import solve
@@ -21,7 +21,7 @@ def sideways_displacement(
     across: int,
     order: int,
     quadrature: Quadrature | None = None,
-    law: EnergyLaw | None = None,
+    law: type[Law] | None = None,
 ) -> float:
     """u_y of the lower corner of the free end, with ``along`` × ``across`` squares cut in two, or cubes cut in six."""
     if model.dim == 2:
@@ -32,7 +32,7 @@ def sideways_displacement(
         points,
         cells,
         model=model,
-        law=law or NeoHookean(),
+        law=law or NeoHookean,
         order=order,
         young=1770.0,
         poisson=0.42,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fenicsmech.elasticity import SPATIAL, Quadrature
-from fenicsmech.mechanism import IsochoricNeoHookean
+from fenicsmech.laws import IsochoricNeoHookean
 
 from ..oracles import calculix
 from ..plot.grids import box
@@ -26,7 +26,7 @@ def strip(quadrature):
     return single_link(
         *box(10, 2, 2, SIZE),
         model=SPATIAL,
-        law=IsochoricNeoHookean(),
+        law=IsochoricNeoHookean,
         young=YOUNG,
         poisson=POISSON,
         quadrature=quadrature,

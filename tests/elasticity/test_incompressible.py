@@ -7,7 +7,7 @@ from dolfinx import fem
 
 from fenicsmech.compat import compile_form
 from fenicsmech.elasticity import PLANE_STRAIN, SPATIAL
-from fenicsmech.mechanism import NeoHookean
+from fenicsmech.laws import NeoHookean
 
 from ..plot.grids import rectangle
 from .even_stretch import free_stretch, stretch
@@ -22,7 +22,7 @@ MU = YOUNG / (2.0 * (1.0 + POISSON))
 @pytest.mark.parametrize(("model", "pulled"), [(PLANE_STRAIN, 1), (SPATIAL, 1), (SPATIAL, 2)])
 def test_evenly_stretched_block_is_exact_on_a_distorted_mesh(model, pulled, ratio):
     dim = model.dim
-    body = single_link(*distorted(dim), model=model, law=NeoHookean(), young=YOUNG, poisson=POISSON, with_pressure=True)
+    body = single_link(*distorted(dim), model=model, law=NeoHookean, young=YOUNG, poisson=POISSON, mixed=True)
     stretch(body, ratio, pulled=pulled)
     free, pressure = free_stretch((ratio,) * pulled, dim - pulled, young=YOUNG, poisson=POISSON)
     exact = np.array([ratio - 1.0] * pulled + [free - 1.0] * (dim - pulled))
@@ -57,11 +57,11 @@ def tube_errors(order: int, count: int) -> tuple[float, float]:
         points + (1.0, 0.3),
         cells,
         model=PLANE_STRAIN,
-        law=NeoHookean(),
+        law=NeoHookean,
         order=order,
         young=2.0 * (1.0 + poisson) * MU,
         poisson=poisson,
-        with_pressure=True,
+        mixed=True,
     )
     u, p = tube(ufl.SpatialCoordinate(body.mesh))
     F = ufl.Identity(2) + ufl.grad(u)

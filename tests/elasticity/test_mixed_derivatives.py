@@ -15,7 +15,7 @@ STEPS = 10.0 ** -np.arange(1.5, 3.6, 0.5)
 
 def loaded(model, law, *, order: int = 2):
     """A body somewhere, with no symmetry, and its values."""
-    body = single_link(*distorted(model.dim), model=model, law=law, order=order, poisson=0.4999, with_pressure=True)
+    body = single_link(*distorted(model.dim), model=model, law=law, order=order, poisson=0.4999, mixed=True)
     interpolate(body.u, wave(model.dim, 0.05, seed=1))
     interpolate(body.d, wave(model.dim, 0.02, seed=2))
     random = np.random.default_rng(3)

@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 import ufl
 
-from fenicsmech.elasticity import PLANE_STRAIN, SPATIAL, Moduli, dilatation, mixed_density, volumetric_modulus
-from fenicsmech.mechanism import (
-    EnergyLaw,
+from fenicsmech.elasticity import PLANE_STRAIN, SPATIAL
+from fenicsmech.laws import (
     IsochoricNeoHookean,
     IsochoricSimoNeoHookean,
+    Law,
     LogarithmicNeoHookean,
     NeoHookean,
 )
 
 from . import textbook
 from .cases import LAWS, each_law, name
-from .pointwise import arguments, pointwise, tensor
+from .pointwise import arguments, of_constants, pointwise, tensor
 from .test_energies import random_gradients, rotations
 
 each_bulky_case = pytest.mark.parametrize(
@@ -23,25 +23,25 @@ each_bulky_case = pytest.mark.parametrize(
 )
 
 
-def tension(law: EnergyLaw, j):
+def tension(law: type[Law], j):
     """U′ of a law, by hand."""
     return {
-        NeoHookean(): ((1 + j) - 1 / (1 + j)) / 2,
-        LogarithmicNeoHookean(): ufl.ln(1 + j),
-        IsochoricNeoHookean(): j,
-        IsochoricSimoNeoHookean(): ((1 + j) - 1 / (1 + j)) / 2,
+        NeoHookean: ((1 + j) - 1 / (1 + j)) / 2,
+        LogarithmicNeoHookean: ufl.ln(1 + j),
+        IsochoricNeoHookean: j,
+        IsochoricSimoNeoHookean: ((1 + j) - 1 / (1 + j)) / 2,
     }[law]
 
 
-def at_stationary_pressure(model, law: EnergyLaw, H: np.ndarray, young: float, poisson: float) -> np.ndarray:
+def at_stationary_pressure(model, law: type[Law], H: np.ndarray, young: float, poisson: float) -> np.ndarray:
     """Π, ∂Π/∂p and −p at p = −M U′, (n, 3)."""
 
-    def build(youngs_modulus, poissons_ratio, *entries):
-        moduli = Moduli(youngs_modulus, poissons_ratio)
-        strain = model.strain(law, tensor(entries), moduli)
-        tensile = volumetric_modulus(law, moduli) * tension(law, strain.j)
+    def build(E, nu, *entries):
+        material = of_constants(law, E, nu)
+        strain = model.strain(material, tensor(entries))
+        tensile = material.volumetric_modulus * tension(law, strain.j)
         p = ufl.variable(-tensile)
-        energy = mixed_density(law, strain, moduli, p)
+        energy = material.mixed_energy(strain, p)
         return ufl.as_vector([energy, ufl.diff(energy, p), tensile])
 
     return pointwise(build, arguments(H, young, poisson))
@@ -72,7 +72,7 @@ def test_pressure_balances_the_tension_of_pure_swelling_at_small_strain(law):
 def test_dilatation_is_the_relative_change_of_volume_at_small_strain_and_grows_with_it(law):
     def build(value):
         j = ufl.variable(value)
-        g = dilatation(law, j)
+        g = law.volumetric.dilatation(j)
         return ufl.as_vector([g, ufl.diff(g, j)])
 
     g, slope = pointwise(build, np.array([-0.95, -0.5, -0.1, 0.0, 1e-12, 0.1, 0.5, 3.0])[:, None]).T
@@ -88,8 +88,8 @@ def test_energy_does_not_see_superposed_rotations(model, law):
     turned = rotations(model.dim, len(H)) @ (identity + H) - identity
 
     def build(*entries):
-        moduli = Moduli(1.9, 0.4999)
-        return mixed_density(law, model.strain(law, tensor(entries), moduli), moduli, 0.3)
+        material = law(1.9, 0.4999)
+        return material.mixed_energy(model.strain(material, tensor(entries)), 0.3)
 
     values = [pointwise(build, gradients.reshape(len(H), -1)) for gradients in (H, turned)]
     assert values[1] == pytest.approx(values[0], rel=1e-11, abs=1e-12)

@@ -30,7 +30,7 @@ def values(body, field):
 
 def stiffness(mixed):
     """∫ ∇v ΔS : ∇w dV, dense."""
-    matrix = fem.petsc.create_matrix(mixed._body.tangent_form)
+    matrix = fem.petsc.create_matrix(mixed._body.tangent_forms[0][0])
     mixed.tangent(matrix)
     matrix.assemble()
     dense = matrix[:, :]

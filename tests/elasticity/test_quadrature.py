@@ -9,7 +9,7 @@ from .cases import each_case, name
 from .single_link import distorted, interpolate, single_link, wave
 from .strip import sideways_displacement
 
-# Error of the tip displacement of the strip of strip.py with NeoHookean() and quadratic displacements, by degree of
+# Error of the tip displacement of the strip of strip.py with NeoHookean and quadratic displacements, by degree of
 # quadrature, in per cent of the value on a much finer mesh: cells along × across, then 2, 3, 4, 6 (5 in 3D)
 #
 #     plane strain    10 × 1    −4.51   −4.56   −4.71   −4.71

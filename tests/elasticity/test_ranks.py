@@ -40,7 +40,7 @@ def test_residual_and_tangent(bodies):
         interpolate(probe, wave(body.model.dim, 1.0, seed=5))
         interpolate(other, wave(body.model.dim, 1.0, seed=6))
         force = body.residuals()
-        matrix = fem.petsc.create_matrix(body.tangent_form)
+        matrix = fem.petsc.create_matrix(body.tangent_forms[0][0])
         body.tangent(matrix)
         matrix.assemble()
         right, image = matrix.createVecs()

@@ -6,7 +6,7 @@ import pytest
 import ufl
 from mpmath import mpf
 
-from fenicsmech.elasticity import cube_root_remainder, log_remainder
+from fenicsmech.laws import cube_root_remainder, log_remainder
 
 from .pointwise import pointwise
 

@@ -39,7 +39,7 @@ def body_of(request):
 @pytest.mark.parametrize("order", [1, 2])
 def test_rigid_motion_costs_no_energy_and_takes_no_force(body_of, model, law, order):
     body = body_of(model, law, order)
-    young = body.youngs_modulus.x.array[0]
+    young = body.parameters["E"].x.array[0]
     for angle in ANGLES:
         body.u.x.array[:] = 0.0
         move(body, rotation(model.dim, angle))

@@ -6,7 +6,8 @@ import ufl
 from dolfinx import fem
 
 from fenicsmech.compat import compile_form
-from fenicsmech.elasticity import PLANE_STRESS, Moduli
+from fenicsmech.elasticity import PLANE_STRESS
+from fenicsmech.laws import NeoHookean
 
 from .cases import each_case
 from .single_link import distorted, single_link, tangent
@@ -17,7 +18,7 @@ YOUNG, POISSON, DEPTH = 1770.0, 0.42, 2.5
 def linear_stiffness(body) -> np.ndarray:
     """∫ (2 μ ε(u) : ε(v) + λ tr ε(u) tr ε(v)) b dX, in plane stress with λ* = 2 λ μ / (λ + 2 μ)."""
     space = body.u.function_space
-    moduli = Moduli(YOUNG, POISSON)
+    moduli = NeoHookean(YOUNG, POISSON)
     lam = 2 * moduli.lam * moduli.mu / (moduli.lam + 2 * moduli.mu) if body.model is PLANE_STRESS else moduli.lam
     strain, virtual = (ufl.sym(ufl.grad(f(space))) for f in (ufl.TrialFunction, ufl.TestFunction))
     power = 2 * moduli.mu * ufl.inner(strain, virtual) + lam * ufl.tr(strain) * ufl.tr(virtual)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from fenicsmech.elasticity import PLANE_STRAIN, PLANE_STRESS, SPATIAL, Moduli
-from fenicsmech.mechanism import (
+from fenicsmech.elasticity import PLANE_STRAIN, PLANE_STRESS, SPATIAL
+from fenicsmech.laws import (
     IsochoricNeoHookean,
     IsochoricSimoNeoHookean,
     LogarithmicNeoHookean,
@@ -16,7 +16,7 @@ from .cases import each_case
 from .single_link import distorted, interpolate, single_link
 
 YOUNG, POISSON = 1.9, 0.4
-MODULI = Moduli(YOUNG, POISSON)
+MODULI = NeoHookean(YOUNG, POISSON)
 
 
 def _isochoric(squares, J):
@@ -25,10 +25,10 @@ def _isochoric(squares, J):
 
 # J σ_i from the squares of the principal stretches
 KIRCHHOFF = {
-    NeoHookean(): lambda b, J: MODULI.mu * (b - 1.0) + 0.5 * MODULI.lam * (J**2 - 1.0),
-    LogarithmicNeoHookean(): lambda b, J: MODULI.mu * (b - 1.0) + MODULI.lam * np.log(J),
-    IsochoricNeoHookean(): lambda b, J: _isochoric(b, J) + MODULI.kappa * J * (J - 1.0),
-    IsochoricSimoNeoHookean(): lambda b, J: _isochoric(b, J) + 0.5 * MODULI.kappa * (J**2 - 1.0),
+    NeoHookean: lambda b, J: MODULI.mu * (b - 1.0) + 0.5 * MODULI.lam * (J**2 - 1.0),
+    LogarithmicNeoHookean: lambda b, J: MODULI.mu * (b - 1.0) + MODULI.lam * np.log(J),
+    IsochoricNeoHookean: lambda b, J: _isochoric(b, J) + MODULI.kappa * J * (J - 1.0),
+    IsochoricSimoNeoHookean: lambda b, J: _isochoric(b, J) + 0.5 * MODULI.kappa * (J**2 - 1.0),
 }
 
 

@@ -30,9 +30,7 @@ def beam_forces(displacements: np.ndarray) -> np.ndarray:
     """Forces of the symmetric beam, elastic from the rim of the pin's disc to the crown."""
     whole = centreline.through(POINTS)
     half = whole.trimmed(0.5 * THICKNESS, 0.5 * whole.length)
-    section = beam.Section.rectangle(
-        young=STEEL.youngs_modulus, poisson=STEEL.poissons_ratio, thickness=THICKNESS, depth=DEPTH
-    )
+    section = beam.Section.rectangle(young=STEEL.law.E, poisson=STEEL.law.nu, thickness=THICKNESS, depth=DEPTH)
     line, forces, solution = beam.Beam(half, section, start_pin=POINTS[0]), [], None
     for displacement in displacements:
         solution = beam.solve(line, beam.PINNED, beam.End(x=0.0, y=-displacement, rotation=0.0), initial=solution)

@@ -58,9 +58,7 @@ def forces(displacements: np.ndarray, material: fm.Material = PLASTIC) -> np.nda
     The knee A turns about the crank's pivot, the pin B about the knee. The coupler carries a force along itself only:
     that fixes B, and the moment about the crank's pivot the force, A × (F (0, −1) − P) = 0 with P on the follower.
     """
-    section = beam.Section.rectangle(
-        young=material.youngs_modulus, poisson=material.poissons_ratio, thickness=THICKNESS, depth=DEPTH
-    )
+    section = beam.Section.rectangle(young=material.law.E, poisson=material.law.nu, thickness=THICKNESS, depth=DEPTH)
     line = centreline.through([tuple(ROOT), tuple(PIN)])
     line = line.trimmed(0.0, 0.5 * THICKNESS)
     follower = beam.Beam(line, section, end_pin=tuple(PIN))

@@ -25,7 +25,7 @@ class Crowded:
 def crowded(space: str, comm: MPI.Comm = MPI.COMM_SELF, *, rubber: fm.Material | None = None) -> Crowded:
     """Parallelogram of rigid links with a motor, a flexible third leg (redundant) and a flexible diagonal.
 
-    A leg of ``rubber`` has a pressure of its own.
+    A leg of ``rubber`` is in the u–p formulation.
     """
     mechanism = fm.Mechanism("crowded")
     base = mechanism.rigid("base", fixed=True)

@@ -21,7 +21,7 @@ from fenicsmech.equilibrium import (
 from .finger import RUBBER, finger
 
 SIDE, LENGTH = 3.0, 60.0
-EULER = np.pi**2 * RUBBER.youngs_modulus * SIDE**4 / 12.0 / LENGTH**2
+EULER = np.pi**2 * RUBBER.law.E * SIDE**4 / 12.0 / LENGTH**2
 
 
 def column(size: float = 2.0):

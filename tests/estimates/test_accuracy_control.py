@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRESS, SPATIAL, Mixed
+from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRESS, SPATIAL, MixedFormulation
 from fenicsmech.estimates import (
     AccuracyControl,
     AccuracyOptions,
@@ -24,7 +24,7 @@ LOADS = {"truss": 0.4, "claw": 10.0, "klann": 5.0}
 
 
 def control(accuracy: float, **changes) -> AccuracyControl:
-    return AccuracyControl(cantilever()[0], accuracy, None, Mixed(), **changes)
+    return AccuracyControl(cantilever()[0], accuracy, None, MixedFormulation(), **changes)
 
 
 class Recorder:
@@ -164,7 +164,7 @@ def test_what_corrections_leave_is_what_they_may_leave(name):
 
 
 def _at(scene: fm.Scene, level: FidelityLevel) -> fm.Simulation:
-    fidelity = AccuracyControl(scene, 1.0, None, Mixed()).fidelity(level)
+    fidelity = AccuracyControl(scene, 1.0, None, MixedFormulation()).fidelity(level)
     return fm.Simulation(
         scene,
         space=fidelity.model.name,

@@ -1,6 +1,6 @@
-"""Runs all hard cases and prints the table of the README.
+"""Runs all hard cases and prints their table.
 
-python3 -m tests.hard [PART OF A NAME]
+python3 -m tests.hard [PART OF A NAME …] [--write]
 mpirun -n 2 python3 -m tests.hard
 """
 
@@ -11,6 +11,9 @@ from time import perf_counter
 
 from mpi4py import MPI
 
+from benchmarks.table import command, publish
+from fenicsmech.report import format_table
+
 from .case import Check, Deviation, Fact, HardCase
 from .cases import CASES
 
@@ -20,19 +23,21 @@ COMM = MPI.COMM_WORLD
 
 def main() -> int:
     """The number of cases in which something known was not found."""
+    parser = command(__doc__)
+    parser.add_argument("parts", nargs="*", help="parts of the names of cases (default: all cases)")
+    options = parser.parse_args()
     rows, failed = [], 0
     for case in CASES:
-        if all(part in case.name for part in sys.argv[1:]):
+        if all(part in case.name for part in options.parts):
             start = perf_counter()
             checks = [check for space in case.spaces for check in _run(case, space)]
             seconds = perf_counter() - start
             failed += not all(check.holds for check in checks)
-            rows.append((case.name, case.hard, ", ".join(case.spaces), _told(checks), f"{seconds:.1f}"))
+            rows.append((case.name, case.hard, ", ".join(case.spaces), _found(checks), round(seconds, 1)))
             if COMM.rank == 0:
                 print(f"{case.name}: {seconds:.1f} s", file=sys.stderr, flush=True)
     if COMM.rank == 0:
-        for cells in (HEADERS, ["---"] * 4 + ["---:"], *rows):
-            print("|", " | ".join(cells), "|")
+        publish("hard_cases", format_table(HEADERS, rows), write=options.write)
     return failed
 
 
@@ -44,7 +49,7 @@ def _run(case: HardCase, space: str) -> list[Check]:
         return [Fact(f"{space}: no {type(failure).__name__}: {failure}", False)]
 
 
-def _told(checks: list[Check]) -> str:
+def _found(checks: list[Check]) -> str:
     """What happened: of the same thing in several spaces the worst."""
     worst: dict[str, Check] = {}
     for check in checks:

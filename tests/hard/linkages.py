@@ -80,10 +80,10 @@ def _change_point(space: str, comm: MPI.Comm) -> Iterator[Check]:
         poses = frame.state.poses
         apart = point_of(simulation.linkage, poses, rocker, far) - point_of(simulation.linkage, poses, wheel, pin)
         yield deviation("a parallelogram beyond its change points", apart[:2], [coupler, 0.0], 1e-9)
-        yield Deviation("its energy", frame.strain_energy / (SOFT.youngs_modulus * coupler**3), 1e-18)
+        yield Deviation("its energy", frame.strain_energy / (SOFT.law.E * coupler**3), 1e-18)
     flat = scene.configuration("flat", {motor: turned})
     frame = simulation.load_displacement(push, forces=[1e-3, 0.05], configuration=flat).frames[-1]
-    stiffness = SOFT.youngs_modulus * 3.0 * 6.0 / (coupler - 3.0)
+    stiffness = SOFT.law.E * 3.0 * 6.0 / (coupler - 3.0)
 
     def across(angle: float) -> float:
         """Moment about the rocker's axle that is out of balance, at an ``angle`` of the rocker."""
@@ -185,7 +185,7 @@ def _paradoxical(hinges, theta: float, turn: float, comm: MPI.Comm, redundancy: 
     there, _ = hinges(theta + turn)
     found = point_of(simulation.linkage, rest.state.poses, links[2], points[2])
     yield deviation("hinges follow the closed form", found, there[2], 1e-8)
-    yield Deviation("energy on the way", rest.strain_energy / (fm.ONYX.youngs_modulus * 30.0**3), 1e-15)
+    yield Deviation("energy on the way", rest.strain_energy / (fm.ONYX.law.E * 30.0**3), 1e-15)
     step = 1e-6
     rate = (hinges(theta + turn + step)[0][2] - hinges(theta + turn - step)[0][2]) / (2.0 * step)
     yield deviation("torque against a force", frame.motors[motor], -force * (rate @ across), 2e-3)

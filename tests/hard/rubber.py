@@ -19,7 +19,7 @@ from .case import Check, Fact, HardCase, deviation
 
 STRAIN, SPACE = "plane-strain", "3d"
 RUBBERS = (0.45, 0.49, 0.499, 0.4999)  # Poisson's ratios
-ALONE, PRESSED = fm.Displacement(), fm.Mixed(above=0.4)
+ALONE, PRESSED = fm.DisplacementFormulation(), fm.MixedFormulation(above=0.4)
 SHEAR_MODULUS, THICKNESS, LENGTH = 1.0, 4.0, 60.0
 
 
@@ -34,9 +34,7 @@ def _stretched_block(space: str, comm: MPI.Comm) -> Iterator[Check]:
     for poisson in RUBBERS:
         for own, how in ((False, "displacements alone"), (True, "with a pressure")):
             young = _young(poisson)
-            block = single_link(
-                *distorted(dim), model=model, young=young, poisson=poisson, with_pressure=own, comm=comm
-            )
+            block = single_link(*distorted(dim), model=model, young=young, poisson=poisson, mixed=own, comm=comm)
             stretch(block, 1.5, pulled=1)
             free, pressure = free_stretch((1.5,), dim - 1, young=young, poisson=poisson)
             exact = nodes(block.u) * np.array([0.5] + [free - 1.0] * (dim - 1))

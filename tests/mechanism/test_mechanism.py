@@ -4,13 +4,13 @@ import pytest
 
 from fenicsmech.errors import DescriptionError
 from fenicsmech.joints import SPHERICAL
+from fenicsmech.laws import NeoHookean
 from fenicsmech.mechanism import (
     ONYX,
     Configuration,
     Disc,
     Material,
     Mechanism,
-    NeoHookean,
     Rectangle,
     RigidLink,
     Scene,
@@ -221,6 +221,6 @@ def test_shape_and_material_of_the_wrong_kind_are_refused():
     with pytest.raises(DescriptionError, match="link 'bar': its material is 'PLA'"):
         other.flexible("bar", bar(), "PLA")
     with pytest.raises(DescriptionError, match="material 'PLA': its law is"):
-        Material("PLA", 2000.0, 0.3, NeoHookean)
+        Material("PLA", law=NeoHookean)
     with pytest.raises(DescriptionError, match="not a list of points"):
         strip(None, thickness=1.0, depth=1.0)

@@ -25,7 +25,8 @@ from fenicsmech.mechanism import (
 from .parts import parts
 
 PACKAGE = Path(fenicsmech.mechanism.__file__).parents[1]
-SOLVERS = {"dolfinx", "ufl", "basix", "ffcx", "petsc4py", "slepc4py", "mpi4py", "gmsh", "matplotlib"}
+# UFL is not among them: the law of a material is its energy, written in UFL's symbols
+SOLVERS = {"dolfinx", "basix", "ffcx", "petsc4py", "slepc4py", "mpi4py", "gmsh", "matplotlib"}
 
 
 def described():

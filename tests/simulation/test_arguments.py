@@ -58,7 +58,7 @@ def test_following_before_the_accuracy_has_chosen_anything():
     refused("curve of", lambda: simulation.follow(push, until=fm.Until(force=1.0)), simulation=simulation)
 
 
-@pytest.mark.parametrize("formulation", ["mixed", 0.49, fm.Mixed])
+@pytest.mark.parametrize("formulation", ["mixed", 0.49, fm.MixedFormulation])
 def test_formulation_that_is_none(formulation):
     scene, _ = describe("truss")
     refused("formulation", lambda: simulate(scene, formulation=formulation))
@@ -66,7 +66,7 @@ def test_formulation_that_is_none(formulation):
 
 @pytest.mark.parametrize("above", [-0.1, 0.5, math.nan])
 def test_mixed_formulation_without_a_sensible_limit(above):
-    refused("mixed formulation", lambda: fm.Mixed(above=above))
+    refused("mixed formulation", lambda: fm.MixedFormulation(above=above))
 
 
 @pytest.mark.parametrize("size", [0.0, -2.0, math.nan, math.inf, "fine"])
@@ -190,17 +190,6 @@ def test_mechanism_of_rigid_links_only():
     mechanism = fm.Mechanism("stiff")
     mechanism.revolute(mechanism.rigid("ground", fixed=True), mechanism.rigid("bar"), at=(0, 0))
     refused("'stiff'", lambda: simulate(fm.Scene(mechanism)))
-
-
-def test_law_without_a_plane_stress_form_is_refused_with_its_link_and_material():
-    scene, _ = describe("truss")
-    ground = scene.mechanism.links[0]
-    rubber = fm.Material("rubber", 1.0, 0.4, fm.IsochoricNeoHookean())
-    bar = scene.mechanism.flexible("bar", fm.strip([(0, 0), (-40, 0)], thickness=3, depth=5), rubber)
-    scene.mechanism.revolute(ground, bar, at=(0, 0), radius=1.5)
-    with pytest.raises(fm.DescriptionError, match="'bar'.*IsochoricNeoHookean of 'rubber'"):
-        simulate(scene)
-    simulate(scene, space="plane-strain")
 
 
 def test_mechanism_that_changed_after_the_simulation_was_made(truss):

@@ -6,7 +6,7 @@ from mpi4py import MPI
 
 import fenicsmech as fm
 from fenicsmech.elasticity import Quadrature
-from fenicsmech.mechanism import IsochoricNeoHookean
+from fenicsmech.laws import IsochoricNeoHookean
 
 from ..oracles import calculix
 
@@ -25,7 +25,7 @@ def four_bar(quadrature: Quadrature | None):
     base, crank = mechanism.rigid("base", fixed=True), mechanism.rigid("crank")
 
     def link(name, *points):
-        material = fm.Material(name, YOUNG[name], POISSON, IsochoricNeoHookean())
+        material = fm.Material(name, law=IsochoricNeoHookean(YOUNG[name], POISSON))
         return mechanism.flexible(name, fm.strip(points, thickness=3.0, depth=5.0), material)
 
     coupler, rocker = link("coupler", (0, 20), (25, 33), (50, 30)), link("rocker", (40, 0), (50, 30))

@@ -53,7 +53,7 @@ def test_rigid_motion_stores_no_energy_and_takes_no_force(space, order):
     model = bow(space, order)[0].model
     assert model.elastic.bulge is not None
     move(model)
-    young = fm.ONYX.youngs_modulus
+    young = fm.ONYX.law.E
     assert abs(model.elastic.energy()) < 1e-12 * young
     assert np.abs(model.elastic.residuals()).max() < 1e-12 * young * OUTER
 

@@ -97,10 +97,10 @@ def test_compression_is_compared_with_the_load_that_buckles_a_link_out_of_the_pl
     [
         (0.3, "plane-strain", 2, None, False, False),
         (0.495, "plane-strain", 2, None, False, True),
-        (0.495, "plane-strain", 2, fm.Displacement(), True, False),
+        (0.495, "plane-strain", 2, fm.DisplacementFormulation(), True, False),
         (0.495, "plane-strain", 1, None, True, False),
         (0.485, "plane-strain", 2, None, True, False),
-        (0.485, "plane-strain", 2, fm.Mixed(above=0.48), False, True),
+        (0.485, "plane-strain", 2, fm.MixedFormulation(above=0.48), False, True),
         (0.495, "plane-stress", 2, None, False, False),
     ],
 )

@@ -122,7 +122,7 @@ def toggle(space: str, *, driven: bool):
 
 @pytest.mark.parametrize("space", ["plane-stress", "3d"])
 def test_crank_in_line_with_its_coupler_holds_a_pull_and_gives_way_to_a_push_unless_a_motor_holds_it(space):
-    stiffness = SOFT.youngs_modulus * 4.0 * 16.0 / 41.0  # of the coupler between the rims of its pins
+    stiffness = SOFT.law.E * 4.0 * 16.0 / 41.0  # of the coupler between the rims of its pins
     loads = [0.002 * stiffness, 0.01 * stiffness]
     for driven in (False, True):
         simulation, pull = toggle(space, driven=driven)

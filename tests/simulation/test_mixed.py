@@ -34,7 +34,7 @@ def test_pressures_are_those_of_nodes_of_bulky_links_outside_interfaces():
     pressed = elastic.pressure.unknown
     assert np.all(x[pressed] < 33.0 + 1e-9)  # the link ends beyond its pin
     assert not np.any(pressed & (np.hypot(x, y) < 1.9))
-    rubber = simulation.model.with_pressure
+    rubber = simulation.model.mixed
     assert rubber == (True, False)
     assert simulation.model.pressure_dofs == pressed.sum() > 10
 
@@ -46,7 +46,7 @@ def test_nothing_is_added_where_no_link_is_bulky(space):
     if space == "plane-stress":
         materials = (RUBBER, PLASTIC)
     found = []
-    for formulation in (None, fm.Displacement()):
+    for formulation in (None, fm.DisplacementFormulation()):
         simulation, push = arm(materials, space=space, formulation=formulation)
         system = simulation.newton(push).system
         elastic = simulation.model.elastic
@@ -96,7 +96,7 @@ def test_limit_of_incompressibility_is_approached_without_trouble(space):
 
 def test_wherever_the_limit_is_set_compressible_links_bend_alike():
     curves = []
-    for formulation in (fm.Displacement(), fm.Mixed(above=0.0), fm.Mixed(above=0.36)):
+    for formulation in (fm.DisplacementFormulation(), fm.MixedFormulation(above=0.0), fm.MixedFormulation(above=0.36)):
         simulation, push = arm((fm.Material("soft", 2.0, 0.37), PLASTIC), formulation=formulation)
         curves.append(simulation.load_displacement(push, forces=[0.01, 0.05]))
     for curve in curves[1:]:

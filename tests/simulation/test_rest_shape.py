@@ -56,7 +56,7 @@ def test_a_reshaped_mechanism_assembles_without_energy(space):
     model.reshape(wave(simulation, 5.0))
     model.load(model.assembled_state(assembly.poses, motors))
     stored = model.elastic.energy()
-    assert abs(stored) < 1e-18 * PLASTIC.youngs_modulus * 40.0**3
+    assert abs(stored) < 1e-18 * PLASTIC.law.E * 40.0**3
 
 
 @pytest.mark.parallel

@@ -173,7 +173,7 @@ def column(space: str, *, depth: float) -> tuple[fm.Simulation, Force, float]:
     mechanism.revolute(strut, head, at=(80, 0), radius=2.0)
     mechanism.prismatic(base, head, at=(80, 0), axis=(1, 0))
     push = mechanism.force(on=head, at=(80, 0), direction=(-1, 0))
-    euler = pi**2 * PLASTIC.youngs_modulus * depth * 4.0**3 / 12.0 / 80.0**2
+    euler = pi**2 * PLASTIC.law.E * depth * 4.0**3 / 12.0 / 80.0**2
     return simulate(fm.Scene(mechanism), space, size=4.0), push, euler
 
 

@@ -5,10 +5,11 @@ Verdicts are kept in DIR/seed-SEED.jsonl; the same command goes on after an inte
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 from pathlib import Path
+
+from benchmarks.table import command, publish
 
 from .record import append, read
 from .summary import table
@@ -17,7 +18,7 @@ from .worker import Worker
 
 def main() -> int:
     """Runs what the command line asks for."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = command(__doc__)
     parser.add_argument("--count", type=int, default=1000, help="number of scenes")
     parser.add_argument("--seed", type=int, default=0, help="the first scene")
     parser.add_argument("--limit", type=float, default=300.0, help="seconds after which a scene hangs")
@@ -39,7 +40,7 @@ def main() -> int:
         )
     worker.close()
     print(file=sys.stderr)
-    print(table(verdicts[seed] for seed in seeds))
+    publish("random_scenes", table(verdicts[seed] for seed in seeds), write=options.write)
     return int(any(verdict.wrong for verdict in verdicts.values()))
 
 

@@ -193,9 +193,8 @@ def build(blueprint: Blueprint) -> Built:
         if not link.centreline:
             built.links[link.name] = mechanism.rigid(link.name, fixed=link.fixed)
             continue
-        materials[link.name] = fm.Material(
-            f"material of {link.name}", link.young, link.poisson, getattr(fm, link.law)()
-        )
+        law = getattr(fm, link.law)(link.young, link.poisson)
+        materials[link.name] = fm.Material(f"material of {link.name}", law=law)
         shape = fm.strip(link.centreline, thickness=link.thickness, depth=link.depth)
         built.links[link.name] = mechanism.flexible(link.name, shape, materials[link.name])
     for joint in blueprint.joints:

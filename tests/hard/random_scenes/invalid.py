@@ -302,14 +302,6 @@ def out_of_plane(rng: Random, scene: Blueprint) -> Spoiled:
     return _refused("ball joint in the plane", _with_joint(flat, joint, kind="spherical", axis=None), joint.name)
 
 
-def law_without_plane_stress(rng: Random, scene: Blueprint) -> Spoiled:
-    """A law that has no closed form in plane stress."""
-    link = rng.choice(scene.flexible)
-    law = rng.choice(("LogarithmicNeoHookean", "IsochoricNeoHookean", "IsochoricSimoNeoHookean"))
-    flat = replace(scene, links=tuple(replace(x, law="NeoHookean") for x in scene.links), space="plane-stress")
-    return _refused("law in plane stress", _with_link(flat, flat.link(link.name), law=law), link.name)
-
-
 def interfaces_cover_link(rng: Random, scene: Blueprint) -> Spoiled:
     """A clamp holds the whole link: nothing of it can bend."""
     link = rng.choice(scene.flexible)
@@ -344,6 +336,5 @@ SPOILERS: tuple[Spoiler, ...] = (
     foreign_part,
     bad_fidelity,
     out_of_plane,
-    law_without_plane_stress,
     interfaces_cover_link,
 )

@@ -1,10 +1,4 @@
-"""What an effect adds to the potential energy of a mechanism: on its flexible links, and between its bodies.
-
-    Π = E_int + share · (Σ link energies + Σ body potentials) + Σ potentials that hold − loads
-
-``share`` grows from 0 to 1 before the controlled force does, as that of the constant loads. What holds the mechanism,
-as the stiffness of a spring does, acts from the start: without it equilibria on the way need not exist.
-"""
+"""What the energies of effects are written in: the fields of flexible links, and the poses of bodies."""
 
 from __future__ import annotations
 
@@ -17,7 +11,7 @@ import ufl
 from dolfinx import fem
 
 from fenicsmech.effects.faces import Boundary, Faces, cofactor
-from fenicsmech.elasticity import ElasticBody, ElasticModel, Stretch
+from fenicsmech.elasticity import ElasticBody, ElasticModel
 from fenicsmech.mechanism import Effect, FlexibleLink
 from fenicsmech.multibody import Linkage
 
@@ -111,19 +105,6 @@ class LinkFields:
         return sum(terms[1:], start=terms[0])
 
 
-class LinkEffect(Effect):
-    """An effect with an energy on flexible links."""
-
-    @property
-    def faces(self) -> Sequence[Faces]:
-        """The parts of links' boundaries that the energy is integrated over."""
-        return ()
-
-    @abstractmethod
-    def energy(self, fields: LinkFields) -> ufl.Form | None:
-        """The energy as a form; None if no link is concerned."""
-
-
 class PosePotential(ABC):
     """A potential V(z) of the poses of a few bodies.
 
@@ -148,35 +129,6 @@ class PosePotential(ABC):
         """∂²V/∂z², (n · pose_size, n · pose_size)."""
 
 
-class BodyEffect(Effect):
-    """An effect with potentials of body poses."""
-
-    @abstractmethod
-    def potentials(self, linkage: Linkage) -> Sequence[PosePotential]:
-        """The potentials."""
-
-
 def holding(effects: Sequence[Effect], linkage: Linkage) -> tuple[PosePotential, ...]:
     """The potentials of ``effects`` that act in full from the start."""
-    found = [effect.potentials(linkage) for effect in effects if isinstance(effect, BodyEffect)]
-    return tuple(potential for potentials in found for potential in potentials if potential.holds)
-
-
-class JointSoftening(Effect):
-    """An effect that lets equations of joints give way to their multipliers: C + c λ = 0."""
-
-    @abstractmethod
-    def compliances(self, linkage: Linkage) -> Mapping[int, float]:
-        """c ≥ 0 of the rows of ``linkage.joints`` concerned; those of several effects add up."""
-
-
-class RestStretch(Effect):
-    """An effect by which links without strain are longer or shorter than drawn."""
-
-    @abstractmethod
-    def stretches(self, model: ElasticModel) -> Mapping[FlexibleLink, Stretch]:
-        """The stretch of each link concerned.
-
-        Raises:
-            DescriptionError: it makes no sense in ``model``.
-        """
+    return tuple(found for effect in effects for found in effect.pose_potentials(linkage) if found.holds)

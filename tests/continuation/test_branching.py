@@ -11,7 +11,7 @@ from scipy.special import ellipe, ellipk
 import fenicsmech as fm
 from fenicsmech.continuation import ArcLengthTracer
 
-from .column import DEPTH, EULER, LENGTH, THICKNESS, YOUNG, Column, column, critical_load
+from ..equilibrium.column import DEPTH, EULER, LENGTH, THICKNESS, YOUNG, Column, column, critical_load
 
 CRITICAL = critical_load(0.5 * THICKNESS)
 

@@ -6,9 +6,9 @@ from mpi4py import MPI
 
 import fenicsmech as fm
 
+from ..equilibrium import column, toggle
+from ..equilibrium.struts import Hold, strut
 from ..simulation.clamped import YOUNG, cantilever
-from . import column, toggle
-from .struts import Hold, strut
 
 
 @pytest.mark.parametrize("hold", Hold)

@@ -10,10 +10,10 @@ from scipy.optimize import brentq, minimize_scalar
 import fenicsmech as fm
 from fenicsmech.mechanism import Motor, Output
 
+from ..equilibrium import column, toggle
+from ..equilibrium.bistable import COUPLER, RISE, RUN, forces, four_bar
+from ..equilibrium.bow import bow
 from ..hard import turned_ends
-from . import column, toggle
-from .bistable import COUPLER, RISE, RUN, forces, four_bar
-from .bow import bow
 
 SOFT = 0.075  # MPa of the toggle's stilt: its head turns back while the toggle snaps
 
@@ -131,7 +131,7 @@ def test_curve_of_a_motor_is_labelled_with_its_own_units(tmp_path):
     assert [axis.label for axis in curve.axes] == ["position [mm]", "force [N]"]
     curve.plot(tmp_path / "curve.png")
     curve.write_csv(tmp_path / "curve.csv")
-    assert (tmp_path / "curve.csv").read_text().startswith("position [mm],force [N],stable,jumped,")
+    assert (tmp_path / "curve.csv").read_text().startswith("position [mm],force [N],stable,snapped_through,")
     curve.picture(tmp_path / "toggle.png")
     assert (tmp_path / "toggle.png").stat().st_size > 0
     case = four_bar(MPI.COMM_SELF)

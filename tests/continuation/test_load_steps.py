@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from .finger import finger
+from ..equilibrium.finger import finger
 
 SPACES = ["plane-stress", "plane-strain", "3d"]
 

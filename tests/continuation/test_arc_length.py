@@ -7,9 +7,9 @@ from scipy.optimize import minimize_scalar
 
 import fenicsmech as fm
 
-from . import toggle
-from .arch import DISPLACEMENTS, RISE, arch, beam_forces
-from .deep_arch import LIMIT_LOAD, deep_arch
+from ..equilibrium import toggle
+from ..equilibrium.arch import DISPLACEMENTS, RISE, arch, beam_forces
+from ..equilibrium.deep_arch import LIMIT_LOAD, deep_arch
 
 STIFF, SOFT = 200.0, 0.075  # MPa of the stilt: the force's point follows the toggle, or turns back while it snaps
 SUNK = 12.0  # mm at the end

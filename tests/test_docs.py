@@ -1,0 +1,99 @@
+"""The code of README and of the guide runs as printed, and gives what mechanics expects."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[1]
+Names = dict[str, object]
+
+
+def readme(names: Names, folder: Path) -> None:
+    curve, result = names["curve"], names["result"]
+    assert np.all(curve.stable)
+    stiffness = np.diff(curve.forces) / np.diff(curve.displacements)
+    assert np.all(np.diff(stiffness) > 0)
+    assert result.worst_error < 0.01
+    assert 1.5 <= result.thickness[0] <= result.thickness[1] <= 6.0
+    files = {path.name for path in (*folder.iterdir(), *(folder / "links").iterdir())}
+    assert {"curve.png", "optimised.png", "design.json", "diagonal.step", "diagonal.stl"} <= files
+
+
+def getting_started(names: Names, folder: Path) -> None:
+    curve = names["curve"]
+    bending, L = 1770.0 * 10.0 * 3.0**3 / 12.0, 54.0  # EI; mm from the clamp to the pin
+    assert curve.displacements[1] == pytest.approx(1.0 * L**3 / (3.0 * bending), rel=0.06)
+    assert (folder / "cantilever.png").exists()
+
+
+def describe(names: Names, folder: Path) -> None:
+    assert {link.name for link in names["scene"].mechanism.links} == {"ground", "crank", "coupler", "follower"}
+
+
+def simulate(names: Names, folder: Path) -> None:
+    curve, held = names["curve"], names["held"]
+    assert np.interp(2.0, curve.displacements, curve.forces) < held.forces[1]
+    assert np.all(np.diff(held.forces) > 0)
+    assert {"curve.png", "curve.csv", "finger.png", "finger.xdmf"} <= {path.name for path in folder.iterdir()}
+
+
+def snap_through(names: Names, folder: Path) -> None:
+    upper, lower = names["curve"].limit_points
+    assert upper.frame.force > 0.0 > lower.frame.force
+    assert (folder / "switch.png").exists()
+
+
+def design(names: Names, folder: Path) -> None:
+    assert names["result"].worst_error < 0.01
+    assert names["after"].displacements == pytest.approx([6.0, 9.0], rel=0.01)
+    assert names["before"].displacements[0] < 5.0
+
+
+def accuracy(names: Names, folder: Path) -> None:
+    bending, L, forces = 1770.0 * 10.0 * 3.0**3 / 12.0, 54.0, np.array([1.0, 2.0, 3.0])
+    assert names["curve"].corrected == pytest.approx(forces * L**3 / (3.0 * bending), rel=0.06)
+
+
+PAGES: dict[str, Callable[[Names, Path], None]] = {
+    "README.md": readme,
+    "docs/getting-started.md": getting_started,
+    "docs/guide/describe.md": describe,
+    "docs/guide/simulate.md": simulate,
+    "docs/guide/snap-through.md": snap_through,
+    "docs/guide/design.md": design,
+    "docs/guide/accuracy.md": accuracy,
+}
+
+
+def code(page: str) -> str:
+    return "\n".join(re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), flags=re.S))
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_code_of_a_page_runs_and_is_right(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names: Names = {}
+    exec(compile(code(page), page, "exec"), names)  # the project's own file
+    PAGES[page](names, tmp_path)
+
+
+def test_every_page_with_code_is_run():
+    pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
+    assert {str(page.relative_to(ROOT)) for page in pages if "```python" in page.read_text()} == set(PAGES)
+
+
+def test_every_module_of_the_theory_stands_on_one_page():
+    folders = ("equilibrium", "continuation", "elasticity", "effects", "joints", "multibody", "estimates", "design")
+    files = (file for folder in folders for file in (ROOT / "fenicsmech" / folder).rglob("*.py"))
+    modules = {".".join(file.relative_to(ROOT).with_suffix("").parts) for file in files if file.stem != "__init__"}
+    listed = [
+        name
+        for page in (ROOT / "docs" / "theory").glob("*.md")
+        for name in re.findall(r"automodule:: (\S+)", page.read_text())
+    ]
+    assert sorted(listed) == sorted(modules)
