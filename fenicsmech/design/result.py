@@ -280,7 +280,7 @@ def rest_meshes(simulation: Simulation, links: Sequence[FlexibleLink]) -> list[L
     Links of which one half is meshed are given by their plan.
     """
     meshes = gather_links(simulation.model.mesh, rest_vertices(simulation.model))
-    everyone, halves = simulation.scene.mechanism.flexible_links, simulation.fidelity.model.symmetric
+    everyone, halves = simulation.scene.mechanism.flexible_links, simulation.fidelity.model.half
     chosen = [meshes[everyone.index(link)] for link in links]
     return on_one(simulation.comm, lambda: [plan_of(mesh).mesh for mesh in chosen] if halves else chosen)
 

@@ -47,7 +47,7 @@ class MechanismModel:
         mixed: whether each flexible link is in the u–p formulation.
         effects: what acts beside links, joints and forces.
         potentials: potentials of body poses.
-        holding: those of springs, which act from the start.
+        spring_potentials: those of springs, which act from the start.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class MechanismModel:
         self.materials = tuple(link.material for link in links) if materials is None else tuple(materials)
         self.mixed = fidelity.formulation.mixed(list(self.materials), fidelity.model, fidelity.order)
         faces = [part for effect in effects for part in effect.faces]
-        self._boundaries = find_boundaries(mesh.mesh, links, mesh.link, faces, half=fidelity.model.symmetric)
+        self._boundaries = find_boundaries(mesh.mesh, links, mesh.link, faces, half=fidelity.model.half)
         self.elastic = ElasticBody(
             mesh.mesh,
             link=mesh.link,
@@ -83,7 +83,7 @@ class MechanismModel:
             mixed=self.mixed,
         )
         self.potentials = [potential for effect in effects for potential in effect.pose_potentials(linkage)]
-        self.holding = tuple(potential for potential in self.potentials if potential.holds)
+        self.spring_potentials = tuple(potential for potential in self.potentials if potential.holds)
         self._compliances: dict[int, float] = {}
         for effect in effects:
             for row, compliance in effect.soften(linkage).items():
@@ -267,6 +267,6 @@ def _mesh_request(link: FlexibleLink, linkage: Linkage, fidelity: Fidelity) -> t
     # a pin along z holds its link at whatever height the link is
     ats = [body.centre[:2] if body.axis[2] == 1.0 else body.centre for body in bodies]
     sites = [InterfaceSite(at, body.region, body.axis, body.name) for at, body in zip(ats, bodies, strict=True)]
-    size, half = fidelity.sizes[link], fidelity.model.symmetric
+    size, half = fidelity.sizes[link], fidelity.model.half
     options = {"layers": fidelity.layers, "segments": fidelity.segments}
     return sites, {"dim": fidelity.model.dim, "size": size, "half": half, **options}

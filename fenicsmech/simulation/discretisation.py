@@ -13,7 +13,7 @@ from fenicsmech.continuation import Predictor
 from fenicsmech.equilibrium import EquilibriumSolver, Iteration
 from fenicsmech.errors import DescriptionError
 from fenicsmech.estimates import Estimates
-from fenicsmech.mechanism import Force, Leader, Material, Scene
+from fenicsmech.mechanism import Force, Material, PrescribedPart, Scene
 from fenicsmech.meshing import MechanismMesh
 from fenicsmech.model import Fidelity, MechanismModel, check_links, mesh_mechanism
 from fenicsmech.multibody import build_linkage
@@ -100,7 +100,7 @@ class Discretisation:
         """Error estimates at equilibria."""
         return Estimates(self.model)
 
-    def newton(self, part: Leader, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
+    def newton(self, part: PrescribedPart, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
         """The solver for what changes and some constant forces, kept for all configurations."""
         key = part, others
         if key not in self._newtons:
