@@ -35,13 +35,13 @@ def publish(name: str, text: str, *, write: bool, folder: Path = ROOT / "docs" /
     Args:
         name: of the benchmark.
         text: its tables, in Markdown.
-        write: whether they become the page NAME.md of ``folder``, for other pages to include.
+        write: whether they become a page of ``folder``, NAME.md with hyphens, for other pages to include.
         folder: of the generated tables.
     """
     text = f"{text}\n\n{provenance()}\n"
     print(text, flush=True)
     if write:
-        with atomic_write(folder / f"{name}.md") as file:
+        with atomic_write(folder / f"{name.replace('_', '-')}.md") as file:
             file.write(text)
 
 

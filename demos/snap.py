@@ -3,9 +3,9 @@
     python3 demos/snap.py [--size MM] [--out DIR]
 
 Both curves are followed past their limit points. Pushed directly the force falls and rises again; behind the spring the
-curve folds back over itself, so that even a held finger feels the switch jump: load_displacement holds it at one
-position after the other, and tells where. A motor in the crank's hinge turns the switch over without a jump; its torque
-is drawn over its angle. Leaves curve.png, crank.png and the pictures. The geometry is this project's own.
+curve folds back over itself, so that even a held finger feels the switch snap: load_displacement holds it at one
+position after the other, and its remarks say where. A motor in the crank's hinge turns the switch over without a snap;
+its torque is drawn over its angle. Leaves curve.png, crank.png and the pictures. The geometry is this project's own.
 """
 
 import argparse
@@ -16,7 +16,7 @@ import fenicsmech as fm
 PIVOT, KNEE, PIN, ROOT = (0, 0), (25, 8), (50, 0), (50, -40)
 HEAD, BOW = (25, 68), (45, 38)  # the finger's end of the spring, and the middle of its bow
 ONWARD = 2.0  # N: beyond the force at which the switch snaps
-HELD = (9.0, 11.0, 13.0, 15.0)  # mm: where the finger is held, before and after the jump
+HELD = (9.0, 11.0, 13.0, 15.0)  # mm: where the finger is held, before and after the snap
 OVER = -0.7  # rad: beyond the crank's second rest
 
 

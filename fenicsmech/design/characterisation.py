@@ -15,7 +15,7 @@ Source: Seber & Wild, Nonlinear Regression (doi:10.1002/0471725315), chapters 2 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import t as student
@@ -89,6 +89,7 @@ class ModulusFit:
         curves: simulated at the fitted modulus, one per experiment.
         residuals: simulated minus measured displacement, per experiment.
         iterations: of Gauss–Newton.
+        material: the one given, with the fitted modulus, as ``Simulation.with_material`` takes it.
     """
 
     youngs_modulus: float
@@ -98,10 +99,11 @@ class ModulusFit:
     curves: tuple[Curve, ...]
     residuals: tuple[tuple[float, ...], ...]
     iterations: int
+    material: Material
 
 
 def fit_modulus(experiments: Sequence[Experiment], material: Material) -> ModulusFit:
-    """Young's modulus of ``material``; the simulations keep it.
+    """Young's modulus of ``material``; the experiments' simulations stay as they are.
 
     Args:
         experiments: measurements, at least two readings in all.
@@ -138,23 +140,21 @@ def fit_modulus(experiments: Sequence[Experiment], material: Material) -> Modulu
         curves=tuple(curves),
         residuals=tuple(tuple(r.tolist()) for r in residuals),
         iterations=iterations,
+        material=_with_modulus(material, modulus),
     )
 
 
+def _with_modulus(material: Material, modulus: float) -> Material:
+    return replace(material, law=material.law.with_parameters({**material.law.parameters, "E": modulus}))
+
+
 class _Rig:
-    """One experiment in simulation."""
+    """One experiment in a simulation of its own, whose modulus changes."""
 
     def __init__(self, experiment: Experiment, material: Material) -> None:
         self._experiment, self._request = experiment, experiment.request
-        self._simulation = experiment.simulation
-        mechanism = self._simulation.scene.mechanism
-        self._links = np.array([link.material == material for link in mechanism.flexible_links])
-        if not self._links.any():
-            raise DescriptionError(
-                f"modulus of {material.name!r}",
-                f"no link of {mechanism.name!r} is made of it",
-                "Give the material of the samples",
-            )
+        self._simulation = experiment.simulation.with_material(material, material)
+        self._links = np.array([made_of == material for made_of in self._simulation.model.materials])
         self.range = float(np.abs(experiment.displacements).max())
 
     def compare(self, modulus: float) -> tuple[Curve, np.ndarray, np.ndarray]:

@@ -161,7 +161,7 @@ class TargetEquilibria:
             frame = frames[target.force]
             if not frame.stable:
                 raise Infeasible(_unstable(target))
-            if any(before.jumped for before in curve.frames if abs(before.force) <= abs(frame.force)):
+            if any(before.snapped_through for before in curve.frames if abs(before.force) <= abs(frame.force)):
                 raise Infeasible(_folded(target, "the mechanism snaps on the way there from zero load"))
             start = self._travel(target, frame.state) - frame.displacement
             origin = self._unloaded(target, curve.frames[0].state) if moving else None

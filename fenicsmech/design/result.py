@@ -268,9 +268,7 @@ def link_designs(
                 controls=tuple(tuple(map(tuple, point)) for point in link.spline.controls_at(own).tolist()),
                 thickness=(float(thickness.min()), float(thickness.max())),
                 bend=float(np.abs(bend).max(initial=0.0)),
-                centreline=None
-                if design.centreline is None
-                else tuple(tuple(map(float, at)) for at in design.centreline),
+                centreline=None if drawn is None else tuple(tuple(map(float, point)) for point in drawn),
             )
         )
     return tuple(designs)

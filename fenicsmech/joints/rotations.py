@@ -25,14 +25,14 @@ import sympy
 class RigidSpace(ABC):
     """Rigid-body coordinates in ``dim`` dimensions; poses are arrays of ``pose_size`` numbers.
 
-    Rotation parameters may obey a constraint among themselves (|q|² − 1 = 0); by default they obey none.
+    Rotation parameters may obey a constraint (|q|² − 1 = 0); by default there is none.
 
     Attributes:
         dim: dimension of the space (2 or 3).
         rotation_size: number of rotation parameters r.
         freedoms: rigid-body degrees of freedom (3 or 6).
         pose_size: ``dim + rotation_size``.
-        identity: the pose of a body that has not moved, (pose_size,).
+        identity: the pose of a body as drawn, (pose_size,).
     """
 
     dim: int
@@ -210,4 +210,4 @@ class SpatialSpace(RigidSpace):
 
 
 RIGID_SPACES = {2: PlanarSpace(), 3: SpatialSpace()}
-"""The coordinates of a dimension."""
+"""Rigid-body coordinates by dimension."""

@@ -18,7 +18,7 @@ from fenicsmech.effects import LinkFields, find_boundaries
 from fenicsmech.elasticity import ElasticBody, ElasticModel, Stretch
 from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State, load_fields
 from fenicsmech.errors import DescriptionError
-from fenicsmech.mechanism import Effect, FlexibleLink, Force, Mechanism, Output, in_dimension
+from fenicsmech.mechanism import Effect, FlexibleLink, Force, Material, Mechanism, Output, in_dimension
 from fenicsmech.meshing import (
     InterfaceSite,
     LinkMesh,
@@ -37,6 +37,7 @@ class MechanismModel:
 
     Attributes:
         mechanism, linkage: what is simulated, and its bodies.
+        materials: of the flexible links.
         mesh: the reference mesh of all flexible links.
         elastic: their elastic energy.
         interfaces: interface nodes as functions of body poses.
@@ -57,18 +58,20 @@ class MechanismModel:
         fidelity: Fidelity,
         clock: Clock,
         effects: Sequence[Effect] = (),
+        materials: Sequence[Material] | None = None,
     ) -> None:
         self.mechanism, self.linkage, self.mesh, self.clock = mechanism, linkage, mesh, clock
         self.effects = tuple(effects)
         links = mechanism.flexible_links
-        self.mixed = fidelity.formulation.mixed([link.material for link in links], fidelity.model, fidelity.order)
+        self.materials = tuple(link.material for link in links) if materials is None else tuple(materials)
+        self.mixed = fidelity.formulation.mixed(list(self.materials), fidelity.model, fidelity.order)
         faces = [part for effect in effects for part in effect.faces]
         self._boundaries = find_boundaries(mesh.mesh, links, mesh.link, faces, half=fidelity.model.symmetric)
         self.elastic = ElasticBody(
             mesh.mesh,
             link=mesh.link,
             free=mesh.interface < 0,
-            materials=[link.material for link in links],
+            materials=list(self.materials),
             depths=[link.shape.depth for link in links],
             model=fidelity.model,
             order=fidelity.order,

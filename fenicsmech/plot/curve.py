@@ -1,10 +1,10 @@
-"""Plots of load–displacement curves, as in the field's papers: displacement across, force up."""
+"""Plots of load–displacement curves."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -18,17 +18,21 @@ from fenicsmech.errors import DescriptionError
 from fenicsmech.plot.style import INK, MUTED, PALETTE, house_style, new_figure, open_frame, save_png
 
 _DASHES = (0, (3.0, 1.6))  # of unstable parts
-_DOTS = (0, (1.0, 1.6))  # of jumps
+_DOTS = (0, (1.0, 1.6))  # of snap-throughs
 _MARKERS = ("s", "^", "X", "P", "v", "*")  # of the kinds of marks, in the order of their names
 
 
 @dataclass(frozen=True)
 class CurveMark:
-    """A point of a curve that stands out, and what it is: marks of one kind look alike."""
+    """A point of a curve with a marker; marks of one ``kind`` look alike."""
 
     displacement: float
     force: float
     kind: str
+
+
+def _no_flags() -> NDArray[np.bool_]:
+    return np.zeros(0, bool)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,12 +43,12 @@ class CurveSeries:
         displacement: (n,) abscissae.
         force: (n,) ordinates.
         label: its name in the legend.
-        stable: (n,) whether each equilibrium is stable; None: all are.
-        jumped: (n,) whether what is drawn snapped on the way to each sample; None: it never did.
+        stable: (n,) whether each equilibrium is stable; empty: all are.
+        snapped_through: (n,) whether the mechanism snapped through on the way to each sample; empty: nowhere.
         joined: draw the line through the samples; False for measurements.
         colour: a matplotlib colour; None takes the next of the palette.
-        faint: draw it thin and light behind the others, as what was before.
-        marks: points that stand out.
+        faint: draw it thin and light behind the others, as a curve of before.
+        marks: points with a marker.
 
     Raises:
         DescriptionError: the arrays differ in length or are not finite.
@@ -53,32 +57,34 @@ class CurveSeries:
     displacement: NDArray[np.float64]
     force: NDArray[np.float64]
     label: str = ""
-    stable: NDArray[np.bool_] | None = None
+    stable: NDArray[np.bool_] = field(default_factory=_no_flags)
     joined: bool = True
     colour: str | None = None
     faint: bool = False
     marks: tuple[CurveMark, ...] = ()
-    jumped: NDArray[np.bool_] | None = None
+    snapped_through: NDArray[np.bool_] = field(default_factory=_no_flags)
 
     def __post_init__(self) -> None:
         part = f"curve '{self.label}'"
         displacement = real_array(f"displacements of {part}", self.displacement, None)
         force = real_array(f"forces of {part}", self.force, len(displacement))
-        stable = np.ones(len(force), bool) if self.stable is None else np.array(self.stable, dtype=bool)
-        jumped = np.zeros(len(force), bool) if self.jumped is None else np.array(self.jumped, dtype=bool)
-        for what, flags in (("stability", stable), ("jumps", jumped)):
+        stable = np.array(self.stable, dtype=bool) if np.size(self.stable) else np.ones(len(force), bool)
+        snapped = np.zeros(len(force), bool)
+        if np.size(self.snapped_through):
+            snapped = np.array(self.snapped_through, dtype=bool)
+        for what, flags in (("stability", stable), ("snaps", snapped)):
             if flags.shape != force.shape:
                 raise DescriptionError(
                     f"{what} of {part}", f"{flags.size} flags for {force.size} samples", "Give one flag per sample"
                 )
-        checked = {"displacement": displacement, "force": force, "stable": stable, "jumped": jumped}
+        checked = {"displacement": displacement, "force": force, "stable": stable, "snapped_through": snapped}
         for name, value in checked.items():
             object.__setattr__(self, name, value)
 
 
 @dataclass(frozen=True)
 class CurveTarget:
-    """A point the curve shall pass through; ``colour`` None draws it in ink."""
+    """A target point of a curve; ``colour`` None draws it in ink."""
 
     displacement: float
     force: float
@@ -97,16 +103,16 @@ def plot_curve(
     ylabel: str = "force [N]",
     title: str = "",
 ) -> None:
-    """Draw load–displacement curves: displacement across, force up, as in the field's papers.
+    """Draws load–displacement curves, displacement across and force up, as a PNG.
 
-    Stable parts are solid, unstable parts dashed, jumps dotted arrows, samples dots, targets open diamonds. For curves
-    before and after a change, give both the same colour and make the first faint; curves that share a label appear once
-    in the legend, in grey if their colours differ.
+    Stable parts are solid, unstable parts dashed, snap-throughs dotted arrows, samples dots, targets open diamonds. For
+    curves before and after a change, give both the same colour and make the first faint; curves with the same label
+    appear once in the legend, in grey if their colours differ.
 
     Args:
         path: the PNG file.
         series: the curves, drawn in this order, faint ones behind.
-        targets: points the curves shall pass through; equal ones are drawn around each other.
+        targets: target points; equal ones are drawn around each other.
         xlabel, ylabel: quantity and unit of the axes.
         title: a line above the plot.
 
@@ -148,9 +154,9 @@ def _draw_series(axes: Axes, curve: CurveSeries, colour: str) -> None:
     colour, width, size = _line_style(colour, faint=curve.faint)
     behind = 1.0 if curve.faint else 0.0
     if curve.joined:
-        # a step is stable when both its ends are, and no equilibria lie along a jump
-        solid, leap = stable[:-1] & stable[1:], curve.jumped[1:]
-        for part, style in ((solid & ~leap, "-"), (~solid & ~leap, _DASHES)):
+        # a step is stable when both its ends are, and no equilibria lie along a snap-through
+        solid, snaps = stable[:-1] & stable[1:], curve.snapped_through[1:]
+        for part, style in ((solid & ~snaps, "-"), (~solid & ~snaps, _DASHES)):
             # breaking the line with NaN keeps one artist per style
             runs = [np.array([[np.nan, np.nan]])]
             edges = np.flatnonzero(np.diff(np.concatenate(([0], part.astype(int), [0]))))
@@ -158,7 +164,7 @@ def _draw_series(axes: Axes, curve: CurveSeries, colour: str) -> None:
                 runs += [np.column_stack((x[start : stop + 1], y[start : stop + 1])), runs[0]]
             line = np.concatenate(runs)
             axes.plot(line[:, 0], line[:, 1], ls=style, color=colour, lw=width, zorder=3 - behind)
-        for index in np.flatnonzero(leap):
+        for index in np.flatnonzero(snaps):
             start, end = np.array([x[index], y[index]]), np.array([x[index + 1], y[index + 1]])
             axes.plot(*np.array([start, end]).T, ls=_DOTS, color=colour, lw=0.7 * width, zorder=3 - behind)
             tip = {"arrowstyle": "-|>", "shrinkA": 0.0, "shrinkB": 3.0, "color": colour, "lw": 0.7 * width}
@@ -207,8 +213,10 @@ def _draw_legend(axes: Axes, series: Sequence[CurveSeries], targets: Sequence[Cu
         handles.append(
             Line2D([], [], color=MUTED, ls=_DASHES, lw=2.0, marker="o", ms=4.5, mfc="white", label="unstable")
         )
-    if any(curve.joined and curve.jumped.any() for curve in series):
-        handles.append(Line2D([], [], color=MUTED, ls=_DOTS, lw=1.4, marker=">", markevery=(1, 1), ms=5, label="jump"))
+    if any(curve.joined and curve.snapped_through.any() for curve in series):
+        handles.append(
+            Line2D([], [], color=MUTED, ls=_DOTS, lw=1.4, marker=">", markevery=(1, 1), ms=5, label="snap-through")
+        )
     for kind, marker in _markers(series).items():
         handles.append(Line2D([], [], lw=0, marker=marker, ms=8, mfc="white", mec=INK, mew=1.5, label=kind))
     if targets:
@@ -219,5 +227,5 @@ def _draw_legend(axes: Axes, series: Sequence[CurveSeries], targets: Sequence[Cu
 
 
 def _common(colours: Sequence[str]) -> str:
-    """The colour they share, or grey."""
+    """Their common colour, or grey."""
     return colours[0] if len(set(colours)) == 1 else MUTED

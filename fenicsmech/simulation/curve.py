@@ -96,16 +96,16 @@ class Curve:
         return np.array([frame.stable for frame in self.frames])
 
     @property
-    def jumped(self) -> np.ndarray:
+    def snapped_through(self) -> np.ndarray:
         """Whether the mechanism snapped on the way to each frame, (frames,)."""
-        return np.array([frame.jumped for frame in self.frames])
+        return np.array([frame.snapped_through for frame in self.frames])
 
     @property
     def remarks(self) -> tuple[str, ...]:
         """Where the mechanism snapped and which equilibria are unstable, a sentence each."""
         (across, up), name, said = self.axes, self.configuration.name, []
         for before, after in pairwise((None, *self.frames)):
-            if after.jumped:
+            if after.snapped_through:
                 since = "on the way there" if before is None else f"after {up.quantity} {up(before.force)}"
                 said.append(
                     f"{name}: snaps {since}, to {across.quantity} {across(after.displacement)} at {up.quantity} "
@@ -260,7 +260,7 @@ class Curve:
             stable=self.stable,
             colour=colour,
             faint=faint,
-            jumped=self.jumped,
+            snapped_through=self.snapped_through,
         )
 
     def plot(self, path: str | Path) -> None:
@@ -333,7 +333,7 @@ class Curve:
             across.label: self.displacements,
             up.label: self.forces,
             "stable": self.stable,
-            "jumped": self.jumped,
+            "snapped_through": self.snapped_through,
             f"strain energy [{force} {length}]": np.array([frame.strain_energy for frame in self.frames]),
             f"max von Mises [{stress}]": np.array([frame.max_stress for frame in self.frames]),
         }

@@ -20,8 +20,8 @@ class Frame:
         displacement: of the force's point along it, from the assembled configuration, or the motors' position, from
             the drawing.
         stable: whether small disturbances die out under dead loads.
-        jumped: whether the mechanism snapped on the way from the frame before: the path turns back there, and this
-            equilibrium lies on another one, perhaps not the one that dynamics would lead to.
+        snapped_through: whether the mechanism snapped on the way from the frame before: the path turns back there, and
+            this equilibrium lies on another one, perhaps not the one that dynamics would lead to.
         unstable_modes: directions in which the energy has a maximum, under dead loads.
         stable_under_control: whether it is stable while its control is held.
         strain_energy: elastic energy of all links.
@@ -40,7 +40,7 @@ class Frame:
     force: float
     displacement: float
     stable: bool
-    jumped: bool
+    snapped_through: bool
     unstable_modes: int
     stable_under_control: bool
     strain_energy: float
@@ -59,5 +59,6 @@ class Frame:
         figures = [f"force {self.force:.6g}", f"displacement {self.displacement:.6g}"]
         figures += [f"{part.name} {value:.6g}" for part, value in (*self.outputs.items(), *self.motors.items())]
         figures += [f"strain energy {self.strain_energy:.4g}", f"stress {self.max_stress:.4g}"]
-        figures += ["stable" if self.stable else f"{self.unstable_modes} unstable modes"] + ["snapped"] * self.jumped
+        figures.append("stable" if self.stable else f"{self.unstable_modes} unstable modes")
+        figures += ["snapped through"] * self.snapped_through
         return f"<Frame: {', '.join(figures)}>"

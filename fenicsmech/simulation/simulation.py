@@ -19,7 +19,7 @@ from fenicsmech.equilibrium import EquilibriumSolver, Iteration, PrimalDualNewto
 from fenicsmech.errors import DescriptionError
 from fenicsmech.estimates import AccuracyControl, Choice, Estimates, FidelityLevel, LevelErrors
 from fenicsmech.log import Progress, Silent
-from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Leader, Mechanism, Output, Scene
+from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Leader, Material, Mechanism, Output, Scene
 from fenicsmech.meshing import radius_ratios
 from fenicsmech.model import Fidelity, MechanismModel, read_fidelity
 from fenicsmech.multibody import Linkage
@@ -254,6 +254,20 @@ class Simulation:
         other = copy(self)
         other._design, other._control = values.copy(), None
         return other
+
+    def with_material(self, drawn: Material, other: Material) -> Simulation:
+        """The same scene at the same fidelity with links of another material; the mesh is shared.
+
+        Args:
+            drawn: the material of some links.
+            other: what these links are made of instead; effects, as the densities of ``Gravity``, keep what was drawn.
+
+        Raises:
+            DescriptionError: no link is made of ``drawn``.
+        """
+        simulation = copy(self)
+        simulation._discretisation, simulation._control = self._discretisation.with_material(drawn, other), None
+        return simulation
 
     def on(self, comm: MPI.Comm) -> Simulation:
         """The same scene at the same fidelity for other processes, as drawn."""

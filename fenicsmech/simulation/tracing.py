@@ -131,10 +131,10 @@ class CurveTracer:
             names = ", ".join(map(repr, self.freedom.mobile))
             problem = f"at force {control.target:g} where {names} come to rest is lost in the rounding of stiff links"
             raise self._error(self.request.where, problem, before[-1] if before else None, before)
-        jumped, self._snaps = self._snaps + path.snaps > snaps, 0
+        snapped_through, self._snaps = self._snaps + path.snaps > snaps, 0
         return replace(
             record,
-            jumped=jumped,
+            snapped_through=snapped_through,
             iterations=path.iterations - iterations,
             seconds=perf_counter() - start,
             phases=clock.since(seconds),
@@ -152,7 +152,7 @@ class CurveTracer:
                 force=force,
                 displacement=displacement - self.origin,
                 stable=point.unstable_modes == 0,
-                jumped=False,
+                snapped_through=False,
                 unstable_modes=point.unstable_modes,
                 stable_under_control=point.unstable_under_control == 0,
                 strain_energy=model.elastic.strain_energy(),

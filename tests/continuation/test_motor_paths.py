@@ -131,7 +131,7 @@ def test_curve_of_a_motor_is_labelled_with_its_own_units(tmp_path):
     assert [axis.label for axis in curve.axes] == ["position [mm]", "force [N]"]
     curve.plot(tmp_path / "curve.png")
     curve.write_csv(tmp_path / "curve.csv")
-    assert (tmp_path / "curve.csv").read_text().startswith("position [mm],force [N],stable,jumped,")
+    assert (tmp_path / "curve.csv").read_text().startswith("position [mm],force [N],stable,snapped_through,")
     curve.picture(tmp_path / "toggle.png")
     assert (tmp_path / "toggle.png").stat().st_size > 0
     case = four_bar(MPI.COMM_SELF)

@@ -9,7 +9,7 @@ from mpi4py import MPI
 import fenicsmech as fm
 from fenicsmech.design import group_count
 
-from .mechanisms import Case, bow, strained, truss
+from .mechanisms import PLASTIC, Case, bow, strained, truss
 from .refusal import refused
 
 REACHABLE = ((0.1, 2.0), (0.4, 3.2))

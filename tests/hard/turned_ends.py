@@ -75,7 +75,9 @@ def _snap(space: str, comm: MPI.Comm) -> Iterator[Check]:
     wanted = [turned(line, angle, angle).end.moment for angle in before]
     found = [(-frame.motors[motors[0]], frame.motors[motors[1]]) for frame in frames]
     yield deviation("both torques up to 0.99 of the fold", found, np.column_stack([wanted, wanted]), 1e-2)
-    yield Fact("stable there, nothing jumped", all(frame.stable and not frame.jumped for frame in frames))
+    yield Fact(
+        "stable there, nothing snapped through", all(frame.stable and not frame.snapped_through for frame in frames)
+    )
     beyond = [1.01 * largest, 1.2 * largest]
     hanging, wanted = turned(line, 0.0, 2.0 * largest), []
     for angle in beyond[::-1]:

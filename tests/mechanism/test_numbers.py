@@ -171,7 +171,7 @@ def test_outline_of_anything_but_lines_and_arcs_is_refused():
     assert_refused(
         lambda: outline((0.0, 0.0), [(1.0, 1.0)], depth=1.0),
         "outline",
-        "(1.0, 1.0) is no segment",
+        "(1.0, 1.0) is not a segment",
         "Give Line(…) or Arc(…)",
     )
 

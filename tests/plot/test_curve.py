@@ -109,12 +109,12 @@ def test_the_unstable_part_is_dashed(tmp_path):
     assert 0.0 < share_of_colour(tmp_path / "dashed.png", blue) < 0.9 * share_of_colour(tmp_path / "solid.png", blue)
 
 
-def test_a_jump_is_a_dotted_arrow_with_an_entry_of_its_own(tmp_path, drawn):
-    jumped = np.arange(len(X)) == 4
-    for flags in (None, jumped):
-        plot_curve(tmp_path / "a.png", [CurveSeries(X, X, "pushed", jumped=flags)])
+def test_a_snap_through_is_a_dotted_arrow_with_an_entry_of_its_own(tmp_path, drawn):
+    snapped_through = np.arange(len(X)) == 4
+    for flags in (np.zeros(len(X), bool), snapped_through):
+        plot_curve(tmp_path / "a.png", [CurveSeries(X, X, "pushed", snapped_through=flags)])
     whole, broken = (figure.axes[0] for figure in drawn)
-    assert [text.get_text() for text in broken.get_legend().get_texts()] == ["pushed", "jump"]
+    assert [text.get_text() for text in broken.get_legend().get_texts()] == ["pushed", "snap-through"]
     assert [text.get_text() for text in whole.get_legend().get_texts()] == ["pushed"]
     (arrow,) = broken.texts
     assert arrow.xy == pytest.approx([X[4], X[4]]) and not whole.texts
@@ -173,7 +173,7 @@ def test_any_number_of_samples_is_drawn(tmp_path, count):
         ({"displacement": X, "force": X[1:]}, "forces of curve 'c'.*shape"),
         ({"displacement": X, "force": np.full(9, np.inf)}, "forces of curve 'c'.*entry"),
         ({"displacement": X, "force": X, "stable": [True]}, "stability of curve 'c': 1 flags for 9 samples"),
-        ({"displacement": X, "force": X, "jumped": [True]}, "jumps of curve 'c': 1 flags for 9 samples"),
+        ({"displacement": X, "force": X, "snapped_through": [True]}, "snaps of curve 'c': 1 flags for 9 samples"),
     ],
 )
 def test_a_contradictory_series_is_refused(arguments, message):
