@@ -104,7 +104,7 @@ class Mechanism:
         *,
         at: Sequence[float],
         axis: Sequence[float] = _Z,
-        radius: float | None = None,
+        interface_radius: float | None = None,
         region: Region | None = None,
         name: str | None = None,
     ) -> Joint:
@@ -115,8 +115,8 @@ class Mechanism:
             a, b: links of this mechanism.
             at: where it is drawn, 2 or 3 coordinates (z = 0 if left out).
             axis: its axis, 2 or 3 coordinates.
-            radius: interface radius on flexible links: everything this close to the axis moves rigidly.
-            region: interface region instead of a disc of ``radius`` (a ``Rectangle`` for clamps).
+            interface_radius: on flexible links everything this close to the axis moves rigidly.
+            region: interface region instead of a disc of ``interface_radius`` (a ``Rectangle`` for clamps).
             name: for messages; unique.
 
         Raises:
@@ -136,12 +136,14 @@ class Mechanism:
         self._check_name(part, name, self.joints)
         if a == b:
             raise DescriptionError(part, f"link {a.name!r} is joined with itself", "Name two different links")
-        region = _interface(part, radius, region)
+        region = _interface(part, interface_radius, region)
         regions = tuple(region if isinstance(link, FlexibleLink) else None for link in (a, b))
         for link in (a, b):
             if isinstance(link, FlexibleLink) and region is None:
                 raise DescriptionError(
-                    part, f"no interface on flexible link {link.name!r}", "Give radius=… (pin) or region=… (clamp)"
+                    part,
+                    f"no interface on flexible link {link.name!r}",
+                    "Give interface_radius=… (pin) or region=… (clamp)",
                 )
         axis = unit(f"axis of {part}", axis)
         joint = Joint(kind, a, b, at, (*axis, 0.0)[:3], (regions[0], regions[1]), name)
@@ -273,7 +275,7 @@ class Mechanism:
 def _interface(part: str, radius: float | None, region: Region | None) -> Region | None:
     """The interface region given as a radius or as a region, checked."""
     if radius is not None and region is not None:
-        raise DescriptionError(part, "both a radius and a region are given", "Give one of the two")
+        raise DescriptionError(part, "both an interface radius and a region are given", "Give one of the two")
     match region if radius is None else Disc(radius):
         case None:
             return None

@@ -72,7 +72,7 @@ def _check_interfaces(mechanism: Mechanism, dim: int) -> None:
                     raise DescriptionError(
                         f"{joint.name!r}",
                         f"its interface on {link.name!r} is {region}, but {first.name!r} has {known} at the same place",
-                        "Give joints at one place of a link the same radius or region",
+                        "Give joints at one place of a link the same interface radius or region",
                     )
             found.append((link, joint, region))
 

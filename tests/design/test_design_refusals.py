@@ -196,7 +196,7 @@ def test_a_link_without_a_centreline():
     base = mechanism.rigid("base", fixed=True)
     plate = mechanism.flexible("plate", fm.polygon([(-5, -5), (45, -5), (45, 5), (-5, 5)], depth=5.0), fm.ONYX)
     for x in (0, 40):
-        mechanism.revolute(base, plate, at=(x, 0), radius=2.0)
+        mechanism.revolute(base, plate, at=(x, 0), interface_radius=2.0)
     push = mechanism.force(on=plate, at=(20, 0), direction=(0, 1))
     case = Case(fm.Scene(mechanism), [fm.SplineDesign(plate, 2)], [fm.Target(push, 1.0, 0.1)])
     refused(lambda: case.problem(), part="'plate'", problem="no centreline", remedy="centreline=")

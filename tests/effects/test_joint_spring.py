@@ -203,7 +203,7 @@ def tower(effects, *, hinged: bool) -> tuple[fm.Simulation, fm.mechanism.Force]:
     base, post = mechanism.rigid("base", fixed=True), mechanism.rigid("post")
     beam = mechanism.flexible("beam", fm.strip([(0, 30), (0, 60)], thickness=3.0, depth=4.0), PLASTIC)
     joint = (mechanism.revolute if hinged else mechanism.weld)(base, post, at=(0, 0))
-    mechanism.weld(post, beam, at=(0, 32), radius=1.5)
+    mechanism.weld(post, beam, at=(0, 32), interface_radius=1.5)
     push = mechanism.force(on=beam, at=(0, 60), direction=(1, 0))
     return fm.Simulation(fm.Scene(mechanism, effects=effects(joint)), space="plane-stress", size=1.5), push
 

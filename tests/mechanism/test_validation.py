@@ -99,26 +99,26 @@ def test_different_interfaces_at_one_place_are_refused(region, at, dim):
         lambda: validate(p.mechanism, dim),
         "'second pin'",
         f"its interface on 'rod' is {region}, but 'pin' has Disc(radius=2.0) at the same place",
-        "Give joints at one place of a link the same radius or region",
+        "Give joints at one place of a link the same interface radius or region",
     )
 
 
 @EVERY_DIMENSION
 def test_equal_interfaces_at_one_place_are_accepted(dim):
     p = parts()
-    p.mechanism.revolute(p.rod, p.base, at=(10.0, 0.0, 0.0), radius=2.0)
+    p.mechanism.revolute(p.rod, p.base, at=(10.0, 0.0, 0.0), interface_radius=2.0)
     validate(p.mechanism, dim)
 
 
 def test_interfaces_above_each_other_meet_in_the_plane_only():
     p = parts()
-    p.mechanism.revolute(p.rod, p.base, at=(10.0, 0.0, 5.0), radius=3.0, name="upper pin")
+    p.mechanism.revolute(p.rod, p.base, at=(10.0, 0.0, 5.0), interface_radius=3.0, name="upper pin")
     validate(p.mechanism, 3)
     assert_refused(
         lambda: validate(p.mechanism, 2),
         "'upper pin'",
         "its interface on 'rod' is Disc(radius=3.0), but 'pin' has Disc(radius=2.0) at the same place",
-        "Give joints at one place of a link the same radius or region",
+        "Give joints at one place of a link the same interface radius or region",
     )
 
 
