@@ -29,7 +29,7 @@ from fenicsmech.meshing import (
     mesh_link,
 )
 from fenicsmech.model.fidelity import Fidelity
-from fenicsmech.multibody import DesignAtNodes, InterfaceMap, Linkage, MaterialPoint, body_point, link_point
+from fenicsmech.multibody import BodyPoint, DesignAtNodes, InterfaceMap, Linkage, LinkPoint, body_point, link_point
 
 
 class MechanismModel:
@@ -144,7 +144,7 @@ class MechanismModel:
         """Makes the finite-element fields hold ``state``."""
         load_fields(self.elastic, self.interfaces, state)
 
-    def point(self, part: Force | Output) -> MaterialPoint:
+    def point(self, part: Force | Output) -> BodyPoint | LinkPoint:
         """The material point of a force or output."""
         if not isinstance(part.on, FlexibleLink):
             at = np.array(in_dimension(part.at, self.linkage.dim))
