@@ -12,8 +12,8 @@ def prepare():
     diagonal = finger.flexible("diagonal", shape, fm.SMOOTH_SIL_950)
     for a, b, at in ((base, left, (0, 0)), (base, right, (40, 0)), (left, tip, (0, 60)), (right, tip, (40, 60))):
         finger.revolute(a, b, at=at)
-    finger.revolute(base, diagonal, at=(0, 0), radius=3.0)
-    finger.revolute(diagonal, tip, at=(40, 60), radius=3.0)
+    finger.revolute(base, diagonal, at=(0, 0), interface_radius=3.0)
+    finger.revolute(diagonal, tip, at=(40, 60), interface_radius=3.0)
     push = finger.force(on=tip, at=(20, 70), direction=(1, 0))
     sim = fm.Simulation(fm.Scene(finger, effects=[]), space="plane-stress", size=3.0)
     targets = [fm.Target(push, force=0.1, displacement=2.0)]

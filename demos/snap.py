@@ -28,14 +28,14 @@ def describe(sprung):
     follower = switch.flexible("follower", fm.strip([(50, -44), PIN], thickness=4.0, depth=5.0), fm.ONYX)
     hinge = switch.revolute(pivot, crank, at=PIVOT)
     switch.revolute(crank, coupler, at=KNEE)
-    switch.revolute(coupler, follower, at=PIN, radius=2.0)
+    switch.revolute(coupler, follower, at=PIN, interface_radius=2.0)
     switch.weld(wall, follower, at=(50, -42), region=fm.Rectangle(6.0, 4.0))
     if not sprung:
         return fm.Scene(switch), switch.force(on=crank, at=KNEE, direction=(0, -1), name="finger"), hinge
     finger, guide = switch.rigid("finger"), switch.rigid("guide", fixed=True)
     spring = switch.flexible("spring", fm.strip([KNEE, BOW, HEAD], thickness=1.6, depth=5.0), fm.ONYX)
-    switch.revolute(crank, spring, at=KNEE, radius=0.8)
-    switch.revolute(spring, finger, at=HEAD, radius=0.8)
+    switch.revolute(crank, spring, at=KNEE, interface_radius=0.8)
+    switch.revolute(spring, finger, at=HEAD, interface_radius=0.8)
     switch.prismatic(guide, finger, at=HEAD, axis=(0, 1))
     return fm.Scene(switch), switch.force(on=finger, at=HEAD, direction=(0, -1), name="finger"), hinge
 

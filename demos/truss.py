@@ -30,8 +30,8 @@ def describe():
     finger.revolute(base, right, at=(40, 0))
     finger.revolute(left, tip, at=(0, 60))
     finger.revolute(right, tip, at=(40, 60))
-    finger.revolute(base, diagonal, at=(0, 0), radius=PIN)
-    finger.revolute(diagonal, tip, at=(40, 60), radius=PIN)
+    finger.revolute(base, diagonal, at=(0, 0), interface_radius=PIN)
+    finger.revolute(diagonal, tip, at=(40, 60), interface_radius=PIN)
     return fm.Scene(finger), finger.force(on=tip, at=(20, 70), direction=(1, 0), name="push on tip"), [fm.DRAWN]
 
 

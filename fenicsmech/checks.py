@@ -1,9 +1,10 @@
-"""Checks that turn what a user typed into plain, finite data or say what is wrong with it."""
+"""Checks of a user's numbers: each returns plain, finite data or raises an error that names the part."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from fenicsmech.errors import DescriptionError
 
 
-def finite(part: str, value: float) -> float:
+def finite(part: str, value: Any) -> float:
     """``value`` as a float.
 
     Raises:
@@ -26,7 +27,7 @@ def finite(part: str, value: float) -> float:
     return number
 
 
-def positive(part: str, value: float) -> float:
+def positive(part: str, value: Any) -> float:
     """``value`` as a float greater than zero.
 
     Raises:
@@ -52,6 +53,11 @@ def point(part: str, values: Sequence[float], *, dimensions: tuple[int, ...] = (
         wanted = " or ".join(str(d) for d in dimensions)
         raise DescriptionError(part, f"{values!r} has not {wanted} coordinates", f"Give {wanted} numbers")
     return tuple(finite(part, c) for c in coordinates)
+
+
+def point_text(point: Iterable[float]) -> str:
+    """A point as messages show it: ``(1, 2.5)``."""
+    return f"({', '.join(f'{c:g}' for c in point)})"
 
 
 def points(

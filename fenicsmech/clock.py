@@ -1,4 +1,4 @@
-"""Where the time goes: seconds per named phase."""
+"""Wall-clock seconds per named phase."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from time import perf_counter
 
 
 class Clock:
-    """Adds up wall-clock seconds per phase.
+    """A stopwatch with named phases.
 
     Attributes:
         seconds: phase → seconds so far.
@@ -16,11 +16,11 @@ class Clock:
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
-        self._inner = 0.0  # of phases inside the present one
+        self._inner = 0.0  # s, of phases inside the present one
 
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:
-        """Counts the time inside the block for phase ``name``, but that of phases inside it, which count their own."""
+        """Adds the time inside the block to phase ``name``, less that of the phases inside it."""
         outer, self._inner = self._inner, 0.0
         start = perf_counter()
         try:

@@ -1,4 +1,4 @@
-"""Work that one process does for all, and errors that all processes see, so that none waits for one that has failed."""
+"""Work of one process for all, and errors raised on all processes, so that none waits for one that has failed."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ T = TypeVar("T")
 
 
 def on_one(comm: MPI.Comm, work: Callable[[], T], *, root: int = 0) -> T | None:
-    """Calls ``work`` on one process while the others wait (collective).
+    """Calls ``work`` on one process while the others wait.
 
     Args:
         comm: the processes.
-        work: takes part in nothing collective that the others do not.
+        work: calls nothing collective.
         root: the rank that calls it.
 
     Returns:
@@ -31,12 +31,12 @@ def on_one(comm: MPI.Comm, work: Callable[[], T], *, root: int = 0) -> T | None:
 
 
 def from_one(comm: MPI.Comm, work: Callable[[], T], *, root: int = 0) -> T:
-    """The same, and all processes get what ``work`` returned."""
+    """As ``on_one``; all processes get what ``work`` returned."""
     return pickle.loads(comm.bcast(on_one(comm, lambda: pickle.dumps(work()), root=root), root=root))
 
 
 def on_all(comm: MPI.Comm, work: Callable[[], T]) -> T:
-    """Calls ``work`` on every process, and fails on all if it fails on one (collective).
+    """Calls ``work`` on every process, and fails on all if it fails on one.
 
     Args:
         comm: the processes.
@@ -45,27 +45,30 @@ def on_all(comm: MPI.Comm, work: Callable[[], T]) -> T:
     Raises:
         Exception: what ``work`` raised on the lowest rank where it did.
     """
-    done, failure = None, None
+    results: list[T] = []
+    failure: Exception | None = None
     try:
-        done = work()
+        results.append(work())
     except Exception as error:
         failure = error
     failures = comm.allgather(_sendable(failure))
-    first = next((rank for rank, other in enumerate(failures) if other is not None), None)
+    if failure is not None:
+        failures[comm.rank] = failure
     try:
-        if first is not None:
-            raise failure if first == comm.rank else failures[first]
+        for other in failures:
+            if other is not None:
+                raise other
     finally:
         # an error that its own traceback refers to would keep all that is in there until Python looks for cycles
-        failure = failures = None
-    return done
+        del failure, failures, other
+    return results[0]
 
 
 def mpi_abort_on_error() -> None:
-    """Lets an uncaught error on one process end all of them; MPI by itself leaves the others waiting for ever.
+    """Ends all processes after an uncaught error on one; MPI by itself leaves the others waiting for ever.
 
-    A script calls it once, at its start. It replaces ``sys.excepthook`` where there are several processes. Where all
-    fail, as they do in most cases, each comes to its end as usual.
+    A script calls it once, at its start. It replaces ``sys.excepthook`` where there are several processes. If all
+    fail, each ends as usual.
     """
     show, world = sys.excepthook, MPI.COMM_WORLD
 
@@ -84,7 +87,7 @@ def mpi_abort_on_error() -> None:
 
 
 def _sendable(failure: Exception | None) -> Exception | None:
-    """``failure``, or its words where it cannot be sent to another process."""
+    """``failure``, or its message where it cannot be pickled."""
     try:
         pickle.loads(pickle.dumps(failure))
     except Exception:

@@ -1,4 +1,4 @@
-"""Every difference between the supported versions of dolfinx (0.5.2, 0.9 and 0.11) and what goes with them."""
+"""Differences between the supported versions of dolfinx (0.5.2, 0.9 and 0.11) and their companions."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ _LEGACY = _VERSION < (0, 6)
 if not _LEGACY:
     import basix.ufl
 
-# Marks communicators whose duplicate is in the list for as long as the process lives: an attribute's value is let go of
-# too late for PETSc to free a duplicate then.
+# Marks communicators whose duplicate is kept in the list while the process lives. An attribute would hold the duplicate
+# itself, but is deleted too late for PETSc to free it.
 _KEPT = MPI.Comm.Create_keyval()
 _DUPLICATES: list[PETSc.Comm] = []
 
@@ -36,7 +36,7 @@ _ADD = (dolfinx.la.ScatterMode if _LEGACY else dolfinx.la.InsertMode).add
 
 @contextmanager
 def _compiling():
-    """Around what may compile forms: the build tools under the form compiler log every command on the root logger."""
+    """A context for compiling forms, without the commands that its build tools log on the root logger."""
     logging.disable(logging.INFO)
     try:
         with compiling():
@@ -53,7 +53,7 @@ def create_mesh(comm: MPI.Comm, cells: np.ndarray, points: np.ndarray) -> dmesh.
         domain = ufl.Mesh(ufl.VectorElement("Lagrange", ufl.Cell(shape, geometric_dimension=dim), 1))
         partitioner = dolfinx.cpp.mesh.create_cell_partitioner()
         return dmesh.create_mesh(comm, cells, points, domain, dmesh.GhostMode.none, partitioner)
-    # dolfinx 0.10 asks how many cells may share a facet
+    # dolfinx 0.10 takes the largest number of cells at a facet
     facets = () if _VERSION < (0, 10) else (2,)
     partitioner = dmesh.create_cell_partitioner(dmesh.GhostMode.none, *facets)
     domain = ufl.Mesh(basix.ufl.element("Lagrange", shape, 1, shape=(dim,)))
@@ -93,7 +93,7 @@ def interpolation_matrix(coarse: fem.FunctionSpace, fine: fem.FunctionSpace) -> 
     matrix.assemble()
     starts, columns, values = matrix.getValuesCSR()
     shape = matrix.getLocalSize()[0], matrix.getSize()[1]
-    matrix.destroy()  # what is on the communicator of a mesh is not collected
+    matrix.destroy()  # objects on the communicator of a mesh are not collected
     values[np.abs(values) < 1e-12] = 0.0  # rounding
     found = csr_matrix((values, columns, starts), shape=shape)
     found.eliminate_zeros()
@@ -168,12 +168,12 @@ def owned_values(function: fem.Function) -> np.ndarray:
 
 
 def add_ghosts(function: fem.Function) -> None:
-    """Adds the ghost values of all ranks to their owners' (collective)."""
+    """Adds the ghost values of all ranks to their owners'."""
     function.x.scatter_reverse(_ADD)
 
 
 def assemble_vector(form, work: fem.Function) -> np.ndarray:
-    """A compiled linear form, this rank's owned values, flat (collective).
+    """A compiled linear form, this rank's owned values, flat.
 
     Args:
         form: the form.
@@ -186,7 +186,7 @@ def assemble_vector(form, work: fem.Function) -> np.ndarray:
 
 
 def assemble_matrix(form, comm: MPI.Comm) -> PETSc.Mat:
-    """A compiled bilinear form as a new matrix, on ``comm`` as ``destroy_garbage`` wants it (collective)."""
+    """A compiled bilinear form as a new matrix, on ``comm`` as ``destroy_garbage`` requires."""
     own = fem.petsc.assemble_matrix(form)
     own.assemble()
     matrix = PETSc.Mat().createAIJ(own.getSizes(), csr=own.getValuesCSR(), bsize=own.getBlockSize(), comm=comm)
@@ -207,16 +207,15 @@ def add_blocks(matrix: PETSc.Mat, forms) -> None:
 
 
 def destroy_garbage(comm: MPI.Comm) -> None:
-    """Destroys the PETSc objects on ``comm`` that no Python object refers to any more (collective).
+    """Destroys the PETSc objects on ``comm`` that no Python object refers to any more.
 
-    petsc4py only queues them, in 3.18 on one process too, as processes may let go of them in different orders. Meshes
-    have communicators of their own, and what is queued there when a mesh dies is lost: matrices, vectors and solvers
-    belong on the communicator that the mesh was made with.
+    petsc4py only queues them (3.18 on one process too), because processes may drop them in different orders. Meshes
+    have communicators of their own, and objects queued there when a mesh is deleted are lost: matrices, vectors and
+    solvers belong on the communicator that the mesh was made with.
 
-    Call it before the first such object is made. PETSc works on a duplicate of ``comm`` that it makes, collectively,
-    when there is none, and frees with the last object on it. Which object that is may differ between processes for a
-    while: they forget objects at different times, for ever where an error's traceback held an object and a view of its
-    values. One process would then make a duplicate while another does not; so the first one is kept.
+    Call it before the first such object is made. PETSc works on a duplicate of ``comm``, which it makes collectively if
+    there is none and frees with the last object on it. Processes drop that object at different times, or never where a
+    traceback holds it; one would then make a duplicate while another does not. So the first duplicate is kept.
     """
     if comm.Get_attr(_KEPT) is None:
         comm.Set_attr(_KEPT, True)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 
 class FenicsmechError(Exception):
-    """Base of every error this package raises on purpose.
+    """Base of the errors of this package.
 
     Args:
-        part: what the error is about, in the user's words ("strip of link 'diagonal'").
-        problem: what is wrong, with the offending value.
-        remedy: what to do about it.
+        part: the part concerned, in the user's words ("strip of link 'diagonal'").
+        problem: the problem, with the offending value.
+        remedy: the way to mend it.
     """
 
     def __init__(self, part: str, problem: str, remedy: str) -> None:

@@ -10,7 +10,7 @@ import secrets
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,10 +21,10 @@ from fenicsmech.errors import DescriptionError
 
 @contextmanager
 def atomic_write(path: str | Path, *, binary: bool = False) -> Iterator[IO]:
-    """Open ``path`` for writing; it is replaced only when the block ends without an error.
+    """Opens ``path`` for writing; it is replaced only when the block ends without an error.
 
-    The data go to a hidden file in the same folder, reach the disk, and then take the name in one step:
-    an interrupted run leaves the old file untouched and nothing beside it.
+    The data go to a hidden file in the same folder, synchronised with the disk and then renamed: an interrupted run
+    leaves the old file untouched and nothing beside it.
 
     Args:
         path: the file; missing parent folders are created.
@@ -37,16 +37,13 @@ def atomic_write(path: str | Path, *, binary: bool = False) -> Iterator[IO]:
         OSError: the folder or the file cannot be written.
     """
     target = Path(path)
+    text: dict[str, Any] = {} if binary else {"encoding": "utf-8", "newline": "\n"}
     target.parent.mkdir(parents=True, exist_ok=True)
     temporary = target.with_name(f".{target.name}.{secrets.token_hex(6)}.tmp")
     # not mkstemp: its files are private (0600), results should follow the user's umask
     descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
     try:
-        if binary:
-            file = os.fdopen(descriptor, "wb")
-        else:
-            file = os.fdopen(descriptor, "w", encoding="utf-8", newline="\n")
-        with file:
+        with open(descriptor, "wb" if binary else "w", **text) as file:
             yield file
             file.flush()
             os.fsync(file.fileno())
@@ -57,14 +54,14 @@ def atomic_write(path: str | Path, *, binary: bool = False) -> Iterator[IO]:
 
 
 def write_json(path: str | Path, data: Mapping[str, object]) -> None:
-    """Write ``data`` as JSON, keys in the order given, indented by two.
+    """Writes ``data`` as JSON, keys in the order given, indented by two.
 
     Args:
         path: the file.
-        data: mappings, sequences, arrays, numbers, words, flags, None and paths, nested at will.
+        data: mappings, sequences, arrays, numbers, strings, flags, None and paths, nested.
 
     Raises:
-        DescriptionError: a number is not finite, or a value has no JSON form; the message says where.
+        DescriptionError: a number is not finite, or a value has no JSON form; the message gives its key.
     """
     text = json.dumps(_plain("", data), indent=2, ensure_ascii=False, allow_nan=False)
     with atomic_write(path) as file:
@@ -72,25 +69,25 @@ def write_json(path: str | Path, data: Mapping[str, object]) -> None:
 
 
 def _plain(key: str, value: object) -> object:
-    """``value`` in JSON's own types; ``key`` is its place, for messages."""
+    """``value`` in the types of JSON; ``key`` is its path, for messages."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if value is None or isinstance(value, bool | int | str):
         return value
     if isinstance(value, float):
         if not math.isfinite(value):
-            raise _error(key, f"the value is {value}", "Use None for what is not known")
+            raise _error(key, f"the value is {value}", "Use None for unknown values")
         return value
     if isinstance(value, Path):
         return str(value)
     if isinstance(value, Mapping):
         for name in value:
             if not isinstance(name, str):
-                raise _error(key, f"the key {name!r} is not a word", "Use words as keys")
+                raise _error(key, f"the key {name!r} is not a string", "Use strings as keys")
         return {name: _plain(f"{key}.{name}" if key else name, item) for name, item in value.items()}
     if isinstance(value, Sequence) and not isinstance(value, bytes | bytearray):
         return [_plain(f"{key}[{index}]", item) for index, item in enumerate(value)]
-    raise _error(key, f"{type(value).__name__} has no JSON form", "Convert it to numbers, words, lists or mappings")
+    raise _error(key, f"{type(value).__name__} has no JSON form", "Convert it to numbers, strings, lists or mappings")
 
 
 def _error(key: str, problem: str, remedy: str) -> DescriptionError:
@@ -98,7 +95,7 @@ def _error(key: str, problem: str, remedy: str) -> DescriptionError:
 
 
 def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> None:
-    """Write columns of numbers under their headers; floats keep every digit.
+    """Writes columns of numbers under their headers; floats keep every digit.
 
     Args:
         path: the CSV file.
@@ -123,7 +120,7 @@ def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> None:
 
 
 def read_csv(path: str | Path) -> dict[str, NDArray[np.float64]]:
-    """Read what :func:`write_csv` writes, or a spreadsheet's export of the same form.
+    """Reads what :func:`write_csv` writes, or a spreadsheet's export of the same form.
 
     Blank lines and lines that start with # are skipped.
 
@@ -131,7 +128,7 @@ def read_csv(path: str | Path) -> dict[str, NDArray[np.float64]]:
         header to (n,) values, in the order of the file.
 
     Raises:
-        DescriptionError: no header, a repeated header, a row of another length, or a field that is no finite number.
+        DescriptionError: no header, a repeated header, a row of another length, or a field that is not a finite number.
         OSError: the file cannot be read.
     """
     with open(path, encoding="utf-8-sig", newline="") as file:  # -sig: spreadsheets put a byte-order mark first

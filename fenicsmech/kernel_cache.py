@@ -1,8 +1,8 @@
-"""Where compiled forms are kept, and with what options they are compiled.
+"""The cache of compiled forms, and the options of the compiler.
 
-FFCx marks a form as being compiled by its C file: whoever finds one that is not finished waits for it. A process that
-is killed at that leaves such a file behind, and all later ones would wait for nothing. So whoever compiles holds a lock
-on the folder that others may share; who can have it alone knows that nobody is at work, and removes what is unfinished.
+FFCx marks a form as being compiled by its C file, and other processes wait until it is finished. A process that is
+killed while it compiles leaves an unfinished file behind, for which later ones would wait without end. Processes
+therefore compile under a shared lock on the folder; one that gets the exclusive lock removes unfinished files.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _FLAGS = "-O3 -march=native -fno-math-errno -fno-trapping-math -fno-schedule-ins
 
 
 def _processor() -> str:
-    """A short name for the instruction set of this processor: compiled kernels are only good for their own."""
+    """A short name for the instruction set of this processor: compiled kernels run on their own only."""
     try:
         text = Path("/proc/cpuinfo").read_text()
     except OSError:
@@ -39,13 +39,13 @@ FOLDER = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "fenic
 
 
 def options() -> dict:
-    """FFCx's options, a dictionary of the caller's own."""
+    """FFCx's options, a new dictionary."""
     return {"cffi_extra_compile_args": _FLAGS.split(), "cache_dir": FOLDER, "timeout": 300}
 
 
 @contextmanager
 def compiling(folder: Path = FOLDER) -> Iterator[None]:
-    """Around everything that may compile into ``folder``."""
+    """A context for everything that may compile into ``folder``."""
     _remove_unfinished(folder)
     with _lock(folder, fcntl.LOCK_SH):
         yield
@@ -53,7 +53,7 @@ def compiling(folder: Path = FOLDER) -> Iterator[None]:
 
 @contextmanager
 def _lock(folder: Path, how: int) -> Iterator[bool]:
-    """Whether the lock could be had; read-only folders and some network file systems have none to give."""
+    """Whether the lock was obtained; read-only folders and some network file systems have none."""
     with ExitStack() as stack:
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -66,7 +66,7 @@ def _lock(folder: Path, how: int) -> Iterator[bool]:
 
 @cache
 def _remove_unfinished(folder: Path) -> None:
-    """Once per process, unless another one is at work."""
+    """Removes unfinished C files, once per process and unless another process compiles."""
     with _lock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB) as alone:
         for source in folder.glob("libffcx_*.c") if alone else ():
             if not source.with_suffix(".c.cached").exists():

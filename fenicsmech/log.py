@@ -46,7 +46,7 @@ def logger(name: str) -> logging.LoggerAdapter:
 
 
 def configure(level: int = logging.INFO) -> None:
-    """Show the package's messages on standard error, for scripts; an application sets up `logging` itself.
+    """Shows the package's messages on standard error, for scripts; an application sets up `logging` itself.
 
     Args:
         level: the lowest level shown, `logging.DEBUG`, `logging.INFO` and so on.
@@ -61,9 +61,9 @@ def configure(level: int = logging.INFO) -> None:
     others = logging.getLogger()
     if not others.handlers:
         others.addHandler(logging.StreamHandler())
-    for handler in others.handlers:
-        if type(handler) is logging.StreamHandler:  # not the handlers of an application or a test runner
-            handler.setLevel(max(handler.level, logging.WARNING))
+    for other in others.handlers:
+        if type(other) is logging.StreamHandler:  # not the handlers of an application or a test runner
+            other.setLevel(max(other.level, logging.WARNING))
 
 
 _TERMINAL_PAUSE = 0.5  # s between redrawn lines
@@ -71,15 +71,15 @@ _LOG_PAUSE = 5.0  # s between lines in a file or pipe
 
 
 class Progress:
-    """Shows the progress of one task on a stream.
+    """The progress of one task, shown on a stream.
 
-    A terminal gets one line that is redrawn at most twice a second; a file or pipe gets a line every five seconds.
-    The last update is always shown. Use it as a context manager, or call :meth:`close` at the end.
+    A terminal gets one line that is redrawn at most twice a second, a file or pipe a line every five seconds. The last
+    update is always shown. Use it as a context manager, or call :meth:`close` at the end.
 
     Args:
-        total: how much there is to do; None if that is not known.
-        label: what is being done.
-        stream: where to write; None is the standard error stream.
+        total: of the task; None if it is not known.
+        label: name of the task.
+        stream: the output; None is the standard error stream.
         clock: seconds from an arbitrary start, increasing.
 
     Raises:
@@ -101,11 +101,11 @@ class Progress:
         self._terminal = self._stream.isatty()
         self._start = clock()
         self._shown = -math.inf
-        self._pending: str | None = None
+        self._pending = ""
         self._open_line = False
 
     def update(self, done: float, note: str = "") -> None:
-        """Report that ``done`` of the total is finished; ``note`` says something about the latest step."""
+        """Reports that ``done`` of the total is finished; ``note`` is a remark on the latest step."""
         now = self._clock()
         self._pending = self._describe(done, note, now - self._start)
         complete = self._total is not None and done >= self._total
@@ -113,8 +113,8 @@ class Progress:
             self._show(now)
 
     def close(self) -> None:
-        """Show the last update, if it is not yet shown, and end the line."""
-        if self._pending is not None:
+        """Shows the last update and ends the line."""
+        if self._pending:
             self._show(self._clock())
         if self._open_line:
             self._stream.write("\n")
@@ -139,7 +139,7 @@ class Progress:
         return f"{line}  {note}" if note else line
 
     def _show(self, now: float) -> None:
-        line, self._pending, self._shown = self._pending, None, now
+        line, self._pending, self._shown = self._pending, "", now
         if self._terminal:
             width = shutil.get_terminal_size().columns - 1  # a full line would wrap and not be overwritten
             self._stream.write(f"\r{line[:width]}\x1b[K")
@@ -150,13 +150,13 @@ class Progress:
 
 
 class Silent:
-    """Takes the calls of :class:`Progress` and shows nothing: for every rank but the first."""
+    """A :class:`Progress` that shows nothing, for every rank but the first."""
 
     def update(self, done: float, note: str = "") -> None:
-        """Ignore the report."""
+        """Does nothing."""
 
     def close(self) -> None:
-        """Nothing was opened."""
+        """Does nothing."""
 
     def __enter__(self) -> Silent:
         return self

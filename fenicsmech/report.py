@@ -39,7 +39,7 @@ class Report:
     """The contents of a report.
 
     Attributes:
-        folder: where its files are.
+        folder: of its files.
         summary: all figures, as in ``summary.json``.
     """
 
@@ -64,7 +64,7 @@ class Optimisation:
         result: its optimum.
         before: curves of the drawn design.
         start: the optimum of a cheaper simulation that the optimisation started from.
-        pin_diameter: of the holes that are left for pins in the exported links.
+        pin_diameter: of the holes for pins in the exported links.
     """
 
     problem: DesignProblem
@@ -80,8 +80,8 @@ def write_report(
     """Writes the files listed above.
 
     Args:
-        folder: where to; it is created.
-        simulation: that the curves are of, with the optimised shapes after an optimisation.
+        folder: created if it does not exist.
+        simulation: of the curves, with the optimised shapes after an optimisation.
         curves: one per configuration, at least one of them with a loaded equilibrium.
         optimisation: the one that the simulation's shapes are of, if there was one.
 
@@ -89,14 +89,15 @@ def write_report(
         the figures.
 
     Raises:
-        DescriptionError: there is no curve.
+        DescriptionError: there are no curves.
         OSError: the folder or a file cannot be written.
     """
     folder, name, comm = Path(folder), simulation.scene.mechanism.name, simulation.comm
     if not curves:
-        raise DescriptionError(f"report on {name!r}", "there is no curve", "Give at least one")
+        raise DescriptionError(f"report on {name!r}", "there are no curves", "Give at least one")
     units = simulation.scene.units
-    panels, paths = [curve.panel() for curve in curves], [_suffixed(curve, curves) for curve in curves]
+    panels = [panel for curve in curves if (panel := curve.panel()) is not None]  # on rank 0
+    paths = [_suffixed(curve, curves) for curve in curves]
     for curve, path in zip(curves, paths, strict=True):
         curve.write(folder / f"deformed{path}.xdmf")
         curve.write_csv(folder / f"curve{path}.csv", errors=True)
@@ -139,7 +140,7 @@ def _plot(path: Path, name: str, curves: Sequence[Curve], optimisation: Optimisa
 
 
 def _summarise(sim: Simulation, curves: Sequence[Curve], optimisation: Optimisation | None) -> dict:
-    result = optimisation and optimisation.result
+    result = None if optimisation is None else optimisation.result
     errors = np.concatenate([curve.error_estimates() for curve in curves])
     summary = {
         "mechanism": sim.scene.mechanism.name,
@@ -157,7 +158,7 @@ def _summarise(sim: Simulation, curves: Sequence[Curve], optimisation: Optimisat
         "seconds": {
             "setup": sim.setup_seconds,
             "frame_median": median(frame.seconds for frame in _loaded(curves)),
-            "optimise": result and result.seconds + (optimisation.start.seconds if optimisation.start else 0.0),
+            "optimise": None if optimisation is None else _seconds(optimisation),
             "phases": sim.clock.seconds,
         },
         "iterations": sum(frame.iterations for frame in _loaded(curves)) if result is None else result.iterations,
@@ -172,7 +173,12 @@ def _summarise(sim: Simulation, curves: Sequence[Curve], optimisation: Optimisat
     return summary if optimisation is None else summary | _summarise_design(optimisation)
 
 
-def _summarise_design(optimisation: Optimisation) -> dict:
+def _seconds(optimisation: Optimisation) -> float:
+    """The time of an optimisation, with that of the cheaper one before."""
+    return optimisation.result.seconds + (optimisation.start.seconds if optimisation.start else 0.0)
+
+
+def _summarise_design(optimisation: Optimisation) -> dict[str, object]:
     """The figures of an optimisation."""
     result = optimisation.result
     figures = {
@@ -228,7 +234,7 @@ def _frames(curves: Sequence[Curve]) -> list[dict]:
 
 
 def _loaded(curves: Sequence[Curve]) -> list[Frame]:
-    """Equilibria under load: those without cost less time."""
+    """Equilibria under load; those without take less time."""
     frames = [frame for curve in curves for frame in curve.frames]
     return [frame for frame in frames if frame.force != 0.0] or frames
 
@@ -240,8 +246,8 @@ def _text(summary: dict, folder: Path) -> str:
     """Equilibria, targets, size of the problem and times, for the console."""
     keys = ("configuration", "force", "displacement", "displacement_error", "stable", "iterations", "seconds")
     length, force = summary["units"]["length"], summary["units"]["force"]
-    headers = ("configuration", f"force [{force}]", f"displacement [{length}]", f"finer elements add [{length}]")
-    headers += ("stable", "iterations", "seconds")
+    headers = ["configuration", f"force [{force}]", f"displacement [{length}]", f"finer elements add [{length}]"]
+    headers += ["stable", "iterations", "seconds"]
     lines = [format_table(headers, [[frame[key] for key in keys] for frame in summary["frames"]])]
     if summary["parameters"] is not None:
         lines += _design_text(summary)
@@ -260,15 +266,15 @@ def _text(summary: dict, folder: Path) -> str:
 
 def _design_text(summary: dict) -> list[str]:
     length, force = summary["units"]["length"], summary["units"]["force"]
-    headers = ("configuration", f"force [{force}]", *(f"{name} [{length}]" for name in ("wanted", "reached")))
-    headers += (f"finer elements add [{length}]", "error [%]")
+    headers = ["configuration", f"force [{force}]", *(f"{name} [{length}]" for name in ("wanted", "reached"))]
+    headers += [f"finer elements add [{length}]", "error [%]"]
     rows = [
         [t["configuration"], t["force"], t["wanted"], t["reached"], t["reached_error"], 100.0 * t["relative_error"]]
         for t in summary["targets"]
     ]
     start = summary.get("start")
     if start is not None:
-        headers += (f"optimum of the start [{length}]", f"the same here [{length}]")
+        headers += [f"optimum of the start [{length}]", f"the same here [{length}]"]
         rows = [[*row, *pair] for row, *pair in zip(rows, start["reached"], start["reached_here"], strict=True)]
     (least, most), objective, error = summary["thickness"], summary["objective"], summary["objective_error"]
     finer = "" if error is None else f", to which finer elements add {error:.2g}"
@@ -287,7 +293,7 @@ def _design_text(summary: dict) -> list[str]:
 
 
 def format_table(headers: Sequence[str], rows: Sequence[Sequence[object]], *, digits: int = 4) -> str:
-    """Lay out ``rows`` under ``headers``; numbers stand right, words left.
+    """``rows`` laid out under ``headers``; numbers stand right, words left.
 
     Args:
         headers: (k,) column names.

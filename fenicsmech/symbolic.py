@@ -1,4 +1,4 @@
-"""Functions given by formulae: derivatives are derived symbolically, and all is compiled to Python once.
+"""Functions given by formulae, differentiated symbolically and compiled to Python once.
 
 f(x; c) ∈ Rᵐ,     ∂f_k/∂x_i,     Σ_k w_k ∂²f_k/∂x_i∂x_j     with variables x ∈ Rⁿ and constants c.
 """
@@ -16,8 +16,8 @@ import sympy
 class SmoothFunction:
     """A compiled function f of n variables with m components.
 
-    Every function takes the variables (n,) and the constants (k,). Where ``derive`` was asked for many points at once,
-    every array has one axis more, the first, of the points.
+    Every function takes the variables (n,) and the constants (k,). With ``many`` points at once every array has a first
+    axis more, of the points.
 
     Attributes:
         size: m.
@@ -43,7 +43,7 @@ def derive(
 
     Args:
         formulae: f, one expression per component.
-        variables: x; symbols are not called x0, x1, …, which common subexpressions are.
+        variables: x; the names x0, x1, … are reserved for common subexpressions.
         constants: c.
         many: whether the function is for many points at once; it is fastest for one point otherwise.
     """
@@ -91,6 +91,6 @@ def _at_many_points(
 
 
 def _lambdify(arguments: tuple, expressions: list[sympy.Expr], module: str) -> Callable[..., list]:
-    # lambdify prints what it is given into a docstring: half of its time unless subexpressions are taken out before
+    # lambdify prints its input into a docstring: half of its time unless subexpressions are eliminated before
     common, reduced = sympy.cse(expressions, list=False)
     return sympy.lambdify(arguments, reduced, module, cse=lambda _: (common, reduced))

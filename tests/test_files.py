@@ -82,7 +82,7 @@ def test_numpy_becomes_plain_and_the_order_of_keys_is_kept(tmp_path):
         ({"field": np.array([1.0, np.inf])}, r"'field\[1\]'.*inf"),
         ({"x": np.float32("nan")}, "'x'.*nan"),
         ({"x": 1j}, "'x'.*complex has no JSON form"),
-        ({"x": {1: 2}}, "'x'.*the key 1 is not a word"),
+        ({"x": {1: 2}}, "'x'.*the key 1 is not a string"),
         ({"x": b"bytes"}, "'x'.*bytes"),
     ],
 )

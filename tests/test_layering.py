@@ -18,7 +18,7 @@ LAYERS = (
     "errors",
     "checks",
     "laws",
-    "symbolic",
+    "polygons",
     "log",
     "clock",
     "symbolic",

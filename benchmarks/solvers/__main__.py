@@ -157,8 +157,8 @@ def column():
     base, head = made.rigid("base", fixed=True), made.rigid("head")
     shape = fm.strip([(0, 0), (length / 2, 0.01 * thickness), (length, 0)], thickness=thickness, depth=1.0)
     strut = made.flexible("strut", shape, fm.Material("steel", young, 0.3))
-    made.revolute(base, strut, at=(0, 0), radius=0.5 * thickness)
-    made.revolute(strut, head, at=(length, 0), radius=0.5 * thickness)
+    made.revolute(base, strut, at=(0, 0), interface_radius=0.5 * thickness)
+    made.revolute(strut, head, at=(length, 0), interface_radius=0.5 * thickness)
     made.prismatic(base, head, at=(length, 0), axis=(1, 0))
     push = made.force(on=head, at=(length, 0), direction=(-1, 0))
     return fm.Scene(made), push, pi**2 * young * thickness**3 / 12.0 / length**2
@@ -175,11 +175,11 @@ def contrast():
         "stiff", fm.strip([(40, 0), (40, 60)], thickness=3.0, depth=20.0), fm.Material("stiff", 2e5, 0.3)
     )
     made.revolute(base, left, at=(0, 0))
-    made.revolute(base, stiff, at=(40, 0), radius=3.0)
+    made.revolute(base, stiff, at=(40, 0), interface_radius=3.0)
     made.revolute(left, tip, at=(0, 60))
-    made.revolute(stiff, tip, at=(40, 60), radius=3.0)
-    made.revolute(base, soft, at=(0, 0), radius=3.0)
-    made.revolute(soft, tip, at=(40, 60), radius=3.0)
+    made.revolute(stiff, tip, at=(40, 60), interface_radius=3.0)
+    made.revolute(base, soft, at=(0, 0), interface_radius=3.0)
+    made.revolute(soft, tip, at=(40, 60), interface_radius=3.0)
     return fm.Scene(made), made.force(on=tip, at=(20, 70), direction=(1, 0))
 
 
@@ -194,17 +194,17 @@ def four_bar(ends):
     made.revolute(base, right, at=(55, 0))
     ends(made, left, coupler, (0, 40))
     ends(made, right, coupler, (50, 45))
-    made.revolute(base, strut, at=(0, 0), radius=3.0)
-    made.revolute(strut, right, at=(50, 45), radius=3.0)
+    made.revolute(base, strut, at=(0, 0), interface_radius=3.0)
+    made.revolute(strut, right, at=(50, 45), interface_radius=3.0)
     return fm.Scene(made), made.force(on=left, at=(0, 40), direction=(1, 0))
 
 
 def hinged(made, rigid, flexible, at):
-    made.revolute(rigid, flexible, at=at, radius=3.0)
+    made.revolute(rigid, flexible, at=at, interface_radius=3.0)
 
 
 def balled(made, rigid, flexible, at):
-    made.spherical(rigid, flexible, at=at, radius=3.0)
+    made.spherical(rigid, flexible, at=at, interface_radius=3.0)
 
 
 def arch():
@@ -214,8 +214,8 @@ def arch():
     made = fm.Mechanism("arch")
     base = made.rigid("base", fixed=True)
     bow = made.flexible("bow", fm.strip(points, thickness=thickness, depth=2.0), fm.Material("steel", 1000.0, 0.3))
-    made.revolute(base, bow, at=points[0], radius=0.5 * thickness)
-    made.revolute(base, bow, at=points[-1], radius=0.5 * thickness)
+    made.revolute(base, bow, at=points[0], interface_radius=0.5 * thickness)
+    made.revolute(base, bow, at=points[-1], interface_radius=0.5 * thickness)
     push = made.force(on=bow, at=(0.5 * span, rise), direction=(0, -1))
     return fm.Scene(made), push, [1.3, 2.6, 3.9, 5.2]
 

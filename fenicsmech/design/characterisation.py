@@ -15,7 +15,7 @@ Source: Seber & Wild, Nonlinear Regression (doi:10.1002/0471725315), chapters 2 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import t as student
@@ -34,7 +34,7 @@ class Experiment:
 
     Attributes:
         simulation: of the sample in its test rig.
-        force_part: the force that was applied.
+        part: the force that was applied.
         forces: its magnitudes, (n,).
         displacements: how far its point moved along it, (n,).
         configuration: motor positions.
@@ -44,7 +44,7 @@ class Experiment:
     """
 
     simulation: Simulation
-    force_part: Force
+    part: Force
     forces: Sequence[float]
     displacements: Sequence[float]
     configuration: Configuration = DRAWN
@@ -67,7 +67,7 @@ class Experiment:
         """The curve through all measured forces, from the smallest to the largest."""
         request = read_request(
             self.simulation.scene.mechanism,
-            self.force_part,
+            self.part,
             forces=self.forces,
             displacements=None,
             configuration=self.configuration,
@@ -89,6 +89,7 @@ class ModulusFit:
         curves: simulated at the fitted modulus, one per experiment.
         residuals: simulated minus measured displacement, per experiment.
         iterations: of Gauss–Newton.
+        material: the one given, with the fitted modulus, as ``Simulation.with_material`` takes it.
     """
 
     youngs_modulus: float
@@ -98,10 +99,11 @@ class ModulusFit:
     curves: tuple[Curve, ...]
     residuals: tuple[tuple[float, ...], ...]
     iterations: int
+    material: Material
 
 
 def fit_modulus(experiments: Sequence[Experiment], material: Material) -> ModulusFit:
-    """Young's modulus of ``material``; the simulations keep it.
+    """Young's modulus of ``material``; the experiments' simulations stay as they are.
 
     Args:
         experiments: measurements, at least two readings in all.
@@ -138,23 +140,21 @@ def fit_modulus(experiments: Sequence[Experiment], material: Material) -> Modulu
         curves=tuple(curves),
         residuals=tuple(tuple(r.tolist()) for r in residuals),
         iterations=iterations,
+        material=_with_modulus(material, modulus),
     )
 
 
+def _with_modulus(material: Material, modulus: float) -> Material:
+    return replace(material, law=material.law.with_parameters({**material.law.parameters, "E": modulus}))
+
+
 class _Rig:
-    """One experiment in simulation."""
+    """One experiment in a simulation of its own, whose modulus changes."""
 
     def __init__(self, experiment: Experiment, material: Material) -> None:
         self._experiment, self._request = experiment, experiment.request
-        self._simulation = experiment.simulation
-        mechanism = self._simulation.scene.mechanism
-        self._links = np.array([link.material == material for link in mechanism.flexible_links])
-        if not self._links.any():
-            raise DescriptionError(
-                f"modulus of {material.name!r}",
-                f"no link of {mechanism.name!r} is made of it",
-                "Give the material of the samples",
-            )
+        self._simulation = experiment.simulation.with_material(material, material)
+        self._links = np.array([made_of == material for made_of in self._simulation.model.materials])
         self.range = float(np.abs(experiment.displacements).max())
 
     def compare(self, modulus: float) -> tuple[Curve, np.ndarray, np.ndarray]:
@@ -169,6 +169,6 @@ class _Rig:
             (gradient,) = adjoint.gradients(frame.state, [newton.system.controlled])
             travels[frame.force] = frame.displacement
             slopes[frame.force] = modulus * float(gradient.parameters["E"][self._links].sum())
-        forces = self._experiment.forces.tolist()
-        reached = np.array([travels[force] for force in forces])
-        return curve, reached - self._experiment.displacements, np.array([slopes[force] for force in forces])
+        measured = self._experiment
+        reached, slope = (np.array([values[force] for force in measured.forces]) for values in (travels, slopes))
+        return curve, reached - measured.displacements, slope

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import BSpline, CubicSpline, make_interp_spline
 
-from fenicsmech.meshing import CircleArc, Curve, line
+from fenicsmech.meshing import CircleArc, Curve, straight_line
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def smooth_outline(polygon: np.ndarray) -> list[Curve]:
     for start, end in zip(breaks, [*breaks[1:], breaks[0] + count], strict=True):
         run = polygon[np.arange(start, end + 1) % count]
         if _bulge(run) <= allowed:
-            curves.append(line(*run[[0, -1]]))
+            curves.append(straight_line(*run[[0, -1]]))
         elif _is_arc(run, allowed):
             curves.append(_arc_through(run))
         else:
@@ -72,7 +72,8 @@ def smooth_outline(polygon: np.ndarray) -> list[Curve]:
 
 def _breaks(polygon: np.ndarray) -> list[int]:
     """The corners of a polygon, and the vertices where exact lines and arcs begin and end."""
-    count, corner, ends = len(polygon), corners_of(polygon), set()
+    count, corner = len(polygon), corners_of(polygon)
+    ends: set[int] = set()
     for first, last in _exact_runs(polygon):
         corner[np.arange(first + 1, last) % count] = False
         ends.update((first, last % count))

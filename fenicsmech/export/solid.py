@@ -1,4 +1,4 @@
-"""Links to make: their meshes, smoothed and extruded, as solids in STEP files and as surfaces in STL files.
+"""Links for manufacture: their meshes, smoothed and extruded, as solids in STEP files and surfaces in STL files.
 
 Both files describe the same body: the curves through the boundary vertices of the link's plan, minus the holes of its
 pins, between z = −depth/2 and z = depth/2.
@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from fenicsmech.checks import point, positive
+from fenicsmech.checks import point, point_text, positive
 from fenicsmech.errors import MeshingError
 from fenicsmech.export.smooth_outline import smooth_outline
 from fenicsmech.files import atomic_write
@@ -24,18 +24,15 @@ from fenicsmech.meshing import (
     LinkMesh,
     boundary_loops,
     cell_measures,
-    distance,
     draw_loop,
-    first_crossing,
     gmsh,
     gmsh_session,
-    inside,
-    line,
     muted_output,
     plan_of,
     sampled,
-    shown,
+    straight_line,
 )
+from fenicsmech.polygons import distance_to, first_crossing, is_inside
 
 
 @dataclass(frozen=True)
@@ -47,7 +44,7 @@ class PinHole:
         diameter: of the hole.
     """
 
-    centre: tuple[float, float]
+    centre: tuple[float, ...]
     diameter: float
 
 
@@ -64,13 +61,13 @@ def write_step(
         path: the file; missing parent folders are created.
         mesh: the whole link, in mm (the unit of the file): triangles, or tetrahedra in layers along z.
         depth: extent along z, symmetric about z = 0.
-        pins: holes to be left for pins.
+        pins: holes for pins.
         name: the link's name, for messages; None: that of the file.
 
     Raises:
         MeshingError: cells are turned over, the outline crosses itself, the tetrahedra do not stand in layers or have
             another depth, a pin hole leaves the link or meets another, or gmsh cannot make the solid.
-        DescriptionError: the depth, or a pin's centre or diameter, makes no sense.
+        DescriptionError: the depth, or a pin's centre or diameter, is not finite or not positive.
         OSError: the file cannot be written.
     """
     name = name or Path(path).stem
@@ -124,7 +121,7 @@ def _extrude(loops: Sequence[Sequence[Curve]], depth: float, layers: Sequence[in
 
 
 def _edges(polygon: np.ndarray) -> list[Curve]:
-    return [line(*ends) for ends in zip(polygon, np.roll(polygon, -1, axis=0), strict=True)]
+    return [straight_line(*ends) for ends in zip(polygon, np.roll(polygon, -1, axis=0), strict=True)]
 
 
 def _written(kind: str) -> bytes:
@@ -152,7 +149,7 @@ def _section(name: str, mesh: LinkMesh, depth: float, pins: Sequence[PinHole]) -
     Raises:
         MeshingError: cells are turned over, the outline crosses itself, the tetrahedra do not stand in layers or have
             another depth, or a pin hole leaves the link or meets another.
-        DescriptionError: a number makes no sense.
+        DescriptionError: a pin's centre or diameter is not finite or not positive.
     """
     link = f"link {name!r}"
     plan = _plan(link, mesh, depth)
@@ -197,11 +194,13 @@ def _check_simple(link: str, polygons: Sequence[np.ndarray]) -> None:
     """Refuse loops that cross themselves, and holes that reach beyond the outline."""
     outline, *holes = polygons
     crossings = [first_crossing(polygon) for polygon in polygons]
-    crossings += [corner for hole in holes for corner in hole if not inside(outline, corner)]
+    crossings += [corner for hole in holes for corner in hole if not is_inside(outline, corner)]
     where = next((at for at in crossings if at is not None), None)
     if where is not None:
         raise MeshingError(
-            link, f"its outline crosses itself near {shown(where)}", "Choose a design that does not run into itself"
+            link,
+            f"its outline crosses itself near {point_text(where)}",
+            "Choose a design that does not run into itself",
         )
 
 
@@ -213,16 +212,18 @@ def _checked(link: str, pin: PinHole) -> PinHole:
 def _drills(pin: PinHole, hole: np.ndarray) -> bool:
     """Whether nothing is left of a hole of the mesh, up to 0.1 % wider than the pin's, once that is drilled."""
     reach = np.linalg.norm(hole - pin.centre, axis=1).max()
-    return bool(inside(hole, np.array(pin.centre)) and reach <= 1.001 * 0.5 * pin.diameter)
+    return bool(is_inside(hole, np.array(pin.centre)) and reach <= 1.001 * 0.5 * pin.diameter)
 
 
 def _check_room(link: str, pin: PinHole, polygons: Sequence[np.ndarray], others: Sequence[PinHole]) -> None:
     """Refuse a pin hole that the link does not surround."""
     centre, radius = np.array(pin.centre), 0.5 * pin.diameter
-    part = f"pin hole at {shown(centre)} in {link}"
+    part = f"pin hole at {point_text(centre)} in {link}"
     outline, *holes = polygons
-    room = min(distance(polygon, centre) for polygon in polygons)
-    if not inside(outline, centre) or any(inside(hole, centre) and distance(hole, centre) > radius for hole in holes):
+    room = min(distance_to(polygon, centre) for polygon in polygons)
+    if not is_inside(outline, centre) or any(
+        is_inside(hole, centre) and distance_to(hole, centre) > radius for hole in holes
+    ):
         raise MeshingError(part, "its centre is not on the link", "Leave it out, or give the joint's place")
     if room <= radius:
         raise MeshingError(
@@ -232,4 +233,4 @@ def _check_room(link: str, pin: PinHole, polygons: Sequence[np.ndarray], others:
         )
     for other in others:
         if math.dist(other.centre, pin.centre) <= radius + 0.5 * other.diameter:
-            raise MeshingError(part, f"it meets the one at {shown(other.centre)}", "Choose thinner pins")
+            raise MeshingError(part, f"it meets the one at {point_text(other.centre)}", "Choose thinner pins")

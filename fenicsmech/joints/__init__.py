@@ -1,7 +1,7 @@
 """Joints: constraints between two bodies, each a few symbolic lines in a file of its own.
 
 - ``rotations``: poses, rotations and the derivatives of a placed point
-- ``joint``: the protocol of a joint kind, the markers it speaks of, and the numbers derived from its equations
+- ``joint``: the joint kind, the markers of its equations, and their derivatives
 - ``revolute``, ``prismatic``, ``cylindrical``, ``spherical``, ``universal``, ``planar``, ``weld``: the joints
 """
 

@@ -100,17 +100,17 @@ class SpatialMarker:
 
 
 class JointKind(ABC):
-    """A joint between two bodies: all that the package knows of it.
+    """A kind of joint between two bodies, given by its equations.
 
     Attributes:
-        name: what users call it.
+        name: for messages.
         planar: whether it exists in planar models, with ``planar_equations``.
         motorised: whether it has one free coordinate, ``coordinate``, for motors and springs.
         sliding: whether that coordinate is a length, scaled by the mechanism's length; otherwise it is an angle.
         axis_in_plane: whether its axis lies in the plane of a planar model; otherwise it is normal to the plane.
         pin_along_axis: whether it holds flexible links by a pin along its axis; otherwise along z.
         shares_point: whether its first equations are x_b − x_a = 0.
-        clamps: whether it clamps flexible links: design keeps the direction they have there.
+        clamps: whether it clamps flexible links, whose direction there an optimisation keeps.
     """
 
     name: str
@@ -179,8 +179,10 @@ def _markers(dim: int):
         origin = sympy.Matrix(z[:dim]) + (rotation - sympy.eye(dim)) * sympy.Matrix(anchor)
         vectors = [rotation * triad[k, :].T for k in range(dim)]
         if dim == 2:
-            return PlanarMarker(origin, *vectors, angle=z[2])
-        return SpatialMarker(origin, *vectors, drawn_axis=triad[2, :].T, quaternion=(z[3], sympy.Matrix(z[4:])))
+            axis, normal = vectors
+            return PlanarMarker(origin, axis, normal, z[2])
+        e1, e2, e3 = vectors
+        return SpatialMarker(origin, e1, e2, e3, triad[2, :].T, (z[3], sympy.Matrix(z[4:])))
 
     a = marker(list(poses[: space.pose_size]), constants[:dim])
     b = marker(list(poses[space.pose_size :]), constants[dim : 2 * dim])

@@ -25,14 +25,14 @@ import sympy
 class RigidSpace(ABC):
     """Rigid-body coordinates in ``dim`` dimensions; poses are arrays of ``pose_size`` numbers.
 
-    Rotation parameters may obey a constraint among themselves (|q|² − 1 = 0); by default they obey none.
+    Rotation parameters may obey a constraint (|q|² − 1 = 0); by default there is none.
 
     Attributes:
         dim: dimension of the space (2 or 3).
         rotation_size: number of rotation parameters r.
         freedoms: rigid-body degrees of freedom (3 or 6).
         pose_size: ``dim + rotation_size``.
-        identity: the pose of a body that has not moved, (pose_size,).
+        identity: the pose of a body as drawn, (pose_size,).
     """
 
     dim: int
@@ -61,7 +61,7 @@ class RigidSpace(ABC):
         """R(r) in sympy, the same formula as the numeric one."""
 
     @abstractmethod
-    def turns(self, pose: np.ndarray) -> np.ndarray:
+    def rotation_rates(self, pose: np.ndarray) -> np.ndarray:
         """∂r/∂ω for a small rotation vector ω in space, (rotation_size, 1 or 3)."""
 
     @abstractmethod
@@ -137,7 +137,7 @@ class PlanarSpace(RigidSpace):
         (angle,) = parameters
         return sympy.Matrix([[sympy.cos(angle), -sympy.sin(angle)], [sympy.sin(angle), sympy.cos(angle)]])
 
-    def turns(self, pose):
+    def rotation_rates(self, pose):
         return np.ones((1, 1))
 
     def compose(self, outer, inner, lever):
@@ -183,7 +183,7 @@ class SpatialSpace(RigidSpace):
         cross = sympy.Matrix([[0, -z, y], [z, 0, -x], [-y, x, 0]])
         return sympy.eye(3) + 2 * (w * cross + v * v.T - v.dot(v) * sympy.eye(3))
 
-    def turns(self, pose):
+    def rotation_rates(self, pose):
         # dq = ½ (0, ω) ∘ q
         w, v = pose[3], pose[4:]
         cross = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
@@ -210,4 +210,4 @@ class SpatialSpace(RigidSpace):
 
 
 RIGID_SPACES = {2: PlanarSpace(), 3: SpatialSpace()}
-"""The coordinates of a dimension."""
+"""Rigid-body coordinates by dimension."""

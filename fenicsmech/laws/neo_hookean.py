@@ -20,16 +20,18 @@ from fenicsmech.errors import DescriptionError
 from fenicsmech.laws.law import SplitLaw, Strain, Volumetric, cube_root_remainder, log_remainder
 
 
-def elastic_constants(part: str, E: float, nu: float) -> tuple[float, float]:
+def elastic_constants(part: str, E: float | None, nu: float | None) -> tuple[float, float]:
     """E and ν as floats.
 
     Raises:
         DescriptionError: E ≤ 0, ν outside (−1, 0.5), or not numbers; ``part`` says of what.
     """
-    E, nu = positive(f"Young's modulus of {part}", E), finite(f"Poisson's ratio of {part}", nu)
-    if not -1.0 < nu < 0.5:
-        raise DescriptionError(part, f"Poisson's ratio is {nu:g}", "Give a value between −1 and 0.5, both excluded")
-    return E, nu
+    young, poisson = positive(f"Young's modulus of {part}", E), finite(f"Poisson's ratio of {part}", nu)
+    if not -1.0 < poisson < 0.5:
+        raise DescriptionError(
+            part, f"Poisson's ratio is {poisson:g}", "Give a value between −1 and 0.5, both excluded"
+        )
+    return young, poisson
 
 
 def _simo_complement(q: Expr) -> Expr:

@@ -2,7 +2,7 @@
 
 - ``materials``: names and laws with their numbers
 - ``shapes``: strips and their centrelines, outlines, STEP parts, meshes; interface regions, clamps
-- ``parts``: links, joints, motors, forces, outputs, and where they are
+- ``parts``: links, joints, motors, forces, outputs, and their positions
 - ``mechanism``: the builder that collects parts
 - ``scene``: effects, configurations and names of units
 - ``validation``: checks of the whole
@@ -19,10 +19,10 @@ from fenicsmech.mechanism.parts import (
     FlexibleLink,
     Force,
     Joint,
-    Leader,
     Link,
     Motor,
     Output,
+    PrescribedPart,
     RigidLink,
     in_dimension,
     same_place,
@@ -59,7 +59,7 @@ __all__ = [
     "FlexibleLink",
     "Force",
     "Joint",
-    "Leader",
+    "PrescribedPart",
     "Line",
     "Link",
     "Material",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
+from typing import TypeVar
 
 from fenicsmech.checks import direction as unit
 from fenicsmech.checks import finite, point, positive
@@ -21,7 +22,10 @@ from fenicsmech.joints import (
 )
 from fenicsmech.mechanism.materials import Material
 from fenicsmech.mechanism.parts import FlexibleLink, Force, Joint, Link, Motor, Output, RigidLink, in_dimension
-from fenicsmech.mechanism.shapes import Disc, Rectangle, Region, Shape, Strip, end_clamp
+from fenicsmech.mechanism.shapes import Disc, Point, Rectangle, Region, Shape, Strip, end_clamp
+
+Part = TypeVar("Part")
+AnyLink = TypeVar("AnyLink", RigidLink, FlexibleLink)
 
 _Z = (0.0, 0.0, 1.0)
 
@@ -54,7 +58,8 @@ class Mechanism:
     @property
     def length(self) -> float:
         """Diagonal of the box around all joints, forces and outputs; 1 if it has no size."""
-        places = [in_dimension(part.at, 3) for part in (*self.joints, *self.forces, *self.outputs)]
+        places = [in_dimension(joint.at, 3) for joint in self.joints]
+        places += [in_dimension(part.at, 3) for part in (*self.forces, *self.outputs)]
         return math.hypot(*(max(axis) - min(axis) for axis in zip(*places, strict=True))) or 1.0
 
     @property
@@ -75,7 +80,7 @@ class Mechanism:
         """Adds a flexible link of ``shape`` and ``material``.
 
         Raises:
-            DescriptionError: they are none, or the name is taken.
+            DescriptionError: ``shape`` is not a shape, ``material`` is not a material, or the name is taken.
         """
         if not isinstance(shape, Shape):
             raise DescriptionError(
@@ -99,7 +104,7 @@ class Mechanism:
         *,
         at: Sequence[float],
         axis: Sequence[float] = _Z,
-        radius: float | None = None,
+        interface_radius: float | None = None,
         region: Region | None = None,
         name: str | None = None,
     ) -> Joint:
@@ -110,8 +115,8 @@ class Mechanism:
             a, b: links of this mechanism.
             at: where it is drawn, 2 or 3 coordinates (z = 0 if left out).
             axis: its axis, 2 or 3 coordinates.
-            radius: interface radius on flexible links: everything this close to the axis moves rigidly.
-            region: interface region instead of a disc of ``radius`` (a ``Rectangle`` for clamps).
+            interface_radius: on flexible links everything this close to the axis moves rigidly.
+            region: interface region instead of a disc of ``interface_radius`` (a ``Rectangle`` for clamps).
             name: for messages; unique.
 
         Raises:
@@ -131,20 +136,22 @@ class Mechanism:
         self._check_name(part, name, self.joints)
         if a == b:
             raise DescriptionError(part, f"link {a.name!r} is joined with itself", "Name two different links")
-        region = _interface(part, radius, region)
+        region = _interface(part, interface_radius, region)
         regions = tuple(region if isinstance(link, FlexibleLink) else None for link in (a, b))
-        for link, own in zip((a, b), regions, strict=True):
-            if isinstance(link, FlexibleLink) and own is None:
+        for link in (a, b):
+            if isinstance(link, FlexibleLink) and region is None:
                 raise DescriptionError(
-                    part, f"no interface on flexible link {link.name!r}", "Give radius=… (pin) or region=… (clamp)"
+                    part,
+                    f"no interface on flexible link {link.name!r}",
+                    "Give interface_radius=… (pin) or region=… (clamp)",
                 )
         axis = unit(f"axis of {part}", axis)
-        joint = Joint(kind, a, b, at, (*axis, 0.0)[:3], regions, name)
+        joint = Joint(kind, a, b, at, (*axis, 0.0)[:3], (regions[0], regions[1]), name)
         self.joints.append(joint)
         return joint
 
     def revolute(self, a: Link, b: Link, *, at: Sequence[float], **options) -> Joint:
-        """Adds a hinge: the links share the point ``at`` and turn about ``axis`` (z); options as in ``join``."""
+        """Adds a hinge at ``at`` that turns about ``axis`` (by default z); options as in ``join``."""
         return self.join(REVOLUTE, a, b, at=at, **options)
 
     def prismatic(self, a: Link, b: Link, *, at: Sequence[float], axis: Sequence[float], **options) -> Joint:
@@ -168,7 +175,7 @@ class Mechanism:
         return self.join(PLANAR_JOINT, a, b, at=at, axis=axis, **options)
 
     def weld(self, a: Link, b: Link, *, at: Sequence[float], **options) -> Joint:
-        """Joins two links firmly (a clamp, if one of them is flexible); options as in ``join``."""
+        """Adds a weld, or a clamp if one of the links is flexible; options as in ``join``."""
         return self.join(WELD, a, b, at=at, **options)
 
     def clamp(self, a: Link, strip: FlexibleLink, *, end: str, length: float, name: str | None = None) -> Joint:
@@ -182,12 +189,12 @@ class Mechanism:
             name: for messages; unique.
 
         Raises:
-            DescriptionError: as ``join``; the link is no strip, or the clamp does not fit it.
+            DescriptionError: as ``join``; the link is not a strip, or the clamp does not fit it.
         """
         part = f"{name or f'clamp {a.name}–{strip.name}'!r}"
         if not isinstance(strip, FlexibleLink) or not isinstance(strip.shape, Strip):
             raise DescriptionError(
-                part, f"link {strip.name!r} is no strip", "Use weld(…, at=…, region=Rectangle(…)) for other shapes"
+                part, f"link {strip.name!r} is not a strip", "Use weld(…, at=…, region=Rectangle(…)) for other shapes"
             )
         at, region = end_clamp(strip.shape, end, length, part=part)
         return self.weld(a, strip, at=at, region=region, name=name)
@@ -217,37 +224,40 @@ class Mechanism:
 
     def force(self, *, on: Link, at: Sequence[float], direction: Sequence[float], name: str | None = None) -> Force:
         """Adds a dead force along ``direction`` at the material point ``at`` of link ``on``."""
-        return self._add_at_point(Force, self.forces, on, at, direction, name)
+        return self._add(Force(*self._at_point("force", self.forces, on, at, direction, name)), self.forces)
 
     def output(self, *, on: Link, at: Sequence[float], direction: Sequence[float], name: str | None = None) -> Output:
         """Adds an output: the displacement along ``direction`` of the material point ``at`` of link ``on``."""
-        return self._add_at_point(Output, self.outputs, on, at, direction, name)
+        return self._add(Output(*self._at_point("output", self.outputs, on, at, direction, name)), self.outputs)
 
     def _counts(self) -> list[str]:
-        """How many parts there are of each sort, in words."""
+        """Number of parts of each sort, in words."""
         sorts = [*("rigid link" if isinstance(link, RigidLink) else "flexible link" for link in self.links)]
         sorts += [f"{joint.kind.name} joint" for joint in self.joints]
         sorts += ["motor"] * len(self.motors) + ["force"] * len(self.forces) + ["output"] * len(self.outputs)
         return [f"{count} {sort}{'s' if count > 1 else ''}" for sort, count in Counter(sorts).items()]
 
-    def _add_at_point(
+    def _at_point(
         self,
-        kind: type[Force] | type[Output],
-        taken: list,
+        what: str,
+        taken: Sequence[Force] | Sequence[Output],
         on: Link,
         at: Sequence[float],
         direction: Sequence[float],
         name: str | None,
-    ) -> Force | Output:
-        what = kind.__name__.lower()
+    ) -> tuple[Link, Point, Point, str]:
+        """The checked attributes of a new force or output."""
         self._check_member(f"{name or what!r}", on)
         name = name or f"{what} on {on.name}"
         self._check_name(f"{name!r}", name, taken)
-        part = kind(on, point(f"position of {name!r}", at), unit(f"direction of {name!r}", direction), name)
-        taken.append(part)
+        return on, point(f"position of {name!r}", at), unit(f"direction of {name!r}", direction), name
+
+    @staticmethod
+    def _add(part: Part, parts: list[Part]) -> Part:
+        parts.append(part)
         return part
 
-    def _add_link(self, link: Link) -> Link:
+    def _add_link(self, link: AnyLink) -> AnyLink:
         self._check_name(f"link {link.name!r}", link.name, self.links)
         self.links.append(link)
         return link
@@ -265,7 +275,7 @@ class Mechanism:
 def _interface(part: str, radius: float | None, region: Region | None) -> Region | None:
     """The interface region given as a radius or as a region, checked."""
     if radius is not None and region is not None:
-        raise DescriptionError(part, "both a radius and a region are given", "Give one of the two")
+        raise DescriptionError(part, "both an interface radius and a region are given", "Give one of the two")
     match region if radius is None else Disc(radius):
         case None:
             return None

@@ -1,4 +1,4 @@
-"""Parts of a mechanism as plain data: links, joints, motors, forces and output points, and where they are."""
+"""Parts of a mechanism as plain data: links, joints, motors, forces and output points, and their positions."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from fenicsmech.checks import finite
+from fenicsmech.checks import finite, point_text
 from fenicsmech.errors import DescriptionError
 from fenicsmech.joints import JointKind
 from fenicsmech.mechanism.materials import Material
@@ -49,9 +49,9 @@ class Joint:
     """Connects link ``a`` with link ``b``.
 
     Attributes:
-        kind: which relative motions it leaves free.
+        kind: its constraint equations.
         a, b: the links; motions are counted of b relative to a.
-        at: where it is drawn (2 or 3 coordinates).
+        at: its drawn position (2 or 3 coordinates).
         axis: unit vector of its axis, 3 coordinates (revolute: z by default).
         regions: interface region on a and on b; None on rigid links.
         name: unique in the mechanism.
@@ -66,7 +66,7 @@ class Joint:
     name: str
 
     def __repr__(self) -> str:
-        return f"Joint({self.name!r}: {self.kind.name}, {self.a.name!r} to {self.b.name!r} at {_figures(self.at)})"
+        return f"Joint({self.name!r}: {self.kind.name}, {self.a.name!r} to {self.b.name!r} at {point_text(self.at)})"
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class Drive:
         if not checked or not all(isinstance(motor, Motor) and ratio for motor, ratio in checked):
             raise DescriptionError(part, f"its ratios are {given!r}", "Give motors with ratios other than zero")
         if len({motor.joint.kind.sliding for motor, _ in checked}) > 1:
-            raise DescriptionError(part, "some of its motors turn and others slide", "Let it move one sort")
+            raise DescriptionError(part, "some of its motors turn and others slide", "Give motors of one sort")
         object.__setattr__(self, "ratios", checked)
 
     def __repr__(self) -> str:
@@ -124,7 +124,7 @@ class _AtPoint:
     name: str
 
     def __repr__(self) -> str:
-        sort, at, direction = type(self).__name__, _figures(self.at), _figures(self.direction)
+        sort, at, direction = type(self).__name__, point_text(self.at), point_text(self.direction)
         return f"{sort}({self.name!r} on {self.on.name!r} at {at} along {direction})"
 
 
@@ -136,8 +136,8 @@ class Output(_AtPoint):
     """The displacement of the material point ``at`` of link ``on`` along ``direction`` (unit vector)."""
 
 
-Leader = Force | Motor | Drive
-"""What may lead a curve that is followed."""
+PrescribedPart = Force | Motor | Drive
+"""A part whose value is prescribed along an equilibrium path."""
 
 
 def in_dimension(position: Sequence[float], dim: int) -> tuple[float, ...]:
@@ -148,7 +148,3 @@ def in_dimension(position: Sequence[float], dim: int) -> tuple[float, ...]:
 def same_place(a: Sequence[float], b: Sequence[float], *, dim: int, length: float) -> bool:
     """Whether two positions in a mechanism of size ``length`` differ by rounding only."""
     return math.dist(in_dimension(a, dim), in_dimension(b, dim)) <= 1e-9 * length
-
-
-def _figures(vector: Sequence[float]) -> str:
-    return f"({', '.join(f'{x:g}' for x in vector)})"

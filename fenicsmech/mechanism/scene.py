@@ -20,11 +20,12 @@ from fenicsmech.mechanism.mechanism import Mechanism
 from fenicsmech.mechanism.parts import Joint, Link, Motor
 
 
+@dataclass(frozen=True)
 class Effect(ABC):
-    """Something that acts on a mechanism; a frozen dataclass derived from this one, in a file of its own.
+    """An influence on a mechanism; a frozen dataclass derived from this one, in a file of its own.
 
-    It overrides those hooks that it needs; each is nothing by default, and what is nothing costs nothing: no form, no
-    unknown, no entry of a matrix. The arguments of hooks are objects of the layers above.
+    It overrides the hooks that it needs. Each is nothing by default and then adds no form, no unknown and no entry of a
+    matrix. The arguments of hooks are objects of the layers above.
 
     Attributes:
         faces: ``Faces``, the parts of links' boundaries that ``link_energy`` integrates over.
@@ -34,13 +35,13 @@ class Effect(ABC):
 
     @abstractmethod
     def explain(self) -> str:
-        """What is simulated, in one plain sentence without a full stop."""
+        """The effect in one plain sentence without a full stop."""
 
     def check(self, mechanism: Mechanism, dim: int) -> None:
-        """Refuses what makes no sense for ``mechanism`` in ``dim`` dimensions; by default, parts of another mechanism.
+        """Checks that the effect applies to ``mechanism`` in ``dim`` dimensions; by default, that its parts exist.
 
         Raises:
-            DescriptionError: saying which part, and the remedy.
+            DescriptionError: it does not.
         """
         for field in fields(self):
             part = getattr(self, field.name)
@@ -48,7 +49,7 @@ class Effect(ABC):
                 kind = "joint" if isinstance(part, Joint) else "link"
                 raise DescriptionError(
                     f"effect {type(self).__name__}",
-                    f"{part.name!r} is no {kind} of {mechanism.name!r}",
+                    f"{part.name!r} is not a {kind} of {mechanism.name!r}",
                     f"Name a {kind} of the mechanism",
                 )
 
@@ -68,7 +69,7 @@ class Effect(ABC):
         """The ``Stretch`` by flexible link by which it is longer or shorter without strain than drawn.
 
         Raises:
-            DescriptionError: it makes no sense in the ``ElasticModel``.
+            DescriptionError: the ``ElasticModel`` does not support it.
         """
         return {}
 
@@ -84,7 +85,7 @@ class Units:
 
 @dataclass(frozen=True)
 class Configuration:
-    """Motor positions that stay as they are while loads are applied.
+    """Motor positions that stay fixed while loads are applied.
 
     Attributes:
         name: for messages, plots and tables.
@@ -119,9 +120,7 @@ DRAWN = Configuration("as drawn")
 
 @dataclass(frozen=True)
 class Scene:
-    """A mechanism and what is simulated of its surroundings: nothing that is not listed in ``effects``.
-
-    ``units`` name the units of the description in plots and tables.
+    """A mechanism and the ``effects`` that act on it; ``units`` name the units of plots and tables.
 
     Raises:
         DescriptionError: ``mechanism`` is not a mechanism, or something listed under ``effects`` is not an effect.
@@ -137,9 +136,7 @@ class Scene:
             raise DescriptionError("scene", f"{self.mechanism!r} is not a mechanism", "Pass a Mechanism")
         for effect in self.effects:
             if not isinstance(effect, Effect):
-                raise DescriptionError(
-                    "scene", f"{effect!r} is not an effect", "List effects, as Gravity(…); links, joints and forces act"
-                )
+                raise DescriptionError("scene", f"{effect!r} is not an effect", "List effects only, as Gravity(…)")
 
     def __repr__(self) -> str:
         effects = "; ".join(effect.explain() for effect in self.effects)

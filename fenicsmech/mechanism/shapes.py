@@ -8,11 +8,12 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.integrate import fixed_quad
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from fenicsmech.checks import finite, point, points, positive
+from fenicsmech.checks import finite, point, point_text, points, positive
 from fenicsmech.errors import DescriptionError
 
 Point = tuple[float, ...]
@@ -82,7 +83,7 @@ class Outline:
 class StepPart:
     """A solid from a STEP file; in 2D its section with the plane z = ``section``, of depth ``depth``.
 
-    With mid-plane symmetry, the half above its middle, at whatever height it was drawn.
+    With mid-plane symmetry the half above its centroid is meshed, at whatever height it was drawn.
     """
 
     path: Path
@@ -119,16 +120,13 @@ def polygon(corners: Sequence[Sequence[float]], *, depth: float) -> Outline:
 
 def outline(start: Sequence[float], segments: Sequence[Line | Arc], *, depth: float) -> Outline:
     """The closed outline that runs from ``start`` along ``segments`` and back, extruded by ``depth``."""
-    checked = []
+    checked: list[Line | Arc] = []
     for segment in segments:
-        match segment:
-            case Line(end=end):
-                checked.append(Line(point("outline segment end", end, dimensions=(2,))))
-            case Arc(via=via, end=end):
-                via = point("outline arc", via, dimensions=(2,))
-                checked.append(Arc(via, point("outline segment end", end, dimensions=(2,))))
-            case _:
-                raise DescriptionError("outline", f"{segment!r} is no segment", "Give Line(…) or Arc(…)")
+        if not isinstance(segment, Line | Arc):
+            raise DescriptionError("outline", f"{segment!r} is not a segment", "Give Line(…) or Arc(…)")
+        end = point("outline segment end", segment.end, dimensions=(2,))
+        via = point("outline arc", segment.via, dimensions=(2,)) if isinstance(segment, Arc) else None
+        checked.append(Line(end) if via is None else Arc(via, end))
     return Outline(point("outline start", start, dimensions=(2,)), tuple(checked), positive("outline depth", depth))
 
 
@@ -150,7 +148,7 @@ class Centreline:
 
     Args:
         points: (n, dim) with n ≥ 2; neighbours must differ.
-        part: what the curve belongs to, for messages.
+        part: the owner of the curve, for messages.
 
     Attributes:
         knots: parameters s_k of the points, shape (n,).
@@ -160,14 +158,15 @@ class Centreline:
     """
 
     def __init__(self, points: Sequence[Sequence[float]], *, part: str = "centreline") -> None:
-        points = np.asarray(points, dtype=float)
-        chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
+        through = np.asarray(points, dtype=float)
+        chords = np.linalg.norm(np.diff(through, axis=0), axis=1)
         if not np.all(chords > 0.0):
             k = int(np.argmin(chords))
-            where = ", ".join(f"{c:g}" for c in points[k])
-            raise DescriptionError(part, f"points {k} and {k + 1} coincide at ({where})", "Remove one of them")
+            raise DescriptionError(
+                part, f"points {k} and {k + 1} coincide at {point_text(through[k])}", "Remove one of them"
+            )
         self.knots = np.concatenate([[0.0], np.cumsum(chords)])
-        self._curve = CubicSpline(self.knots, points, bc_type="not-a-knot")
+        self._curve = CubicSpline(self.knots, through, bc_type="not-a-knot")
 
     @property
     def end(self) -> float:
@@ -213,12 +212,12 @@ class Centreline:
         spans = [np.linspace(a, b, per_span, endpoint=False) for a, b in zip(self.knots, self.knots[1:], strict=False)]
         return np.concatenate([*spans, self.knots[-1:]])
 
-    def closest(self, point: Sequence[float]) -> float:
+    def closest(self, point: ArrayLike) -> float:
         """Parameter of the point of the curve nearest to ``point``: (c(s) − p)·c′(s) = 0, or an end."""
         s = self.samples(64)
         nearest = int(np.argmin(np.linalg.norm(self.evaluate(s) - point, axis=1)))
         low, high = s[max(nearest - 1, 0)], s[min(nearest + 1, len(s) - 1)]
-        # bisection on the sign of the slope of the distance: plain, and exact to the last digits
+        # bisection on the sign of the slope of the distance, exact to the last digits
         for _ in range(60):
             middle = 0.5 * (low + high)
             slope = np.dot(self.evaluate(middle) - point, self._curve(middle, 1))
@@ -230,9 +229,9 @@ class Centreline:
 
 
 def end_clamp(shape: Strip, end: str, length: float, *, part: str = "clamp") -> tuple[Point, Rectangle]:
-    """Where a clamp at an end of a strip is, and the region that it holds: all of the strip up to its inner face.
+    """The place of a clamp at an end of a strip, and the region that it holds: the strip up to its inner face.
 
-    The inner face stands across the centreline where that is ``length`` away from the end. The rectangle is centred on
+    The inner face is normal to the centreline at the arc length ``length`` from the end. The rectangle is centred on
     the end, aligned with the strip at the inner face, and wider than the strip.
 
     Args:
@@ -242,8 +241,8 @@ def end_clamp(shape: Strip, end: str, length: float, *, part: str = "clamp") -> 
         part: the clamp's name, for messages.
 
     Raises:
-        DescriptionError: an argument makes no sense, or the strip bends so much that the rectangle would not hold the
-            piece, or more than it.
+        DescriptionError: an argument is out of its range, or the strip bends so much that no rectangle holds the
+            piece and nothing else.
     """
     curve = Centreline(shape.centreline, part=f"centreline of {part}")
     if end not in ("start", "end"):
@@ -262,7 +261,7 @@ def end_clamp(shape: Strip, end: str, length: float, *, part: str = "clamp") -> 
     normal = np.array([-direction[1], direction[0]])
 
     def sides(start: float, stop: float) -> tuple[np.ndarray, np.ndarray]:
-        """How far points of both sides of a piece are from the centre, along the strip at the face and across it."""
+        """Distances of both sides of a piece from the centre, along the strip at the face and across it."""
         s = np.linspace(start, stop, 257)
         offsets = 0.5 * shape.thickness * curve.normal(s)
         points = np.concatenate([curve.evaluate(s) + offsets, curve.evaluate(s) - offsets]) - centre

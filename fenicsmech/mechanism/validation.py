@@ -45,7 +45,7 @@ def _check_ground(mechanism: Mechanism) -> None:
     if adrift:
         raise DescriptionError(
             f"link {adrift[0]!r}",
-            f"no load path to ground: {', '.join(map(repr, adrift))} hang together but on no fixed link",
+            f"no load path to ground: no joint connects {', '.join(map(repr, adrift))} with a fixed link",
             "Join one of them to a fixed link",
         )
 
@@ -55,8 +55,8 @@ def _check_forces(mechanism: Mechanism) -> None:
         if isinstance(force.on, RigidLink) and force.on.fixed:
             raise DescriptionError(
                 f"force {force.name!r}",
-                f"it acts on the fixed link {force.on.name!r} and can do no work",
-                "Let it act on a link that moves",
+                f"it acts on the fixed link {force.on.name!r}",
+                "Give a link that moves",
             )
 
 
@@ -64,7 +64,7 @@ def _check_interfaces(mechanism: Mechanism, dim: int) -> None:
     found: list[tuple[FlexibleLink, Joint, Region]] = []
     for joint in mechanism.joints:
         for link, region in zip((joint.a, joint.b), joint.regions, strict=True):
-            if not isinstance(link, FlexibleLink):
+            if not isinstance(link, FlexibleLink) or region is None:
                 continue
             for owner, first, known in found:
                 same = owner == link and same_place(first.at, joint.at, dim=dim, length=mechanism.length)
@@ -72,7 +72,7 @@ def _check_interfaces(mechanism: Mechanism, dim: int) -> None:
                     raise DescriptionError(
                         f"{joint.name!r}",
                         f"its interface on {link.name!r} is {region}, but {first.name!r} has {known} at the same place",
-                        "Give joints at one place of a link the same radius or region",
+                        "Give joints at one place of a link the same interface radius or region",
                     )
             found.append((link, joint, region))
 

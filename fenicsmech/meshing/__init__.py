@@ -1,9 +1,9 @@
 """Meshes of single links: conforming to the regions where joints hold the link, made by gmsh, kept as plain arrays.
 
-Ask for a mesh
+Meshes
     ``mesh_link``       shape + interface sites → ``LinkMesh``
-    ``check_link``      what can be refused before anything is meshed
-    ``InterfaceSite``   where a joint takes hold of the link
+    ``check_link``      checks of the shape before anything is meshed
+    ``InterfaceSite``   region of a link that a joint holds
     ``LinkMesh``        points, cells, and which interface holds each cell (``FREE``: none)
     ``distribute``      the meshes of all links as one dolfinx mesh
 
@@ -31,20 +31,16 @@ from fenicsmech.meshing.link_mesh import (
     cell_measures,
     count_pieces,
     radius_ratios,
-    shown,
 )
 from fenicsmech.meshing.link_mesher import check_link, mesh_link, typical_thickness
 from fenicsmech.meshing.planar import extrude, extrude_half, layer_count, plan_of
 from fenicsmech.meshing.plane_curves import (
     CircleArc,
     Curve,
-    distance,
     draw_loop,
-    first_crossing,
-    inside,
-    line,
     sampled,
     start_of,
+    straight_line,
 )
 from fenicsmech.meshing.request import LEAST_SEGMENTS, InterfaceSite
 
@@ -63,24 +59,20 @@ __all__ = [
     "check_link",
     "circle_segments",
     "count_pieces",
-    "distance",
     "distribute",
     "draw_loop",
     "extrude",
     "extrude_half",
-    "first_crossing",
     "gmsh",
     "gmsh_session",
-    "inside",
     "layer_count",
-    "line",
     "mesh_link",
     "muted_output",
     "on_mid_plane",
     "plan_of",
     "radius_ratios",
     "sampled",
-    "shown",
     "start_of",
+    "straight_line",
     "typical_thickness",
 ]

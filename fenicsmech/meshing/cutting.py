@@ -1,13 +1,13 @@
-"""A link's CAD body in the current gmsh model, cut along its interface regions and meshed.
+"""A link's CAD body in the current gmsh model: cut along its interface regions and meshed.
 
-The element size is the requested one, finer only where small features need it: around pins, so that enough segments
-stand for the circle, and in narrow gaps.
+The element size is the requested one, finer only where small features need it: around pins, for enough segments of
+the circle, and in narrow gaps.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +22,7 @@ DimTag = tuple[int, int]
 
 @dataclass(frozen=True)
 class Grading:
-    """How the element size changes over a link.
+    """Gradients of the element size over a link.
 
     Attributes:
         growth: of the element size per unit of distance from a small feature.
@@ -39,11 +39,11 @@ GRADING = Grading()
 
 
 def circle_segments(radius: float, size: float) -> int:
-    """Number of segments that stand for a whole circle."""
+    """Number of segments of the polygon of a whole circle."""
     return max(LEAST_SEGMENTS, math.ceil(2.0 * math.pi * radius / size))
 
 
-def gap_refinement(at: Sequence[float], gap: float, radius: float, widening: Sequence[Sequence[float]]) -> str:
+def gap_refinement(at: Sequence[float], gap: float, radius: float, widening: Sequence[Iterable[float]]) -> str:
     """Element size, as a gmsh expression, in the narrow gap around a disc. Lengths are in element sizes.
 
     Where the gap widens along straight sides, it has grown to gap + a²/(2 radius) at the distance a; the element
@@ -116,7 +116,7 @@ def mesh_fragments(
     sites: Sequence[InterfaceSite] = (),
     refinements: Sequence[str] = (),
 ) -> LinkMesh:
-    """Mesh ``bodies``, conforming to ``cutters``, in the current gmsh model.
+    """Meshes ``bodies``, conforming to ``cutters``, in the current gmsh model.
 
     Args:
         bodies: faces or solids of the link.
@@ -129,7 +129,7 @@ def mesh_fragments(
         The mesh in the model's coordinates; ``interface`` counts the cutters.
 
     Raises:
-        MeshingError: two cutters share a part of the link.
+        MeshingError: two cutters overlap in the link.
     """
     occ = gmsh.model.occ
     pieces, origins = occ.fragment(bodies, cutters) if cutters else (bodies, [[body] for body in bodies])
@@ -147,7 +147,7 @@ def mesh_fragments(
 
 
 def _set_element_size(size: float, refinements: Sequence[str]) -> None:
-    """Make the smallest of ``size`` and ``refinements`` the element size of the current gmsh model."""
+    """Makes the smallest of ``size`` and ``refinements`` the element size of the current gmsh model."""
     field = gmsh.model.mesh.field
     tag = field.add("MathEval")
     field.setString(tag, "F", f"min({', '.join([repr(float(size)), *refinements])})" if refinements else repr(size))
@@ -156,7 +156,7 @@ def _set_element_size(size: float, refinements: Sequence[str]) -> None:
 
 
 def _pin_refinements(sites: Sequence[InterfaceSite], size: float, segments: int) -> list[str]:
-    """Element sizes, as gmsh expressions, that give pins at least so many ``segments``."""
+    """Element sizes, as gmsh expressions, that give pins at least ``segments`` segments."""
     expressions = []
     for site in sites:
         if isinstance(site.region, Disc) and (longest := 2.0 * math.pi * site.region.radius / segments) < size:
@@ -180,12 +180,12 @@ def _collect(dim: int, link: Sequence[DimTag], holders: Sequence[int]) -> LinkMe
     # corners between which gmsh's cells of second order have their further nodes, in order
     edges = {2: [(0, 1), (1, 2), (2, 0)], 3: [(0, 1), (1, 2), (2, 0), (3, 0), (2, 3), (1, 3)]}[dim]
     points, row_of = mesh_nodes()
-    rows, interface = [], []
+    nodes_of, interface = [], []
     for piece, holder in zip(link, holders, strict=True):
         _, _, (nodes,) = gmsh.model.mesh.getElements(*piece)
-        rows.append(row_of[nodes.astype(np.int64)].reshape(-1, dim + 1 + len(edges)))
-        interface.append(np.full(len(rows[-1]), holder))
-    points, rows = points[:, :dim], np.concatenate(rows)
+        nodes_of.append(row_of[nodes.astype(np.int64)].reshape(-1, dim + 1 + len(edges)))
+        interface.append(np.full(len(nodes_of[-1]), holder))
+    points, rows = points[:, :dim], np.concatenate(nodes_of)
     cells, ends, middles = rows[:, : dim + 1], rows[:, edges], rows[:, dim + 1 :]
     curved = CurvedEdges.through(points, ends.reshape(-1, 2), points[middles.ravel()])
     return LinkMesh.from_cells(points, cells, np.concatenate(interface), curved)

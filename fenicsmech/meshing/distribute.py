@@ -11,6 +11,7 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
+from fenicsmech.collective import from_one
 from fenicsmech.compat import cell_dofs, cell_nodes, create_mesh, original_cells, original_nodes, vector_space
 from fenicsmech.meshing.link_mesh import CurvedEdges, LinkMesh
 
@@ -26,7 +27,7 @@ class MechanismMesh:
         vertices, cells: the whole mesh as one array each, on every rank: (n, dim), (m, dim + 1).
         link_of_cell: index of the flexible link of each of ``cells``, (m,).
         curved: edges of the whole mesh that follow curves, on every rank.
-        comm: the processes that share it; the mesh itself keeps a duplicate.
+        comm: the communicator; the mesh itself keeps a duplicate.
     """
 
     mesh: dmesh.Mesh
@@ -44,12 +45,8 @@ class MechanismMesh:
 
 
 def distribute(comm: MPI.Comm, link_meshes: Sequence[LinkMesh] | None, *, root: int = 0) -> MechanismMesh:
-    """Join ``link_meshes`` (given on ``root`` only) and distribute them over ``comm``.
-
-    Interfaces are numbered through, link after link.
-    """
-    whole = _join(link_meshes) if comm.rank == root else None
-    vertices, cells, link, interface, curved = comm.bcast(whole, root=root)
+    """Distributes ``link_meshes`` (given on ``root`` only) over ``comm``; interfaces are numbered link after link."""
+    vertices, cells, link, interface, curved = from_one(comm, lambda: _join(link_meshes or ()), root=root)
     dim = vertices.shape[1]
     if comm.rank == root:
         mesh = create_mesh(comm, cells, vertices)

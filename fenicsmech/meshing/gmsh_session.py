@@ -1,4 +1,4 @@
-"""gmsh, started and stopped around one mesh, with every option that decides the result set explicitly.
+"""The gmsh session of one mesh, with every option that affects the mesh set explicitly.
 
 No other module starts gmsh.
 """
@@ -8,14 +8,16 @@ from __future__ import annotations
 import ctypes
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from types import FrameType
+from typing import Any
 
 from fenicsmech.errors import MeshingError
 
 
-def _restore_interrupts(handler: object) -> None:
-    """Give Ctrl-C back to ``handler``; None stands for one that Python does not know."""
+def _restore_interrupts(handler: Callable[[int, FrameType | None], Any] | int | None) -> None:
+    """Makes ``handler`` that of Ctrl-C again; None stands for one that was not installed by Python."""
     if handler is not None:
         signal.signal(signal.SIGINT, handler)
 
@@ -51,9 +53,9 @@ _OPTIONS = {
 
 @contextmanager
 def gmsh_session(part: str) -> Iterator[None]:
-    """Run the block inside a fresh gmsh model; gmsh is finalised however the block ends.
+    """Runs the block inside a fresh gmsh model; gmsh is finalised however the block ends.
 
-    gmsh keeps one global state, so sessions do not nest, and one started elsewhere must have been finalised.
+    gmsh has one global state: sessions do not nest, and one started elsewhere must have been finalised.
 
     Args:
         part: what is being meshed, for messages.
@@ -86,11 +88,11 @@ def gmsh_session(part: str) -> Iterator[None]:
 
 @contextmanager
 def muted_output() -> Iterator[None]:
-    """Drop what libraries write to the standard output of this process inside the block.
+    """Discards what libraries write to the standard output of this process inside the block.
 
-    Python's own output is not lost: what it has not passed on yet stays in its buffer.
+    Python's own output stays in its buffer.
     """
-    # what C libraries have buffered belongs to the time before and after
+    # what C libraries have buffered was written before the block
     flush = ctypes.CDLL(None).fflush
     flush(None)
     kept = os.dup(1)

@@ -12,7 +12,6 @@ elements. Source: Ciarlet & Raviart, Interpolation theory over curved elements (
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -20,7 +19,9 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from fenicsmech.checks import point_text
 from fenicsmech.errors import MeshingError
+from fenicsmech.polygons import edge_loops, signed_area
 
 FREE = -1
 
@@ -35,17 +36,15 @@ class LinkMesh:
         points: vertex coordinates, shape (n, dim), in the user's unit of length. Every vertex belongs to a cell.
         cells: vertex numbers, shape (m, dim + 1): triangles or tetrahedra of positive volume.
         interface: shape (m,): the index of the interface site that holds the cell, ``FREE`` (-1) if none does.
-        curved: edges that follow a curve; None: no edge does.
+        curved: edges that follow a curve.
     """
 
     points: np.ndarray
     cells: np.ndarray
     interface: np.ndarray
-    curved: CurvedEdges | None = None
+    curved: CurvedEdges
 
     def __post_init__(self) -> None:
-        if self.curved is None:
-            object.__setattr__(self, "curved", CurvedEdges(np.zeros((0, 2), np.int64), np.zeros((0, self.dim))))
         for array in (self.points, self.cells, self.interface, self.curved.ends, self.curved.bulges):
             array.setflags(write=False)
 
@@ -65,15 +64,14 @@ class LinkMesh:
                 curved: edges between rows of ``points`` that bulge.
         """
         used, renumbered = np.unique(cells, return_inverse=True)
-        if curved is not None:
-            numbers = np.full(len(points), -1)
-            numbers[used] = np.arange(len(used))
-            curved = curved.renumbered(numbers)
+        numbers = np.full(len(points), -1)
+        numbers[used] = np.arange(len(used))
+        edges = (curved or CurvedEdges.none(points.shape[1])).renumbered(numbers)
         points = np.array(points[used], dtype=np.float64)
         cells = renumbered.reshape(cells.shape).astype(np.int64)
         turned = cell_measures(points, cells) < 0.0
         cells[turned, -2:] = cells[turned, :-3:-1]
-        return cls(points, cells, np.array(interface, dtype=np.int32), curved and curved.limited(points, cells))
+        return cls(points, cells, np.array(interface, dtype=np.int32), edges.limited(points, cells))
 
     def cells_of(self, site: int) -> np.ndarray:
         """The cells (k, dim + 1) that the interface ``site`` holds; ``FREE`` gives the flexible ones."""
@@ -91,6 +89,11 @@ class CurvedEdges:
 
     ends: np.ndarray
     bulges: np.ndarray
+
+    @classmethod
+    def none(cls, dim: int) -> CurvedEdges:
+        """No edge of a mesh in ``dim`` dimensions."""
+        return cls(np.zeros((0, 2), np.int64), np.zeros((0, dim)))
 
     @classmethod
     def through(cls, points: np.ndarray, ends: np.ndarray, middles: np.ndarray) -> CurvedEdges:
@@ -131,7 +134,7 @@ class CurvedEdges:
     def limited(self, points: np.ndarray, cells: np.ndarray) -> CurvedEdges:
         """These edges, less curved (halved up to six times, straight at last) where they squeeze a cell too much."""
         edges = self
-        for factor in (*[0.5] * 6, 0.0):
+        for factor in (*[0.5] * 6, 0.0) if len(self.ends) else ():
             squeezed = edges._squeezed(points, cells)
             if not squeezed.any():
                 break
@@ -240,54 +243,27 @@ def boundary_loops(part: str, mesh: LinkMesh) -> tuple[np.ndarray, ...]:
     _, first, repeats = np.unique(forth, return_index=True, return_counts=True)
     if np.any(repeats > 1):
         raise _turned_over(part, mesh, int(first[np.argmax(repeats)]) // 3, np.count_nonzero(repeats > 1))
-    starts, ends = edges[~np.isin(forth, back)].T
-    vertices, visits = np.unique(starts, return_counts=True)
+    vertices, visits = np.unique(edges[~np.isin(forth, back), 0], return_counts=True)
     if np.any(visits > 1):
         raise MeshingError(
             part,
-            f"the link touches itself in the single point {shown(mesh.points[vertices[np.argmax(visits)]])}",
+            f"the link touches itself in the single point {point_text(mesh.points[vertices[np.argmax(visits)]])}",
             "Give its shape some width there",
         )
-    following = np.full(count, -1)
-    following[starts] = ends
-    areas = {tuple(loop): _area(mesh.points[loop]) for loop in _cycles(following)}
-    outlines = sum(area > 0.0 for area in areas.values())
+    loops = edge_loops(mesh.cells)
+    areas = [signed_area(mesh.points[loop]) for loop in loops]
+    outlines = sum(area > 0.0 for area in areas)
     if outlines > 1:
         raise MeshingError(
             part, f"the link falls into {outlines} separate pieces", "Describe each piece as a link of its own"
         )
-    return tuple(np.array(loop) for loop in sorted(areas, key=lambda loop: -areas[loop]))
-
-
-def _cycles(following: np.ndarray) -> list[list[int]]:
-    """The cycles of the map from each vertex to the next; -1 marks vertices in none."""
-    loops, seen = [], following < 0
-    for start in np.flatnonzero(~seen).tolist():
-        loop, vertex = [], start
-        while not seen[vertex]:
-            seen[vertex] = True
-            loop.append(vertex)
-            vertex = int(following[vertex])
-        if loop:
-            loops.append(loop)
-    return loops
-
-
-def _area(polygon: np.ndarray) -> float:
-    """Signed area of a closed ``polygon`` ((n, 2)), positive if it runs counter-clockwise."""
-    x, y = polygon.T
-    return 0.5 * float(x @ np.roll(y, -1) - np.roll(x, -1) @ y)
+    return tuple(loops[k] for k in sorted(range(len(loops)), key=lambda k: -areas[k]))
 
 
 def _turned_over(part: str, mesh: LinkMesh, cell: int, count: int) -> MeshingError:
     return MeshingError(
         part,
         f"{count} of its {len(mesh.cells)} triangles are turned over or lie on others, one of them near "
-        f"{shown(mesh.points[mesh.cells[cell]].mean(axis=0))}",
+        f"{point_text(mesh.points[mesh.cells[cell]].mean(axis=0))}",
         "Choose a design that deforms the mesh less",
     )
-
-
-def shown(point: Sequence[float]) -> str:
-    """A point as messages name it: ``(1, 2.5)``."""
-    return f"({', '.join(f'{c:g}' for c in point)})"

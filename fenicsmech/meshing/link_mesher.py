@@ -1,4 +1,4 @@
-"""From the shape of a link to its mesh, and what every link mesh must satisfy."""
+"""The mesh of a link from its shape, and the checks that every link mesh passes."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ from itertools import combinations
 
 import numpy as np
 
-from fenicsmech.checks import positive
+from fenicsmech.checks import point_text, positive
 from fenicsmech.errors import DescriptionError, MeshingError
 from fenicsmech.log import logger
 from fenicsmech.mechanism import Arc, Outline, Shape, Strip
-from fenicsmech.meshing.link_mesh import FREE, LinkMesh, cell_measures, count_pieces, shown
+from fenicsmech.meshing.link_mesh import FREE, LinkMesh, cell_measures, count_pieces
 from fenicsmech.meshing.request import LEAST_SEGMENTS, InterfaceSite, MeshRequest, check_shape, holds, mesh_shape
 from fenicsmech.meshing.strip import clamp_defect
+from fenicsmech.polygons import signed_area
 
 _log = logger(__name__)
 
@@ -31,24 +32,24 @@ def mesh_link(
     segments: int = LEAST_SEGMENTS,
     half: bool = False,
 ) -> LinkMesh:
-    """Mesh one link so that the cells of each interface fill the region where its joint holds the link.
+    """Meshes one link so that the cells of each interface fill the region where its joint holds the link.
 
     The same input gives the same arrays. Lengths have no preferred unit, except that STEP files are read in mm.
 
     Args:
         name: the link's name, for messages.
-        shape: what the link looks like.
+        shape: the link's shape.
         sites: where joints hold it; ``LinkMesh.interface`` counts them.
         dim: 2 (triangles) or 3 (tetrahedra).
         size: target edge length, in the plane for links that are extruded.
         layers: layers through the depth of an extruded link; None: one per two element sizes.
-        segments: of which the circle around a pin has at least so many.
-        half: mesh the half above the mid-plane z = 0 only, which ``layers`` count through then.
+        segments: least number of segments of the circle around a pin.
+        half: mesh the half above the mid-plane z = 0 only; ``layers`` are those of the half.
 
     Raises:
         MeshingError: the link cannot be meshed as described, a joint is not on the link or holds no cell, or the
             regions of two joints touch.
-        DescriptionError: an argument makes no sense, or half is asked of a shape without mirror symmetry.
+        DescriptionError: an argument is out of its range, or ``half`` is set for a shape without mirror symmetry.
     """
     request = _request(name, sites, dim, size, layers, segments, half)
     check_shape(shape, request)
@@ -74,7 +75,7 @@ def check_link(
     segments: int = LEAST_SEGMENTS,
     half: bool = False,
 ) -> None:
-    """Refuse what can be seen to be wrong with a link before it is meshed; arguments as in ``mesh_link``.
+    """Checks a link before it is meshed; arguments as in ``mesh_link``.
 
     A warning is logged for rectangles that do not hold a strip as a clamp across it would.
 
@@ -92,7 +93,9 @@ def check_link(
             _log.warning("%s: %s. %s", request.part_at(site), *defect)
     for part, at in points.items():
         if not holds(shape, request, tuple(at)):
-            raise MeshingError(f"{part!r}", f"the point {shown(at)} is not on link {name!r}", "Move it onto the link")
+            raise MeshingError(
+                f"{part!r}", f"the point {point_text(at)} is not on link {name!r}", "Move it onto the link"
+            )
 
 
 def typical_thickness(shape: Shape, part: str) -> float:
@@ -113,10 +116,10 @@ def typical_thickness(shape: Shape, part: str) -> float:
             corners = [shape.start]
             for segment in shape.segments:
                 corners += [segment.via, segment.end] if isinstance(segment, Arc) else [segment.end]
-            x, y = np.array(corners).T
-            area = 0.5 * abs(x @ np.roll(y, -1) - np.roll(x, -1) @ y)
-            return float(2.0 * area / np.hypot(np.roll(x, -1) - x, np.roll(y, -1) - y).sum())
-    raise DescriptionError(part, "its thickness is not known, as it comes from a file", "Give size=… for it")
+            polygon = np.array(corners)
+            perimeter = np.hypot(*(np.roll(polygon, -1, axis=0) - polygon).T).sum()
+            return float(2.0 * abs(signed_area(polygon)) / perimeter)
+    raise DescriptionError(part, "its shape comes from a file, so its thickness is not known", "Give size=… for it")
 
 
 def _request(
@@ -139,7 +142,7 @@ def _request(
             part, f"the number of segments around pins is {segments!r}", f"Give a whole number from {LEAST_SEGMENTS} up"
         )
     if dim == 2 or half:
-        # in the plane there is only one way to sweep a region, whatever the joint's own axis (of a slider, say)
+        # in the plane every region is swept along z, whatever the joint's own axis (of a slider, say)
         sites = [replace(site, axis=(0.0, 0.0, 1.0)) for site in sites]
     return MeshRequest(name, tuple(sites), dim, size, layers, segments, half)
 
@@ -148,7 +151,7 @@ def _check_volumes(mesh: LinkMesh, request: MeshRequest) -> None:
     longest = np.ptp(mesh.points[mesh.cells], axis=1).max(axis=1)
     flat = np.flatnonzero(cell_measures(mesh.points, mesh.cells) <= 1e-12 * longest**mesh.dim)
     if len(flat):
-        where = shown(mesh.points[mesh.cells[flat[0]]].mean(axis=0))
+        where = point_text(mesh.points[mesh.cells[flat[0]]].mean(axis=0))
         raise MeshingError(
             request.part,
             f"{len(flat)} of {len(mesh.cells)} cells have no volume, one of them at {where}",
@@ -166,19 +169,19 @@ def _check_connected(mesh: LinkMesh, request: MeshRequest) -> None:
 
 def _check_held(mesh: LinkMesh, request: MeshRequest, number: int, site: InterfaceSite) -> None:
     held = mesh.cells_of(number)
-    tolerance = 1e-2 * request.size  # how far a joint may lie off its link: rounded coordinates, flattened arcs
+    tolerance = 1e-2 * request.size  # of joints off their link, by rounded coordinates or flattened arcs
     offsets = site.across(mesh.points)
     away = _distance(offsets, mesh.cells)
     if away > tolerance and not _surrounds(offsets, held):
         raise MeshingError(
             request.part_at(site),
-            f"the point {shown(site.at)} is not on the link, but {away:g} away from it",
+            f"the point {point_text(site.at)} is not on the link, but {away:g} away from it",
             "Move the joint onto the link, or change the link's shape",
         )
     if not len(held):
         raise MeshingError(
             request.part_at(site),
-            f"no cell lies in {site.region} around {shown(site.at)}",
+            f"no cell lies in {site.region} around {point_text(site.at)}",
             "Make the region larger or the elements smaller",
         )
     if mesh.dim == len(site.at) == 3:
@@ -186,7 +189,7 @@ def _check_held(mesh: LinkMesh, request: MeshRequest, number: int, site: Interfa
         if heights.min() > tolerance or heights.max() < -tolerance:
             raise MeshingError(
                 request.part_at(site),
-                f"the point {shown(site.at)} is not on the link: along the joint's axis the link lies between "
+                f"the point {point_text(site.at)} is not on the link: along the joint's axis the link lies between "
                 f"{heights.min():g} and {heights.max():g} from it",
                 "Move the joint along its axis onto the link",
             )
@@ -214,7 +217,7 @@ def _surrounds(offsets: np.ndarray, cells: np.ndarray) -> bool:
     if not len(cells):
         return False
     angles = np.arctan2(offsets[cells, 1], offsets[cells, 0])
-    # a cell beside the origin is seen under less than a half turn: measure it from its own first vertex
+    # a cell beside the origin subtends less than a half turn, measured from its own first vertex
     relative = np.angle(np.exp(1j * (angles - angles[:, :1])))
     start = angles[:, 0] + relative.min(axis=1)
     width = np.ptp(relative, axis=1)
@@ -230,7 +233,7 @@ def _surrounds(offsets: np.ndarray, cells: np.ndarray) -> bool:
 
 
 def _check_apart(mesh: LinkMesh, request: MeshRequest) -> None:
-    """No two interfaces may share a vertex: it could not follow both bodies."""
+    """Two interfaces with a common vertex are refused: it could not follow both bodies."""
     held = mesh.interface != FREE
     holder = np.repeat(mesh.interface[held], mesh.dim + 1)
     vertex = mesh.cells[held].reshape(-1)

@@ -6,13 +6,15 @@ import math
 
 import numpy as np
 
+from fenicsmech.checks import point_text
 from fenicsmech.errors import MeshingError
 from fenicsmech.mechanism import Arc, Line, Outline
 from fenicsmech.meshing.gmsh_session import gmsh
-from fenicsmech.meshing.link_mesh import LinkMesh, shown
+from fenicsmech.meshing.link_mesh import LinkMesh
 from fenicsmech.meshing.planar import PlaneDrawing, in_units_of, mesh_planar
-from fenicsmech.meshing.plane_curves import CircleArc, Curve, distance, draw_loop, first_crossing, inside, line, sampled
+from fenicsmech.meshing.plane_curves import CircleArc, Curve, draw_loop, sampled, straight_line
 from fenicsmech.meshing.request import InterfaceSite, MeshRequest, check_shape, holds, mesh_shape
+from fenicsmech.polygons import distance_to, first_crossing, is_inside
 
 _SAMPLED = 0.02  # of the element size: how far the polygons that checks look at deviate from the outline
 
@@ -34,23 +36,23 @@ def _(shape: Outline, request: MeshRequest) -> None:
     if crossing is not None:
         raise MeshingError(
             request.part,
-            f"the outline crosses itself near {shown(crossing * request.size)}",
+            f"the outline crosses itself near {point_text(crossing * request.size)}",
             "Lead its segments apart there",
         )
     for site in request.sites:
         if not holds(shape, request, site.at):
             raise MeshingError(
                 request.part_at(site),
-                f"the point {shown(site.at[:2])} is not on the link",
+                f"the point {point_text(site.at[:2])} is not on the link",
                 "Move the joint into the outline",
             )
 
 
 @holds.register
 def _(shape: Outline, request: MeshRequest, at: tuple[float, ...]) -> bool:
-    polygon, at = sampled(_loop(shape, request), _SAMPLED), np.asarray(at[:2]) / request.size
+    polygon, place = sampled(_loop(shape, request), _SAMPLED), np.asarray(at[:2]) / request.size
     # a joint on the very edge may be off the polygon, by rounding too
-    return inside(polygon, at) or distance(polygon, at) <= 0.1
+    return is_inside(polygon, place) or distance_to(polygon, place) <= 0.1
 
 
 def _loop(outline: Outline, request: MeshRequest) -> list[Curve]:
@@ -65,7 +67,7 @@ def _loop(outline: Outline, request: MeshRequest) -> list[Curve]:
         if isinstance(segment, Arc):
             loop.append(_arc(start, segment, request))
         elif math.dist(start, segment.end) > 1e-8:  # ends this near are one point
-            loop.append(line(start, segment.end))
+            loop.append(straight_line(start, segment.end))
         start = segment.end
     if len(loop) < 2:
         raise MeshingError(

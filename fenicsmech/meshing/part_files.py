@@ -27,14 +27,14 @@ def _(shape: MeshPart, request: MeshRequest) -> None:
     if request.half:
         raise DescriptionError(
             request.part,
-            "a mesh file does not say whether its cells are symmetric about a mid-plane",
+            "the symmetry of a mesh file about its mid-plane is not known",
             "Use space='3d', or give the link as a strip, an outline or a STEP file",
         )
     _require_header(shape.path, "$MeshFormat", kind="gmsh mesh file", part=request.part)
 
 
 def _require_header(path: Path, header: str, *, kind: str, part: str) -> None:
-    """Make sure that ``path`` is a file of the right kind before gmsh guesses what to do with it.
+    """Checks that ``path`` is a file of the right kind; gmsh would guess.
 
     Args:
         path: the file.
@@ -93,12 +93,12 @@ def _mesh_solid(shape: StepPart, solid: DimTag, request: MeshRequest) -> LinkMes
 
 
 def _upper_half(shape: StepPart, solid: DimTag, request: MeshRequest) -> list[DimTag]:
-    """What of the solid lies above its centroid, which comes to lie at z = 0.
+    """The part of the solid above its centroid, which moves to z = 0.
 
     The halves are mirror images if their volumes, centroids and moments of inertia agree.
 
     Raises:
-        DescriptionError: they are not.
+        DescriptionError: the halves differ.
     """
     occ = gmsh.model.occ
     x, y, bottom, right, far, top = occ.getBoundingBox(*solid)
@@ -176,12 +176,12 @@ def _read(shape: MeshPart, request: MeshRequest) -> tuple[np.ndarray, np.ndarray
             f"Save a mesh of {plural} for a {dim}D model",
         )
     points, row_of = mesh_nodes()
-    cells = []
+    simplices = []
     for kind, nodes in zip(kinds[dim][0], kinds[dim][2], strict=True):
         per_cell = gmsh.model.mesh.getElementProperties(kind)[3]
         # the corners come first; the nodes on edges and faces of curved cells are left out
-        cells.append(row_of[nodes.astype(np.int64)].reshape(-1, per_cell)[:, : dim + 1])
-    cells = np.concatenate(cells)
+        simplices.append(row_of[nodes.astype(np.int64)].reshape(-1, per_cell)[:, : dim + 1])
+    cells = np.concatenate(simplices)
     heights = points[np.unique(cells), dim:]
     if heights.size and np.ptp(heights) > _TOLERANCE * np.ptp(points):
         raise MeshingError(

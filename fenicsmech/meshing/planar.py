@@ -2,7 +2,7 @@
 
 CAD kernels compare lengths with absolute tolerances, so a link in metres would not be meshed like the same link
 in millimetres. Shapes are therefore built in units of the element size, rounded to 1e-10 of it: descriptions that
-differ by their unit only give the same numbers, and the same mesh, to the last bit but rounding.
+differ by their unit only give the same numbers, and the same mesh but for rounding.
 
 The layers of tetrahedra repeat the triangulation of the plan, so that plane and spatial models share it. Fields that
 are the same all through the depth are fields on the plan: on tetrahedra whose vertices stand on the three corners of a
@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -30,11 +30,15 @@ Described = TypeVar("Described")
 
 def in_units_of(described: Described, unit: float) -> Described:
     """``described`` (a length, a point, a region, a site or a shape) with its lengths divided by ``unit``."""
-    if is_dataclass(described):
+    return _in_units_of(described, unit)
+
+
+def _in_units_of(described: Any, unit: float) -> Any:
+    if is_dataclass(described) and not isinstance(described, type):
         lengths = [field.name for field in fields(described) if field.name not in ("angle", "axis", "name")]
-        return replace(described, **{name: in_units_of(getattr(described, name), unit) for name in lengths})
+        return replace(described, **{name: _in_units_of(getattr(described, name), unit) for name in lengths})
     if isinstance(described, tuple):
-        return tuple(in_units_of(item, unit) for item in described)
+        return tuple(_in_units_of(item, unit) for item in described)
     return round(described / unit, 10)
 
 
@@ -44,7 +48,7 @@ class PlaneDrawing:
 
     Attributes:
         faces: faces of the plane z = 0 that make up the link.
-        sites: the sites, with regions as they shall be cut.
+        sites: the sites, with the regions to be cut.
         corners: for each site the angles (rad) at which the outline of its disc has vertices.
         refinements: element sizes for small features, as gmsh expressions.
     """
@@ -58,12 +62,10 @@ class PlaneDrawing:
 def mesh_planar(
     request: MeshRequest, depth: float, draw: Callable[[tuple[InterfaceSite, ...]], PlaneDrawing]
 ) -> LinkMesh:
-    """Mesh a link of constant section.
-
-    Only where a joint's axis is not along z is the link meshed as a solid.
+    """Meshes a link of constant section: as a solid where a joint's axis is not along z, else in the plane.
 
     Args:
-        request: what is asked for.
+        request: the mesh wanted.
         depth: extent along z, symmetric about z = 0.
         draw: draws the link in the current gmsh model in units of the element size, given the sites in these units.
 
@@ -92,7 +94,7 @@ def mesh_planar(
 
 
 def layer_count(depth: float, size: float) -> int:
-    """Number of layers through ``depth`` if none is asked for: about twice as high as the triangles are wide."""
+    """Default number of layers through ``depth``: about twice as high as the triangles are wide."""
     return max(1, round(depth / (2.0 * size)))
 
 
@@ -101,7 +103,7 @@ def extrude(plan: LinkMesh, depth: float, layers: int) -> LinkMesh:
 
     A prism over the triangle a < b < c (numbers of its vertices in ``plan``), with a′, b′, c′ above them, is cut
     into abcc′, abb′c′ and aa′b′c′. The diagonal of a side then joins the lower number below with the higher above,
-    whichever of the two neighbours looks at it. Layers above the middle are mirror images of those below, so with an
+    in both of its neighbours. Layers above the middle are mirror images of those below, so with an
     even number of layers the mesh is symmetric about z = 0, and plane loads cause no motion out of the plane.
 
     Args:
@@ -147,7 +149,7 @@ def _walls(plan: CurvedEdges, sides: list[tuple[int, int]], count: int) -> Curve
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What remains of a link when fields do not change through its depth.
+    """The plane mesh of a link and the columns of vertices above it.
 
     Attributes:
         mesh: triangles; the link's own mesh if it is not extruded along z.

@@ -1,4 +1,4 @@
-"""What is asked of the mesh of one link, and the functions that each kind of shape implements."""
+"""The request for the mesh of one link, and the functions that each kind of shape implements."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ from functools import singledispatch
 
 import numpy as np
 
+from fenicsmech.checks import point_text
 from fenicsmech.errors import MeshingError
 from fenicsmech.mechanism import Disc, Region
-from fenicsmech.meshing.link_mesh import FREE, LinkMesh, shown
+from fenicsmech.meshing.link_mesh import FREE, LinkMesh
 
 LEAST_SEGMENTS = 8
-"""Of a circle."""
+"""Least number of segments of a circle."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ class InterfaceSite:
 
 @dataclass(frozen=True)
 class MeshRequest:
-    """What the mesh of one link shall be.
+    """The mesh wanted of one link.
 
     Attributes:
         link: the link's name, for messages.
@@ -94,7 +95,7 @@ class MeshRequest:
         dim: 2 or 3.
         size: target edge length in the plane of the link (everywhere, for a solid).
         layers: number of layers through the depth of an extruded link; None: chosen from depth and size.
-        segments: of which the circle around a pin has at least so many.
+        segments: least number of segments of the circle around a pin.
         half: in space, mesh the half above the mid-plane z = 0 only; ``layers`` are those of the half.
     """
 
@@ -130,29 +131,29 @@ class MeshRequest:
         one, other = self.sites[first], self.sites[second]
         return MeshingError(
             self.part,
-            f"the interface regions of joints {one.name!r} at {shown(one.at)} and {other.name!r} at {shown(other.at)} "
-            "touch or overlap",
+            f"the interface regions of joints {one.name!r} at {point_text(one.at)} and {other.name!r} at "
+            f"{point_text(other.at)} touch or overlap",
             "Make the regions smaller or move the joints apart",
         )
 
 
 @singledispatch
 def mesh_shape(shape: object, request: MeshRequest) -> LinkMesh:
-    """The mesh of ``shape`` that ``request`` asks for; each kind of shape registers its own way."""
+    """The mesh of ``shape`` wanted by ``request``; each kind of shape registers its own function."""
     raise TypeError(f"{type(shape).__name__} is not a shape that can be meshed")
 
 
 @singledispatch
 def check_shape(shape: object, request: MeshRequest) -> None:
-    """Refuse what can be seen to be wrong with ``shape`` and its joints before anything is meshed.
+    """Checks ``shape`` and its joints before anything is meshed.
 
     Raises:
-        MeshingError: the shape is no proper outline, its file cannot be read, or a joint is not on it.
+        MeshingError: the outline of the shape crosses itself, its file cannot be read, or a joint is not on it.
     """
     raise TypeError(f"{type(shape).__name__} is not a shape that can be meshed")
 
 
 @singledispatch
 def holds(shape: object, request: MeshRequest, at: tuple[float, ...]) -> bool:
-    """Whether the point ``at`` lies on ``shape``, as far as can be said without a mesh: True if in doubt."""
+    """Whether the point ``at`` lies on ``shape``, as far as is known without a mesh; True in doubt."""
     return True

@@ -14,14 +14,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from fenicsmech.checks import point_text
 from fenicsmech.errors import MeshingError
 from fenicsmech.mechanism import Centreline, Disc, Rectangle, Strip
 from fenicsmech.meshing.cutting import DimTag, circle_segments, gap_refinement, region_face
 from fenicsmech.meshing.gmsh_session import gmsh
-from fenicsmech.meshing.link_mesh import LinkMesh, shown
+from fenicsmech.meshing.link_mesh import LinkMesh
 from fenicsmech.meshing.planar import PlaneDrawing, in_units_of, mesh_planar
-from fenicsmech.meshing.plane_curves import first_crossing
 from fenicsmech.meshing.request import InterfaceSite, MeshRequest, check_shape, holds, mesh_shape
+from fenicsmech.polygons import first_crossing
 
 _ON_CENTRELINE = 1e-3  # of the thickness: what rounded coordinates may deviate
 
@@ -53,7 +54,7 @@ def _(shape: Strip, request: MeshRequest, at: tuple[float, ...]) -> bool:
 
 
 def _check_sides(part: str, centreline: Centreline, thickness: float) -> None:
-    """Refuse a strip whose sides are no proper outline.
+    """Refuses a strip whose sides fold over or cross.
 
     Raises:
         MeshingError: a side folds over where the centreline bends too sharply, or the outline crosses itself.
@@ -65,7 +66,7 @@ def _check_sides(part: str, centreline: Centreline, thickness: float) -> None:
         raise MeshingError(
             part,
             f"the centreline bends with radius {1.0 / bend[sharpest]:g} near "
-            f"{shown(centreline.evaluate(s[sharpest]))}, which is not more than half the thickness {thickness:g}",
+            f"{point_text(centreline.evaluate(s[sharpest]))}, which is not more than half the thickness {thickness:g}",
             "Make the strip thinner or its centreline smoother",
         )
     right, left = (_parallel(centreline, s, offset * thickness) for offset in (-0.5, 0.5))
@@ -73,13 +74,13 @@ def _check_sides(part: str, centreline: Centreline, thickness: float) -> None:
     if crossing is not None:
         raise MeshingError(
             part,
-            f"the strip crosses itself near {shown(crossing)}",
+            f"the strip crosses itself near {point_text(crossing)}",
             "Lead the centreline apart there, or make the strip thinner",
         )
 
 
 def _check_on_strip(centreline: Centreline, thickness: float, site: InterfaceSite, request: MeshRequest) -> None:
-    """Refuse a joint off the strip, before its eye hides that it is.
+    """Refuses a joint off the strip, which its eye would hide.
 
     Raises:
         MeshingError: it lies farther than half the thickness from the centreline, or beyond an end.
@@ -91,14 +92,14 @@ def _check_on_strip(centreline: Centreline, thickness: float, site: InterfaceSit
     if np.linalg.norm(away) > 0.5 * thickness + tolerance or beyond > tolerance:
         raise MeshingError(
             request.part_at(site),
-            f"the point {shown(site.at[:2])} is not on the link: it is {np.linalg.norm(away):g} away from the "
+            f"the point {point_text(site.at[:2])} is not on the link: it is {np.linalg.norm(away):g} away from the "
             f"centreline of a strip of thickness {thickness:g}",
             "Move the joint onto the centreline, or lead the centreline through the joint",
         )
 
 
 def clamp_defect(shape: Strip, site: InterfaceSite) -> tuple[str, str] | None:
-    """Why the rectangle of ``site`` does not hold the strip as a clamp across it would, with a remedy; None if it does.
+    """The way in which the rectangle of ``site`` differs from a clamp across the strip, and a remedy; or None.
 
     A clamp's inner face, where the centreline leaves the rectangle, stands across the strip (to 1°, more than rounded
     angles miss it by) and is at least as wide.
@@ -125,14 +126,15 @@ def clamp_defect(shape: Strip, site: InterfaceSite) -> tuple[str, str] | None:
         if turn > 1.0:
             right = math.atan2(*curve.tangent(kept)[::-1]) + (0.5 * math.pi if face else 0.0)
             return (
-                f"the face of its {site.region} near {shown(place)} is turned by {turn:.3g}° from across the strip",
+                f"the face of its {site.region} near {point_text(place)} "
+                f"is turned by {turn:.3g}° from across the strip",
                 f"Use Mechanism.clamp(…), or angle={right:.6g} (rad, from x)",
             )
         edges = np.array([place + normal, place - normal]) - centre
         if np.abs(edges @ axes[1 - face]).max() < halves[1 - face] * (1.0 + 1e-6):
             continue
         return (
-            f"its {site.region} does not cover the width {shape.thickness:g} of the strip near {shown(place)}",
+            f"its {site.region} does not cover the width {shape.thickness:g} of the strip near {point_text(place)}",
             "Use Mechanism.clamp(…), or make it wider",
         )
     if not held.any():
@@ -146,7 +148,8 @@ class _Pin:
 
     Attributes:
         site: the site, moved onto the centreline, and its disc to the strip's sides, where it almost meets them.
-        half: half the strip's thickness.
+        radius: of the disc that the pin holds.
+        half_thickness: of the strip.
         inward: unit vector along the strip, away from its nearer end, shape (2,).
         station: parameter of the centreline's point nearest to the pin.
         offset: how far the pin lies left of the centreline.
@@ -154,15 +157,16 @@ class _Pin:
     """
 
     site: InterfaceSite
-    half: float
+    radius: float
+    half_thickness: float
     inward: np.ndarray
     station: float
     offset: float
     to_end: float
 
     @classmethod
-    def place(cls, site: InterfaceSite, centreline: Centreline, thickness: float) -> _Pin:
-        """The pin at ``site``, which has a disc, in the strip along ``centreline``."""
+    def place(cls, site: InterfaceSite, radius: float, centreline: Centreline, thickness: float) -> _Pin:
+        """The pin at ``site``, which has a disc of ``radius``, in the strip along ``centreline``."""
         half, at = 0.5 * thickness, np.asarray(site.at[:2])
         ends = {end: centreline.evaluate(end) for end in (0.0, centreline.end)}
         nearer = min(ends, key=lambda end: np.linalg.norm(at - ends[end]))
@@ -174,51 +178,45 @@ class _Pin:
         inward = centreline.tangent(s) * (1.0 if nearer == 0.0 else -1.0)
         # the polygon that stands for a circle does not resolve differences of the radius below a chord's height
         # r (1 − cos(π/n)): an element does not fit into what is thinner than that, and than 2 % of the strip
-        radius = site.region.radius
         height = radius * (1.0 - math.cos(math.pi / circle_segments(radius, 1.0)))
         radius = half if abs(radius - half) <= min(height, 0.02 * half) else radius
         placed = replace(site, at=(*at.tolist(), *site.at[2:]), region=Disc(radius))
-        return cls(placed, half, inward, s, offset, float(np.linalg.norm(at - ends[nearer])))
-
-    @property
-    def radius(self) -> float:
-        """Radius of the disc that the pin holds."""
-        return self.site.region.radius
+        return cls(placed, radius, half, inward, s, offset, float(np.linalg.norm(at - ends[nearer])))
 
     @property
     def corners(self) -> tuple[float, ...]:
         """Angles (rad) at which the disc's outline has vertices.
 
-        Where the disc touches the sides, so that they share a vertex there; only towards the end if it crosses them.
+        Where the disc touches the sides, which have a vertex there too; only towards the end if it crosses them.
         """
         outward = math.atan2(-self.inward[1], -self.inward[0])
-        return tuple(outward + k * 0.5 * math.pi for k in range(1 if self.radius > self.half else 4))
+        return tuple(outward + k * 0.5 * math.pi for k in range(1 if self.radius > self.half_thickness else 4))
 
     @property
     def touches_sides(self) -> bool:
         """Whether the disc, or an eye as wide as the strip, may touch the strip's sides along the way."""
-        return self.radius <= self.half and self.offset == 0.0
+        return self.radius <= self.half_thickness and self.offset == 0.0
 
     @property
     def rounds_end(self) -> bool:
         """Whether the eye is the round end of the strip, no wider than the strip."""
-        return self.radius <= self.half and self.to_end == 0.0
+        return self.radius <= self.half_thickness and self.to_end == 0.0
 
     @property
     def eye(self) -> InterfaceSite | None:
         """The disc that the eye adds to the strip, if it adds any besides a round end."""
-        inside = self.offset == 0.0 and self.to_end >= self.half
-        if self.radius <= self.half and (self.rounds_end or inside):
+        inside = self.offset == 0.0 and self.to_end >= self.half_thickness
+        if self.radius <= self.half_thickness and (self.rounds_end or inside):
             return None
-        return replace(self.site, region=Disc(max(self.radius, self.half)))
+        return replace(self.site, region=Disc(max(self.radius, self.half_thickness)))
 
     @property
     def refinements(self) -> list[str]:
         """Element sizes, as gmsh expressions, for the narrow places between the disc and the link's edge."""
-        around_eye, beside = self.half - self.radius, self.half - abs(self.offset) - self.radius
+        around_eye, beside = self.half_thickness - self.radius, self.half_thickness - abs(self.offset) - self.radius
         both_ways = (self.inward, -self.inward)
-        gaps = [(around_eye, ())] if self.eye else []
-        gaps += [(beside, both_ways[:1] if self.rounds_end else both_ways)]
+        gaps: list[tuple[float, tuple[np.ndarray, ...]]] = [(around_eye, ())] if self.eye else []
+        gaps.append((beside, both_ways[:1] if self.rounds_end else both_ways))
         at = self.site.at[:2]
         return [gap_refinement(at, gap, self.radius, widening) for gap, widening in gaps if gap > 0.0]
 
@@ -227,7 +225,7 @@ def _draw(strip: Strip, sites: tuple[InterfaceSite, ...]) -> PlaneDrawing:
     """The strip and its eyes, all in units of the element size."""
     centreline = Centreline(strip.centreline)
     pins = {
-        number: _Pin.place(site, centreline, strip.thickness)
+        number: _Pin.place(site, site.region.radius, centreline, strip.thickness)
         for number, site in enumerate(sites)
         if isinstance(site.region, Disc) and site.is_planar
     }
@@ -266,9 +264,8 @@ def _side(centreline: Centreline, offset: float, stations: np.ndarray) -> list[n
         end points.
     """
     pairs = zip(stations[:-1], stations[1:], strict=True)
-    if (
-        np.max(np.abs(centreline.curvature(centreline.samples(32)))) * centreline.end < 1e-9
-    ):  # straight but for rounding
+    bend = np.abs(centreline.curvature(centreline.samples(32))).max()
+    if bend * centreline.end < 1e-9:  # straight but for rounding
         return [_parallel(centreline, np.array(pair), offset) for pair in pairs]
     return [_curved_piece(centreline, offset, *pair) for pair in pairs]
 

@@ -18,7 +18,7 @@ from fenicsmech.effects import LinkFields, find_boundaries
 from fenicsmech.elasticity import ElasticBody, ElasticModel, Stretch
 from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State, load_fields
 from fenicsmech.errors import DescriptionError
-from fenicsmech.mechanism import Effect, FlexibleLink, Force, Mechanism, Output, in_dimension
+from fenicsmech.mechanism import Effect, FlexibleLink, Force, Material, Mechanism, Output, in_dimension
 from fenicsmech.meshing import (
     InterfaceSite,
     LinkMesh,
@@ -29,7 +29,7 @@ from fenicsmech.meshing import (
     mesh_link,
 )
 from fenicsmech.model.fidelity import Fidelity
-from fenicsmech.multibody import DesignAtNodes, InterfaceMap, Linkage, MaterialPoint, body_point, link_point
+from fenicsmech.multibody import BodyPoint, DesignAtNodes, InterfaceMap, Linkage, LinkPoint, body_point, link_point
 
 
 class MechanismModel:
@@ -37,6 +37,7 @@ class MechanismModel:
 
     Attributes:
         mechanism, linkage: what is simulated, and its bodies.
+        materials: of the flexible links.
         mesh: the reference mesh of all flexible links.
         elastic: their elastic energy.
         interfaces: interface nodes as functions of body poses.
@@ -46,7 +47,7 @@ class MechanismModel:
         mixed: whether each flexible link is in the u–p formulation.
         effects: what acts beside links, joints and forces.
         potentials: potentials of body poses.
-        holding: those of springs, which act from the start.
+        spring_potentials: those of springs, which act from the start.
     """
 
     def __init__(
@@ -57,18 +58,20 @@ class MechanismModel:
         fidelity: Fidelity,
         clock: Clock,
         effects: Sequence[Effect] = (),
+        materials: Sequence[Material] | None = None,
     ) -> None:
         self.mechanism, self.linkage, self.mesh, self.clock = mechanism, linkage, mesh, clock
         self.effects = tuple(effects)
         links = mechanism.flexible_links
-        self.mixed = fidelity.formulation.mixed([link.material for link in links], fidelity.model, fidelity.order)
+        self.materials = tuple(link.material for link in links) if materials is None else tuple(materials)
+        self.mixed = fidelity.formulation.mixed(list(self.materials), fidelity.model, fidelity.order)
         faces = [part for effect in effects for part in effect.faces]
-        self._boundaries = find_boundaries(mesh.mesh, links, mesh.link, faces, half=fidelity.model.symmetric)
+        self._boundaries = find_boundaries(mesh.mesh, links, mesh.link, faces, half=fidelity.model.half)
         self.elastic = ElasticBody(
             mesh.mesh,
             link=mesh.link,
             free=mesh.interface < 0,
-            materials=[link.material for link in links],
+            materials=list(self.materials),
             depths=[link.shape.depth for link in links],
             model=fidelity.model,
             order=fidelity.order,
@@ -80,7 +83,7 @@ class MechanismModel:
             mixed=self.mixed,
         )
         self.potentials = [potential for effect in effects for potential in effect.pose_potentials(linkage)]
-        self.holding = tuple(potential for potential in self.potentials if potential.holds)
+        self.spring_potentials = tuple(potential for potential in self.potentials if potential.holds)
         self._compliances: dict[int, float] = {}
         for effect in effects:
             for row, compliance in effect.soften(linkage).items():
@@ -141,7 +144,7 @@ class MechanismModel:
         """Makes the finite-element fields hold ``state``."""
         load_fields(self.elastic, self.interfaces, state)
 
-    def point(self, part: Force | Output) -> MaterialPoint:
+    def point(self, part: Force | Output) -> BodyPoint | LinkPoint:
         """The material point of a force or output."""
         if not isinstance(part.on, FlexibleLink):
             at = np.array(in_dimension(part.at, self.linkage.dim))
@@ -264,6 +267,6 @@ def _mesh_request(link: FlexibleLink, linkage: Linkage, fidelity: Fidelity) -> t
     # a pin along z holds its link at whatever height the link is
     ats = [body.centre[:2] if body.axis[2] == 1.0 else body.centre for body in bodies]
     sites = [InterfaceSite(at, body.region, body.axis, body.name) for at, body in zip(ats, bodies, strict=True)]
-    size, half = fidelity.sizes[link], fidelity.model.symmetric
+    size, half = fidelity.sizes[link], fidelity.model.half
     options = {"layers": fidelity.layers, "segments": fidelity.segments}
     return sites, {"dim": fidelity.model.dim, "size": size, "half": half, **options}

@@ -31,8 +31,8 @@ class AssemblyOptions:
         closed: largest scaled constraint residual of a closed assembly: some hundred roundings.
         largest_step: motor motion in one step; far below the turns at which a loop has several assemblies.
         smallest_step: part of the first step at which the motion ends: motors strain the mechanism there.
-        stray: part of the motion in a step by which it may end away from its extrapolation; beyond that it may have
-            changed to another branch, or crossed a gap that cannot be crossed.
+        stray: largest distance from the extrapolation over the motion in the step; beyond it the assembly may have
+            changed to another branch.
         relaxed: length of a step towards least energy of springs at which such steps end: rounding.
         largest_turn: of such a step, within which the energy is about quadratic.
         curved: part of the largest curvature above which a free motion counts as held by springs.
@@ -74,17 +74,16 @@ def assemble(
 ) -> Assembly:
     """The rigid assembly of ``configuration``.
 
-    If flexible links must deform for the motors to get there, the assembly stops at the last position
-    that is free of strain.
+    If the motion strains flexible links, the assembly stops at the last position free of strain.
 
     Args:
         linkage: bodies and constraints.
-        configuration: where motors are.
+        configuration: motor positions.
         springs: their potentials.
         options: steps and tolerances.
 
     Raises:
-        AssemblyError: some loop does not close even if every flexible link could deform at will.
+        AssemblyError: a loop does not close even with freely deformable links.
     """
     poses, fraction, _ = _Assembler(linkage.rigid, springs, options).follow(configuration)
     if fraction < 1.0:
@@ -93,7 +92,7 @@ def assemble(
             raise AssemblyError(
                 f"configuration {configuration.name!r}",
                 f"the loop through {_loop(linkage.joints, worst)} does not close: "
-                f"the motors get {math.floor(1e3 * closing) / 10:.1f}% of the way",  # never 100% of what fails
+                f"the motors get {math.floor(1e3 * closing) / 10:.1f}% of the way",  # rounded down
                 "Check motor positions and link lengths",
             )
     return Assembly(poses, fraction)

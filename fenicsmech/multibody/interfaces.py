@@ -57,7 +57,7 @@ class InterfaceMap:
         self.unknown[self._mid_plane[: self.owned], space.dim :] = False
 
     def on(self, u: fem.Function) -> InterfaceMap:
-        """The same interfaces of a field of order 1, whose nodes lie on no curved edge but at its ends."""
+        """The same interfaces of a field of order 1, whose nodes are vertices."""
         drawn = u.function_space.tabulate_dof_coordinates()
         return InterfaceMap(u, drawn, self._cell_body, self._centres, self.space)
 
@@ -74,7 +74,7 @@ class InterfaceMap:
         nodes = cell_dofs(V)[cells]
         local[nodes, 0] = cell_body[cells, None] + 1
         local[nodes, 1] = 1
-        # sum over ranks of (body + 1) and of the number of ranks that said so
+        # sums over ranks of (body + 1) and of the number of ranks that marked the node
         add_ghosts(marker)
         marker.x.scatter_forward()
         marked = local[:, 1] > 0
@@ -83,7 +83,7 @@ class InterfaceMap:
         return body
 
     def place(self, poses: np.ndarray) -> None:
-        """Sets all displacements that are no unknowns from ``poses`` (bodies, pose_size)."""
+        """Sets the eliminated displacements from ``poses`` (bodies, pose_size)."""
         values, dim = self._u.x.array.reshape(-1, self.block), self.space.dim
         for body, nodes in self.nodes.items():
             values[nodes, :dim] = self.space.displace(poses[body], self.offsets[body])

@@ -1,4 +1,4 @@
-"""From the described mechanism to bodies and constraints."""
+"""Bodies and constraints of a described mechanism."""
 
 from __future__ import annotations
 

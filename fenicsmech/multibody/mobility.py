@@ -11,7 +11,7 @@ Springs are potentials V(z). Along the null space N of A they have the slope and
 
     Nᵀ ∂V/∂z,     Nᵀ (∂²V/∂z² − Σ λ_k ∂²C_k/∂z²) N,     Aᵀλ = ∂V/∂z,
 
-and hold whatever they curve the potential along, however soft they are. What is left are the zero-energy modes.
+and hold the motions along which this curvature is not zero. The others are the zero-energy modes.
 
 Where flexible links are bent, but move as rigid bodies, a link with the velocity v of a point x₀ and the spin ω takes
 its bodies along:
@@ -34,7 +34,7 @@ _RANK = 1e-9  # singular values of A below this are zero: rows and unknowns are 
 
 
 class SpringPotential(Protocol):
-    """A potential V(z) of the poses of a few ``bodies`` (indices) that acts whatever else does."""
+    """A potential V(z) of the poses of a few ``bodies`` (indices)."""
 
     bodies: tuple[int, ...]
 
@@ -47,7 +47,7 @@ class SpringPotential(Protocol):
 
 @dataclass(frozen=True)
 class FreeMotions:
-    """What springs do along the motions that joints and motors leave, in units of ``JointSystem.pose_scale``.
+    """The potential of springs along the motions that joints and motors leave, in units of ``JointSystem.pose_scale``.
 
     Attributes:
         motions: N as rows, orthonormal, (n, size).
@@ -153,14 +153,14 @@ def free_motions(
 
 
 def is_held(system: JointSystem, poses: np.ndarray, motors: np.ndarray, rate: np.ndarray, rows: np.ndarray) -> bool:
-    """Whether something that changes with the poses at ``rate`` (size,) stays as it is in every motion that is left.
+    """Whether a function of the poses with the gradient ``rate`` (size,) is constant in every motion that is left.
 
     Args:
         system: the constraints.
         poses: (bodies, pose_size).
         motors: motor values, (connections,).
-        rate: derivative by the pose unknowns, (size,).
-        rows: constraints that count.
+        rate: its derivative by the pose unknowns, (size,).
+        rows: constraints considered.
     """
     scaled = _scaled_gradient(system, poses, motors)[rows]
     wanted = rate * system.pose_scale
@@ -175,8 +175,8 @@ def stiff_motions(linkage: Linkage, poses: np.ndarray, motors: np.ndarray) -> li
     """
     joints, dim = linkage.joints, linkage.dim
     space, length = joints.space, linkage.length
-    links = [(i,) for i, body in enumerate(linkage.bodies) if body.region is None and not body.fixed]
-    links += list(linkage.interfaces.values())
+    rigid = [i for i, body in enumerate(linkage.bodies) if body.region is None and not body.fixed]
+    links: list[tuple[int, ...]] = [*((i,) for i in rigid), *linkage.interfaces.values()]
     turns = space.freedoms - dim
     places = np.array([body.centre for body in linkage.bodies]) + poses[:, :dim]
     basis = []
@@ -187,7 +187,9 @@ def stiff_motions(linkage: Linkage, poses: np.ndarray, motors: np.ndarray) -> li
                 slide = length * np.eye(dim)[k] if k < dim else np.zeros(dim)
                 spin[body] = np.eye(turns)[k - dim] if k >= dim else 0.0
                 velocity[body] = slide + _cross(spin[body], (places[body] - places[bodies[0]])[None])[0]
-                z[joints.columns[body]] = np.concatenate([velocity[body], space.turns(poses[body]) @ spin[body]])
+                z[joints.columns[body]] = np.concatenate(
+                    [velocity[body], space.rotation_rates(poses[body]) @ spin[body]]
+                )
             basis.append(Motion(z, velocity, spin))
     rates = joints.row_scale[:, None] * (joints.gradient(poses, motors) @ np.array([motion.z for motion in basis]).T)
     _, values, right = np.linalg.svd(rates, full_matrices=True)
@@ -203,7 +205,7 @@ def _scaled_gradient(system: JointSystem, poses: np.ndarray, motors: np.ndarray)
 
 
 def _takes_part(entries: np.ndarray) -> np.ndarray:
-    """Which entries of a unit vector are no rounding."""
+    """Entries of a unit vector beyond rounding."""
     return np.abs(entries) > 1e-6
 
 

@@ -114,15 +114,17 @@ def _barycentric(position: np.ndarray, vertices: np.ndarray, bulges: np.ndarray)
     """Barycentric coordinates λ of ``position`` in each cell, X₀(λ) + c(λ) = position, (cells, dim + 1)."""
     inverse = np.linalg.inv((vertices[:, 1:] - vertices[:, :1]).transpose(0, 2, 1))
     i, j = np.transpose(list(combinations(range(vertices.shape[1]), 2)))
-    straight, target = None, np.broadcast_to(position, (len(vertices), len(position)))
-    # each of these corrections at least halves the error
-    for _ in range(60 if bulges.any() else 1):
+
+    def in_straight_cells(target: np.ndarray) -> np.ndarray:
         rest = np.einsum("kij,kj->ki", inverse, target - vertices[:, 0])
-        straight = np.column_stack([1.0 - rest.sum(axis=1), rest])
-        # far outside a cell its bulge means nothing
-        within = np.clip(straight, 0.0, 1.0)
-        target = position - np.einsum("ke,ked->kd", 4.0 * within[:, i] * within[:, j], bulges)
-    return straight
+        return np.column_stack([1.0 - rest.sum(axis=1), rest])
+
+    found = in_straight_cells(np.broadcast_to(position, (len(vertices), len(position))))
+    # each of these corrections at least halves the error
+    for _ in range(59 if bulges.any() else 0):
+        within = np.clip(found, 0.0, 1.0)  # a cell's map is defined inside it
+        found = in_straight_cells(position - np.einsum("ke,ked->kd", 4.0 * within[:, i] * within[:, j], bulges))
+    return found
 
 
 def _lagrange(at: np.ndarray, nodes: np.ndarray, corners: np.ndarray) -> np.ndarray:

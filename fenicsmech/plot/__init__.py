@@ -1,11 +1,11 @@
-"""Plots and pictures: draws the plain data it is given, without elements, joints or ranks; call it on one rank.
+"""Plots and pictures of plain data; call them on one rank.
 
 - ``curve``: load–displacement curves
-- ``mechanism``: mechanisms, deformed and not, one or several beside each other
+- ``mechanism``: mechanisms, deformed and not, side by side
 - ``design``: links before and after an optimisation
-- ``shapes``, ``outlines``: what these pictures are made of
+- ``shapes``, ``outlines``: the content of these pictures
 - ``layout``: size of a picture, and places of panels and links
-- ``labels``: labels beside what they name
+- ``labels``: labels of parts of a picture
 - ``style``: the look of all figures, and PNG files
 """
 
@@ -14,7 +14,7 @@ from fenicsmech.plot.design import draw_designs
 from fenicsmech.plot.labels import Labels, Spot
 from fenicsmech.plot.layout import IN_PLACE, lay_out, lay_out_designs
 from fenicsmech.plot.mechanism import draw_configurations
-from fenicsmech.plot.outlines import PlanView, plan_view, rigid_outline, rim
+from fenicsmech.plot.outlines import PlanView, plan_view, rigid_outline
 from fenicsmech.plot.shapes import (
     Arrow,
     DesignShape,
@@ -58,7 +58,6 @@ __all__ = [
     "plan_view",
     "plot_curve",
     "rigid_outline",
-    "rim",
     "save_png",
     "text_size",
 ]

@@ -1,10 +1,10 @@
-"""Plots of load–displacement curves, as in the field's papers: displacement across, force up."""
+"""Plots of load–displacement curves."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -24,11 +24,15 @@ _MARKERS = ("s", "^", "X", "P", "v", "*")  # of the kinds of marks, in the order
 
 @dataclass(frozen=True)
 class CurveMark:
-    """A point of a curve that stands out, and what it is: marks of one kind look alike."""
+    """A point of a curve with a marker; marks of one ``kind`` look alike."""
 
     displacement: float
     force: float
     kind: str
+
+
+def _no_flags() -> NDArray[np.bool_]:
+    return np.zeros(0, bool)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,12 +43,12 @@ class CurveSeries:
         displacement: (n,) abscissae.
         force: (n,) ordinates.
         label: its name in the legend.
-        stable: (n,) whether each equilibrium is stable; None: all are.
-        snapped_through: (n,) whether the mechanism snapped on the way to each sample; None: it never did.
+        stable: (n,) whether each equilibrium is stable; empty: all are.
+        snapped_through: (n,) whether the mechanism snapped through on the way to each sample; empty: nowhere.
         joined: draw the line through the samples; False for measurements.
         colour: a matplotlib colour; None takes the next of the palette.
-        faint: draw it thin and light behind the others, as what was before.
-        marks: points that stand out.
+        faint: draw it thin and light behind the others, as a curve of before.
+        marks: points with a marker.
 
     Raises:
         DescriptionError: the arrays differ in length or are not finite.
@@ -53,19 +57,21 @@ class CurveSeries:
     displacement: NDArray[np.float64]
     force: NDArray[np.float64]
     label: str = ""
-    stable: NDArray[np.bool_] | None = None
+    stable: NDArray[np.bool_] = field(default_factory=_no_flags)
     joined: bool = True
     colour: str | None = None
     faint: bool = False
     marks: tuple[CurveMark, ...] = ()
-    snapped_through: NDArray[np.bool_] | None = None
+    snapped_through: NDArray[np.bool_] = field(default_factory=_no_flags)
 
     def __post_init__(self) -> None:
         part = f"curve '{self.label}'"
         displacement = real_array(f"displacements of {part}", self.displacement, None)
         force = real_array(f"forces of {part}", self.force, len(displacement))
-        stable = np.ones(len(force), bool) if self.stable is None else np.array(self.stable, dtype=bool)
-        snapped = np.zeros(len(force), bool) if self.snapped_through is None else np.array(self.snapped_through, bool)
+        stable = np.array(self.stable, dtype=bool) if np.size(self.stable) else np.ones(len(force), bool)
+        snapped = np.zeros(len(force), bool)
+        if np.size(self.snapped_through):
+            snapped = np.array(self.snapped_through, dtype=bool)
         for what, flags in (("stability", stable), ("snaps", snapped)):
             if flags.shape != force.shape:
                 raise DescriptionError(
@@ -78,7 +84,7 @@ class CurveSeries:
 
 @dataclass(frozen=True)
 class CurveTarget:
-    """A point the curve shall pass through; ``colour`` None draws it in ink."""
+    """A target point of a curve; ``colour`` None draws it in ink."""
 
     displacement: float
     force: float
@@ -97,16 +103,16 @@ def plot_curve(
     ylabel: str = "force [N]",
     title: str = "",
 ) -> None:
-    """Draw load–displacement curves: displacement across, force up, as in the field's papers.
+    """Draws load–displacement curves, displacement across and force up, as a PNG.
 
     Stable parts are solid, unstable parts dashed, snap-throughs dotted arrows, samples dots, targets open diamonds. For
-    curves before and after a change, give both the same colour and make the first faint; curves that share a label
+    curves before and after a change, give both the same colour and make the first faint; curves with the same label
     appear once in the legend, in grey if their colours differ.
 
     Args:
         path: the PNG file.
         series: the curves, drawn in this order, faint ones behind.
-        targets: points the curves shall pass through; equal ones are drawn around each other.
+        targets: target points; equal ones are drawn around each other.
         xlabel, ylabel: quantity and unit of the axes.
         title: a line above the plot.
 
@@ -221,5 +227,5 @@ def _draw_legend(axes: Axes, series: Sequence[CurveSeries], targets: Sequence[Cu
 
 
 def _common(colours: Sequence[str]) -> str:
-    """The colour they share, or grey."""
+    """Their common colour, or grey."""
     return colours[0] if len(set(colours)) == 1 else MUTED

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fenicsmech.errors import DescriptionError
 from fenicsmech.plot.labels import Labels, Spot
-from fenicsmech.plot.layout import IN_PLACE, DesignLayout, View, lay_out_designs, legend_width
+from fenicsmech.plot.layout import IN_PLACE, DesignLayout, Handle, View, lay_out_designs, legend_width
 from fenicsmech.plot.outlines import path_of
 from fenicsmech.plot.shapes import DesignShape, LinkOutline, RigidShape
 from fenicsmech.plot.style import (
@@ -31,6 +31,7 @@ from fenicsmech.plot.style import (
     save_png,
     text_size,
 )
+from fenicsmech.polygons import signed_area
 
 _BEFORE, _BEFORE_RIM = "#dfe2e6", "#6b7078"
 _DASHES = (0, (3.5, 2.0))
@@ -46,7 +47,7 @@ def draw_designs(
     unit: str = "mm",
     title: str = "",
 ) -> None:
-    """Draw links before and after an optimisation in one picture.
+    """Draws links before and after an optimisation in one picture.
 
     On the left all links are in place: light grey with a dashed rim before, orange after. When there are several, each
     is laid down beside it, all at the same larger scale. Where thicknesses are known, the thinnest and the thickest
@@ -60,14 +61,14 @@ def draw_designs(
         title: a line above all.
 
     Raises:
-        DescriptionError: there is no link, or the name does not end in .png.
+        DescriptionError: there are no links, or the name does not end in .png.
     """
     if not designs:
         raise DescriptionError(f"picture '{path}'", "there is nothing to draw", "Give at least one link")
     thicknesses = [_thickness_line(design, unit) for design in designs]
     with house_style():
         handles, subtitle = _handles(designs), ""
-        if len(designs) == 1:  # several have name and thickness beside their details
+        if len(designs) == 1:  # several links have name and thickness beside their details
             subtitle = ": ".join(words for words in (designs[0].name, thicknesses[0]) if words)
         layout = lay_out_designs(
             designs,
@@ -81,7 +82,7 @@ def draw_designs(
         )
         _draw_in_place(layout, designs, rigid, unit, subtitle)
         if layout.details is not None:
-            _draw_details(layout, designs, thicknesses, unit)
+            _draw_details(layout.details, layout, designs, thicknesses, unit)
         layout.page.write(title, handles)
         save_png(layout.page.figure, path)
 
@@ -125,12 +126,13 @@ def _path(outline: LinkOutline, view: View) -> Outline:
     loops = []
     for index, loop in enumerate(outline.loops):
         points = view(loop)
-        loops.append(points if _counter_clockwise(points) == (index == 0) else points[::-1])
+        loops.append(points if (signed_area(points) > 0.0) == (index == 0) else points[::-1])
     return path_of(loops)
 
 
-def _draw_details(layout: DesignLayout, designs: Sequence[DesignShape], thicknesses: Sequence[str], unit: str) -> None:
-    axes = layout.details
+def _draw_details(
+    axes: Axes, layout: DesignLayout, designs: Sequence[DesignShape], thicknesses: Sequence[str], unit: str
+) -> None:
     shapes = [s for design, view in zip(designs, layout.views, strict=True) for s in _shapes(design, view)]
     labels = Labels(axes, shapes)
     for design, view, corner, line in zip(designs, layout.views, layout.captions, thicknesses, strict=True):
@@ -139,11 +141,6 @@ def _draw_details(layout: DesignLayout, designs: Sequence[DesignShape], thicknes
         axes.annotate(line, corner, xytext=(0.0, -14.0), textcoords="offset points", va="top", **SMALL)
         _draw_dimensions(labels, axes, design, view, layout.details_scale)
     _draw_scale_bar(axes, layout.details_scale, unit)
-
-
-def _counter_clockwise(loop: NDArray[np.float64]) -> bool:
-    x, y = loop.T
-    return bool(x @ np.roll(y, -1) > y @ np.roll(x, -1))
 
 
 def _shapes(design: DesignShape, view: View) -> list[NDArray[np.float64]]:
@@ -155,7 +152,7 @@ def _beside(design: DesignShape) -> list[Spot]:
     loop = design.after.loops[0]
     along = _unit(np.roll(loop, -1, axis=0) - np.roll(loop, 1, axis=0))
     normals = np.column_stack((along[:, 1], -along[:, 0]))
-    normals = normals if _counter_clockwise(loop) else -normals
+    normals = normals if signed_area(loop) > 0.0 else -normals
     picked = np.arange(0, len(loop), max(1, len(loop) // 80))
     if len(design.joints):
         away = np.min([np.hypot(*(loop[picked] - joint).T) for joint in design.joints], axis=0)
@@ -171,7 +168,7 @@ def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
 def _draw_dimensions(labels: Labels, axes: Axes, design: DesignShape, view: View, scale: float) -> None:
     """The thinnest and the thickest place: a line across, with the number at one of its ends.
 
-    None is drawn at a joint, where the link is as thick as the joint wants it.
+    None is drawn at a joint, which determines the thickness there.
     """
     thickness = design.after.thickness
     if thickness is None:
@@ -191,12 +188,12 @@ def _draw_dimensions(labels: Labels, axes: Axes, design: DesignShape, view: View
 
 
 def _extremes(thickness: NDArray[np.float64], away: NDArray[np.float64]) -> list[tuple[int, float]]:
-    """Where the link is thinnest and thickest, and how thick; one entry if it has one thickness.
+    """Index and thickness of the thinnest and the thickest place; one entry if the thickness is constant.
 
-    Of places of the same thickness the one that is most ``away``.
+    Of places of the same thickness it is the one that is most ``away``.
     """
     least, most = float(thickness.min()), float(thickness.max())
-    tolerance = 1e-3 * most  # smaller differences are none
+    tolerance = 1e-3 * most  # of equal thicknesses
     extremes = [(thickness <= least + tolerance, least)]
     if most - least > tolerance:
         extremes.append((thickness >= most - tolerance, most))
@@ -226,9 +223,9 @@ def _draw_scale_bar(axes: Axes, scale: float, unit: str) -> None:
     axes.text(length + 0.1 / scale, low, f"{length:g} {unit}", va="center", **SMALL)
 
 
-def _handles(designs: Sequence[DesignShape]) -> dict[str, object]:
+def _handles(designs: Sequence[DesignShape]) -> dict[str, Handle]:
     """Legend handles by their label."""
-    handles: dict[str, object] = {
+    handles: dict[str, Handle] = {
         "before": Patch(fc=_BEFORE, ec=_BEFORE_RIM, lw=0.8, ls=_DASHES),
         "after": Patch(fc=FLEXIBLE, ec=FLEXIBLE_RIM, lw=1.0),
     }

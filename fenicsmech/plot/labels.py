@@ -1,9 +1,10 @@
-"""Labels beside what they name: put where they hide least."""
+"""Labels of parts of a picture, placed where they hide least."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -66,13 +67,13 @@ class Labels:
         self._lines = np.concatenate(dense) if dense else np.empty((0, 2))
         self._taken: list[Bbox] = []
 
-    def add(self, text: str, spots: Sequence[Spot], *, leader: bool = False, **style: object) -> Text:
-        """Put ``text`` at the best of ``spots``, the earlier of equal ones.
+    def add(self, text: str, spots: Sequence[Spot], *, leader: bool = False, **style: Any) -> Text:
+        """Puts ``text`` at the best of ``spots``, the earlier of equal ones.
 
         Args:
             text: the label.
-            spots: where it may go.
-            leader: whether a thin line leads from the anchor to a label that is not right beside it.
+            spots: places tried.
+            leader: whether a thin line connects the anchor with a label that is not right beside it.
             style: of the text.
         """
         label = self._axes.text(0.0, 0.0, text, ha="center", va="center", path_effects=HALO, zorder=9, **style)

@@ -7,10 +7,12 @@ link laid down on the right.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -19,6 +21,7 @@ from fenicsmech.plot.shapes import Arrow, DesignShape, MechanismShape, Panel
 from fenicsmech.plot.style import HEADING, LEGEND, LENGTHS, NAME, TITLE, new_figure, text_size
 
 Reals = NDArray[np.float64]
+Handle: TypeAlias = Artist | tuple[Artist, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +49,7 @@ class Page:
             left += wide + gap
         return cls(figure, tuple(row), LENGTHS.line / height)
 
-    def write(self, title: str, handles: dict[str, object]) -> None:
+    def write(self, title: str, handles: Mapping[str, Handle]) -> None:
         """The heading, and the legend: handles by their label."""
         if title:
             left = self.row[0].get_position().x0
@@ -58,7 +61,7 @@ class Page:
             )  # fmt: skip
 
 
-def legend_width(labels: Sequence[str]) -> float:
+def legend_width(labels: Iterable[str]) -> float:
     """Inches of a legend in one line."""
     return sum(text_size(label, **LEGEND)[0] + LENGTHS.key for label in labels)
 
@@ -71,7 +74,7 @@ class MechanismLayout:
     """An empty picture of mechanisms.
 
     Attributes:
-        page: what to write on.
+        page: the figure.
         axes: one per panel.
         size: diagonal of the mechanism, in the user's unit.
         arrow_scale: length drawn per unit of force.
@@ -95,9 +98,9 @@ def lay_out(panels: Sequence[Panel], *, colour_bar: bool, heading: str, legend: 
     """A figure in which all ``panels`` fit, all with the same limits and the same scale.
 
     Args:
-        panels: what will be drawn.
+        panels: those to be drawn.
         colour_bar: whether room is needed for it.
-        heading: the line above all panels, or nothing.
+        heading: the line above all panels; may be empty.
         legend: the entries in the line below all panels.
     """
     points = np.concatenate([p for panel in panels for p in _extent(panel)])
@@ -110,7 +113,7 @@ def lay_out(panels: Sequence[Panel], *, colour_bar: bool, heading: str, legend: 
 
     widest = min(LENGTHS.panel[0], LENGTHS.row / len(panels))
     low, high, scale = _limits(panels, low, high, arrow_scale, (widest, LENGTHS.panel[1]))
-    # what is slender or small keeps its scale and gets air on both sides
+    # slender and small mechanisms keep their scale and get air on both sides
     lines = text_size(heading, **HEADING)[0], legend_width(legend)
     titles = (text_size(panel.title, **TITLE)[0] for panel in panels)
     least = max(LENGTHS.smallest, max(lines) / len(panels), *titles)
@@ -197,7 +200,7 @@ class DesignLayout:
     """An empty picture of a design.
 
     Attributes:
-        page: what to write on.
+        page: the figure.
         place: axes of the mechanism.
         place_scale: its inches per unit of length.
         details: axes of the links laid down, in the same unit; None for a single link.
@@ -317,12 +320,12 @@ def _scale(size: Reals, largest: tuple[float, float]) -> float:
 
 
 def _corners(design: DesignShape) -> Reals:
-    return np.concatenate((*design.before.loops, *design.after.loops, design.joints))
+    return np.concatenate([*design.before.loops, *design.after.loops, design.joints])
 
 
 def _lay_down(design: DesignShape) -> Reals:
     """(2, 2) the rotation that turns a link's longest direction to x, by less than a quarter turn or little more."""
     _, axes = np.linalg.eigh(np.cov(design.before.loops[0].T))
     along = axes[:, 1]
-    x, y = along if along @ (1.0, 0.5) >= 0.0 else -along  # what points up or right before points right after
+    x, y = along if along @ (1.0, 0.5) >= 0.0 else -along  # directions up or right become right
     return np.array([[x, y], [-y, x]])

@@ -1,4 +1,4 @@
-"""The picture of a mechanism: where its links are, how they deform, what acts on them."""
+"""Pictures of a mechanism: its links, their deformation, forces and paths of points."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ from matplotlib.tri import Triangulation
 
 from fenicsmech.errors import DescriptionError
 from fenicsmech.plot.layout import MechanismLayout, arrow_ends, lay_out
-from fenicsmech.plot.outlines import path_of, rim
+from fenicsmech.plot.outlines import path_of
 from fenicsmech.plot.shapes import Arrow, FlexibleShape, MechanismShape, Panel, RigidShape
 from fenicsmech.plot.style import FLEXIBLE, FLEXIBLE_RIM, HALO, PALETTE, draw_pin, house_style, save_png
+from fenicsmech.polygons import edge_loops
 
 _RIGID, _RIGID_RIM = "#c9ccd1", "#6b7078"
 _FIXED, _FIXED_RIM, _FIXED_HATCH = "#565b63", "#2e3238", "#7d838d"
@@ -41,7 +42,7 @@ def draw_configurations(
     colour_limits: tuple[float, float] | None = None,
     unit: str = "mm",
 ) -> None:
-    """Draw mechanisms side by side, with the same limits, scale of forces and colours.
+    """Draws mechanisms side by side, with the same limits, scale of forces and colours.
 
     The undeformed state is a pale outline under the deformed one. Flexible links are orange or coloured by their
     values, rigid links grey, fixed ones dark and hatched; the largest force has the longest arrow.
@@ -57,8 +58,7 @@ def draw_configurations(
         unit: of lengths, for the axes.
 
     Raises:
-        DescriptionError: there is no panel or nothing in them, the colour limits are not in order, or the name does
-            not end in .png.
+        DescriptionError: the panels are empty, the colour limits are not in order, or the name does not end in .png.
     """
     if not any(s.flexible or s.rigid or s.pins for panel in panels for s in (panel.undeformed, *panel.deformed)):
         raise DescriptionError(f"picture '{path}'", "there is nothing to draw", "Give at least one shape")
@@ -133,7 +133,7 @@ def _rim(shape: FlexibleShape) -> Outline:
     corners = shape.points[shape.triangles]
     (ax, ay), (bx, by) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
     turned = np.where((ax * by < ay * bx)[:, None], shape.triangles[:, [0, 2, 1]], shape.triangles)
-    return path_of(shape.points[loop] for loop in rim(turned))
+    return path_of(shape.points[loop] for loop in edge_loops(turned))
 
 
 def _draw_rigid(axes: Axes, shape: RigidShape) -> None:
@@ -190,7 +190,7 @@ def _draw_colour_bar(layout: MechanismLayout, norm: Normalize, values: np.ndarra
 
 
 def _legend(panels: Sequence[Panel]) -> dict[str, str]:
-    """Colours of the labelled traces; a label that several panels share appears once."""
+    """Colours of the labelled traces; a label of several panels appears once."""
     return {
         trace.label: _trace_colour(index) for panel in panels for index, trace in enumerate(panel.traces) if trace.label
     }

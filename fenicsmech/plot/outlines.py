@@ -1,4 +1,4 @@
-"""Outlines: of a rigid link from its joints, of a solid mesh seen from above, the rim of a triangle mesh."""
+"""Outlines: of a rigid link from its joints, of a solid mesh seen from above."""
 
 from __future__ import annotations
 
@@ -83,38 +83,6 @@ def plan_view(points: ArrayLike, tets: ArrayLike) -> PlanView:
     if not top.any():
         raise DescriptionError("plan view of a solid mesh", "no face looks towards +z", "Extrude planar links along z")
     return PlanView(triangles=faces[top], cells=owner[top])
-
-
-def rim(triangles: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """The closed loops of edges that belong to one triangle only, outer rims and holes alike.
-
-    Args:
-        triangles: (m, 3) indices of vertices; loops follow their orientation when it is consistent.
-
-    Returns:
-        one array of vertex indices per loop, not closed.
-    """
-    edges = triangles[:, ((0, 1), (1, 2), (2, 0))].reshape(-1, 2)
-    _, first, count = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
-    edges = edges[np.sort(first[count == 1])]
-    at: dict[int, list[int]] = {}
-    for index, ends in enumerate(edges.tolist()):
-        for end in ends:
-            at.setdefault(end, []).append(index)
-    unused = dict.fromkeys(range(len(edges)))
-    loops = []
-    while unused:
-        start, vertex = edges[next(iter(unused))].tolist()
-        unused.pop(next(iter(unused)))
-        loop = [start]
-        while vertex != start:
-            loop.append(vertex)
-            index = next(k for k in at[vertex] if k in unused)  # exists: every vertex of a rim has an even degree
-            unused.pop(index)
-            one, other = edges[index].tolist()
-            vertex = other if one == vertex else one
-        loops.append(np.array(loop))
-    return loops
 
 
 def path_of(loops: Iterable[Reals]) -> Path:

@@ -1,9 +1,9 @@
-"""Records that pictures are made of: planar shapes of mechanisms and designs, in the user's unit of length."""
+"""The content of pictures: planar shapes of mechanisms and designs, in the user's unit of length."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,10 @@ from fenicsmech.checks import index_array, real_array
 from fenicsmech.errors import DescriptionError
 
 Reals = NDArray[np.float64]
+
+
+def _no_points() -> Reals:
+    return np.empty((0, 2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,12 +112,11 @@ class Trace:
 
     points: Reals
     label: str = ""
-    marks: Reals | None = None
+    marks: Reals = field(default_factory=_no_points)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", real_array(f"points of trace '{self.label}'", self.points, None, 2))
-        marks = np.empty((0, 2)) if self.marks is None else self.marks
-        object.__setattr__(self, "marks", real_array(f"marks of trace '{self.label}'", marks, None, 2))
+        object.__setattr__(self, "marks", real_array(f"marks of trace '{self.label}'", self.marks, None, 2))
 
 
 @dataclass(frozen=True)
@@ -150,31 +153,29 @@ class LinkOutline:
 
     Args:
         loops: (n, 2) polygons, closed by themselves, in any orientation: the outer rim, then its holes.
-        centreline: (n, 2) points along the link, or None.
+        centreline: (n, 2) points along the link.
         thickness: (n,) thickness in the plane at the points of the centreline, or None.
-        controls: (k, 2) control points of the centreline, or None.
+        controls: (k, 2) control points of the centreline.
 
     Raises:
-        DescriptionError: no outline, the arrays do not fit each other, or a value that cannot be drawn.
+        DescriptionError: no outline, the arrays do not fit each other, or a value that is not finite.
     """
 
     loops: Sequence[Reals]
-    centreline: Reals | None = None
+    centreline: Reals = field(default_factory=_no_points)
     thickness: Reals | None = None
-    controls: Reals | None = None
+    controls: Reals = field(default_factory=_no_points)
 
     def __post_init__(self) -> None:
         loops = tuple(real_array("loop of a link's outline", loop, None, 2) for loop in self.loops)
         if not loops:
-            raise DescriptionError("outline of a link", "there is no loop", "Give its outer rim first, then its holes")
+            raise DescriptionError("outline of a link", "there are no loops", "Give its outer rim, then its holes")
         for loop in loops:
             if len(loop) < 3:
                 raise DescriptionError("loop of a link's outline", f"{len(loop)} point(s) given", "Give at least 3")
         object.__setattr__(self, "loops", loops)
         for name, part in (("centreline", "centreline of a link"), ("controls", "control points of a link")):
-            given = getattr(self, name)
-            points = np.empty((0, 2)) if given is None else given
-            object.__setattr__(self, name, real_array(part, points, None, 2))
+            object.__setattr__(self, name, real_array(part, getattr(self, name), None, 2))
         if self.thickness is not None:
             thickness = real_array("thickness along a link's centreline", self.thickness, len(self.centreline))
             if not (len(thickness) > 1 and thickness.min() > 0.0):
@@ -193,8 +194,7 @@ class DesignShape:
     name: str
     before: LinkOutline
     after: LinkOutline
-    joints: Reals | None = None
+    joints: Reals = field(default_factory=_no_points)
 
     def __post_init__(self) -> None:
-        joints = np.empty((0, 2)) if self.joints is None else self.joints
-        object.__setattr__(self, "joints", real_array(f"joints of link '{self.name}'", joints, None, 2))
+        object.__setattr__(self, "joints", real_array(f"joints of link '{self.name}'", self.joints, None, 2))

@@ -1,7 +1,4 @@
-"""The look all pictures share, the lengths they are laid out with, and the way a figure becomes a PNG file.
-
-There is no display and no state of pyplot.
-"""
+"""The common look of all pictures, the lengths of their layouts, and PNG files, without a display or pyplot."""
 
 from __future__ import annotations
 
@@ -9,6 +6,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -27,11 +25,11 @@ INK, MUTED = "#333333", "#777777"
 FLEXIBLE, FLEXIBLE_RIM = "#f39c3d", "#a85b0b"
 PALETTE = ("#2166ac", "#d95f02", "#1b9e77", "#b2182b", "#7570b3", "#8c6d31")
 HALO = (patheffects.withStroke(linewidth=2.5, foreground="white"),)
-HEADING = {"fontsize": 11.5, "fontweight": "bold"}
-TITLE = {"fontsize": 10.5, "fontweight": "bold"}
-NAME = {"fontsize": 9.5, "fontweight": "bold"}
-LEGEND = {"fontsize": 9.0}
-SMALL = {"fontsize": 8.5}
+HEADING: dict[str, Any] = {"fontsize": 11.5, "fontweight": "bold"}
+TITLE: dict[str, Any] = {"fontsize": 10.5, "fontweight": "bold"}
+NAME: dict[str, Any] = {"fontsize": 9.5, "fontweight": "bold"}
+LEGEND: dict[str, Any] = {"fontsize": 9.0}
+SMALL: dict[str, Any] = {"fontsize": 8.5}
 
 
 @dataclass(frozen=True)
@@ -46,10 +44,10 @@ class Lengths:
         right, top: margins.
         line: height of a line of text.
         padding: air around a mechanism.
-        gap: between panels that share an axis.
-        bar, bar_room: width of a colour bar, and of all that it needs.
+        gap: between panels with a common axis.
+        bar, bar_room: width of a colour bar, without and with its numbers and label.
         key: line and gap of one entry of a legend.
-        longest_arrow: relative to the mechanism's diagonal.
+        longest_arrow: length of the longest arrow, relative to the mechanism's diagonal.
         details: largest width and height of all links laid down, unless they would be smaller than in place.
         details_gap: between the mechanism and the links laid down, and between these.
         details_padding: air around a mechanism whose links have names beside them.
@@ -93,7 +91,7 @@ LENGTHS = Lengths()
 
 
 def house_style() -> AbstractContextManager[None]:
-    """Everything drawn inside this context has the look of the package's figures."""
+    """A context in which figures have the look of the package."""
     return matplotlib.rc_context(
         {
             "font.family": "sans-serif",
@@ -129,13 +127,13 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
-def text_size(text: str, **style: object) -> tuple[float, float]:
+def text_size(text: str, **style: Any) -> tuple[float, float]:
     """Width and height of ``text`` in inches, in the look of the figures."""
     return _text_size(text, tuple(style.items()))
 
 
 @cache
-def _text_size(text: str, style: tuple[tuple[str, object], ...]) -> tuple[float, float]:
+def _text_size(text: str, style: tuple[tuple[str, Any], ...]) -> tuple[float, float]:
     with house_style():
         figure = new_figure(1.0, 1.0)
         extent = figure.text(0.0, 0.0, text, **dict(style)).get_window_extent(figure.canvas.get_renderer())
@@ -143,12 +141,12 @@ def _text_size(text: str, style: tuple[tuple[str, object], ...]) -> tuple[float,
 
 
 def open_frame(axes: Axes) -> None:
-    """Keep only the left and the bottom line of the frame."""
+    """Keeps only the left and the bottom line of the frame."""
     axes.spines[["top", "right"]].set_visible(False)
 
 
 def draw_pin(axes: Axes, at: ArrayLike, radius: float, *, welded: bool = False) -> None:
-    """Draw a joint at ``at`` (2,): a ring with a dot or, of a weld, a square; over all but arrows and labels."""
+    """Draws a joint at ``at`` (2,): a ring with a dot or, of a weld, a square; over all but arrows and labels."""
     if welded:
         side = 1.4 * radius
         axes.add_patch(Rectangle(np.subtract(at, 0.5 * side), side, side, fc=INK, ec="white", lw=1.0, zorder=6))
@@ -158,12 +156,12 @@ def draw_pin(axes: Axes, at: ArrayLike, radius: float, *, welded: bool = False) 
 
 
 def save_png(figure: Figure, path: str | Path) -> None:
-    """Write ``figure`` to ``path``, atomically and without a time stamp: equal figures give equal files.
+    """Writes ``figure`` to ``path``, atomically and without a time stamp: equal figures give equal files.
 
     Raises:
         DescriptionError: the name does not end in .png.
     """
     if Path(path).suffix.lower() != ".png":
-        raise DescriptionError(f"picture '{path}'", "only PNG files are drawn", "Let the name end in .png")
+        raise DescriptionError(f"picture '{path}'", "only PNG files are written", "Give a name that ends in .png")
     with atomic_write(path, binary=True) as file:
         figure.canvas.print_png(file, metadata={"Software": None})

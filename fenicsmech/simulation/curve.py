@@ -17,7 +17,7 @@ from fenicsmech.equilibrium import Iteration, LoadControl, MotorControl, NotConv
 from fenicsmech.errors import DescriptionError, EquilibriumError
 from fenicsmech.estimates import AccuracyOptions, Equilibrium, ErrorKind
 from fenicsmech.files import write_csv
-from fenicsmech.mechanism import Configuration, Force, Joint, Leader, Output, Units
+from fenicsmech.mechanism import Configuration, Force, Joint, Output, PrescribedPart, Units
 from fenicsmech.multibody import Freedom
 from fenicsmech.plot import CurveSeries, Panel, Trace, draw_configurations, plot_curve
 from fenicsmech.simulation.buckling import BucklingLoad, BucklingPosition, ModeShape, SoftMode, mode_shape
@@ -45,7 +45,7 @@ class Curve:
             was followed.
     """
 
-    part: Leader
+    part: PrescribedPart
     configuration: Configuration
     freedom: Freedom
     frames: tuple[Frame, ...]

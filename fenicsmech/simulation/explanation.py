@@ -100,7 +100,8 @@ def _simulated(model: MechanismModel) -> tuple[str, ...]:
     mechanism, elastic = model.mechanism, model.elastic
     kinds = sorted({joint.kind.name for joint in mechanism.joints})
     links = ", ".join(
-        f"{link.name} ({link.material.name}, {type(link.material.law).__name__})" for link in mechanism.flexible_links
+        f"{link.name} ({material.name}, {type(material.law).__name__})"
+        for link, material in zip(mechanism.flexible_links, model.materials, strict=True)
     )
     mixed = [link.name for link, own in zip(mechanism.flexible_links, model.mixed, strict=True) if own]
     items = [
@@ -156,8 +157,8 @@ def _compressibility_hint(model: MechanismModel, limit: float) -> Hint | None:
     elastic, links = model.elastic, model.mechanism.flexible_links
     stiff = [
         link.name
-        for link, own in zip(links, model.mixed, strict=True)
-        if link.material.law.nu > limit and elastic.model.confined and not own
+        for link, material, own in zip(links, model.materials, model.mixed, strict=True)
+        if material.law.nu > limit and elastic.model.confined and not own
     ]
     if not stiff:
         return None
@@ -224,5 +225,6 @@ def _slenderness(model: MechanismModel, link: FlexibleLink, frame: Frame) -> tup
     length = hypot(*(last - first))
     forces = [frame.reactions[joint.name].force[:2] for joint in joints if joint.name in frame.reactions]
     load = max((float(np.linalg.norm(force)) for force in forces), default=0.0)
-    critical = pi**2 * link.material.law.E * link.shape.thickness * link.shape.depth**3 / 12.0 / length**2
+    young = model.materials[model.mechanism.flexible_links.index(link)].law.E
+    critical = pi**2 * young * link.shape.thickness * link.shape.depth**3 / 12.0 / length**2
     return load / critical, link.name

@@ -13,13 +13,23 @@ from mpi4py import MPI
 from fenicsmech.clock import Clock
 from fenicsmech.collective import from_one
 from fenicsmech.continuation import ArcSteps, Hermite, Predictor
-from fenicsmech.effects import holding
+from fenicsmech.effects import spring_potentials
 from fenicsmech.elasticity import Formulation, MixedFormulation, Quadrature
 from fenicsmech.equilibrium import EquilibriumSolver, Iteration, PrimalDualNewton
 from fenicsmech.errors import DescriptionError
 from fenicsmech.estimates import AccuracyControl, Choice, Estimates, FidelityLevel, LevelErrors
 from fenicsmech.log import Progress, Silent
-from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Leader, Mechanism, Output, Scene
+from fenicsmech.mechanism import (
+    DRAWN,
+    Configuration,
+    FlexibleLink,
+    Force,
+    Material,
+    Mechanism,
+    Output,
+    PrescribedPart,
+    Scene,
+)
 from fenicsmech.meshing import radius_ratios
 from fenicsmech.model import Fidelity, MechanismModel, read_fidelity
 from fenicsmech.multibody import Linkage
@@ -158,7 +168,7 @@ class Simulation:
 
     def follow(
         self,
-        part: Leader,
+        part: PrescribedPart,
         *,
         until: Until,
         configuration: Configuration = DRAWN,
@@ -229,7 +239,9 @@ class Simulation:
         Raises:
             AssemblyError: one of the configurations does not assemble, or its motors strain the links.
         """
-        return unloaded_positions(self.linkage, part, configurations, holding(self.scene.effects, self.linkage))
+        return unloaded_positions(
+            self.linkage, part, configurations, spring_potentials(self.scene.effects, self.linkage)
+        )
 
     # -- others like this one ------------------------------------------------------------------------------------
 
@@ -254,6 +266,20 @@ class Simulation:
         other = copy(self)
         other._design, other._control = values.copy(), None
         return other
+
+    def with_material(self, drawn: Material, other: Material) -> Simulation:
+        """The same scene at the same fidelity with links of another material; the mesh is shared.
+
+        Args:
+            drawn: the material of some links.
+            other: what these links are made of instead; effects, as the densities of ``Gravity``, keep what was drawn.
+
+        Raises:
+            DescriptionError: no link is made of ``drawn``.
+        """
+        simulation = copy(self)
+        simulation._discretisation, simulation._control = self._discretisation.with_material(drawn, other), None
+        return simulation
 
     def on(self, comm: MPI.Comm) -> Simulation:
         """The same scene at the same fidelity for other processes, as drawn."""
@@ -296,7 +322,7 @@ class Simulation:
             rest, dim = rest_vertices(self.model), self.fidelity.model.dim
         return from_one(self.comm, lambda: dim / float(radius_ratios(rest, self.model.mesh.cells).min()))
 
-    def newton(self, part: Leader, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
+    def newton(self, part: PrescribedPart, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
         """The solver for what changes and some constant forces, kept for all configurations."""
         return self._discretisation.newton(part, others)
 
@@ -346,7 +372,7 @@ class Simulation:
                 "Make a new Simulation",
             )
 
-    def _check_chosen(self, part: Leader) -> None:
+    def _check_chosen(self, part: PrescribedPart) -> None:
         """Refuses to follow anything as long as the accuracy asked for has chosen nothing."""
         if self._control is not None and self.choice is None:
             raise DescriptionError(

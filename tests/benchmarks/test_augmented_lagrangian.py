@@ -60,10 +60,10 @@ def test_rounding_of_redundant_hinges_ends_iterations():
     strut = made.flexible("strut", fm.strip([(0, 0), (22, 16), (50, 45)], thickness=3.0, depth=6.0), plastic)
     made.revolute(base, left, at=(0, 0))
     made.revolute(base, right, at=(55, 0))
-    made.revolute(left, coupler, at=(0, 40), radius=3.0)
-    made.revolute(coupler, right, at=(50, 45), radius=3.0)
-    made.revolute(base, strut, at=(0, 0), radius=3.0)
-    made.revolute(strut, right, at=(50, 45), radius=3.0)
+    made.revolute(left, coupler, at=(0, 40), interface_radius=3.0)
+    made.revolute(coupler, right, at=(50, 45), interface_radius=3.0)
+    made.revolute(base, strut, at=(0, 0), interface_radius=3.0)
+    made.revolute(strut, right, at=(50, 45), interface_radius=3.0)
     push = made.force(on=left, at=(0, 40), direction=(1, 0))
     found = []
     for solver in (fm.PrimalDualNewton(), AugmentedLagrangian()):

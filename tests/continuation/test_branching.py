@@ -104,8 +104,8 @@ def test_two_columns_that_buckle_at_once_each_have_their_branches():
     for y in (0.0, 20.0):
         shape = fm.strip([(0, y), (LENGTH, y)], thickness=THICKNESS, depth=DEPTH)
         strut = mechanism.flexible(f"strut at {y:g}", shape, fm.Material("steel", YOUNG, 0.3))
-        mechanism.revolute(base, strut, at=(0, y), radius=0.5 * THICKNESS)
-        mechanism.revolute(strut, head, at=(LENGTH, y), radius=0.5 * THICKNESS)
+        mechanism.revolute(base, strut, at=(0, y), interface_radius=0.5 * THICKNESS)
+        mechanism.revolute(strut, head, at=(LENGTH, y), interface_radius=0.5 * THICKNESS)
     mechanism.prismatic(base, head, at=(LENGTH, 10), axis=(1, 0))
     push = mechanism.force(on=head, at=(LENGTH, 10), direction=(-1, 0))
     simulation = fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=THICKNESS, comm=MPI.COMM_SELF)

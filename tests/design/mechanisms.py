@@ -112,7 +112,7 @@ def pinned_links(unit: float = 1.0) -> Case:
         shape = fm.strip(scaled(centreline), thickness=THICKNESS / unit, depth=DEPTH / unit)
         links.append(mechanism.flexible(name, shape, PLASTIC))
         for at in scaled(joints):
-            mechanism.revolute(base, links[-1], at=at, radius=RADIUS / unit)
+            mechanism.revolute(base, links[-1], at=at, interface_radius=RADIUS / unit)
     tight = {"thickness": (2.8 / unit, 3.2 / unit), "bend": 0.01}
     return Case(fm.Scene(mechanism), [fm.SplineDesign(link, 3, **tight) for link in links])
 
@@ -123,7 +123,7 @@ def bow(*forces: float) -> Case:
     base = mechanism.rigid("base", fixed=True)
     arch = mechanism.flexible("arch", fm.strip([(0, 0), (30, 14), (60, 0)], thickness=4.0, depth=8.0), PLASTIC)
     for at in ((0, 0), (60, 0)):
-        mechanism.revolute(base, arch, at=at, radius=3.0)
+        mechanism.revolute(base, arch, at=at, interface_radius=3.0)
     push = mechanism.force(on=arch, at=(25, 13), direction=(0.6, -0.8))
     return Case(
         fm.Scene(mechanism), [fm.SplineDesign(arch, 2)], [fm.Target(push, force, force / 40.0) for force in forces]
@@ -139,10 +139,10 @@ def strained(*forces: float, angle: float = 0.1) -> Case:
     brace = mechanism.flexible("brace", fm.strip([(80, 0), (64, 20), (40, 30)], thickness=3.0, depth=6.0), PLASTIC)
     shaft = mechanism.revolute(base, crank, at=(0, 0))
     mechanism.revolute(base, rocker, at=(40, 0))
-    mechanism.revolute(crank, coupler, at=(0, 30), radius=2.5)
-    mechanism.revolute(coupler, rocker, at=(40, 30), radius=2.5)
-    mechanism.revolute(rocker, brace, at=(40, 30), radius=2.5)
-    mechanism.revolute(brace, base, at=(80, 0), radius=2.5)
+    mechanism.revolute(crank, coupler, at=(0, 30), interface_radius=2.5)
+    mechanism.revolute(coupler, rocker, at=(40, 30), interface_radius=2.5)
+    mechanism.revolute(rocker, brace, at=(40, 30), interface_radius=2.5)
+    mechanism.revolute(brace, base, at=(80, 0), interface_radius=2.5)
     motor = mechanism.motor(shaft)
     push = mechanism.force(on=rocker, at=(40, 30), direction=(1, 0))
     scene = fm.Scene(mechanism)
@@ -160,8 +160,8 @@ def turned_beam(*forces: float, angle: float = 0.75 * np.pi) -> Case:
     base, hub, hand = mechanism.rigid("base", fixed=True), mechanism.rigid("hub"), mechanism.rigid("hand")
     beam = mechanism.flexible("beam", fm.strip([(0, 0), (25, 8), (50, 10)], thickness=3.0, depth=6.0), PLASTIC)
     motor = mechanism.motor(mechanism.revolute(base, hub, at=(0, 0)))
-    mechanism.weld(hub, beam, at=(0, 0), radius=2.5)
-    mechanism.weld(beam, hand, at=(50, 10), radius=2.5)
+    mechanism.weld(hub, beam, at=(0, 0), interface_radius=2.5)
+    mechanism.weld(beam, hand, at=(50, 10), interface_radius=2.5)
     push = mechanism.force(on=hand, at=(52, 10), direction=(0, 1))
     scene = fm.Scene(mechanism)
     turned = scene.configuration("turned", {motor: angle})

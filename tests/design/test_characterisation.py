@@ -47,6 +47,27 @@ def test_modulus_of_exact_data_is_found_again():
     assert fit.curves[0].displacements == pytest.approx(exact(), rel=1e-6)
 
 
+def test_a_fit_leaves_simulations_and_their_curves_as_they_are():
+    simulation, push = bench(GUESS)
+    before = simulation.load_displacement(push, forces=FORCES)
+    fit = fit_modulus([Experiment(simulation, push, FORCES, exact())], GUESS)
+    assert simulation.load_displacement(push, forces=FORCES).displacements == pytest.approx(
+        before.displacements, rel=1e-12
+    )
+    (soft, soft_push), (stiff, stiff_push) = bench(GUESS), bench(fit.material)
+    wanted = soft.load_displacement(soft_push, forces=FORCES).error_estimates()
+    assert before.error_estimates() == pytest.approx(wanted, rel=1e-8)
+    wanted = stiff.load_displacement(stiff_push, forces=FORCES).error_estimates()
+    assert fit.curves[0].error_estimates() == pytest.approx(wanted, rel=1e-4)
+
+
+def test_a_simulation_goes_on_with_the_fitted_material():
+    simulation, push = bench(GUESS)
+    fit = fit_modulus([Experiment(simulation, push, FORCES, exact())], GUESS)
+    fitted = simulation.with_material(GUESS, fit.material)
+    assert fitted.load_displacement(push, forces=FORCES).displacements == pytest.approx(exact(), rel=1e-6)
+
+
 def test_all_links_of_the_material_change_together():
     fit = fit_modulus([experiment(exact(samples=2), samples=2)], GUESS)
     assert fit.youngs_modulus == pytest.approx(1500.0, rel=1e-6)

@@ -48,8 +48,8 @@ def soft_truss() -> Case:
     diagonal = mechanism.flexible("diagonal", case.designs[0].link.shape, soft)
     for a, b, at in ((base, left, (0, 0)), (base, right, (40, 0)), (left, tip, (0, 60)), (right, tip, (40, 60))):
         mechanism.revolute(a, b, at=at)
-    mechanism.revolute(base, diagonal, at=(0, 0), radius=3.0)
-    mechanism.revolute(diagonal, tip, at=(40, 60), radius=3.0)
+    mechanism.revolute(base, diagonal, at=(0, 0), interface_radius=3.0)
+    mechanism.revolute(diagonal, tip, at=(40, 60), interface_radius=3.0)
     push = mechanism.force(on=tip, at=(20, 70), direction=(1, 0), name="push on tip")
     return Case(fm.Scene(mechanism), [fm.SplineDesign(diagonal, 3, thickness=(1.5, 6.0))], [fm.Target(push, 0.4, 1.8)])
 

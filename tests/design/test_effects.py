@@ -19,8 +19,8 @@ def two_arms() -> tuple[fm.Scene, list[fm.FlexibleLink], list[fm.Force]]:
     for name, y in (("upper", 20.0), ("lower", 0.0)):
         hand = mechanism.rigid(f"{name} hand")
         arm = mechanism.flexible(name, fm.strip([(0, y), (20, y + 3), (40, y)], thickness=3.0, depth=6.0), PLASTIC)
-        mechanism.weld(base, arm, at=(0, y), radius=2.0)
-        mechanism.weld(arm, hand, at=(40, y), radius=2.0)
+        mechanism.weld(base, arm, at=(0, y), interface_radius=2.0)
+        mechanism.weld(arm, hand, at=(40, y), interface_radius=2.0)
         links.append(arm)
         forces.append(mechanism.force(on=hand, at=(40, y), direction=(0, -1), name=f"push {name}"))
     return fm.Scene(mechanism), links, forces

@@ -73,7 +73,7 @@ def sled(effects: MakeEffects, *, space: str = "plane-stress", angle: float = 0.
 def _idle_leaf(mechanism: fm.Mechanism, base) -> None:
     """A flexible link without load: a simulation needs one."""
     leaf = mechanism.flexible("leaf", fm.strip([(0, -30), (20, -30)], thickness=6.0, depth=6.0), PLASTIC)
-    mechanism.weld(base, leaf, at=(3, -30), radius=2.0)
+    mechanism.weld(base, leaf, at=(3, -30), interface_radius=2.0)
 
 
 def _simulate(mechanism, effects, joint: Joint, force: Force, space: str, comm: MPI.Comm) -> Loaded:

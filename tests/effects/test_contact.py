@@ -119,8 +119,8 @@ def test_a_rigid_link_rests_on_its_points(space):
     leaf = mechanism.flexible(
         "leaf", fm.strip([(-40, 0), (0, 0)], thickness=1.0, depth=2.0), fm.Material("foam", 200.0, 0.3)
     )
-    mechanism.weld(base, leaf, at=(-40, 0), radius=1.0)
-    mechanism.weld(leaf, table, at=(0, 0), radius=1.0)
+    mechanism.weld(base, leaf, at=(-40, 0), interface_radius=1.0)
+    mechanism.weld(leaf, table, at=(0, 0), interface_radius=1.0)
     push = mechanism.force(on=table, at=(15, -8), direction=(0, -1))  # below the feet, where it steadies
     contact = Contact(table, HalfPlane((0, -3), (0, 1)), stiffness=50.0, points=[(10, -3.01), (30, -3.01)])
     simulation = fm.Simulation(fm.Scene(mechanism, effects=[contact]), space=space, size=2.0)
@@ -135,7 +135,7 @@ def test_descriptions_without_sense_are_refused():
     base = mechanism.rigid("base", fixed=True)
     link = mechanism.flexible("link", fm.strip([(0, 0), (20, 0)], thickness=2.0, depth=2.0), fm.ONYX)
     stranger = fm.Mechanism("other").rigid("stranger")
-    mechanism.weld(base, link, at=(0, 0), radius=1.0)
+    mechanism.weld(base, link, at=(0, 0), interface_radius=1.0)
     floor = HalfPlane((0, -5), (0, 1))
     refused(lambda: Contact(base, floor), part="'base'", problem="points only", remedy="points=")
     refused(lambda: Contact(base, floor, points=[(0, 0)]), part="'base'", problem="points only", remedy="stiffness=")

@@ -24,7 +24,7 @@ def strip(space: str, obstacle, order: int) -> tuple[Contact, object]:
     mechanism = fm.Mechanism("strip")
     base = mechanism.rigid("base", fixed=True)
     link = mechanism.flexible("link", fm.strip([(0, 0), (20, 0)], thickness=2.0, depth=1.5), fm.ONYX)
-    mechanism.weld(base, link, at=(0, 0), radius=1.0)
+    mechanism.weld(base, link, at=(0, 0), interface_radius=1.0)
     contact = Contact(link, obstacle)
     model = fm.Simulation(fm.Scene(mechanism, effects=[contact]), space=space, size=2.0, order=order).model
     fields = model.fields
@@ -56,8 +56,8 @@ def test_points_of_rigid_links_have_exact_gradients_and_hessians(dim, obstacle):
     mechanism = fm.Mechanism("pair")
     base, arm = mechanism.rigid("base", fixed=True), mechanism.rigid("arm")
     link = mechanism.flexible("link", fm.strip([(0, 0), (20, 0)], thickness=2.0, depth=2.0), fm.ONYX)
-    mechanism.weld(base, link, at=(0, 0), radius=1.0)
-    mechanism.weld(link, arm, at=(20, 0), radius=1.0)
+    mechanism.weld(base, link, at=(0, 0), interface_radius=1.0)
+    mechanism.weld(link, arm, at=(20, 0), interface_radius=1.0)
     linkage = build_linkage(mechanism, dim)
     # the last point stays clear of the obstacle
     contact = Contact(arm, OBSTACLES[obstacle], 7.0, points=[(8.5, -1.2), (9.8, -1.3), (9.0, 3.0)])

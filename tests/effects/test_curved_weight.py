@@ -17,8 +17,8 @@ def test_weight_and_energy_are_integrated_exactly_in_curved_cells(space):
     wall = rig.rigid("wall", fixed=True)
     nylon = fm.Material("nylon", 2000.0, 0.3)
     bow = rig.flexible("bow", fm.strip([(0, 0), (14, 12), (20, 30)], thickness=3.0, depth=4.0), nylon)
-    rig.revolute(wall, bow, at=(0, 0), radius=2.0)
-    rig.revolute(wall, bow, at=(20, 30), radius=2.0)
+    rig.revolute(wall, bow, at=(0, 0), interface_radius=2.0)
+    rig.revolute(wall, bow, at=(20, 30), interface_radius=2.0)
     rig.force(on=bow, at=(14, 12), direction=(1, 0))
     gravity = Gravity((0, -G), {nylon: DENSITY})
     body = fm.Simulation(fm.Scene(rig, effects=[gravity]), space=space, size=4.0, comm=MPI.COMM_SELF).model.elastic

@@ -36,13 +36,13 @@ class Bars:
         for name, height in (("lower", 0.0), ("upper", 9.0)):
             shape = fm.strip([(0, height), (LENGTH, height)], thickness=THICKNESS, depth=DEPTH)
             self.bars.append(mechanism.flexible(name, shape, fm.ONYX))
-            mechanism.weld(base, self.bars[-1], at=(0.5 * LENGTH, height), radius=1.0)
+            mechanism.weld(base, self.bars[-1], at=(0.5 * LENGTH, height), interface_radius=1.0)
         self.model = fm.Simulation(fm.Scene(mechanism), space=space, size=4.0, comm=comm).model
 
     def fields(self, *faces: Faces) -> LinkFields:
         mesh = self.model.mesh
         body = self.model.elastic
-        found = find_boundaries(mesh.mesh, self.bars, mesh.link, faces, half=body.model.symmetric)
+        found = find_boundaries(mesh.mesh, self.bars, mesh.link, faces, half=body.model.half)
         return LinkFields(tuple(self.bars), body, found)
 
     def area(self, fields: LinkFields, part: Faces) -> float:

@@ -52,8 +52,8 @@ def test_a_pendulum_on_a_flexible_hinge_hangs_where_its_force_and_its_weight_bal
     soft = fm.Material("foam", 1e-3, 0.3)
     spring = rig.flexible("spring", fm.strip([(0, -60), (0, -30)], thickness=2.0, depth=2.0), soft)
     rig.revolute(wall, rod, at=(0, 0))
-    rig.revolute(wall, spring, at=(0, -60), radius=1.0)
-    rig.revolute(spring, rod, at=(0, -30), radius=1.0)
+    rig.revolute(wall, spring, at=(0, -60), interface_radius=1.0)
+    rig.revolute(spring, rod, at=(0, -30), interface_radius=1.0)
     push = rig.force(on=rod, at=(0, -20), direction=(1, 0))
     mass = 1e-4
     scene = fm.Scene(rig, effects=[Gravity((0, -G), masses={rod: Mass(mass, (0, -10))})])

@@ -45,8 +45,8 @@ def strut(effects_of, *, space: str = "plane-stress", hold: str = "revolute") ->
     mechanism = fm.Mechanism("strut")
     base, head = mechanism.rigid("base", fixed=True), mechanism.rigid("head")
     bar = mechanism.flexible("bar", fm.strip([(0, 0), (40, 0)], thickness=4.0, depth=4.0), PLASTIC)
-    foot = getattr(mechanism, hold)(base, bar, at=(0, 0), radius=1.5)
-    mechanism.revolute(bar, head, at=(40, 0), radius=1.5)
+    foot = getattr(mechanism, hold)(base, bar, at=(0, 0), interface_radius=1.5)
+    mechanism.revolute(bar, head, at=(40, 0), interface_radius=1.5)
     mechanism.prismatic(base, head, at=(40, 0), axis=(1, 0))
     pull = mechanism.force(on=head, at=(40, 0), direction=(1, 0))
     simulation = fm.Simulation(fm.Scene(mechanism, effects=effects_of(foot)), space=space, order=1, size=4.0)
@@ -88,7 +88,7 @@ def test_two_soft_pins_let_a_rigid_column_buckle(space):
     mechanism = fm.Mechanism("column")
     base, column, head = mechanism.rigid("base", fixed=True), mechanism.rigid("column"), mechanism.rigid("head")
     leaf = mechanism.flexible("leaf", fm.strip([(0, -30), (20, -30)], thickness=6.0, depth=6.0), PLASTIC)
-    mechanism.weld(base, leaf, at=(3, -30), radius=2.0)
+    mechanism.weld(base, leaf, at=(3, -30), interface_radius=2.0)
     pins = mechanism.revolute(base, column, at=(0, 0)), mechanism.revolute(column, head, at=(ARM, 0))
     mechanism.prismatic(base, head, at=(ARM, 0), axis=(1, 0))
     push = mechanism.force(on=head, at=(ARM, 0), direction=(-1, 0))
@@ -143,7 +143,7 @@ def test_ranks_agree_on_a_mechanism_with_soft_pins():
     curves = []
     for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
         case = soft_truss(0.1)
-        curves.append(case.simulate(comm=comm).load_displacement(case.targets[0].force_part, forces=[0.1, 0.4]))
+        curves.append(case.simulate(comm=comm).load_displacement(case.targets[0].part, forces=[0.1, 0.4]))
     assert curves[1].displacements == pytest.approx(curves[0].displacements, rel=1e-8)
 
 

@@ -203,7 +203,7 @@ def tower(effects, *, hinged: bool) -> tuple[fm.Simulation, fm.mechanism.Force]:
     base, post = mechanism.rigid("base", fixed=True), mechanism.rigid("post")
     beam = mechanism.flexible("beam", fm.strip([(0, 30), (0, 60)], thickness=3.0, depth=4.0), PLASTIC)
     joint = (mechanism.revolute if hinged else mechanism.weld)(base, post, at=(0, 0))
-    mechanism.weld(post, beam, at=(0, 32), radius=1.5)
+    mechanism.weld(post, beam, at=(0, 32), interface_radius=1.5)
     push = mechanism.force(on=beam, at=(0, 60), direction=(1, 0))
     return fm.Simulation(fm.Scene(mechanism, effects=effects(joint)), space="plane-stress", size=1.5), push
 
@@ -243,7 +243,7 @@ def test_ranks_agree_on_a_mechanism_with_a_spring():
     curves = []
     for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
         case = sprung_truss(lambda hinge: JointSpring(hinge, 200.0, rest=0.02))
-        push = case.targets[0].force_part
+        push = case.targets[0].part
         curves.append(case.simulate(comm=comm).load_displacement(push, forces=[0.1, 0.4]))
     assert curves[1].displacements == pytest.approx(curves[0].displacements, rel=1e-8)
     assert curves[1].stable.tolist() == curves[0].stable.tolist()

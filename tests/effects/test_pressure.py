@@ -108,7 +108,7 @@ def test_a_disc_on_a_rigid_core_shrinks_as_lame_says():
     base = mechanism.rigid("base", fixed=True)
     arcs = [Arc((0, radius), (-radius, 0)), Arc((0, -radius), (radius, 0))]
     disc = mechanism.flexible("disc", fm.outline((radius, 0), arcs, depth=3.0), fm.Material("rubber", YOUNG, POISSON))
-    mechanism.weld(base, disc, at=(0, 0), radius=core)
+    mechanism.weld(base, disc, at=(0, 0), interface_radius=core)
     edge = mechanism.force(on=disc, at=(radius, 0), direction=(-1, 0))
     scene = fm.Scene(mechanism, effects=[Pressure(disc, pressure)])
     simulation = fm.Simulation(scene, space="plane-strain", size=1.0)

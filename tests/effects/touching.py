@@ -59,7 +59,7 @@ def finger(
     base = mechanism.rigid("base", fixed=True)
     strip = fm.strip([(0, 0), (0, 60)], thickness=3.0, depth=6.0)
     link = mechanism.flexible("finger", strip, fm.Material("rubber", 50.0, 0.4))
-    mechanism.weld(base, link, at=(0, 0), radius=3.0)
+    mechanism.weld(base, link, at=(0, 0), interface_radius=3.0)
     pull = mechanism.force(on=link, at=(0, 60), direction=(-1, 0))
     contact = Contact(link, Cylinder(centre, 6.0), stiffness)
     return Touching(_simulation(mechanism, [contact] if active else [], space, size, comm), pull, contact)

@@ -20,8 +20,8 @@ def arch(comm: MPI.Comm = MPI.COMM_SELF, *, space: str = "plane-stress") -> tupl
     mechanism = fm.Mechanism("arch")
     base = mechanism.rigid("base", fixed=True)
     bow = mechanism.flexible("bow", fm.strip(POINTS, thickness=THICKNESS, depth=DEPTH), STEEL)
-    mechanism.revolute(base, bow, at=POINTS[0], radius=0.5 * THICKNESS)
-    mechanism.revolute(base, bow, at=POINTS[-1], radius=0.5 * THICKNESS)
+    mechanism.revolute(base, bow, at=POINTS[0], interface_radius=0.5 * THICKNESS)
+    mechanism.revolute(base, bow, at=POINTS[-1], interface_radius=0.5 * THICKNESS)
     push = mechanism.force(on=bow, at=(0.5 * SPAN, RISE), direction=(0, -1), name="push")
     return fm.Simulation(fm.Scene(mechanism), space=space, size=SIZE[space], comm=comm), push
 

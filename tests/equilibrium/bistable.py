@@ -45,7 +45,7 @@ def four_bar(
     follower = mechanism.flexible("follower", shape, material)
     mechanism.revolute(base, crank, at=(0, 0))
     mechanism.revolute(crank, coupler, at=tuple(KNEE))
-    mechanism.revolute(coupler, follower, at=tuple(PIN), radius=0.5 * THICKNESS)
+    mechanism.revolute(coupler, follower, at=tuple(PIN), interface_radius=0.5 * THICKNESS)
     region = fm.Rectangle(1.5 * THICKNESS, BLOCK)
     mechanism.weld(base, follower, at=tuple(ROOT - (0.0, 0.5 * BLOCK)), region=region)
     push = mechanism.force(on=crank, at=tuple(KNEE), direction=(0, -1), name="push")

@@ -35,8 +35,8 @@ def column(
     base, head = mechanism.rigid("base", fixed=True), mechanism.rigid("head")
     shape = fm.strip([(0, 0), (LENGTH, 0)], thickness=THICKNESS, depth=DEPTH)
     strut = mechanism.flexible("strut", shape, fm.Material("steel", YOUNG, poisson))
-    mechanism.revolute(base, strut, at=(0, 0), radius=0.5 * THICKNESS)
-    mechanism.revolute(strut, head, at=(LENGTH, 0), radius=0.5 * THICKNESS)
+    mechanism.revolute(base, strut, at=(0, 0), interface_radius=0.5 * THICKNESS)
+    mechanism.revolute(strut, head, at=(LENGTH, 0), interface_radius=0.5 * THICKNESS)
     for k in range(slides):
         mechanism.prismatic(base, head, at=(LENGTH + 5.0 * k, 3.0 * k), axis=(1, 0))
     push = mechanism.force(on=head, at=(LENGTH, 0), direction=(-1, 0))

@@ -36,17 +36,17 @@ def crowded(space: str, comm: MPI.Comm = MPI.COMM_SELF, *, rubber: fm.Material |
     mechanism.revolute(base, right, at=(16, 0))
     mechanism.revolute(left, tip, at=(0, 16))
     mechanism.revolute(right, tip, at=(16, 16))
-    mechanism.weld(base, diagonal, at=(0, 0), radius=2.5)
-    mechanism.weld(diagonal, slide, at=(16, 16), radius=2.5)
+    mechanism.weld(base, diagonal, at=(0, 0), interface_radius=2.5)
+    mechanism.weld(diagonal, slide, at=(16, 16), interface_radius=2.5)
     mechanism.prismatic(slide, tip, at=(16, 16), axis=(0.8, 0.6))
     planar = space != "3d"
     if planar:
-        mechanism.revolute(base, leg, at=(8, 0), radius=2.5)
-        mechanism.revolute(leg, tip, at=(8, 16), radius=2.5)
+        mechanism.revolute(base, leg, at=(8, 0), interface_radius=2.5)
+        mechanism.revolute(leg, tip, at=(8, 16), interface_radius=2.5)
         mechanism.revolute(plate, right, at=(20, 8))
     else:
-        mechanism.universal(base, leg, at=(8, 0), axis=(0, 0, 1), radius=2.5)
-        mechanism.spherical(leg, tip, at=(8, 16), radius=2.5)
+        mechanism.universal(base, leg, at=(8, 0), axis=(0, 0, 1), interface_radius=2.5)
+        mechanism.spherical(leg, tip, at=(8, 16), interface_radius=2.5)
         mechanism.cylindrical(plate, right, at=(20, 8), axis=(0, 0.6, 0.8))
         mechanism.planar(plate, tip, at=(24, 12), axis=(0.6, 0, 0.8))
     mechanism.motor(shaft)

@@ -25,8 +25,8 @@ def deep_arch(comm: MPI.Comm = MPI.COMM_SELF) -> tuple[fm.Simulation, Force, flo
     mechanism = fm.Mechanism("deep arch")
     base = mechanism.rigid("base", fixed=True)
     bow = mechanism.flexible("bow", fm.strip(points, thickness=THICKNESS, depth=DEPTH), fm.Material("m", YOUNG, 0.3))
-    mechanism.weld(base, bow, at=points[0], radius=rim)
-    mechanism.revolute(base, bow, at=points[-1], radius=rim)
+    mechanism.weld(base, bow, at=points[0], interface_radius=rim)
+    mechanism.revolute(base, bow, at=points[-1], interface_radius=rim)
     push = mechanism.force(on=bow, at=(0.0, RADIUS), direction=(0, -1), name="push")
     simulation = fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=2.0 * THICKNESS, comm=comm)
     return simulation, push, 1.16 * RADIUS

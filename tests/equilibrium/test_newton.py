@@ -81,7 +81,7 @@ def test_force_that_nothing_resists_is_refused():
     mechanism = fm.Mechanism("sled")
     base, sled = mechanism.rigid("base", fixed=True), mechanism.rigid("sled")
     spring = mechanism.flexible("spring", fm.strip([(0, 0), (40, 0)], thickness=4.0, depth=5.0), RUBBER)
-    mechanism.weld(base, spring, at=(0, 0), radius=2.0)
+    mechanism.weld(base, spring, at=(0, 0), interface_radius=2.0)
     mechanism.prismatic(base, sled, at=(0, 20), axis=(1, 0))
     push = mechanism.force(on=sled, at=(0, 20), direction=(1, 0), name="push")
     simulation = fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=4.0, comm=MPI.COMM_SELF)

@@ -28,8 +28,8 @@ def scaffold() -> tuple[fm.Simulation, Force]:
     base, head = mechanism.rigid("base", fixed=True), mechanism.rigid("head")
     strut, plate = mechanism.rigid("strut"), mechanism.rigid("plate")
     post = mechanism.flexible("post", fm.strip([(0, 0), (4, 16), (0, 30)], thickness=5.0, depth=6.0), RUBBER)
-    mechanism.weld(post, base, at=(0, 0), radius=3.0)  # the ground comes second
-    mechanism.universal(post, head, at=(0, 30), axis=(0, 0, 1), radius=3.0)
+    mechanism.weld(post, base, at=(0, 0), interface_radius=3.0)  # the ground comes second
+    mechanism.universal(post, head, at=(0, 30), axis=(0, 0, 1), interface_radius=3.0)
     mechanism.spherical(base, strut, at=(25, 0, 3))
     mechanism.revolute(strut, head, at=(20, 30, 0), axis=(0.6, 0, 0.8))
     mechanism.cylindrical(head, plate, at=(0, 40, 0), axis=(0.8, 0.6, 0))
@@ -106,8 +106,8 @@ def test_torque_or_force_of_a_motor_that_strains_a_link_is_the_derivative_of_the
     mechanism = fm.Mechanism("bender")
     base, hand = mechanism.rigid("base", fixed=True), mechanism.rigid("hand")
     rod = mechanism.flexible("rod", fm.strip([(0, 0), (40, 0)], thickness=5.0, depth=6.0), RUBBER)
-    mechanism.weld(base, rod, at=(0, 0), radius=3.0)
-    mechanism.weld(rod, hand, at=(40, 0), radius=3.0)
+    mechanism.weld(base, rod, at=(0, 0), interface_radius=3.0)
+    mechanism.weld(rod, hand, at=(40, 0), interface_radius=3.0)
     if kind == "revolute":
         joint = mechanism.revolute(base, hand, at=(25, -8))
     else:

@@ -29,8 +29,8 @@ def column(size: float = 2.0):
     mechanism = fm.Mechanism("column")
     base, head = mechanism.rigid("base", fixed=True), mechanism.rigid("head")
     strut = mechanism.flexible("strut", fm.strip([(0, 0), (LENGTH, 0)], thickness=SIDE, depth=SIDE), RUBBER)
-    mechanism.revolute(base, strut, at=(0, 0), radius=0.5 * SIDE)
-    mechanism.revolute(strut, head, at=(LENGTH, 0), radius=0.5 * SIDE)
+    mechanism.revolute(base, strut, at=(0, 0), interface_radius=0.5 * SIDE)
+    mechanism.revolute(strut, head, at=(LENGTH, 0), interface_radius=0.5 * SIDE)
     mechanism.prismatic(base, head, at=(LENGTH, 0), axis=(1, 0))
     push = mechanism.force(on=head, at=(LENGTH, 0), direction=(-1, 0))
     return fm.Simulation(fm.Scene(mechanism), space="3d", size=size, comm=MPI.COMM_WORLD), push

@@ -31,8 +31,8 @@ def arch():
     rig = fm.Mechanism("arch")
     ground, slide = rig.rigid("ground", fixed=True), rig.rigid("slide")
     link = rig.flexible("link", fm.strip([(0, 0), (20, 9), (40, 0)], thickness=3.0, depth=5.0), RUBBER)
-    rig.revolute(ground, link, at=(0, 0), radius=2.5)
-    rig.revolute(link, slide, at=(40, 0), radius=2.5)
+    rig.revolute(ground, link, at=(0, 0), interface_radius=2.5)
+    rig.revolute(link, slide, at=(40, 0), interface_radius=2.5)
     rig.prismatic(ground, slide, at=(40, 0), axis=(1, 0, 0))
     return fm.Scene(rig), rig.force(on=slide, at=(40, 0), direction=(-1, 0)), 0.034
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from fenicsmech.export import corners_of, smooth_outline
-from fenicsmech.meshing import CircleArc, boundary_loops, distance, sampled, start_of
+from fenicsmech.meshing import CircleArc, boundary_loops, sampled, start_of
+from fenicsmech.polygons import distance_to
 
 from ..meshing.bent_links import CURVED, STRAIGHT, THICKNESS, bent, link
 
@@ -17,7 +18,7 @@ def outline(mesh):
 
 def hausdorff(one, other):
     """The largest distance of a vertex of one closed polygon from the other polygon, either way."""
-    return max(max(distance(b, p) for p in a) for a, b in ((one, other), (other, one)))
+    return max(max(distance_to(b, p) for p in a) for a, b in ((one, other), (other, one)))
 
 
 def along(start, end, count):
@@ -60,7 +61,7 @@ def test_the_outline_of_a_mesh_is_that_of_a_much_finer_mesh(shape, size):
 def test_the_outline_runs_through_every_vertex(shape):
     polygon = outline(SHAPES[shape](1.73))
     fine = sampled(smooth_outline(polygon), 1e-7)
-    assert max(distance(fine, vertex) for vertex in polygon) < 1e-6
+    assert max(distance_to(fine, vertex) for vertex in polygon) < 1e-6
 
 
 @pytest.mark.parametrize("shape", SHAPES)
@@ -71,7 +72,7 @@ def test_nothing_overshoots_at_corners(shape):
     for point in sampled(smooth_outline(polygon), 1e-4):
         if len(corners) and np.linalg.norm(corners - point, axis=1).min() < edge:
             # the sagitta of an arc of the smallest radius over the longest edge
-            assert distance(polygon, point) < 1.1 * edge**2 / (8.0 * 2.5)
+            assert distance_to(polygon, point) < 1.1 * edge**2 / (8.0 * 2.5)
 
 
 def test_curves_follow_each_other_and_none_is_closed():
@@ -116,7 +117,7 @@ def test_a_drop_keeps_its_only_corner():
     drop = np.column_stack([np.cos(t), np.sin(t) * np.sin(0.5 * t) ** 1.5]) * (3.0, 2.0)
     tip = int(np.argmax(drop[:, 0]))
     assert np.flatnonzero(corners_of(drop)).tolist() == [tip]
-    assert max(distance(sampled(smooth_outline(drop), 1e-7), vertex) for vertex in drop) < 1e-6
+    assert max(distance_to(sampled(smooth_outline(drop), 1e-7), vertex) for vertex in drop) < 1e-6
 
 
 @pytest.mark.parametrize("edge", [0.4, 1.0, 2.0])

@@ -31,8 +31,8 @@ def _dead_centre(space: str, comm: MPI.Comm) -> Iterator[Check]:
     base, wheel, slider = mechanism.rigid("base", fixed=True), mechanism.rigid("crank"), mechanism.rigid("slider")
     bar = mechanism.flexible("rod", fm.strip([tuple(pin), (stroke, 0)], thickness=3.0, depth=6.0), SOFT)
     motor = mechanism.motor(mechanism.revolute(base, wheel, at=(0, 0)))
-    mechanism.revolute(wheel, bar, at=pin, radius=2.0)
-    mechanism.revolute(bar, slider, at=(stroke, 0), radius=2.0)
+    mechanism.revolute(wheel, bar, at=pin, interface_radius=2.0)
+    mechanism.revolute(bar, slider, at=(stroke, 0), interface_radius=2.0)
     mechanism.prismatic(base, slider, at=(stroke, 0), axis=(1, 0))
     push = mechanism.force(on=slider, at=(stroke, 0), direction=(-1, 0))
     scene = fm.Scene(mechanism)
@@ -66,8 +66,8 @@ def _change_point(space: str, comm: MPI.Comm) -> Iterator[Check]:
     base, wheel, rocker = mechanism.rigid("base", fixed=True), mechanism.rigid("crank"), mechanism.rigid("rocker")
     link = mechanism.flexible("coupler", fm.strip([tuple(pin), tuple(far)], thickness=3.0, depth=6.0), SOFT)
     motor = mechanism.motor(mechanism.revolute(base, wheel, at=(0, 0)))
-    mechanism.revolute(wheel, link, at=pin, radius=1.5)
-    mechanism.revolute(link, rocker, at=far, radius=1.5)
+    mechanism.revolute(wheel, link, at=pin, interface_radius=1.5)
+    mechanism.revolute(link, rocker, at=far, interface_radius=1.5)
     mechanism.revolute(base, rocker, at=(coupler, 0))
     turned = -start  # flat: from (20, 0) to (60, 0), the rocker from (40, 0)
     # the force is dead: across the flat parallelogram, on the rocker's pin
@@ -106,8 +106,8 @@ def _four_bar(space: str, comm: MPI.Comm, hinges: int) -> tuple[fm.Curve, float]
     shape = fm.strip([tuple(pin), tuple(joint)], thickness=2.0, depth=4.0)
     coupler = mechanism.flexible("coupler", shape, SOFT)
     motor = mechanism.motor(mechanism.revolute(base, crank, at=STOPPED.shaft))
-    mechanism.revolute(crank, coupler, at=pin, radius=1.0)
-    mechanism.weld(coupler, rocker, at=joint, radius=1.0)
+    mechanism.revolute(crank, coupler, at=pin, interface_radius=1.0)
+    mechanism.weld(coupler, rocker, at=joint, interface_radius=1.0)
     mechanism.revolute(base, rocker, at=STOPPED.axle)
     for k in range(1, hinges):
         mechanism.revolute(base, crank, at=(*STOPPED.shaft, 5.0 * k))
@@ -169,8 +169,8 @@ def _paradoxical(hinges, theta: float, turn: float, comm: MPI.Comm, redundancy: 
     near, away = mechanism.rigid("near bracket"), mechanism.rigid("far bracket")
     ends = [tuple(points[0] + share * (points[1] - points[0]))[:2] for share in (0.2, 0.8)]
     bar = mechanism.flexible("bar", fm.strip(ends, thickness=3.0, depth=3.0), fm.ONYX)
-    mechanism.weld(near, bar, at=ends[0], radius=1.5)
-    mechanism.weld(bar, away, at=ends[1], radius=1.5)
+    mechanism.weld(near, bar, at=ends[0], interface_radius=1.5)
+    mechanism.weld(bar, away, at=ends[1], interface_radius=1.5)
     links: list[Link] = [base, away, *(mechanism.rigid(f"bar {k}") for k in range(2, count))]
     motor = mechanism.motor(mechanism.revolute(base, near, at=points[0], axis=axes[0]))
     for k in range(1, count):
@@ -212,8 +212,8 @@ def _hand(space: str, comm: MPI.Comm, kind: str) -> fm.Curve:
     mechanism = fm.Mechanism("hand")
     base, palm = mechanism.rigid("base", fixed=True), mechanism.rigid("palm")
     link = mechanism.flexible("link", fm.strip([(0, 0), (20, 4), (40, 0)], thickness=3.0, depth=5.0), SOFT)
-    mechanism.weld(base, link, at=(0, 0), radius=2.0)
-    mechanism.weld(link, palm, at=(40, 0), radius=2.0)
+    mechanism.weld(base, link, at=(0, 0), interface_radius=2.0)
+    mechanism.weld(link, palm, at=(40, 0), interface_radius=2.0)
     loaded = palm
     if kind == "over-constrained":
         corners = [(40.0, 0.0), (50.0, 0.0), (50.0, 10.0), (40.0, 10.0)]
@@ -267,7 +267,7 @@ def _closing(space: str, comm: MPI.Comm) -> Iterator[Check]:
     beam = mechanism.flexible(
         "whip", fm.strip([tuple(joint), (joint[0], joint[1] + 30.0)], thickness=2.0, depth=4.0), SOFT
     )
-    mechanism.weld(rocker, beam, at=joint, radius=1.0)
+    mechanism.weld(rocker, beam, at=joint, interface_radius=1.0)
     push = mechanism.force(on=beam, at=(joint[0], joint[1] + 29.0), direction=(1, 0))
     scene = fm.Scene(mechanism)
     simulation = fm.Simulation(scene, space=space, order=1, size=2.0, comm=comm)

@@ -71,7 +71,7 @@ def four_bar(space: str, comm: MPI.Comm, described: Described) -> tuple[fm.Curve
         if described.order is not None and name != "shaft" and shuffle.random() < 0.5:
             a, b = b, a
         add = mechanism.weld if name == "middle" else mechanism.revolute
-        joint = add(a, b, at=at(place), radius=2.5 * unit, name=name)
+        joint = add(a, b, at=at(place), interface_radius=2.5 * unit, name=name)
         if name == "shaft":
             motor = mechanism.motor(joint)
     push = mechanism.force(on=made["hammer"], at=at((30, 60)), direction=(0.6, -0.8))

@@ -29,7 +29,7 @@ def parts() -> Parts:
     base, crank = m.rigid("base", fixed=True), m.rigid("crank")
     rod = m.flexible("rod", strip([(10.0, 0.0), (40.0, 0.0)], thickness=2.0, depth=10.0), ONYX)
     shaft = m.revolute(base, crank, at=(0.0, 0.0), name="shaft")
-    m.revolute(crank, rod, at=(10.0, 0.0), radius=2.0, name="pin")
+    m.revolute(crank, rod, at=(10.0, 0.0), interface_radius=2.0, name="pin")
     return Parts(m, base, crank, rod, shaft, m.motor(shaft, name="drive"))
 
 

@@ -62,9 +62,9 @@ def test_only_strips_have_ends():
     mechanism = Mechanism("rig")
     wall = mechanism.rigid("wall", fixed=True)
     plate = mechanism.flexible("plate", polygon([(0, 0), (9, 0), (9, 2)], depth=1.0), ONYX)
-    with pytest.raises(DescriptionError, match=r"link 'plate' is no strip. Use weld\(…, at=…, region=Rectangle"):
+    with pytest.raises(DescriptionError, match=r"link 'plate' is not a strip. Use weld\(…, at=…, region=Rectangle"):
         mechanism.clamp(wall, plate, end="start", length=4.0)
-    with pytest.raises(DescriptionError, match="'wall' is no strip"):
+    with pytest.raises(DescriptionError, match="'wall' is not a strip"):
         mechanism.clamp(plate, wall, end="start", length=4.0)
 
 

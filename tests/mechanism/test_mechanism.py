@@ -118,16 +118,18 @@ def test_flexible_link_without_interface_is_refused(ends):
         lambda: p.mechanism.revolute(*(getattr(p, end) for end in ends), at=(40.0, 0.0), name="far pin"),
         "'far pin'",
         "no interface on flexible link 'rod'",
-        "Give radius=… (pin) or region=… (clamp)",
+        "Give interface_radius=… (pin) or region=… (clamp)",
     )
 
 
 def test_interface_given_twice_is_refused():
     p = parts()
     assert_refused(
-        lambda: p.mechanism.weld(p.crank, p.rod, at=(40.0, 0.0), radius=2.0, region=Rectangle(1.0, 1.0), name="clamp"),
+        lambda: p.mechanism.weld(
+            p.crank, p.rod, at=(40.0, 0.0), interface_radius=2.0, region=Rectangle(1.0, 1.0), name="clamp"
+        ),
         "'clamp'",
-        "both a radius and a region are given",
+        "both an interface radius and a region are given",
         "Give one of the two",
     )
 
@@ -146,7 +148,7 @@ def test_interface_is_on_flexible_links_only():
     p = parts()
     joint = p.mechanism.weld(p.crank, p.rod, at=(40.0, 0.0), region=Rectangle(2, 3, 0.5))
     assert joint.regions == (None, Rectangle(2.0, 3.0, 0.5))
-    assert p.mechanism.revolute(p.rod, p.base, at=(20.0, 0.0), radius=1).regions == (Disc(1.0), None)
+    assert p.mechanism.revolute(p.rod, p.base, at=(20.0, 0.0), interface_radius=1).regions == (Disc(1.0), None)
 
 
 def test_motor_on_a_joint_that_takes_none_is_refused():

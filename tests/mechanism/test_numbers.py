@@ -28,14 +28,16 @@ TRIANGLE = [(0.0, 0.0), (4.0, 0.0), (0.0, 3.0)]
 
 def pin(p, **options):
     """A joint between crank and rod at another place."""
-    return p.mechanism.revolute(p.crank, p.rod, **{"at": (40.0, 0.0), "radius": 2.0, "name": "far pin", **options})
+    return p.mechanism.revolute(
+        p.crank, p.rod, **{"at": (40.0, 0.0), "interface_radius": 2.0, "name": "far pin", **options}
+    )
 
 
 # What is named in the message, and the entry: a function of the parts and the number that is wrong.
 COORDINATES = {
     "position of 'far pin'": lambda p, x: pin(p, at=(x, 0.0)),
     "axis of 'far pin'": lambda p, x: pin(p, axis=(0.0, x, 1.0)),
-    "angle of the interface of 'far pin'": lambda p, x: pin(p, radius=None, region=Rectangle(1.0, 1.0, x)),
+    "angle of the interface of 'far pin'": lambda p, x: pin(p, interface_radius=None, region=Rectangle(1.0, 1.0, x)),
     "position of 'push'": lambda p, x: p.mechanism.force(on=p.crank, at=(0.0, x), direction=(1.0, 0.0), name="push"),
     "direction of 'push'": lambda p, x: p.mechanism.force(on=p.crank, at=(0.0, 0.0), direction=(x, 1.0), name="push"),
     "position of 'tip'": lambda p, x: p.mechanism.output(on=p.crank, at=(x, 0.0), direction=(1.0, 0.0), name="tip"),
@@ -53,10 +55,10 @@ COORDINATES = {
     "Poisson's ratio of material 'clay'": lambda p, x: Material("clay", 1.0, x),
 }
 SIZES = {
-    "radius of 'far pin'": lambda p, x: pin(p, radius=x),
-    "radius of 'far clamp'": lambda p, x: pin(p, radius=None, region=Disc(x), name="far clamp"),
-    "length of the interface of 'far pin'": lambda p, x: pin(p, radius=None, region=Rectangle(x, 1.0)),
-    "width of the interface of 'far pin'": lambda p, x: pin(p, radius=None, region=Rectangle(1.0, x)),
+    "radius of 'far pin'": lambda p, x: pin(p, interface_radius=x),
+    "radius of 'far clamp'": lambda p, x: pin(p, interface_radius=None, region=Disc(x), name="far clamp"),
+    "length of the interface of 'far pin'": lambda p, x: pin(p, interface_radius=None, region=Rectangle(x, 1.0)),
+    "width of the interface of 'far pin'": lambda p, x: pin(p, interface_radius=None, region=Rectangle(1.0, x)),
     "strip thickness": lambda p, x: strip(TRIANGLE, thickness=x, depth=1.0),
     "strip depth": lambda p, x: strip(TRIANGLE, thickness=1.0, depth=x),
     "polygon depth": lambda p, x: polygon(TRIANGLE, depth=x),
@@ -171,14 +173,14 @@ def test_outline_of_anything_but_lines_and_arcs_is_refused():
     assert_refused(
         lambda: outline((0.0, 0.0), [(1.0, 1.0)], depth=1.0),
         "outline",
-        "(1.0, 1.0) is no segment",
+        "(1.0, 1.0) is not a segment",
         "Give Line(…) or Arc(…)",
     )
 
 
 def test_numbers_of_any_kind_become_plain_ones():
     p = parts()
-    joint = pin(p, at=np.array([40, 0]), axis=np.array([0, 0, 2]), radius=np.float32(2))
+    joint = pin(p, at=np.array([40, 0]), axis=np.array([0, 0, 2]), interface_radius=np.float32(2))
     assert (joint.at, joint.axis, joint.regions[1]) == ((40.0, 0.0), (0.0, 0.0, 1.0), Disc(2.0))
     assert {type(x) for x in (*joint.at, *joint.axis, joint.regions[1].radius)} == {float}
     assert strip(np.array(TRIANGLE), thickness=1, depth=1).centreline == tuple(TRIANGLE)

@@ -32,6 +32,6 @@ def truss_finger(shape: Strip, material: Material, *, radius: float = 3.0) -> Tr
     mechanism.revolute(base, right, at=(40.0, 0.0))
     mechanism.revolute(left, tip, at=(0.0, 60.0))
     mechanism.revolute(right, tip, at=HEAD)
-    mechanism.revolute(base, diagonal, at=FOOT, radius=radius)
-    mechanism.revolute(diagonal, tip, at=HEAD, radius=radius)
+    mechanism.revolute(base, diagonal, at=FOOT, interface_radius=radius)
+    mechanism.revolute(diagonal, tip, at=HEAD, interface_radius=radius)
     return TrussFinger(mechanism, tip, hinge)

@@ -8,7 +8,7 @@ import pytest
 
 from fenicsmech.errors import MeshingError
 from fenicsmech.mechanism import step_file
-from fenicsmech.meshing import LinkMesh, boundary_loops, cell_measures, mesh_link
+from fenicsmech.meshing import CurvedEdges, LinkMesh, boundary_loops, cell_measures, mesh_link
 
 from .bent_links import link
 
@@ -25,7 +25,7 @@ def edges_of(loops):
 
 
 def triangles(points, cells):
-    return LinkMesh(np.array(points, dtype=float), np.array(cells), np.full(len(cells), -1))
+    return LinkMesh(np.array(points, dtype=float), np.array(cells), np.full(len(cells), -1), CurvedEdges.none(2))
 
 
 def test_a_part_with_two_holes_has_three_loops_and_their_areas_add_up():

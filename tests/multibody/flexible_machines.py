@@ -31,9 +31,9 @@ def flexible_four_bar(angle: float, *, driven: bool = True) -> Machine:
     coupler = m.flexible("coupler", bent_strip(pin, joint), ONYX)
     rocker = m.flexible("rocker", bent_strip(CRANK_ROCKER.axle, joint), ONYX)
     shaft = m.revolute(ground, crank, at=CRANK_ROCKER.shaft)
-    m.revolute(crank, coupler, at=pin, radius=2.0)
-    m.revolute(coupler, rocker, at=joint, radius=2.0)
-    m.revolute(rocker, ground, at=CRANK_ROCKER.axle, radius=2.0)
+    m.revolute(crank, coupler, at=pin, interface_radius=2.0)
+    m.revolute(coupler, rocker, at=joint, interface_radius=2.0)
+    m.revolute(rocker, ground, at=CRANK_ROCKER.axle, interface_radius=2.0)
     return Machine(m, m.motor(shaft) if driven else None, {"pin": (crank, pin)})
 
 

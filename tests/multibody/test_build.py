@@ -38,9 +38,9 @@ def test_joints_at_one_place_of_a_flexible_link_share_an_interface(dim):
     m = Mechanism("shared pin")
     base, a, b = m.rigid("base", fixed=True), m.rigid("a"), m.rigid("b")
     link = m.flexible("link", bent_strip((0.0, 0.0), (30.0, 0.0)), ONYX)
-    m.revolute(base, link, at=(0.0, 0.0), radius=2.0)
-    m.revolute(link, a, at=(30.0, 0.0), radius=2.0)
-    m.revolute(link, b, at=(30.0, 0.0, 0.0), radius=2.0)  # the same place, its z written out
+    m.revolute(base, link, at=(0.0, 0.0), interface_radius=2.0)
+    m.revolute(link, a, at=(30.0, 0.0), interface_radius=2.0)
+    m.revolute(link, b, at=(30.0, 0.0, 0.0), interface_radius=2.0)  # the same place, its z written out
     linkage = build_linkage(m, dim)
     first, second = linkage.interfaces[link]
     assert [c.a for c in linkage.joints.connections[1:]] == [second, second]

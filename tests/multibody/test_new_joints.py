@@ -86,7 +86,7 @@ def moved(mechanism: fm.Mechanism, dim: int, positions: dict, link) -> np.ndarra
 def simulated(mechanism: fm.Mechanism, base, effects: list, space: str) -> fm.Simulation:
     """A simulation; the one flexible link it needs carries no load."""
     leaf = mechanism.flexible("leaf", fm.strip([(0, -30), (20, -30)], thickness=6.0, depth=6.0), fm.ONYX)
-    mechanism.weld(base, leaf, at=(3, -30), radius=2.0)
+    mechanism.weld(base, leaf, at=(3, -30), interface_radius=2.0)
     return fm.Simulation(fm.Scene(mechanism, effects=effects), space=space, order=1, size=6.0, comm=MPI.COMM_SELF)
 
 

@@ -13,8 +13,8 @@ def slider_crank() -> tuple[fm.Mechanism, object]:
     base, crank, slider = (mechanism.rigid(name, fixed=name == "base") for name in ("base", "crank", "slider"))
     rod = mechanism.flexible("rod", fm.strip([(10, 20), (60, 0)], thickness=2.0, depth=3.0), fm.ONYX)
     mechanism.revolute(base, crank, at=(0, 0))
-    mechanism.revolute(crank, rod, at=(10, 20), radius=1.0)
-    mechanism.revolute(rod, slider, at=(60, 0), radius=1.0)
+    mechanism.revolute(crank, rod, at=(10, 20), interface_radius=1.0)
+    mechanism.revolute(rod, slider, at=(60, 0), interface_radius=1.0)
     return mechanism, mechanism.prismatic(base, slider, at=(60, 0), axis=(1, 0))
 
 

@@ -111,7 +111,7 @@ def test_the_unstable_part_is_dashed(tmp_path):
 
 def test_a_snap_through_is_a_dotted_arrow_with_an_entry_of_its_own(tmp_path, drawn):
     snapped_through = np.arange(len(X)) == 4
-    for flags in (None, snapped_through):
+    for flags in (np.zeros(len(X), bool), snapped_through):
         plot_curve(tmp_path / "a.png", [CurveSeries(X, X, "pushed", snapped_through=flags)])
     whole, broken = (figure.axes[0] for figure in drawn)
     assert [text.get_text() for text in broken.get_legend().get_texts()] == ["pushed", "snap-through"]

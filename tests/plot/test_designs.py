@@ -92,7 +92,7 @@ def test_points_that_coincide_are_drawn(tmp_path):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: LinkOutline([]), "there is no loop"),
+        (lambda: LinkOutline([]), "there are no loops"),
         (lambda: LinkOutline([SQUARE[:2]]), "2 point"),
         (lambda: LinkOutline([SQUARE * np.nan]), "Give finite numbers"),
         (lambda: LinkOutline([SQUARE], thickness=[1.0]), "thickness along a link's centreline"),

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from fenicsmech.errors import DescriptionError
-from fenicsmech.plot import plan_view, rim
+from fenicsmech.plot import plan_view
+from fenicsmech.polygons import edge_loops
 
 from .grids import box, rectangle
 
@@ -65,7 +66,7 @@ def test_the_rim_of_a_plate_with_a_hole_is_two_loops():
     points, triangles = rectangle(6, 6, 6.0, 6.0)
     centres = points[triangles].mean(axis=1)
     plate = triangles[(np.abs(centres - 3.0) > 1.0).any(axis=1)]
-    loops = sorted(rim(plate), key=len)
+    loops = sorted(edge_loops(plate), key=len)
     assert [len(loop) for loop in loops] == [8, 24]
     areas = [signed_areas(points, np.array([(loop[0], a, b) for a, b in zip(loop[1:], loop[2:], strict=False)])).sum()
              for loop in loops]  # fmt: skip
@@ -74,6 +75,6 @@ def test_the_rim_of_a_plate_with_a_hole_is_two_loops():
 
 def test_the_rim_of_parts_that_touch_in_a_point_uses_every_edge_once():
     triangles = np.array([(0, 1, 2), (2, 3, 4)])
-    loops = rim(triangles)
+    loops = edge_loops(triangles)
     edges = sorted(tuple(sorted(e)) for loop in loops for e in zip(loop, np.roll(loop, -1), strict=True))
     assert edges == [(0, 1), (0, 2), (1, 2), (2, 3), (2, 4), (3, 4)]

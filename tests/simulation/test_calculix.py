@@ -30,9 +30,9 @@ def four_bar(quadrature: Quadrature | None):
 
     coupler, rocker = link("coupler", (0, 20), (25, 33), (50, 30)), link("rocker", (40, 0), (50, 30))
     mechanism.motor(mechanism.revolute(base, crank, at=(0, 0)))
-    mechanism.revolute(crank, coupler, at=(0, 20), radius=2.0)
-    mechanism.revolute(coupler, rocker, at=(50, 30), radius=2.0)
-    mechanism.revolute(base, rocker, at=(40, 0), radius=2.0)
+    mechanism.revolute(crank, coupler, at=(0, 20), interface_radius=2.0)
+    mechanism.revolute(coupler, rocker, at=(50, 30), interface_radius=2.0)
+    mechanism.revolute(base, rocker, at=(40, 0), interface_radius=2.0)
     push = mechanism.force(on=coupler, at=(25.0, 33.0, 0.0), direction=(0.28, -0.96, 0.0))
     simulation = fm.Simulation(fm.Scene(mechanism), space="3d", size=3.0, quadrature=quadrature, comm=MPI.COMM_SELF)
     return simulation, push

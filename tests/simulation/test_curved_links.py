@@ -79,8 +79,8 @@ def test_points_are_found_in_the_most_curved_cells_too():
     base = mechanism.rigid("base", fixed=True)
     shape = fm.strip([(0.0, 0.0), (8.0, 6.0), (16.0, 0.0)], thickness=3.0, depth=2.0)
     hook = mechanism.flexible("hook", shape, fm.ONYX)
-    mechanism.revolute(base, hook, at=(0.0, 0.0), radius=2.4)
-    mechanism.revolute(base, hook, at=(16.0, 0.0), radius=2.4)
+    mechanism.revolute(base, hook, at=(0.0, 0.0), interface_radius=2.4)
+    mechanism.revolute(base, hook, at=(16.0, 0.0), interface_radius=2.4)
     model = fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=4.0, comm=MPI.COMM_SELF).model
     move(model)
     for place in middles(model.mesh):

@@ -49,9 +49,9 @@ def four_bar(space: str, seed: int | None) -> fm.Curve:
         if seed is not None and name != "shaft" and order.random() < 0.5:
             a, b = b, a
         if name == "middle":
-            mechanism.weld(a, b, at=PLACES[name], radius=2.5, name=name)
+            mechanism.weld(a, b, at=PLACES[name], interface_radius=2.5, name=name)
         else:
-            joint = mechanism.revolute(a, b, at=PLACES[name], radius=2.5, name=name)
+            joint = mechanism.revolute(a, b, at=PLACES[name], interface_radius=2.5, name=name)
         if name == "shaft":
             motor = mechanism.motor(joint)
     push = mechanism.force(on=made["hammer"], at=PLACES["lever"], direction=(0.6, -0.8))

@@ -74,8 +74,8 @@ def pinned(material: fm.Material, *, depth: float = 4.0, space: str = "plane-str
     rig = fm.Mechanism("strut")
     ground, slide = rig.rigid("ground", fixed=True), rig.rigid("slide")
     strut = rig.flexible("strut", fm.strip([(0, 0), (60, 0)], thickness=6.0, depth=depth), material)
-    rig.revolute(ground, strut, at=(0, 0), radius=2.0)
-    rig.revolute(strut, slide, at=(60, 0), radius=2.0)
+    rig.revolute(ground, strut, at=(0, 0), interface_radius=2.0)
+    rig.revolute(strut, slide, at=(60, 0), interface_radius=2.0)
     rig.prismatic(ground, slide, at=(60, 0), axis=(1, 0, 0))
     push = rig.force(on=slide, at=(60, 0), direction=(-1, 0))
     return fm.Simulation(fm.Scene(rig), space=space, size=4.0, order=order, formulation=formulation), push
@@ -121,8 +121,8 @@ def test_links_that_cross_are_pointed_out():
     one = rig.flexible("one", fm.strip([(0, 0), (40, 30)], thickness=3.0, depth=4.0), fm.ONYX)
     other = rig.flexible("other", fm.strip([(0, 30), (40, 0)], thickness=3.0, depth=4.0), fm.ONYX)
     for link, start, stop in ((one, (0, 0), (40, 30)), (other, (0, 30), (40, 0))):
-        rig.revolute(ground, link, at=start, radius=2.0)
-        rig.revolute(link, end, at=stop, radius=2.0)
+        rig.revolute(ground, link, at=start, interface_radius=2.0)
+        rig.revolute(link, end, at=stop, interface_radius=2.0)
     push = rig.force(on=end, at=(40, 15), direction=(1, 0))
     simulation = fm.Simulation(fm.Scene(rig), space="plane-stress", size=3.0)
     curve = simulation.load_displacement(push, forces=[1.0])

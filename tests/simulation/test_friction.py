@@ -59,8 +59,8 @@ def parallelogram() -> tuple[fm.Simulation, fm.mechanism.Force, list]:
         mechanism.revolute(right, coupler, at=(40, 30)),
     ]
     beam = mechanism.flexible("beam", fm.strip([(40, 90), (40, 30)], thickness=2.0, depth=4.0), fm.ONYX)
-    mechanism.weld(base, beam, at=(40, 87), radius=0.9)
-    mechanism.revolute(beam, coupler, at=(40, 30), radius=0.9, name="soft end")
+    mechanism.weld(base, beam, at=(40, 87), interface_radius=0.9)
+    mechanism.revolute(beam, coupler, at=(40, 30), interface_radius=0.9, name="soft end")
     push = mechanism.force(on=coupler, at=(0, 30), direction=(1, 0))
     return fm.Simulation(fm.Scene(mechanism), space="plane-stress", order=1, size=2.0), push, pins
 

@@ -13,7 +13,7 @@ def driven_crank(*effects) -> tuple[fm.Simulation, object]:
     blade = mechanism.flexible("blade", fm.strip([(20, 0), (50, 0)], thickness=2.0, depth=4.0), fm.ONYX)
     hinge = mechanism.revolute(base, crank, at=(0, 0), name="hinge")
     mechanism.motor(hinge)
-    mechanism.weld(crank, blade, at=(20, 0), radius=1.5)
+    mechanism.weld(crank, blade, at=(20, 0), interface_radius=1.5)
     push = mechanism.force(on=crank, at=(10, 0), direction=(1, 1), name="push")
     scene = fm.Scene(mechanism, effects=[effect(hinge) for effect in effects])
     return fm.Simulation(scene, space="plane-stress", size=2.0, comm=MPI.COMM_SELF), push

@@ -13,7 +13,7 @@ def pendulum(modulus: float) -> tuple[fm.Simulation, object]:
     blade = mechanism.flexible(
         "blade", fm.strip([(0, 0), (30, 0)], thickness=2.0, depth=4.0), fm.Material("steel", modulus, 0.3)
     )
-    mechanism.revolute(base, blade, at=(0, 0), radius=1.0)
+    mechanism.revolute(base, blade, at=(0, 0), interface_radius=1.0)
     push = mechanism.force(on=blade, at=(30, 0), direction=(0.8, 0.6))
     return fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=2.0, comm=MPI.COMM_SELF), push
 
@@ -36,7 +36,7 @@ def test_springs_softer_than_rounding_are_named():
     blade = mechanism.flexible(
         "blade", fm.strip([(0, 0), (30, 0)], thickness=2.0, depth=4.0), fm.Material("steel", 2e5, 0.3)
     )
-    hinge = mechanism.revolute(base, blade, at=(0, 0), radius=1.0)
+    hinge = mechanism.revolute(base, blade, at=(0, 0), interface_radius=1.0)
     push = mechanism.force(on=blade, at=(30, 0), direction=(0, 1))
     scene = fm.Scene(mechanism, effects=[fm.JointSpring(hinge, 1e-10, rest=0.2)])
     simulation = fm.Simulation(scene, space="plane-stress", size=2.0, comm=MPI.COMM_SELF)

@@ -21,7 +21,7 @@ def arm(materials=(RUBBER, PLASTIC), *, space="plane-strain", comm=MPI.COMM_SELF
     upper = mechanism.flexible("upper", fm.strip([(0, 0), (30, 0)], thickness=6.0, depth=6.0), materials[0])
     lower = mechanism.flexible("lower", fm.strip([(30, 0), (60, 0)], thickness=6.0, depth=6.0), materials[1])
     for a, b, x in ((base, upper, 0), (upper, knee, 30), (knee, lower, 30), (lower, hand, 60)):
-        mechanism.weld(a, b, at=(x, 0), radius=2.0)
+        mechanism.weld(a, b, at=(x, 0), interface_radius=2.0)
     push = mechanism.force(on=hand, at=(60, 0), direction=(0, 1))
     mechanism.force(on=upper, at=(16, 0.5), direction=(0, 1), name="inner")
     return fm.Simulation(fm.Scene(mechanism), space=space, size=4.0, comm=comm, **options), push

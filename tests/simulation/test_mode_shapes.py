@@ -16,8 +16,8 @@ def column(material: fm.Material) -> tuple[fm.Scene, fm.Force]:
     rig = fm.Mechanism("column")
     ground, slide = rig.rigid("ground", fixed=True), rig.rigid("slide")
     strut = rig.flexible("strut", fm.strip([(0, 0), (LENGTH, 0)], thickness=THICKNESS, depth=DEPTH), material)
-    rig.revolute(ground, strut, at=(0, 0), radius=0.5)
-    rig.revolute(strut, slide, at=(LENGTH, 0), radius=0.5)
+    rig.revolute(ground, strut, at=(0, 0), interface_radius=0.5)
+    rig.revolute(strut, slide, at=(LENGTH, 0), interface_radius=0.5)
     rig.prismatic(ground, slide, at=(LENGTH, 0), axis=(1, 0))
     return fm.Scene(rig), rig.force(on=slide, at=(LENGTH, 0), direction=(-1, 0))
 

@@ -21,8 +21,8 @@ def pinned(space: str, poisson: float, radius: float):
     base, carriage = mechanism.rigid("base", fixed=True), mechanism.rigid("carriage")
     shape = fm.strip(POINTS, thickness=THICKNESS, depth=DEPTH)
     link = mechanism.flexible("link", shape, fm.Material("steel", YOUNG, poisson))
-    mechanism.revolute(base, link, at=POINTS[0], radius=radius)
-    mechanism.revolute(link, carriage, at=POINTS[-1], radius=radius)
+    mechanism.revolute(base, link, at=POINTS[0], interface_radius=radius)
+    mechanism.revolute(link, carriage, at=POINTS[-1], interface_radius=radius)
     mechanism.prismatic(base, carriage, at=POINTS[-1], axis=(1, 0))
     pull = mechanism.force(on=carriage, at=POINTS[-1], direction=(1, 0))
     return fm.Simulation(fm.Scene(mechanism), space=space, size=0.5 * THICKNESS, comm=MPI.COMM_SELF), pull

@@ -70,8 +70,8 @@ def test_force_and_output_on_points_of_a_flexible_link(space):
         mechanism = fm.Mechanism("bow")
         base = mechanism.rigid("base", fixed=True)
         bow = mechanism.flexible("bow", fm.strip([(0, 0), (25, 20), (60, 0)], thickness=5.0, depth=8.0), fm.ONYX)
-        mechanism.revolute(base, bow, at=(0, 0), radius=3.0)
-        mechanism.revolute(base, bow, at=(60, 0), radius=3.0)
+        mechanism.revolute(base, bow, at=(0, 0), interface_radius=3.0)
+        mechanism.revolute(base, bow, at=(60, 0), interface_radius=3.0)
         push = mechanism.force(on=bow, at=(25.0, 20.0), direction=(0.6, -0.8))
         mechanism.output(on=bow, at=(40.0, 16.0), direction=(0, 1))
         order = 1 if space == "3d" else 2
@@ -84,7 +84,7 @@ def test_force_beside_its_link_is_refused_on_all_ranks():
     mechanism = fm.Mechanism("off the link")
     base = mechanism.rigid("base", fixed=True)
     bar = mechanism.flexible("bar", fm.strip([(0, 0), (60, 0)], thickness=5.0, depth=8.0), fm.ONYX)
-    mechanism.weld(base, bar, at=(0, 0), radius=3.0)
+    mechanism.weld(base, bar, at=(0, 0), interface_radius=3.0)
     beside = mechanism.force(on=bar, at=(30, 10), direction=(0, 1), name="beside")
     with pytest.raises(fm.FenicsmechError, match="'beside'.*not on"):
         simulation = fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=4.0)
@@ -99,7 +99,7 @@ def test_link_that_cannot_be_meshed_is_refused_on_all_ranks(shared_tmp_path):
     mechanism = fm.Mechanism("unreadable")
     base = mechanism.rigid("base", fixed=True)
     bar = mechanism.flexible("bar", fm.gmsh_mesh(nonsense, depth=5.0), fm.ONYX)
-    mechanism.weld(base, bar, at=(0, 0), radius=3.0)
+    mechanism.weld(base, bar, at=(0, 0), interface_radius=3.0)
     push = mechanism.force(on=bar, at=(30, 0), direction=(0, 1))
     with pytest.raises(fm.MeshingError, match="'bar'"):
         simulation = fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=4.0)

@@ -17,7 +17,7 @@ def lever(stiffness: float) -> tuple[fm.Simulation, object]:
         "blade", fm.strip([(20, 0), (50, 0)], thickness=2.0, depth=4.0), fm.Material("steel", 2e5, 0.3)
     )
     hinge = mechanism.revolute(base, arm, at=(0, 0), name="hinge")
-    mechanism.weld(arm, blade, at=(20, 0), radius=1.5)
+    mechanism.weld(arm, blade, at=(20, 0), interface_radius=1.5)
     push = mechanism.force(on=arm, at=(10, 0), direction=(0, 1))
     scene = fm.Scene(mechanism, effects=[fm.JointSpring(hinge, stiffness)])
     return fm.Simulation(scene, space="plane-stress", size=2.0, comm=MPI.COMM_SELF), push
@@ -46,7 +46,7 @@ def test_displacements_count_from_where_springs_hold_what_motors_leave():
         "blade", fm.strip([(20, 0), (50, 0)], thickness=2.0, depth=4.0), fm.Material("nylon", 2e3, 0.4)
     )
     hinge = mechanism.revolute(base, arm, at=(0, 0))
-    motor = mechanism.motor(mechanism.revolute(arm, blade, at=(20, 0), radius=1.0))
+    motor = mechanism.motor(mechanism.revolute(arm, blade, at=(20, 0), interface_radius=1.0))
     push = mechanism.force(on=blade, at=(50, 0), direction=(0, 1))
     scene = fm.Scene(mechanism, effects=[fm.JointSpring(hinge, 1e5)])
     simulation = fm.Simulation(scene, space="plane-stress", size=2.0, comm=MPI.COMM_SELF)

@@ -45,7 +45,7 @@ def test_a_lever_bends_between_its_eyes_wherever_they_are(thickness):
     base, handle = mechanism.rigid("base", fixed=True), mechanism.rigid("handle")
     lever = mechanism.flexible("lever", fm.strip([(0, 0), (40, 0)], thickness=thickness, depth=DEPTH), fm.ONYX)
     for at in ((0, 0), (20, 0)):
-        mechanism.revolute(base, lever, at=at, radius=RADIUS)
+        mechanism.revolute(base, lever, at=at, interface_radius=RADIUS)
     mechanism.weld(lever, handle, at=(40, 0), region=fm.Disc(RADIUS))
     push = mechanism.force(on=handle, at=(40, 0), direction=(0, 1))
     simulation = fm.Simulation(fm.Scene(mechanism, effects=[]), space="plane-stress", size=0.5 * thickness)

@@ -11,13 +11,15 @@ O. Sorkine: Bounded biharmonic weights for real-time deformation (doi:10.1145/19
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from petsc4py import PETSc
 from scipy.sparse import coo_matrix, csr_matrix, diags, identity, kron
 
 from fenicsmech.design.shape.handles import BETWEEN, LinkHandles
 from fenicsmech.errors import FenicsmechError
-from fenicsmech.meshing import FREE, LinkMesh, cell_measures, plan_of
+from fenicsmech.meshing import FREE, CurvedEdges, LinkMesh, cell_measures, plan_of
 
 
 def handle_weights(mesh: LinkMesh, handles: LinkHandles, *, part: str = "link") -> np.ndarray:
@@ -123,7 +125,7 @@ def _smallest_cell(way: tuple[LinkMesh, int]) -> float:
 def _move(mesh: LinkMesh, vertex: int, at: np.ndarray) -> tuple[LinkMesh, int]:
     points = mesh.points.copy()
     points[vertex] = at
-    return LinkMesh(points, mesh.cells, mesh.interface), int(vertex)
+    return replace(mesh, points=points, curved=CurvedEdges.none(mesh.dim)), int(vertex)
 
 
 def _split(mesh: LinkMesh, near: np.ndarray, around: np.ndarray, at: np.ndarray) -> tuple[LinkMesh, int]:
@@ -132,7 +134,7 @@ def _split(mesh: LinkMesh, near: np.ndarray, around: np.ndarray, at: np.ndarray)
     parts = [np.where(mesh.cells[around] == old, vertex, mesh.cells[around]) for old in near]
     cells = np.concatenate([mesh.cells[~around], *parts])
     interface = np.concatenate([mesh.interface[~around], np.full(len(cells) - np.sum(~around), FREE)])
-    return LinkMesh(np.vstack([mesh.points, at]), cells, interface), vertex
+    return LinkMesh(np.vstack([mesh.points, at]), cells, interface, CurvedEdges.none(mesh.dim)), vertex
 
 
 def _barycentric(mesh: LinkMesh, at: np.ndarray) -> np.ndarray:

@@ -225,7 +225,7 @@ def _join(mechanism: fm.Mechanism, joint: JointPlan, links: Mapping[str, object]
         case Clamp(length=length, width=width, angle=angle):
             options["region"] = fm.Rectangle(length, width, angle)
         case radius if radius is not None:
-            options["radius"] = radius
+            options["interface_radius"] = radius
     return getattr(mechanism, joint.kind)(links[joint.a], links[joint.b], at=joint.at, name=joint.name, **options)
 
 

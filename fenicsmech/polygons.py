@@ -1,0 +1,88 @@
+"""Closed polygons in the plane, (n, 2) without a repeated corner, and the loops of edges that bound triangles."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def signed_area(polygon: np.ndarray) -> float:
+    """½ Σ (x_i y_{i+1} − x_{i+1} y_i), positive if ``polygon`` runs counter-clockwise."""
+    x, y = polygon.T
+    return 0.5 * float(x @ np.roll(y, -1) - np.roll(x, -1) @ y)
+
+
+def is_inside(polygon: np.ndarray, point: np.ndarray) -> bool:
+    """Whether ``point`` (2,) lies in ``polygon``: a ray from it crosses an odd number of edges."""
+    a, b = polygon - point, np.roll(polygon, -1, axis=0) - point
+    straddles = (a[:, 1] > 0.0) != (b[:, 1] > 0.0)
+    a, b = a[straddles], b[straddles]
+    reach = a[:, 0] - a[:, 1] * (b[:, 0] - a[:, 0]) / (b[:, 1] - a[:, 1])
+    return bool(np.count_nonzero(reach > 0.0) % 2)
+
+
+def distance_to(polygon: np.ndarray, point: np.ndarray) -> float:
+    """Distance of ``point`` (2,) from the edges of ``polygon``."""
+    edge = np.roll(polygon, -1, axis=0) - polygon
+    along = np.einsum("ij,ij->i", point - polygon, edge) / np.einsum("ij,ij->i", edge, edge)
+    nearest = polygon + np.clip(along, 0.0, 1.0)[:, None] * edge
+    return float(np.linalg.norm(point - nearest, axis=1).min())
+
+
+def first_crossing(polygon: np.ndarray) -> np.ndarray | None:
+    """A point where two edges of ``polygon`` that are not neighbours meet, or None."""
+    count, edge = len(polygon), np.roll(polygon, -1, axis=0) - polygon
+    ends = np.stack([polygon, polygon + edge])
+    # sweep along the longer side of the polygon: only edges that overlap there can meet
+    sweep = ends[..., int(np.argmax(np.ptp(polygon, axis=0)))]
+    order = np.argsort(sweep.min(axis=0))
+    behind = np.searchsorted(sweep.min(axis=0)[order], sweep.max(axis=0)[order], side="right") - np.arange(count) - 1
+    first = np.repeat(np.arange(count), behind)
+    second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(behind) - behind, behind)
+    i, j = np.sort([order[first], order[second]], axis=0)
+    apart = (j - i > 1) & (j - i < count - 1)
+    i, j = i[apart], j[apart]
+    # p_i + t e_i = p_j + u e_j; collinear edges do not cross
+    between, sine, lengths = polygon[j] - polygon[i], _cross(edge[i], edge[j]), np.linalg.norm(edge, axis=1)
+    sine[np.abs(sine) <= 1e-10 * lengths[i] * lengths[j]] = np.nan
+    t, u = _cross(between, edge[j]) / sine, _cross(between, edge[i]) / sine
+    meetings = np.flatnonzero((t >= 0.0) & (t <= 1.0) & (u >= 0.0) & (u <= 1.0))
+    if not len(meetings):
+        return None
+    k = min(meetings, key=lambda k: (i[k], j[k]))
+    return polygon[i[k]] + t[k] * edge[i[k]]
+
+
+def edge_loops(triangles: np.ndarray) -> list[np.ndarray]:
+    """The closed loops of edges that belong to one triangle only: outlines and holes alike.
+
+    Args:
+        triangles: (m, 3) vertex numbers; loops follow their orientation where it is consistent. Loops may touch.
+
+    Returns:
+        Vertex numbers (k,) of each loop from its lowest one on, in the order of these.
+    """
+    edges = triangles[:, ((0, 1), (1, 2), (2, 0))].reshape(-1, 2)
+    _, first, count = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
+    edges = edges[np.sort(first[count == 1])]
+    edges_at: dict[int, list[int]] = {}
+    for index, ends in enumerate(edges.tolist()):
+        for end in ends:
+            edges_at.setdefault(end, []).append(index)
+    unused, loops = dict.fromkeys(range(len(edges))), []
+    while unused:
+        index = next(iter(unused))
+        unused.pop(index)
+        start, vertex = edges[index].tolist()
+        loop = [start]
+        while vertex != start:
+            loop.append(vertex)
+            index = next(k for k in edges_at[vertex] if k in unused)  # exists: every vertex has an even degree
+            unused.pop(index)
+            one, other = edges[index].tolist()
+            vertex = other if one == vertex else one
+        loops.append(np.roll(loop, -int(np.argmin(loop))))
+    return sorted(loops, key=lambda loop: int(loop[0]))
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
