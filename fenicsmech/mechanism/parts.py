@@ -136,7 +136,7 @@ class Output(_AtPoint):
     """The displacement of the material point ``at`` of link ``on`` along ``direction`` (unit vector)."""
 
 
-Leader = Force | Motor | Drive
+PrescribedPart = Force | Motor | Drive
 """A part whose value is prescribed along an equilibrium path."""
 
 

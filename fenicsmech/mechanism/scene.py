@@ -31,7 +31,7 @@ class Effect(ABC):
         faces: ``Faces``, the parts of links' boundaries that ``link_energy`` integrates over.
     """
 
-    faces = ()
+    faces: tuple = ()
 
     @abstractmethod
     def explain(self) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 from fenicsmech.checks import finite
 from fenicsmech.equilibrium import Control, DisplacementControl, LoadControl, MotorControl, PointLoad
 from fenicsmech.errors import DescriptionError
-from fenicsmech.mechanism import Configuration, Drive, Force, Leader, Mechanism, Motor, Units
+from fenicsmech.mechanism import Configuration, Drive, Force, Mechanism, Motor, PrescribedPart, Units
 from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import JointSystem, body_point
 
@@ -31,7 +31,7 @@ class CurveRequest:
         others: constant magnitudes of other forces.
     """
 
-    part: Leader
+    part: PrescribedPart
     controls: tuple[Control, ...]
     configuration: Configuration
     others: tuple[tuple[Force, float], ...]
@@ -63,8 +63,7 @@ class Until:
 
     def __post_init__(self) -> None:
         for name in ("displacement", "force", "position"):
-            given = getattr(self, name)
-            values = tuple(given) if isinstance(given, Iterable) and not isinstance(given, str) else (given,)
+            values = _several(getattr(self, name))
             object.__setattr__(self, name, tuple(finite(f"{name} where a path ends", value) for value in values))
         if not (self.displacement or self.force or self.position):
             raise DescriptionError("end of a path", "no displacement, position or force is given", "Give one of them")
@@ -78,9 +77,18 @@ class Until:
             raise DescriptionError("end of a path", f"{self.frames!r} frames", "Give a whole number of at least 2")
 
     @property
-    def travel(self) -> tuple[float, ...]:
+    def travels(self) -> tuple[float, ...]:
         """Displacements or positions, whichever are given."""
-        return self.displacement or self.position
+        return _several(self.displacement or self.position)
+
+    @property
+    def forces(self) -> tuple[float, ...]:
+        """Magnitudes of the force."""
+        return _several(self.force)
+
+
+def _several(given: float | Iterable[float]) -> tuple[float, ...]:
+    return tuple(given) if isinstance(given, Iterable) and not isinstance(given, str) else (given,)
 
 
 @dataclass(frozen=True)
@@ -100,14 +108,14 @@ class Axis:
         return f"{value:.{digits}g} {self.unit}"
 
 
-def quantities(part: Leader) -> tuple[str, str]:
+def quantities(part: PrescribedPart) -> tuple[str, str]:
     """What lies across and up on the curve of a part."""
     if isinstance(part, Force):
         return "displacement", "force"
     return ("position", "force") if _drive(part).sliding else ("angle", "torque")
 
 
-def axes(part: Leader, units: Units) -> tuple[Axis, Axis]:
+def axes(part: PrescribedPart, units: Units) -> tuple[Axis, Axis]:
     """The same with their units."""
     across, up = quantities(part)
     if across == "angle":
@@ -115,7 +123,7 @@ def axes(part: Leader, units: Units) -> tuple[Axis, Axis]:
     return Axis(across, units.length), Axis(up, units.force)
 
 
-def followed_control(part: Leader, joints: JointSystem) -> LoadControl | MotorControl:
+def followed_control(part: PrescribedPart, joints: JointSystem) -> LoadControl | MotorControl:
     """The control whose value changes along the path of a part."""
     if isinstance(part, Force):
         return LoadControl()
@@ -123,7 +131,7 @@ def followed_control(part: Leader, joints: JointSystem) -> LoadControl | MotorCo
     return MotorControl(0.0, joints.motor_values(lambda motor: ratios.get(motor, 0.0)))
 
 
-def controlled_load(part: Leader, model: MechanismModel) -> PointLoad:
+def controlled_load(part: PrescribedPart, model: MechanismModel) -> PointLoad:
     """The load whose magnitude is an unknown of the equilibrium; for motors one without effect, on a link they move."""
     if isinstance(part, Force):
         return model.point_load(part)
@@ -165,7 +173,7 @@ def read_request(
 
 def read_path(
     mechanism: Mechanism,
-    part: Leader,
+    part: PrescribedPart,
     *,
     until: object,
     configuration: Configuration,
@@ -190,7 +198,7 @@ def read_path(
     return CurveRequest(part, (), configuration, constant)
 
 
-def check_until(until: object, part: Leader) -> None:
+def check_until(until: object, part: PrescribedPart) -> None:
     """Refuses an end that the path of ``part`` does not have.
 
     Raises:
@@ -210,7 +218,7 @@ def _drive(part: Motor | Drive) -> Drive:
 
 
 def _read_others(
-    mechanism: Mechanism, part: Leader, others: Mapping[Force, float] | None
+    mechanism: Mechanism, part: PrescribedPart, others: Mapping[Force, float] | None
 ) -> tuple[tuple[Force, float], ...]:
     others = dict(others or {})
     for other in others:
