@@ -29,7 +29,7 @@ class Quantity:
     """The displacement of a force's point along the force: the number that a study looks at.
 
     Attributes:
-        force_part: the force that grows from zero.
+        part: the force that grows from zero.
         load: its magnitude, not zero.
         configuration: motor positions.
 
@@ -37,19 +37,19 @@ class Quantity:
         DescriptionError: the load is zero or not finite.
     """
 
-    force_part: Force
+    part: Force
     load: float
     configuration: Configuration = DRAWN
 
     def __post_init__(self) -> None:
-        part = f"load of {self.force_part.name!r}"
+        part = f"load of {self.part.name!r}"
         object.__setattr__(self, "load", finite(part, self.load))
         if self.load == 0.0:
             raise DescriptionError(part, "it is zero: nothing would move", "Give another magnitude")
 
     @property
     def name(self) -> str:
-        return f"displacement of {self.force_part.name!r}"
+        return f"displacement of {self.part.name!r}"
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,7 @@ def _measure_elastic(
         solver=PrimalDualNewton(tolerance=level.tolerance),
         comm=comm,
     )
-    force, configuration = quantity.force_part, quantity.configuration
+    force, configuration = quantity.part, quantity.configuration
     # compiles, and touches every page for the first time
     simulation.load_displacement(force, forces=[0.0], configuration=configuration)
     forces = [factor * quantity.load for factor in _SAMPLES]

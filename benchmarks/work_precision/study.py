@@ -119,7 +119,7 @@ class Study:
         if model is None:
             own = Limit(0.0, 0.0, None, 0)
         else:
-            own = self.reference if model.symmetric else self.limits.get(model)
+            own = self.reference if model.half else self.limits.get(model)
         if measurement.value is None or own is None or self.reference is None:
             return None
         return split_error(measurement, self.measurements, own=own, reference=self.reference)

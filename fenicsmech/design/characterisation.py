@@ -34,7 +34,7 @@ class Experiment:
 
     Attributes:
         simulation: of the sample in its test rig.
-        force_part: the force that was applied.
+        part: the force that was applied.
         forces: its magnitudes, (n,).
         displacements: how far its point moved along it, (n,).
         configuration: motor positions.
@@ -44,7 +44,7 @@ class Experiment:
     """
 
     simulation: Simulation
-    force_part: Force
+    part: Force
     forces: Sequence[float]
     displacements: Sequence[float]
     configuration: Configuration = DRAWN
@@ -67,7 +67,7 @@ class Experiment:
         """The curve through all measured forces, from the smallest to the largest."""
         request = read_request(
             self.simulation.scene.mechanism,
-            self.force_part,
+            self.part,
             forces=self.forces,
             displacements=None,
             configuration=self.configuration,
@@ -169,6 +169,6 @@ class _Rig:
             (gradient,) = adjoint.gradients(frame.state, [newton.system.controlled])
             travels[frame.force] = frame.displacement
             slopes[frame.force] = modulus * float(gradient.parameters["E"][self._links].sum())
-        forces = [float(force) for force in self._experiment.forces]
-        reached = np.array([travels[force] for force in forces])
-        return curve, reached - self._experiment.displacements, np.array([slopes[force] for force in forces])
+        measured = self._experiment
+        reached, slope = (np.array([values[force] for force in measured.forces]) for values in (travels, slopes))
+        return curve, reached - measured.displacements, slope

@@ -87,7 +87,7 @@ class Target:
     """A wanted sample of a load–displacement curve.
 
     Attributes:
-        force_part: the force that acts.
+        part: the force that acts.
         force: its magnitude.
         displacement: how far its point should move along it.
         configuration: motor positions.
@@ -97,18 +97,18 @@ class Target:
         DescriptionError: a number makes no sense.
     """
 
-    force_part: Force
+    part: Force
     force: float
     displacement: float
     configuration: Configuration = DRAWN
     weight: float = 1.0
 
     def __post_init__(self) -> None:
-        if not isinstance(self.force_part, Force):
-            raise DescriptionError("target", f"{self.force_part!r} is no force", "Give one of the mechanism's")
-        finite(f"force of a target for {self.force_part.name!r}", self.force)
-        finite(f"displacement of a target for {self.force_part.name!r}", self.displacement)
-        positive(f"weight of a target for {self.force_part.name!r}", self.weight)
+        if not isinstance(self.part, Force):
+            raise DescriptionError("target", f"{self.part!r} is no force", "Give one of the mechanism's")
+        finite(f"force of a target for {self.part.name!r}", self.force)
+        finite(f"displacement of a target for {self.part.name!r}", self.displacement)
+        positive(f"weight of a target for {self.part.name!r}", self.weight)
 
 
 def shape_request(design: SplineDesign, mechanism: Mechanism, linkage: Linkage) -> ShapeRequest:
@@ -122,11 +122,13 @@ def shape_request(design: SplineDesign, mechanism: Mechanism, linkage: Linkage) 
     if link not in mechanism.flexible_links:
         raise DescriptionError(part, f"it is not a flexible link of {mechanism.name!r}", "Name one of its links")
     points = design.centreline
-    if points is None and not isinstance(link.shape, Strip):
-        raise DescriptionError(part, "its shape has no centreline", "Give centreline=…, points along the link")
-    centreline = Centreline(link.shape.centreline if points is None else points, part=part)
+    if points is None:
+        if not isinstance(link.shape, Strip):
+            raise DescriptionError(part, "its shape has no centreline", "Give centreline=…, points along the link")
+        points = link.shape.centreline
+    centreline = Centreline(points, part=part)
     bodies = [linkage.bodies[i] for i in linkage.interfaces[link]]
-    joints = tuple(body.centre[:2] for body in bodies)
+    joints = tuple((body.centre[0], body.centre[1]) for body in bodies)
     stations = sorted(centreline.closest(at) for at in joints)
     gaps = np.diff(stations)
     interior = np.zeros(len(gaps), dtype=int)
@@ -175,7 +177,7 @@ def check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
             raise DescriptionError("design problem", f"{target!r} is no target", "Give Target(…)")
         read_request(
             simulation.scene.mechanism,
-            target.force_part,
+            target.part,
             forces=[target.force],
             displacements=None,
             configuration=target.configuration,
@@ -209,7 +211,7 @@ def check_effects(
             reason = f"{names} do not carry the force, or something rigid holds its point"
             remedy = "Let links change that carry it, or give targets of another force"
         raise DescriptionError(
-            f"target of {target.force_part.name!r} ({target.force:g} in configuration {target.configuration.name!r})",
+            f"target of {target.part.name!r} ({target.force:g} in configuration {target.configuration.name!r})",
             f"its displacement does not depend on the shapes that may change: {reason}",
             remedy,
         )

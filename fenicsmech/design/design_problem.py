@@ -255,8 +255,8 @@ class DesignProblem:
             )
         return group, objective
 
-    def _meshes(self, given: tuple[np.ndarray, HandlePlacement | None]) -> list[LinkMesh] | None:
-        """Meshes of the links that may change on the first process, None elsewhere."""
+    def _meshes(self, given: tuple[np.ndarray, HandlePlacement | None]) -> list[LinkMesh]:
+        """Meshes of the links that may change, on the first process alone."""
         model = self.simulation.model
         with model.shaped(self._rest.field(*given)):
             return rest_meshes(self.simulation, [design.link for design in self.designs])

@@ -81,7 +81,7 @@ class TargetEquilibria:
     def __init__(self, simulation: Simulation, targets: Sequence[Target], options: FollowOptions | None = None) -> None:
         self._simulation, self._model, self._options = simulation, simulation.model, options or FollowOptions()
         self.targets = tuple(targets)
-        forces = dict.fromkeys(target.force_part for target in targets)
+        forces = dict.fromkeys(target.part for target in targets)
         self._newtons = {part: simulation.newton(part) for part in forces}
         self._sensitivities = {part: Sensitivity(self._model, newton) for part, newton in self._newtons.items()}
 
@@ -94,7 +94,7 @@ class TargetEquilibria:
         samples: dict[Target, Sample] = {}
         paths: dict[tuple, list[Target]] = {}
         for target in self.targets:
-            key = target.force_part, target.configuration, target.force < 0.0
+            key = target.part, target.configuration, target.force < 0.0
             paths.setdefault(key, []).append(target)
         for targets in paths.values():
             samples.update(self._traced(targets))
@@ -126,7 +126,7 @@ class TargetEquilibria:
         return np.array([self._error(*pair, known.design) for pair in zip(self.targets, known.samples, strict=True)])
 
     def _error(self, target: Target, sample: Sample, design: np.ndarray) -> float:
-        newton = self._newtons[target.force_part]
+        newton = self._newtons[target.part]
 
         def error(state: State) -> float:
             (added,) = self._simulation.estimates.at(newton, Equilibrium(state, design, Quantity.DISPLACEMENT))
@@ -135,8 +135,8 @@ class TargetEquilibria:
         return error(sample.state) - (0.0 if sample.origin is None else error(sample.origin))
 
     def _gradient(self, target: Target, sample: Sample) -> np.ndarray:
-        adjoint = self._sensitivities[target.force_part]
-        outputs = [self._newtons[target.force_part].system.controlled]
+        adjoint = self._sensitivities[target.part]
+        outputs = [self._newtons[target.part].system.controlled]
         (loaded,) = adjoint.gradients(sample.state, outputs)
         if sample.origin is None:
             return loaded.design
@@ -145,7 +145,7 @@ class TargetEquilibria:
 
     def _traced(self, targets: Sequence[Target]) -> dict[Target, Sample]:
         """The samples of targets on one path, which differ in the size of their force alone."""
-        part, configuration = targets[0].force_part, targets[0].configuration
+        part, configuration = targets[0].part, targets[0].configuration
         moving = self._origin_moves(targets[0])
         loads = {0.0} if moving else set()
         loads |= {target.force for target in targets}
@@ -170,7 +170,7 @@ class TargetEquilibria:
 
     def _unloaded(self, target: Target, state: State) -> State:
         """The equilibrium without force and without effects, from one without force."""
-        newton = self._newtons[target.force_part]
+        newton = self._newtons[target.part]
         try:
             return newton.solve(replace(state, load_factor=0.0), LoadControl(0.0)).state
         except NotConverged as failure:
@@ -200,7 +200,7 @@ class TargetEquilibria:
 
     def _next(self, target: Target, start: State, control: LoadControl, before: np.ndarray, after: np.ndarray) -> State:
         """The same in one step."""
-        model, newton = self._model, self._newtons[target.force_part]
+        model, newton = self._model, self._newtons[target.part]
         model.reshape(before)
         guess = model.carry(start, after)
         try:
@@ -223,12 +223,12 @@ class TargetEquilibria:
 
     def _origin_moves(self, target: Target) -> bool:
         """Whether the unloaded position of the target's point depends on the design."""
-        on_link = isinstance(target.force_part.on, FlexibleLink)
+        on_link = isinstance(target.part.on, FlexibleLink)
         return on_link or assemble(self._simulation.linkage, target.configuration).fraction < 1.0
 
     def _travel(self, target: Target, state: State) -> float:
         self._model.load(state)
-        return self._model.travel(target.force_part, state)
+        return self._model.travel(target.part, state)
 
 
 class _Lost(Infeasible):

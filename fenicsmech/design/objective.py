@@ -72,9 +72,9 @@ class Objective:
         self.reached = np.full(len(targets), np.nan)
 
     @property
-    def placement(self) -> HandlePlacement | None:
+    def placement(self) -> HandlePlacement:
         """Handle positions of the best design so far."""
-        return self._base and self._base.placement
+        return self._best.placement
 
     def begin(self, near: HandlePlacement | None) -> None:
         """Starts afresh: the next evaluation finds its equilibria from zero load, its handles near ``near``."""
@@ -114,7 +114,7 @@ class Objective:
     def errors(self) -> np.ndarray:
         """Estimated errors |e| of the residuals of the best design so far, those of the finite elements, (targets,)."""
         with self._clock.phase("estimates"):
-            estimates = on_all(self._group.everyone, lambda: self._equilibria.errors(self._base.known))
+            estimates = on_all(self._group.everyone, lambda: self._equilibria.errors(self._best.known))
         return np.abs(self._gathered(estimates[:, None])[:, 0]) / self._scale
 
     def traced(self, parameters: np.ndarray) -> float:
@@ -134,6 +134,11 @@ class Objective:
         """The bounds that hold the design ``parameters`` back, in words."""
         placement = on_all(self._group.everyone, lambda: self._rest.place(parameters, self.placement))
         return self._group.everyone.bcast(self._regulariser.active(self._rest, placement), root=0)
+
+    @property
+    def _best(self) -> _Base:
+        assert self._base is not None, "no design was evaluated yet"
+        return self._base
 
     def _residuals(self, reached: np.ndarray) -> np.ndarray:
         return (reached - self._wanted) / self._scale
@@ -241,8 +246,8 @@ def split(comm: MPI.Comm, targets: int) -> Group:
     if count == 1:
         return Group(comm, comm, tuple(range(targets)))
     mine = comm.rank * count // comm.size
-    parts: dict[int, MPI.Comm] | None = comm.Get_attr(_PARTS)
-    if parts is None:
+    parts = comm.Get_attr(_PARTS)
+    if not isinstance(parts, dict):
         parts = {}
         comm.Set_attr(_PARTS, parts)
     if count not in parts:

@@ -238,7 +238,7 @@ def verified_targets(
     errors = target_errors(targets, reached)
     results = tuple(
         TargetResult(
-            force_name=target.force_part.name,
+            force_name=target.part.name,
             configuration=target.configuration.name,
             force=target.force,
             wanted=target.displacement,
@@ -258,7 +258,7 @@ def link_designs(
     """The shapes of all links at a placement."""
     designs = []
     for link, design, handles in zip(rest.links, wanted, rest.handles(placement), strict=True):
-        own = placement.p[link.place]
+        own, drawn = placement.p[link.place], design.centreline
         thickness, bend = link.thickness * link.samples.thickness(own), link.samples.curvature(own)
         designs.append(
             LinkDesign(
@@ -268,21 +268,21 @@ def link_designs(
                 controls=tuple(tuple(map(tuple, point)) for point in link.spline.controls_at(own).tolist()),
                 thickness=(float(thickness.min()), float(thickness.max())),
                 bend=float(np.abs(bend).max(initial=0.0)),
-                centreline=design.centreline and tuple(tuple(map(float, point)) for point in design.centreline),
+                centreline=None if drawn is None else tuple(tuple(map(float, point)) for point in drawn),
             )
         )
     return tuple(designs)
 
 
-def rest_meshes(simulation: Simulation, links: Sequence[FlexibleLink]) -> list[LinkMesh] | None:
-    """Meshes of some links in their present shape on the first process, None elsewhere.
+def rest_meshes(simulation: Simulation, links: Sequence[FlexibleLink]) -> list[LinkMesh]:
+    """Meshes of some links in their present shape, on the first process alone.
 
     Links of which one half is meshed are given by their plan.
     """
     meshes = gather_links(simulation.model.mesh, rest_vertices(simulation.model))
-    everyone, halves = simulation.scene.mechanism.flexible_links, simulation.fidelity.model.symmetric
+    everyone, halves = simulation.scene.mechanism.flexible_links, simulation.fidelity.model.half
     chosen = [meshes[everyone.index(link)] for link in links]
-    return on_one(simulation.comm, lambda: [plan_of(mesh).mesh for mesh in chosen] if halves else chosen)
+    return on_one(simulation.comm, lambda: [plan_of(mesh).mesh for mesh in chosen] if halves else chosen) or []
 
 
 def _outline(link: DesignedLink, mesh: LinkMesh, p: np.ndarray) -> LinkOutline:
@@ -325,7 +325,7 @@ def write_solids(
     """Local. Writes ``NAME.step`` and ``NAME.stl`` of every link, with holes of this diameter for pins if given."""
     for link, mesh in zip(links, meshes, strict=True):
         regions = [linkage.bodies[i] for i in linkage.interfaces[link]]
-        pins = [PinHole(tuple(b.centre[:2]), hole) for b in regions if hole and isinstance(b.region, Disc)]
+        pins = [PinHole((b.centre[0], b.centre[1]), hole) for b in regions if hole and isinstance(b.region, Disc)]
         stem = Path(folder) / link.name.replace(" ", "-")
         for suffix, write in ((".step", write_step), (".stl", write_stl)):
             write(stem.with_suffix(suffix), mesh, depth=link.shape.depth, pins=pins, name=link.name)

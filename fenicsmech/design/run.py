@@ -66,6 +66,7 @@ def minimise_together(
             last = optimiser.minimise(_Shared(comm, objective), start, watch=watch_first)
         finally:
             comm.bcast(None, root=0)
+        assert last.reason is not None, "an optimiser ends for a reason"
         return Optimum(last.number, last.evaluations, last.evaluation.parameters, last.reason, started[0])
 
     return comm.bcast(on_all(comm, lambda: lead() if comm.rank == 0 else _follow(comm, objective)), root=0)
@@ -193,7 +194,7 @@ def fingerprint(
         "drawing": [repr(link) for link in mechanism.flexible_links],
         "links": [[link.name, link.spline.initial.tolist()] for link in rest.links],
         "bounds": [repr(link.bounds) for link in rest.links],
-        "forces": [[t.force_part.name, *t.force_part.at, *t.force_part.direction] for t in targets],
+        "forces": [[t.part.name, *t.part.at, *t.part.direction] for t in targets],
         "configurations": [[t.configuration.name, *(at for _, at in t.configuration.positions)] for t in targets],
         "targets": [[t.force, t.displacement, t.weight] for t in targets],
         "regulariser": repr(regulariser),

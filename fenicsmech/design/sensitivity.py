@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import ufl
@@ -91,7 +92,7 @@ class Sensitivity:
         return nodal
 
     @cached_property
-    def _forms(self) -> dict[str, tuple[fem.Form, fem.Function]]:
+    def _forms(self) -> dict[str, tuple[Any, fem.Function]]:
         """r · û, differentiated by design, displacement and moduli, and where each derivative is assembled."""
         elastic = self._model.elastic
         fields = {"design": elastic.d, "displacement": elastic.u, **elastic.parameters}

@@ -13,7 +13,7 @@ nothing: no form, no unknown, no entry of a matrix.
 """
 
 from fenicsmech.effects.contact import Contact, ContactGauge
-from fenicsmech.effects.energies import LinkFields, PosePotential, holding
+from fenicsmech.effects.energies import LinkFields, PosePotential, spring_potentials
 from fenicsmech.effects.faces import Faces, find_boundaries
 from fenicsmech.effects.gravity import Gravity, Mass
 from fenicsmech.effects.joint_compliance import JointCompliance
@@ -38,5 +38,5 @@ __all__ = [
     "Pressure",
     "Prestrain",
     "find_boundaries",
-    "holding",
+    "spring_potentials",
 ]

@@ -129,6 +129,6 @@ class PosePotential(ABC):
         """∂²V/∂z², (n · pose_size, n · pose_size)."""
 
 
-def holding(effects: Sequence[Effect], linkage: Linkage) -> tuple[PosePotential, ...]:
+def spring_potentials(effects: Sequence[Effect], linkage: Linkage) -> tuple[PosePotential, ...]:
     """The potentials of ``effects`` that act in full from the start."""
     return tuple(found for effect in effects for found in effect.pose_potentials(linkage) if found.holds)

@@ -74,7 +74,7 @@ class Pressure(Effect):
                 "the part it acts on is open: its load has an energy only if the rim is held",
                 "Hold the rim and give about=…, or press on a closed part",
             )
-        if fields.model.symmetric and self.about is not None and in_dimension(self.about, 3)[2] != 0.0:
+        if fields.model.half and self.about is not None and in_dimension(self.about, 3)[2] != 0.0:
             raise DescriptionError(
                 f"pressure on {self.link.name!r}",
                 f"the point {self.about} it goes about is not on the mid-plane",

@@ -35,7 +35,7 @@ class ElasticModel(ABC):
     confined: bool = True
 
     @property
-    def symmetric(self) -> bool:
+    def half(self) -> bool:
         """Whether the mesh is one half of the links, the other its mirror image at the plane z = 0."""
         return self.mechanism_dim < self.dim
 

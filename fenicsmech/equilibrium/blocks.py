@@ -105,8 +105,9 @@ class Blocks:
         self, comm: MPI.Comm, *, nodes: int, pressures: int, poses: int, multipliers: int, padding: int = 0
     ) -> None:
         self.comm, self.last = comm, comm.rank == comm.size - 1
-        here, first = nodes + pressures, comm.exscan(nodes + pressures) or 0
-        totals = comm.allreduce(np.array([nodes, pressures]))
+        counts = np.array(comm.allgather((nodes, pressures)))  # by rank
+        here, first = nodes + pressures, int(counts[: comm.rank].sum())
+        totals = counts.sum(axis=0)
         start, border = int(totals.sum()), poses + multipliers + 1
 
         def on_last(begin: int, size: int) -> Block:

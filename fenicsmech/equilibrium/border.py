@@ -18,7 +18,7 @@ from fenicsmech.elasticity import ElasticBody
 from fenicsmech.equilibrium.blocks import Numbering
 from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadControl
 from fenicsmech.equilibrium.state import State
-from fenicsmech.multibody import BodyPoint, JointSystem, LinkPoint, MaterialPoint
+from fenicsmech.multibody import BodyPoint, JointSystem, LinkPoint
 
 REGULARISATION = 1e-8
 """ε = 1/ρ of the multipliers, the proximal term of the augmented Lagrangian: keeps redundant constraints regular. In
@@ -32,7 +32,7 @@ class PointLoad:
     """A dead force along ``direction``, of as many coordinates as u(point): work f · direction · u(point)."""
 
     name: str
-    point: MaterialPoint
+    point: BodyPoint | LinkPoint
     direction: np.ndarray
 
 
@@ -155,8 +155,8 @@ class BorderTerms:
             for one, columns in places:
                 for other, other_columns in places:
                     yield z + columns, z + other_columns, curvature[one, other]
-        for one, other, block in joints.hessian_blocks(state.poses, state.motors, state.multipliers):
-            yield z + one, z + other, -block
+        for poses, other_poses, block in joints.hessian_blocks(state.poses, state.motors, state.multipliers):
+            yield z + poses, z + other_poses, -block
         for constraints, columns, block in joints.gradient_blocks(state.poses, state.motors):
             yield multipliers + constraints, z + columns, -block
             yield z + columns, multipliers + constraints, -block.T

@@ -58,15 +58,11 @@ class KktMatrix:
         # K̂ by entries: its copy, whether it is up to date, its diagonal, and whether that is without what is added
         self._entries: EntryCopy | None = None
         self._converted, self._entries_plain = False, False
-        self._entries_diagonal: PETSc.Vec | None = None
+        self._entries_diagonal = PETSc.Vec()
         # the whole matrix, whether it is up to date, and its diagonal without what is added
-        self._matrix: PETSc.Mat | None = None
-        self._formed = False
-        self._diagonal: PETSc.Vec | None = None
+        self._matrix, self._formed, self._diagonal = PETSc.Mat(), False, PETSc.Vec()
         # G of the border, K̂ G of it, Gᵀ K̂ G of it
-        self._border_map: PETSc.Mat | None = None
-        self._images: PETSc.Mat | None = None
-        self._border_columns: PETSc.Mat | None = None
+        self._border_map, self._images, self._border_columns = PETSc.Mat(), PETSc.Mat(), PETSc.Mat()
 
     def tangent(self) -> None:
         """Makes K̂ hold ∂²E/∂u² of the present fields, and nothing else."""

@@ -35,7 +35,7 @@ def joint_reactions(joints: JointSystem, state: State) -> dict[str, Reaction]:
         force = force_on_pose[: space.dim]
         pose = state.poses[body]
         lever = space.rotate(pose, np.array(connection.at) - np.array(joints.bodies[body].centre))
-        about_centre = space.turns(pose).T @ force_on_pose[space.dim :]
+        about_centre = space.rotation_rates(pose).T @ force_on_pose[space.dim :]
         reactions[connection.name] = Reaction(force, about_centre - _cross(lever, force))
     return reactions
 

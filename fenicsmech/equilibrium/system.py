@@ -315,4 +315,4 @@ class EquilibriumSystem:
 
 def _added(a: dict[int, np.ndarray], b: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
     """Sum of two ranks' moments; a rank may hold no node of some body."""
-    return {body: a.get(body, 0.0) + b.get(body, 0.0) for body in sorted(a.keys() | b.keys())}
+    return {body: np.sum([own[body] for own in (a, b) if body in own], axis=0) for body in sorted(a.keys() | b.keys())}

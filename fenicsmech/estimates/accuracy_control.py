@@ -295,6 +295,6 @@ class AccuracyControl:
 
 def _fits(scene: Scene, model: ElasticModel) -> bool:
     """Whether the scene can be simulated in ``model``, and its links be meshed for it."""
-    if model.symmetric and any(isinstance(link.shape, StepPart | MeshPart) for link in scene.mechanism.flexible_links):
+    if model.half and any(isinstance(link.shape, StepPart | MeshPart) for link in scene.mechanism.flexible_links):
         return False
     return fits(scene, model)

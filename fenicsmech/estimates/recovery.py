@@ -61,7 +61,7 @@ class Recovery:
         for k, vanishes in enumerate(odd):
             part.array_w[:] = right[k :: len(odd)]
             solver = self._solver
-            if vanishes and self._elastic.model.symmetric:
+            if vanishes and self._elastic.model.half:
                 part.array_w[self._mid_plane] = 0.0
                 solver = self._solver_off_mid_plane
             solver.solve(part, values)

@@ -61,7 +61,7 @@ class RigidSpace(ABC):
         """R(r) in sympy, the same formula as the numeric one."""
 
     @abstractmethod
-    def turns(self, pose: np.ndarray) -> np.ndarray:
+    def rotation_rates(self, pose: np.ndarray) -> np.ndarray:
         """∂r/∂ω for a small rotation vector ω in space, (rotation_size, 1 or 3)."""
 
     @abstractmethod
@@ -137,7 +137,7 @@ class PlanarSpace(RigidSpace):
         (angle,) = parameters
         return sympy.Matrix([[sympy.cos(angle), -sympy.sin(angle)], [sympy.sin(angle), sympy.cos(angle)]])
 
-    def turns(self, pose):
+    def rotation_rates(self, pose):
         return np.ones((1, 1))
 
     def compose(self, outer, inner, lever):
@@ -183,7 +183,7 @@ class SpatialSpace(RigidSpace):
         cross = sympy.Matrix([[0, -z, y], [z, 0, -x], [-y, x, 0]])
         return sympy.eye(3) + 2 * (w * cross + v * v.T - v.dot(v) * sympy.eye(3))
 
-    def turns(self, pose):
+    def rotation_rates(self, pose):
         # dq = ½ (0, ω) ∘ q
         w, v = pose[3], pose[4:]
         cross = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])

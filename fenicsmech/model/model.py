@@ -29,7 +29,7 @@ from fenicsmech.meshing import (
     mesh_link,
 )
 from fenicsmech.model.fidelity import Fidelity
-from fenicsmech.multibody import DesignAtNodes, InterfaceMap, Linkage, MaterialPoint, body_point, link_point
+from fenicsmech.multibody import BodyPoint, DesignAtNodes, InterfaceMap, Linkage, LinkPoint, body_point, link_point
 
 
 class MechanismModel:
@@ -47,7 +47,7 @@ class MechanismModel:
         mixed: whether each flexible link is in the u–p formulation.
         effects: what acts beside links, joints and forces.
         potentials: potentials of body poses.
-        holding: those of springs, which act from the start.
+        spring_potentials: those of springs, which act from the start.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class MechanismModel:
         self.materials = tuple(link.material for link in links) if materials is None else tuple(materials)
         self.mixed = fidelity.formulation.mixed(list(self.materials), fidelity.model, fidelity.order)
         faces = [part for effect in effects for part in effect.faces]
-        self._boundaries = find_boundaries(mesh.mesh, links, mesh.link, faces, half=fidelity.model.symmetric)
+        self._boundaries = find_boundaries(mesh.mesh, links, mesh.link, faces, half=fidelity.model.half)
         self.elastic = ElasticBody(
             mesh.mesh,
             link=mesh.link,
@@ -83,7 +83,7 @@ class MechanismModel:
             mixed=self.mixed,
         )
         self.potentials = [potential for effect in effects for potential in effect.pose_potentials(linkage)]
-        self.holding = tuple(potential for potential in self.potentials if potential.holds)
+        self.spring_potentials = tuple(potential for potential in self.potentials if potential.holds)
         self._compliances: dict[int, float] = {}
         for effect in effects:
             for row, compliance in effect.soften(linkage).items():
@@ -144,7 +144,7 @@ class MechanismModel:
         """Makes the finite-element fields hold ``state``."""
         load_fields(self.elastic, self.interfaces, state)
 
-    def point(self, part: Force | Output) -> MaterialPoint:
+    def point(self, part: Force | Output) -> BodyPoint | LinkPoint:
         """The material point of a force or output."""
         if not isinstance(part.on, FlexibleLink):
             at = np.array(in_dimension(part.at, self.linkage.dim))
@@ -271,6 +271,6 @@ def _mesh_request(link: FlexibleLink, linkage: Linkage, fidelity: Fidelity) -> t
         for at, body in zip(ats, bodies, strict=True)
         if body.region is not None  # interfaces have regions, rigid links none
     ]
-    size, half = fidelity.sizes[link], fidelity.model.symmetric
+    size, half = fidelity.sizes[link], fidelity.model.half
     options = {"layers": fidelity.layers, "segments": fidelity.segments}
     return sites, {"dim": fidelity.model.dim, "size": size, "half": half, **options}

@@ -187,10 +187,12 @@ def stiff_motions(linkage: Linkage, poses: np.ndarray, motors: np.ndarray) -> li
                 slide = length * np.eye(dim)[k] if k < dim else np.zeros(dim)
                 spin[body] = np.eye(turns)[k - dim] if k >= dim else 0.0
                 velocity[body] = slide + _cross(spin[body], (places[body] - places[bodies[0]])[None])[0]
-                z[joints.columns[body]] = np.concatenate([velocity[body], space.turns(poses[body]) @ spin[body]])
+                z[joints.columns[body]] = np.concatenate(
+                    [velocity[body], space.rotation_rates(poses[body]) @ spin[body]]
+                )
             basis.append(Motion(z, velocity, spin))
-    rates = joints.row_scale[:, None] * (joints.gradient(poses, motors) @ np.array([motion.z for motion in basis]).T)
-    _, values, right = np.linalg.svd(rates, full_matrices=True)
+    opening = joints.row_scale[:, None] * (joints.gradient(poses, motors) @ np.array([motion.z for motion in basis]).T)
+    _, values, right = np.linalg.svd(opening, full_matrices=True)
     return [
         Motion(*(np.tensordot(weights, [getattr(m, name) for m in basis], 1) for name in ("z", "velocity", "spin")))
         for weights in right[int(np.sum(values > _RANK)) :]

@@ -13,7 +13,7 @@ from mpi4py import MPI
 from fenicsmech.clock import Clock
 from fenicsmech.collective import from_one
 from fenicsmech.continuation import ArcSteps, Hermite, Predictor
-from fenicsmech.effects import holding
+from fenicsmech.effects import spring_potentials
 from fenicsmech.elasticity import Formulation, MixedFormulation, Quadrature
 from fenicsmech.equilibrium import EquilibriumSolver, Iteration, PrimalDualNewton
 from fenicsmech.errors import DescriptionError
@@ -255,7 +255,9 @@ class Simulation:
         Raises:
             AssemblyError: one of the configurations does not assemble, or its motors strain the links.
         """
-        return unloaded_positions(self.linkage, part, configurations, holding(self.scene.effects, self.linkage))
+        return unloaded_positions(
+            self.linkage, part, configurations, spring_potentials(self.scene.effects, self.linkage)
+        )
 
     # -- others like this one ------------------------------------------------------------------------------------
 

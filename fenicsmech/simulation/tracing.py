@@ -71,9 +71,9 @@ class CurveTracer:
     def __init__(self, discretisation: Discretisation, request: CurveRequest) -> None:
         self.discretisation, self.request, self._model = discretisation, request, discretisation.model
         model, rigid = self._model, self._model.linkage.rigid
-        assembly = assemble_before_strain(model.linkage, request.configuration, model.holding)
+        assembly = assemble_before_strain(model.linkage, request.configuration, model.spring_potentials)
         motors = assembly.fraction * rigid.motor_values(request.configuration.position)
-        self.freedom = count_freedom(rigid, assembly.poses, motors, model.holding)
+        self.freedom = count_freedom(rigid, assembly.poses, motors, model.spring_potentials)
         self.solver = discretisation.newton(request.part, request.others)
         self._system, self._joints = self.solver.system, model.linkage.joints
         self.followed = followed_control(request.part, self._joints)
@@ -274,8 +274,8 @@ class CurveTracer:
         """Whether some freedom is held by springs that rounding of the links' stiffness, 1e-15 of it, outweighs."""
         rigid, motors = self._model.linkage.rigid, self._joints.motor_values(self.request.configuration.position)
         motors = np.concatenate([motors, np.zeros(len(rigid.connections) - len(motors))])  # welds of links
-        free = free_motions(rigid, self._poses, motors, self._model.holding)
-        held = np.abs(np.linalg.eigvalsh(free.curvature)) if self._model.holding else np.zeros(0)
+        free = free_motions(rigid, self._poses, motors, self._model.spring_potentials)
+        held = np.abs(np.linalg.eigvalsh(free.curvature)) if self._model.spring_potentials else np.zeros(0)
         return bool(np.min(held[held > 0.0], initial=np.inf) < 1e-15 * self._system.unknowns.unit**2)
 
     # -- residual along zero-energy modes -----------------------------------------------------------------------
@@ -324,7 +324,7 @@ class CurveTracer:
 
 
 def unloaded_positions(
-    linkage: Linkage, part: Force | Output, configurations: Sequence[Configuration], holding: Sequence[SpringPotential]
+    linkage: Linkage, part: Force | Output, configurations: Sequence[Configuration], springs: Sequence[SpringPotential]
 ) -> np.ndarray:
     """Positions of the point of a force or output in each unloaded configuration, (configurations, dim).
 
@@ -336,7 +336,7 @@ def unloaded_positions(
     drawn = np.array(in_dimension(part.at, linkage.dim))
     positions = []
     for configuration in configurations:
-        assembly = assemble(linkage, configuration, holding)
+        assembly = assemble(linkage, configuration, springs)
         if assembly.fraction < 1.0:
             raise AssemblyError(
                 f"configuration {configuration.name!r}",

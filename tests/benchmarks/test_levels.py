@@ -44,7 +44,7 @@ def test_a_model_without_a_form_for_an_effect_is_left_out():
 
 
 def test_a_load_that_moves_nothing_is_refused():
-    force = cantilever().tip.force_part
+    force = cantilever().tip.part
     with pytest.raises(DescriptionError, match="zero"):
         Quantity(force, 0.0)
     with pytest.raises(DescriptionError):

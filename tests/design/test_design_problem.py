@@ -9,7 +9,7 @@ from mpi4py import MPI
 import fenicsmech as fm
 from fenicsmech.design import group_count
 
-from .mechanisms import Case, bow, strained, truss
+from .mechanisms import PLASTIC, Case, bow, strained, truss
 from .refusal import refused
 
 REACHABLE = ((0.1, 2.0), (0.4, 3.2))
@@ -40,11 +40,10 @@ def test_targets_are_reached(reached):
 
 def test_the_simulation_stays_as_it_was_and_gives_one_of_the_best_shape(reached):
     whole, result = reached
-    push = whole.targets[0].force_part
+    push = whole.targets[0].part
     drawn = truss(*REACHABLE).problem()
     stays, fresh = (
-        problem.simulation.load_displacement(problem.targets[0].force_part, forces=[0.1, 0.4])
-        for problem in (whole, drawn)
+        problem.simulation.load_displacement(problem.targets[0].part, forces=[0.1, 0.4]) for problem in (whole, drawn)
     )
     assert stays.displacements == pytest.approx(fresh.displacements, rel=1e-10)
     curve = whole.simulation.with_design(result).load_displacement(push, forces=[0.1, 0.4])
@@ -68,7 +67,7 @@ def test_a_result_says_what_its_links_look_like(reached):
 def test_applying_a_result_restores_its_shape(reached, route, tmp_path):
     _, result = reached
     fresh = truss(*REACHABLE).problem()
-    push = fresh.targets[0].force_part
+    push = fresh.targets[0].part
     expected = [target.reached for target in result.targets]
     given = result
     if route == "file":
@@ -85,7 +84,7 @@ def test_applying_a_result_restores_its_shape(reached, route, tmp_path):
 
 def test_the_drawn_shape_is_the_initial_design(reached):
     whole = truss(*REACHABLE).problem()
-    push = whole.targets[0].force_part
+    push = whole.targets[0].part
     drawn = whole.simulation.load_displacement(push, forces=[0.4]).displacements
     initial = whole.simulation.with_design(whole.rest_shape(whole.initial))
     # as drawn up to how the spline follows the centreline, and better placed handles
@@ -117,7 +116,7 @@ def test_contradicting_targets_end_with_their_compromise():
 
 def test_weights_shift_the_compromise():
     case = truss((0.4, 2.0), (0.4, 3.0))
-    push = case.targets[0].force_part
+    push = case.targets[0].part
     wanted = [fm.Target(push, 0.4, 2.0), fm.Target(push, 0.4, 3.0, weight=9.0)]
     result = Case(case.scene, case.designs, wanted).problem().optimise(optimiser=fm.LevenbergMarquardt(tolerance=1e-6))
     # (u − 2) / 4 + 9 (u − 3) / 9 = 0
@@ -155,10 +154,10 @@ def test_links_that_carry_their_force_themselves_or_are_strained_by_motors_can_b
     drawn = case.problem()
     (first, last) = case.targets
     curve = drawn.simulation.with_design(drawn.rest_shape(drawn.initial)).load_displacement(
-        first.force_part, forces=[first.force, last.force], configuration=first.configuration
+        first.part, forces=[first.force, last.force], configuration=first.configuration
     )
     wanted = [
-        fm.Target(t.force_part, t.force, 1.3 * u, t.configuration)
+        fm.Target(t.part, t.force, 1.3 * u, t.configuration)
         for t, u in zip(case.targets, curve.displacements, strict=True)
     ]
     result = Case(case.scene, case.designs, wanted).problem().optimise()
@@ -207,7 +206,7 @@ def test_the_optimum_does_not_depend_on_the_number_of_ranks(wanted, shared_tmp_p
         whole = truss(*wanted).problem(comm=comm)
         file = shared_tmp_path / f"{comm.size}.json" if comm.size > 1 else None
         results.append(whole.optimise(checkpoint=file))
-        push = whole.targets[0].force_part
+        push = whole.targets[0].part
         curve = whole.simulation.with_design(results[-1]).load_displacement(push, forces=[force for force, _ in wanted])
         assert curve.displacements == pytest.approx([target.reached for target in results[-1].targets], rel=1e-8)
     alone, together = results
@@ -237,3 +236,20 @@ def test_refusals_are_the_same_on_all_ranks(shared_tmp_path):
     # an error while the checkpoint is written, which only the first process does
     with pytest.raises(OSError):
         whole.optimise(checkpoint=file / "not a folder" / "checkpoint.json")
+
+
+def test_elements_too_large_for_the_handles_of_a_thin_strip_are_refused():
+    mechanism = fm.Mechanism("thin strip")
+    base, tip = mechanism.rigid("base", fixed=True), mechanism.rigid("tip")
+    strip = mechanism.flexible("strip", fm.strip([(0, 0), (18, 34), (40, 60)], thickness=1.0, depth=20.0), PLASTIC)
+    mechanism.revolute(base, strip, at=(0, 0), radius=3.0)
+    mechanism.revolute(strip, tip, at=(40, 60), radius=3.0)
+    mechanism.prismatic(base, tip, at=(40, 60), axis=(0, 1))
+    push = mechanism.force(on=tip, at=(40, 60), direction=(0, -1))
+    case = Case(fm.Scene(mechanism), [fm.SplineDesign(strip, 3)], [fm.Target(push, 0.1, 1.0)])
+    refused(
+        lambda: case.problem(size=3.0, order=1).initial,
+        part="'strip'",
+        problem="2 of its 44 handles move no vertex",
+        remedy="smaller elements",
+    )

@@ -99,7 +99,7 @@ def test_a_force_of_another_mechanism():
     case, other = truss(*REACHABLE), bow(10.0)
     refused(
         lambda: Case(case.scene, case.designs, other.targets).problem(),
-        part=other.targets[0].force_part.name,
+        part=other.targets[0].part.name,
         problem="not a force of 'truss finger'",
         remedy="force",
     )
@@ -107,7 +107,7 @@ def test_a_force_of_another_mechanism():
 
 def test_motors_of_another_mechanism():
     case, other = truss(*REACHABLE), strained(1.0)
-    target = fm.Target(case.targets[0].force_part, 0.1, 2.0, other.targets[0].configuration)
+    target = fm.Target(case.targets[0].part, 0.1, 2.0, other.targets[0].configuration)
     refused(
         lambda: Case(case.scene, case.designs, [target]).problem(),
         part="'turned'",
@@ -119,7 +119,7 @@ def test_motors_of_another_mechanism():
 @pytest.mark.parametrize("number", [math.nan, math.inf, "two", None])
 @pytest.mark.parametrize("name", ["force", "displacement", "weight"])
 def test_targets_that_are_no_numbers(name, number):
-    push = truss(*REACHABLE).targets[0].force_part
+    push = truss(*REACHABLE).targets[0].part
     numbers = {"force": 0.1, "displacement": 2.0, "weight": 1.0, name: number}
     refused(
         lambda: fm.Target(push, **numbers),
@@ -131,7 +131,7 @@ def test_targets_that_are_no_numbers(name, number):
 
 @pytest.mark.parametrize("weight", [0.0, -1.0])
 def test_targets_that_count_for_nothing(weight):
-    push = truss(*REACHABLE).targets[0].force_part
+    push = truss(*REACHABLE).targets[0].part
     refused(lambda: fm.Target(push, 0.1, 2.0, weight=weight), part="weight", problem="not positive", remedy="greater")
 
 
@@ -185,7 +185,7 @@ def test_a_configuration_that_does_not_assemble():
     mechanism.revolute(crank, stop, at=(0, 30))
     mechanism.revolute(stop, base, at=(5, 30))
     far = case.scene.configuration("far", {motor: 2.0})
-    target = fm.Target(case.targets[0].force_part, 1.0, 0.1, far)
+    target = fm.Target(case.targets[0].part, 1.0, 0.1, far)
     with pytest.raises(fm.AssemblyError, match="does not close") as caught:
         Case(case.scene, case.designs, [target]).problem()
     assert "'far'" in caught.value.part

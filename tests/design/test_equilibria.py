@@ -71,7 +71,7 @@ def test_displacements_are_those_of_the_curve_that_a_user_computes():
         known = both.equilibria.trace()
         for target, reached in zip(both.equilibria.targets, displacements(known), strict=True):
             curve = both.simulation.load_displacement(
-                target.force_part, forces=[target.force / 2, target.force], configuration=target.configuration
+                target.part, forces=[target.force / 2, target.force], configuration=target.configuration
             )
             assert curve.displacements[-1] == pytest.approx(reached, rel=1e-8), name
 
@@ -100,7 +100,7 @@ def test_a_large_change_of_design_is_halved_on_the_way(monkeypatch):
     start = both.rest.place(both.rest.initial, None)
     known = both.equilibria.trace()
     both.rest.place(bulged(both), start)
-    newton = both.simulation.newton(both.equilibria.targets[0].force_part)
+    newton = both.simulation.newton(both.equilibria.targets[0].part)
     solve, failures = Newton.solve, []
 
     def counted(self, *arguments, **options):
@@ -124,7 +124,7 @@ def test_a_change_that_is_too_large_is_infeasible_and_leaves_the_design_in_place
     known = both.equilibria.trace()
     both.rest.place(bulged(both), start)
     design = both.field()
-    both.simulation.newton(both.equilibria.targets[0].force_part).options = fm.PrimalDualNewton(iterations=2)
+    both.simulation.newton(both.equilibria.targets[0].part).options = fm.PrimalDualNewton(iterations=2)
     with pytest.raises(Infeasible, match="no equilibrium at 0.1"):
         both.equilibria.follow(known)
     assert np.array_equal(both.field(), design)

@@ -34,14 +34,13 @@ def away(bench, change: float = 0.05) -> tuple[np.ndarray, np.ndarray]:
 def test_value_is_half_the_weighted_sum_of_squared_relative_errors():
     case = truss(*TARGETS)
     light, heavy = (
-        fm.Target(t.force_part, t.force, t.displacement, weight=w)
-        for t, w in zip(case.targets, (0.5, 3.0), strict=True)
+        fm.Target(t.part, t.force, t.displacement, weight=w) for t, w in zip(case.targets, (0.5, 3.0), strict=True)
     )
     whole, bench = objective(Case(case.scene, case.designs, [light, heavy]), StayClose())
     here = whole.evaluate(bench.rest.initial)
     errors = (whole.reached - [2.0, 3.2]) / [2.0, 3.2]
     assert here.value == pytest.approx(0.5 * (0.5 * errors[0] ** 2 + 3.0 * errors[1] ** 2), rel=1e-10)
-    curve = bench.simulation.load_displacement(light.force_part, forces=[0.1, 0.4])
+    curve = bench.simulation.load_displacement(light.part, forces=[0.1, 0.4])
     assert whole.reached == pytest.approx(curve.displacements, rel=1e-8)
     assert whole.traced(bench.rest.initial) == pytest.approx(here.value, rel=1e-8)
 

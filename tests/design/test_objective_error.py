@@ -49,7 +49,7 @@ def test_designs_carry_the_errors_of_displacements_and_objective():
     problem = case.problem(size=4.0)
     result = problem.optimise(optimiser=fm.LevenbergMarquardt(iterations=2))
     forces = [target.force for target in result.targets]
-    curve = problem.simulation.with_design(result).load_displacement(case.targets[0].force_part, forces=forces)
+    curve = problem.simulation.with_design(result).load_displacement(case.targets[0].part, forces=forces)
     errors = [target.finer_elements_add for target in result.targets]
     assert errors == pytest.approx(curve.error_estimates(), rel=1e-5)
     reached = np.array([target.reached for target in result.targets])

@@ -15,7 +15,7 @@ TARGETS = (0.1, 5.0), (0.4, 7.0)
 
 def errors(case: Case, simulation: fm.Simulation) -> np.ndarray:
     """Estimates at the targets, relative to them."""
-    curve = simulation.load_displacement(case.targets[0].force_part, forces=[target.force for target in case.targets])
+    curve = simulation.load_displacement(case.targets[0].part, forces=[target.force for target in case.targets])
     return np.abs(curve.error_estimates()) / [target.displacement for target in case.targets]
 
 

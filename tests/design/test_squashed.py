@@ -31,9 +31,9 @@ class Squashed:
         self.inwards = self.inwards.ravel()
         low, high = 0.0, 1.0
         for _ in range(60):
-            share = 0.5 * (low + high)
-            model.reshape(smooth + share * self.inwards)
-            low, high = (share, high) if self.bench.simulation.mesh_ratio_max < ratio else (low, share)
+            fraction = 0.5 * (low + high)
+            model.reshape(smooth + fraction * self.inwards)
+            low, high = (fraction, high) if self.bench.simulation.mesh_ratio_max < ratio else (low, fraction)
         self.design, self.left = smooth + low * self.inwards, 1.0 - low
         model.reshape(self.design)
 

@@ -42,7 +42,7 @@ class Bars:
     def fields(self, *faces: Faces) -> LinkFields:
         mesh = self.model.mesh
         body = self.model.elastic
-        found = find_boundaries(mesh.mesh, self.bars, mesh.link, faces, half=body.model.symmetric)
+        found = find_boundaries(mesh.mesh, self.bars, mesh.link, faces, half=body.model.half)
         return LinkFields(tuple(self.bars), body, found)
 
     def area(self, fields: LinkFields, part: Faces) -> float:

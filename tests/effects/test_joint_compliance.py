@@ -143,7 +143,7 @@ def test_ranks_agree_on_a_mechanism_with_soft_pins():
     curves = []
     for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
         case = soft_truss(0.1)
-        curves.append(case.simulate(comm=comm).load_displacement(case.targets[0].force_part, forces=[0.1, 0.4]))
+        curves.append(case.simulate(comm=comm).load_displacement(case.targets[0].part, forces=[0.1, 0.4]))
     assert curves[1].displacements == pytest.approx(curves[0].displacements, rel=1e-8)
 
 

@@ -243,7 +243,7 @@ def test_ranks_agree_on_a_mechanism_with_a_spring():
     curves = []
     for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
         case = sprung_truss(lambda hinge: JointSpring(hinge, 200.0, rest=0.02))
-        push = case.targets[0].force_part
+        push = case.targets[0].part
         curves.append(case.simulate(comm=comm).load_displacement(push, forces=[0.1, 0.4]))
     assert curves[1].displacements == pytest.approx(curves[0].displacements, rel=1e-8)
     assert curves[1].stable.tolist() == curves[0].stable.tolist()

@@ -110,7 +110,7 @@ class Drawn:
             own = np.array([-arm[1], arm[0], 1.0])
         else:
             omega = space.rotate(a, self.triad[k])
-            own = np.concatenate([np.cross(omega, arm), space.turns(z) @ omega])
+            own = np.concatenate([np.cross(omega, arm), space.rotation_rates(z) @ omega])
         rest = np.zeros(space.pose_size)
         return np.concatenate([rest, own] if slot else [own, rest])
 

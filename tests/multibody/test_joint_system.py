@@ -118,7 +118,7 @@ def test_joint_acts_on_both_of_its_bodies_in_balance(system):
         for body, wrench in ((c.a, on_a), (c.b, on_b)):
             arm, force = ([*v, 0.0][:3] for v in (system.bodies[body].centre, wrench[:dim]))
             moment = np.cross(arm, force)[-total.size :]
-            total = total + system.space.turns(system.space.identity).T @ wrench[dim:] + moment
+            total = total + system.space.rotation_rates(system.space.identity).T @ wrench[dim:] + moment
         assert total == pytest.approx(np.zeros(2 * dim - 3), abs=1e-12 * system.length)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fenicsmech.effects import JointSpring, holding
+from fenicsmech.effects import JointSpring, spring_potentials
 from fenicsmech.mechanism import Joint, Mechanism, Scene
 from fenicsmech.multibody import assemble, build_linkage, count_freedom
 
@@ -25,7 +25,7 @@ def test_a_spring_keeps_its_joint_while_a_motor_turns_the_next_one(dim):
     motor = mechanism.motor(elbow)
     scene = Scene(mechanism, effects=[spring := JointSpring(shoulder, 1e-3)])
     linkage, configuration = build_linkage(mechanism, dim), scene.configuration("bent", {motor: DRIVEN})
-    springs = holding([spring], linkage)
+    springs = spring_potentials([spring], linkage)
     poses = assemble(linkage, configuration, springs).poses
     upper, fore = (poses[[body.name for body in linkage.bodies].index(name)] for name in ("upper", "fore"))
     assert upper[:dim] == pytest.approx(0.0, abs=1e-12)
@@ -43,7 +43,7 @@ def test_springs_share_a_turn_as_their_stiffness_says():
     motor = mechanism.motor(third)
     scene = Scene(mechanism, effects=[JointSpring(first, FIRST), JointSpring(second, SECOND)])
     linkage = build_linkage(mechanism, 2)
-    springs = holding(scene.effects, linkage)
+    springs = spring_potentials(scene.effects, linkage)
     poses = assemble(linkage, scene.configuration("apart", {motor: 5.0}), springs).poses
     # k₁ x₁ = k₂ x₂, x₁ + x₂ = 5
     assert poses[1, 0] == pytest.approx(5.0 * SECOND / (FIRST + SECOND), rel=1e-10)
@@ -56,7 +56,7 @@ def test_what_springs_hold_is_held_however_soft_they_are(stiffness):
     still, drawn = np.zeros(3), linkage.rigid.drawn
 
     def loose(*joints: Joint) -> tuple[int, tuple[str, ...]]:
-        springs = holding([JointSpring(joint, stiffness) for joint in joints], linkage)
+        springs = spring_potentials([JointSpring(joint, stiffness) for joint in joints], linkage)
         freedom = count_freedom(linkage.rigid, drawn, still, springs)
         return freedom.mobility, freedom.zero_energy
 

@@ -159,7 +159,8 @@ class Resolution:
     """Whether errors hide what is left to gain; they are estimated a few times on the way from ``start``."""
 
     def __init__(self, options: LevenbergMarquardt, start: Iterate) -> None:
-        self._options, self._errors, self._estimated = options, exact(), None
+        self._options, self._errors = options, exact()
+        self._estimated: Evaluation | None = None
         self._below = options.again * _gain(start)
 
     def reached(self, last: Iterate, metric: np.ndarray) -> bool:

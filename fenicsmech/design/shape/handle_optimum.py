@@ -112,9 +112,18 @@ class HandleOptimum:
         Args:
             placement: from ``solve``.
             by_p, by_theta: ∂O/∂p (…, parameters) and ∂O/∂θ (…, handles), as from ``ShapeMap.apply_transpose``.
+
+        Raises:
+            ShapeError: S_θθ is not positive definite.
         """
-        links = zip(self._second_derivatives(placement), self._map.positions(by_theta), strict=True)
-        followed = [cho_solve(link.factor, slope[..., link.free].T).T @ link.mixed for link, slope in links]
+        followed, links = [], self._second_derivatives(placement)
+        for shape, link, slope in zip(self._map.shapes, links, self._map.positions(by_theta), strict=True):
+            try:
+                followed.append(cho_solve(link.factor, slope[..., link.free].T).T @ link.mixed)
+            except np.linalg.LinAlgError:
+                raise ShapeError(
+                    f"shape of link {shape.name!r}", "its mesh leaves positions of handles open", "Use smaller elements"
+                ) from None
         return by_p - np.concatenate(followed, axis=-1)
 
     def _solve(self, p: np.ndarray, start: HandlePlacement, halvings: int) -> HandlePlacement:

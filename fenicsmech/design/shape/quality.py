@@ -14,6 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from math import factorial, inf, isnan
+from typing import Any
 
 import numpy as np
 import ufl
@@ -106,7 +107,7 @@ class QualitySum:
         return compile_form(self._sum)
 
     @cached_property
-    def _gradient(self) -> tuple[fem.Form, fem.Function]:
+    def _gradient(self) -> tuple[Any, fem.Function]:
         """The form of the gradient, and where it is assembled: functions are costly to make on several ranks."""
         return compile_form(ufl.derivative(self._sum, self.design)), fem.Function(self.design.function_space)
 

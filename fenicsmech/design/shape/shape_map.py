@@ -55,12 +55,14 @@ class LinkShape:
 
     Attributes:
         link: index of the flexible link.
+        name: its name, for messages.
         handles: its handles.
         weights: of each handle at each vertex of the link, (n, handles).
         thickness: in the plane, where δ = 1.
     """
 
     link: int
+    name: str
     handles: LinkHandles
     weights: np.ndarray
     thickness: float
@@ -70,14 +72,21 @@ def shape_link(mesh: LinkMesh, request: ShapeRequest) -> LinkShape:
     """Spline, handles and weights of one link.
 
     Raises:
-        DescriptionError: the spline does not fit the link.
+        DescriptionError: the spline does not fit the link, or elements are too large for its handles.
     """
     part = f"link {request.name!r}"
     fit = fit_spline(request.centreline, request.joints, request.interior, part=f"spline of {part}")
     width = _mean_width(mesh, request.centreline.length)
     handles = _place_handles(mesh, fit, spacing=request.spacing or width, turns=request.turns, part=part)
     weights = handle_weights(mesh, handles, part=part)
-    return LinkShape(request.link, handles, weights, request.thickness or width)
+    hidden = int(np.sum(weights.max(axis=0) < 1e-6))  # between vertices that interfaces hold
+    if hidden:
+        raise DescriptionError(
+            f"design of {part}",
+            f"{hidden} of its {len(handles)} handles move no vertex: its elements are too large",
+            "Use smaller elements",
+        )
+    return LinkShape(request.link, request.name, handles, weights, request.thickness or width)
 
 
 def shape_links(mesh: MechanismMesh, requests: Sequence[ShapeRequest]) -> list[LinkShape]:
@@ -130,7 +139,7 @@ def _place_handles(mesh: LinkMesh, fit: SplineFit, *, spacing: float, turns: Seq
     held = plan.points[np.unique(plan.cells[plan.interface != FREE])][:, :2]
 
     joints = np.flatnonzero(spline.is_joint).astype(float)
-    t, site = [joints[0]], [fit.sites[0]]
+    t, sites = [joints[0]], [fit.sites[0]]
     for start, end, end_site in zip(joints, joints[1:], fit.sites[1:], strict=False):
         a, b = np.interp([start, end], samples, arc)
         parts = max(2, round((b - a) / spacing))
@@ -146,10 +155,10 @@ def _place_handles(mesh: LinkMesh, fit: SplineFit, *, spacing: float, turns: Seq
             clear = np.linalg.norm(held - at, axis=1).min() > 0.25 * (b - a) / parts
             if clear and np.all(plan.interface[cells] == FREE):
                 t.append(candidate)
-                site.append(BETWEEN)
+                sites.append(BETWEEN)
         t.append(end)
-        site.append(end_site)
-    site = np.array(site)
+        sites.append(end_site)
+    site = np.array(sites)
     return LinkHandles(spline, np.array(t), site, (site != BETWEEN) & np.array(turns)[site])
 
 

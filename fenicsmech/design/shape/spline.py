@@ -191,7 +191,6 @@ def fit_spline(
     Raises:
         DescriptionError: fewer than two joints, two joints at one place of the curve, or ``interior`` does not match.
     """
-    joints = np.asarray(joints, dtype=float)
     if len(joints) < 2:
         raise DescriptionError(part, f"the link has {len(joints)} joint", "Only links with two joints or more have one")
     if len(interior) != len(joints) - 1 or any(count < 0 for count in interior):
@@ -207,13 +206,13 @@ def fit_spline(
     if np.any(np.diff(arcs) <= 1e-9 * curve.length):
         raise DescriptionError(part, "two joints are at one place of the centreline", "Move one of them")
 
-    knots, is_joint = [arcs[0]], [True]
+    knots, joint_flags = [arcs[0]], [True]
     for start, end, count in zip(arcs, arcs[1:], interior, strict=False):
         knots += np.linspace(start, end, count + 2)[1:].tolist()
-        is_joint += [False] * count + [True]
-    is_joint = np.array(is_joint)
+        joint_flags += [False] * count + [True]
+    is_joint = np.array(joint_flags)
     positions = curve.point(np.array(knots))
-    positions[is_joint] = joints[order]
+    positions[is_joint] = np.asarray(joints, dtype=float)[order]
 
     controls = np.zeros((len(knots), 2, 3))
     controls[:, 0, :2], controls[:, 0, 2] = positions, 1.0
@@ -253,7 +252,7 @@ class _ArcLength:
     def length(self) -> float:
         return float(self._a[-1])
 
-    def arc(self, point: np.ndarray) -> float:
+    def arc(self, point: Sequence[float]) -> float:
         return float(np.interp(self._curve.closest(point), self._s, self._a))
 
     def point(self, a: np.ndarray) -> np.ndarray:

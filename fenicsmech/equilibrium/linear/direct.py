@@ -77,7 +77,7 @@ class Factor(LinearSolver):
     """
 
     def __init__(self, matrix: PETSc.Mat) -> None:
-        self._matrix = matrix
+        self._matrix, self._fresh = matrix, True
         self._analyse()
 
     def refactor(self) -> bool:

@@ -130,30 +130,27 @@ class TwoLevelSolver(LinearSolver):
         self._coarse = CoarseLevel(system)
         self._smoother = _chebyshev(system.comm, options)
         self._sets = system.blocks.nodes.index_set(), system.blocks.border.index_set()
-        self._stiffness: PETSc.Mat | None = None
-        self._border: PETSc.Mat | None = None
-        self._corner: PETSc.Mat | None = None
-        self._matrix: PETSc.Mat | None = None
+        self._stiffness, self._border, self._corner, self._matrix = (PETSc.Mat() for _ in range(4))
         # petsc4py destroys what it creates late: nothing is created per iteration
         self._work, self._residual, self._z, self._image, self._p, self._q = (system.unknowns.zeros() for _ in range(6))
-        self._nodal: tuple[PETSc.Vec, PETSc.Vec] | None = None
+        self._rough, self._smoothed = PETSc.Vec(), PETSc.Vec()
         self._met = 0
         self.iterations: list[int] = []
         self.probes: list[int] = []
 
     def refactor(self) -> bool:
         """Takes the KKT matrix's current values; whether that could be done."""
-        if self._matrix is not None:
-            self._matrix.destroy()
-            self._stiffness.destroy()
+        self._matrix.destroy()
+        self._stiffness.destroy()
         self._stiffness, columns = self._system.kkt.nodal_stiffness(), self._system.kkt.border_columns()
         if not math.isfinite(self._stiffness.norm()):
             return False
         nodes, border = self._sets
         self._border = columns.createSubMatrix(nodes, None, self._border)
         self._corner = columns.createSubMatrix(border, None, self._corner)
-        if self._nodal is None:
-            self._nodal, self._transposed = self._stiffness.createVecs(), PETSc.Mat().createTranspose(self._border)
+        if not self._rough:
+            self._rough, self._smoothed = self._stiffness.createVecs()
+            self._transposed = PETSc.Mat().createTranspose(self._border)
         blocks = [[self._stiffness, self._border], [self._transposed, self._corner]]
         self._matrix = PETSc.Mat().createNest(blocks, self._sets, self._sets, comm=self._system.comm)
         self._smoother.setOperators(self._stiffness)
@@ -221,7 +218,8 @@ class TwoLevelSolver(LinearSolver):
 
     def inertia(self) -> Inertia:
         """Of the matrix last refactored."""
-        coarse, found, spent = self._coarse.factor.inertia(), [], 0
+        found: list[Direction] = []
+        coarse, spent = self._coarse.factor.inertia(), 0
         while True:
             direction, iterations = self._probe(found)
             spent += iterations
@@ -275,11 +273,11 @@ class TwoLevelSolver(LinearSolver):
 
     def _smooth(self, r: PETSc.Vec) -> float:
         """z = S r, and rᵀ z."""
-        nodes, (rough, smooth), z = self._system.blocks.nodes.local, self._nodal, self._z
-        rough.array_w[:] = r.array_r[nodes]
-        self._smoother.solve(rough, smooth)
+        nodes, z = self._system.blocks.nodes.local, self._z
+        self._rough.array_w[:] = r.array_r[nodes]
+        self._smoother.solve(self._rough, self._smoothed)
         z.set(0.0)
-        z.array_w[nodes] = smooth.array_r
+        z.array_w[nodes] = self._smoothed.array_r
         return r.dot(z)
 
     def _project(self, found: Sequence[Direction]) -> None:
@@ -321,6 +319,9 @@ class CoarseLevel:
 
     Args:
         system: whose KKT matrix it is.
+
+    Attributes:
+        factor: of KKT₁, made by the first ``update``.
     """
 
     def __init__(self, system: EquilibriumSystem) -> None:
@@ -331,20 +332,17 @@ class CoarseLevel:
         units = np.full(len(numbering.free), system.unknowns.unit_u)
         self._map = UnknownMap(numbering, self._interfaces, system.joints, units, system.unknowns.scale)
         self._values = _values_at_nodes(system, numbering)
-        self._prolongation: PETSc.Mat | None = None
-        self._mapped: PETSc.Mat | None = None
-        self._matrix: PETSc.Mat | None = None
-        self.factor: Factor | None = None
+        self._prolongation, self._mapped, self._matrix = PETSc.Mat(), PETSc.Mat(), PETSc.Mat()
 
     def update(self) -> bool:
         """Takes the values of the KKT matrix; whether KKT₁ could be factored."""
-        system, unknowns = self._system, self._system.unknowns
+        system, unknowns, first = self._system, self._system.unknowns, not self._matrix
         self._interfaces.reshape(system.elastic.d.x.array.reshape(-1, system.joints.space.dim))
         self._map.turn(unknowns.poses)
         self._prolongation = self._values.matMult(self._map.matrix, result=self._prolongation)
         self._mapped = unknowns.map.matMult(self._prolongation, result=self._mapped)
         self._matrix = system.kkt.restricted(self._mapped, self._matrix)
-        if self.factor is None:
+        if first:
             self.factor = Factor(self._matrix)
             self._right, self._solution = self._matrix.createVecs()
         return self.factor.refactor()
