@@ -51,9 +51,7 @@ CASES = (
         "1 %",
         "simulation/test_pinned_link.py",
     ),
-    Case(
-        "two flexible links in a four-bar against CalculiX on the same mesh", "1e-3", "simulation/test_calculix.py"
-    ),
+    Case("two flexible links in a four-bar against CalculiX on the same mesh", "1e-3", "simulation/test_calculix.py"),
     Case("Cook's membrane, plane strain, P2 on 16 × 16: 14.74 mm at mid-edge", "0.3 %", "elasticity/test_cook.py"),
     Case(
         "rubber, ν → 0.5, mixed u–p: evenly stretched blocks; orders of displacement and pressure in a blown-up tube",
@@ -106,7 +104,9 @@ def rows(cases: tuple[Case, ...]) -> list[tuple]:
         own = [t for t in found if t.get("classname") == module and t.get("name", "").startswith(function)]
         passed = sum(not any(child.tag in ("failure", "error", "skipped") for child in test) for test in own)
         seconds = sum(float(test.get("time", 0.0)) for test in own)
-        lines.append((case.what, case.within, f"`tests/{case.test}`", f"{passed} of {len(own)} hold", round(seconds, 1)))
+        lines.append(
+            (case.what, case.within, f"`tests/{case.test}`", f"{passed} of {len(own)} hold", round(seconds, 1))
+        )
     return lines
 
 
