@@ -120,7 +120,7 @@ docs: install-docs ## the pages in docs/_build/html; warnings are errors
 	$(call heading,documentation)
 	$(PYTHON) -m sphinx -q -W --keep-going -b html docs docs/_build/html
 
-demos-quick: $(DEMOS:%=demo-quick-%) ## every demo, coarse, in results/quick/
+demos-quick: $(DEMOS:%=demo-quick-%) ## the demos that optimise or fit, coarse, in results/quick/
 
 .PHONY: $(DEMOS:%=demo-quick-%)
 $(DEMOS:%=demo-quick-%): demo-quick-%: install
