@@ -83,6 +83,7 @@ def spatial_strain(H: Expr) -> Strain:
     return Strain(H, tr(H) + second + third, inner(H, H) - 2 * (second + third))
 
 
+@dataclass(frozen=True)
 class Law(ABC):
     """A strain energy and its parameters; derive a frozen dataclass from it.
 
@@ -122,7 +123,7 @@ class Law(ABC):
     @property
     def parameters(self) -> dict[str, float]:
         """Every number of the law by name; those of a tuple are counted: alpha0, alpha1, …"""
-        found = {}
+        found: dict[str, float] = {}
         for field in fields(self):
             value = getattr(self, field.name)
             counted = [(f"{field.name}{k}", v) for k, v in enumerate(value)] if isinstance(value, tuple) else None
