@@ -29,7 +29,8 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from copy import copy
-from dataclasses import dataclass, fields
+from dataclasses import Field, dataclass, fields
+from typing import Any, ClassVar
 
 from ufl import Identity, conditional, det, inner, ln, lt, tr
 from ufl.core.expr import Expr
@@ -83,7 +84,6 @@ def spatial_strain(H: Expr) -> Strain:
     return Strain(H, tr(H) + second + third, inner(H, H) - 2 * (second + third))
 
 
-@dataclass(frozen=True)
 class Law(ABC):
     """A strain energy and its parameters; derive a frozen dataclass from it.
 
@@ -94,6 +94,7 @@ class Law(ABC):
 
     E: float | Expr
     nu: float | Expr
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]  # of the derived class
 
     @abstractmethod
     def energy(self, strain: Strain) -> Expr:
