@@ -1,4 +1,4 @@
-"""What every test shares: MPI-aware reporting, directories common to all ranks, and programs run under mpirun."""
+"""Fixtures of all tests: MPI-aware reporting, directories common to all ranks, and programs run under mpirun."""
 
 from __future__ import annotations
 
@@ -18,10 +18,14 @@ from mpi4py import MPI
 COMM = MPI.COMM_WORLD.Dup()
 
 # Seconds after which a test is taken to hang, alone and on several ranks, and after which a rank whose test failed
-# takes the others to wait for it in vain.
+# waits no longer for the others.
 ALONE, ON_RANKS, AFTER_FAILURE = 300, 120, 30
 
 STDERR = pytest.StashKey[int]()
+
+SET_BY_MPI = ("PMIX_", "ORTE_", "OMPI_APP_", "OMPI_COMM_", "OMPI_UNIVERSE_") + tuple(
+    f"OMPI_MCA_{name}" for name in ("ess", "orte_", "pmix")
+)
 
 # The same examples on every rank and in every run; a form that must be compiled first is not a slow example.
 hypothesis.settings.register_profile("reproducible", derandomize=True, deadline=None, database=None)
@@ -91,10 +95,12 @@ def mpirun() -> Callable[..., subprocess.CompletedProcess]:
     """Run a Python script on some ranks: `mpirun(2, "demos/truss.py", "--quick")`, from a serial test."""
 
     def run(ranks: int, *arguments: str | os.PathLike) -> subprocess.CompletedProcess:
-        # os.environ, unlike the environment of this process, lacks what MPI_Init put there, which mpirun trips over.
+        # What MPI_Init puts into the environment makes mpirun stumble. os.environ of this process lacks it, but workers
+        # of pytest-xdist have it from the process that started them.
+        given = {name: value for name, value in os.environ.items() if not name.startswith(SET_BY_MPI)}
         root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
         settings = {"OPENBLAS_NUM_THREADS": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1"}
-        environment = {**root, **os.environ, **settings, "MPIEXEC_TIMEOUT": str(ALONE)}
+        environment = {**root, **given, **settings, "MPIEXEC_TIMEOUT": str(ALONE)}
         command = ["mpirun", "-n", str(ranks), sys.executable, *map(os.fspath, arguments)]
         return subprocess.run(command, env=environment, capture_output=True, text=True)
 

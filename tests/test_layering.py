@@ -163,7 +163,7 @@ def test_folders_are_reached_through_their_front_doors(folder):
     assert not complaints, "\n".join(complaints)
 
 
-def test_versions_are_told_apart_in_compat_only():
+def test_versions_are_distinguished_in_compat_only():
     complaints = [
         f"{module}:{node.lineno} reads __version__"
         for module, path in modules().items()
@@ -175,7 +175,7 @@ def test_versions_are_told_apart_in_compat_only():
 
 
 @pytest.mark.parametrize("module", modules())
-def test_every_module_says_what_it_is(module):
+def test_every_module_has_a_docstring(module):
     assert ast.get_docstring(ast.parse(modules()[module].read_text())), f"{module} has no docstring"
 
 

@@ -110,7 +110,7 @@ class PosePotential(ABC):
 
     Attributes:
         bodies: indices of the bodies.
-        holds: whether it acts in full from the start, instead of growing with the share.
+        holds: whether it acts in full from the start, instead of growing with the load factor.
     """
 
     bodies: tuple[int, ...]
