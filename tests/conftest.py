@@ -12,7 +12,16 @@ from pathlib import Path
 
 import hypothesis
 import pytest
-from mpi4py import MPI
+
+# Workers of pytest-xdist are given what MPI_Init put into the environment of the process that started them; neither
+# their own MPI_Init nor an mpirun under them gets along with it.
+if "PYTEST_XDIST_WORKER" in os.environ:
+    for name in [name for name in os.environ if name.startswith(("PMIX_", "ORTE_", "OMPI_APP_", "OMPI_MCA_orte_"))]:
+        del os.environ[name]
+    for name in ("OMPI_MCA_ess", "OMPI_MCA_pmix"):
+        os.environ.pop(name, None)
+
+from mpi4py import MPI  # noqa: E402
 
 # The bookkeeping below has a communicator of its own: none of it is mistaken for a message of the code under test.
 COMM = MPI.COMM_WORLD.Dup()
@@ -22,10 +31,6 @@ COMM = MPI.COMM_WORLD.Dup()
 ALONE, ON_RANKS, AFTER_FAILURE = 300, 120, 30
 
 STDERR = pytest.StashKey[int]()
-
-SET_BY_MPI = ("PMIX_", "ORTE_", "OMPI_APP_", "OMPI_COMM_", "OMPI_UNIVERSE_") + tuple(
-    f"OMPI_MCA_{name}" for name in ("ess", "orte_", "pmix")
-)
 
 # The same examples on every rank and in every run; a form that must be compiled first is not a slow example.
 hypothesis.settings.register_profile("reproducible", derandomize=True, deadline=None, database=None)
@@ -95,12 +100,10 @@ def mpirun() -> Callable[..., subprocess.CompletedProcess]:
     """Run a Python script on some ranks: `mpirun(2, "demos/truss.py", "--quick")`, from a serial test."""
 
     def run(ranks: int, *arguments: str | os.PathLike) -> subprocess.CompletedProcess:
-        # What MPI_Init puts into the environment makes mpirun stumble. os.environ of this process lacks it, but workers
-        # of pytest-xdist have it from the process that started them.
-        given = {name: value for name, value in os.environ.items() if not name.startswith(SET_BY_MPI)}
+        # os.environ, unlike the environment of this process, lacks what MPI_Init put there, which mpirun trips over.
         root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
         settings = {"OPENBLAS_NUM_THREADS": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1"}
-        environment = {**root, **given, **settings, "MPIEXEC_TIMEOUT": str(ALONE)}
+        environment = {**root, **os.environ, **settings, "MPIEXEC_TIMEOUT": str(ALONE)}
         command = ["mpirun", "-n", str(ranks), sys.executable, *map(os.fspath, arguments)]
         return subprocess.run(command, env=environment, capture_output=True, text=True)
 
