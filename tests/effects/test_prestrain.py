@@ -81,11 +81,11 @@ def test_residuals_of_displacement_and_pressure_are_differentiated_by_the_share(
     weights = np.random.default_rng(4).uniform(-1.0, 1.0, len(body.values()))
 
     def at_share(values):
-        body.share.value = values[0]
+        body.load_factor.value = values[0]
         return weights @ body.residuals()
 
-    body.share.value = 0.8
-    rate = weights @ body.share_residuals()
+    body.load_factor.value = 0.8
+    rate = weights @ body.load_factor_derivative()
     rates = taylor_rates(at_share, [0.8], [1.0], [rate], [0.1, 0.05, 0.025])
     assert rates.with_gradient.min() > 1.9
 
@@ -118,7 +118,7 @@ def test_energy_and_its_gradient_are_differentiated(space, along):
     work = fem.Function(body.u.function_space)
     for field, size, seed in ((body.d, 0.1, 1), (body.u, 0.1, 2), (work, 1.0, 3)):
         interpolate(field, wave(dim, size, seed=seed))
-    body.share.value = 0.8
+    body.load_factor.value = 0.8
     residual = ufl.derivative(body.energy_ufl, body.u, work)
     for form in (body.energy_ufl, residual):
         for field in (body.u, body.d):
@@ -127,10 +127,10 @@ def test_energy_and_its_gradient_are_differentiated(space, along):
     # what the path of growing effects needs: the derivative of the residual by the share
     compiled = compile_form(residual)
     vector = work.x.array.copy()
-    rate = body.share_residuals()[: len(vector)] @ vector
+    rate = body.load_factor_derivative()[: len(vector)] @ vector
 
     def at_share(values):
-        body.share.value = values[0]
+        body.load_factor.value = values[0]
         return fem.assemble_scalar(compiled)
 
     rates = taylor_rates(at_share, [0.8], [1.0], [rate], [0.1, 0.05, 0.025])
@@ -161,7 +161,7 @@ def test_prestrain_without_sense_is_refused():
     (link,) = mechanism.flexible_links
     refused(lambda: Prestrain(link, 0.0), part="'bar'", problem="not positive", remedy="greater")
     refused(lambda: Prestrain(link, 1.1, (0, 0)), part="direction", problem="zero length", remedy="somewhere")
-    refused(lambda: Prestrain(mechanism.rigid_links[0], 1.1), part="prestrain", problem="no flexible", remedy="Give")
+    refused(lambda: Prestrain(mechanism.rigid_links[0], 1.1), part="prestrain", problem="not a flexible", remedy="Give")
     out = fm.Scene(mechanism, effects=[Prestrain(link, 1.1, (0, 0, 1))])
     refused(lambda: fm.Simulation(out, space="plane-stress", size=2.0), part="prestrain", problem="plane", remedy="two")
     twice = fm.Scene(mechanism, effects=[Prestrain(link, 1.1, (1, 0)), Prestrain(link, 1.2, (1, 0))])
