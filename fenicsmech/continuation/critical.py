@@ -66,8 +66,8 @@ class CriticalPoint:
             equilibrium is near it, but the line through the stiffnesses on either side has its root where they would
             cross.
         modes: by how many the unstable modes change there.
-        course: the direction of the path over the step in which it lies. The tangent in the point itself is no measure
-            of it: rounding and the asymmetry of meshes let it lean towards the paths that cross.
+        course: the direction of the path over the step in which it lies. The tangent in the point itself is another:
+            rounding and the asymmetry of meshes let it lean towards the paths that cross.
     """
 
     kind: Critical
@@ -200,7 +200,7 @@ def _search(piece: _Piece, low: _Sample, high: _Sample, tolerance: float) -> lis
     path, least, before = piece.path, 0.4 * tolerance, None
     while (width := high.distance - low.distance) > tolerance and least < width:
         root = _root(path, low, high)
-        aside = least if before is None else max(least, abs(root - before))  # it is no nearer to where it will be
+        aside = least if before is None else max(least, abs(root - before))  # the true root may be as far off
         before = root
         middle = 0.5 * (low.distance + high.distance)
         # on the side of the farther end, and within the ends

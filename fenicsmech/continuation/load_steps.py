@@ -14,8 +14,9 @@ coordinate x swings ever faster while the links do as they like: close by, in un
 
 e the strain and b how far the motors are beyond the dead centre. Before it (b < 0) joints close by x alone, x = √(−2b)
 and λ = 0; beyond it x = 0 and λ = k b. Newton's method does not get from one to the other: as long as λ = 0 the energy
-is not curved along x, every step closes the joints by x alone, x ← ½ x − b / x, and for b > 0 these jump about for
-ever. From a state that strains instead it converges, λ being the curvature. Such states lie along the rate with x held:
+is not curved along x, every step closes the joints by x alone, x ← ½ x − b / x, and for b > 0 these oscillate
+without end. From a state that strains instead it converges, λ being the curvature. Such states lie along the rate with
+x held:
 
     K ẏ = r,     K w = n,     ẏ ← ẏ − w (n · ẏ) / (n · w),     n the motion in ẏ, which is all x near the dead centre.
 """
@@ -31,7 +32,6 @@ from fenicsmech.equilibrium import (
     EquilibriumPoint,
     EquilibriumSystem,
     Iteration,
-    MotorControl,
     NotConverged,
     State,
     Step,
@@ -242,7 +242,7 @@ class LoadStepper:
         """The prediction at ``value``, a plainer one where it runs away, in the end the last equilibrium."""
         if not self._points:
             return self._start
-        system, last = self._system, self._last.state
+        system, last = self._system, self._points[-1].state
         for predictor in (self._predictor, Tangent()):
             guess = predictor.predict(system, self._points, value, self._steps.reach)
             if system.size(system.difference(guess, last)) <= self._steps.runaway:
@@ -253,7 +253,7 @@ class LoadStepper:
         """``step``, shortened if it moves anything too far, not to less than ``least``."""
         if not self._points:
             return step
-        motion = self._system.size(self._last.tangent) * abs(step)
+        motion = self._system.size(self._points[-1].tangent) * abs(step)
         shortened = step * min(1.0, self._steps.motion / max(motion, self._steps.motion))
         return shortened if abs(shortened) > least else step
 
@@ -279,7 +279,7 @@ class LoadStepper:
         distance = point.control.target - self._value
         if not self._points or distance == 0.0:
             return False
-        system, last, steps = self._system, self._last, self._steps
+        system, last, steps = self._system, self._points[-1], self._steps
         before = last.tangent if self._rate is None else last.tangent.slower(self._rate)
         rate = system.difference(point.state, last.state).scaled(1.0 / distance)
         span = (before, point.tangent, point.tangent.scaled(steps.bend))
@@ -304,7 +304,7 @@ class LoadStepper:
 class MotorStepper(LoadStepper):
     """Equilibria as motors move, past the dead centre of an unloaded mechanism too."""
 
-    def advance(self, control: MotorControl) -> EquilibriumPoint:
+    def advance(self, control: Control) -> EquilibriumPoint:
         try:
             return super().advance(control)
         except LoadStepsFailed as failure:
@@ -312,7 +312,7 @@ class MotorStepper(LoadStepper):
                 raise
         return super().advance(control)
 
-    def _strain(self, last: EquilibriumPoint, control: MotorControl) -> bool:
+    def _strain(self, last: EquilibriumPoint, control: Control) -> bool:
         """Goes on from the ``last`` equilibrium by straining links; whether that led to another one."""
         system, steps, distance = self._system, self._steps, control.target - self._value
         try:
@@ -342,7 +342,7 @@ class MotorStepper(LoadStepper):
         beyond = system.size(system.independent(rate.beyond((held, last.tangent, point.tangent))))
         return beyond > self._steps.off_tangent * max(system.size(held), system.size(point.tangent))
 
-    def _held_rate(self, last: EquilibriumPoint, control: MotorControl) -> Step:
+    def _held_rate(self, last: EquilibriumPoint, control: Control) -> Step:
         """Rate of the state with the target of ``control``, the motion that runs away held.
 
         Raises:

@@ -48,6 +48,7 @@ class Stability:
     under_displacement: int
 
 
+@dataclass(frozen=True, eq=False)
 class Control(ABC):
     """A value that is prescribed.
 
@@ -199,7 +200,7 @@ class MotorControl(Control):
         """Whether anything moves."""
         return system.size(tangent) > 0.0
 
-    def _along(self, motors: np.ndarray) -> float:
+    def _along(self, motors: np.ndarray | float) -> float:
         return float(np.sum(self.direction * motors) / np.sum(self.direction**2))
 
     def _exerted(self, system, multipliers: np.ndarray) -> float:

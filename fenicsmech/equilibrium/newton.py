@@ -95,7 +95,8 @@ class Newton(Iteration):
     def iterate(self, start: State, control: Control) -> EquilibriumPoint:
         system, options, least = self.system, self.options, start.minimum_shift
         state, residual = start, system.residual(start, control)
-        best, spent, careful, passed, missed = (state, residual), 0, False, None, None
+        best, spent, careful, missed = (state, residual), 0, False, None
+        passed: tuple[State, np.ndarray] | None = None
         residuals, shift, trusted, mixed, norm = [], least, True, False, math.inf
         for iteration in range(options.iterations + 1):
             residuals.append(self.relative(residual))
@@ -106,9 +107,10 @@ class Newton(Iteration):
             if iteration == options.iterations:
                 break
             near = trusted and residuals[-1] < options.near
-            mixed = not near and passed is not None
-            if mixed:
-                system.linearise_mixed(state, control, residual, *passed)
+            kept = None if near else passed
+            mixed = kept is not None
+            if kept is not None:
+                system.linearise_mixed(state, control, residual, *kept)
             else:
                 system.linearise(state, control, residual)
             x, shift = self._direction(residual, least, last=shift, any_inertia=near)
@@ -120,7 +122,7 @@ class Newton(Iteration):
                 state, residual, length = advance(state, control, step, residual, iteration)
             except NotConverged as failure:
                 return self.accept_best(*best, control, residuals, failure)
-            # a pressure of its own is a stress that the step solves for already
+            # pressures of mixed elements are stresses that the step solves for already
             passed = (before, length * motion) if options.mixed_stress and not system.blocks.pressures.size else None
             if near and residual.norm > norm and not self.converged(residual, norm):
                 if missed is None and self.relative(residual) < options.near:

@@ -18,6 +18,7 @@ truss, claw and Klann leg, where what space adds is 0.7 to 1.6 times its estimat
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from time import perf_counter
@@ -258,7 +259,7 @@ class AccuracyControl:
         while following is not None:
             self.level, start = following, perf_counter()
             found = run(self.level)
-            scale = max(abs(found.value), np.finfo(float).tiny)
+            scale = max(abs(found.value), sys.float_info.min)
             elements, plane_stress = found.elements / scale, found.plane_stress / scale
             spent = perf_counter() - start
             trials.append(Trial(self.level, elements, plane_stress, found.unknowns, spent, self.options))

@@ -24,10 +24,10 @@ order 1, that polygons stand for curved outlines.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import cached_property
 
-import numpy as np
 import ufl
 from dolfinx import fem
 
@@ -100,7 +100,7 @@ class ElementError:
     @cached_property
     def _scale(self) -> fem.Function:
         """c of each cell's link."""
-        return self._model.elastic.cellwise(np.sqrt(self._squares))
+        return self._model.elastic.cellwise([math.sqrt(square) for square in self._squares])
 
     @cached_property
     def _pressures(self) -> list[PressureError]:

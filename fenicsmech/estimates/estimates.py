@@ -77,7 +77,7 @@ class Estimates:
 
     def at(
         self,
-        newton: Iteration,
+        solver: Iteration,
         equilibrium: Equilibrium,
         kinds: Sequence[ErrorKind] = (ErrorKind.ELEMENTS,),
         output: PointLoad | None = None,
@@ -85,7 +85,7 @@ class Estimates:
         """What is to be added to the quantity of an equilibrium, by kinds of error, from one adjoint.
 
         Args:
-            newton: the solver that found it.
+            solver: the solver that found it.
             equilibrium: of this model.
             kinds: of errors.
             output: a point whose travel is asked for instead, while what is prescribed stays as it is.
@@ -96,7 +96,7 @@ class Estimates:
         """
         errors = [self._element_error if kind is ErrorKind.ELEMENTS else self._plane_stress_error for kind in kinds]
         with self._model.clock.phase("estimate"), self._model.shaped(equilibrium.design):
-            adjoint = adjoint_at(newton, equilibrium, output)
+            adjoint = adjoint_at(solver, equilibrium, output)
             return [error.of(adjoint) for error in errors]
 
     @cached_property
@@ -108,22 +108,22 @@ class Estimates:
         return PlaneStressError(self._model, self._calibration.decay)
 
 
-def adjoint_at(newton: Iteration, equilibrium: Equilibrium, output: PointLoad | None = None) -> Adjoint:
+def adjoint_at(solver: Iteration, equilibrium: Equilibrium, output: PointLoad | None = None) -> Adjoint:
     """The adjoint of the quantity of an equilibrium, or of the travel of ``output``; the model keeps the state.
 
     Args:
-        newton: the solver that found it.
+        solver: the solver that found it.
         equilibrium: of a model that has its rest shape.
         output: a point.
 
     Raises:
         EquilibriumError: the tangent is singular.
     """
-    system, state, force = newton.system, equilibrium.state, equilibrium.quantity is Quantity.FORCE
+    system, state, force = solver.system, equilibrium.state, equilibrium.quantity is Quantity.FORCE
     system.load(state)
     control = DisplacementControl(system.load_displacement(state)) if force else LoadControl(state.force)
     try:
-        at = newton.linearise(state, control)
+        at = solver.linearise(state, control)
         return Adjoint.of_force(at) if force and output is None else Adjoint.of_travel(at, output or system.controlled)
     except NotConverged as failure:
         raise EquilibriumError(

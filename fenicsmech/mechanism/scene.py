@@ -26,12 +26,12 @@ class Effect(ABC):
 
     It overrides the hooks that it needs. Each is nothing by default and then adds no form, no unknown and no entry of a
     matrix. The arguments of hooks are objects of the layers above.
-
-    Attributes:
-        faces: ``Faces``, the parts of links' boundaries that ``link_energy`` integrates over.
     """
 
-    faces = ()
+    @property
+    def faces(self) -> tuple:
+        """``Faces``, the parts of links' boundaries that ``link_energy`` integrates over."""
+        return ()
 
     @abstractmethod
     def explain(self) -> str:

@@ -34,7 +34,7 @@ class InterfaceSite:
 
     at: tuple[float, ...]
     region: Region
-    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    axis: tuple[float, ...] = (0.0, 0.0, 1.0)
     name: str = ""
 
     @property

@@ -149,7 +149,7 @@ class MechanismModel:
         if not isinstance(part.on, FlexibleLink):
             at = np.array(in_dimension(part.at, self.linkage.dim))
             body = self.linkage.body_of(part.on)
-            return body_point(at, body, self.linkage.bodies[body].centre, self.linkage.joints.space)
+            return body_point(at, body, np.array(self.linkage.bodies[body].centre), self.linkage.joints.space)
         topology = self.mesh.mesh.topology
         owned = topology.index_map(topology.dim).size_local
         index = self.mechanism.flexible_links.index(part.on)
@@ -266,7 +266,11 @@ def _mesh_request(link: FlexibleLink, linkage: Linkage, fidelity: Fidelity) -> t
     bodies = [linkage.bodies[index] for index in linkage.interfaces[link]]
     # a pin along z holds its link at whatever height the link is
     ats = [body.centre[:2] if body.axis[2] == 1.0 else body.centre for body in bodies]
-    sites = [InterfaceSite(at, body.region, body.axis, body.name) for at, body in zip(ats, bodies, strict=True)]
+    sites = [
+        InterfaceSite(at, body.region, body.axis, body.name)
+        for at, body in zip(ats, bodies, strict=True)
+        if body.region is not None  # interfaces have regions, rigid links none
+    ]
     size, half = fidelity.sizes[link], fidelity.model.half
     options = {"layers": fidelity.layers, "segments": fidelity.segments}
     return sites, {"dim": fidelity.model.dim, "size": size, "half": half, **options}

@@ -191,8 +191,8 @@ def stiff_motions(linkage: Linkage, poses: np.ndarray, motors: np.ndarray) -> li
                     [velocity[body], space.rotation_rates(poses[body]) @ spin[body]]
                 )
             basis.append(Motion(z, velocity, spin))
-    opening = joints.row_scale[:, None] * (joints.gradient(poses, motors) @ np.array([motion.z for motion in basis]).T)
-    _, values, right = np.linalg.svd(opening, full_matrices=True)
+    rates = joints.row_scale[:, None] * (joints.gradient(poses, motors) @ np.array([motion.z for motion in basis]).T)
+    _, values, right = np.linalg.svd(rates, full_matrices=True)
     return [
         Motion(*(np.tensordot(weights, [getattr(m, name) for m in basis], 1) for name in ("z", "velocity", "spin")))
         for weights in right[int(np.sum(values > _RANK)) :]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -104,7 +103,7 @@ class Curve:
     def remarks(self) -> tuple[str, ...]:
         """Where the mechanism snapped and which equilibria are unstable, a sentence each."""
         (across, up), name, said = self.axes, self.configuration.name, []
-        for before, after in pairwise((None, *self.frames)):
+        for before, after in zip((None, *self.frames), self.frames, strict=False):
             if after.snapped_through:
                 since = "on the way there" if before is None else f"after {up.quantity} {up(before.force)}"
                 said.append(
@@ -152,7 +151,8 @@ class Curve:
 
         Raises as ``error_estimates``.
         """
-        return AccuracyOptions().corrections(sum(self.errors_by_kind()), self.values)
+        elements, plane_stress = self.errors_by_kind()
+        return AccuracyOptions().corrections(elements + plane_stress, self.values)
 
     @property
     def corrected(self) -> np.ndarray:
@@ -234,7 +234,7 @@ class Curve:
         options, frame = ExplanationOptions(tolerance=tolerance), self.frames[-1]
         self._need_force()
         return explain(
-            self.discretisation.model, self._newton, self.equilibrium(frame), frame, self.units, options=options
+            self.discretisation.model, self._solver, self.equilibrium(frame), frame, self.units, options=options
         )
 
     # -- pictures and files --------------------------------------------------------------------------------------
@@ -287,27 +287,28 @@ class Curve:
             beside: curves of other configurations to draw beside this one.
         """
         panels = [self.panel(stress=stress, traces=traces), *(curve.panel(stress=stress) for curve in beside)]
+        drawn = [panel for panel in panels if panel is not None]
         label = f"von Mises stress [{self.units.stress}]" if stress else ""
         title = self.discretisation.scene.mechanism.name
         on_one(
             self.discretisation.comm,
-            lambda: draw_configurations(path, panels, title=title, colour_label=label, unit=self.units.length),
+            lambda: draw_configurations(path, drawn, title=title, colour_label=label, unit=self.units.length),
         )
 
     def panel(self, *, stress: bool = True, traces: Sequence[Trace] = ()) -> Panel | None:
         """The picture of the first and the last frame, on rank 0; None elsewhere."""
         model = self.discretisation.model
         first, last = (gather(model, self.frames[k]) for k in (0, -1))
-        if first is None:
+        if first is None or last is None:
             return None
         plotter = MechanismPlotter(model)
-        (across, up), end, arrows = self.axes, self.frames[-1], ()
+        (across, up), end, arrows = self.axes, self.frames[-1], []
         if isinstance(self.part, Force):
-            arrows = (plotter.arrow(self.part, end.force, last, label=f"{end.force:g} {up.unit}"),)
+            arrows.append(plotter.arrow(self.part, end.force, last, label=f"{end.force:g} {up.unit}"))
         return Panel(
             plotter.shape(first, stress=False),
             (plotter.shape(last, stress=stress),),
-            arrows,
+            tuple(arrows),
             tuple(traces),
             f"{self.configuration.name}: {up(end.force)}, {across(end.displacement)}",
         )
@@ -356,7 +357,7 @@ class Curve:
         return self.discretisation.comm.rank == 0
 
     @property
-    def _newton(self) -> Iteration:
+    def _solver(self) -> Iteration:
         return self.discretisation.newton(self.part, self.others)
 
     def _need_force(self) -> None:
@@ -381,7 +382,7 @@ class Curve:
         model = self.discretisation.model
         with model.shaped(frame.design):
             try:
-                found = modes(self._newton, held, frame.state, count=count)
+                found = modes(self._solver, held, frame.state, count=count)
                 return [(mode.value, mode_shape(model, mode.step)) for mode in found]
             except NotConverged as failure:
                 where = f"{self.part.name!r} in configuration {self.configuration.name!r}"
@@ -397,8 +398,9 @@ class Curve:
         self._need_force()
         missing = [kind for kind in kinds if (kind, output) not in self._errors]
         if missing:
-            estimates, point = self.discretisation.estimates, output and self.discretisation.model.point_load(output)
-            rows = [estimates.at(self._newton, self.equilibrium(frame), missing, point) for frame in self.frames]
+            estimates, model = self.discretisation.estimates, self.discretisation.model
+            point = None if output is None else model.point_load(output)
+            rows = [estimates.at(self._solver, self.equilibrium(frame), missing, point) for frame in self.frames]
             for kind, column in zip(missing, np.array(rows).T, strict=True):
                 self._errors[kind, output] = column
         return [self._errors[kind, output] for kind in kinds]

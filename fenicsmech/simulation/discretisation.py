@@ -52,7 +52,7 @@ class Discretisation:
         self.solver, self.predictor = solver, predictor
         self.linkage = build_linkage(scene.mechanism, fidelity.model.mechanism_dim)
         self.materials = tuple(link.material for link in scene.mechanism.flexible_links)
-        self._newtons: dict[tuple, Iteration] = {}
+        self._iterations: dict[tuple, Iteration] = {}
         on_one(comm, lambda: check_links(scene.mechanism, self.linkage, fidelity))
 
     def at(self, fidelity: Fidelity, clock: Clock, comm: MPI.Comm) -> Discretisation:
@@ -75,7 +75,7 @@ class Discretisation:
             )
         changed = copy(self)
         changed.materials = tuple(other if material == drawn else material for material in self.materials)
-        changed.mesh, changed._newtons = self.mesh, {}
+        changed.mesh, changed._iterations = self.mesh, {}
         for name in ("model", "estimates"):
             changed.__dict__.pop(name, None)
         return changed
@@ -103,7 +103,7 @@ class Discretisation:
     def newton(self, part: PrescribedPart, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
         """The solver for what changes and some constant forces, kept for all configurations."""
         key = part, others
-        if key not in self._newtons:
+        if key not in self._iterations:
             loads = tuple((self.model.point_load(other), float(magnitude)) for other, magnitude in others)
-            self._newtons[key] = self.solver.on(self.model.system(controlled_load(part, self.model), loads))
-        return self._newtons[key]
+            self._iterations[key] = self.solver.on(self.model.system(controlled_load(part, self.model), loads))
+        return self._iterations[key]

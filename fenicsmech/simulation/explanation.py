@@ -72,12 +72,12 @@ class Explanation:
 
 
 def explain(
-    model: MechanismModel, newton: Iteration, at: Equilibrium, frame: Frame, units: Units, options: ExplanationOptions
+    model: MechanismModel, solver: Iteration, at: Equilibrium, frame: Frame, units: Units, options: ExplanationOptions
 ) -> Explanation:
     """What is simulated, and hints on what is left out, from one frame of a curve.
 
     Args:
-        model, newton: the discretised mechanism, and the solver that found the frame.
+        model, solver: the discretised mechanism, and the solver that found the frame.
         at: the equilibrium of the frame.
         frame: of the curve.
         units: of the description; weights are only known in N and mm.
@@ -87,7 +87,7 @@ def explain(
         EquilibriumError: the tangent of the frame is singular.
     """
     hints = [
-        _weight_hint(model, newton, at, frame, units, options),
+        _weight_hint(model, solver, at, frame, units, options),
         _compressibility_hint(model, options.locking[model.elastic.order]),
         _touching_hint(model, frame),
     ]
@@ -116,13 +116,13 @@ def _simulated(model: MechanismModel) -> tuple[str, ...]:
 
 
 def _weight_hint(
-    model: MechanismModel, newton: Iteration, at: Equilibrium, frame: Frame, units: Units, options: ExplanationOptions
+    model: MechanismModel, solver: Iteration, at: Equilibrium, frame: Frame, units: Units, options: ExplanationOptions
 ) -> Hint | None:
     if any(isinstance(effect, Gravity) for effect in model.effects):
         return None
     if (units.length, units.force) != ("mm", "N"):
         return Hint("weight", "list Gravity(…) with densities in your units to include it", False)
-    change = options.weight * float(np.linalg.norm(weight_influence(model, newton, at)))
+    change = options.weight * float(np.linalg.norm(weight_influence(model, solver, at)))
     part = change / max(abs(frame.displacement), 1e-300)
     return Hint(
         "weight",
@@ -132,14 +132,14 @@ def _weight_hint(
     )
 
 
-def weight_influence(model: MechanismModel, newton: Iteration, at: Equilibrium) -> np.ndarray:
+def weight_influence(model: MechanismModel, solver: Iteration, at: Equilibrium) -> np.ndarray:
     """Derivative of the displacement by a weight per volume along each axis the mechanism moves in.
 
     dQ/dw_k = û · ∫ e_k dV, û the nodal adjoint of the displacement
     """
     elastic = model.elastic
     with model.shaped(at.design):
-        adjoint = adjoint_at(newton, replace(at, quantity=Quantity.DISPLACEMENT))
+        adjoint = adjoint_at(solver, replace(at, quantity=Quantity.DISPLACEMENT))
         displacements = elastic.split(adjoint.nodal)[0]
         depths = [elastic.model.multiplier(link.shape.depth) for link in model.mechanism.flexible_links]
         v = ufl.TestFunction(elastic.u.function_space)
@@ -187,6 +187,8 @@ def _close_pairs(model: MechanismModel, frame: Frame) -> list[tuple[str, str]]:
     mesh, links = model.mesh, model.mechanism.flexible_links
 
     def search() -> list[tuple[str, str]]:
+        if snapshot is None:
+            return []
         places = (snapshot.rest + snapshot.displacement)[:, :2]
         trees = [cKDTree(places[np.unique(mesh.cells[mesh.link_of_cell == k])]) for k in range(len(links))]
         edge = np.linalg.norm(np.diff(places[mesh.cells[:, :2]], axis=1)[:, 0], axis=1).mean()

@@ -83,7 +83,7 @@ def gather(model: MechanismModel, frame: Frame) -> Snapshot | None:
             ),
             root=0,
         )
-    if parts is None:
+    if parts is None or rest is None:
         return None
     displacement, stress = np.zeros_like(mesh.vertices), np.zeros(len(mesh.cells))
     for nodes, u, cells, values in parts:
@@ -101,8 +101,8 @@ def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame])
         DescriptionError: the path does not end in .xdmf.
         OSError: nothing can be written there.
     """
-    path = Path(path)
-    if path.suffix != ".xdmf":
+    target = Path(path)
+    if target.suffix != ".xdmf":
         raise DescriptionError(f"file {str(path)!r}", "only XDMF is written", "Give a name that ends in .xdmf")
     elastic, mesh, comm = model.elastic, model.mesh.mesh, model.mesh.mesh.comm
     stress, nodal = fem.Function(cellwise_space(mesh)), {"displacement": fem.Function(vector_space(mesh, 1))}
@@ -122,13 +122,13 @@ def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame])
     def move_up() -> None:
         """The heavy data first: the light file that names it must never point at nothing."""
         for suffix in (".h5", ".xdmf"):
-            os.replace(folder / path.with_suffix(suffix).name, path.with_suffix(suffix))
+            os.replace(folder / target.with_suffix(suffix).name, target.with_suffix(suffix))
         folder.rmdir()
 
-    folder = from_one(comm, lambda: _folder_beside(path))
+    folder = from_one(comm, lambda: _folder_beside(target))
     forces = np.array([frame.force for frame in frames])
     with _at_rest(model, frames[0].design):
-        write_series(folder / path.name, mesh, {**nodal, "von Mises stress": stress}, forces, update, comm)
+        write_series(folder / target.name, mesh, {**nodal, "von Mises stress": stress}, forces, update, comm)
     comm.barrier()  # all have closed the file
     on_one(comm, move_up)
 

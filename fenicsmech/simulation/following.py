@@ -140,7 +140,9 @@ def branches(
         EquilibriumError: the curve is not found, or ends early; carries the frames before that.
     """
     if event not in curve.bifurcations:
-        raise DescriptionError("branches", "the event is no bifurcation of the curve", "Choose from its bifurcations")
+        raise DescriptionError(
+            "branches", "the event is not a bifurcation of the curve", "Choose from its bifurcations"
+        )
     if mode is None and event.modes != 1:
         raise DescriptionError(
             "branches",
@@ -254,7 +256,9 @@ class CurveFollower:
     def _path(self, state: State) -> ArcLengthTracer:
         """The path through ``state``, in units of what is asked for."""
         until, value, conjugate = self._until, self._followed.value(self._system, state), self._conjugate(state)
-        values, conjugates = (until.travel, until.force) if self._followed.displaces else (until.force, until.travel)
+        values, conjugates = until.travels, until.forces
+        if not self._followed.displaces:
+            values, conjugates = conjugates, values
         return ArcLengthTracer(
             self._tracer.solver,
             self._followed,
@@ -266,12 +270,12 @@ class CurveFollower:
 
     def _finishes(self, path: ArcLengthTracer) -> list[Finish]:
         """Displacements or positions first, then forces."""
-        value = path.value, path.value_rate
+        followed = path.value, path.value_rate
         conjugate = (lambda point: self._conjugate(point.state)), (lambda point: point.conjugate_rate)
-        travel, force = (value, conjugate) if self._followed.displaces else (conjugate, value)
+        travel, force = (followed, conjugate) if self._followed.displaces else (conjugate, followed)
         return [
-            Finish(*quantity, target, max(map(abs, targets)) or 1.0)
-            for quantity, targets in ((travel, self._until.travel), (force, self._until.force))
+            Finish(value, rate, target, max(map(abs, targets)) or 1.0)
+            for (value, rate), targets in ((travel, self._until.travels), (force, self._until.forces))
             for target in targets
         ]
 

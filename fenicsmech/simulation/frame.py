@@ -57,7 +57,8 @@ class Frame:
 
     def __repr__(self) -> str:
         figures = [f"force {self.force:.6g}", f"displacement {self.displacement:.6g}"]
-        figures += [f"{part.name} {value:.6g}" for part, value in (*self.outputs.items(), *self.motors.items())]
+        named: list[tuple[Output | Motor, float]] = [*self.outputs.items(), *self.motors.items()]
+        figures += [f"{part.name} {value:.6g}" for part, value in named]
         figures += [f"strain energy {self.strain_energy:.4g}", f"stress {self.max_stress:.4g}"]
         figures.append("stable" if self.stable else f"{self.unstable_modes} unstable modes")
         figures += ["snapped through"] * self.snapped_through

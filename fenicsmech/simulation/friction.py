@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -68,7 +69,7 @@ def friction_band(
         angles.append(turned)
         moments.append(pin.coefficient * pin.radius * np.linalg.norm(forces, axis=1))
     arc = _arc(frames, linkage)
-    order = min(2, len(poses) - 1)
+    order: Literal[1, 2] = 1 if len(poses) == 2 else 2
     loss = np.zeros_like(arc)
     for moment, turned in zip(moments, angles, strict=True):
         loss += moment * np.abs(np.gradient(turned, arc, edge_order=order))

@@ -63,8 +63,7 @@ class Until:
 
     def __post_init__(self) -> None:
         for name in ("displacement", "force", "position"):
-            given = getattr(self, name)
-            values = tuple(given) if isinstance(given, Iterable) and not isinstance(given, str) else (given,)
+            values = _several(getattr(self, name))
             object.__setattr__(self, name, tuple(finite(f"{name} where a path ends", value) for value in values))
         if not (self.displacement or self.force or self.position):
             raise DescriptionError("end of a path", "no displacement, position or force is given", "Give one of them")
@@ -78,9 +77,18 @@ class Until:
             raise DescriptionError("end of a path", f"{self.frames!r} frames", "Give a whole number of at least 2")
 
     @property
-    def travel(self) -> tuple[float, ...]:
+    def travels(self) -> tuple[float, ...]:
         """Displacements or positions, whichever are given."""
-        return self.displacement or self.position
+        return _several(self.displacement or self.position)
+
+    @property
+    def forces(self) -> tuple[float, ...]:
+        """Magnitudes of the force."""
+        return _several(self.force)
+
+
+def _several(given: float | Iterable[float]) -> tuple[float, ...]:
+    return tuple(given) if isinstance(given, Iterable) and not isinstance(given, str) else (given,)
 
 
 @dataclass(frozen=True)

@@ -102,15 +102,23 @@ class Simulation:
                 "formulation", f"it is {formulation!r}", "Give MixedFormulation() or DisplacementFormulation()"
             )
         formulation = formulation or MixedFormulation()
-        given = {"space": space, "order": order, "layers": layers, "segments": segments, "quadrature": quadrature}
         self.scene, self.comm, self.clock = scene, comm, Clock()
         self.choice: Choice | None = None
         self._control: AccuracyControl | None = None
         self._design: np.ndarray | None = None
         if accuracy is None:
-            fidelity = read_fidelity(scene, **given, size=size, formulation=formulation)
+            fidelity = read_fidelity(
+                scene,
+                space=space,
+                order=order,
+                size=size,
+                quadrature=quadrature,
+                formulation=formulation,
+                layers=layers,
+                segments=segments,
+            )
         else:
-            _refuse_beside_accuracy(given)
+            _refuse_beside_accuracy(space=space, order=order, layers=layers, segments=segments, quadrature=quadrature)
             self._control = AccuracyControl(scene, accuracy, size, formulation)
             fidelity = self._control.fidelity(self._control.level)
         solver, predictor = solver or PrimalDualNewton(), predictor or Hermite()
@@ -160,11 +168,19 @@ class Simulation:
             others=others,
         )
         with self._progress(len(request.controls), configuration) as progress:
-            if self._control is None:
+            control = self._control
+            if control is None:
                 return self.trace(request, watch=progress.update)
+
             curves: list[Curve] = []
-            self.choice = self._control.choose(lambda level: self._errors(level, request, progress.update, curves))
-            return curves[-1]
+
+            def run(level: FidelityLevel) -> LevelErrors:
+                self._use(control.fidelity(level))
+                curves[:] = [self.trace(request, watch=progress.update)]
+                return _errors(curves[0])
+
+            self.choice = control.choose(run)
+            return curves[0]
 
     def follow(
         self,
@@ -319,8 +335,8 @@ class Simulation:
     def mesh_ratio_max(self) -> float:
         """Largest ratio of circumradius to inradius among the cells of the rest shape."""
         with self._shaped():
-            rest, dim = rest_vertices(self.model), self.fidelity.model.dim
-        return from_one(self.comm, lambda: dim / float(radius_ratios(rest, self.model.mesh.cells).min()))
+            rest, cells, dim = rest_vertices(self.model), self.model.mesh.cells, self.fidelity.model.dim
+        return from_one(self.comm, lambda: 1.0 if rest is None else dim / float(radius_ratios(rest, cells).min()))
 
     def newton(self, part: PrescribedPart, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
         """The solver for what changes and some constant forces, kept for all configurations."""
@@ -348,20 +364,10 @@ class Simulation:
     def _progress(self, frames: int, configuration: Configuration) -> Progress | Silent:
         return Progress(frames, configuration.name) if self.comm.rank == 0 else Silent()
 
-    def _errors(
-        self, level: FidelityLevel, request: CurveRequest, watch: Callable[[int], None], curves: list[Curve]
-    ) -> LevelErrors:
-        """Makes the curve of a fidelity level the only one of ``curves``; returns its largest value and errors."""
-        fidelity = self._control.fidelity(level)
+    def _use(self, fidelity: Fidelity) -> None:
+        """Goes on at another fidelity; curves keep what they were computed with."""
         if fidelity != self.fidelity:
-            # curves keep what they were computed with
             self._discretisation, self.choice = self._discretisation.at(fidelity, self.clock, self.comm), None
-        curve = self.trace(request, watch=watch)
-        curves[:] = [curve]
-        elements, plane_stress = curve.errors_by_kind()
-        largest, model = int(np.argmax(np.abs(curve.values))), self.model
-        unknowns = model.rigid_dofs + model.flexible_dofs + model.pressure_dofs
-        return LevelErrors(*(float(values[largest]) for values in (curve.values, elements, plane_stress)), unknowns)
 
     def _check_description(self) -> None:
         """Refuses a mechanism that is not the one this simulation was made for."""
@@ -382,7 +388,19 @@ class Simulation:
             )
 
 
-def _refuse_beside_accuracy(given: Mapping[str, object]) -> None:
+def _errors(curve: Curve) -> LevelErrors:
+    """The largest value of a curve and the estimates of its errors."""
+    elements, plane_stress = curve.errors_by_kind()
+    largest, model = int(np.argmax(np.abs(curve.values))), curve.discretisation.model
+    return LevelErrors(
+        value=float(curve.values[largest]),
+        elements=float(elements[largest]),
+        plane_stress=float(plane_stress[largest]),
+        unknowns=model.rigid_dofs + model.flexible_dofs + model.pressure_dofs,
+    )
+
+
+def _refuse_beside_accuracy(**given: object) -> None:
     """Refuses a fidelity beside an accuracy that is to choose it."""
     for name, value in given.items():
         if value is not None:

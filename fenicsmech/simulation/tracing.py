@@ -98,7 +98,8 @@ class CurveTracer:
         Raises:
             EquilibriumError: a sample was not reached; carries the frames before it.
         """
-        request, frames = self.request, []
+        request = self.request
+        frames: list[Frame] = []
         for control in request.controls:
             frames.append(self.frame(control, frames))
             watch(len(frames))
@@ -277,7 +278,7 @@ class CurveTracer:
         held = np.abs(np.linalg.eigvalsh(free.curvature)) if self._model.spring_potentials else np.zeros(0)
         return bool(np.min(held[held > 0.0], initial=np.inf) < 1e-15 * self._system.unknowns.unit**2)
 
-    # -- balance along zero-energy modes -----------------------------------------------------------------------
+    # -- residual along zero-energy modes -----------------------------------------------------------------------
 
     def _imbalance(self, state: State, control: Control) -> float:
         """Largest work of a loaded equilibrium along motions that deform no link, over loads times greatest velocity.

@@ -92,7 +92,7 @@ def test_what_is_no_bifurcation_of_the_curve_is_refused():
     curve = straight(case)
     event = curve.bifurcations[0]
     other = column()
-    with pytest.raises(fm.DescriptionError, match="no bifurcation of the curve"):
+    with pytest.raises(fm.DescriptionError, match="not a bifurcation of the curve"):
         other.simulation.branches(straight(other), event, until=fm.Until(force=1.0))
     with pytest.raises(fm.DescriptionError, match="does not say where"):
         case.simulation.branches(curve, event, until=1.0)

@@ -147,7 +147,7 @@ def test_descriptions_without_sense_are_refused():
     refused(lambda: Cylinder((0, 0, 0), 1.0), part="centre", problem="has not 2 coordinates", remedy="2 numbers")
     refused(lambda: Cylinder((0, 0), 0.0), part="radius", problem="not positive", remedy="greater")
     for contact, space, problem in (
-        (Contact(stranger, floor, 1.0, [(0, 0)]), "3d", "no link"),
+        (Contact(stranger, floor, 1.0, [(0, 0)]), "3d", "is not a link of"),
         (Contact(link, HalfPlane((0, 0), (0, 0, 1))), "plane-stress", "leaves the plane"),
     ):
         scene = fm.Scene(mechanism, effects=[contact])

@@ -257,7 +257,7 @@ def test_springs_that_make_no_sense_are_refused():
         JointSpring(hinge, 0.0)
     with pytest.raises(fm.DescriptionError, match="no single free coordinate"):
         JointSpring(ball, 1.0).check(mechanism, 3)
-    with pytest.raises(fm.DescriptionError, match="no joint of 'other'"):
+    with pytest.raises(fm.DescriptionError, match="is not a joint of 'other'"):
         JointSpring(hinge, 1.0).check(fm.Mechanism("other"), 2)
     with pytest.raises(fm.DescriptionError, match="full turn"):
         JointSpring(hinge, 1.0, rest=7.0).check(mechanism, 3)

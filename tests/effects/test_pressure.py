@@ -162,6 +162,11 @@ def test_pressure_without_sense_is_refused():
     refused(lambda: Pressure(link, 1.0, about=(0,)), part="centre", problem="coordinates", remedy="2 or 3")
     other, _ = beam("plane-stress", 1.0)
     scene = fm.Scene(other.scene.mechanism, effects=[Pressure(fm.mechanism.FlexibleLink("x", link.shape, fm.ONYX), 1)])
-    refused(lambda: fm.Simulation(scene, space="3d", size=2.0), part="pressure", problem="no link", remedy="out")
+    refused(
+        lambda: fm.Simulation(scene, space="3d", size=2.0),
+        part="Pressure",
+        problem="is not a link of",
+        remedy="Name a link",
+    )
     simulation, push = beam("plane-stress", 1.0, about=None)
     refused(lambda: simulation.load_displacement(push, forces=[0.0]), part="'beam'", problem="is open", remedy="about=")
