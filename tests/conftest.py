@@ -1,4 +1,4 @@
-"""What every test shares: MPI-aware reporting, directories common to all ranks, and programs run under mpirun."""
+"""Fixtures of all tests: MPI-aware reporting, directories common to all ranks, and programs run under mpirun."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from mpi4py import MPI
 COMM = MPI.COMM_WORLD.Dup()
 
 # Seconds after which a test is taken to hang, alone and on several ranks, and after which a rank whose test failed
-# takes the others to wait for it in vain.
+# waits no longer for the others.
 ALONE, ON_RANKS, AFTER_FAILURE = 300, 120, 30
 
 STDERR = pytest.StashKey[int]()

@@ -142,7 +142,7 @@ def test_libraries_stay_in_their_layers(library):
     assert not complaints, "\n".join(complaints)
 
 
-def test_versions_are_told_apart_in_compat_only():
+def test_versions_are_distinguished_in_compat_only():
     complaints = [
         f"{module}:{node.lineno} reads __version__"
         for module, path in modules().items()
@@ -154,7 +154,7 @@ def test_versions_are_told_apart_in_compat_only():
 
 
 @pytest.mark.parametrize("module", modules())
-def test_every_module_says_what_it_is(module):
+def test_every_module_has_a_docstring(module):
     assert ast.get_docstring(ast.parse(modules()[module].read_text())), f"{module} has no docstring"
 
 

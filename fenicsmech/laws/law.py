@@ -30,7 +30,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import Field, dataclass, fields
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from ufl import Identity, conditional, det, inner, ln, lt, tr
 from ufl.core.expr import Expr
@@ -94,7 +94,7 @@ class Law(ABC):
 
     E: float | Expr
     nu: float | Expr
-    __dataclass_fields__: ClassVar[dict[str, Field]]
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]  # of the derived class
 
     @abstractmethod
     def energy(self, strain: Strain) -> Expr:

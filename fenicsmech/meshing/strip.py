@@ -289,7 +289,7 @@ def _parallel(centreline: Centreline, s: np.ndarray, offset: float) -> np.ndarra
 
 
 def _points(side: Sequence[np.ndarray]) -> list[list[int]]:
-    """The points of a side in the model, piece by piece; neighbouring pieces share one."""
+    """The points of a side in the model, piece by piece; neighbouring pieces have one in common."""
     pieces: list[list[int]] = []
     for piece in side:
         shared = pieces[-1][-1:] if pieces else []

@@ -33,7 +33,7 @@ def rigid_outline(points: ArrayLike, width: float) -> Reals:
     """
     joints = real_array("joints of a rigid link", points, None, 2)
     if not len(joints):
-        raise DescriptionError("outline of a rigid link", "there is no joint", "Give at least one point")
+        raise DescriptionError("outline of a rigid link", "there are no joints", "Give at least one point")
     if not (width > 0.0 and np.isfinite(width)):
         raise DescriptionError("outline of a rigid link", f"the width is {width}", "Give a positive width")
     angles = np.linspace(0.0, 2.0 * np.pi, 384, endpoint=False)  # of the polygon that stands for a disc
