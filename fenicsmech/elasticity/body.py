@@ -213,7 +213,7 @@ class ElasticBody(BodyFields):
         """Whether the energy depends on the load factor."""
         return self.effects_ufl is not None or self._growth is not None
 
-    def load_factor_derivative(self) -> np.ndarray:
+    def load_factor_residuals(self) -> np.ndarray:
         """The derivative of ``residuals`` by the load factor."""
         found = np.zeros(sum(map(len, self.split(self.values()))))
         for part, form, work in zip(self.split(found), self._load_factor_forms, self._sums, strict=False):

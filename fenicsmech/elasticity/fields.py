@@ -52,7 +52,7 @@ class BodyFields:
         pressure: of the links in the u–p formulation, P_(order − 1); None if no link is.
         parameters: of the links' laws by name, each with one value per cell; changing them needs no compiling.
         depth: one value per cell.
-        load_factor: factor s of the effects.
+        load_factor: of the effects.
     """
 
     def __init__(
@@ -191,7 +191,7 @@ class Growth:
         cellwise: makes a field with one value per cell from one value per link, (links,).
         free: whether each local cell can deform; the others do not grow, (cells,).
         dim: of the model; planar ones are free to grow in depth.
-        load_factor: s, as a constant.
+        load_factor: s.
     """
 
     def __init__(

@@ -284,7 +284,7 @@ class EquilibriumSystem:
         """… the load factor of the constant loads."""
         links, border = self._border.load_factor_rate(state)
         if self.elastic.depends_on_load_factor:
-            links -= self.elastic.load_factor_derivative()
+            links -= self.elastic.load_factor_residuals()
         return self.unknowns.apply_transpose(links, border)
 
     def target_rate(self) -> PETSc.Vec:

@@ -313,7 +313,7 @@ class CurveTracer:
         """Sum of the sizes of all forces of effects that grow with the load factor."""
         model, total = self._model, 0.0
         if model.elastic.depends_on_load_factor:
-            local = float(np.abs(model.elastic.load_factor_derivative()).sum())
+            local = float(np.abs(model.elastic.load_factor_residuals()).sum())
             total += model.mesh.mesh.comm.allreduce(local, op=MPI.SUM)
         for potential in model.potentials:
             if not potential.holds:

@@ -73,20 +73,20 @@ def test_a_free_bar_of_rubber_does_so_without_pressure(space, stretch):
 
 
 @pytest.mark.parametrize("space", ["plane-strain", "3d"])
-def test_residuals_of_displacement_and_pressure_are_differentiated_by_the_share(space):
+def test_residuals_of_displacement_and_pressure_are_differentiated_by_the_load_factor(space):
     body = bar(space, 1.2, along=(0.8, 0.6), material=RUBBER)[0].model.elastic
     for field, size, seed in ((body.d, 0.1, 1), (body.u, 0.1, 2)):
         interpolate(field, wave(body.model.dim, size, seed=seed))
     body.pressure.p.x.array[:] = np.linspace(-30.0, 20.0, len(body.pressure.p.x.array))
     weights = np.random.default_rng(4).uniform(-1.0, 1.0, len(body.values()))
 
-    def at_share(values):
+    def at_load_factor(values):
         body.load_factor.value = values[0]
         return weights @ body.residuals()
 
     body.load_factor.value = 0.8
-    rate = weights @ body.load_factor_derivative()
-    rates = taylor_rates(at_share, [0.8], [1.0], [rate], [0.1, 0.05, 0.025])
+    rate = weights @ body.load_factor_residuals()
+    rates = taylor_rates(at_load_factor, [0.8], [1.0], [rate], [0.1, 0.05, 0.025])
     assert rates.with_gradient.min() > 1.9
 
 
@@ -124,16 +124,16 @@ def test_energy_and_its_gradient_are_differentiated(space, along):
         for field in (body.u, body.d):
             assert form_derivative(form, field, size=0.05, seed=5).rates.with_gradient[-1] > 1.95
 
-    # what the path of growing effects needs: the derivative of the residual by the share
+    # what the path of growing effects needs: the derivative of the residual by the load factor
     compiled = compile_form(residual)
     vector = work.x.array.copy()
-    rate = body.load_factor_derivative()[: len(vector)] @ vector
+    rate = body.load_factor_residuals()[: len(vector)] @ vector
 
-    def at_share(values):
+    def at_load_factor(values):
         body.load_factor.value = values[0]
         return fem.assemble_scalar(compiled)
 
-    rates = taylor_rates(at_share, [0.8], [1.0], [rate], [0.1, 0.05, 0.025])
+    rates = taylor_rates(at_load_factor, [0.8], [1.0], [rate], [0.1, 0.05, 0.025])
     assert rates.with_gradient.min() > 1.9
 
 
