@@ -77,7 +77,7 @@ def test_points_that_cannot_be_drawn_are_refused(change, message):
 
 
 def test_a_plot_of_nothing_and_other_formats_are_refused(tmp_path):
-    with pytest.raises(DescriptionError, match="no point"):
+    with pytest.raises(DescriptionError, match="it has no points"):
         plot_work_precision(tmp_path / "a.png", [])
     with pytest.raises(DescriptionError, match="PNG"):
         plot_work_precision(tmp_path / "a.pdf", series())

@@ -84,12 +84,12 @@ def pinned(material: fm.Material, *, depth: float = 4.0, space: str = "plane-str
 def test_compression_is_compared_with_the_load_that_buckles_a_link_out_of_the_plane():
     stiff = fm.Material("stiff", 2000.0, 0.3)
     critical = np.pi**2 * 2000.0 * 6.0 * 4.0**3 / 12.0 / 60.0**2
-    for share in (0.05, 0.5):
+    for fraction in (0.05, 0.5):
         simulation, push = pinned(stiff)
-        curve = simulation.load_displacement(push, forces=[share * critical])
+        curve = simulation.load_displacement(push, forces=[fraction * critical])
         found = hint(curve.explain(), "bending out of the plane")
-        assert f"about {share:.2g} " in found.text
-        assert found.matters is (share > 0.2)
+        assert f"about {fraction:.2g} " in found.text
+        assert found.matters is (fraction > 0.2)
 
 
 @pytest.mark.parametrize(
