@@ -31,7 +31,7 @@ from fenicsmech.compat import (
     evaluate_expression,
 )
 from fenicsmech.elasticity.fields import BodyFields, Growth, Stretch
-from fenicsmech.elasticity.models import ElasticModel, cauchy_stress
+from fenicsmech.elasticity.models import ElasticModel, PlaneStress, cauchy_stress
 from fenicsmech.errors import DescriptionError
 from fenicsmech.laws import Law
 from fenicsmech.mechanism import Material
@@ -175,6 +175,7 @@ class ElasticBody(BodyFields):
 
     def contraction_energy(self, weight, *, degree: int) -> ufl.Form:
         """½ ∫ w E (F₃₃ − 1)² dV with a scalar field w, of links in plane stress."""
+        assert isinstance(self.model, PlaneStress), "links contract freely in plane stress alone"
         H, terms = self._elastic(self.gradient(self.u)), []
         for term in self._terms:
             density = 0.5 * weight * term.law.E * self.model.contraction(term.law, H) ** 2
@@ -238,6 +239,7 @@ class ElasticBody(BodyFields):
 
         Volumes resist with p² / μ per volume once shear has done what it can.
         """
+        assert self.pressure is not None, "no link is in the u–p formulation"
         mixed = [term for term in self._terms if term.mixed]
         form = _sum(self._volume * 2 * (1 + term.law.nu) / term.law.E * term.dx for term in mixed)
         volume = self.mesh.comm.allreduce(fem.assemble_scalar(compile_form(form)))
@@ -265,7 +267,9 @@ class ElasticBody(BodyFields):
     def _density(self, term: _Term, H):
         """W, or Π, of the elastic gradient H."""
         strain = self.model.strain(term.law, H)
-        return term.law.mixed_energy(strain, self.pressure.p) if term.mixed else term.law.energy(strain)
+        if self.pressure is None or not term.mixed:
+            return term.law.energy(strain)
+        return term.law.mixed_energy(strain, self.pressure.p)
 
     @property
     def _volume(self):

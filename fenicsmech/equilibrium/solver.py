@@ -82,7 +82,7 @@ class EquilibriumPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class EquilibriumSolver(ABC):
-    """How equilibria are found.
+    """The method that finds equilibria.
 
     Attributes:
         tolerance: residual over the forces that balance in it, at convergence.

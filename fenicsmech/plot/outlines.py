@@ -81,7 +81,9 @@ def plan_view(points: ArrayLike, tets: ArrayLike) -> PlanView:
     faces = np.where(inward[:, None], faces[:, [0, 2, 1]], faces)
     top = normal[:, 2] > 0.5 * np.linalg.norm(normal, axis=1)
     if not top.any():
-        raise DescriptionError("plan view of a solid mesh", "no face looks towards +z", "Extrude planar links along z")
+        raise DescriptionError(
+            "plan view of a solid mesh", "no face has a normal towards +z", "Extrude planar links along z"
+        )
     return PlanView(triangles=faces[top], cells=owner[top])
 
 

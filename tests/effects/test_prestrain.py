@@ -161,7 +161,7 @@ def test_prestrain_without_sense_is_refused():
     (link,) = mechanism.flexible_links
     refused(lambda: Prestrain(link, 0.0), part="'bar'", problem="not positive", remedy="greater")
     refused(lambda: Prestrain(link, 1.1, (0, 0)), part="direction", problem="zero length", remedy="somewhere")
-    refused(lambda: Prestrain(mechanism.rigid_links[0], 1.1), part="prestrain", problem="no flexible", remedy="Give")
+    refused(lambda: Prestrain(mechanism.rigid_links[0], 1.1), part="prestrain", problem="not a flexible", remedy="Give")
     out = fm.Scene(mechanism, effects=[Prestrain(link, 1.1, (0, 0, 1))])
     refused(lambda: fm.Simulation(out, space="plane-stress", size=2.0), part="prestrain", problem="plane", remedy="two")
     twice = fm.Scene(mechanism, effects=[Prestrain(link, 1.1, (1, 0)), Prestrain(link, 1.2, (1, 0))])

@@ -1,4 +1,4 @@
-"""What simulations held is given back when they are gone, and what iterations hold while they go on."""
+"""Memory: simulations free theirs when they are gone, iterations while they go on."""
 
 from __future__ import annotations
 
