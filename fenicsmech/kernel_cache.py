@@ -1,7 +1,7 @@
 """The cache of compiled forms, and the options of the compiler.
 
-FFCx marks a form as being compiled by its C file, and other processes wait until it is finished. A process that is
-killed while it compiles leaves an unfinished file behind, for which later ones would wait without end. Processes
+FFCx marks a form as being compiled by its C file, and other processes wait until it is finished. A process killed
+while compiling leaves an unfinished file, for which later ones would wait indefinitely. Processes
 therefore compile under a shared lock on the folder; one that gets the exclusive lock removes unfinished files.
 """
 
@@ -45,7 +45,7 @@ def options() -> dict:
 
 @contextmanager
 def compiling(folder: Path = FOLDER) -> Iterator[None]:
-    """A context for everything that may compile into ``folder``."""
+    """A context for code that may compile into ``folder``."""
     _remove_unfinished(folder)
     with _lock(folder, fcntl.LOCK_SH):
         yield
@@ -53,7 +53,7 @@ def compiling(folder: Path = FOLDER) -> Iterator[None]:
 
 @contextmanager
 def _lock(folder: Path, how: int) -> Iterator[bool]:
-    """Whether the lock was obtained; read-only folders and some network file systems have none."""
+    """A context that holds the lock; yields False without it: some network and read-only file systems have none."""
     with ExitStack() as stack:
         try:
             folder.mkdir(parents=True, exist_ok=True)

@@ -1,6 +1,8 @@
 """Functions given by formulae, differentiated symbolically and compiled to Python once.
 
-f(x; c) ∈ Rᵐ,     ∂f_k/∂x_i,     Σ_k w_k ∂²f_k/∂x_i∂x_j     with variables x ∈ Rⁿ and constants c.
+    f(x; c) ∈ Rᵐ,     ∂f_k/∂x_i,     Σ_k w_k ∂²f_k/∂x_i∂x_j
+
+with variables x ∈ Rⁿ and constants c.
 """
 
 from __future__ import annotations
@@ -16,8 +18,8 @@ import sympy
 class SmoothFunction:
     """A compiled function f of n variables with m components.
 
-    Every function takes the variables (n,) and the constants (k,). With ``many`` points at once every array has a first
-    axis more, of the points.
+    Every function takes the variables (n,) and the constants (k,). With ``many`` points at once every array has
+    a leading axis, of the points.
 
     Attributes:
         size: m.

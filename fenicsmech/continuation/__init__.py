@@ -1,4 +1,4 @@
-"""Paths of equilibria: predicted, corrected by an equilibrium solver, accepted.
+"""Continuation of paths of equilibria: prediction, correction by an equilibrium solver, step control.
 
 - ``load_steps``: natural continuation, past dead centres of motors too
 - ``arc_length``: arc-length continuation, past limit points and folds

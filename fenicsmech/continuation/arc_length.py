@@ -36,18 +36,17 @@ _log = logger(__name__)
 
 @dataclass(frozen=True)
 class ArcSteps:
-    """How finely a path is followed.
+    """Options of arc-length continuation.
 
     Attributes:
-        first: length of the first step; 1 is as far as ``until`` would be if the mechanism were linear.
+        first: length of the first step; 1 reaches ``until`` if the mechanism is linear.
         largest: the longest step, likewise, in force and in the displacement of its point.
         smallest: the shortest step, likewise; where even that fails the path ends with an error.
-        motion: how far a step may move anything, in lengths of the mechanism or rad.
-        tolerance: how closely limit points and bifurcations are located, as a part of the step they lie in.
-        turn: angle between the tangents at both ends of a step that is as long as it should be, rad.
-        largest_turn: the same from which a step is taken again, shorter: it is a jump to another branch, or cuts off a
-            bend.
-        iterations: of a step as long as it should be; the last one only judges the stability.
+        motion: largest motion of a step, in lengths of the mechanism or rad.
+        tolerance: of the location of limit points and bifurcations, over the step they lie in.
+        turn: target angle between the tangents at both ends of a step, rad.
+        largest_turn: angle from which on a step is repeated shorter: it jumps to another branch, or cuts off a bend.
+        iterations: target number per step; the last one only judges the stability.
 
     Raises:
         DescriptionError: a length is not positive, or the tolerance not between 0 and 1.
@@ -96,19 +95,19 @@ class Finish:
 class ArcLengthTracer:
     """Steps along the path through one equilibrium.
 
-    Distances are in units of what a linear mechanism would do until it is where the path shall lead.
+    Distances are in units of the arc on which a linear mechanism reaches ``value`` or ``conjugate``.
 
     Args:
         solver: of the equilibria.
         followed: the control whose value the path is followed by.
         state: an equilibrium that sets the units.
-        steps: how fine the steps are.
-        value: change of the followed value that is of interest, or
-        conjugate: change of its conjugate; of two, the one that is reached first.
+        steps: options of the steps.
+        value, conjugate: changes of the followed value and of its conjugate that set the unit of distance: of two, the
+            one that is reached first.
 
     Attributes:
         start: the point at ``state``; the followed value grows along its tangent.
-        metric: what distances are measured in.
+        metric: of distances.
         length: of the next step.
 
     Raises:
@@ -147,16 +146,16 @@ class ArcLengthTracer:
         return self.followed.value(self.system, point.state)
 
     def value_rate(self, point: EquilibriumPoint) -> float:
-        """That along the path."""
+        """Rate of the followed value along the path."""
         return self.followed.change(point.tangent)
 
     def correct(self, guess: State, normal: Step, near: EquilibriumPoint) -> EquilibriumPoint:
-        """The equilibrium in the plane through ``guess`` across ``normal``, its tangent not against that.
+        """The equilibrium in the plane through ``guess`` across ``normal``, its tangent oriented along that.
 
         Args:
             guess: a state near it.
-            normal: across which the plane stands.
-            near: an equilibrium nearby, which decides what is held.
+            normal: of the plane.
+            near: an equilibrium nearby, which decides which value is held.
 
         Raises:
             NotConverged: there is none near.
@@ -171,11 +170,11 @@ class ArcLengthTracer:
         return self.followed
 
     def chord(self, start: EquilibriumPoint, end: EquilibriumPoint) -> Step:
-        """From ``start`` to ``end``."""
+        """Change of state from ``start`` to ``end``."""
         return self.system.difference(end.state, start.state)
 
     def along(self, start: EquilibriumPoint, end: EquilibriumPoint) -> float:
-        """How far ``end`` lies ahead of ``start`` along the tangent there."""
+        """Distance of ``end`` ahead of ``start`` along the tangent there."""
         return self.metric.dot(start.tangent, self.chord(start, end))
 
     def between(self, start: EquilibriumPoint, end: EquilibriumPoint, distance: float) -> EquilibriumPoint:
@@ -245,7 +244,7 @@ class ArcLengthTracer:
             point = following
 
     def _guess(self, point: EquilibriumPoint) -> State:
-        """Along the tangent, and along the curvature if that bends it little."""
+        """Prediction along the tangent, and along the curvature if that bends it little."""
         ahead, before = point.tangent.scaled(self.length), self._before
         if before is not None:
             width = self.metric.norm(self.chord(before, point))
@@ -255,7 +254,7 @@ class ArcLengthTracer:
         return self.system.moved(point.state, ahead)
 
     def _longest(self, point: EquilibriumPoint) -> float:
-        """The arc that changes neither the value nor its conjugate nor anything's place too much."""
+        """The longest arc within the limits on the value, its conjugate and motions."""
         rates = (
             abs(self.value_rate(point)) / (self.steps.largest * self.metric.value),
             abs(point.conjugate_rate) / (self.steps.largest * self._conjugate_reference),
@@ -270,9 +269,9 @@ class ArcLengthTracer:
         return math.acos(min(max(cosine, -1.0), 1.0))
 
     def _end(self, before: EquilibriumPoint, after: EquilibriumPoint, finish: Finish) -> EquilibriumPoint:
-        """Where the path has the finish's value, by Newton's method within the step; as near as can be got to it.
+        """The point with the finish's value, or the nearest found, by Newton's method within the step.
 
-        That is within 1e-10 of the finish's scale and 1e-8 of the change over the step.
+        Tolerance: within 1e-10 of the finish's scale and 1e-8 of the change over the step.
         """
         width = self.along(before, after)
         low, high = 0.0, width

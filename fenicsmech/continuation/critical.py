@@ -1,15 +1,15 @@
 """Limit points, turning points and bifurcations of a path, and the paths that cross at bifurcations.
 
-What a step across each of them changes, with n unstable modes, the rates v̇ of the followed value and q̇ of its
-conjugate:
+They are detected by a change over a step of n, the number of unstable modes, of v̇, the rate of the followed value, or
+of q̇, that of its conjugate:
 
     limit point     force's rate changes sign           a dead load has an extremum and snaps from here
     turning point   displacement's rate changes sign    so has a held point, or a motor
     bifurcation     n changes otherwise                 other paths cross this one
 
-n changes by one where v̇ changes sign. Located is the root of the line through the rates or, at a bifurcation, through
-the stiffness μ of the softest mode on either side; the inertia judges on which side of it an equilibrium lies, until
-what changes is known closely enough and single. μ comes from inverse iteration with the factor of K at hand,
+n changes by one where v̇ changes sign. The point is located at the root of the line through the rates or, at a
+bifurcation, through the stiffness μ of the softest mode on either side; the inertia brackets it, until the interval is
+small and holds a single change. μ comes from inverse iteration with the factor of the KKT matrix K,
 
     y = K⁻¹ M φ,    μ = (y · M φ) / (y · M y),    φ ← y / √(y · M y),
 
@@ -41,7 +41,7 @@ _log = logger(__name__)
 
 
 class Critical(Enum):
-    """What a critical point of a path is."""
+    """Kinds of critical points of a path."""
 
     LIMIT = "limit point"
     TURNING = "turning point"
@@ -49,7 +49,7 @@ class Critical(Enum):
 
 
 class Sense(Enum):
-    """Along the null vector, or against it."""
+    """Sense of a branch: along the null vector, or against it."""
 
     ALONG = 1.0
     AGAINST = -1.0
@@ -60,12 +60,12 @@ class CriticalPoint:
     """A critical point of a path.
 
     Attributes:
-        kind: what it is.
+        kind: limit point, turning point or bifurcation.
         point: the equilibrium nearest to it that was found.
         value: the followed value there. Where the mesh turns a bifurcation into two paths that pass each other, no
             equilibrium is near it, but the line through the stiffnesses on either side has its root where they would
             cross.
-        modes: by how many the unstable modes change there.
+        modes: number of modes that change their stability there.
         course: the direction of the path over the step in which it lies. The tangent in the point itself is another:
             rounding and the asymmetry of meshes let it lean towards the paths that cross.
     """
@@ -120,7 +120,7 @@ def crossing(path: ArcLengthTracer, critical: CriticalPoint, mode: Step, sense: 
 
 @dataclass(frozen=True)
 class _Sample:
-    """A point of a piece: how far along it lies, and the stiffness of its softest mode."""
+    """A point of a piece, its distance along it, and the stiffness of its softest mode."""
 
     distance: float
     point: EquilibriumPoint
@@ -166,13 +166,13 @@ class _SoftestMode:
     def __init__(self, system: EquilibriumSystem) -> None:
         self._mask = system.unknowns.coordinates_mask()
         self._mode = self._mask.duplicate()
-        # without symmetry, so that it has something of every mode in it
+        # without symmetry, so that it has a component in every mode
         self._mode.array_w[:] = np.random.default_rng(system.comm.rank).standard_normal(self._mode.local_size)
 
     def stiffness(self, at: Linearisation) -> float:
         """μ of a tangent, to a relative change of 1e-3.
 
-        Twelve iterations at most: where two modes are as soft as each other, any of them will do.
+        Twelve iterations at most: where two modes are equally soft, either suffices.
         """
         mask, mode, before = self._mask, self._mode, math.inf
         right = mask.duplicate()
@@ -194,8 +194,8 @@ class _SoftestMode:
 def _search(piece: _Piece, low: _Sample, high: _Sample, tolerance: float) -> list[CriticalPoint]:
     """The critical points between two samples of ``piece``.
 
-    Looked at is not the root but 0.4 tolerances beside it, so that both sides of it become known; eight times farther
-    off where there was no equilibrium to be found.
+    Equilibria are sampled 0.4 tolerances beside the estimated root, so that it is bracketed; eight times farther off
+    after a sample without equilibrium.
     """
     path, least, before = piece.path, 0.4 * tolerance, None
     while (width := high.distance - low.distance) > tolerance and least < width:
@@ -219,7 +219,7 @@ def _search(piece: _Piece, low: _Sample, high: _Sample, tolerance: float) -> lis
 
 
 def _root(path: ArcLengthTracer, low: _Sample, high: _Sample) -> float:
-    """Where the line through what changes sign vanishes; the middle if nothing does."""
+    """Root of the line through the quantity that changes sign; the middle if none does."""
     pairs = [(rate(path, low.point), rate(path, high.point)) for rate in (_value_rate, _conjugate_rate)]
     for first, second in (*pairs, (low.stiffness, high.stiffness)):
         if first * second < 0.0:
@@ -234,7 +234,7 @@ def _value_rate(path: ArcLengthTracer, point: EquilibriumPoint) -> float:
 
 
 def _conjugate_rate(path: ArcLengthTracer, point: EquilibriumPoint) -> float:
-    """q̇ of a displacement, likewise; what motors exert may have any number of extrema without harm."""
+    """q̇ of a displacement, likewise; extrema of motor torques are not critical."""
     rate = 0.0 if path.followed.displaces else point.conjugate_rate / path.metric.conjugate
     return rate if abs(rate) > 1e-9 else 0.0
 
@@ -248,7 +248,7 @@ def _changes(path: ArcLengthTracer, a: EquilibriumPoint, b: EquilibriumPoint) ->
 
 
 def _classified(piece: _Piece, low: _Sample, high: _Sample) -> list[CriticalPoint]:
-    """What lies between two samples that are as good as one."""
+    """Critical points between two samples within the tolerance."""
     path, course, a, b = piece.path, piece.course, low.point, high.point
     found, modes = [], abs(b.unstable_modes - a.unstable_modes)
     if _value_rate(path, a) * _value_rate(path, b) < 0.0:

@@ -1,14 +1,14 @@
 """Load steps (natural continuation): from a known equilibrium to the wanted value of a control.
 
 An equilibrium is predicted from those before, corrected, and accepted. Steps halve when the solver fails and double
-when it was easy, and never go farther than a stride of the tangent; equilibria that were reached are never lost. They
-end where they are small beside the way gone, however far the target: the softest stiffness falls as √(1 − p / p*)
+when it took few iterations; the tangent bounds their motion; equilibria reached are kept. They end where they are small
+relative to the distance covered, however far the target: the softest stiffness falls as √(1 − p / p*)
 towards a limit load p*, and the last equilibrium, at p* − 2 p* / 1024 or nearer, keeps 5 % of it at most. A step that
-moves anything otherwise than the tangents at both its ends say may have snapped over a fold, where the path turns
-back: it halves too, and where that does not help the snap is accepted and counted.
+moves a coordinate outside the range of the tangents at its ends may have snapped over a fold, where the path turns
+back: it is halved too, and if that does not help the snap is accepted and counted.
 
-Motors may go beyond a dead centre, where the slack of the joints ends and links must strain. On the way there a
-coordinate x swings ever faster while the links do as they like: close by, in units of x,
+Motors may go beyond a dead centre, where the slack of the joints ends and links must strain. Towards it a
+coordinate x moves ever faster while the links are free of strain: close by, in units of x,
 
     C = b + ½ x² − e = 0,     E = ½ k e²,     λ = k e,     x λ = 0,
 
@@ -43,24 +43,24 @@ _log = logger(__name__)
 
 @dataclass(frozen=True, kw_only=True)
 class LoadSteps:
-    """How long load steps are; motions are in lengths of the mechanism, or rad.
+    """Options of load steps; motions are in lengths of the mechanism, or rad.
 
     Attributes:
-        smallest: smallest step, of the distance asked for, or of the way that lies behind if that is less.
-        motion: how far a step may move anything by the tangent (measured).
-        meaningless: of the distance asked for; a tangent that wants steps this small says nothing, as in a singular
-            position.
-        runaway: a prediction that moves anything this far is discarded.
-        reach: widths between two equilibria that their cubic is trusted to go on for: its error grows as t⁴.
+        smallest: smallest step, over the distance to the target, or the distance covered if that is less.
+        motion: largest motion of a step along the tangent (measured).
+        meaningless: smallest step that the tangent may impose, over the distance to the target; smaller ones arise in
+            singular positions, where the tangent is ignored.
+        runaway: motion from which on a prediction is discarded.
+        reach: longest extrapolation by the cubic, over the width between its equilibria: its error grows as t⁴.
         easy: iterations up to which the next step is twice as long.
-        off_tangent: of the largest rate; what moves farther off its tangents may have snapped, kinks never do.
-        bend: times the rate at its end, how far a step off a bifurcation may go.
-        least_snap: a motion that never is a snap, as past a bifurcation.
-        smallest_snap: a step, as ``smallest``, that is not halved any more because it snaps.
+        off_tangent: deviation from the tangents, over the largest rate, that counts as a snap; kinks stay below.
+        bend: largest rate of a step off a bifurcation, over the rate at its end.
+        least_snap: smallest motion that counts as a snap; bifurcations stay below.
+        smallest_snap: smallest step, as ``smallest``, that is halved because of a snap.
         minimum_shift: least shift of the tangent, in units of the mean stiffness, where a mechanism has zero-energy
             modes, which would leave it singular.
-        shifts: parts of it that are tried: soft springs, or forces, may hold zero-energy modes with less yet, and a
-            shift slows Newton's method down where the true stiffness is smaller still.
+        shifts: factors of ``minimum_shift``, tried in order: a shift slows Newton's method down where soft springs or
+            forces hold zero-energy modes with a smaller stiffness.
     """
 
     smallest: float = 1.0 / 1024.0
@@ -83,7 +83,7 @@ class LoadStepsFailed(Exception):
     Attributes:
         last: the last equilibrium reached, or None.
         reached: its control value.
-        reason: what the solver said.
+        reason: the solver's message.
         tried: control values without equilibrium.
     """
 
@@ -99,7 +99,7 @@ class Predictor(ABC):
     def predict(
         self, system: EquilibriumSystem, points: Sequence[EquilibriumPoint], value: float, reach: float
     ) -> State:
-        """The guess at ``value`` from at most the last two points, whose cubic is trusted for ``reach`` widths."""
+        """The guess at ``value`` from at most the last two points, whose cubic extrapolates ``reach`` widths."""
 
 
 class Constant(Predictor):
@@ -120,7 +120,7 @@ class Tangent(Predictor):
 class Hermite(Predictor):
     """The cubic through the last two equilibria and their tangents.
 
-    While there is only one, and where the two lie close together compared with the step, along the tangent.
+    The tangent replaces it while there is only one, and where the two lie close together compared with the step.
 
     With t = (v − v₀) / w, w = v₀ − v₋₁:
 
@@ -147,13 +147,13 @@ class LoadStepper:
     Args:
         solver: of the equilibria.
         start: a first guess at the control's value there.
-        control: that changes.
+        control: whose target changes.
         predictor: of the next equilibrium.
-        steps: how long steps are.
+        steps: options of the steps.
 
     Attributes:
         iterations: KKT systems factored and solved so far.
-        snaps: how often the path turned back, and the equilibrium that was reached lies on another one.
+        snaps: number of times the path turned back and an equilibrium on another one was reached.
     """
 
     def __init__(
@@ -174,7 +174,7 @@ class LoadStepper:
         self.iterations = self.snaps = 0
 
     def advance(self, control: Control) -> EquilibriumPoint:
-        """The equilibrium at ``control``'s target, reached in as many steps as it takes.
+        """The equilibrium at ``control``'s target, reached in as many steps as needed.
 
         Raises:
             LoadStepsFailed: the smallest step failed.
@@ -239,7 +239,7 @@ class LoadStepper:
         raise NotConverged(reason)
 
     def _guess(self, value: float) -> State:
-        """The prediction at ``value``, a plainer one where it runs away, in the end the last equilibrium."""
+        """The prediction at ``value``; where it moves too far that of the tangent, then the last equilibrium."""
         if not self._points:
             return self._start
         system, last = self._system, self._points[-1].state
@@ -250,7 +250,7 @@ class LoadStepper:
         return last
 
     def _shortened(self, step: float, *, least: float) -> float:
-        """``step``, shortened if it moves anything too far, not to less than ``least``."""
+        """``step``, shortened to the largest ``motion`` unless that is less than ``least``."""
         if not self._points:
             return step
         motion = self._system.size(self._points[-1].tangent) * abs(step)
@@ -258,7 +258,7 @@ class LoadStepper:
         return shortened if abs(shortened) > least else step
 
     def _scale(self, distance: float) -> float:
-        """What steps are small beside: the way gone so far, or the first step if there is none, whatever the target.
+        """Reference length of steps: the distance covered so far, at first the first step, whatever the target.
 
         A limit load is located as closely by a load a thousand times as large as by one just beyond it.
         """
@@ -266,15 +266,15 @@ class LoadStepper:
         return min(abs(distance), way)
 
     def _snapped(self, point: EquilibriumPoint) -> bool:
-        """Whether a step to ``point`` leads where the tangents at its ends do not.
+        """Whether the rate of the step to ``point`` lies outside the range of the tangents at its ends.
 
         The rate of every coordinate over the step should lie between those at its ends, whatever moves elsewhere:
 
             r = (y₁ − y₀) / (v₁ − v₀),    |r − [y₀′, y₁′]| > 0.2 max(|y₀′|, |y₁′|)
 
-        A path that bends off at a bifurcation moves as √v and r = 2 y₁′, however short the step; the span reaches that
-        far. Close to a fold y₀′ says nothing, as it grows beyond all bounds; the rate of the step before does. A step
-        over which the difference of the two would go far is too long to judge.
+        A path that bends off at a bifurcation moves as √v and r = 2 y₁′, however short the step; the span includes
+        that. Close to a fold y₀′ grows beyond all bounds and is replaced by the rate of the step before. A step over
+        which the two differ by a large motion is too long to judge.
         """
         distance = point.control.target - self._value
         if not self._points or distance == 0.0:
@@ -302,7 +302,7 @@ class LoadStepper:
 
 
 class MotorStepper(LoadStepper):
-    """Equilibria as motors move, past the dead centre of an unloaded mechanism too."""
+    """Load steps of motors, also past the dead centre of an unloaded mechanism."""
 
     def advance(self, control: Control) -> EquilibriumPoint:
         try:
@@ -313,7 +313,7 @@ class MotorStepper(LoadStepper):
         return super().advance(control)
 
     def _strain(self, last: EquilibriumPoint, control: Control) -> bool:
-        """Goes on from the ``last`` equilibrium by straining links; whether that led to another one."""
+        """Continues from the ``last`` equilibrium by straining links; whether this succeeded."""
         system, steps, distance = self._system, self._steps, control.target - self._value
         try:
             rate = self._held_rate(last, control.at(self._value))
@@ -336,17 +336,17 @@ class MotorStepper(LoadStepper):
         return False
 
     def _strayed(self, last: EquilibriumPoint, held: Step, step: float, point: EquilibriumPoint) -> bool:
-        """Whether a coordinate moved otherwise than at a rate between the ``held`` one, x's before and that after."""
+        """Whether a coordinate's rate over ``step`` lies outside the range of ``held`` and the tangents at its ends."""
         system = self._system
         rate = system.difference(point.state, last.state).scaled(1.0 / step)
         beyond = system.size(system.independent(rate.beyond((held, last.tangent, point.tangent))))
         return beyond > self._steps.off_tangent * max(system.size(held), system.size(point.tangent))
 
     def _held_rate(self, last: EquilibriumPoint, control: Control) -> Step:
-        """Rate of the state with the target of ``control``, the motion that runs away held.
+        """Rate of the state with the target of ``control``, the dominant motion x held.
 
         Raises:
-            NotConverged: the tangent cannot be factored, or solved with, or has a maximum of the energy in it.
+            NotConverged: the tangent cannot be factored or solved with, or is not positive along the motion.
         """
         at = self._solver.linearise(last.state, control)
         rate = at.rate()

@@ -3,8 +3,8 @@
 A ``DesignProblem`` is described as plain data (``description``), minimised by one of the ``optimisers`` in a ``run``,
 and ends in a ``DesignResult``. Its ``objective`` is made of the targets' ``equilibria`` with their adjoint
 ``sensitivity``, and of ``regularisers``. The ``rest_shape`` of the links follows the parameters through ``shape``:
-``spline``, ``handles`` that ride on it, ``weights`` by which handles move the mesh, the ``shape_map`` of these, and
-the ``handle_optimum`` that makes the mesh ``quality`` best. ``characterisation`` fits Young's modulus to measurements.
+``spline``, ``handles`` on it, ``weights`` by which handles move the mesh, the ``shape_map`` of these, and the
+``handle_optimum`` of the mesh ``quality``. ``characterisation`` fits Young's modulus to measurements.
 """
 
 from fenicsmech.design.characterisation import Experiment, ModulusFit, fit_modulus

@@ -1,6 +1,8 @@
-"""The rest shape of a simulation's links as a function of the design p, handles placed at their best.
+"""The rest shape of a simulation's links as a function of the design p, with optimal handles.
 
-p → θ*(p) → d(p, θ*(p)) → X = X₀ + d
+    p → θ*(p) → d(p, θ*(p)) → X = X₀ + d
+
+with the handle positions θ and the design field d.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""A run of an optimiser: one process decides and all compute, with a line of progress and checkpoints on the way.
+"""Runs of an optimiser, with progress output and checkpoints.
 
-The optimiser runs on the first process, the others evaluate with it: decisions that depend on the last bit of a number
-cannot differ between processes.
+The optimiser runs on the first process, and all evaluate the objective: decisions that depend on rounding cannot differ
+between processes.
 """
 
 from __future__ import annotations

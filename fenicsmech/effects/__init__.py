@@ -1,11 +1,11 @@
-"""Effects: what may act on a mechanism beside its links, joints and forces, one per file.
+"""Effects on a mechanism beside its links, joints and forces, one per file.
 
-- ``energies``: what energies are written in, fields of links and poses of bodies; ``faces``: parts of links' boundaries
+- ``energies``: of fields of links and poses of bodies; ``faces``: parts of links' boundaries
 - ``gravity``: weight
 - ``joint_spring``: springs in revolute and prismatic joints
-- ``joint_compliance``: pins that give way
+- ``joint_compliance``: elastic pins
 - ``pressure``: of a fluid on the boundary of a link
-- ``prestrain``: links that would be longer or shorter than drawn
+- ``prestrain``: links whose strain-free length is not the drawn one
 - ``contact``: frictionless contact with ``obstacles``
 
 Each is an ``Effect`` of the ``mechanism`` layer in a file of its own. An effect that a scene does not list costs

@@ -28,21 +28,21 @@ from fenicsmech.mechanism import Effect, FlexibleLink, Link, RigidLink, in_dimen
 
 @dataclass(frozen=True)
 class Contact(Effect):
-    """A link and an obstacle that cannot pass through each other.
+    """Frictionless contact of a link and an obstacle.
 
     Attributes:
         link: a flexible link, touched anywhere on its boundary, or a rigid link, touched at ``points``.
         obstacle: a ``Cylinder`` or a ``HalfPlane``.
         stiffness: for flexible links pressure per penetration κ, by default a tenth of that of the outermost layer of
-            elements, 0.1 E / h with its height h: under the pressure p the obstacle gives way by 10 (p / E) h. For
+            elements, 0.1 E / h with its height h: the penetration under the pressure p is 10 (p / E) h. For
             rigid links force per penetration k of each point; must be given.
         points: of a rigid link as drawn.
 
-    Penetration falls as 1 / stiffness, while Newton's method takes the more iterations where contact changes. Obstacles
+    Penetration falls as 1 / stiffness, while Newton's method takes more iterations where contact changes. Obstacles
     act once the motors have moved: a configuration whose rigid assembly is on the far side of an obstacle stays there.
-    From there on flexible links cannot slip through a cylinder: no state in which they reach a quarter of its radius
-    deep is taken. In space a pressed edge also feels its flat faces inside of the obstacle, by a part of the order
-    of penetration over depth.
+    Afterwards flexible links cannot slip through a cylinder: states with a penetration of a quarter of its radius are
+    rejected. In space a pressed edge is also pressed on its flat faces inside the obstacle, with an error of
+    the order of penetration over depth.
 
     Raises:
         DescriptionError: a number makes no sense, or what a link of this kind needs is missing.

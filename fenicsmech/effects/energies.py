@@ -1,4 +1,4 @@
-"""Terms of the energies of effects: the fields of flexible links, and the poses of bodies."""
+"""Energies of effects in terms of the fields of flexible links and of the poses of bodies."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class LinkFields:
     Attributes:
         links: all flexible links.
         body: the links as one body.
-        boundaries: the parts of links' boundaries that effects ask for.
+        boundaries: the parts of links' boundaries that effects list.
     """
 
     links: tuple[FlexibleLink, ...]
@@ -75,7 +75,7 @@ class LinkFields:
         return ufl.det(self.body.rest_gradient)
 
     def integral(self, density, *, degree: int) -> ufl.Form:
-        """∫ density dV over the mesh at rest, to be multiplied as ``model`` says; ``degree`` of ``density``.
+        """∫ density dV over the mesh at rest, times the depth or half factor of ``model``; ``degree`` of ``density``.
 
         In curved cells det(∇X) is a polynomial too, of degree dim.
         """
@@ -83,7 +83,7 @@ class LinkFields:
         return density * self.stretch * self.dx(metadata={"quadrature_degree": whole})
 
     def boundary_integral(self, density, faces: Faces, *, degree: int) -> ufl.Form:
-        """∫ density dA over ``faces`` of the mesh at rest, to be multiplied as ``model`` says.
+        """∫ density dA over ``faces`` of the mesh at rest, times the depth or half factor of ``model``.
 
         By Nanson's formula dA = |det(∇X) (∇X)⁻ᵀ N| dA₀.
         """
@@ -91,7 +91,7 @@ class LinkFields:
         return self.reference_integral(density * ufl.sqrt(ufl.dot(area, area)), faces, degree=degree)
 
     def flux(self, vector, faces: Faces, *, degree: int) -> ufl.Form:
-        """∫ vector · n da over ``faces`` of the mesh as deformed, to be multiplied as ``model`` says.
+        """∫ vector · n da over ``faces`` of the deformed mesh, times the depth or half factor of ``model``.
 
         n points out of the link. By Nanson's formula n da = cof(∇X + ∇u) N dA₀.
         """

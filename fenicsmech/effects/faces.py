@@ -28,8 +28,8 @@ class Faces:
 
     Attributes:
         link: the link.
-        where: from positions on the boundary of the drawn link, (n, dim), whether each is on the part, (n,); a facet
-            belongs to the part if all its corners do. None for the whole boundary.
+        where: predicate of points on the drawn boundary, (n, dim) → (n,) bool; a facet belongs to the part if it holds
+            at all its corners. None for the whole boundary.
     """
 
     link: FlexibleLink
@@ -53,7 +53,7 @@ class Boundary:
     measures: tuple[ufl.Measure, ...]
 
     def is_closed(self, comm: MPI.Comm) -> bool:
-        """Whether the facets of all ranks together, with their mirror images, have no rim."""
+        """True if the facets of all ranks together, with their mirror images, have no rim."""
         rims: Counter[tuple[int, ...]] = Counter()
         joined: set[int] = set()
         for found, mirrored in comm.allgather((self.corners, self.joined)):
@@ -77,7 +77,7 @@ def find_boundaries(
         mesh: the mesh of all links.
         links: all flexible links.
         link_of_cell: index of the link of each local cell, (cells,).
-        faces: the parts asked for; without any nothing is made.
+        faces: the requested parts; none cost nothing.
         half: the mesh is the half of the links above their mid-plane z = 0.
 
     Raises:
@@ -122,7 +122,7 @@ def find_boundaries(
 
 
 def _asked_together(comm: MPI.Comm, where: Callable[[np.ndarray], np.ndarray], places: np.ndarray) -> np.ndarray:
-    """``where`` at this rank's ``places``; it sees those of all ranks, as it may compare them."""
+    """``where`` at this rank's ``places``, called with those of all ranks, as it may compare them."""
     everywhere = comm.allgather(places)
     before = sum(len(others) for others in everywhere[: comm.rank])
     return np.asarray(where(np.concatenate(everywhere)), dtype=bool)[before : before + len(places)]

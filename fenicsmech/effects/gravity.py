@@ -1,6 +1,8 @@
 """Gravity: weight of flexible links by the density of their material, of rigid links by their mass.
 
-V = − Σ_links ∫ ρ g · u dV − Σ_rigid m g · u(centre of mass)
+    V = − Σ_links ∫ ρ g · u dV − Σ_rigid m g · u(centre of mass)
+
+with the density ρ, the mass m of a rigid link and the acceleration g.
 """
 
 from __future__ import annotations

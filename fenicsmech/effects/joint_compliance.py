@@ -1,4 +1,4 @@
-"""Joint compliance: pins that give way under the force they carry.
+"""Joint compliance: elastic pins.
 
 A force λ across the pin moves its two ends apart by c λ. With the constraint C = x_b − x_a of a rigid pin,
 
@@ -18,9 +18,9 @@ from fenicsmech.mechanism import Effect, Joint
 
 @dataclass(frozen=True)
 class JointCompliance(Effect):
-    """A joint whose links share a point gives way there, alike in all directions; its axis stays aligned.
+    """Compliance of a joint at the shared point of its links, isotropic; its axis stays aligned.
 
-    Two compliances of one joint act in series. What is stored in the joint is not part of a frame's strain energy.
+    Two compliances of one joint act in series. The energy of the joint is not part of a frame's strain energy.
 
     Attributes:
         joint: a revolute, spherical, universal or weld joint.

@@ -1,9 +1,9 @@
-"""Joint springs: what turns about a hinge or slides along a slider against a linear spring.
+"""Linear springs in revolute and prismatic joints.
 
-V = ½ k (φ − φ₀)² = ½ k φ² − k φ₀ φ + const.
+    V = ½ k (φ − φ₀)² = ½ k φ² − k φ₀ φ + const.
 
-The first term holds the mechanism from the start, the second winds the spring up as constant loads grow: on the way
-its rest position goes from 0 to φ₀.
+The first term holds the mechanism from the start, the second grows with the load factor of constant
+loads, which takes the rest position from 0 to φ₀.
 """
 
 from __future__ import annotations

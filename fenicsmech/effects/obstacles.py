@@ -16,7 +16,7 @@ from fenicsmech.mechanism import in_dimension
 
 
 class Obstacle(ABC):
-    """Something rigid that stands still.
+    """A rigid, fixed obstacle.
 
     Numbers enter forms as constants, so that obstacles of one kind share their compiled code.
     """
@@ -24,14 +24,14 @@ class Obstacle(ABC):
     @property
     @abstractmethod
     def core(self) -> float | None:
-        """Penetration at which the way out is in doubt; None if it never is."""
+        """Penetration beyond which the direction of the gap's gradient is ambiguous; None if it never is."""
 
     @abstractmethod
     def check(self, dim: int) -> None:
-        """Refuses what makes no sense in ``dim`` dimensions.
+        """Checks the description in ``dim`` dimensions.
 
         Raises:
-            DescriptionError: saying why.
+            DescriptionError: it is invalid.
         """
 
     @abstractmethod

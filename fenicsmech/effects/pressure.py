@@ -11,7 +11,7 @@ vanishes
 - in space, where it moves within planes through x₀ that it lies in, as on a plane of symmetry; with an axis x₀, within
   planes z = const. that it lies in: to motions along z the load is that on a hole that plugs close.
 
-With other rims the load has no energy: how much work it does depends on the way.
+With other rims the load has no potential: its work depends on the path.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ class Pressure(Effect):
     Attributes:
         link: the link.
         pressure: into the link; negative for suction.
-        where: from positions on the boundary of the drawn link, (n, dim), whether each is pressed on, (n,): facets
-            whose corners all are. None: the whole boundary.
-        about: x₀; to be given for an open part, and a promise that its rim is held or moves as said above. In space
+        where: predicate of points on the drawn boundary, (n, dim) → (n,) bool; a facet belongs to the part if it holds
+            at all its corners. None: the whole boundary.
+        about: x₀; required for an open part, whose rim must be held or move as above. In space
             two coordinates are an axis along z, which suits holes through extruded links, and their sides.
 
     Raises:

@@ -1,8 +1,8 @@
-"""Prestrain: a link that would be longer or shorter than drawn if nothing held it.
+"""Prestrain: links whose strain-free state is a stretch of the drawn one.
 
     E = ∫ W(F F_p⁻¹) det F_p dV,     F_p = λ I or I + (λ − 1) e ⊗ e
 
-replaces the link's strain energy. Swelling, heat, shrinkage of a print, a tendon cast in.
+replaces the link's strain energy. Models swelling, thermal expansion, shrinkage of prints, embedded tendons.
 """
 
 from __future__ import annotations

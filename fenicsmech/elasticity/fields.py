@@ -7,10 +7,10 @@ shape X = X₀ + c + d and displacement u from the rest shape:
 
 Links whose strain-free state is not the one drawn have grown by F_p, and only F_e of F = F_e F_p strains the material:
 
-    F_p = I + s (λ − 1) N,     N = e ⊗ e or I,
-    H_e = F_e − I = H + Γ + H Γ,     Γ = F_p⁻¹ − I = −s (λ − 1) / (1 + s (λ − 1)) N,
+    F_p = I + σ (λ − 1) N,     N = e ⊗ e or I,
+    H_e = F_e − I = H + Γ + H Γ,     Γ = F_p⁻¹ − I = −σ (λ − 1) / (1 + σ (λ − 1)) N,
 
-and W counts per strain-free volume, det F_p times the drawn one: (1 + s (λ − 1)) to the power of 1 or 3. s is the load
+and W counts per strain-free volume, det F_p times the drawn one: (1 + σ (λ − 1)) to the power of 1 or 3. σ is the load
 factor of effects.
 """
 
@@ -191,7 +191,7 @@ class Growth:
         cellwise: makes a field with one value per cell from one value per link, (links,).
         free: whether each local cell can deform; the others do not grow, (cells,).
         dim: of the model; planar ones are free to grow in depth.
-        load_factor: s.
+        load_factor: σ.
     """
 
     def __init__(

@@ -1,16 +1,16 @@
-"""Equilibria of a mechanism: elements and joints meet here.
+"""Equilibria of a mechanism: finite elements coupled with rigid bodies and joints.
 
 - ``state``: displacements, poses, multipliers, controlled force
-- ``control``: what is prescribed: a force, a displacement, motors, an arc length
-- ``blocks``, ``unknowns``: where each unknown stands, and the change of state it stands for
+- ``control``: the prescribed force, displacement, motors or arc length
+- ``blocks``, ``unknowns``: numbering of the unknowns, and the change of state they stand for
 - ``border``: loads, potentials of poses and joints
 - ``kkt``: the distributed KKT matrix
 - ``system``: energy, residual and KKT matrix at a state
 - ``linear``: its factor LDLᵀ with inertia, or conjugate gradients on two levels where that is too large
 - ``solver``: the interface of equilibrium solvers, and the tangent at an equilibrium
-- ``newton``: the default one, the primal–dual iteration
+- ``newton``: the default solver, a primal–dual Newton iteration
 - ``adjoint``: of displacements and forces
-- ``reactions``: what joints and motors exert
+- ``reactions``: forces and moments of joints, torques of motors
 """
 
 from fenicsmech.equilibrium.adjoint import Adjoint, Quantity

@@ -1,11 +1,11 @@
 """Adjoints of displacements and forces at an equilibrium.
 
-The equilibrium y solves F(y, p) = Gᵀ ∇L = 0. With its symmetric KKT matrix ∂F/∂y, the adjoint x of a quantity Q solves
+The equilibrium y solves F(y, p) = Gᵀ ∇L = 0. With the KKT matrix K = ∂F/∂y, the adjoint x of a quantity Q solves
 
-    KKT x = ∂Q/∂y,     dQ/dp = −xᵀ ∂F/∂p
+    K x = ∂Q/∂y,     dQ/dp = −xᵀ ∂F/∂p
 
 for any parameter p. Q is the travel a · u_P of a material point, or the controlled force f, which is one of the
-unknowns y; what is prescribed stays as it is.
+unknowns y; the control stays as it is.
 """
 
 from __future__ import annotations

@@ -1,17 +1,17 @@
-"""The blocks of the equilibrium system, and where each unknown stands in it.
+"""The blocks of the equilibrium system, and the numbering of its unknowns.
 
 Nodes of links, poses of bodies, multipliers of joints and the controlled load are unknowns of one symmetric matrix:
 
                  nodes  pressures │ poses  multipliers  load
-    nodes       ⎡  K      Gᵀ      │  Kᵀ_zu      0       −a_u ⎤      K     tangent of the links at their free nodes
-    pressures   ⎢  G      −M      │  G_z        0        0   ⎥      G, M  volume and compliance of links in u–p form
+    nodes       ⎡ K_uu   Kᵀ_pu    │  Kᵀ_zu      0       −a_u ⎤      K_uu  elastic block: links at their free nodes
+    pressures   ⎢ K_pu    −M      │  K_pz       0        0   ⎥      K_pu, M  volume and compliance of links in u–p form
                 ⎢─────────────────┼──────────────────────────⎥
-    poses       ⎢ K_zu    Gᵀ_z    │   B        −Aᵀ      −a_z ⎥      B     curvature of rigid motions, A = ∂C/∂z
+    poses       ⎢ K_zu   Kᵀ_pz    │   B        −Aᵀ      −a_z ⎥      B     curvature of rigid motions, A = ∂C/∂z
     multipliers ⎢  0       0      │  −A       −ε − c     0   ⎥      c, ε  compliance of joints, regularisation
     load        ⎣ −a_uᵀ    0      │ −a_zᵀ       0        0   ⎦      a     direction of the load at its point
 
 It is 2 × 2 blocks: links (thousands of unknowns, sparse, distributed) and the border (dozens, on the last rank). Nodes
-on interfaces are functions of the poses of their bodies, which couples both: K_zu, G_z and a part of B come from the
+on interfaces are functions of the poses of their bodies, which couples both: K_zu, K_pz and a part of B come from the
 links. Where the load is given instead of the displacement of its point, the load's row is −f alone.
 
 All blocks stand in one matrix, factored as LDLᵀ: by Sylvester's law its pivots have the signs of the eigenvalues, and
@@ -45,8 +45,8 @@ class Block:
     """Unknowns of one kind.
 
     Attributes:
-        local: where those of this rank stand among its values of a vector.
-        first: global number of the first of them; on ranks that hold none of the border, of the border's first ones.
+        local: this rank's unknowns among its values of a vector.
+        first: global number of this rank's first unknown; of the block's first one on ranks without the border.
         size: number on all ranks.
         comm: the processes.
     """
@@ -91,7 +91,7 @@ class Blocks:
         comm: the processes.
         nodes, pressures: numbers on this rank.
         poses, multipliers: numbers on all ranks.
-        padding: values after the border that belong to no block.
+        padding: number of values after the border that belong to no block.
 
     Attributes:
         nodes, pressures, poses, multipliers, load: the blocks.
@@ -144,7 +144,7 @@ class Blocks:
 
 
 class Numbering:
-    """Which degrees of freedom are unknowns, and where they stand.
+    """Numbers of the rows of K̂ and of the unknowns.
 
     Args:
         comm: the processes that share the links.

@@ -2,8 +2,8 @@
 
     L_b = V(z) − Σ f_k (a_k · u_k) − f (a · u_P) − λᵀ C(z) − ½ λᵀ c λ
 
-V and the constant loads f_k count as much as the load factor σ says, but for the part of V that holds the mechanism,
-which always counts in full. A load acts on a point of a body, whose displacement u_P is a function of z, or of a link.
+V and the constant loads f_k are multiplied by the load factor σ, except the part of V that holds the mechanism, which
+always acts in full. A load acts on a point of a body, whose displacement u_P is a function of z, or of a link.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class BorderTerms:
     # -- values --------------------------------------------------------------------------------------------
 
     def travel(self, load: PointLoad, state: State) -> float:
-        """a · u_P, how far a load's point has moved along it in the loaded ``state``."""
+        """a · u_P, the travel of a load's point in the loaded ``state``."""
         return float(load.direction @ load.point.displacement(self._elastic.u, state.poses))
 
     def work(self, state: State, force: float) -> float:
@@ -170,7 +170,7 @@ class BorderTerms:
             yield load, load, np.array([[-regularisation[-1]]])
 
     def pattern(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Where ``entries`` may put something, as (global rows, global columns). Local."""
+        """Pattern of ``entries``, as (global rows, global columns). Local."""
         joints, dim = self._joints, self._joints.space.dim
         drawn = State(np.zeros(0), joints.drawn, np.zeros(joints.rows), 0.0, np.zeros(len(joints.connections)))
         moments = {body: np.zeros((dim, dim)) for body in joints.columns}
@@ -196,7 +196,7 @@ class BorderTerms:
                 return self._numbering.rows_of(nodes)
 
     def _places(self, potential: PosePotential) -> list[tuple[slice, np.ndarray]]:
-        """Which part of a potential's derivatives belongs to which pose unknowns; fixed bodies have none."""
+        """Parts of a potential's derivatives, and the pose unknowns they belong to; fixed bodies have none."""
         size = self._joints.space.pose_size
         return [
             (slice(k * size, (k + 1) * size), self._joints.columns[body])

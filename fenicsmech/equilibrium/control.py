@@ -1,15 +1,15 @@
-"""Controls: what is prescribed at an equilibrium, one value v each.
+"""Controls: prescribed scalars of equilibria, one value v each.
 
 The magnitude f of the controlled force is always an unknown. Its equation is
 
     constrained:  −(a · u_P − v) = 0, with f the multiplier,      otherwise:  f given.
 
-The rate of the scaled unknowns x with v solves K x′ = r. What works with v is its conjugate q:
+The rate of the scaled unknowns x with v solves K x′ = r, K the KKT matrix. The work-conjugate of v is q:
 
     control         v                                  q
     load            force f                            displacement a · u_P of its point
     displacement    a · u_P                            f
-    motors          φ, the motors standing at φ d      what they exert, Σ d λ
+    motors          φ, the motors standing at φ d      their torques, Σ d λ
     load factor     σ of the constant loads            their work
 
 A path may turn back in v and in q. Its arc length s is a control as well,
@@ -50,7 +50,10 @@ class Stability:
 
 @dataclass(frozen=True, eq=False)
 class Control(ABC):
-    """A value that is prescribed.
+    """A prescribed value.
+
+    The controls whose value a path can be followed by, ``LoadControl`` and ``MotorControl``, also have ``opposite``
+    (LoadControl only), ``change``, ``conjugate`` and ``moves``.
 
     Attributes:
         target: the value.
@@ -81,11 +84,11 @@ class Control(ABC):
         return step
 
     def conjugate_rate(self, system, right: PETSc.Vec, x: PETSc.Vec, tangent: Step) -> float:
-        """q′ with the target: r · x′ for a conjugate −∂L/∂v."""
+        """Rate q′ of the conjugate with the target: r · x′ if q = −∂L/∂v."""
         return right.dot(x)
 
     def stability(self, excess: int, conjugate_rate: float) -> Stability:
-        """From the number of negative eigenvalues beyond those of a stable equilibrium under this control."""
+        """Stability from the number of negative eigenvalues in ``excess`` of a stable equilibrium's, and q′."""
         return Stability(max(excess, 0), max(excess, 0))
 
 
@@ -117,7 +120,7 @@ class LoadControl(Control):
 
     @property
     def opposite(self) -> DisplacementControl:
-        """The control of the conjugate."""
+        """Displacement control of the force's point: its value is the conjugate q, its conjugate the force."""
         return DisplacementControl()
 
     def change(self, step: Step) -> float:
@@ -129,7 +132,7 @@ class LoadControl(Control):
         return system.load_displacement(state)
 
     def moves(self, system, tangent: Step) -> bool:
-        """Whether anything moves; ideal joints have a compliance of 1e-8 of the mean, which is none."""
+        """Whether the force moves its point; a compliance of 1e-8 of the mean, that of ideal joints, counts as zero."""
         return system.size(tangent) > 1e-6 * system.joints.length / system.unknowns.unit**2
 
 
@@ -197,7 +200,7 @@ class MotorControl(Control):
         return self._exerted(system, state.multipliers)
 
     def moves(self, system, tangent: Step) -> bool:
-        """Whether anything moves."""
+        """Whether the motors move any node or body."""
         return system.size(tangent) > 0.0
 
     def _along(self, motors: np.ndarray | float) -> float:
@@ -231,7 +234,7 @@ class LoadFactorControl(Control):
 
 @dataclass(frozen=True)
 class ArcMetric:
-    """⟨a, b⟩ of changes of state: mean squares of motion and of the followed value, each over its reference.
+    """Inner product ⟨a, b⟩ of changes of state: mean motion, followed value and conjugate, each over its reference.
 
     Attributes:
         system: whose unknowns are compared.
@@ -273,7 +276,7 @@ def mean_product(system, a: Step, b: Step) -> float:
 
 @dataclass(frozen=True, eq=False)
 class ArcLengthControl(Control):
-    """The state lies in a plane across a path: ⟨n, y − y₀⟩ = ``target``.
+    """The state lies in a plane normal to a path: ⟨n, y − y₀⟩ = ``target``.
 
     Attributes:
         metric: ⟨·, ·⟩.

@@ -1,6 +1,7 @@
-"""The KKT matrix Gᵀ K̂ G in scaled unknowns.
+"""The KKT matrix K = Gᵀ K̂ G in scaled unknowns.
 
-K̂ is the Hessian of the Lagrangian by all degrees of freedom, those on interfaces too, the "extended matrix"
+K̂ is the Hessian of the Lagrangian by all degrees of freedom, those on interfaces too, the "extended matrix", E the
+total energy of links and effects,
 
     K̂ = [[∂²E/∂u², 0    , 0   , −a_u],
          [0       , B    , −Aᵀ , −a_z],
@@ -10,7 +11,7 @@ K̂ is the Hessian of the Lagrangian by all degrees of freedom, those on interfa
 and G the map from the scaled unknowns. K̂ is stored by the blocks of its nodes, into which element matrices go in half
 the time; products of sparse matrices want it by entries. The product over all unknowns is formed on
 demand. Two-level solvers need only its stiffness by blocks of nodes, its columns of the border, and
-Pᵀ KKT P = (G P)ᵀ K̂ (G P) for a narrow P.
+Pᵀ K P = (G P)ᵀ K̂ (G P) for a narrow P.
 """
 
 from __future__ import annotations
@@ -38,9 +39,9 @@ class KktMatrix:
     Args:
         elastic: the flexible links.
         numbering: of rows and unknowns.
-        unknowns: what rows and columns stand for.
+        unknowns: of its rows and columns.
         extended: K̂, with the pattern of all its entries.
-        clock: where time is counted.
+        clock: of the phases.
 
     Attributes:
         linearised: number of linearisations so far.
@@ -65,13 +66,13 @@ class KktMatrix:
         self._border_map, self._images, self._border_columns = PETSc.Mat(), PETSc.Mat(), PETSc.Mat()
 
     def tangent(self) -> None:
-        """Makes K̂ hold ∂²E/∂u² of the present fields, and nothing else."""
+        """Sets K̂ to ∂²E/∂u² of the present fields."""
         with self._clock.phase("assemble"):
             self.extended.zeroEntries()
             self._elastic.tangent(self.extended)
 
     def linearise(self, entries: Entries) -> None:
-        """Takes the tangent that K̂ holds and the ``entries`` of its border, without shift and softness."""
+        """Adds the ``entries`` of the border to the tangent in K̂, without shift and softness."""
         with self._clock.phase("assemble"):
             self.extended.assemble()
             if self._rows.last:
@@ -90,7 +91,7 @@ class KktMatrix:
         self._shift, self._plain = 0.0, True
 
     def shift(self, shift: float) -> None:
-        """Makes the matrix hold ``shift`` · I more than it was assembled with, for displacements and poses."""
+        """Sets the δ = ``shift`` of the δI added to the matrix in displacements and poses."""
         self._shift, self._plain = shift, self._plain and shift == 0.0
         parts = self._blocks.restrict(self._added.array_w)
         parts.nodes[:] = parts.poses[:] = shift
@@ -99,9 +100,9 @@ class KktMatrix:
             self._add_to_diagonal()
 
     def soften(self, softness: float, control: Control) -> None:
-        """Makes the matrix hold −``softness`` · I instead of −ε · I for multipliers.
+        """Replaces −ε · I by −``softness`` · I in the multipliers, from the next ``shift`` on.
 
-        The load is one of them under a ``control`` that constrains. Before ``shift``, which makes it take effect.
+        The load is a multiplier under a constrained ``control``.
         """
         self._plain = False
         parts = self._blocks.restrict(self._added.array_w)
@@ -119,7 +120,7 @@ class KktMatrix:
         return self._matrix
 
     def restricted(self, mapped: PETSc.Mat, result: PETSc.Mat | None = None) -> PETSc.Mat:
-        """Pᵀ KKT P for G P, ``mapped``; into an earlier ``result``, if there is one."""
+        """Pᵀ K P from G P (``mapped``), into an earlier ``result`` if given."""
         with self._clock.phase("project"):
             return self._by_entries(plain=self._plain).ptap(mapped, result=result)
 
@@ -144,12 +145,12 @@ class KktMatrix:
         return stiffness
 
     def _add_to_diagonal(self) -> None:
-        """Makes the whole matrix hold what was assembled and what is added to its diagonal."""
+        """Adds shift and softness to the assembled diagonal."""
         if not self._plain:
             self._matrix.setDiagonal(self._diagonal + self._added)
 
     def _by_entries(self, *, plain: bool) -> PETSc.Mat:
-        """K̂ by entries: ``plain``, or with what gives the KKT matrix the addition to its diagonal."""
+        """K̂ by entries: ``plain``, or with the entries that add shift and softness to the KKT matrix."""
         if self._entries is None:
             self._entries = EntryCopy(self.extended)
         entries = self._entries.matrix
@@ -224,7 +225,7 @@ class EntryCopy:
         blocked: the matrix by blocks, assembled, whose pattern does not change any more.
 
     Attributes:
-        matrix: its copy by entries, good after an ``update``.
+        matrix: its copy by entries, valid after an ``update``.
     """
 
     def __init__(self, blocked: PETSc.Mat) -> None:
@@ -250,7 +251,7 @@ _LIBRARY = ctypes.CDLL(PETSc.__file__)
 
 
 def _values(matrix: PETSc.Mat, kind: str) -> list[np.ndarray]:
-    """The values that this rank stores in a matrix of ``kind``, in its own columns and in those of others."""
+    """This rank's values in a matrix of ``kind``: those in its own columns and in those of other ranks."""
     pointer = ctypes.c_void_p
     parts = [pointer(matrix.handle)]
     if matrix.comm.size > 1:
@@ -269,6 +270,6 @@ def _values(matrix: PETSc.Mat, kind: str) -> list[np.ndarray]:
 
 
 def _call(name: str, *arguments) -> None:
-    """One of PETSc's functions."""
+    """Calls one of PETSc's functions."""
     if code := getattr(_LIBRARY, name)(*arguments):
         raise RuntimeError(f"{name} of PETSc failed with code {code}")

@@ -1,4 +1,4 @@
-"""Primal–dual Newton iteration with inertia control for min E(s) s.t. C(s) = 0.
+"""Primal–dual Newton iteration with inertia control for min E(s) s.t. C(s) = 0, E the total energy.
 
 Each iteration solves
 
@@ -14,17 +14,17 @@ found and reported as such. Merit of a step: the augmented Lagrangian
 
 and at the new pressures p, with ½ ρ_m |∂E/∂p|² beside it.
 
-Slender links bend at far smaller forces than they stretch, so a good step may raise every merit for a few
-iterations: steps are taken in full as long as a watchdog allows, then the iteration returns to its best state and
-searches the line. For the same reason ∇²L holds, far from equilibrium, the stress that the last step solved for
+Slender links are far softer in bending than in tension, so a good step may raise every merit for a few iterations:
+steps are taken in full as long as a watchdog allows, then the iteration returns to its best state and searches the
+line. For the same reason ∇²L holds, far from equilibrium, the stress that the last step solved for
 instead of the one its displacements led to (``elasticity.mixed_stress``): iterations halve, and steps ten times as
 long converge.
 
-The last corrections cost next to nothing: once a step has come close, those that follow are solved with its factor,
+Close to convergence the factor of the KKT matrix K is reused (simplified Newton method),
 
     y ← y − K(y₁)⁻¹ r(y),
 
-as long as they shrink by a thousand and more. Where they do not, as next to a limit point, K is factored anew.
+as long as corrections contract by a factor of 1000 or more; otherwise, as next to a limit point, K is factored anew.
 
 Sources: Nocedal & Wright, Numerical Optimization (doi:10.1007/978-0-387-40065-5), chapters 17–19; Chamberlain et al. on
 the watchdog (Mathematical Programming Studies 16, 1982); Deuflhard on the simplified Newton method
@@ -62,8 +62,8 @@ class PrimalDualNewton(EquilibriumSolver):
         mixed_stress: whether tangents, as long as the residual is large, hold the stress that the last step solved
             for instead of the one it led to.
         largest_turn: largest rotation (rad), or displacement over the mechanism's length, of one step.
-        reuse_factor: relative error of the last factor, which shows in how fast corrections with it shrink, up to which
-            it serves for them, for stability and for the tangent of the path; above, and with 0, K is factored anew.
+        reuse_factor: largest contraction rate of corrections at which the last factor of K is reused, also for
+            stability and the tangent of the path; 0: never.
 
     Raises:
         DescriptionError: a limit is not a positive number, or ``reuse_factor`` is negative.
@@ -147,9 +147,9 @@ class Newton(Iteration):
     def _direction(
         self, residual: Residual, least: float, *, last: float, any_inertia: bool
     ) -> tuple[PETSc.Vec, float]:
-        """The Newton step; unless ``any_inertia`` will do, raises δ until the inertia promises descent.
+        """The Newton step; unless ``any_inertia`` will do, raises δ until the inertia guarantees descent.
 
-        δ = ``least`` is tried first; then a third of the ``last`` one that served, and eight times that, …
+        δ = ``least`` is tried first; then a third of the ``last`` successful one, and eight times that, …
         """
         shift, following = least, max(_LEAST_SHIFT, last / 3.0)
         for _ in range(20):
@@ -171,7 +171,7 @@ class Newton(Iteration):
 
         Args:
             state, residual: where the step led.
-            control: what is asked for.
+            control: the prescribed value.
             before: residual norm before the step.
             step: the step.
 
@@ -212,7 +212,7 @@ class Newton(Iteration):
     def _search(
         self, state: State, control: Control, step: Step, residual: Residual, iteration: int
     ) -> tuple[State, Residual, float]:
-        """Armijo backtracking on the augmented Lagrangian; near convergence a smaller residual will do."""
+        """Armijo backtracking on the augmented Lagrangian; near convergence a smaller residual suffices."""
         system = self.system
         state, step = system.pressed(state, step)
         system.load(state)

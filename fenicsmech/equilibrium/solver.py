@@ -1,10 +1,10 @@
 """The interface of equilibrium solvers: a description with its limits, and the iteration it makes for one system.
 
-An iteration finds equilibria its own way. What follows an equilibrium is the same for all: the KKT matrix K there is
-factored, and its ``Linearisation`` gives rates along paths, stability and adjoints.
+Iterations differ in how they reach an equilibrium. All factor the KKT matrix K there, whose ``Linearisation`` gives
+rates along paths, stability and adjoints.
 
-The arc length of a path is prescribed by bordering, likewise the same for all: Newton's method with a plane across the
-path in place of the equation of the followed value, which never needs a row of K,
+All prescribe the arc length of a path by bordering: Newton's method with the equation of a plane normal to the path in
+place of that of the followed value, without a row in K,
 
     R(y) = 0,    ⟨n, y − y₀⟩ = s,        K x₀ = −R,    K x₁ = r,    x = x₀ + τ x₁,
 
@@ -72,7 +72,7 @@ class EquilibriumPoint:
 
     @property
     def unstable_under_control(self) -> int:
-        """The same while the control holds what it can; along a path, the displacement of the force's point."""
+        """The same with the controlled quantity held; along a path, the displacement of the force's point."""
         return self.stability.under_displacement if self.control.constrained else self.stability.under_load
 
     def scaled(self, factor: float) -> EquilibriumPoint:
@@ -82,13 +82,13 @@ class EquilibriumPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class EquilibriumSolver(ABC):
-    """The method that finds equilibria.
+    """Options of equilibrium solvers.
 
     Attributes:
         tolerance: residual over the forces that balance in it, at convergence.
         roundoff: residual in units of mean stiffness times the largest displacement (rotations: times length) below
-            which digits are lost; of mean stiffness times length where the tangent is all but singular.
-        linear: how the linear systems are solved; by their size unless said otherwise.
+            which digits are lost; of mean stiffness times length where the tangent is nearly singular.
+        linear: method for the linear systems; by default chosen by their size.
 
     Raises:
         DescriptionError: a limit is not a positive number.
@@ -110,7 +110,7 @@ class EquilibriumSolver(ABC):
 class Linearisation:
     """The KKT matrix K at one state under one control, factored.
 
-    It serves until its solver makes or factors another matrix; from then on it refuses.
+    Valid until its solver assembles or factors another matrix; methods raise RuntimeError afterwards.
 
     Args:
         solver: which has just factored K.
@@ -214,7 +214,7 @@ class Linearisation:
 class Iteration(ABC):
     """One system's solver, with the linear solver it keeps between solves.
 
-    A solver implements ``iterate``; all else is there for it to use.
+    Subclasses implement ``iterate``.
 
     Attributes:
         system: the equations.
@@ -286,7 +286,7 @@ class Iteration(ABC):
             return x if self.linear.solve(right, x, tolerance) else None
 
     def descends(self) -> bool:
-        """Whether what the last solve saw of the matrix promises that its solution is a direction of descent."""
+        """Whether the inertia known from the last solve guarantees that its solution is a descent direction."""
         inertia = self.linear.known_inertia()
         return inertia.negative <= self.expected and inertia.zero == 0
 
@@ -300,26 +300,26 @@ class Iteration(ABC):
         return residual.norm / max(residual.forces, self._rounding(residual))
 
     def step_accuracy(self, residual: Residual) -> float:
-        """Relative error of a step from there that does no harm, 1e-3 far from the equilibrium.
+        """Admissible relative error of a Newton step, 1e-3 far from the equilibrium.
 
-        A tenth of what the step leaves anyway, or what takes the residual well below the tolerance: an error of stiff
-        modes counts for hundreds of times more in the residual than in the energy.
+        A tenth of the residual that the step leaves anyway, or enough to take it well below the tolerance: errors of
+        stiff modes weigh hundreds of times more in the residual than in the energy.
         """
         relative = self.relative(residual)
         enough = 1e-3 * self.options.tolerance / max(relative, self.options.tolerance)
         return min(max(0.1 * relative, enough, _STEP), 1e-3)
 
     def converged(self, residual: Residual, before: float = 0.0, *, noise: float = 0.0) -> bool:
-        """Whether the residual is small beside the forces and joints are closed, or it is rounding that falls no more.
+        """Whether the residual is small beside the forces and joints are closed, or rounding that no longer falls.
 
-        Joints count as closed within 1e-10 of the mechanism's length, or rad: reactions without bounds would hide wider
-        gaps. Rounding has to have stopped falling, to a quarter of what was ``before``: soft springs and modes feel
-        what is left below the rounding of stiff links.
+        Joints count as closed within 1e-10 of the mechanism's length, or rad: unbounded reactions would hide wider
+        gaps. Rounding must have stopped falling, to no less than a quarter of ``before``: soft springs and modes
+        respond to residuals below the rounding of stiff links.
 
         Args:
             residual: at the state.
             before: norm of the residual one iteration ago; 0 if no other iteration can follow.
-            noise: what else rounds the residual, as a norm of it.
+            noise: norm of other rounding errors of the residual.
         """
         if residual.norm <= self.options.tolerance * residual.forces < math.inf and residual.gap <= 1e-10:
             return True
@@ -338,9 +338,9 @@ class Iteration(ABC):
     def accept_best(
         self, best: State, residual: Residual, control: Control, residuals: list[float], failure: NotConverged
     ) -> EquilibriumPoint:
-        """The ``best`` state where nothing better is found, as at a bifurcation, if only rounding is left there.
+        """The ``best`` state if its residual is rounding, as at a bifurcation.
 
-        That is 1e-4 of the forces where the tangent is all but singular.
+        Rounding is up to 1e-4 of the forces where the tangent is nearly singular.
 
         Raises:
             NotConverged: the ``failure``, if more is left.
@@ -361,7 +361,7 @@ class Iteration(ABC):
     def _iterate_bordered(self, start: State, control: ArcLengthControl) -> EquilibriumPoint:
         """Newton's method by bordering, as above.
 
-        It ends early, for a shorter step to do better, after 10 iterations, where the residual grows a thousandfold
+        It ends early, so that a shorter step is tried, after 10 iterations, where the residual grows a thousandfold
         from below 1e-2 of the forces, or where an iteration moves anything by half the mechanism's length, or half a
         rad.
         """
@@ -388,7 +388,7 @@ class Iteration(ABC):
     def _across(
         self, control: ArcLengthControl, at: Linearisation, residuals: Sequence[float], iterations: int
     ) -> EquilibriumPoint:
-        """The equilibrium with the direction of the path for a tangent, not against the control's normal."""
+        """The equilibrium with the unit tangent of the path, oriented along the control's normal."""
         point, followed = at.point(residuals, iterations), control.metric.followed
         scale = 1.0 / control.metric.norm(point.tangent)
         if not control.metric.dot(point.tangent, control.normal) > 0.0:

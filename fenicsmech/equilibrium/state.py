@@ -22,7 +22,7 @@ class State:
         multipliers: λ, one per constraint row, on every rank.
         force: magnitude f of the controlled force.
         motors: motor value per connection.
-        load_factor: part of the constant loads and effects that acts, 0 … 1.
+        load_factor: σ of the constant loads and effects, 0 … 1.
         minimum_shift: least shift δ of the tangent, which zero-energy modes need, in units of the mean stiffness.
     """
 

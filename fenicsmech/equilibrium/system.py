@@ -4,8 +4,8 @@
 
     residual   Gᵀ ∇L,     KKT matrix   Gᵀ ∇²L G,     x ↦ (u, z, λ, f) = G x
 
-Where links are in u–p form, u stands for (u, p) in all of this; E is a saddle then, stationary in p. The terms of L
-beside E are those of ``border``, the blocks of the equations those of ``blocks``, their matrix that of ``kkt``.
+E is the energy of links and effects; where links are in u–p form, u stands for (u, p) and E is a saddle. The terms of
+L beside E are those of ``border``, the blocks of the equations those of ``blocks``, their matrix that of ``kkt``.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Residual:
         vector: Gᵀ ∇L, dimensionless.
         norm: its norm.
         forces: norm of the loads and reactions that should cancel in it.
-        gap: how far joints are from closed, over the mechanism's length, or rad.
+        gap: largest violation of a joint, over the mechanism's length, or rad.
         motion: largest displacement from the drawn configuration over the mechanism's length, or rotation.
         moments: Σ r_i ⊗ (X_i − c) of each interface body.
         nodal: r = ∂E/∂u minus the loads on links, (owned displacements,).
@@ -68,7 +68,7 @@ class EquilibriumSystem:
         loads: fixed loads, with their magnitudes.
         potentials: of body poses.
         compliances: c by constraint row; 0 where none is given.
-        clock: where time is counted.
+        clock: of the phases.
         comm: the processes that share the links.
 
     Attributes:
@@ -127,7 +127,7 @@ class EquilibriumSystem:
 
     @property
     def rigid_rows(self) -> np.ndarray:
-        """Constraints that do not give way, (n,)."""
+        """Constraints without compliance, (n,)."""
         return np.flatnonzero(self.compliances == 0.0)
 
     # -- states --------------------------------------------------------------------------------------------
@@ -192,7 +192,7 @@ class EquilibriumSystem:
             return self.elastic.energy()
 
     def load_displacement(self, state: State) -> float:
-        """a · u_P, how far the controlled force's point has moved along it."""
+        """a · u_P, the travel of the controlled force's point."""
         return self._border.travel(self.controlled, state)
 
     def potential(self, state: State, force: float) -> float:
@@ -200,7 +200,7 @@ class EquilibriumSystem:
         return self.elastic_energy() + self._border.pose_potential(state) - self._border.work(state, force)
 
     def volume_violation(self) -> float:
-        """Norm of ∂E/∂p of the loaded state in scaled units: by how much volumes miss their pressures."""
+        """Norm of ∂E/∂p of the loaded state in scaled units."""
         if self.elastic.pressure is None:
             return 0.0
         links = self.elastic.residuals()[self.numbering.free] * self.unknowns.units[self.blocks.links.local]
@@ -260,7 +260,7 @@ class EquilibriumSystem:
     def linearise_mixed(
         self, state: State, control: Control, residual: Residual, before: State, motion: np.ndarray
     ) -> None:
-        """``linearise``, with the stress that the step δu = ``motion`` from ``before`` promised.
+        """``linearise``, with the stress predicted by the step δu = ``motion`` from ``before``.
 
         Args:
             state, control, residual: as in ``linearise``.

@@ -1,4 +1,4 @@
-"""The scaled unknowns x of the KKT system, and the map G between these and the change of state they stand for.
+"""The scaled unknowns x of the KKT system, and the map G from these to the change of state they stand for.
 
     x ↦ (u, z, λ, f) = G x,     G = diag(∂u/∂s, 1) · D,     D = (ℓ, ℓ or 1, …) / (ℓ √k),
 
@@ -96,10 +96,10 @@ class ScaledUnknowns:
     Attributes:
         unit: a residual of this norm is a displacement of the mechanism's length against the mean stiffness.
         unit_u: the displacement that a unit of a scaled unknown stands for.
-        units: D, of this rank's unknowns, (local unknowns,).
+        units: D of this rank's unknowns, (local unknowns,).
         scale: D of the border, (border,).
         map: G.
-        poses: those that G is at.
+        poses: at which G is taken.
     """
 
     def __init__(

@@ -2,9 +2,9 @@
 
 Effects add to the potential energy
 
-    Π = E_int + s · (Σ link energies + Σ pose potentials) + Σ potentials that hold − loads.
+    Π = E_int + σ · (Σ link energies + Σ pose potentials) + Σ potentials that hold − loads.
 
-The load factor s grows from 0 to 1 before the controlled force does, as that of the constant loads. What holds the
+The load factor σ grows from 0 to 1 before the controlled force does, as that of the constant loads. What holds the
 mechanism, as the stiffness of a spring does, acts from the start: without it equilibria on the way need not exist.
 """
 

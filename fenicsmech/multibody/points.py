@@ -1,7 +1,9 @@
 """Material points that forces act on and displacements are read from.
 
-on a rigid link:     u(z) = t + (R − I)(P − c)
-on a flexible link:  u = Σ_i N_i(P) u_i, the finite-element interpolation in the cell that holds P.
+    on a rigid link:     u(z) = t + (R − I)(P − c)
+    on a flexible link:  u = Σ_i N_i(P) u_i
+
+with the pose (t, R) and the centre c of a body, and the shape functions N_i of the cell that holds P.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """The least-squares problem that optimisers solve, and the history of a run.
 
-O(p) = ½ |r(p)|² + R(p)
+    O(p) = ½ |r(p)|² + R(p)
+
+with the residuals r and the regularisation R.
 """
 
 from __future__ import annotations

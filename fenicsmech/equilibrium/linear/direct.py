@@ -1,4 +1,4 @@
-"""Symmetric indefinite factorisation LDLᵀ of the KKT matrix, with its inertia; and what any linear solver is."""
+"""Symmetric indefinite factorisation LDLᵀ of the KKT matrix, with its inertia, and the interface of linear solvers."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class LinearSolver(ABC):
 
     @abstractmethod
     def refactor(self) -> bool:
-        """Takes the matrix's current values; whether that could be done."""
+        """Factors the matrix's current values; whether this succeeded."""
 
     @abstractmethod
     def inertia(self) -> Inertia:
@@ -32,19 +32,19 @@ class LinearSolver(ABC):
 
     @abstractmethod
     def known_inertia(self) -> Inertia:
-        """What the last ``solve`` has seen of it: no more than there is."""
+        """Lower bound of the inertia, known from the last ``solve``."""
 
     @abstractmethod
     def solve(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float) -> bool:
-        """Solves with the matrix last refactored, to a relative error of ``tolerance``; whether that could be done."""
+        """Solves with the matrix last refactored, to a relative error of ``tolerance``; whether this succeeded."""
 
     @abstractmethod
     def solve_and_count(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float) -> Inertia | None:
-        """``solve`` and ``inertia``, hardly dearer than one of them; None if it could not be solved."""
+        """``solve`` and ``inertia`` at hardly more than the cost of one; None if the solve failed."""
 
 
 class LinearMethod(ABC):
-    """A way to solve linear systems."""
+    """A method for linear systems."""
 
     @abstractmethod
     def solver(self, system: EquilibriumSystem) -> LinearSolver:
@@ -70,7 +70,7 @@ _MUMPS = {
 
 
 class Factor(LinearSolver):
-    """MUMPS LDLᵀ of a matrix whose pattern does not change: the symbolic analysis is kept as long as it serves.
+    """MUMPS LDLᵀ of a matrix whose pattern does not change: the symbolic analysis is reused.
 
     Args:
         matrix: the matrix; refactor after changing its values.
@@ -81,7 +81,7 @@ class Factor(LinearSolver):
         self._analyse()
 
     def refactor(self) -> bool:
-        """Factors the matrix's current values; whether it could be done."""
+        """Factors the matrix's current values; whether this succeeded."""
         done = self._numeric()
         if not self._fresh and not (done and self.inertia().zero == 0):
             # the analysis pairs unknowns by the values it sees: in other ones a pair may be zero, the matrix regular
@@ -92,7 +92,7 @@ class Factor(LinearSolver):
         return done
 
     def _analyse(self) -> None:
-        """A solver that orders and pairs the unknowns by the values it is first given."""
+        """A new solver, which orders and pairs the unknowns by the first values it factors."""
         # the only way that reaches all of MUMPS's controls, the ordering among them
         prefix = "fenicsmech_kkt_"
         options = PETSc.Options(prefix)
@@ -129,7 +129,7 @@ class Factor(LinearSolver):
         return Inertia(mumps.getMumpsInfog(12), mumps.getMumpsInfog(28))
 
     def known_inertia(self) -> Inertia:
-        """The same: a factor knows all of it."""
+        """The same: a factor gives the exact inertia."""
         return self.inertia()
 
     @property
@@ -143,13 +143,13 @@ class Factor(LinearSolver):
         return True
 
     def solve_and_count(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float = 0.0) -> Inertia:
-        """``solve``, and the ``inertia`` that the factor knows."""
+        """``solve``, and the ``inertia`` of the factor."""
         self.solve(right, solution, tolerance)
         return self.inertia()
 
 
 class _KktFactor(Factor):
-    """The factor of the whole KKT matrix, which is formed only where it is asked for."""
+    """The factor of the whole KKT matrix, formed on demand."""
 
     def __init__(self, kkt: KktMatrix) -> None:
         self._kkt = kkt

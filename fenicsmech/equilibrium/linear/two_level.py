@@ -56,9 +56,9 @@ class TwoLevel(LinearMethod):
     Attributes:
         degree: m of the smoother, products with A that one application takes, plus one.
         ratio: a/b of the smoother; both measured on the claw, whose curve takes least time with these.
-        safety: b over the estimate of λ, which is one from below: single bad cells are seen late.
-        iterations: most conjugate gradients of one solve; more say that the coarse level does not suit.
-        probe: relative energy down to which a random start is followed for the inertia.
+        safety: b over the estimate of λ, which is a lower bound: single bad cells show late in it.
+        iterations: most conjugate gradients of one solve; more mean that the coarse level does not suit.
+        probe: relative energy at which iterations from a random start end when counting the inertia.
         roundoff: of the solution, in units of the mean stiffness: residuals below are rounding.
     """
 
@@ -71,7 +71,7 @@ class TwoLevel(LinearMethod):
 
     @staticmethod
     def suits(system: EquilibriumSystem) -> bool:
-        """Whether displacements have a level below them, all components of free nodes are unknown, pressures none."""
+        """Whether u has order 2 or more, all components of free nodes are unknown, and there are no pressures."""
         return system.elastic.order > 1 and system.numbering.whole_nodes
 
     def solver(self, system):
@@ -86,7 +86,7 @@ class TwoLevel(LinearMethod):
 
 @dataclass(frozen=True)
 class BySize(LinearMethod):
-    """Two levels beyond so many unknowns, in space and where they suit; the factor otherwise.
+    """Two levels above ``limit`` unknowns in space, where they suit; the factor otherwise.
 
     In the plane a factor costs little at any size. Where two levels do not suit (order 1, the u–p formulation, the
     nodes of a mid-plane) the factor is all there is. In space, whole curves of a claw with their stability cost as much
@@ -94,7 +94,7 @@ class BySize(LinearMethod):
     (benchmarks/large.py).
 
     Attributes:
-        limit: unknowns.
+        limit: number of unknowns.
     """
 
     limit: int = 80_000
@@ -139,7 +139,7 @@ class TwoLevelSolver(LinearSolver):
         self.probes: list[int] = []
 
     def refactor(self) -> bool:
-        """Takes the KKT matrix's current values; whether that could be done."""
+        """Takes the KKT matrix's current values; whether this succeeded."""
         self._matrix.destroy()
         self._stiffness.destroy()
         self._stiffness, columns = self._system.kkt.nodal_stiffness(), self._system.kkt.border_columns()
@@ -169,7 +169,7 @@ class TwoLevelSolver(LinearSolver):
 
         Args:
             right: right-hand side.
-            solution: where the solution goes.
+            solution: filled with the solution.
             tolerance: of the energy norm of the error, relative to that of the error after one coarse correction.
         """
         self._start(right, solution)
@@ -206,13 +206,13 @@ class TwoLevelSolver(LinearSolver):
                 return False
             iterations += 1
             solution.axpy(energy / direction.curvature, direction.p)
-            # later ones may be copies of the first: long recurrences forget what they were conjugate to
+            # later ones may be copies of the first: long recurrences lose conjugacy
             self._met = max(self._met, int(direction.curvature < 0.0))
         self.iterations.append(iterations)
         return True
 
     def known_inertia(self) -> Inertia:
-        """What is certain after the last solve: the coarse level's, and one more if it met a negative curvature."""
+        """Lower bound: that of the coarse level, and one more if the last solve met a negative curvature."""
         coarse = self._coarse.factor.inertia()
         return Inertia(coarse.negative + self._met, coarse.zero)
 
@@ -250,7 +250,7 @@ class TwoLevelSolver(LinearSolver):
     ) -> Iterator[tuple[float, Direction]]:
         """Conjugate directions for a residual r with Pᵀ r = 0: its energy rᵀ z, and where to go on.
 
-        They end when the energy is ``least``² or has fallen by ``tolerance``². One is good until the next is asked for.
+        They end when the energy is ``least``² or has fallen by ``tolerance``². Each is valid until the next one.
         """
         z, image, p, q = self._z, self._image, self._p, self._q
         p.set(0.0)
