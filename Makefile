@@ -36,10 +36,10 @@ help: ## list the targets
 demo: install ## install what is missing and run the truss finger; pictures and summary.json in results/truss/
 	$(PYTHON) demos/truss.py
 
-test: lint test-serial test-parallel demos-quick ## style, types, layers; fast tests on one process and on two ranks; quick demos
+test: lint test-serial test-parallel demos-quick ## style, types, layers; fast tests on one process, on two ranks; quick demos
 
 # What moves by itself, as Debian's newest, is no part of it.
-check: test-thorough test-slow hard-cases random-scenes-check docs test-debian13 ## everything else, after `make test`
+check: test-thorough test-slow hard-cases random-scenes-check docs test-debian13 ## everything that `make test` leaves out
 
 # Where the packages come from elsewhere (the Debian 13 root), INSTALL= switches the installation off.
 INSTALL := yes
@@ -57,6 +57,7 @@ lint: install-test ## style, types and layering: seconds
 	$(call heading,lint)
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .
+	$(PYTHON) -m mypy
 	$(PYTHON) -m pytest -q tests/test_layering.py
 
 # Two processes side by side; the tests of one file stay together. What is marked `parallel` runs on ranks instead, and
@@ -101,7 +102,8 @@ VERSION_TESTS := tests/elasticity tests/joints tests/multibody tests/mechanism t
     tests/design/test_sensitivity.py tests/design/test_weights.py \
     $(patsubst %,tests/test_%.py,collective compat kernel_cache uncaught_errors) \
     tests/effects/test_contact_derivatives.py \
-    $(patsubst %,tests/equilibrium/test_%.py,eigen factor lagrangian mixed_lagrangian newton path two_level) \
+    $(patsubst %,tests/equilibrium/test_%.py,blocks factor lagrangian mixed_lagrangian newton two_level) \
+    $(patsubst %,tests/continuation/test_%.py,eigen load_steps) \
     $(patsubst %,tests/simulation/test_%.py,files memory ranks units)
 OTHER_SUITE = tools/debian.sh $(1) make --no-print-directory INSTALL= PYTHON=/usr/bin/python3 \
     SELECT="$(SELECT) and not calculix" $(if $(FULL),,TESTS="$(VERSION_TESTS)") test-serial test-parallel
@@ -118,18 +120,18 @@ docs: install-docs ## the pages in docs/_build/html; warnings are errors
 	$(call heading,documentation)
 	$(PYTHON) -m sphinx -q -W --keep-going -b html docs docs/_build/html
 
-demos-quick: $(DEMOS:%=demo-quick-%) ## every demo, coarse, in results/quick/
+demos-quick: $(DEMOS:%=demo-quick-%) ## the demos that optimise or fit, coarse, in results/quick/
 
 .PHONY: $(DEMOS:%=demo-quick-%)
 $(DEMOS:%=demo-quick-%): demo-quick-%: install
 	$(call heading,demo $*)
 	$(PYTHON) demos/$*.py --quick --out results/quick/$*
 
-hard-cases: install-test ## every case of tests/hard/, slow ones too, its table in docs/tables/
-	$(PYTHON) -m tests.hard --write
+hard-cases: install-test ## every case of tests/hard/, slow ones too, as a table
+	$(PYTHON) -m tests.hard
 
 # The tables that pages of the documentation include; `make bench` measures one, `make tables` all (hours).
-BENCHMARKS := solvers work_precision accuracy_control large stopping performance effects optimisers
+BENCHMARKS := verification solvers work_precision accuracy_control large stopping performance effects optimisers
 BENCH = OPENBLAS_NUM_THREADS=1 $(PYTHON) -m benchmarks
 
 bench: install ## seconds per load step of every demo's initial design: 3D, on ranks, plane stress
@@ -138,7 +140,9 @@ bench: install ## seconds per load step of every demo's initial design: 3D, on r
 	$(MPIRUN) $(PYTHON) -m benchmarks.frames --write
 	$(BENCH).frames --space plane-stress --write
 
-tables: bench $(BENCHMARKS:%=table-%) ## every benchmark, its table in docs/tables/ (hours)
+tables: bench $(BENCHMARKS:%=table-%) ## every table of the documentation, in docs/tables/ (hours)
+	$(PYTHON) -m tests.hard --write
+	OPENBLAS_NUM_THREADS=1 $(PYTHON) -m tests.hard.random_scenes --count $(N) --seed $(SEED) --write
 
 .PHONY: tables $(BENCHMARKS:%=table-%)
 $(BENCHMARKS:%=table-%): table-%: install

@@ -12,6 +12,7 @@
 ``effects``           the time that each effect takes
 ``optimisers``        Levenberg–Marquardt beside BFGS
 ``frames``            seconds per load step of the demos' mechanisms
+``verification``      the tests that compare with exact solutions and other programs, as one table
 ``walk``              two calls whose files are counted
 ====================  ==========================================================================================
 

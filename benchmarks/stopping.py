@@ -4,8 +4,8 @@
 
 Two tables. Equilibria: the curves of each mechanism by ways to end Newton's iteration, taking turns; factors counted,
 processor time over that of the strictest way (median over the turns), and how far displacements move over the
-estimated error of the elements (the largest of all frames). Designs: to an explicit tolerance, and to what the elements
-can tell; in space both start from the optimum in plane stress.
+estimated error of the elements (the largest of all frames). Designs: to an explicit tolerance, and to what the
+elements resolve; in space both start from the optimum in plane stress.
 """
 
 from statistics import median

@@ -59,7 +59,7 @@ def on_all(comm: MPI.Comm, work: Callable[[], T]) -> T:
             if other is not None:
                 raise other
     finally:
-        # an error that its own traceback refers to would keep all that is in there until Python looks for cycles
+        # an error that its own traceback refers to would keep its frames alive until the next garbage collection
         del failure, failures, other
     return results[0]
 

@@ -162,7 +162,7 @@ def evaluate_expression(expression: fem.Expression, mesh: dmesh.Mesh, cells: np.
 
 
 def owned_values(function: fem.Function) -> np.ndarray:
-    """This rank's owned values of a function, flat (shared memory)."""
+    """This rank's owned values of a function, flat; a view."""
     dofmap = function.function_space.dofmap
     return function.x.array[: dofmap.index_map.size_local * dofmap.index_map_bs]
 

@@ -105,7 +105,7 @@ def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> None:
         DescriptionError: no column, columns of different length, or a value that is not finite.
     """
     if not columns:
-        raise DescriptionError(f"table '{path}'", "there is no column", "Give at least one")
+        raise DescriptionError(f"table '{path}'", "there are no columns", "Give at least one")
     rows = None
     checked = []
     for header, values in columns.items():

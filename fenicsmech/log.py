@@ -17,7 +17,7 @@ ROOT = "fenicsmech"
 
 
 class _RankZero(logging.LoggerAdapter):
-    """A logger that is silent on every rank but the first, so that a message appears once whatever their number."""
+    """A logger that is silent on every rank but the first, so that a message appears once."""
 
     def isEnabledFor(self, level: int) -> bool:
         from mpi4py import MPI  # here, not above: describing a mechanism must not start MPI

@@ -292,11 +292,11 @@ def _design_text(summary: dict) -> list[str]:
 
 
 def format_table(headers: Sequence[str], rows: Sequence[Sequence[object]], *, digits: int = 4) -> str:
-    """``rows`` laid out under ``headers``; numbers stand right, words left.
+    """``rows`` laid out under ``headers``; numbers are right-aligned, text left.
 
     Args:
         headers: (k,) column names.
-        rows: each of k cells: numbers, words, flags, or None for "not known".
+        rows: each of k cells: numbers, text, flags, or None for unknown values.
         digits: significant digits of floats.
 
     Returns:

@@ -1,4 +1,4 @@
-"""What every test shares: MPI-aware reporting, directories common to all ranks, and programs run under mpirun."""
+"""Fixtures of all tests: MPI-aware reporting, directories common to all ranks, and programs run under mpirun."""
 
 from __future__ import annotations
 
@@ -12,13 +12,22 @@ from pathlib import Path
 
 import hypothesis
 import pytest
-from mpi4py import MPI
+
+# Workers of pytest-xdist are given what MPI_Init put into the environment of the process that started them; neither
+# their own MPI_Init nor an mpirun under them gets along with it.
+if "PYTEST_XDIST_WORKER" in os.environ:
+    for name in [name for name in os.environ if name.startswith(("PMIX_", "ORTE_", "OMPI_APP_", "OMPI_MCA_orte_"))]:
+        del os.environ[name]
+    for name in ("OMPI_MCA_ess", "OMPI_MCA_pmix"):
+        os.environ.pop(name, None)
+
+from mpi4py import MPI  # noqa: E402
 
 # The bookkeeping below has a communicator of its own: none of it is mistaken for a message of the code under test.
 COMM = MPI.COMM_WORLD.Dup()
 
 # Seconds after which a test is taken to hang, alone and on several ranks, and after which a rank whose test failed
-# takes the others to wait for it in vain.
+# waits no longer for the others.
 ALONE, ON_RANKS, AFTER_FAILURE = 300, 120, 30
 
 STDERR = pytest.StashKey[int]()

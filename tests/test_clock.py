@@ -29,7 +29,7 @@ def test_a_phase_does_not_count_those_inside_it(wait):
     assert clock.seconds == {"outer": 1, "inner": 10, "innermost": 100}
 
 
-def test_what_follows_a_phase_inside_another_counts_for_the_outer_one(wait):
+def test_time_after_an_inner_phase_counts_for_the_outer_one(wait):
     clock = Clock()
     with clock.phase("outer"):
         with pytest.raises(ValueError), clock.phase("inner"):

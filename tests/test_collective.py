@@ -1,4 +1,4 @@
-"""What one process does is done for all: they wait for it, and get its result or its error."""
+"""Work of one process for all: they wait for it, and get its result or its error."""
 
 import gc
 import threading
@@ -48,7 +48,7 @@ def test_its_error_is_raised_on_all(call):
 
 
 @pytest.mark.parametrize("error", [OddError("link", 3), OSError("link", threading.Lock())], ids=["odd", "locked"])
-def test_an_error_that_cannot_be_sent_is_told_in_words(error):
+def test_an_error_that_cannot_be_pickled_is_replaced_by_its_message(error):
     with pytest.raises(type(error) if COMM.rank == 0 else RuntimeError, match="link"):
         on_one(COMM, lambda: fail(error))
     assert COMM.allreduce(1) == COMM.size
@@ -80,7 +80,7 @@ class Large:
 
 
 @pytest.mark.parametrize("call", [on_one, from_one, on_all])
-def test_what_was_in_use_when_work_failed_is_let_go_of_with_the_error(call):
+def test_objects_in_use_when_work_failed_are_freed_with_the_error(call):
     used = []
 
     def work() -> None:

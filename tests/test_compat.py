@@ -1,4 +1,4 @@
-"""PETSc objects that processes let go of at different times."""
+"""PETSc objects that processes drop at different times."""
 
 import pytest
 from mpi4py import MPI
@@ -14,7 +14,7 @@ def vector() -> PETSc.Vec:
 
 
 @pytest.mark.parallel
-def test_new_objects_can_be_made_when_one_process_has_forgotten_all_and_another_has_not():
+def test_new_objects_can_be_made_when_only_one_process_has_dropped_the_old():
     destroy_garbage(COMM)
     old = vector()
     if COMM.rank == 0:

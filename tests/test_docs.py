@@ -88,7 +88,17 @@ def test_every_page_with_code_is_run():
 
 
 def test_every_module_of_the_theory_stands_on_one_page():
-    folders = ("equilibrium", "continuation", "elasticity", "effects", "joints", "multibody", "estimates", "design")
+    folders = (
+        "equilibrium",
+        "continuation",
+        "laws",
+        "elasticity",
+        "effects",
+        "joints",
+        "multibody",
+        "estimates",
+        "design",
+    )
     files = (file for folder in folders for file in (ROOT / "fenicsmech" / folder).rglob("*.py"))
     modules = {".".join(file.relative_to(ROOT).with_suffix("").parts) for file in files if file.stem != "__init__"}
     listed = [
@@ -97,3 +107,17 @@ def test_every_module_of_the_theory_stands_on_one_page():
         for name in re.findall(r"automodule:: (\S+)", page.read_text())
     ]
     assert sorted(listed) == sorted(modules)
+
+
+def test_every_path_of_the_makefile_exists():
+    text = re.sub(r"\\\n\s*", " ", (ROOT / "Makefile").read_text())
+    for folder, names in re.findall(r"patsubst %,(tests/[\w/%.]+\.py),([\w ]+)\)", text):
+        for name in names.split():
+            assert (ROOT / folder.replace("%", name)).exists(), folder.replace("%", name)
+    for path in re.findall(r"(?<![%\w])((?:tests|tools|demos)/[\w/-]+(?:\.py|\.sh|\.txt)?)(?=[\s\\])", text):
+        assert (ROOT / path).exists(), path
+
+
+def test_generated_tables_are_measured():
+    for table in (ROOT / "docs" / "tables").glob("*.md"):
+        assert re.search(r"^Commit [0-9a-f]{7}", table.read_text(), flags=re.M), f"{table.name}: run its command"

@@ -86,7 +86,7 @@ def test_numpy_becomes_plain_and_the_order_of_keys_is_kept(tmp_path):
         ({"x": b"bytes"}, "'x'.*bytes"),
     ],
 )
-def test_what_json_cannot_hold_is_refused_and_the_old_file_stays(tmp_path, data, message):
+def test_values_without_a_json_form_are_refused_and_the_old_file_stays(tmp_path, data, message):
     path = tmp_path / "summary.json"
     path.write_text("old")
     with pytest.raises(DescriptionError, match=message):

@@ -1,4 +1,4 @@
-"""What a killed process leaves unfinished in the folder of compiled forms does not hold up those after it."""
+"""Unfinished files of a killed process in the cache of compiled forms do not block later processes."""
 
 import signal
 import subprocess
@@ -54,7 +54,7 @@ def test_a_folder_that_is_not_there_yet_is_made(tmp_path):
         assert (tmp_path / "new" / "folder").is_dir()
 
 
-def test_where_no_lock_can_be_had_compiling_goes_on_without(tmp_path):
+def test_compiling_works_without_a_lock(tmp_path):
     (tmp_path / "file").touch()
     entered = False
     with compiling(tmp_path / "file"):

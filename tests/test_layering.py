@@ -142,7 +142,28 @@ def test_libraries_stay_in_their_layers(library):
     assert not complaints, "\n".join(complaints)
 
 
-def test_versions_are_told_apart_in_compat_only():
+def deep_imports(path: Path) -> list[str]:
+    """The imports of a file that pass by the front door of a folder of the package which is not its own."""
+    parts = path.relative_to(PACKAGE.parent).parts
+    own = parts[1] if parts[0] == ROOT and len(parts) > 2 else None
+    complaints = []
+    for node in ast.walk(ast.parse(path.read_text())):
+        names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+        names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else names
+        for name in names:
+            first, *rest = name.split(".")
+            if first == ROOT and len(rest) > 1 and rest[0] != own:
+                complaints.append(f"{path}:{node.lineno} imports {name}")
+    return complaints
+
+
+@pytest.mark.parametrize("folder", [ROOT, "tests", "benchmarks", "demos"])
+def test_folders_are_reached_through_their_front_doors(folder):
+    complaints = [c for path in sorted((PACKAGE.parent / folder).rglob("*.py")) for c in deep_imports(path)]
+    assert not complaints, "\n".join(complaints)
+
+
+def test_versions_are_distinguished_in_compat_only():
     complaints = [
         f"{module}:{node.lineno} reads __version__"
         for module, path in modules().items()
@@ -154,7 +175,7 @@ def test_versions_are_told_apart_in_compat_only():
 
 
 @pytest.mark.parametrize("module", modules())
-def test_every_module_says_what_it_is(module):
+def test_every_module_has_a_docstring(module):
     assert ast.get_docstring(ast.parse(modules()[module].read_text())), f"{module} has no docstring"
 
 
@@ -183,8 +204,8 @@ def test_an_upward_import_is_found_however_it_is_written(source):
         "from fenicsmech import errors",
         "from fenicsmech.errors import AssemblyError",
         "from ..checks import positive",
-        "from .kind import JointKind",
-        "from . import kind",
+        "from .joint import JointKind",
+        "from . import joint",
     ],
 )
 def test_a_downward_import_is_accepted_however_it_is_written(source):

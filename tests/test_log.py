@@ -24,7 +24,7 @@ def package_logger() -> Iterator[logging.Logger]:
 
 
 @pytest.mark.parallel
-def test_only_the_first_rank_speaks(caplog):
+def test_only_the_first_rank_logs(caplog):
     with caplog.at_level(logging.INFO, log.ROOT):
         log.logger("fenicsmech.equilibrium.newton").info("iteration %d", 3)
     assert caplog.messages == (["iteration 3"] if MPI.COMM_WORLD.rank == 0 else [])
@@ -49,7 +49,7 @@ def test_configuring_twice_shows_a_message_once(capsys):
     assert capsys.readouterr().err.count("1204 cells") == 1
 
 
-def test_a_script_shows_no_chatter_of_others():
+def test_a_script_shows_no_messages_of_other_libraries():
     script = """
 import logging
 from fenicsmech import log

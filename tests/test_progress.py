@@ -7,7 +7,7 @@ from fenicsmech.log import Progress, Silent
 
 
 class Clock:
-    """Time that passes when told to."""
+    """A clock that the test sets."""
 
     def __init__(self):
         self.now = 100.0

@@ -1,4 +1,4 @@
-"""Errors that nobody catches end a program on all ranks: none waits for one that is gone."""
+"""An uncaught error on one rank ends the program on all."""
 
 import subprocess
 import sys

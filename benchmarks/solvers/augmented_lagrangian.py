@@ -8,7 +8,7 @@ to a tolerance ω. Its steps solve (∇²L(s, λ⁺) + δ I + μ AᵀA) ds = −
 
     [[∇²L + δ I, −Aᵀ], [−A, −1/μ]] (ds, dλ) = −(∇L_A, 0),
 
-with δ grown until the matrix of ds is positive definite (as the inertia of the whole one tells), and lengths by
+with δ grown until the matrix of ds is positive definite (by the inertia of the whole one), and lengths by
 Armijo's rule on L_A. Then λ ← λ⁺ where |C| has fallen to η, and the penalty grows where it has not. A controlled
 displacement is one more constraint, its force one more multiplier; where joints have a compliance c, the constraint is
 C + c λ⁺ = 0 and λ⁺ = (λ − μ C) / (1 + μ c).
@@ -79,11 +79,11 @@ class AugmentedLagrangianIteration(Iteration):
     options: AugmentedLagrangian
 
     def iterate(self, start: State, control: Control) -> EquilibriumPoint:
-        system, options, floor = self.system, self.options, start.minimum_shift
+        system, options, minimum_shift = self.system, self.options, start.minimum_shift
         state = start
         penalty = options.penalty
         omega, eta = 1.0 / penalty, penalty**-0.1
-        shift, residuals, before, best = floor, [], math.inf, None
+        shift, residuals, before, best = minimum_shift, [], math.inf, None
         for iteration in range(options.iterations + 1):
             # multipliers of ``state`` are λ, those of ``current`` λ⁺
             current = self._updated(state, control, 1.0 / penalty)
@@ -110,7 +110,7 @@ class AugmentedLagrangianIteration(Iteration):
                 current = self._updated(state, control, 1.0 / penalty)
                 residual = system.residual(current, control)
                 gradient, violation = self._parts(residual)
-            step, descent, shift = self._direction(current, control, residual, 1.0 / penalty, floor, last=shift)
+            step, descent, shift = self._direction(current, control, residual, 1.0 / penalty, minimum_shift, last=shift)
             try:
                 state = self._search(state, control, step, descent, gradient, 1.0 / penalty, iteration)
             except NotConverged as failure:
@@ -157,7 +157,14 @@ class AugmentedLagrangianIteration(Iteration):
         return gradient, violation / self.system.unknowns.unit
 
     def _direction(
-        self, current: State, control: Control, residual: Residual, softness: float, floor: float, *, last: float
+        self,
+        current: State,
+        control: Control,
+        residual: Residual,
+        softness: float,
+        minimum_shift: float,
+        *,
+        last: float,
     ) -> tuple[Step, float, float]:
         """The Newton step of s, with δ grown until it descends; the slope of L_A along it; δ."""
         system = self.system
@@ -165,7 +172,7 @@ class AugmentedLagrangianIteration(Iteration):
         system.kkt.soften(softness, control)
         right = residual.vector.copy()
         right.array_w[system.blocks.multipliers.local.start :] = 0.0
-        shift, following = floor, max(_LEAST_SHIFT, last / 3.0)
+        shift, following = minimum_shift, max(_LEAST_SHIFT, last / 3.0)
         for _ in range(20):
             x = self.try_solve(right, self.step_accuracy(residual)) if self.factor(shift) else None
             if x is not None and self.descends():

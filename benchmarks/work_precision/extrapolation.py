@@ -39,7 +39,7 @@ class Limit:
     Attributes:
         value: f₀.
         uncertainty: half the width of the interval around it, from safety factors of the literature.
-        order: observed; None if the sequence does not tell.
+        order: observed; None if the sequence shows none.
         levels: meshes used, at most three.
     """
 

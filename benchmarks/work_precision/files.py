@@ -145,20 +145,20 @@ def plot_study(path: str | Path, study: Study) -> None:
     Raises:
         DescriptionError: the name does not end in .png.
     """
-    families: dict[tuple[str, str, bool], list[Measurement]] = {}
+    sequences: dict[tuple[str, str, bool], list[Measurement]] = {}
     for m in _judged(study):
         order = "" if m.level.model is None else f"P{m.level.order}"
-        families.setdefault((m.level.model_name, order, not m.level.is_variant), []).append(m)
+        sequences.setdefault((m.level.model_name, order, not m.level.is_variant), []).append(m)
     series = [
         WorkSeries(
             model,
             order,
-            [m.frame_seconds for m in family],
-            [_magnitude(study, m) for m in family],
-            [m.level.name for m in family],
+            [m.frame_seconds for m in sequence],
+            [_magnitude(study, m) for m in sequence],
+            [m.level.name for m in sequence],
             joined=joined,
         )
-        for (model, order, joined), family in families.items()
+        for (model, order, joined), sequence in sequences.items()
     ]
     names = {m.level.model: m.level.model_name for m in study.measurements}
     modelling = [

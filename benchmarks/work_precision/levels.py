@@ -82,7 +82,7 @@ def fidelity_levels(
     quadratures: Sequence[int] = _QUADRATURES,
     tolerances: Sequence[float] = _TOLERANCES,
 ) -> list[FidelityLevel]:
-    """The levels for ``scene``, each family from coarse to fine: rigid, plane strain and stress, 3D half and whole.
+    """The levels for ``scene``, each sequence from coarse to fine: rigid, plane strain and stress, 3D half and whole.
 
     Models of motion in the plane are left out where the scene has no such form. Quadrature and tolerance are varied for
     order 2 at the base size, in plane stress and in whole 3D.
@@ -99,8 +99,8 @@ def fidelity_levels(
     """
     found = [RIGID]
     check_scene(scene, SPATIAL)
-    families = {PLANE_STRAIN: planar, PLANE_STRESS: planar, MID_PLANE_SYMMETRIC: spatial, SPATIAL: spatial}
-    for model, sizes in families.items():
+    sequences = {PLANE_STRAIN: planar, PLANE_STRESS: planar, MID_PLANE_SYMMETRIC: spatial, SPATIAL: spatial}
+    for model, sizes in sequences.items():
         if model is not SPATIAL and not fits(scene, model):
             continue
         for order, factors in sizes.items():

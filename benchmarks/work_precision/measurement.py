@@ -1,4 +1,4 @@
-"""What is looked at, and one level measured: the value it gives, and the seconds it takes."""
+"""The quantity of a study, and one level measured: the value it gives, and the seconds it takes."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Measurement:
         spacing: cells^(−1/dim): the element size that refinement around pins leaves, up to a constant.
         iterations: of Newton's method, for the curve.
         repeats: curves whose median the seconds are.
-        failure: why there is no value.
+        failure: the reason where the value is missing.
     """
 
     level: FidelityLevel

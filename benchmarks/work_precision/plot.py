@@ -27,11 +27,11 @@ _LOWEST = 0.2  # of the uncertainty: where smaller errors are drawn
 
 @dataclass(frozen=True, eq=False)
 class WorkSeries:
-    """Points of one family of choices.
+    """Points of one sequence of meshes.
 
     Args:
         model: what decides the colour.
-        variant: what decides the marker, among the families of a model.
+        variant: what decides the marker, among the sequences of a model.
         seconds: (n,) positive.
         errors: (n,) relative to the reference, not negative.
         names: (n,) of the points, for labels on the front.
@@ -71,7 +71,7 @@ class ModellingError:
 def pareto_front(seconds: ArrayLike, errors: ArrayLike, *, least_gain: float = 0.05) -> list[int]:
     """Indices of the points that are worth their time, fastest first.
 
-    Each is more accurate than every faster one, by a share of at least ``least_gain``: differences that are noise do
+    Each is more accurate than every faster one, by a fraction of at least ``least_gain``: differences that are noise do
     not put a point on the front.
 
     Args:
@@ -110,10 +110,10 @@ def plot_work_precision(
         title: a line above the plot.
 
     Raises:
-        DescriptionError: the name does not end in .png, or there is no point.
+        DescriptionError: the name does not end in .png, or there are no points.
     """
     if not any(len(one.seconds) for one in series):
-        raise DescriptionError(f"plot '{path}'", "there is no point", "Give at least one level with a value")
+        raise DescriptionError(f"plot '{path}'", "it has no points", "Give at least one level with a value")
     colours = dict(zip(dict.fromkeys(one.model for one in series), PALETTE * len(series), strict=False))
     with house_style():
         figure = new_figure(8.0, 5.2)
@@ -201,7 +201,7 @@ def _draw_front(axes: Axes, series: Sequence[WorkSeries], uncertainty: float) ->
 def _obstacles(
     axes: Axes, series: Sequence[WorkSeries], uncertainty: float, front: Sequence[tuple[float, float, str, str]]
 ) -> list[NDArray[np.float64]]:
-    """What labels should not hide: squares around the points, the families' lines and the staircase."""
+    """What labels should not hide: squares around the points, the sequences' lines and the staircase."""
     scale, corners = np.array([1.04, 1.06]), np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
     lines = [np.column_stack([one.seconds, _shown(one.errors, uncertainty)]) for one in series]
     # nested, so that hiding a point costs more than crossing a line
@@ -217,7 +217,7 @@ def _label_line(axes: Axes, labels: Labels, text: str, error: float, sides: Sequ
     low, high = axes.get_xlim()
     width, _ = text_size(text, fontsize=_SMALL)
     half = 0.5 * width / (axes.get_position().width * axes.figure.get_figwidth()) + 0.01
-    places = [np.array([low * (high / low) ** share, error]) for share in (half, 1.0 - half, 0.5)]
+    places = [np.array([low * (high / low) ** part, error]) for part in (half, 1.0 - half, 0.5)]
     spots = [Spot(place, np.array([0.0, side])) for place in places for side in sides]
     labels.add(text, spots, color=colour, fontsize=_SMALL)
 

@@ -138,13 +138,13 @@ def run_study(
     """Runs every level of ``levels`` and finds the limits of the models.
 
     A level that fails is recorded with the reason, as is one whose curve would take longer than ``longest`` by the
-    next coarser mesh of its family. A model's limit is that of its best known family of one order; the reference is
+    next coarser mesh of its sequence. A model's limit is that of its best known sequence of one order; the reference is
     the limit in space.
 
     Args:
         scene: what is computed.
         quantity: what is read.
-        levels: the levels, families from coarse to fine.
+        levels: the levels, sequences from coarse to fine.
         size: element size at factor 1, or one per flexible link. Where depths are even multiples of it, layers
             through the depth double as it halves, and sequences are even.
         repeats: most curves to time per level; the median counts.
@@ -173,12 +173,12 @@ def run_study(
 
 def model_limits(measurements: Sequence[Measurement]) -> dict[ElasticModel, Limit]:
     """The limit of each elastic model: that of the order whose sequence of meshes is the most certain."""
-    families: dict[tuple[ElasticModel, int], list[Measurement]] = {}
+    sequences: dict[tuple[ElasticModel, int], list[Measurement]] = {}
     for m in _default_meshes(measurements):
-        families.setdefault((m.level.model, m.level.order), []).append(m)
+        sequences.setdefault((m.level.model, m.level.order), []).append(m)
     limits: dict[ElasticModel, Limit] = {}
-    for (model, _), family in families.items():
-        limit = extrapolate([m.spacing for m in family], [m.value for m in family])
+    for (model, _), sequence in sequences.items():
+        limit = extrapolate([m.spacing for m in sequence], [m.value for m in sequence])
         if limit is not None and (model not in limits or limit.uncertainty < limits[model].uncertainty):
             limits[model] = limit
     return limits
@@ -190,13 +190,13 @@ def _default_meshes(measurements: Iterable[Measurement]) -> list[Measurement]:
 
 
 def _expected_seconds(level: FidelityLevel, done: Sequence[Measurement]) -> float | None:
-    """Seconds of a level's curve, from the finest coarser mesh of its family; None without one."""
-    family = [
+    """Seconds of a level's curve, from the finest coarser mesh of its sequence; None without one."""
+    sequence = [
         m
         for m in _default_meshes(done)
         if m.level.model is level.model and m.level.order == level.order and m.level.factor > level.factor
     ]
-    if not family:
+    if not sequence:
         return None
-    nearest = min(family, key=lambda m: m.level.factor)
+    nearest = min(sequence, key=lambda m: m.level.factor)
     return nearest.curve_seconds * (nearest.level.factor / level.factor) ** (_COST_ORDER * level.model.dim)

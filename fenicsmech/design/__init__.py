@@ -43,7 +43,6 @@ from fenicsmech.design.shape.spline import LinkSpline, SplineSamples, fit_spline
 from fenicsmech.design.shape.weights import insert, lumped_mass, pierced, solve_partition, stiffness
 
 __all__ = [
-    "Sensitivity",
     "BETWEEN",
     "BFGS",
     "Barrier",
@@ -70,12 +69,13 @@ __all__ = [
     "ModulusFit",
     "Objective",
     "Optimiser",
+    "ParametricShape",
     "Quadratic",
     "QualitySum",
     "Reason",
     "Regulariser",
     "Resolution",
-    "ParametricShape",
+    "Sensitivity",
     "ShapeBounds",
     "ShapeError",
     "ShapeMap",

@@ -52,7 +52,9 @@ class SplineDesign:
 
     def __post_init__(self) -> None:
         if not isinstance(self.link, FlexibleLink):
-            raise DescriptionError("spline design", f"{self.link!r} is no flexible link", "Name one of the mechanism's")
+            raise DescriptionError(
+                "spline design", f"{self.link!r} is not a flexible link", "Name one of the mechanism's"
+            )
         part = f"design of link {self.link.name!r}"
         if not isinstance(self.segments, int) or self.segments < 1:
             raise DescriptionError(part, f"{self.segments!r} segments", "Give a whole number of at least 1")
@@ -105,7 +107,7 @@ class Target:
 
     def __post_init__(self) -> None:
         if not isinstance(self.part, Force):
-            raise DescriptionError("target", f"{self.part!r} is no force", "Give one of the mechanism's")
+            raise DescriptionError("target", f"{self.part!r} is not a force", "Give one of the mechanism's")
         finite(f"force of a target for {self.part.name!r}", self.force)
         finite(f"displacement of a target for {self.part.name!r}", self.displacement)
         positive(f"weight of a target for {self.part.name!r}", self.weight)
@@ -156,7 +158,7 @@ def check_designs(designs: Sequence[SplineDesign]) -> None:
         raise DescriptionError("design problem", "no link may change", "Name links with SplineDesign(…)")
     for design in designs:
         if not isinstance(design, SplineDesign):
-            raise DescriptionError("design problem", f"{design!r} is no design of a link", "Give SplineDesign(…)")
+            raise DescriptionError("design problem", f"{design!r} is not a design of a link", "Give SplineDesign(…)")
     names = [design.link.name for design in designs]
     for name in names:
         if names.count(name) > 1:
@@ -167,14 +169,14 @@ def check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
     """Refuses targets whose force or configuration ``simulation`` does not have.
 
     Raises:
-        DescriptionError: there is no target, or one of another mechanism.
+        DescriptionError: a target is missing, or one of another mechanism.
         AssemblyError: a configuration does not assemble.
     """
     if not targets:
         raise DescriptionError("design problem", "nothing is wanted", "Give targets=[Target(…), …]")
     for target in targets:
         if not isinstance(target, Target):
-            raise DescriptionError("design problem", f"{target!r} is no target", "Give Target(…)")
+            raise DescriptionError("design problem", f"{target!r} is not a target", "Give Target(…)")
         read_request(
             simulation.scene.mechanism,
             target.part,
@@ -186,15 +188,15 @@ def check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
         assemble(simulation.linkage, target.configuration)
 
 
-def check_effects(
-    targets: Sequence[Target], designs: Sequence[SplineDesign], *, effects: np.ndarray, errors: np.ndarray
+def check_sensitivities(
+    targets: Sequence[Target], designs: Sequence[SplineDesign], *, sensitivities: np.ndarray, errors: np.ndarray
 ) -> None:
-    """Refuses targets that are missed and that no parameter moves: their derivatives cannot be right, or no help.
+    """Refuses targets that are missed and that no parameter moves.
 
     Args:
         targets: what is wanted.
         designs: the links that may change.
-        effects: relative change of each displacement when one parameter changes as much as counts,
+        sensitivities: relative change of each displacement when a parameter changes by its length ℓ,
             (targets, parameters).
         errors: relative errors of the displacements, (targets,).
 
@@ -202,7 +204,7 @@ def check_effects(
         DescriptionError: naming the first such target.
     """
     names, rounding = ", ".join(repr(design.link.name) for design in designs), 1e-9
-    for target, row, error in zip(targets, effects, errors, strict=True):
+    for target, row, error in zip(targets, sensitivities, errors, strict=True):
         if np.abs(row).max(initial=0.0) > rounding or abs(error) <= rounding:
             continue
         if target.force == 0.0:

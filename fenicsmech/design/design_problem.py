@@ -15,7 +15,7 @@ from fenicsmech.design.description import (
     SplineDesign,
     Target,
     check_designs,
-    check_effects,
+    check_sensitivities,
     check_targets,
     shape_request,
 )
@@ -205,9 +205,9 @@ class DesignProblem:
 
         def watch(iterate: Iterate) -> None:
             if iterate.number == begin.number:
-                effects = objective.effects(iterate.evaluation)
+                relative = objective.sensitivities(iterate.evaluation)
                 errors = target_errors(self.targets, objective.reached)
-                check_effects(self.targets, self.designs, effects=effects, errors=errors)
+                check_sensitivities(self.targets, self.designs, sensitivities=relative, errors=errors)
             if saved is not None:
                 saved.save(iterate, objective.placement.theta)
             progress.update(iterate, target_errors(self.targets, objective.reached))

@@ -36,12 +36,12 @@ class FollowOptions:
 
     Attributes:
         halvings: of a change of design whose equilibrium is not found, or lies elsewhere.
-        astray: times |δ|, how far the prediction may miss: up to 1.7 on one branch, 3.8 and more across folds.
+        largest_miss: of the prediction, over |δ|: up to 1.7 on one branch, 3.8 and more across folds.
         rounding: misses below this part of the mechanism's length, or rad, are none.
     """
 
     halvings: int = 2
-    astray: float = 2.0
+    largest_miss: float = 2.0
     rounding: float = 1e-6
 
 
@@ -217,7 +217,7 @@ class TargetEquilibria:
         step = system.unknowns.step(x)
         miss = system.size(system.difference(start, system.moved(back, step)))
         model.reshape(after)
-        if miss > max(self._options.astray * system.size(step), self._options.rounding):
+        if miss > max(self._options.largest_miss * system.size(step), self._options.rounding):
             raise _Lost(_folded(target, "a fold lies between this design and the last one"))
         return found.state
 

@@ -24,7 +24,7 @@ from fenicsmech.design.regularisers import Model, Regulariser
 from fenicsmech.design.rest_shape import ParametricShape
 from fenicsmech.design.shape.handle_optimum import HandlePlacement, ShapeError
 
-_PARTS = MPI.Comm.Create_keyval()  # of a communicator: its parts by their number, made once
+_PARTS = MPI.Comm.Create_keyval()  # attribute of a communicator: its parts by their number, split once
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class Objective:
         clock: where time is counted: handles, regularisers, equilibria, gradients, estimates.
 
     Attributes:
-        lengths: changes of the parameters that count alike, (parameters,).
+        lengths: typical change ℓ of each parameter, (parameters,).
         reached: displacement of each target at the last evaluation, (targets,).
     """
 
@@ -126,8 +126,8 @@ class Objective:
         _, model, known = on_all(self._group.everyone, lambda: self._solve(parameters, None))
         return self._value(parameters, model, self._displacements(known))
 
-    def effects(self, evaluation: Evaluation) -> np.ndarray:
-        """Relative change of each displacement when one parameter changes as much as counts, (targets, parameters)."""
+    def sensitivities(self, evaluation: Evaluation) -> np.ndarray:
+        """Relative change of each displacement when a parameter changes by its length ℓ, (targets, parameters)."""
         return evaluation.jacobian * self.lengths / self._root_weights[:, None]
 
     def active(self, parameters: np.ndarray) -> tuple[str, ...]:
@@ -146,13 +146,13 @@ class Objective:
     def _value(self, parameters: np.ndarray, model: Model, reached: np.ndarray) -> float:
         residuals = self._residuals(reached)
         value = 0.5 * float(residuals @ residuals) + model(parameters).value
-        return self._group.everyone.bcast(value, root=0)  # what hangs on its last bit must not differ
+        return self._group.everyone.bcast(value, root=0)  # decisions may depend on its last bit
 
     def _displacements(self, known: Known) -> np.ndarray:
         return self._gathered(np.array([[sample.displacement] for sample in known.samples]))[:, 0]
 
     def _solve(self, parameters: np.ndarray, base: _Base | None) -> tuple[HandlePlacement, Model, Known]:
-        """HandlePlacement, model of R and this group's equilibria, followed from those of ``base`` if there is one."""
+        """Handle placement, model of R and this group's equilibria, followed from those of ``base`` if there is one."""
         with self._clock.phase("handles"):
             try:
                 placement = self._rest.place(parameters, base.placement if base else self._near)
@@ -186,7 +186,7 @@ def target_errors(targets: Sequence[Target], reached: np.ndarray) -> np.ndarray:
 
 
 def objective_error(targets: Sequence[Target], reached: np.ndarray, errors: Sequence[float | None]) -> float | None:
-    """How wrong the objective is because elements are not infinitely fine: O(u + d) − O(u).
+    """Discretisation error of the objective, O(u + d) − O(u).
 
     With the errors d_k of the targets' displacements, of scale s_k, and with residuals r_k,
 

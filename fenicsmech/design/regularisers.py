@@ -1,6 +1,6 @@
-"""What keeps designs near the start, their meshes good, and their links printable: terms R(p) of the objective.
+"""Regularisers: terms R(p) of the objective that keep designs near the start, meshes good and links printable.
 
-Regularisers combine with + and *: ``MeshQuality() + ShapeBounds() + 1e-3 * StayClose()``. All are free of units.
+They combine with + and *: ``MeshQuality() + ShapeBounds() + 1e-3 * StayClose()``. All are free of units.
 """
 
 from __future__ import annotations
@@ -122,7 +122,7 @@ class ShapeBounds(Regulariser):
 
 @dataclass(frozen=True, eq=False)
 class _Bound:
-    """What is bounded from above along a link.
+    """A quantity with an upper bound along a link.
 
     Attributes:
         name: of the bound.

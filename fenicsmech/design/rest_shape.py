@@ -52,7 +52,7 @@ class ParametricShape:
     Attributes:
         links: the links that change.
         initial: p of the drawn design, (parameters,).
-        lengths: what a unit of (p − p₀) / lengths stands for, (parameters,): a link's thickness; 1 for δ.
+        lengths: typical change ℓ of each parameter, (parameters,): a link's thickness; 1 for δ.
 
     Raises:
         DescriptionError: the drawn thickness of a link is not within its bounds.
@@ -80,7 +80,7 @@ class ParametricShape:
         return ParametricShape(simulation.model, shape_links(simulation.model.mesh, requests), designs)
 
     def known(self, p: np.ndarray, theta: np.ndarray) -> HandlePlacement | None:
-        """A placement to start from, for handle positions found before; None if there are as many handles no more."""
+        """A placement to start from, for handle positions found before; None if their number has changed."""
         if theta.shape != self._map.initial_theta.shape:
             return None
         return HandlePlacement(p, theta)

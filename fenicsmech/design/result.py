@@ -58,15 +58,15 @@ class LinkDesign:
 
 @dataclass(frozen=True)
 class TargetResult:
-    """How far a target was reached.
+    """A target and the displacement reached.
 
     Attributes:
         force_name, configuration: what acts, and where the motors stand.
         force: its magnitude.
         wanted, started, reached: displacement that is wanted, of the design the optimisation started from, and of
             the best design.
-        error: of the reached displacement, relative to the wanted one (to a tenth of the largest wanted one where
-            the wanted one is next to nothing).
+        error: of the reached displacement, relative to the wanted one, or to a tenth of the largest wanted one where
+            that is more.
         finer_elements_add: estimate of what infinitely fine elements would add to the reached displacement; None if
             loading the mechanism from zero does not lead there.
     """
@@ -188,7 +188,7 @@ class DesignResult:
         """Local. A result that was saved.
 
         Raises:
-            DescriptionError: there is no such file, or it holds no design.
+            DescriptionError: the file does not exist, or does not hold a design.
         """
         part = f"design {str(path)!r}"
         try:
@@ -217,7 +217,7 @@ def _read(data: dict) -> DesignResult:
 def verified_targets(
     simulation: Simulation, targets: Sequence[Target], started: np.ndarray, followed: np.ndarray
 ) -> tuple[tuple[TargetResult, ...], bool]:
-    """How far each target is reached when it is loaded from zero, which is what a user will do; logs where not.
+    """Results of the targets, each loaded from zero as a user will do; logs those that are not reached.
 
     Args:
         simulation: its model has the shapes of the optimum.

@@ -1,7 +1,7 @@
 """A run of an optimiser: one process decides and all compute, with a line of progress and checkpoints on the way.
 
-The optimiser runs on the first process, the others evaluate with it: decisions that hang on the last bit of a number
-can then not differ between processes.
+The optimiser runs on the first process, the others evaluate with it: decisions that depend on the last bit of a number
+cannot differ between processes.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from fenicsmech.simulation import Simulation
 
 @dataclass(frozen=True, eq=False)
 class Optimum:
-    """How a run ended.
+    """The optimum found by a run.
 
     Attributes:
         number, evaluations, parameters, reason: as in ``Iterate`` and its evaluation.
@@ -55,7 +55,7 @@ def minimise_together(
         Exception: whatever ``watch`` raises, on all processes.
     """
 
-    def lead() -> Optimum:
+    def decide() -> Optimum:
         started = []
 
         def watch_first(iterate: Iterate) -> None:
@@ -69,11 +69,11 @@ def minimise_together(
         assert last.reason is not None, "an optimiser ends for a reason"
         return Optimum(last.number, last.evaluations, last.evaluation.parameters, last.reason, started[0])
 
-    return comm.bcast(on_all(comm, lambda: lead() if comm.rank == 0 else _follow(comm, objective)), root=0)
+    return comm.bcast(on_all(comm, lambda: decide() if comm.rank == 0 else _follow(comm, objective)), root=0)
 
 
 class _Shared:
-    """The objective as the first process sees it: what it asks for, all compute."""
+    """The objective on the first process: all processes compute each call."""
 
     def __init__(self, comm: MPI.Comm, objective: Objective) -> None:
         self._comm, self._objective, self.lengths = comm, objective, objective.lengths
@@ -110,7 +110,7 @@ _FORMAT = "fenicsmech checkpoint 1"
 
 @dataclass(frozen=True, eq=False)
 class Saved:
-    """What a checkpoint holds: where to go on, and the handle positions θ there."""
+    """Contents of a checkpoint: the start of the next run, and the handle positions θ there."""
 
     start: Start
     handles: np.ndarray
@@ -147,7 +147,7 @@ class Checkpoint:
         """Local. Where to go on.
 
         Raises:
-            DescriptionError: there is no such file, it is no checkpoint, or one of another problem.
+            DescriptionError: the file does not exist, is not a checkpoint, or is one of another problem.
         """
         part = f"checkpoint {str(self.path)!r}"
         try:
@@ -172,7 +172,7 @@ class Checkpoint:
         return Saved(start, np.array(data["handles"]))
 
     def load_together(self, comm: MPI.Comm) -> Saved | None:
-        """The same on all processes, errors too; None if there is no file yet."""
+        """The same on all processes, errors too; None if the file does not exist yet."""
         return from_one(comm, lambda: self.load() if self.path.exists() else None)
 
 
@@ -183,7 +183,7 @@ def fingerprint(
     regulariser: Regulariser,
     optimiser: Optimiser,
 ) -> dict[str, object]:
-    """What is minimised and how, as plain data that a checkpoint must agree with."""
+    """The problem and its optimiser as plain data, with which a checkpoint must agree."""
     fidelity, mechanism = simulation.fidelity, simulation.scene.mechanism
     return {
         "mechanism": mechanism.name,

@@ -10,7 +10,7 @@ With û = ∂u/∂y · x at all nodes, pressures included where links have some 
 
 The first part is a form, differentiated symbolically: elements know X₀ + d, and so do effects whose energy is a form.
 The second part is derived by hand. An interface node moves with its body, u_i = t + (R − I)(X_i − X_b): where it was
-drawn enters its displacement through G, which is no form. The work of forces at points is no form either; they stay at
+drawn enters its displacement through G, which is not a form. Nor is the work of forces at points; they stay at
 the same place of their cell, or of their body, so that it depends on d through the displacements of nodes alone, and
 the nodal forces r hold it.
 

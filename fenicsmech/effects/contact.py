@@ -41,8 +41,8 @@ class Contact(Effect):
     Penetration falls as 1 / stiffness, while Newton's method takes the more iterations where contact changes. Obstacles
     act once the motors have moved: a configuration whose rigid assembly is on the far side of an obstacle stays there.
     From there on flexible links cannot slip through a cylinder: no state in which they reach a quarter of its radius
-    deep is taken. In space a pressed edge also feels its flat faces inside of the obstacle, by a share of the order of
-    penetration over depth.
+    deep is taken. In space a pressed edge also feels its flat faces inside of the obstacle, by a part of the order
+    of penetration over depth.
 
     Raises:
         DescriptionError: a number makes no sense, or what a link of this kind needs is missing.
@@ -55,13 +55,13 @@ class Contact(Effect):
 
     def __post_init__(self) -> None:
         if not isinstance(self.link, Link):
-            raise DescriptionError("contact", f"{self.link!r} is no link", "Give a rigid or a flexible link")
+            raise DescriptionError("contact", f"{self.link!r} is not a link", "Give a rigid or a flexible link")
         part = f"contact of {self.link.name!r}"
         if self.stiffness is not None:
             object.__setattr__(self, "stiffness", positive(f"stiffness of {part}", self.stiffness))
         object.__setattr__(self, "points", points(f"points of {part}", self.points, least=0, dimensions=(2, 3)))
         if not isinstance(self.obstacle, Obstacle):
-            raise DescriptionError(part, f"{self.obstacle!r} is no obstacle", "Give a Cylinder(…) or HalfPlane(…)")
+            raise DescriptionError(part, f"{self.obstacle!r} is not an obstacle", "Give a Cylinder(…) or HalfPlane(…)")
         match self.link:
             case RigidLink() if not self.points or self.stiffness is None:
                 raise DescriptionError(
@@ -87,20 +87,20 @@ class Contact(Effect):
         gap = self.obstacle.gap_form(fields.position, fields.mesh)
         inside = -gap
         if self.obstacle.core is not None:
-            # like an inverted element, what no solution may be found beyond
+            # NaN, as in an inverted element: no solution lies beyond
             lost = ufl.lt(gap, fem.Constant(fields.mesh, -self.obstacle.core))
             inside = ufl.conditional(lost, fem.Constant(fields.mesh, np.nan), inside)
         inside = ufl.conditional(ufl.lt(gap, 0.0), inside, 0.0)
-        density = 0.5 * self._stiffness(fields) * inside**2
+        density = 0.5 * self._stiffness(self.link, fields) * inside**2
         return fields.boundary_integral(density, Faces(self.link), degree=2 * fields.order)
 
-    def _stiffness(self, fields: LinkFields):
+    def _stiffness(self, link: FlexibleLink, fields: LinkFields):
         """κ in UFL."""
         if self.stiffness is not None:
             return fem.Constant(fields.mesh, self.stiffness)
         height = fields.dim * ufl.CellVolume(fields.mesh) / ufl.FacetArea(fields.mesh)
         # ten times more costs slender links several times the iterations
-        return fem.Constant(fields.mesh, 0.1 * self.link.material.law.E) / height
+        return fem.Constant(fields.mesh, 0.1 * link.material.law.E) / height
 
     def pose_potentials(self, linkage):
         if not isinstance(self.link, RigidLink):
@@ -156,13 +156,13 @@ class ContactGauge:
     def __init__(self, contact: Contact, fields: LinkFields) -> None:
         self._obstacle, self._fields = contact.obstacle, fields
         self._form = compile_form(-ufl.derivative(contact.link_energy(fields), fields.u))
-        facets = fields.boundaries[Faces(contact.link)].facets
+        (faces,) = contact.faces
         V = fields.u.function_space
         self._design, self._forces = fem.Function(V), fem.Function(V)
-        self._nodes = fem.locate_dofs_topological(V, fields.dim - 1, facets)
+        self._nodes = fem.locate_dofs_topological(V, fields.dim - 1, fields.boundaries[faces].facets)
 
     def force(self) -> np.ndarray:
-        """What the obstacle exerts on the link, (dim,)."""
+        """The force of the obstacle on the link, (dim,)."""
         # shape functions sum up to one: so do nodal forces to the resultant
         force = assemble_vector(self._form, self._forces).reshape(-1, self._fields.dim).sum(axis=0)
         return self._fields.mesh.comm.allreduce(force, op=MPI.SUM)

@@ -1,4 +1,4 @@
-"""What the energies of effects are written in: the fields of flexible links, and the poses of bodies."""
+"""Terms of the energies of effects: the fields of flexible links, and the poses of bodies."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class LinkFields:
     Attributes:
         links: all flexible links.
         body: the links as one body.
-        boundaries: where the parts of links' boundaries are that effects ask for.
+        boundaries: the parts of links' boundaries that effects ask for.
     """
 
     links: tuple[FlexibleLink, ...]
@@ -32,7 +32,7 @@ class LinkFields:
 
     @property
     def model(self) -> ElasticModel:
-        """What is assumed about the third dimension."""
+        """The assumption about the third dimension."""
         return self.body.model
 
     @property
@@ -66,7 +66,7 @@ class LinkFields:
 
     @property
     def position(self):
-        """x = X + u, where material points are."""
+        """x = X + u, the positions of material points."""
         return self.body.rest + self.u
 
     @property
@@ -115,7 +115,7 @@ class PosePotential(ABC):
 
     Attributes:
         bodies: indices of the bodies.
-        holds: whether it acts in full from the start, instead of growing with the share.
+        holds: whether it acts in full from the start, instead of growing with the load factor.
     """
 
     bodies: tuple[int, ...]

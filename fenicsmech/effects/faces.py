@@ -1,7 +1,7 @@
 """Parts of the boundaries of flexible links: their facets, and measures to integrate over them.
 
 Facets are tagged by the set of requested parts they belong to, so that parts may overlap; facets of no part are not
-tagged and cost nothing. Where only half of the links is meshed, its facets on the mid-plane are no boundary of theirs.
+tagged and cost nothing. Where only half of the links is meshed, its facets on the mid-plane do not count.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ class Faces:
 
     Attributes:
         link: the link.
-        where: is given positions on the boundary of the drawn link, (n, dim), all at once, and tells those on the part
-            from others, (n,); a facet belongs to the part if all its corners do. None for the whole boundary.
+        where: from positions on the boundary of the drawn link, (n, dim), whether each is on the part, (n,); a facet
+            belongs to the part if all its corners do. None for the whole boundary.
     """
 
     link: FlexibleLink
@@ -38,7 +38,7 @@ class Faces:
 
 @dataclass(frozen=True)
 class Boundary:
-    """Where ``Faces`` are on the reference mesh.
+    """``Faces`` on the reference mesh.
 
     Attributes:
         facets: this rank's facets.
@@ -54,7 +54,8 @@ class Boundary:
 
     def is_closed(self, comm: MPI.Comm) -> bool:
         """Whether the facets of all ranks together, with their mirror images, have no rim."""
-        rims, joined = Counter(), set()
+        rims: Counter[tuple[int, ...]] = Counter()
+        joined: set[int] = set()
         for found, mirrored in comm.allgather((self.corners, self.joined)):
             joined.update(found[mirrored].tolist())
             for facet in np.sort(found, axis=1).tolist():
@@ -70,7 +71,7 @@ def find_boundaries(
     *,
     half: bool = False,
 ) -> dict[Faces, Boundary]:
-    """Where each of ``faces`` is.
+    """The boundary of each of ``faces``.
 
     Args:
         mesh: the mesh of all links.

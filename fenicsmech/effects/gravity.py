@@ -27,7 +27,7 @@ class Mass:
         at: its centre as drawn.
 
     Raises:
-        DescriptionError: the mass is not positive, or the centre is no point.
+        DescriptionError: the mass is not positive, or the centre is not a point.
     """
 
     mass: float
@@ -71,7 +71,7 @@ class Gravity(Effect):
                 )
         for link in self.masses:
             if link not in mechanism.rigid_links:
-                raise DescriptionError("gravity", f"{link!r} is no rigid link of {mechanism.name!r}", "Leave it out")
+                raise DescriptionError("gravity", f"{link!r} is not a rigid link of {mechanism.name!r}", "Leave it out")
         if dim == 2 and in_dimension(self.acceleration, 3)[2] != 0.0:
             raise DescriptionError(
                 "gravity", f"{self.acceleration} leaves the plane", "Simulate in space, or give two coordinates"

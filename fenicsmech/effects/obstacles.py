@@ -60,7 +60,7 @@ class HalfPlane(Obstacle):
         normal: n, out of the obstacle; any length.
 
     Raises:
-        DescriptionError: they are no point and no direction.
+        DescriptionError: they are not a point and a direction.
     """
 
     point: tuple[float, ...]
@@ -113,7 +113,7 @@ class Cylinder(Obstacle):
         radius: R.
 
     Raises:
-        DescriptionError: they are no point and no positive number.
+        DescriptionError: they are not a point and a positive number.
     """
 
     centre: tuple[float, float]

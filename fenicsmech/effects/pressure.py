@@ -36,14 +36,14 @@ class Pressure(Effect):
     Attributes:
         link: the link.
         pressure: into the link; negative for suction.
-        where: is given positions on the boundary of the drawn link, (n, dim), all at once, and tells those that are
-            pressed on from others, (n,): facets whose corners all are. None: the whole boundary.
+        where: from positions on the boundary of the drawn link, (n, dim), whether each is pressed on, (n,): facets
+            whose corners all are. None: the whole boundary.
         about: x₀; to be given for an open part, and a promise that its rim is held or moves as said above. In space
             two coordinates are an axis along z, which suits holes through extruded links, and their sides.
 
     Raises:
-        DescriptionError: a number makes no sense, or this is no flexible link. Later, when the link is meshed: the part
-            is open without a point to go ``about``, or empty.
+        DescriptionError: a number makes no sense, or the link is not flexible. Later, when it is meshed: the part is
+            open without a point to go ``about``, or empty.
     """
 
     link: FlexibleLink
@@ -53,7 +53,7 @@ class Pressure(Effect):
 
     def __post_init__(self) -> None:
         if not isinstance(self.link, FlexibleLink):
-            raise DescriptionError("pressure", f"{self.link!r} is no flexible link", "Give one")
+            raise DescriptionError("pressure", f"{self.link!r} is not a flexible link", "Give one")
         object.__setattr__(self, "pressure", finite(f"pressure on {self.link.name!r}", self.pressure))
         if self.about is not None:
             object.__setattr__(self, "about", point(f"centre of the pressure on {self.link.name!r}", self.about))

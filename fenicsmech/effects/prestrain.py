@@ -25,7 +25,7 @@ class Prestrain(Effect):
         along: direction of the drawn link in which it is stretched; None: in all directions, depth included.
 
     Raises:
-        DescriptionError: this is no flexible link, the stretch is not positive, or the direction is none.
+        DescriptionError: this is not a flexible link, the stretch is not positive, or the direction is none.
     """
 
     link: FlexibleLink
@@ -34,7 +34,7 @@ class Prestrain(Effect):
 
     def __post_init__(self) -> None:
         if not isinstance(self.link, FlexibleLink):
-            raise DescriptionError("prestrain", f"{self.link!r} is no flexible link", "Give one")
+            raise DescriptionError("prestrain", f"{self.link!r} is not a flexible link", "Give one")
         object.__setattr__(self, "stretch", positive(f"prestrain of {self.link.name!r}", self.stretch))
         if self.along is not None:
             object.__setattr__(self, "along", direction(f"direction of prestrain of {self.link.name!r}", self.along))

@@ -32,7 +32,7 @@ from fenicsmech.compat import (
     evaluate_expression,
 )
 from fenicsmech.elasticity.fields import BodyFields, Growth, Stretch
-from fenicsmech.elasticity.models import ElasticModel, cauchy_stress
+from fenicsmech.elasticity.models import ElasticModel, PlaneStress, cauchy_stress
 from fenicsmech.errors import DescriptionError
 from fenicsmech.laws import Law
 from fenicsmech.mechanism import Material
@@ -115,7 +115,7 @@ class ElasticBody(BodyFields):
         self._effects = tuple(effects)
         self._growth = None
         if any(stretches):
-            self._growth = Growth(stretches, self.cellwise, free=free, dim=model.dim, share=self.share)
+            self._growth = Growth(stretches, self.cellwise, free=free, dim=model.dim, load_factor=self.load_factor)
         kinds = [(str(type(m.law)), *m.law.parameters, own) for m, own in zip(materials, mixed, strict=True)]
         known = sorted(set(kinds), key=str)
         kind_of_cell = np.array([known.index(kind) for kind in kinds])[link]
@@ -131,7 +131,7 @@ class ElasticBody(BodyFields):
     @cached_property
     def energy_ufl(self) -> ufl.Form:
         """E(u, d), the energy of effects included, symbolic; everything else is a derivative of it."""
-        return self._strain_ufl if self.effects_ufl is None else self._strain_ufl + self.share * self.effects_ufl
+        return self._strain_ufl if self.effects_ufl is None else self._strain_ufl + self.load_factor * self.effects_ufl
 
     @cached_property
     def effects_ufl(self) -> ufl.Form | None:
@@ -176,6 +176,7 @@ class ElasticBody(BodyFields):
 
     def contraction_energy(self, weight, *, degree: int) -> ufl.Form:
         """½ ∫ w E (F₃₃ − 1)² dV with a scalar field w, of links in plane stress."""
+        assert isinstance(self.model, PlaneStress), "links contract freely in plane stress alone"
         H, terms = self._elastic(self.gradient(self.u)), []
         for term in self._terms:
             density = 0.5 * weight * term.law.E * self.model.contraction(term.law, H) ** 2
@@ -209,14 +210,14 @@ class ElasticBody(BodyFields):
         return assemble_vector(form, self._sums[0]).copy()
 
     @property
-    def shares(self) -> bool:
-        """Whether the energy depends on the share."""
+    def depends_on_load_factor(self) -> bool:
+        """Whether the energy depends on the load factor."""
         return self.effects_ufl is not None or self._growth is not None
 
-    def share_residuals(self) -> np.ndarray:
-        """The derivative of ``residuals`` by the share."""
+    def load_factor_residuals(self) -> np.ndarray:
+        """The derivative of ``residuals`` by the load factor."""
         found = np.zeros(sum(map(len, self.split(self.values()))))
-        for part, form, work in zip(self.split(found), self._share_forms, self._sums, strict=False):
+        for part, form, work in zip(self.split(found), self._load_factor_forms, self._sums, strict=False):
             part[:] = assemble_vector(form, work)
         return found
 
@@ -239,6 +240,7 @@ class ElasticBody(BodyFields):
 
         Volumes resist with p² / μ per volume once shear has done what it can.
         """
+        assert self.pressure is not None, "no link is in the u–p formulation"
         mixed = [term for term in self._terms if term.mixed]
         form = _sum(self._volume * 2 * (1 + term.law.nu) / term.law.E * term.dx for term in mixed)
         volume = self.mesh.comm.allreduce(fem.assemble_scalar(compile_form(form)))
@@ -266,7 +268,9 @@ class ElasticBody(BodyFields):
     def _density(self, term: _Term, H):
         """W, or Π, of the elastic gradient H."""
         strain = self.model.strain(term.law, H)
-        return term.law.mixed_energy(strain, self.pressure.p) if term.mixed else term.law.energy(strain)
+        if self.pressure is None or not term.mixed:
+            return term.law.energy(strain)
+        return term.law.mixed_energy(strain, self.pressure.p)
 
     @property
     def _volume(self):
@@ -279,11 +283,11 @@ class ElasticBody(BodyFields):
         return compile_form(self._strain_ufl)
 
     @cached_property
-    def _share_forms(self) -> list:
-        """The derivatives of ``residual_forms`` by the share; only growth has one of ∂E/∂p."""
+    def _load_factor_forms(self) -> list:
+        """The derivatives of ``residual_forms`` by the load factor; only growth has one of ∂E/∂p."""
         terms = [self.effects_ufl] if self.effects_ufl is not None else []
         if self._growth is not None:
-            terms.append(ufl.diff(self._strain_ufl, self._growth.share))
+            terms.append(ufl.diff(self._strain_ufl, self._growth.load_factor))
         concerned = self.fields if self._growth is not None else [self.u]
         return [compile_form(ufl.derivative(_sum(terms), field)) for field in concerned]
 

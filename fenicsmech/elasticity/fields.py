@@ -33,7 +33,7 @@ from fenicsmech.mechanism import Material
 
 
 class BodyFields:
-    """What an elastic body is computed from: the state it is in, and what it is made of.
+    """State, shape and materials of an elastic body.
 
     Args:
         mesh: reference mesh.
@@ -52,7 +52,7 @@ class BodyFields:
         pressure: of the links in the u–p formulation, P_(order − 1); None if no link is.
         parameters: of the links' laws by name, each with one value per cell; changing them needs no compiling.
         depth: one value per cell.
-        share: how much of the effects acts.
+        load_factor: of the effects.
     """
 
     def __init__(
@@ -77,9 +77,9 @@ class BodyFields:
         }
         self.depth = self.cellwise(depths)
         self.pressure = None if pressed is None else PressureField(mesh, order - 1, pressed)
-        self.share = fem.Constant(mesh, PETSc.ScalarType(1.0))
+        self.load_factor = fem.Constant(mesh, PETSc.ScalarType(1.0))
 
-    def cellwise(self, per_link: Sequence[float]) -> fem.Function:
+    def cellwise(self, per_link: Sequence[float] | np.ndarray) -> fem.Function:
         """A field with one value per cell from one value per link, (links,)."""
         function = fem.Function(cellwise_space(self.mesh))
         function.x.array[: len(self._link)] = np.asarray(per_link, dtype=float)[self._link]
@@ -172,7 +172,7 @@ class BodyFields:
 
 @dataclass(frozen=True)
 class Stretch:
-    """How much longer a link is without strain than drawn.
+    """The strain-free length of a link over the drawn one.
 
     Attributes:
         ratio: λ.
@@ -191,34 +191,34 @@ class Growth:
         cellwise: makes a field with one value per cell from one value per link, (links,).
         free: whether each local cell can deform; the others do not grow, (cells,).
         dim: of the model; planar ones are free to grow in depth.
-        share: s, as a constant.
+        load_factor: s.
     """
 
     def __init__(
         self,
         stretches: Sequence[Stretch | None],
-        cellwise: Callable[[Sequence[float]], fem.Function],
+        cellwise: Callable[[Sequence[float] | np.ndarray], fem.Function],
         *,
         free: np.ndarray,
         dim: int,
-        share: fem.Constant,
+        load_factor: fem.Constant,
     ) -> None:
-        stretches = [stretch or Stretch(1.0, None) for stretch in stretches]
-        self.share = ufl.variable(share)
-        self._excess = cellwise([stretch.ratio - 1.0 for stretch in stretches])
+        every = [stretch or Stretch(1.0, None) for stretch in stretches]
+        self.load_factor = ufl.variable(load_factor)
+        self._excess = cellwise([stretch.ratio - 1.0 for stretch in every])
         self._excess.x.array[np.flatnonzero(~free)] = 0.0
-        self._power = cellwise([3.0 if stretch.along is None else 1.0 for stretch in stretches])
-        tensors = np.array([np.eye(dim) if s.along is None else np.outer(s.along, s.along) for s in stretches])
+        self._power = cellwise([3.0 if stretch.along is None else 1.0 for stretch in every])
+        tensors = np.array([np.eye(dim) if s.along is None else np.outer(s.along, s.along) for s in every])
         parts = {(i, j): cellwise(tensors[:, i, j]) for i in range(dim) for j in range(i, dim)}
         self._tensor = ufl.as_matrix([[parts[min(i, j), max(i, j)] for j in range(dim)] for i in range(dim)])
 
     def elastic(self, H):
         """H_e in UFL."""
-        grown = self.share * self._excess
+        grown = self.load_factor * self._excess
         inverse = -grown / (1 + grown) * self._tensor
         return H + inverse + ufl.dot(H, inverse)
 
     @property
     def volume(self):
         """det F_p in UFL, the growth of depth included."""
-        return (1 + self.share * self._excess) ** self._power
+        return (1 + self.load_factor * self._excess) ** self._power

@@ -26,7 +26,7 @@ LOCKING = 0.49
 
 
 class Formulation(ABC):
-    """How links of nearly incompressible material are treated."""
+    """Treatment of links of nearly incompressible material."""
 
     @abstractmethod
     def mixed(self, materials: Sequence[Material], model: ElasticModel, order: int) -> tuple[bool, ...]:
@@ -53,7 +53,7 @@ class MixedFormulation(Formulation):
     displacements, displacements are alone.
 
     Attributes:
-        above: the limit, at least 0: there is no pressure without resistance to changes of volume.
+        above: the limit, at least 0: a pressure needs resistance to changes of volume.
 
     Raises:
         DescriptionError: the limit is not in [0, 0.5).

@@ -8,9 +8,9 @@ K̂ is the Hessian of the Lagrangian by all degrees of freedom, those on interfa
          [−a_uᵀ   , −a_zᵀ, 0   , 0   ]]
 
 and G the map from the scaled unknowns. K̂ is stored by the blocks of its nodes, into which element matrices go in half
-the time; products of sparse matrices want it by entries. The product over all unknowns is formed for those who ask for
-it. Others need no more than its stiffness by blocks of nodes, its columns of the border, and Pᵀ KKT P = (G P)ᵀ K̂ (G P)
-for a narrow P.
+the time; products of sparse matrices want it by entries. The product over all unknowns is formed on
+demand. Two-level solvers need only its stiffness by blocks of nodes, its columns of the border, and
+Pᵀ KKT P = (G P)ᵀ K̂ (G P) for a narrow P.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What joints and motors exert, from the multipliers: the constraint force on s is Aᵀλ."""
+"""Reactions of joints and motors from the multipliers: the constraint force on s is Aᵀλ."""
 
 from __future__ import annotations
 

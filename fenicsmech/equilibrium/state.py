@@ -77,6 +77,6 @@ class Step:
 def load_fields(elastic: ElasticBody, interfaces: InterfaceMap, state: State) -> None:
     """Makes the fields of ``elastic`` hold ``state``, with interface nodes on their bodies."""
     elastic.take(state.u)
-    elastic.share.value = state.load_factor
+    elastic.load_factor.value = state.load_factor
     elastic.update()
     interfaces.place(state.poses)

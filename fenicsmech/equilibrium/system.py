@@ -283,8 +283,8 @@ class EquilibriumSystem:
     def load_factor_rate(self, state: State) -> PETSc.Vec:
         """… the load factor of the constant loads."""
         links, border = self._border.load_factor_rate(state)
-        if self.elastic.shares:
-            links -= self.elastic.share_residuals()
+        if self.elastic.depends_on_load_factor:
+            links -= self.elastic.load_factor_residuals()
         return self.unknowns.apply_transpose(links, border)
 
     def target_rate(self) -> PETSc.Vec:

@@ -1,4 +1,4 @@
-"""How far results are from those of infinitely fine elements, or of a model in space.
+"""Estimates of the errors of elements and of plane stress, and the fidelity chosen by them.
 
 - ``estimates``: goal-oriented error estimates at equilibria
 - ``element_error``: of elements, by ``recovery`` of gradients

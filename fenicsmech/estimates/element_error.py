@@ -1,4 +1,4 @@
-"""How far a displacement or force is from that of infinitely fine elements on the same outline: an estimate.
+"""Discretisation error of a displacement or force: the difference from infinitely fine elements on the same outline.
 
 With the errors e_u of the displacement and e_z of the adjoint z of the quantity Q, to first order
 

@@ -1,4 +1,4 @@
-"""What plane stress gets wrong: pins hold links all through their depth, so that near them links cannot contract there.
+"""Error of plane stress: pins hold links all through their depth, so that near them links cannot contract there.
 
 Blocked contraction stores the energy
 
@@ -46,7 +46,7 @@ class PlaneStressError:
         if space is not PLANE_STRESS:
             raise DescriptionError(
                 "modelling error",
-                f"there is no estimate for space={space.name!r}",
+                f"only plane stress has an estimate, and space={space.name!r}",
                 "Simulate in plane stress, or in 3D",
             )
         self._model, self._decay = model, decay

@@ -1,4 +1,4 @@
-"""Revolute joint: two bodies share a point and an axis, and turn about it."""
+"""Revolute joint: two bodies with a common point and axis, about which they turn."""
 
 from fenicsmech.joints.joint import JointKind
 

@@ -1,4 +1,4 @@
-"""Spherical joint: two bodies share a point."""
+"""Spherical joint: two bodies with a common point."""
 
 from fenicsmech.joints.joint import JointKind
 

@@ -1,4 +1,4 @@
-"""Universal (Cardan) joint: two bodies share a point and the two arms of a cross."""
+"""Universal (Cardan) joint: two bodies joined by a cross, whose arms each turn in one of them."""
 
 from fenicsmech.joints.joint import JointKind
 

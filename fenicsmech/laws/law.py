@@ -29,7 +29,8 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from copy import copy
-from dataclasses import dataclass, fields
+from dataclasses import Field, dataclass, fields
+from typing import Any, ClassVar
 
 from ufl import Identity, conditional, det, inner, ln, lt, tr
 from ufl.core.expr import Expr
@@ -93,6 +94,7 @@ class Law(ABC):
 
     E: float | Expr
     nu: float | Expr
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]  # of the derived class
 
     @abstractmethod
     def energy(self, strain: Strain) -> Expr:
@@ -122,7 +124,7 @@ class Law(ABC):
     @property
     def parameters(self) -> dict[str, float]:
         """Every number of the law by name; those of a tuple are counted: alpha0, alpha1, …"""
-        found = {}
+        found: dict[str, float] = {}
         for field in fields(self):
             value = getattr(self, field.name)
             counted = [(f"{field.name}{k}", v) for k, v in enumerate(value)] if isinstance(value, tuple) else None

@@ -89,7 +89,7 @@ class Drive:
         ratios: (motor, ratio) pairs, or a mapping; motors that all turn or all slide.
 
     Raises:
-        DescriptionError: there is no motor, a ratio is zero or not a number, or some motors turn and others slide.
+        DescriptionError: there are no motors, a ratio is zero or not a number, or some motors turn and others slide.
     """
 
     name: str

@@ -16,7 +16,7 @@ Geometry that other layers use too
 Each kind of link has its file: ``strip``, ``outline`` (with ``plane_curves``) and ``part_files``. It implements the
 functions of ``request``, which ``link_mesher`` calls before it checks what every mesh must satisfy. Links that are the
 same all through their depth are drawn in the plane, cut by their interfaces (``cutting``) and extruded (``planar``).
-Only ``gmsh_session`` starts gmsh, only ``distribute`` knows of finite elements and of parallel ranks.
+Only ``gmsh_session`` starts gmsh; only ``distribute`` makes dolfinx meshes, over parallel ranks.
 """
 
 from fenicsmech.meshing import outline, part_files, strip  # noqa: F401  (each registers its shapes)

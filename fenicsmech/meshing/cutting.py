@@ -135,7 +135,7 @@ def mesh_fragments(
     pieces, origins = occ.fragment(bodies, cutters) if cutters else (bodies, [[body] for body in bodies])
     link = sorted(set().union(*origins[: len(bodies)]))
     held = [set(origin) for origin in origins[len(bodies) :]]
-    # what sticks out of the link goes, with its boundary: recursion spares entities that the link still needs
+    # parts of cutters outside the link go, with their boundaries; recursion spares entities of the link
     occ.remove(sorted(set(pieces) - set(link)), recursive=True)
     occ.synchronize()
     holders = [request.holder([k for k, origin in enumerate(held) if piece in origin]) for piece in link]

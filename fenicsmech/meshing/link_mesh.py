@@ -25,7 +25,7 @@ from fenicsmech.polygons import edge_loops, signed_area
 
 FREE = -1
 
-_LEAST_VOLUME = 0.3  # of that of the straight cell, where its curved edges squeeze it most
+_LEAST_VOLUME = 0.3  # least det ∂(X₀ + c)/∂X₀ in a cell
 
 
 @dataclass(frozen=True, eq=False)

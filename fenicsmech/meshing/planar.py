@@ -4,9 +4,9 @@ CAD kernels compare lengths with absolute tolerances, so a link in metres would 
 in millimetres. Shapes are therefore built in units of the element size, rounded to 1e-10 of it: descriptions that
 differ by their unit only give the same numbers, and the same mesh but for rounding.
 
-The layers of tetrahedra repeat the triangulation of the plan, so that plane and spatial models share it. Fields that
-are the same all through the depth are fields on the plan: on tetrahedra whose vertices stand on the three corners of a
-triangle such a field has exactly no gradient along z.
+The layers of tetrahedra repeat the triangulation of the plan, as in a plane model. Fields that are the same all
+through the depth are fields on the plan: on tetrahedra whose vertices stand on the three corners of a triangle such a
+field has exactly no gradient along z.
 """
 
 from __future__ import annotations

@@ -127,7 +127,7 @@ class MeshRequest:
         return candidates[0] if len(candidates) else FREE
 
     def overlap(self, first: int, second: int) -> MeshingError:
-        """The error that says that the sites ``first`` and ``second`` touch or overlap."""
+        """The error of sites ``first`` and ``second`` that touch or overlap."""
         one, other = self.sites[first], self.sites[second]
         return MeshingError(
             self.part,

@@ -24,7 +24,7 @@ from fenicsmech.meshing.planar import PlaneDrawing, in_units_of, mesh_planar
 from fenicsmech.meshing.request import InterfaceSite, MeshRequest, check_shape, holds, mesh_shape
 from fenicsmech.polygons import first_crossing
 
-_ON_CENTRELINE = 1e-3  # of the thickness: what rounded coordinates may deviate
+_ON_CENTRELINE = 1e-3  # of the thickness: deviation of rounded coordinates
 
 
 @mesh_shape.register
@@ -177,7 +177,7 @@ class _Pin:
             at, offset = foot, 0.0
         inward = centreline.tangent(s) * (1.0 if nearer == 0.0 else -1.0)
         # the polygon that stands for a circle does not resolve differences of the radius below a chord's height
-        # r (1 − cos(π/n)): an element does not fit into what is thinner than that, and than 2 % of the strip
+        # r (1 − cos(π/n)): gaps thinner than that, and than 2 % of the strip, are closed
         height = radius * (1.0 - math.cos(math.pi / circle_segments(radius, 1.0)))
         radius = half if abs(radius - half) <= min(height, 0.02 * half) else radius
         placed = replace(site, at=(*at.tolist(), *site.at[2:]), region=Disc(radius))
@@ -289,7 +289,7 @@ def _parallel(centreline: Centreline, s: np.ndarray, offset: float) -> np.ndarra
 
 
 def _points(side: Sequence[np.ndarray]) -> list[list[int]]:
-    """The points of a side in the model, piece by piece; neighbouring pieces share one."""
+    """The points of a side in the model, piece by piece; neighbouring pieces have one in common."""
     pieces: list[list[int]] = []
     for piece in side:
         shared = pieces[-1][-1:] if pieces else []

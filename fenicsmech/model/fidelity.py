@@ -1,4 +1,4 @@
-"""How finely a scene is computed, as users say it."""
+"""Fidelity: the elastic model, the elements and the formulation that a scene is computed with."""
 
 from __future__ import annotations
 

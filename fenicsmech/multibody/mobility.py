@@ -98,7 +98,7 @@ class Motion:
         return self.velocity[body] + _cross(self.spin[body], offsets)
 
     def fastest(self, length: float) -> float:
-        """The largest velocity of a body's centre, or of what is ``length`` away from it."""
+        """The largest velocity of a body's centre, or of a point at the distance ``length`` from it."""
         spins = np.linalg.norm(self.spin, axis=1) * length
         return float(max(np.max(np.linalg.norm(self.velocity, axis=1)), np.max(spins)))
 

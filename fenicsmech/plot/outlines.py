@@ -33,7 +33,7 @@ def rigid_outline(points: ArrayLike, width: float) -> Reals:
     """
     joints = real_array("joints of a rigid link", points, None, 2)
     if not len(joints):
-        raise DescriptionError("outline of a rigid link", "there is no joint", "Give at least one point")
+        raise DescriptionError("outline of a rigid link", "there are no joints", "Give at least one point")
     if not (width > 0.0 and np.isfinite(width)):
         raise DescriptionError("outline of a rigid link", f"the width is {width}", "Give a positive width")
     angles = np.linspace(0.0, 2.0 * np.pi, 384, endpoint=False)  # of the polygon that stands for a disc
@@ -81,7 +81,9 @@ def plan_view(points: ArrayLike, tets: ArrayLike) -> PlanView:
     faces = np.where(inward[:, None], faces[:, [0, 2, 1]], faces)
     top = normal[:, 2] > 0.5 * np.linalg.norm(normal, axis=1)
     if not top.any():
-        raise DescriptionError("plan view of a solid mesh", "no face looks towards +z", "Extrude planar links along z")
+        raise DescriptionError(
+            "plan view of a solid mesh", "no face has a normal towards +z", "Extrude planar links along z"
+        )
     return PlanView(triangles=faces[top], cells=owner[top])
 
 

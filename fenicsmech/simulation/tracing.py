@@ -312,8 +312,8 @@ class CurveTracer:
     def _effects(self, state: State) -> float:
         """Sum of the sizes of all forces of effects that grow with the load factor."""
         model, total = self._model, 0.0
-        if model.elastic.shares:
-            local = float(np.abs(model.elastic.share_residuals()).sum())
+        if model.elastic.depends_on_load_factor:
+            local = float(np.abs(model.elastic.load_factor_residuals()).sum())
             total += model.mesh.mesh.comm.allreduce(local, op=MPI.SUM)
         for potential in model.potentials:
             if not potential.holds:

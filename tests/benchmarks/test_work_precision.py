@@ -4,7 +4,7 @@ import pytest
 from benchmarks.work_precision import ModellingError, WorkSeries, pareto_front, plot_work_precision
 from fenicsmech.errors import DescriptionError
 
-from ..plot.png import png_size, share_of_colour
+from ..plot.png import colour_fraction, png_size
 
 GREY, BLUE = (238, 238, 238), (33, 102, 172)
 
@@ -56,8 +56,8 @@ def test_a_plot_has_a_fixed_size_and_the_same_bytes_every_time(tmp_path):
 def test_the_uncertainty_of_the_reference_is_a_band(tmp_path):
     for name, uncertainty in (("without", 0.0), ("with", 0.004)):
         plot_work_precision(tmp_path / f"{name}.png", series()[:3], uncertainty=uncertainty)
-    assert share_of_colour(tmp_path / "with.png", GREY) > share_of_colour(tmp_path / "without.png", GREY) + 0.02
-    assert share_of_colour(tmp_path / "with.png", BLUE) > 0.0
+    assert colour_fraction(tmp_path / "with.png", GREY) > colour_fraction(tmp_path / "without.png", GREY) + 0.02
+    assert colour_fraction(tmp_path / "with.png", BLUE) > 0.0
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_points_that_cannot_be_drawn_are_refused(change, message):
 
 
 def test_a_plot_of_nothing_and_other_formats_are_refused(tmp_path):
-    with pytest.raises(DescriptionError, match="no point"):
+    with pytest.raises(DescriptionError, match="it has no points"):
         plot_work_precision(tmp_path / "a.png", [])
     with pytest.raises(DescriptionError, match="PNG"):
         plot_work_precision(tmp_path / "a.pdf", series())

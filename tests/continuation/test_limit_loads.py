@@ -1,4 +1,4 @@
-"""A load beyond a limit load is told as closely, and costs hardly more, however far beyond it lies."""
+"""Limit loads are located as closely, at hardly more cost, however far beyond them the load asked for lies."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_last_equilibrium_is_next_to_the_limit_load_and_has_lost_its_stiffness(b
 
 
 @pytest.mark.parametrize("beyond", BEYOND)
-def test_load_steps_after_the_first_tell_it_as_closely_and_a_load_on_the_way_back_is_reached(beyond):
+def test_load_steps_after_the_first_locate_it_as_closely_and_a_load_on_the_way_back_is_reached(beyond):
     path = LoadStepper(OneFreedom(), start(), LoadControl(), predictor=Hermite())
     path.advance(LoadControl(0.5))
     with pytest.raises(LoadStepsFailed) as failure:
@@ -99,7 +99,7 @@ def test_steps_of_a_led_force_and_of_constant_loads_do_not_depend_on_what_is_out
 
 
 @pytest.mark.parametrize("beyond", [3.0, 1e3, 1e5])
-def test_leap_is_told_next_to_the_limit_load(caplog, beyond):
+def test_snap_through_is_logged_next_to_the_limit_load(caplog, beyond):
     case = toggle.toggle(stilt_modulus=100.0)
     limit = toggle.force(np.linspace(0.0, toggle.RISE, 100001)).max()
     assert case.simulation.load_displacement(case.push, forces=[beyond * limit]).snapped_through.all()

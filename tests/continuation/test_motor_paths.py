@@ -55,7 +55,7 @@ def test_motor_whose_position_turns_back_is_followed_through_the_equilibria_of_t
     assert [frame.stable_under_control for frame in curve.frames] == curve.stable.tolist()
 
 
-def test_path_of_a_motor_ends_at_a_force_and_starts_where_the_configuration_says():
+def test_path_of_a_motor_ends_at_a_force_and_starts_at_the_configuration():
     simulation, motor, output = driven_toggle()
     free = simulation.follow(motor, until=fm.Until(position=-16.0, force=0.5))
     assert free.forces[-1] == pytest.approx(0.5, rel=1e-8)
@@ -96,7 +96,7 @@ def test_torque_of_the_crank_of_a_bistable_four_bar_is_that_of_beam_theory():
     assert rest == pytest.approx(-2.0 * level, rel=1e-2)  # the mirror image is free of strain
 
 
-def test_position_at_which_a_motor_turns_back_is_told_the_better_the_nearer():
+def test_position_at_which_a_motor_turns_back_is_found_the_better_the_nearer():
     simulation, motor, _ = driven_toggle()
     curve = simulation.follow(motor, until=fm.Until(position=-16.0))
     turning = curve.turning_points[0]
@@ -118,8 +118,8 @@ def test_column_that_a_slide_shortens_buckles_at_its_euler_load():
     (event,) = curve.bifurcations
     assert event.frame.force == pytest.approx(-critical, rel=1e-2)
     # from rest, without a path: Euler's, and four times as far the next one
-    told = [point.position for point in curve.buckling_positions(frame=curve.frames[0], count=2)]
-    assert told == pytest.approx([event.frame.displacement, 4.0 * event.frame.displacement], rel=1e-2)
+    found = [point.position for point in curve.buckling_positions(frame=curve.frames[0], count=2)]
+    assert found == pytest.approx([event.frame.displacement, 4.0 * event.frame.displacement], rel=1e-2)
     for branch in simulation.branches(curve, event, until=fm.Until(position=-1.0)):
         assert branch.displacements[-1] == pytest.approx(-1.0) and branch.stable[1:].all()
         assert branch.forces[-1] == pytest.approx(-critical, rel=1e-2)

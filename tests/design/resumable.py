@@ -32,7 +32,7 @@ class Slow(Regulariser):
         return lambda p: Quadratic.zero(len(p))
 
 
-class Told(fm.LevenbergMarquardt):
+class Logged(fm.LevenbergMarquardt):
     """Prints the number of each iterate after it has been seen."""
 
     def minimise(self, problem, start, *, watch):
@@ -53,7 +53,7 @@ def main(folder: Path, *, resume: bool) -> None:
         targets=case.targets,
         regulariser=Slow() + fm.ShapeBounds() + 1e-4 * fm.StayClose(),
     )
-    result = problem.optimise(optimiser=Told(), checkpoint=folder / "checkpoint.json", resume=resume)
+    result = problem.optimise(optimiser=Logged(), checkpoint=folder / "checkpoint.json", resume=resume)
     result.save(folder / "result.json")
 
 

@@ -26,7 +26,7 @@ def checkpoint(folder: Path, **changes) -> Checkpoint:
     return Checkpoint(folder / "checkpoint.json", {**PROBLEM, **changes})
 
 
-def test_what_was_saved_comes_back_to_the_last_bit(tmp_path):
+def test_a_saved_checkpoint_is_read_back_bitwise(tmp_path):
     saved, there = iterate(), checkpoint(tmp_path)
     there.save(saved, HANDLES)
     back = there.load()
@@ -97,7 +97,7 @@ def test_tuples_of_a_problem_are_those_of_its_file(tmp_path):
     "content",
     [b"", b"not a checkpoint", b"[1, 2]", b'{"format": "fenicsmech design 1"}', b"\xff\xfe\x00binary", b'{"format": 3'],
 )
-def test_what_is_no_checkpoint_is_refused(tmp_path, content):
+def test_a_file_that_is_not_a_checkpoint_is_refused(tmp_path, content):
     there = checkpoint(tmp_path)
     there.path.write_bytes(content)
     with pytest.raises(fm.DescriptionError, match="not a checkpoint"):

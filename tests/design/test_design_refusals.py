@@ -71,7 +71,7 @@ def test_a_link_that_looks_the_same_but_is_another():
 
 def test_a_rigid_link():
     tip = truss().scene.mechanism.rigid_links[-1]
-    refused(lambda: fm.SplineDesign(tip, 3), part="spline design", problem="no flexible link", remedy="Name one")
+    refused(lambda: fm.SplineDesign(tip, 3), part="spline design", problem="not a flexible link", remedy="Name one")
 
 
 def test_nothing_is_wanted():
@@ -79,18 +79,18 @@ def test_nothing_is_wanted():
     refused(lambda: case.problem(), part="design problem", problem="nothing is wanted", remedy="targets=")
 
 
-def test_what_is_no_target_or_no_design():
+def test_objects_that_are_not_targets_or_designs():
     case = truss(*REACHABLE)
     refused(
         lambda: Case(case.scene, case.designs, [(0.1, 2.0)]).problem(),
         part="design problem",
-        problem="no target",
+        problem="not a target",
         remedy="Target",
     )
     refused(
         lambda: Case(case.scene, [case.designs[0].link], case.targets).problem(),
         part="design problem",
-        problem="no design",
+        problem="not a design",
         remedy="SplineDesign",
     )
 
@@ -136,7 +136,7 @@ def test_targets_that_count_for_nothing(weight):
 
 
 def test_a_target_without_a_force():
-    refused(lambda: fm.Target("push", 0.1, 2.0), part="target", problem="no force", remedy="mechanism")
+    refused(lambda: fm.Target("push", 0.1, 2.0), part="target", problem="not a force", remedy="mechanism")
 
 
 def test_fewer_segments_than_gaps_between_joints():

@@ -53,8 +53,8 @@ def test_inserted_points_are_vertices_of_a_mesh_of_the_same_link(mesh, seed):
     expanded, inserted = mesh, []
     for cell in random.choice(np.flatnonzero(mesh.interface == FREE), 3, replace=False):
         # near a corner, near an edge, anywhere
-        share = random.dirichlet(np.full(mesh.dim + 1, (0.1, 0.5, 2.0)[len(inserted)]))
-        at = share @ mesh.points[mesh.cells[cell]]
+        weights = random.dirichlet(np.full(mesh.dim + 1, (0.1, 0.5, 2.0)[len(inserted)]))
+        at = weights @ mesh.points[mesh.cells[cell]]
         expanded, vertex = insert(expanded, at)
         inserted.append((vertex, at))
     for vertex, at in inserted[-1:]:

@@ -42,7 +42,7 @@ def test_displacement_sensitivities_hold_close_to_a_limit_point(gap):
 
 
 def lowered(model, by: float) -> None:
-    """Makes the arch of ``model`` lower by a share of its rise."""
+    """Makes the arch of ``model`` lower by a fraction of its rise."""
     positions = model.elastic.d.function_space.tabulate_dof_coordinates()
     fall = np.zeros((len(positions), 2))
     fall[:, 1] = -by * RISE * np.sin(np.pi * positions[:, 0] / SPAN)

@@ -43,7 +43,7 @@ def groups_of(processes: int, targets: int):
     ("processes", "targets", "groups"),
     [
         (1, 5, 1),  # alone
-        (2, 1, 1),  # nothing to share out
+        (2, 1, 1),  # nothing to distribute
         (2, 2, 2),
         (2, 3, 2),  # two rounds of one beat three rounds at 1.4 times the speed
         (4, 2, 2),

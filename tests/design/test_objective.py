@@ -73,8 +73,8 @@ def test_gradient_does_not_depend_on_the_way_to_a_design():
     for through in (0, 1, 2):
         whole, bench = objective(truss(*TARGETS), REGULARISER)
         p, direction = away(bench)
-        for share in np.linspace(0.0, 1.0, through + 1)[:-1]:
-            whole.evaluate(bench.rest.initial + share * (p - bench.rest.initial) + 0.01 * share * direction)
+        for fraction in np.linspace(0.0, 1.0, through + 1)[:-1]:
+            whole.evaluate(bench.rest.initial + fraction * (p - bench.rest.initial) + 0.01 * fraction * direction)
         here = whole.evaluate(p)
         seen.append([here.value, *here.gradient])
     for other in seen[1:]:
@@ -95,7 +95,7 @@ def test_values_that_are_of_no_use_are_refused_without_derivatives(monkeypatch):
         whole.evaluate(p, below=0.999 * value)
 
 
-def test_what_was_reached_is_that_of_the_last_evaluation_of_use():
+def test_reached_displacements_are_those_of_the_last_accepted_evaluation():
     whole, bench = objective(truss(*TARGETS), StayClose())
     assert np.all(np.isnan(whole.reached))
     value = whole.evaluate(bench.rest.initial).value
@@ -164,7 +164,7 @@ def test_any_number_of_processes_finds_the_same_value_and_derivatives(case, fide
 
 
 @pytest.mark.parallel
-def test_what_is_infeasible_in_one_group_is_so_in_all():
+def test_a_design_infeasible_in_one_group_is_infeasible_in_all():
     whole, bench = objective(truss((0.1, 2.0), (1e4, 5.0)), StayClose(), comm=MPI.COMM_WORLD)
     with pytest.raises(Infeasible, match="push on tip"):
         whole.evaluate(bench.rest.initial)

@@ -61,7 +61,7 @@ def test_all_processes_save_one_file(shared_tmp_path):
     assert [path.name for path in shared_tmp_path.iterdir()] == ["design.json"]
 
 
-def test_what_was_saved_comes_back_equal(tmp_path):
+def test_a_saved_design_is_read_back_equal(tmp_path):
     path = tmp_path / "new folder" / "design.json"
     RESULT.save(path)
     assert DesignResult.load(path) == RESULT
@@ -101,7 +101,7 @@ def test_summaries_look_at_all_links_and_targets():
 @pytest.mark.parametrize(
     "content", [b"", b"junk", b"[]", b"{}", b'{"format": "fenicsmech checkpoint 1"}', b"\xff\xfebinary", b'{"format"']
 )
-def test_what_is_no_design_is_refused(tmp_path, content):
+def test_a_file_that_is_not_a_design_is_refused(tmp_path, content):
     path = tmp_path / "junk.json"
     path.write_bytes(content)
     with pytest.raises(fm.DescriptionError, match="does not hold a design") as caught:

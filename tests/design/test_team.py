@@ -25,7 +25,7 @@ COMM = MPI.COMM_WORLD
 
 
 class Valley:
-    """r = (10 (y − x²), 1 − x), to which every process contributes its share; infeasible beyond x = 1.2."""
+    """r = (10 (y − x²), 1 − x), to which every process contributes a part; infeasible beyond x = 1.2."""
 
     def __init__(self) -> None:
         self.lengths, self.reached, self.asked = np.ones(2), np.zeros(2), 0
@@ -88,7 +88,7 @@ def test_a_start_without_a_value_is_refused_on_all_processes():
         minimise_together(COMM, Valley(), LevenbergMarquardt(), Start(np.array([2.0, 0.0])), watch=lambda i: None)
 
 
-def test_what_the_watcher_raises_ends_all_processes():
+def test_an_error_of_the_watcher_ends_all_processes():
     def full(iterate):
         if iterate.number == 2:
             raise OSError("no space left on device")

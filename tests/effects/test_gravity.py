@@ -106,6 +106,6 @@ def test_without_effects_no_form_term_is_added():
         (lambda block: Gravity((0, -G, 1.0), {NYLON: 1e-9}), "leaves the plane"),
     ],
 )
-def test_what_makes_no_sense_is_refused(make, message):
+def test_senseless_numbers_are_refused(make, message):
     with pytest.raises(DescriptionError, match=message):
         cantilever("plane-stress", lambda block: [make(block)])

@@ -73,20 +73,20 @@ def test_a_free_bar_of_rubber_does_so_without_pressure(space, stretch):
 
 
 @pytest.mark.parametrize("space", ["plane-strain", "3d"])
-def test_residuals_of_displacement_and_pressure_are_differentiated_by_the_share(space):
+def test_residuals_of_displacement_and_pressure_are_differentiated_by_the_load_factor(space):
     body = bar(space, 1.2, along=(0.8, 0.6), material=RUBBER)[0].model.elastic
     for field, size, seed in ((body.d, 0.1, 1), (body.u, 0.1, 2)):
         interpolate(field, wave(body.model.dim, size, seed=seed))
     body.pressure.p.x.array[:] = np.linspace(-30.0, 20.0, len(body.pressure.p.x.array))
     weights = np.random.default_rng(4).uniform(-1.0, 1.0, len(body.values()))
 
-    def at_share(values):
-        body.share.value = values[0]
+    def at_load_factor(values):
+        body.load_factor.value = values[0]
         return weights @ body.residuals()
 
-    body.share.value = 0.8
-    rate = weights @ body.share_residuals()
-    rates = taylor_rates(at_share, [0.8], [1.0], [rate], [0.1, 0.05, 0.025])
+    body.load_factor.value = 0.8
+    rate = weights @ body.load_factor_residuals()
+    rates = taylor_rates(at_load_factor, [0.8], [1.0], [rate], [0.1, 0.05, 0.025])
     assert rates.with_gradient.min() > 1.9
 
 
@@ -118,22 +118,22 @@ def test_energy_and_its_gradient_are_differentiated(space, along):
     work = fem.Function(body.u.function_space)
     for field, size, seed in ((body.d, 0.1, 1), (body.u, 0.1, 2), (work, 1.0, 3)):
         interpolate(field, wave(dim, size, seed=seed))
-    body.share.value = 0.8
+    body.load_factor.value = 0.8
     residual = ufl.derivative(body.energy_ufl, body.u, work)
     for form in (body.energy_ufl, residual):
         for field in (body.u, body.d):
             assert form_derivative(form, field, size=0.05, seed=5).rates.with_gradient[-1] > 1.95
 
-    # what the path of growing effects needs: the derivative of the residual by the share
+    # what the path of growing effects needs: the derivative of the residual by the load factor
     compiled = compile_form(residual)
     vector = work.x.array.copy()
-    rate = body.share_residuals()[: len(vector)] @ vector
+    rate = body.load_factor_residuals()[: len(vector)] @ vector
 
-    def at_share(values):
-        body.share.value = values[0]
+    def at_load_factor(values):
+        body.load_factor.value = values[0]
         return fem.assemble_scalar(compiled)
 
-    rates = taylor_rates(at_share, [0.8], [1.0], [rate], [0.1, 0.05, 0.025])
+    rates = taylor_rates(at_load_factor, [0.8], [1.0], [rate], [0.1, 0.05, 0.025])
     assert rates.with_gradient.min() > 1.9
 
 
@@ -161,7 +161,7 @@ def test_prestrain_without_sense_is_refused():
     (link,) = mechanism.flexible_links
     refused(lambda: Prestrain(link, 0.0), part="'bar'", problem="not positive", remedy="greater")
     refused(lambda: Prestrain(link, 1.1, (0, 0)), part="direction", problem="zero length", remedy="somewhere")
-    refused(lambda: Prestrain(mechanism.rigid_links[0], 1.1), part="prestrain", problem="no flexible", remedy="Give")
+    refused(lambda: Prestrain(mechanism.rigid_links[0], 1.1), part="prestrain", problem="not a flexible", remedy="Give")
     out = fm.Scene(mechanism, effects=[Prestrain(link, 1.1, (0, 0, 1))])
     refused(lambda: fm.Simulation(out, space="plane-stress", size=2.0), part="prestrain", problem="plane", remedy="two")
     twice = fm.Scene(mechanism, effects=[Prestrain(link, 1.1, (1, 0)), Prestrain(link, 1.2, (1, 0))])

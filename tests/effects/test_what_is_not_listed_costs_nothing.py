@@ -63,7 +63,7 @@ def test_a_bare_scene_has_three_forms_and_one_term(space, monkeypatch):
 def test_each_effect_adds_only_its_own(space, monkeypatch):
     bare = counts(monkeypatch, space)
     weight = counts(monkeypatch, space, [lambda m: fm.Gravity((0, -9810), {fm.ONYX: 1.2e-9})])
-    # its term, its density, and the form that tells how the residual grows with the share that acts
+    # its term, its density, and the form of the residual's derivative by the load factor
     assert (weight.terms, weight.forms, weight.body_potentials) == (bare.terms + 1, bare.forms + 2, 0)
     assert (weight.unknowns, weight.entries) == (bare.unknowns, bare.entries)
     spring = counts(monkeypatch, space, [lambda m: fm.JointSpring(m.joints[0], 5.0)])

@@ -53,7 +53,7 @@ def test_new_values_of_the_same_matrix_are_factored_anew():
 
 @pytest.mark.parallel
 def test_zero_pivots_are_found_instead_of_failing():
-    # two rows of zeros, as an unused multiplier or an idle freedom leaves them
+    # two rows of zeros, as an unused multiplier or a freedom without stiffness leaves them
     dense = np.zeros((SIZE + 2, SIZE + 2))
     dense[:SIZE, :SIZE] = with_eigenvalues(np.concatenate([[-1.0], np.linspace(0.5, 2.0, SIZE - 1)]))
     factor = Factor(distributed(dense, MPI.COMM_WORLD))

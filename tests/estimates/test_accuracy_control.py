@@ -88,7 +88,7 @@ def test_finer_levels_promise_smaller_errors_and_more_work():
         assert all(a.gain > b.gain and a.work < b.work for a, b in zip(levels[:-1], levels[1:], strict=True))
 
 
-def test_choice_tells_what_was_tried_and_what_ten_times_the_accuracy_would_cost():
+def test_choice_prints_what_was_tried_and_what_ten_times_the_accuracy_would_cost():
     choice = control(0.05).choose(Recorder(0.01, 0.01))
     text = str(choice)
     assert "chosen: plane stress P2" in text

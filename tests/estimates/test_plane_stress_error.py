@@ -1,4 +1,4 @@
-"""What plane stress leaves out is estimated: within a factor of two, and in the right direction."""
+"""The error of plane stress is estimated within a factor of two, and in the right direction."""
 
 from __future__ import annotations
 

@@ -143,14 +143,14 @@ def test_a_curve_may_set_in_where_edges_grow():
     assert np.flatnonzero(corners_of(polygon)).tolist() == [0, len(polygon) - 1]
 
 
-def test_a_triangle_and_a_rectangle_of_single_edges_stay_what_they_are():
+def test_a_triangle_and_a_rectangle_of_single_edges_keep_their_corners():
     for polygon in ([(0, 0), (4, 0), (0, 3)], [(0, 0), (4, 0), (4, 3), (0, 3)]):
         polygon = np.array(polygon, dtype=float)
         assert sampled(smooth_outline(polygon), 1e-3).tolist() == polygon.tolist()
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_uneven_edges_on_a_smooth_shape_are_no_corners(seed):
+def test_uneven_edges_on_a_smooth_shape_give_no_corners(seed):
     random = np.random.default_rng(seed)
     steps = random.uniform(1.0, 1.5, 36)
     angles = 2.0 * math.pi * np.cumsum(steps) / steps.sum()

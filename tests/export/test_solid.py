@@ -1,4 +1,4 @@
-"""Links as files to print: closed, of the right size, and read back as what was written."""
+"""Exported links: closed, of the right size, and read back as written."""
 
 import os
 from dataclasses import replace
@@ -139,7 +139,7 @@ def test_eyes_much_wider_than_the_strip_are_exported(tmp_path):
     assert np.einsum("md,md->", corners[:, 0], outward) / 6.0 == pytest.approx(DEPTH * area, rel=2e-3)
 
 
-def test_facets_are_as_fine_as_asked_for(tmp_path):
+def test_facets_meet_the_tolerance(tmp_path):
     def written(tolerance):
         write_stl(tmp_path / "link.stl", link(2.0), depth=DEPTH, pins=PINS, tolerance=tolerance)
         _, corners = facets_of(tmp_path / "link.stl")
@@ -205,14 +205,14 @@ def crossing():
     ],
     ids=["turned over", "crossing", "too large", "off the link", "meeting", "no layers"],
 )
-def test_what_cannot_be_made_is_refused(write, mesh, pins, message, tmp_path):
+def test_links_that_cannot_be_exported_are_refused(write, mesh, pins, message, tmp_path):
     with pytest.raises(MeshingError, match=message):
         write(tmp_path / "crank", mesh(), depth=DEPTH, pins=pins)
     assert not os.listdir(tmp_path)
 
 
 @pytest.mark.parametrize("write", [write_step, write_stl])
-def test_numbers_that_make_no_sense_are_refused(write, tmp_path):
+def test_numbers_out_of_range_are_refused(write, tmp_path):
     for depth in (0.0, -1.0, np.nan):
         with pytest.raises(DescriptionError, match="depth, link 'crank'"):
             write(tmp_path / "crank.step", link(2.0), depth=depth)

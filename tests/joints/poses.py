@@ -1,4 +1,4 @@
-"""Poses from scipy's rotations, which share nothing with the package's own."""
+"""Poses from scipy's rotations, independent of the package's own."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What each kind says of itself is what it can do."""
+"""The attributes of each joint kind agree with its equations."""
 
 import pytest
 
@@ -33,7 +33,7 @@ def test_flags_are_those_of_the_table(flag, kinds):
 
 
 @pytest.mark.parametrize("kind", [CYLINDRICAL, SPHERICAL, UNIVERSAL], ids=lambda kind: kind.name)
-def test_joint_without_planar_form_says_so(kind):
+def test_planar_equations_of_a_spatial_joint_raise(kind):
     with pytest.raises(NotImplementedError, match=f"a {kind.name} joint has no planar form"):
         constraint(kind, 2, False)
 

@@ -50,7 +50,7 @@ def test_displacement_hessian_passes_the_taylor_test(space, seed):
 
 @EVERY_SPACE
 @pytest.mark.parametrize("seed", range(3))
-def test_turns_is_the_derivative_of_a_finite_rotation_in_space(space, seed):
+def test_rotation_rates_are_the_derivative_of_a_finite_rotation_in_space(space, seed):
     rng = np.random.default_rng(seed)
     z, omega = random_pose(space, rng), rng.standard_normal(2 * space.dim - 3)
     slope = space.rotation_rates(z) @ omega
@@ -102,7 +102,7 @@ def test_retraction_is_idempotent_and_leaves_its_argument_alone(space):
 
 @EVERY_SPACE
 @pytest.mark.parametrize("seed", range(3))
-def test_retraction_is_neutral_to_first_order_along_turns(space, seed):
+def test_retraction_is_neutral_to_first_order_along_rotations(space, seed):
     rng = np.random.default_rng(seed)
     z = random_pose(space, rng)
     along = np.concatenate(
@@ -116,7 +116,7 @@ def test_retraction_is_neutral_to_first_order_along_turns(space, seed):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_quaternion_norm_is_one_on_rotations_and_keeps_to_first_order_along_turns(seed):
+def test_quaternion_norm_is_one_on_rotations_and_stationary_along_them(seed):
     z = random_pose(SPATIAL, np.random.default_rng(seed))
     assert SPATIAL.norm_residual(z) == pytest.approx([0.0], abs=4e-16)
     assert SPATIAL.norm_gradient(z)[:, 3:] @ SPATIAL.rotation_rates(z) == pytest.approx(np.zeros((1, 3)), abs=1e-15)

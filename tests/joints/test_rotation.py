@@ -21,7 +21,7 @@ def test_increment_is_the_rotation_less_the_identity(space, seed):
     assert space.rotation_increment(z) == pytest.approx(expected, abs=1e-15)
 
 
-def test_identity_has_no_increment_at_all(space):
+def test_increment_of_the_identity_is_exactly_zero(space):
     assert np.array_equal(space.rotation_increment(space.identity), np.zeros((space.dim, space.dim)))
 
 

@@ -1,4 +1,4 @@
-"""The Taylor test lets right derivatives pass and no others."""
+"""The Taylor test accepts right derivatives and rejects wrong ones."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A mechanism with one of everything, and how to check what an error says."""
+"""A mechanism with one of everything, and a check of error messages."""
 
 from __future__ import annotations
 

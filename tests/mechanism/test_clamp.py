@@ -1,4 +1,4 @@
-"""Clamps at the ends of strips: one word for their place, their direction and their width."""
+"""Clamps at the ends of strips: place, direction and width."""
 
 import math
 
@@ -47,7 +47,7 @@ def test_the_length_counts_along_the_centreline_of_a_curved_strip(end):
         ({"end": "end", "length": 30.0}, "its length 30 is not less than that of the strip, 30"),
     ],
 )
-def test_a_clamp_that_makes_no_sense_is_refused(arguments, message):
+def test_an_invalid_clamp_is_refused(arguments, message):
     with pytest.raises(DescriptionError, match=message):
         clamped([(0.0, 0.0), (LENGTH, 0.0)], **arguments)
 

@@ -1,4 +1,4 @@
-"""The builder refuses parts that contradict each other, naming the part and what to do."""
+"""The builder refuses contradictory parts, with the name of the part and a remedy."""
 
 import pytest
 
@@ -80,7 +80,7 @@ def test_joint_of_a_link_with_itself_is_refused():
     )
 
 
-def test_joint_kind_that_is_none_is_refused():
+def test_joint_kind_of_another_type_is_refused():
     p = parts()
     assert_refused(
         lambda: p.mechanism.join("hinge", p.base, p.crank, at=(0.0, 0.0)),
@@ -134,7 +134,7 @@ def test_interface_given_twice_is_refused():
     )
 
 
-def test_interface_that_is_no_region_is_refused():
+def test_interface_that_is_not_a_region_is_refused():
     p = parts()
     assert_refused(
         lambda: p.mechanism.weld(p.crank, p.rod, at=(40.0, 0.0), region=2.0, name="clamp"),
@@ -151,7 +151,7 @@ def test_interface_is_on_flexible_links_only():
     assert p.mechanism.revolute(p.rod, p.base, at=(20.0, 0.0), interface_radius=1).regions == (Disc(1.0), None)
 
 
-def test_motor_on_a_joint_that_takes_none_is_refused():
+def test_motor_on_a_joint_without_a_free_coordinate_is_refused():
     p = parts()
     ball = p.mechanism.join(SPHERICAL, p.base, p.crank, at=(0.0, 0.0), name="ball")
     assert_refused(

@@ -1,4 +1,4 @@
-"""No entry of a description lets a number in that is not finite, and each says which one it was."""
+"""Every number of a description is checked to be finite, and named if it is not."""
 
 import re
 
@@ -78,7 +78,7 @@ def test_number_that_is_not_finite_is_refused(part, value):
 
 @pytest.mark.parametrize("value", ["wide", None, (1.0,), 1j], ids=repr)
 @pytest.mark.parametrize("part", [part for part in NUMBERS if part != "radius of 'far pin'"])
-def test_what_is_no_number_is_refused(part, value):
+def test_value_that_is_not_a_number_is_refused(part, value):
     assert_refused(lambda: NUMBERS[part](parts(), value), part, f"{value!r} is not a number", "Give a finite number")
 
 

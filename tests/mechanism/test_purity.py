@@ -1,4 +1,4 @@
-"""Descriptions are plain data: frozen, comparable, hashable, and known to no solver."""
+"""Descriptions are plain data: frozen, comparable, hashable, and independent of solvers."""
 
 import ast
 import dataclasses
@@ -99,7 +99,7 @@ def file_of(name: str) -> Path:
     return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
 
 
-def test_descriptions_load_no_solver_nor_mesher_not_even_through_others():
+def test_descriptions_import_no_solver_and_no_mesher():
     # by the source: importing one package imports the whole of fenicsmech
     waiting, seen, outside = [file_of("fenicsmech.mechanism")], set(), set()
     while waiting:

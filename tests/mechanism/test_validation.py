@@ -1,4 +1,4 @@
-"""A mechanism that cannot be simulated is refused before anything is meshed, naming the part and what to do."""
+"""A mechanism that cannot be simulated is refused before anything is meshed, with the name of the part and a remedy."""
 
 import pytest
 

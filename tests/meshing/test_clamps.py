@@ -1,4 +1,4 @@
-"""Clamps on strips: the region of the one word is filled, and rectangles that lie askew are noticed."""
+"""Clamps on strips: the region is filled, and rectangles askew on their strip are warned of."""
 
 import logging
 import math
@@ -53,7 +53,7 @@ def test_a_clamp_holds_all_of_the_strip_up_to_a_face_across_it(points, end, dim,
         (INCLINED, (0.0, 0.0), Disc(1.0)),
     ],
 )
-def test_a_rectangle_across_its_strip_is_no_matter_for_a_warning(points, at, region, caplog):
+def test_a_rectangle_across_its_strip_gives_no_warning(points, at, region, caplog):
     check_link("blade", strip(points, thickness=THICKNESS, depth=4.0), [InterfaceSite(at, region)], {}, dim=2, size=1.0)
     assert not caplog.records
 
@@ -68,7 +68,7 @@ def test_a_rectangle_across_its_strip_is_no_matter_for_a_warning(points, at, reg
         (STRAIGHT, (9.0, 1.4), Rectangle(6.0, 2.0), "does not reach the centreline", "move it"),
     ],
 )
-def test_a_rectangle_askew_on_its_strip_is_warned_of(points, at, region, problem, remedy, caplog):
+def test_a_rectangle_askew_on_its_strip_gives_a_warning(points, at, region, problem, remedy, caplog):
     with caplog.at_level(logging.WARNING):
         shape = strip(points, thickness=THICKNESS, depth=4.0)
         check_link("blade", shape, [InterfaceSite(at, region, name="clamp")], {}, dim=2, size=1.0)

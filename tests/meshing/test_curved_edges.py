@@ -57,11 +57,11 @@ def test_a_straight_outline_has_no_curved_edge():
 
 
 @pytest.mark.parametrize("layers", [1, 2])
-@pytest.mark.parametrize("share, extruded", [(1.0, extrude), (0.5, extrude_half)])
-def test_walls_of_an_extruded_link_bulge_like_its_plan(share, extruded, layers):
+@pytest.mark.parametrize("part, extruded", [(1.0, extrude), (0.5, extrude_half)])
+def test_walls_of_an_extruded_link_bulge_like_its_plan(part, extruded, layers):
     plan = half_ring(2.0)
     solid = extruded(plan, DEPTH, layers)
-    assert measure(solid) == pytest.approx(share * DEPTH * measure(plan), rel=1e-12)
+    assert measure(solid) == pytest.approx(part * DEPTH * measure(plan), rel=1e-12)
     assert not solid.curved.bulges[:, 2].any()
     assert set(map(tuple, solid.curved.bulges[:, :2])) == set(map(tuple, plan.curved.bulges))
 
@@ -87,7 +87,7 @@ def test_bulges_of_cells_are_those_of_their_pairs_of_corners_however_numbered(ce
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-def test_a_rank_without_cells_of_a_link_asks_for_no_bulges(dim):
+def test_bulges_of_no_cells_are_an_empty_array(dim):
     edges = CurvedEdges(np.array([[0, 2], [1, 2]]), np.ones((2, dim)))
     assert edges.of_cells(np.zeros((0, dim + 1), dtype=np.int32)).shape == (0, dim * (dim + 1) // 2, dim)
 
@@ -107,13 +107,13 @@ def test_edges_through_points_on_their_chords_are_straight():
     assert edges.bulges == pytest.approx(np.array([[0.0, -0.1]]), abs=1e-15)
 
 
-def crowded_cells(dim: int, share: float) -> tuple[np.ndarray, np.ndarray, CurvedEdges]:
-    """A grid all of whose edges bulge anywhere by up to a ``share`` of the side of its squares."""
+def crowded_cells(dim: int, part: float) -> tuple[np.ndarray, np.ndarray, CurvedEdges]:
+    """A grid all of whose edges bulge anywhere by up to a ``part`` of the side of its squares."""
     points, cells = rectangle(3, 2, 3.0, 2.0) if dim == 2 else box(2, 1, 1, (2.0, 1.0, 1.0))
     turned = cell_measures(points, cells) < 0.0
     cells[turned, -2:] = cells[turned, :-3:-1]
     ends = np.unique(np.sort(np.vstack([cells[:, [i, j]] for i in range(dim + 1) for j in range(i)]), axis=1), axis=0)
-    return points, cells, CurvedEdges(ends, np.random.default_rng(4).uniform(-share, share, (len(ends), dim)))
+    return points, cells, CurvedEdges(ends, np.random.default_rng(4).uniform(-part, part, (len(ends), dim)))
 
 
 @pytest.mark.parametrize("dim", [2, 3])

@@ -1,4 +1,4 @@
-"""gmsh sessions end whatever happens in them, say what went wrong, and leave Ctrl-C to Python."""
+"""gmsh sessions always end, report the reason of a failure, and leave Ctrl-C to Python."""
 
 import os
 import signal

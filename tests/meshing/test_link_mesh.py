@@ -45,7 +45,7 @@ def test_quality_of_a_right_triangle():
     assert radius_ratios(points, np.array([(0, 1, 2)])) == pytest.approx([0.8])
 
 
-def test_pieces_that_share_only_a_vertex_are_separate():
+def test_pieces_that_meet_in_a_vertex_only_are_separate():
     assert count_pieces(np.array([(0, 1, 2), (1, 2, 3)])) == 1
     assert count_pieces(np.array([(0, 1, 2), (2, 3, 4)])) == 2
     assert count_pieces(np.array([(0, 1, 2, 3), (2, 3, 4, 5)])) == 2

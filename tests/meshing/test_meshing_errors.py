@@ -1,4 +1,4 @@
-"""What cannot be meshed is refused with the link, the joint, the offending value and a remedy."""
+"""Errors of meshing name the link and the joint, show the value and give a remedy."""
 
 from pathlib import Path
 
@@ -183,7 +183,7 @@ def test_a_mesh_file_of_the_wrong_dimension_is_refused(shape, dim, complaint):
 
 
 @pytest.mark.parametrize("options", [{"size": 0.0}, {"size": float("nan")}, {"dim": 4}, {"layers": 0}, {"layers": 1.5}])
-def test_senseless_arguments_are_refused(options):
+def test_arguments_out_of_range_are_refused(options):
     with pytest.raises(DescriptionError, match="link 'rod'"):
         mesh_link("rod", BAR, **{"dim": 3, "size": 2.0, **options})
 

@@ -19,7 +19,7 @@ EYE = math.pi * (4.0**2 - 1.5**2)
 
 
 def shared_area():
-    """Area that an eye and the band share: at the radius ρ the angle φ with |ρ e^{iφ} − 50| = 4."""
+    """Area common to an eye and the band: at the radius ρ the angle φ with |ρ e^{iφ} − 50| = 4."""
     return quad(lambda rho: rho * math.acos((50.0**2 + rho**2 - 16.0) / (100.0 * rho)), 48.5, 51.5)[0]
 
 

@@ -92,7 +92,7 @@ def test_pins_of_any_width_at_the_ends_and_along_the_way_give_well_shaped_cells(
 
 @pytest.mark.parametrize("points", [STRAIGHT, BENT])
 @pytest.mark.parametrize("thickness, depth, radius", [(3.0, 20.0, 3.0), (1.0, 20.0, 1.0), (6.0, 10.0, 1.5)])
-def test_tetrahedra_of_typical_strips_are_no_slivers(points, thickness, depth, radius):
+def test_tetrahedra_of_typical_strips_are_well_shaped(points, thickness, depth, radius):
     sites = pins(points[0], points[-1], radius=radius)
     mesh = mesh_link("link", strip(points, thickness=thickness, depth=depth), sites, dim=3, size=1.5)
     assert radius_ratios(mesh.points, mesh.cells).min() > 0.2
@@ -113,7 +113,7 @@ def test_a_pin_beside_the_centreline_bulges_to_its_side():
     assert mesh.points[:, 1].min() == pytest.approx(-1.5, abs=1e-9)
 
 
-def test_a_rectangle_holds_its_share_of_the_strip_and_adds_nothing():
+def test_a_rectangle_holds_its_part_of_the_strip_and_adds_nothing():
     sites = [InterfaceSite((0.0, 0.0), Rectangle(8.0, 10.0), name="clamp")]
     mesh = mesh_link("bar", strip(STRAIGHT, thickness=3.0, depth=5.0), sites, dim=2, size=1.0)
     measures = cell_measures(mesh.points, mesh.cells)

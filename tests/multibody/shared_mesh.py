@@ -1,4 +1,4 @@
-"""Small meshes shared by all ranks of a communicator, every cell and node known by where it lies."""
+"""Small meshes on all ranks of a communicator, every cell and node known by its position."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""From a description to bodies: one per rigid link, one per place where a flexible link is held."""
+"""Bodies of a description: one per rigid link, one per interface of a flexible link."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def test_unknowns_are_those_of_the_bodies_that_are_not_fixed(dim):
 
 
 @EVERY_DIMENSION
-def test_joints_at_one_place_of_a_flexible_link_share_an_interface(dim):
+def test_joints_at_one_place_of_a_flexible_link_have_one_interface(dim):
     m = Mechanism("shared pin")
     base, a, b = m.rigid("base", fixed=True), m.rigid("a"), m.rigid("b")
     link = m.flexible("link", bent_strip((0.0, 0.0), (30.0, 0.0)), ONYX)
@@ -71,7 +71,7 @@ def test_length_is_the_diagonal_of_the_box_around_joints_forces_and_outputs():
     assert build_linkage(m, 2).length == 5.0
 
 
-def test_rigid_centre_is_amid_its_joints():
+def test_rigid_centre_is_the_mean_of_its_joints():
     linkage = klann().linkage(2)
     crank = next(body for body in linkage.bodies if body.name == "crank")
     assert crank.centre == pytest.approx((0.5 * (17.607 + 14.631), 11.807))

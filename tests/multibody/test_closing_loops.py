@@ -1,4 +1,4 @@
-"""A loop that cannot close is named, with how far its motor gets."""
+"""A loop that cannot close is named, with the fraction of the motion reached."""
 
 import re
 
@@ -19,13 +19,13 @@ START = 0.9
 EVERY_DIMENSION = pytest.mark.parametrize("dim", [2, 3])
 
 
-def share(error: AssemblyError) -> float:
+def fraction(error: AssemblyError) -> float:
     return float(re.search(r"the motors get (\d+\.\d)% of the way", error.problem)[1]) / 100.0
 
 
 @EVERY_DIMENSION
 @pytest.mark.parametrize("turn", [2.0 * np.pi, LAST - START + 1e-3, -np.pi])
-def test_loop_is_named_with_the_share_of_the_way_its_motor_gets(turn, dim):
+def test_loop_is_named_with_the_fraction_of_the_motion_reached(turn, dim):
     machine = four_bar(STOPPED, START)
     linkage = machine.linkage(dim)
     with pytest.raises(AssemblyError) as caught:
@@ -37,10 +37,10 @@ def test_loop_is_named_with_the_share_of_the_way_its_motor_gets(turn, dim):
         assert link in error.problem
     assert error.remedy == "Check motor positions and link lengths"
     reach = (LAST if turn > 0.0 else FIRST) - START
-    assert share(error) == pytest.approx(reach / turn, abs=2e-3)
+    assert fraction(error) == pytest.approx(reach / turn, abs=2e-3)
 
 
-def test_a_motor_that_nearly_arrives_does_not_get_the_whole_way():
+def test_a_fraction_just_below_one_is_not_printed_as_one():
     machine = slider_crank(10.0, 30.0, 1.0, driven="slider")
     linkage = machine.linkage(2)
     with pytest.raises(AssemblyError, match=r"get 99\.9% of the way"):
@@ -61,7 +61,7 @@ def test_only_the_loop_that_fails_is_named(dim):
 
 
 @EVERY_DIMENSION
-def test_motor_between_fixed_links_gets_nowhere(dim):
+def test_motor_between_fixed_links_cannot_move(dim):
     m = Mechanism("rigid")
     joint = m.revolute(m.rigid("base", fixed=True), m.rigid("wall", fixed=True), at=(0.0, 0.0), name="pin")
     machine = Machine(m, m.motor(joint))
@@ -70,7 +70,7 @@ def test_motor_between_fixed_links_gets_nowhere(dim):
 
 
 @EVERY_DIMENSION
-def test_two_motors_that_fight_each_other_are_refused(dim):
+def test_contradictory_motors_are_refused(dim):
     machine = four_bar(STOPPED, START)
     axle = next(joint for joint in machine.mechanism.joints if joint.name == "axle")
     second = machine.mechanism.motor(axle)

@@ -1,4 +1,4 @@
-"""Free directions and dependent constraints are counted as the theory of mechanisms does, and named."""
+"""Free directions and dependent constraints are counted as in the theory of mechanisms, and named."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def test_klann_leg_has_one_freedom_and_two_loops(dim, redundancy):
 
 
 @pytest.mark.parametrize("theta", [0.6, 1.5, 2.5])
-def test_bennett_loop_moves_though_its_joints_say_it_cannot(theta):
+def test_bennett_loop_moves_although_its_joints_are_redundant(theta):
     # Grübler: 6 · 3 bodies − 4 hinges · 5 = −2 = 1 − 3
     freedom = freedom_as_drawn(Bennett().machine(theta), 3)
     assert (freedom.mobility, freedom.redundancy) == (1, 3)

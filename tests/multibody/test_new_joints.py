@@ -1,4 +1,4 @@
-"""Joints that the package does not have: each is one class written here, and all else follows from it."""
+"""Joints from outside the package: one class each."""
 
 from dataclasses import dataclass
 

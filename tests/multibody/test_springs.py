@@ -1,4 +1,4 @@
-"""Freedoms that motors leave go where springs want them; what no spring holds moves without energy."""
+"""Freedoms that motors leave minimise the energy of springs; the others are zero-energy modes."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def test_a_spring_keeps_its_joint_while_a_motor_turns_the_next_one(dim):
     assert turned == pytest.approx(DRIVEN, abs=1e-12)
 
 
-def test_springs_share_a_turn_as_their_stiffness_says():
+def test_springs_in_series_turn_in_proportion_to_their_compliance():
     # two springs in a row pull on the freedom that the motor leaves, ½ k₁ x₁² + ½ k₂ x₂² is least
     mechanism = Mechanism("slides")
     ground, slide, crank = mechanism.rigid("ground", fixed=True), mechanism.rigid("slide"), mechanism.rigid("crank")
@@ -50,7 +50,7 @@ def test_springs_share_a_turn_as_their_stiffness_says():
 
 
 @pytest.mark.parametrize("stiffness", [1e3, 1e-12])
-def test_what_springs_hold_is_held_however_soft_they_are(stiffness):
+def test_soft_springs_hold_as_stiff_ones_do(stiffness):
     mechanism, (shoulder, elbow, wrist) = arm()
     linkage = build_linkage(mechanism, 2)
     still, drawn = np.zeros(3), linkage.rigid.drawn

@@ -32,8 +32,8 @@ def test_the_motion_of_a_slider_crank_is_the_rate_of_its_assembly(dim):
     rate = linkage.joints.unknowns(poses(-9.0 + step) - poses(-9.0 - step)) / (2.0 * step)
     free = build_linkage(slider_crank()[0], dim)
     (motion,) = stiff_motions(free, here, np.zeros(4))
-    share = (motion.z @ rate) / (rate @ rate)
-    assert motion.z == pytest.approx(share * rate, abs=1e-7 * np.abs(motion.z).max())
+    amplitude = (motion.z @ rate) / (rate @ rate)
+    assert motion.z == pytest.approx(amplitude * rate, abs=1e-7 * np.abs(motion.z).max())
     first, second = free.interfaces[driven.flexible_links[0]]
     apart = here[second, :dim] - here[first, :dim] + np.array([50.0, -20.0, 0.0])[:dim]
     assert motion.velocity[second] == pytest.approx(motion.at(first, apart[None])[0])

@@ -13,7 +13,7 @@ def png_size(path: Path) -> tuple[int, int]:
     return int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
 
 
-def share_of_colour(path: Path, colour: tuple[int, int, int], *, tolerance: int = 12) -> float:
+def colour_fraction(path: Path, colour: tuple[int, int, int], *, tolerance: int = 12) -> float:
     """Share of pixels whose three channels are within ``tolerance`` of ``colour`` (0 to 255)."""
     pixels = np.rint(255 * imread(path)[..., :3])
     return float((np.abs(pixels - colour) <= tolerance).all(axis=-1).mean())

@@ -6,7 +6,7 @@ from fenicsmech.errors import DescriptionError
 from fenicsmech.files import read_csv, write_csv
 from fenicsmech.plot import PALETTE, CurveSeries, CurveTarget, plot_curve
 
-from .png import png_size, share_of_colour
+from .png import colour_fraction, png_size
 
 X = np.linspace(0.0, 20.0, 9)
 
@@ -78,7 +78,7 @@ def test_a_bad_table_is_refused_with_its_line(tmp_path, text, message):
 @pytest.mark.parametrize(
     ("columns", "message"),
     [
-        ({}, "there is no column"),
+        ({}, "there are no columns"),
         ({"a": [1.0, 2.0], "b": [1.0]}, r"column 'b'.*shape \(1,\)"),
         ({"a": [1.0, np.nan]}, r"column 'a'.*entry \[1\] is nan"),
         ({"a": ["one"]}, "not an array of numbers"),
@@ -106,7 +106,7 @@ def test_the_unstable_part_is_dashed(tmp_path):
     blue = (33, 102, 172)
     for name, stable in (("solid.png", X >= 0), ("dashed.png", X < 5)):
         plot_curve(tmp_path / name, [CurveSeries(X, X, stable=stable)])
-    assert 0.0 < share_of_colour(tmp_path / "dashed.png", blue) < 0.9 * share_of_colour(tmp_path / "solid.png", blue)
+    assert 0.0 < colour_fraction(tmp_path / "dashed.png", blue) < 0.9 * colour_fraction(tmp_path / "solid.png", blue)
 
 
 def test_a_snap_through_is_a_dotted_arrow_with_an_entry_of_its_own(tmp_path, drawn):
@@ -128,13 +128,13 @@ def test_a_faint_curve_is_thinner_lighter_and_behind_the_others(tmp_path):
     for name, order in orders.items():
         series = [CurveSeries(X, X, colour="#2166ac", faint=kind == "faint") for kind in order]
         plot_curve(tmp_path / f"{name}.png", series)
-    share = {name: share_of_colour(tmp_path / f"{name}.png", blue) for name in orders}
-    assert share["faint"] == 0.0
-    assert share["both"] == share["turned"] == pytest.approx(share["strong"], rel=0.02)
-    assert 0.0 < share_of_colour(tmp_path / "faint.png", faint) < 0.9 * share["strong"]
+    fraction = {name: colour_fraction(tmp_path / f"{name}.png", blue) for name in orders}
+    assert fraction["faint"] == 0.0
+    assert fraction["both"] == fraction["turned"] == pytest.approx(fraction["strong"], rel=0.02)
+    assert 0.0 < colour_fraction(tmp_path / "faint.png", faint) < 0.9 * fraction["strong"]
 
 
-def test_the_legend_names_what_several_curves_share_once_and_in_grey(tmp_path, drawn):
+def test_a_label_of_several_curves_appears_once_and_in_grey(tmp_path, drawn):
     blue, orange, grey = PALETTE[0], PALETTE[1], "#777777"
     series = [
         CurveSeries(X, X, "initial design", colour=blue, faint=True),
@@ -152,12 +152,12 @@ def test_the_legend_names_what_several_curves_share_once_and_in_grey(tmp_path, d
     assert one["target"] == blue and list(one) == ["initial design", "crank 45 deg", "target"]
 
 
-def test_targets_at_the_same_place_are_all_seen(tmp_path):
+def test_targets_at_the_same_place_are_all_visible(tmp_path):
     colours = PALETTE[:3]
     plot_curve(tmp_path / "targets.png", [CurveSeries(X, X)], targets=[CurveTarget(5, 2, c) for c in colours[::-1]])
     for colour in colours[1:]:
         wanted = tuple(round(255 * c) for c in to_rgb(colour))
-        assert share_of_colour(tmp_path / "targets.png", wanted) > 1e-4
+        assert colour_fraction(tmp_path / "targets.png", wanted) > 1e-4
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 500])

@@ -5,7 +5,7 @@ from matplotlib.colors import to_rgb
 from fenicsmech.errors import DescriptionError
 from fenicsmech.plot import FLEXIBLE, INK, DesignShape, LinkOutline, RigidShape, draw_designs
 
-from .png import png_size, share_of_colour
+from .png import colour_fraction, png_size
 from .strips import design, four_bar, strip
 
 ORANGE, DARK = (tuple(round(255 * c) for c in to_rgb(name)) for name in (FLEXIBLE, INK))
@@ -24,7 +24,7 @@ def test_both_shapes_are_drawn_and_the_same_bytes_every_time(tmp_path, links):
         draw_designs(tmp_path / name, four_bar()[:links], title="four-bar linkage")
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     for colour in (ORANGE, GREY):
-        assert share_of_colour(tmp_path / "a.png", colour) > 0.005
+        assert colour_fraction(tmp_path / "a.png", colour) > 0.005
 
 
 def test_several_links_are_shown_once_more_beside_the_mechanism(tmp_path):
@@ -33,12 +33,12 @@ def test_several_links_are_shown_once_more_beside_the_mechanism(tmp_path):
     assert png_size(tmp_path / "all.png")[0] > png_size(tmp_path / "one.png")[0] + 400
 
 
-def test_an_unchanged_link_hides_what_was_before(tmp_path):
+def test_an_unchanged_link_hides_the_one_before(tmp_path):
     shape = strip([(0, 0), (20, 0), (40, 0)], 5.0)
     draw_designs(tmp_path / "same.png", [DesignShape("leaf", shape, shape)])
     moved = DesignShape("leaf", shape, strip([(0, 0), (20, 9), (40, 0)], 5.0))
     draw_designs(tmp_path / "moved.png", [moved])
-    assert share_of_colour(tmp_path / "same.png", GREY) < 0.1 * share_of_colour(tmp_path / "moved.png", GREY)
+    assert colour_fraction(tmp_path / "same.png", GREY) < 0.1 * colour_fraction(tmp_path / "moved.png", GREY)
 
 
 @pytest.mark.parametrize("turned", [slice(None), slice(None, None, -1)])
@@ -46,7 +46,7 @@ def test_holes_stay_empty_in_whatever_direction_they_run(tmp_path, turned):
     for name, loops in (("full.png", [SQUARE]), ("hole.png", [SQUARE, HOLE[turned]])):
         shape = LinkOutline(loops)
         draw_designs(tmp_path / name, [DesignShape("plate", shape, shape)])
-    full, hole = (share_of_colour(tmp_path / name, ORANGE) for name in ("full.png", "hole.png"))
+    full, hole = (colour_fraction(tmp_path / name, ORANGE) for name in ("full.png", "hole.png"))
     assert hole == pytest.approx(0.75 * full, rel=0.03)
 
 
@@ -56,7 +56,7 @@ def test_thicknesses_are_dimensioned_where_they_are_known(tmp_path):
     for name, thickness in (("known.png", link.after.thickness), ("unknown.png", None)):
         after = LinkOutline(link.after.loops, link.after.centreline, thickness)
         draw_designs(tmp_path / name, [DesignShape(link.name, bare(link.before), after, link.joints)])
-        ink.append(share_of_colour(tmp_path / name, DARK))
+        ink.append(colour_fraction(tmp_path / name, DARK))
     assert ink[0] > 1.05 * ink[1]
 
 
@@ -65,9 +65,9 @@ def test_rigid_links_are_a_background_that_does_not_change_the_limits(tmp_path):
     draw_designs(tmp_path / "alone.png", four_bar())
     draw_designs(tmp_path / "base.png", four_bar(), rigid=[plate])
     assert png_size(tmp_path / "alone.png") == png_size(tmp_path / "base.png")
-    orange = [share_of_colour(tmp_path / name, ORANGE) for name in ("alone.png", "base.png")]
+    orange = [colour_fraction(tmp_path / name, ORANGE) for name in ("alone.png", "base.png")]
     assert orange[0] == pytest.approx(orange[1], rel=1e-3)
-    assert share_of_colour(tmp_path / "base.png", PALE, tolerance=1) > 0.1
+    assert colour_fraction(tmp_path / "base.png", PALE, tolerance=1) > 0.1
 
 
 def test_the_picture_of_a_design_does_not_depend_on_the_unit_of_length(tmp_path):
@@ -76,7 +76,7 @@ def test_the_picture_of_a_design_does_not_depend_on_the_unit_of_length(tmp_path)
         draw_designs(tmp_path / "design.png", [
             DesignShape(d.name, bare(d.before), bare(d.after), d.joints) for d in four_bar(scale)
         ])  # fmt: skip
-        shapes.append((png_size(tmp_path / "design.png"), share_of_colour(tmp_path / "design.png", ORANGE)))
+        shapes.append((png_size(tmp_path / "design.png"), colour_fraction(tmp_path / "design.png", ORANGE)))
     assert shapes[0] == (shapes[1][0], pytest.approx(shapes[1][1], rel=1e-2))
 
 
@@ -86,7 +86,7 @@ def test_points_that_coincide_are_drawn(tmp_path):
     shape = LinkOutline([loop], points, [1.0, 1.0, 1.0, 4.0, 4.0, 4.0])
     for links in (1, 2):
         draw_designs(tmp_path / "link.png", [DesignShape("leaf", shape, shape)] * links)
-        assert share_of_colour(tmp_path / "link.png", ORANGE) > 0.005
+        assert colour_fraction(tmp_path / "link.png", ORANGE) > 0.005
 
 
 @pytest.mark.parametrize(
@@ -103,7 +103,7 @@ def test_points_that_coincide_are_drawn(tmp_path):
         (lambda: DesignShape("rod", LinkOutline([SQUARE]), LinkOutline([SQUARE]), [(0, 0, 0)]), "joints of link 'rod'"),
     ],
 )
-def test_records_refuse_what_is_no_link(make, message):
+def test_invalid_outlines_are_refused(make, message):
     with pytest.raises(DescriptionError, match=message):
         make()
 

@@ -23,7 +23,7 @@ from fenicsmech.plot import (
 )
 
 from .grids import box, rectangle
-from .png import png_size, share_of_colour
+from .png import colour_fraction, png_size
 
 ORANGE, GREY, DARK = (243, 156, 61), (201, 204, 209), (86, 91, 99)
 
@@ -60,7 +60,7 @@ def test_a_mechanism_is_drawn_with_all_its_parts_and_the_same_bytes_every_time(t
     assert 800 < width < 1200 and 300 < height < 900
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     for colour in (ORANGE, GREY, DARK):
-        assert share_of_colour(tmp_path / "a.png", colour) > 0.005
+        assert colour_fraction(tmp_path / "a.png", colour) > 0.005
 
 
 def test_values_colour_the_flexible_links(tmp_path):
@@ -69,7 +69,7 @@ def test_values_colour_the_flexible_links(tmp_path):
     draw_mechanism(
         tmp_path / "stress.png", undeformed=mechanism(), deformed=[mechanism(5.0, stress)], colour_label="stress [MPa]"
     )
-    assert share_of_colour(tmp_path / "stress.png", ORANGE) < 0.2 * share_of_colour(tmp_path / "plain.png", ORANGE)
+    assert colour_fraction(tmp_path / "stress.png", ORANGE) < 0.2 * colour_fraction(tmp_path / "plain.png", ORANGE)
     assert png_size(tmp_path / "stress.png")[0] > png_size(tmp_path / "plain.png")[0]  # the colour bar
 
 
@@ -178,7 +178,7 @@ TRIANGLE = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])
         (lambda: Trace([0, 1, 2], "foot"), "points of trace 'foot'"),
     ],
 )
-def test_records_refuse_what_cannot_be_drawn(make, message):
+def test_values_that_cannot_be_drawn_are_refused(make, message):
     with pytest.raises(DescriptionError, match=message):
         make()
 
@@ -196,8 +196,8 @@ def test_an_empty_picture_and_limits_in_the_wrong_order_are_refused(tmp_path):
 
 
 def test_a_weld_is_drawn_as_a_square_without_a_ring(tmp_path):
-    dark, shares = (51, 51, 51), []
+    dark, areas = (51, 51, 51), []
     for welded in (False, True):
         draw_mechanism(tmp_path / "joint.png", undeformed=MechanismShape(pins=(Pin((3.0, 4.0), 1.0, welded),)))
-        shares.append(share_of_colour(tmp_path / "joint.png", dark))
-    assert shares[1] > 3.0 * shares[0]
+        areas.append(colour_fraction(tmp_path / "joint.png", dark))
+    assert areas[1] > 3.0 * areas[0]

@@ -1,4 +1,4 @@
-"""What a simulation cannot do is refused by name, before anything is meshed."""
+"""Requests that a simulation cannot fulfil are refused by name, before anything is meshed."""
 
 import math
 
@@ -159,8 +159,8 @@ def test_force_and_output_beside_their_link():
 def test_force_on_the_ground():
     scene, push = describe("truss")
     (ground,) = (link for link in scene.mechanism.rigid_links if link.fixed)
-    scene.mechanism.force(on=ground, at=(5, 0), direction=(1, 0), name="idle")
-    refused("'idle'", lambda: simulate(scene))
+    scene.mechanism.force(on=ground, at=(5, 0), direction=(1, 0), name="grounded")
+    refused("'grounded'", lambda: simulate(scene))
 
 
 def test_mechanism_that_cannot_be_assembled():

@@ -49,7 +49,7 @@ def bend(order: int, size: float):
         pytest.param(2, 0.25, id="two quadratic layers", marks=pytest.mark.slow),
     ],
 )
-def test_tip_moves_as_the_benchmark_says(order, size):
+def test_tip_moves_as_in_the_benchmark(order, size):
     simulation, load, outputs = bend(order, size)
     curve = simulation.load_displacement(load, forces=[30.0, 100.0, 200.0, LOAD])
     moved = [curve.frames[-1].outputs[output] for output in outputs]

@@ -1,4 +1,4 @@
-"""What a simulation leaves out is said, and its figures agree with simulations that include it."""
+"""Explanations name what a simulation leaves out; their figures agree with simulations that include it."""
 
 from __future__ import annotations
 
@@ -53,8 +53,8 @@ def test_hint_on_weight_knows_all_forces_that_act():
     weighed = fm.Scene(rig, effects=[fm.Gravity((0, -1e-3 * 9810.0), {link.material: 1.2e-9})])
     heavy = fm.Simulation(weighed, space="plane-stress", size=2.0)
     sunk = heavy.load_displacement(push, forces=[0.01], others={pull: 0.3}).displacements[0] - curve.displacements[0]
-    told = float(hint(curve.explain(), "weight").text.split("at most ")[1].split()[0])
-    assert told == pytest.approx(abs(1e3 * sunk), rel=0.1)
+    printed = float(hint(curve.explain(), "weight").text.split("at most ")[1].split()[0])
+    assert printed == pytest.approx(abs(1e3 * sunk), rel=0.1)
 
 
 def test_effects_that_are_listed_are_named_and_not_hinted_at():
@@ -84,12 +84,12 @@ def pinned(material: fm.Material, *, depth: float = 4.0, space: str = "plane-str
 def test_compression_is_compared_with_the_load_that_buckles_a_link_out_of_the_plane():
     stiff = fm.Material("stiff", 2000.0, 0.3)
     critical = np.pi**2 * 2000.0 * 6.0 * 4.0**3 / 12.0 / 60.0**2
-    for share in (0.05, 0.5):
+    for fraction in (0.05, 0.5):
         simulation, push = pinned(stiff)
-        curve = simulation.load_displacement(push, forces=[share * critical])
+        curve = simulation.load_displacement(push, forces=[fraction * critical])
         found = hint(curve.explain(), "bending out of the plane")
-        assert f"about {share:.2g} " in found.text
-        assert found.matters is (share > 0.2)
+        assert f"about {fraction:.2g} " in found.text
+        assert found.matters is (fraction > 0.2)
 
 
 @pytest.mark.parametrize(

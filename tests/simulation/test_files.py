@@ -13,7 +13,7 @@ from fenicsmech.files import read_csv
 from fenicsmech.plot import Trace
 from fenicsmech.simulation import gather
 
-from ..plot.png import png_size, share_of_colour
+from ..plot.png import colour_fraction, png_size
 from .demo_scenes import describe
 
 pytestmark = pytest.mark.parallel
@@ -103,7 +103,7 @@ def test_picture_shows_links_rigid_and_flexible(space, shared_tmp_path):
     for name in ("claw.png", "plain.png"):
         width, height = png_size(shared_tmp_path / name)
         assert width > 400 and height > 400
-        assert share_of_colour(shared_tmp_path / name, RIGID_GREY) > 0.002
+        assert colour_fraction(shared_tmp_path / name, RIGID_GREY) > 0.002
     assert (shared_tmp_path / "claw.png").read_bytes() != (shared_tmp_path / "plain.png").read_bytes()
 
 

@@ -11,7 +11,7 @@ STIFF = 200.0
 
 
 @pytest.mark.parametrize(
-    "given, told",
+    "given, message",
     [
         ({}, "no displacement, position or force"),
         ({"displacement": float("nan")}, "nan"),
@@ -21,8 +21,8 @@ STIFF = 200.0
         ({"force": 1.0, "frames": 2.5}, "2.5 frames"),
     ],
 )
-def test_ends_that_make_no_sense_are_refused(given, told):
-    with pytest.raises(fm.DescriptionError, match=told):
+def test_ends_that_make_no_sense_are_refused(given, message):
+    with pytest.raises(fm.DescriptionError, match=message):
         fm.Until(**given)
 
 
@@ -40,7 +40,7 @@ def test_what_does_not_say_where_to_end_is_refused():
         case.simulation.follow(case.push, until=12.0)
 
 
-def test_curve_that_cannot_be_followed_says_how_far_it_came():
+def test_error_of_a_curve_that_ends_early_has_the_last_equilibrium():
     case = toggle.toggle(stilt_modulus=STIFF)
     steps = fm.ArcSteps(first=0.5, largest=0.5, smallest=0.4)
     with pytest.raises(fm.EquilibriumError, match="cannot be followed beyond displacement") as caught:
@@ -56,7 +56,7 @@ def test_branches_of_a_curve_of_another_fidelity_are_refused():
         there.branches(curve, None, until=fm.Until(displacement=1.0))
 
 
-def test_curve_and_frames_are_told_in_words():
+def test_curve_and_frames_print_their_figures():
     case = toggle.toggle(stilt_modulus=STIFF)
     curve = case.simulation.follow(case.push, until=fm.Until(displacement=0.5))
     assert repr(curve).startswith(f"<FollowedCurve of {case.push.name!r}, as drawn: {len(curve.frames)} frames, ")
@@ -78,7 +78,7 @@ def test_followed_curve_is_drawn_and_written_like_others(tmp_path):
     assert curve.frames[3].iterations >= 2 and curve.frames[3].seconds > 0.0
 
 
-def test_limit_points_tell_what_snaps():
+def test_limit_points_are_where_dead_loads_snap():
     case = toggle.toggle(stilt_modulus=STIFF)
     curve = case.simulation.follow(case.push, until=fm.Until(displacement=4.0))
     assert {event.mode.link for event in curve.limit_points} == {"stilt"}  # it sinks, the spring hardly moves

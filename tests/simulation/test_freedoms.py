@@ -1,4 +1,4 @@
-"""Redundant constraints, idle freedoms, dead centres and full turns neither stop a solve nor change its result."""
+"""Redundant constraints, zero-energy modes, dead centres and full turns neither stop a solve nor change its result."""
 
 from math import pi
 

@@ -1,4 +1,4 @@
-"""What simulations held is given back when they are gone, and what iterations hold while they go on."""
+"""Memory: simulations free theirs when they are gone, iterations while they go on."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .demo_scenes import describe
 STATUS = Path("/proc/self/status")
 pytestmark = [
     pytest.mark.parallel,
-    pytest.mark.skipif(not STATUS.exists(), reason="the system does not tell how much memory a process holds"),
+    pytest.mark.skipif(not STATUS.exists(), reason="the system does not report the memory of a process"),
 ]
 
 

@@ -1,4 +1,4 @@
-"""Buckling modes of a column are told in every space and formulation: the load is Euler's, the link bends sideways."""
+"""Buckling modes of a column are found in every space and formulation: the load is Euler's, the link bends sideways."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""However many ranks share the work, the results are the same."""
+"""Results do not depend on the number of ranks."""
 
 import numpy as np
 import pytest
@@ -106,7 +106,7 @@ def test_link_that_cannot_be_meshed_is_refused_on_all_ranks(shared_tmp_path):
         simulation.load_displacement(push, forces=[1.0])
 
 
-def test_failed_solve_is_told_alike_on_all_ranks():
+def test_failed_solve_raises_alike_on_all_ranks():
     scene, push = describe("truss")
     simulation = fm.Simulation(scene, space="plane-stress", order=1, size=5.0)
     with pytest.raises(fm.EquilibriumError) as caught:

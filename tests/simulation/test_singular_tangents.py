@@ -1,4 +1,4 @@
-"""Where a tangent cannot be solved with, users are told in words, and keep the frames they have."""
+"""Singular tangents raise errors that name the equilibrium and keep the frames before it."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_force_that_joints_hold_has_no_buckling_load_and_no_path():
 
 
 @pytest.mark.parametrize("found", [True, False])
-def test_curve_that_does_not_end_where_it_should_says_so(found, monkeypatch, caplog):
+def test_curve_that_ends_off_its_target_warns(found, monkeypatch, caplog):
     case = column()
     if not found:
         monkeypatch.setattr(ArcLengthTracer, "between", failing)

@@ -24,7 +24,7 @@ def lever(stiffness: float) -> tuple[fm.Simulation, object]:
 
 
 @pytest.mark.parametrize("stiffness", [10.0, 0.1, 0.01])
-def test_spring_softer_than_what_is_lent_to_idle_freedoms(stiffness):
+def test_spring_softer_than_the_regularisation_of_zero_energy_modes(stiffness):
     simulation, push = lever(stiffness)
     force = 1e-3 * stiffness  # turns the arm by f r / k = 0.01
     (frame,) = simulation.load_displacement(push, forces=[force]).frames

@@ -29,12 +29,12 @@ from fenicsmech.design.optimisers.problem import (
 class BFGS(Optimiser):
     """Stops when the expected reduction is below ``tolerance`` times the objective, or after ``iterations``.
 
-    What it expects hangs on an approximate Hessian: a tolerance that is not small ends it far from a minimum.
+    The expected reduction depends on an approximate Hessian: with a large tolerance it ends far from a minimum.
 
     Attributes:
         iterations: most of them.
         tolerance: least reduction worth a step, over O.
-        armijo: part of the decrease that the slope promises which a step must bring.
+        armijo: fraction of the decrease predicted by the slope that a step must reach.
         halvings: of a step, at most.
 
     Raises:

@@ -46,7 +46,7 @@ class LevenbergMarquardt(Optimiser):
         tolerance: least reduction worth a step, over O. By default 0.005, or earlier where the errors of the finite
             elements hide what is left to gain.
         damping: μ at the start.
-        least_damping: μ at least, so that parameters without influence stay where they are.
+        least_damping: least μ, at which parameters that change nothing stay where they are.
         poor, good: actual over promised reduction; below the first a step is refused, above the second damping falls.
         refusals: most steps refused in a row.
         stalls: steps in a row that gain less than ``tolerance`` of O, after which it ends.

@@ -57,7 +57,7 @@ class Evaluation:
         residuals: r, (m,).
         jacobian: ∂r/∂p, (m, n).
         regulariser: R near p, which costs little to evaluate.
-        errors: estimates the errors |e| of the residuals, (m,); to be asked at the best point so far only.
+        errors: estimates the errors |e| of the residuals, (m,); valid at the best point so far only.
     """
 
     parameters: np.ndarray
@@ -96,7 +96,7 @@ class LeastSquaresProblem(Protocol):
     """An objective that can be evaluated with its derivatives.
 
     Attributes:
-        lengths: changes of the parameters that count alike, (n,).
+        lengths: typical change ℓ of each parameter, (n,).
     """
 
     lengths: np.ndarray
@@ -126,12 +126,12 @@ class Reason(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Where a minimisation starts, or goes on after it was interrupted.
+    """The start of a minimisation, or of one that goes on after an interruption.
 
     Attributes:
         parameters: p, (n,).
         number, evaluations: iterations and objective evaluations so far.
-        memory: what the optimiser has found out, from ``Iterate.memory``; None at the very start.
+        memory: state of the optimiser, from ``Iterate.memory``; None at the very start.
     """
 
     parameters: np.ndarray
@@ -148,7 +148,7 @@ class Iterate:
         number: iterations so far.
         evaluations: objective evaluations so far, infeasible ones included.
         evaluation: the best point.
-        memory: what the optimiser has found out, to go on with.
+        memory: state of the optimiser, to go on with.
         promise: the reduction that is still expected, over the objective; inf if that is not known.
         reason: None while it goes on.
     """

@@ -41,7 +41,7 @@ class HandleOptions:
     Attributes:
         iterations: most Newton iterations; designs near by take two or three.
         settled: predicted decrease of S, relative, after which one last step is taken: smaller ones are rounding.
-        armijo: part of the decrease that the slope promises which a step must bring.
+        armijo: fraction of the decrease predicted by the slope that a step must reach.
         shortest: fraction of a step at which the search of a link ends without one.
         halvings: of a change of p that inverts cells.
         turn: largest turn of a joint in one step, rad.
@@ -163,7 +163,7 @@ class HandleOptimum:
                 if -0.5 * by_theta.slope @ step[by_theta.free] > self._options.settled * sums[link]:
                     steps[link] = by_theta, step
                 else:
-                    # the decrease drowns in rounding, the improvement of θ does not
+                    # the decrease is below rounding, the improvement of θ is not
                     positions[link] = by_theta.moved(positions[link], step)
                     moving.remove(link)
             if steps:

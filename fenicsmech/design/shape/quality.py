@@ -1,4 +1,4 @@
-"""How well shaped the cells of the rest shape are: ρ = circumradius / inradius, as a form on the reference mesh.
+"""Quality of the cells of the rest shape: ρ = circumradius / inradius, as a form on the reference mesh.
 
 With the edges e_k = (I + ∇d) J_k of a cell that meet at one vertex, J its Jacobian and D = det(e_1, …, e_dim),
 

@@ -1,4 +1,4 @@
-"""How links change their shape: from spline parameters and handle positions to the design field, and back.
+"""Shape of the links: from spline parameters and handle positions to the design field, and back.
 
     d_i = Σ_j w_ij T_j(p, θ_j) (X_i − X_j, 1) = Σ_j T_j r_ij,     d linear in the maps T_j (2 × 3) of the handles.
 
@@ -26,7 +26,7 @@ from fenicsmech.meshing import FREE, LinkMesh, MechanismMesh, cell_measures, pla
 
 @dataclass(frozen=True, eq=False)
 class ShapeRequest:
-    """How the shape of one link may change.
+    """The spline and handles wanted for one link.
 
     Attributes:
         link: index of the flexible link.

@@ -74,7 +74,7 @@ _INSIDE = 1e-9  # barycentric coordinates above minus this are inside: rounding
 
 
 def pierced(mesh: LinkMesh, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where the line along z through ``at`` (2,) runs in the mesh.
+    """The cells on the line along z through ``at`` (2,).
 
     Returns:
         The cells that it pierces, (k,), and a point of it inside each, (k, dim); a triangle holds the point itself.
@@ -100,7 +100,7 @@ def insert(mesh: LinkMesh, at: np.ndarray) -> tuple[LinkMesh, int]:
     """``mesh`` with a vertex at the point ``at`` (dim,), which must be in a free cell, and the number of that vertex.
 
     The vertex splits the cell, or an edge or face that it is close to with all cells around it; or a vertex close to
-    it moves there. Of these, the way that leaves the largest smallest cell is taken. Interfaces are not touched.
+    it moves there. Of these ways, the one whose smallest cell is largest is taken. Interfaces are not touched.
     """
     cells = mesh.cells
     coordinates = _barycentric(mesh, at)

@@ -23,7 +23,7 @@ errors with eigenvalues in [a, b] shrink alike. S is symmetric, positive definit
 
 Directions p of conjugate gradients are conjugate, so that the number of negative pᵀ KKT p is that of the negative
 eigenvalues they have met. For the inertia they start from random vectors, until one meets none in the complement of
-those found: what was found is certain, that there is no more is as likely as the iteration has converged.
+those found. Those found are certain; that none is left is as likely as the iteration has converged.
 
 Sources: Tang, Nabben, Vuik & Erlangga on the preconditioner, A-DEF2 (doi:10.1007/s10915-009-9272-6); Adams et al. on
 the smoother (doi:10.1016/S0021-9991(03)00194-3); Haynsworth (doi:10.1016/0024-3795(68)90050-5) on the inertia.
@@ -91,7 +91,7 @@ class BySize(LinearMethod):
     In the plane a factor costs little at any size. Where two levels do not suit (order 1, the u–p formulation, the
     nodes of a mid-plane) the factor is all there is. In space, whole curves of a claw with their stability cost as much
     either way at 64,000 unknowns of order 2 and 110,000 of order 3; two levels take a third of the memory
-    (demos/large.py).
+    (benchmarks/large.py).
 
     Attributes:
         limit: unknowns.

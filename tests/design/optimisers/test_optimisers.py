@@ -1,4 +1,4 @@
-"""Both optimisers find known minima, respect what they are told, can go on later, and say why they stop."""
+"""Both optimisers find known minima, respect their options, can go on later, and say why they stop."""
 
 from __future__ import annotations
 
@@ -57,10 +57,10 @@ class Problem:
 
 
 class Rosenbrock(Problem):
-    """r = (10 (y − x²), 1 − x), infeasible beyond x = 1.2; a weak pull towards the start."""
+    """r = (10 (y − x²), 1 − x), infeasible beyond x = 1.2; a weak spring towards the start."""
 
-    def __init__(self, pull: float = 0.0, *, unit: Sequence[float] = (1.0, 1.0)) -> None:
-        self.pull, self.unit = pull, np.array(unit)
+    def __init__(self, spring: float = 0.0, *, unit: Sequence[float] = (1.0, 1.0)) -> None:
+        self.spring, self.unit = spring, np.array(unit)
         super().__init__(np.array([-1.2, 1.0]) * self.unit, self.unit)
 
     def check(self, parameters):
@@ -75,7 +75,7 @@ class Rosenbrock(Problem):
     def regulariser(self, parameters):
         away = (parameters - self.start) / self.unit
         return Quadratic(
-            0.5 * self.pull * float(away @ away), self.pull * away / self.unit, self.pull * np.diag(self.unit**-2)
+            0.5 * self.spring * float(away @ away), self.spring * away / self.unit, self.spring * np.diag(self.unit**-2)
         )
 
 
@@ -152,7 +152,7 @@ def test_every_evaluation_is_counted(optimiser):
 
 @each_optimiser
 def test_regulariser_moves_the_minimum_to_where_the_whole_gradient_vanishes(optimiser):
-    last, _ = watched(optimiser, Rosenbrock(pull=0.1))
+    last, _ = watched(optimiser, Rosenbrock(spring=0.1))
     assert np.linalg.norm(last.evaluation.gradient) < 1e-5
     assert last.evaluation.parameters[0] < 0.9
 
@@ -160,7 +160,7 @@ def test_regulariser_moves_the_minimum_to_where_the_whole_gradient_vanishes(opti
 def test_levenberg_marquardt_takes_the_same_way_in_any_unit_of_length():
     ways = []
     for unit in ((1.0, 1.0), (1e-3, 1e-3), (1e3, 1e-3)):
-        problem = Rosenbrock(pull=0.01, unit=unit)
+        problem = Rosenbrock(spring=0.01, unit=unit)
         _, history = watched(LevenbergMarquardt(tolerance=1e-8), problem)
         ways.append(np.array([iterate.evaluation.parameters / unit for iterate in history]))
     for way in ways[1:]:
@@ -217,13 +217,13 @@ def test_barriers_are_not_run_through_where_the_residual_would():
 
 @each_optimiser
 def test_going_on_from_any_iterate_repeats_what_would_have_come(optimiser):
-    _, history = watched(optimiser, Rosenbrock(pull=0.01))
+    _, history = watched(optimiser, Rosenbrock(spring=0.01))
     assert len(history) > 8
     for index, iterate in enumerate(history[:-1]):
         # as it comes back from a file
         numbers = json.loads(json.dumps([iterate.evaluation.parameters.tolist(), iterate.memory.tolist()]))
         start = Start(np.array(numbers[0]), iterate.number, iterate.evaluations, np.array(numbers[1]))
-        _, again = watched(optimiser, Rosenbrock(pull=0.01), start)
+        _, again = watched(optimiser, Rosenbrock(spring=0.01), start)
         rest = history[index:]
         assert len(again) == len(rest)
         for ours, theirs in zip(again, rest, strict=True):

@@ -1,4 +1,4 @@
-"""A minimisation ends where what is left to gain is lost in the errors of the residuals, unless told otherwise."""
+"""A minimisation ends where what is left to gain is below the errors of the residuals, unless given a tolerance."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from fenicsmech.design import Evaluation, Iterate, LevenbergMarquardt, Quadratic
 
 EXACT = LevenbergMarquardt(iterations=500, tolerance=1e-12)
 ERRORS = [1e-2, 3e-2, 1e-1]
-PULLS = [0.0, 1e-4, 1e-2]
+SPRINGS = [0.0, 1e-4, 1e-2]
 
 
 @dataclass
 class Doubtful:
-    """r = (10 (y − x²), 1 − x) with errors, and a pull towards the start; counts what it is asked for."""
+    """r = (10 (y − x²), 1 − x) with errors, and a spring towards the start; counts what it is asked for."""
 
     error: float
-    pull: float
+    spring: float
     growth: float = 1.0
     lengths: np.ndarray = field(default_factory=lambda: np.ones(2), init=False)
     evaluations: int = field(default=0, init=False)
@@ -37,7 +37,7 @@ class Doubtful:
 
     def regulariser(self, parameters: np.ndarray) -> Quadratic:
         away = parameters - self.start
-        return Quadratic(0.5 * self.pull * float(away @ away), self.pull * away, self.pull * np.eye(2))
+        return Quadratic(0.5 * self.spring * float(away @ away), self.spring * away, self.spring * np.eye(2))
 
     def errors(self) -> np.ndarray:
         self.estimates += 1
@@ -49,10 +49,10 @@ def minimised(optimiser: LevenbergMarquardt, problem: Doubtful) -> Iterate:
 
 
 @pytest.mark.parametrize("error", ERRORS)
-@pytest.mark.parametrize("pull", PULLS)
-def test_residuals_move_by_less_than_their_errors_when_it_goes_on(error, pull):
-    doubtful = Doubtful(error, pull)
-    early, late = minimised(LevenbergMarquardt(), doubtful), minimised(EXACT, Doubtful(error, pull))
+@pytest.mark.parametrize("spring", SPRINGS)
+def test_residuals_move_by_less_than_their_errors_when_it_goes_on(error, spring):
+    doubtful = Doubtful(error, spring)
+    early, late = minimised(LevenbergMarquardt(), doubtful), minimised(EXACT, Doubtful(error, spring))
     assert early.reason.converged
     assert np.all(np.abs(early.evaluation.residuals - late.evaluation.residuals) < error)
     assert doubtful.evaluations <= early.evaluations

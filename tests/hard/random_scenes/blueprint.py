@@ -193,8 +193,10 @@ def build(blueprint: Blueprint) -> Built:
         if not link.centreline:
             built.links[link.name] = mechanism.rigid(link.name, fixed=link.fixed)
             continue
+        name = f"material of {link.name}"
+        fm.Material(name, link.young, link.poisson)  # names the material where the law below could name itself only
         law = getattr(fm, link.law)(link.young, link.poisson)
-        materials[link.name] = fm.Material(f"material of {link.name}", law=law)
+        materials[link.name] = fm.Material(name, law=law)
         shape = fm.strip(link.centreline, thickness=link.thickness, depth=link.depth)
         built.links[link.name] = mechanism.flexible(link.name, shape, materials[link.name])
     for joint in blueprint.joints:

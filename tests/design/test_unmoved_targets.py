@@ -1,4 +1,4 @@
-"""Targets that no shape can move: refused before the optimiser starts, whoever is to blame."""
+"""Targets that no shape can move: refused before the optimiser starts."""
 
 from __future__ import annotations
 
