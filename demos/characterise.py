@@ -56,8 +56,6 @@ def main():
         experiments.append(fm.Experiment(sim, push, read["force [N]"], read["displacement [mm]"]))
     fit = fm.fit_modulus(experiments, onyx(GUESS))
 
-    if sim.comm.rank > 0:
-        return
     low, high = fit.interval
     series = []
     for curve, test, thickness, colour in zip(fit.curves, experiments, FILES, ("C0", "C1"), strict=True):
@@ -68,11 +66,15 @@ def main():
     fm.plot_curve(options.out / "curve.png", series, title=title)
     figures = {"youngs_modulus": fit.youngs_modulus, "interval": fit.interval, "true": TRUE, "spread": fit.spread}
     figures |= {"iterations": fit.iterations, "residuals": fit.residuals}
-    (options.out / "summary.json").write_text(json.dumps(figures, indent=2))
+    if sim.comm.rank == 0:
+        (options.out / "summary.json").write_text(json.dumps(figures, indent=2))
     for thickness, residuals in zip(FILES, fit.residuals, strict=True):
-        print(f"{thickness:g} mm: {len(residuals)} readings, deviations up to {max(map(abs, residuals)):.3g} mm")
-    print(f"E = {fit.youngs_modulus:.1f} MPa, 95 % interval {low:.1f} to {high:.1f} MPa (true value of the synthetic")
-    print(f"data: {TRUE:g}); {fit.iterations} iterations; files in {options.out}")
+        worst = max(map(abs, residuals))
+        fm.print_once(f"{thickness:g} mm: {len(residuals)} readings, deviations up to {worst:.3g} mm")
+    fm.print_once(f"E = {fit.youngs_modulus:.1f} MPa, 95 % interval {low:.1f} to {high:.1f} MPa")
+    fm.print_once(
+        f"(true value of the synthetic data: {TRUE:g} MPa); {fit.iterations} iterations; files in {options.out}"
+    )
 
 
 if __name__ == "__main__":

@@ -54,18 +54,18 @@ def main():
         series.append(curve.series(label))
         for event in curve.events:
             frame = event.frame
-            print(f"{label}: {event.kind.value} at {frame.displacement:.4g} mm, {frame.force:.4g} N")
+            fm.print_once(f"{label}: {event.kind.value} at {frame.displacement:.4g} mm, {frame.force:.4g} N")
         curve.picture(options.out / f"{scene.mechanism.name.replace(' ', '-')}.png")
     held = sim.load_displacement(finger, displacements=HELD)
     series.append(held.series("held behind the spring"))
     fm.plot_curve(options.out / "curve.png", series, title="bistable switch")
-    print(*held.remarks, sep="\n")
+    fm.print_once(*held.remarks, sep="\n")
     scene, _, hinge = describe(sprung=False)
     motor = scene.mechanism.motor(hinge, name="crank")
     sim = fm.Simulation(scene, space="plane-stress", size=options.size)
     turned = sim.follow(motor, until=fm.Until(position=OVER))
     turned.plot(options.out / "crank.png")
-    print(f"the motor in the crank needs up to {abs(turned.forces).max():.3g} N mm, and snaps nowhere")
+    fm.print_once(f"the motor in the crank needs up to {abs(turned.forces).max():.3g} N mm, and snaps nowhere")
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ discretisation and load–displacement curves; a ``DesignProblem`` optimises the
 """
 
 from fenicsmech.collective import mpi_abort_on_error
-from fenicsmech.continuation import ArcSteps, Critical
+from fenicsmech.continuation import ArcSteps, Constant, Critical, CriticalPoint, Hermite, Predictor, Tangent
 from fenicsmech.design import (
     BFGS,
     DesignProblem,
@@ -25,6 +25,7 @@ from fenicsmech.design import (
     fit_modulus,
 )
 from fenicsmech.effects import (
+    Boundary,
     Contact,
     Cylinder,
     Faces,
@@ -39,8 +40,16 @@ from fenicsmech.effects import (
     Pressure,
     Prestrain,
 )
-from fenicsmech.elasticity import DisplacementFormulation, Formulation, MixedFormulation, Stretch
+from fenicsmech.elasticity import (
+    DisplacementFormulation,
+    ElasticModel,
+    Formulation,
+    MixedFormulation,
+    Quadrature,
+    Stretch,
+)
 from fenicsmech.equilibrium import (
+    BySize,
     Control,
     Direct,
     EquilibriumPoint,
@@ -50,11 +59,13 @@ from fenicsmech.equilibrium import (
     LinearMethod,
     NotConverged,
     PrimalDualNewton,
+    Quantity,
     Reaction,
     State,
     TwoLevel,
 )
 from fenicsmech.errors import AssemblyError, DescriptionError, EquilibriumError, FenicsmechError, MeshingError
+from fenicsmech.estimates import Choice
 from fenicsmech.files import read_csv
 from fenicsmech.joints import JointKind, PlanarMarker, SpatialMarker
 from fenicsmech.laws import (
@@ -67,6 +78,7 @@ from fenicsmech.laws import (
     Strain,
     Volumetric,
 )
+from fenicsmech.log import configure_logging, print_once
 from fenicsmech.mechanism import (
     DRAWN,
     ONYX,
@@ -82,32 +94,40 @@ from fenicsmech.mechanism import (
     Line,
     Material,
     Mechanism,
+    MeshPart,
     Motor,
+    Outline,
     Output,
     Rectangle,
     RigidLink,
     Scene,
+    StepPart,
+    Strip,
     Units,
     gmsh_mesh,
+    in_dimension,
     outline,
     polygon,
     step_file,
     strip,
 )
 from fenicsmech.model import SPACES, Fidelity
-from fenicsmech.multibody import Freedom
+from fenicsmech.multibody import BodyPoint, Freedom, Linkage, body_point
 from fenicsmech.plot import CurveMark, CurveSeries, CurveTarget, Trace, plot_curve
 from fenicsmech.report import Optimisation, Report, write_report
 from fenicsmech.simulation import (
+    Axis,
     BucklingLoad,
     BucklingPosition,
     Curve,
     Explanation,
     FollowedCurve,
     Frame,
+    Hint,
     ModeShape,
     PathEvent,
     PinFriction,
+    RestShape,
     Simulation,
     SoftMode,
     Until,
@@ -132,6 +152,10 @@ __all__ = [
     "Arc",
     "step_file",
     "gmsh_mesh",
+    "Strip",
+    "Outline",
+    "StepPart",
+    "MeshPart",
     "Disc",
     "Rectangle",
     "Scene",
@@ -170,15 +194,31 @@ __all__ = [
     "Obstacle",
     "PosePotential",
     "Stretch",
+    "Boundary",
+    "ElasticModel",
+    "Linkage",
+    "BodyPoint",
+    "body_point",
+    "in_dimension",
     # simulation, its curves and their results
     "Simulation",
     "SPACES",
     "Fidelity",
+    "Quadrature",
+    "Choice",
+    "Predictor",
+    "Hermite",
+    "Tangent",
+    "Constant",
+    "RestShape",
     "Curve",
     "Frame",
+    "Axis",
+    "Quantity",
     "Freedom",
     "Reaction",
     "Explanation",
+    "Hint",
     "PinFriction",
     "write_report",
     "Report",
@@ -188,6 +228,8 @@ __all__ = [
     "CurveTarget",
     "Trace",
     "read_csv",
+    "print_once",
+    "configure_logging",
     "mpi_abort_on_error",
     # path following, stability and buckling
     "FollowedCurve",
@@ -195,6 +237,7 @@ __all__ = [
     "Critical",
     "Until",
     "PathEvent",
+    "CriticalPoint",
     "BucklingLoad",
     "BucklingPosition",
     "SoftMode",
@@ -205,6 +248,7 @@ __all__ = [
     "MixedFormulation",
     "PrimalDualNewton",
     "LinearMethod",
+    "BySize",
     "Direct",
     "TwoLevel",
     "EquilibriumSolver",

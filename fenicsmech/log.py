@@ -26,7 +26,7 @@ class _RankZero(logging.LoggerAdapter):
 
 
 class _Console(logging.StreamHandler):
-    """The handler `configure` installs; a class of its own, so that configuring again replaces it."""
+    """The handler `configure_logging` installs; a class of its own, so that configuring again replaces it."""
 
     def __init__(self) -> None:
         super().__init__()  # standard error as it is now
@@ -45,7 +45,7 @@ def logger(name: str) -> logging.LoggerAdapter:
     return _RankZero(logging.getLogger(name), {})
 
 
-def configure(level: int = logging.INFO) -> None:
+def configure_logging(level: int = logging.INFO) -> None:
     """Shows the package's messages on standard error, for scripts; an application sets up `logging` itself.
 
     Args:
@@ -64,6 +64,17 @@ def configure(level: int = logging.INFO) -> None:
     for other in others.handlers:
         if type(other) is logging.StreamHandler:  # not the handlers of an application or a test runner
             other.setLevel(max(other.level, logging.WARNING))
+
+
+def print_once(*values: object, sep: str = " ") -> None:
+    """As ``print``, on rank 0 of MPI.COMM_WORLD only, for scripts that run on any number of processes. Local.
+
+    All ranks call it where the values are computed together: ``print_once(curve.error_estimates())``.
+    """
+    from mpi4py import MPI
+
+    if MPI.COMM_WORLD.rank == 0:
+        print(*values, sep=sep, flush=True)
 
 
 _TERMINAL_PAUSE = 0.5  # s between redrawn lines

@@ -30,7 +30,8 @@ from fenicsmech.collective import on_one
 from fenicsmech.design import DesignProblem, DesignResult
 from fenicsmech.errors import DescriptionError
 from fenicsmech.files import write_json
-from fenicsmech.plot import PALETTE, CurveTarget, draw_configurations, plot_curve
+from fenicsmech.log import print_once
+from fenicsmech.plot import PALETTE, CurveTarget, draw_configurations, draw_curve
 from fenicsmech.simulation import Curve, Frame, Simulation
 
 
@@ -51,8 +52,7 @@ class Report:
 
     def show(self) -> None:
         """Prints the figures, on one process."""
-        if MPI.COMM_WORLD.rank == 0:
-            print(self, flush=True)
+        print_once(self)
 
 
 @dataclass(frozen=True)
@@ -104,14 +104,13 @@ def write_report(
     if optimisation is not None:
         optimisation.problem.picture(folder / "links.png", optimisation.result)
         optimisation.problem.export(folder / "links", optimisation.result, pin_diameter=optimisation.pin_diameter)
+        optimisation.result.save(folder / "design.json", comm=comm)
     summary = _summarise(simulation, curves, optimisation)
 
     def write() -> None:
         label = f"von Mises stress [{units.stress}]"
         draw_configurations(folder / "mechanism.png", panels, title=name, colour_label=label, unit=units.length)
         _plot(folder / "curve.png", name, curves, optimisation)
-        if optimisation is not None:
-            optimisation.result.save(folder / "design.json")
         write_json(folder / "summary.json", summary)
 
     on_one(comm, write)
@@ -133,7 +132,7 @@ def _plot(path: Path, name: str, curves: Sequence[Curve], optimisation: Optimisa
     wanted = [CurveTarget(t.displacement, t.force, colours.get(t.configuration)) for t in targets]
     across, up = curves[0].axes
     title = name if optimisation else f"{name}: initial design"
-    plot_curve(path, series, targets=wanted, xlabel=across.label, ylabel=up.label, title=title)
+    draw_curve(path, series, targets=wanted, xlabel=across.label, ylabel=up.label, title=title)
 
 
 # -- figures ---------------------------------------------------------------------------------------------------------

@@ -74,7 +74,11 @@ def code(page: str) -> str:
     return "\n".join(re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), flags=re.S))
 
 
-@pytest.mark.parametrize("page", PAGES)
+LONG = ("README.md", "docs/guide/design.md")
+MARKED = [pytest.param(page, marks=[pytest.mark.thorough] * (page in LONG)) for page in PAGES]
+
+
+@pytest.mark.parametrize("page", MARKED)
 def test_code_of_a_page_runs_and_is_right(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names: Names = {}

@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from fenicsmech.kernel_cache import compiling
 
 # compiles for ever
@@ -28,6 +30,7 @@ def test_unfinished_forms_are_removed_and_finished_ones_kept(tmp_path):
     assert left == {"libffcx_forms_done.c", "libffcx_forms_done.c.cached", "other.c", "lock"}
 
 
+@pytest.mark.thorough
 def test_a_form_is_left_to_the_process_that_compiles_it_until_that_is_killed(tmp_path):
     busy = subprocess.Popen([sys.executable, "-c", BUSY, tmp_path], stdout=subprocess.PIPE, text=True)
     try:

@@ -32,7 +32,7 @@ def test_only_the_first_rank_logs(caplog):
 
 @pytest.mark.usefixtures("package_logger")
 def test_nothing_is_shown_below_the_configured_level(capsys):
-    log.configure(logging.WARNING)
+    log.configure_logging(logging.WARNING)
     messages = log.logger("fenicsmech.meshing")
     messages.info("1204 cells")
     messages.warning("a sliver")
@@ -43,8 +43,8 @@ def test_nothing_is_shown_below_the_configured_level(capsys):
 
 @pytest.mark.usefixtures("package_logger")
 def test_configuring_twice_shows_a_message_once(capsys):
-    log.configure(logging.INFO)
-    log.configure(logging.DEBUG)
+    log.configure_logging(logging.INFO)
+    log.configure_logging(logging.DEBUG)
     log.logger("fenicsmech.meshing").debug("1204 cells")
     assert capsys.readouterr().err.count("1204 cells") == 1
 
@@ -53,7 +53,7 @@ def test_a_script_shows_no_messages_of_other_libraries():
     script = """
 import logging
 from fenicsmech import log
-log.configure(logging.INFO)
+log.configure_logging(logging.INFO)
 logging.getLogger().setLevel(logging.INFO)  # as setuptools does when FFCx compiles a form
 logging.info("gcc -O2 form.c")
 logging.warning("a warning of another library")

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
+from mpi4py import MPI
 
 from fenicsmech.collective import on_one
 from fenicsmech.design.description import SplineDesign, Target
@@ -165,10 +166,22 @@ class DesignResult:
         p, theta = (np.concatenate(own) for own in zip(*((o.parameters, o.handles) for o in self.links), strict=True))
         return rest.field(p, rest.known(p, theta))
 
-    def save(self, path: str | Path) -> None:
-        """Local. Writes the result as JSON; call it on one process."""
-        with atomic_write(Path(path)) as file:
-            file.write(json.dumps({"format": _FORMAT, **asdict(self)}, indent=2, ensure_ascii=False))
+    def save(self, path: str | Path, *, comm: MPI.Comm = MPI.COMM_WORLD) -> None:
+        """Writes the result as JSON.
+
+        Args:
+            path: the file.
+            comm: the processes that call it; one of them writes.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+
+        def write() -> None:
+            with atomic_write(path) as file:
+                file.write(json.dumps({"format": _FORMAT, **asdict(self)}, indent=2, ensure_ascii=False))
+
+        on_one(comm, write)
 
     @staticmethod
     def load(path: str | Path) -> DesignResult:

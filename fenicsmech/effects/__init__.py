@@ -14,7 +14,7 @@ nothing: no form, no unknown, no entry of a matrix.
 
 from fenicsmech.effects.contact import Contact, ContactGauge
 from fenicsmech.effects.energies import LinkFields, PosePotential, spring_potentials
-from fenicsmech.effects.faces import Faces, find_boundaries
+from fenicsmech.effects.faces import Boundary, Faces, find_boundaries
 from fenicsmech.effects.gravity import Gravity, Mass
 from fenicsmech.effects.joint_compliance import JointCompliance
 from fenicsmech.effects.joint_spring import JointSpring
@@ -23,6 +23,7 @@ from fenicsmech.effects.pressure import Pressure
 from fenicsmech.effects.prestrain import Prestrain
 
 __all__ = [
+    "Boundary",
     "Contact",
     "ContactGauge",
     "Cylinder",

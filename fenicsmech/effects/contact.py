@@ -84,7 +84,6 @@ class Contact(Effect):
     def link_energy(self, fields):
         if not isinstance(self.link, FlexibleLink):
             return None
-        depth = fields.model.multiplier(self.link.shape.depth)
         gap = self.obstacle.gap_form(fields.position, fields.mesh)
         inside = -gap
         if self.obstacle.core is not None:
@@ -92,7 +91,7 @@ class Contact(Effect):
             lost = ufl.lt(gap, fem.Constant(fields.mesh, -self.obstacle.core))
             inside = ufl.conditional(lost, fem.Constant(fields.mesh, np.nan), inside)
         inside = ufl.conditional(ufl.lt(gap, 0.0), inside, 0.0)
-        density = 0.5 * depth * self._stiffness(self.link, fields) * inside**2
+        density = 0.5 * self._stiffness(self.link, fields) * inside**2
         return fields.boundary_integral(density, Faces(self.link), degree=2 * fields.order)
 
     def _stiffness(self, link: FlexibleLink, fields: LinkFields):

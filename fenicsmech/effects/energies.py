@@ -74,33 +74,38 @@ class LinkFields:
         """det(∇X): volume at rest over that of the reference mesh."""
         return ufl.det(self.body.rest_gradient)
 
+    @property
+    def depth(self):
+        """Factor from integrals over the mesh to those over the links: their depth, or 2 for half models."""
+        return self.model.multiplier(self.body.depth)
+
     def integral(self, density, *, degree: int) -> ufl.Form:
-        """∫ density dV over the mesh at rest, times the depth or half factor of ``model``; ``degree`` of ``density``.
+        """∫ density dV over the links at rest, their depth included; ``degree`` of ``density``.
 
         In curved cells det(∇X) is a polynomial too, of degree dim.
         """
         whole = degree if self.body.bulge is None else degree + self.dim
-        return density * self.stretch * self.dx(metadata={"quadrature_degree": whole})
+        return density * self.stretch * self.depth * self.dx(metadata={"quadrature_degree": whole})
 
     def boundary_integral(self, density, faces: Faces, *, degree: int) -> ufl.Form:
-        """∫ density dA over ``faces`` of the mesh at rest, times the depth or half factor of ``model``.
+        """∫ density dA over ``faces`` of the links at rest, their depth included.
 
         By Nanson's formula dA = |det(∇X) (∇X)⁻ᵀ N| dA₀.
         """
         area = ufl.dot(cofactor(self.body.rest_gradient), ufl.FacetNormal(self.mesh))
-        return self.reference_integral(density * ufl.sqrt(ufl.dot(area, area)), faces, degree=degree)
+        return self.reference_integral(density * self.depth * ufl.sqrt(ufl.dot(area, area)), faces, degree=degree)
 
     def flux(self, vector, faces: Faces, *, degree: int) -> ufl.Form:
-        """∫ vector · n da over ``faces`` of the deformed mesh, times the depth or half factor of ``model``.
+        """∫ vector · n da over ``faces`` of the links as deformed, their depth at rest included.
 
         n points out of the link. By Nanson's formula n da = cof(∇X + ∇u) N dA₀.
         """
         motion = self.body.rest_gradient + ufl.grad(self.u)
         area = ufl.dot(cofactor(motion), ufl.FacetNormal(self.mesh))
-        return self.reference_integral(ufl.dot(vector, area), faces, degree=degree)
+        return self.reference_integral(self.depth * ufl.dot(vector, area), faces, degree=degree)
 
     def reference_integral(self, density, faces: Faces, *, degree: int) -> ufl.Form:
-        """∫ density dA₀ over ``faces`` of the reference mesh."""
+        """∫ density dA₀ over ``faces`` of the reference mesh, without ``depth``."""
         terms = [density * ds(metadata={"quadrature_degree": degree}) for ds in self.boundaries[faces].measures]
         return sum(terms[1:], start=terms[0])
 

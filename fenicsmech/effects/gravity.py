@@ -87,12 +87,7 @@ class Gravity(Effect):
         if not self.densities:
             return None
         g = ufl.as_vector(in_dimension(self.acceleration, fields.dim))
-        density = fields.cellwise(
-            [
-                fields.model.multiplier(link.shape.depth) * self.densities.get(link.material, 0.0)
-                for link in fields.links
-            ]
-        )
+        density = fields.cellwise([self.densities.get(link.material, 0.0) for link in fields.links])
         return fields.integral(-density * ufl.dot(g, fields.u), degree=fields.order)
 
     def pose_potentials(self, linkage):

@@ -83,8 +83,7 @@ class Pressure(Effect):
         dim, order = fields.dim, fields.order
         centre = (0.0,) * dim if self.about is None else self.about[:dim]
         along = len(centre)
-        depth = fields.model.multiplier(self.link.shape.depth)
-        pressure = fem.Constant(fields.mesh, self.pressure * depth / along)
+        pressure = fem.Constant(fields.mesh, self.pressure / along)
         start = fem.Constant(fields.mesh, np.array(centre))
         arm = [fields.position[k] - start[k] for k in range(along)] + [0.0] * (dim - along)
         # x has the degree of u, n da its (dim − 1)th power one degree lower

@@ -20,6 +20,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
+from dolfinx.fem import petsc
 from petsc4py import PETSc
 
 from fenicsmech.compat import (
@@ -223,13 +224,13 @@ class ElasticBody(BodyFields):
     def create_tangent(self) -> PETSc.Mat:
         """An empty matrix for ``tangent``: per rank, the owned values of u, then those of p."""
         if self.pressure is None:
-            return fem.petsc.create_matrix(self.tangent_forms[0][0])
+            return petsc.create_matrix(self.tangent_forms[0][0])
         return create_block_matrix(self.tangent_forms)
 
     def tangent(self, matrix: PETSc.Mat) -> None:
         """Adds ∂²E/∂(u, p)² into ``matrix`` and leaves it unassembled."""
         if self.pressure is None:
-            fem.petsc.assemble_matrix(matrix, self.tangent_forms[0][0])
+            petsc.assemble_matrix(matrix, self.tangent_forms[0][0])
         else:
             add_blocks(matrix, self.tangent_forms)
 

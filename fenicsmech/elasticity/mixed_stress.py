@@ -17,6 +17,7 @@ from __future__ import annotations
 import numpy as np
 import ufl
 from dolfinx import fem
+from dolfinx.fem import petsc
 from petsc4py import PETSc
 
 from fenicsmech.compat import compile_form, owned_values
@@ -55,7 +56,7 @@ class MixedStress:
 
     def tangent(self, matrix: PETSc.Mat) -> None:
         """Adds ∫ ∇v ΔS : ∇w dV into ``matrix`` and leaves it unassembled."""
-        fem.petsc.assemble_matrix(matrix, self._stiffness)
+        petsc.assemble_matrix(matrix, self._stiffness)
 
     def _stresses(self, u: fem.Function):
         """Second Piola–Kirchhoff stress S = F⁻¹ ∂W/∂F per volume of the mesh, and where it holds, per law."""

@@ -17,6 +17,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from petsc4py import PETSc
@@ -219,14 +220,17 @@ class Iteration(ABC):
     Attributes:
         system: the equations.
         options: of the solver.
-        linear: the linear solver; None before the first matrix.
         factored: number of matrices factored so far.
     """
 
     def __init__(self, system: EquilibriumSystem, options: EquilibriumSolver) -> None:
         self.system, self.options = system, options
-        self.linear: LinearSolver | None = None
         self.factored = 0
+
+    @cached_property
+    def linear(self) -> LinearSolver:
+        """The linear solver, made for the first matrix and kept."""
+        return self.options.linear.solver(self.system)
 
     def solve(self, start: State, control: Control) -> EquilibriumPoint:
         """The equilibrium near ``start`` under ``control``.
@@ -242,7 +246,9 @@ class Iteration(ABC):
         self.system.load(start)
         if not math.isfinite(self.system.elastic_energy()):
             raise NotConverged("elements are inverted in the predicted state")
-        return (self._iterate_bordered if isinstance(control, ArcLengthControl) else self.iterate)(start, control)
+        if isinstance(control, ArcLengthControl):
+            return self._iterate_bordered(start, control)
+        return self.iterate(start, control)
 
     @abstractmethod
     def iterate(self, start: State, control: Control) -> EquilibriumPoint:
@@ -275,8 +281,6 @@ class Iteration(ABC):
         with self.system.clock.phase("factor"):
             self.factored += 1
             self.system.kkt.shift(shift)
-            if self.linear is None:
-                self.linear = self.options.linear.solver(self.system)
             return self.linear.refactor()
 
     def try_solve(self, right: PETSc.Vec, tolerance: float) -> PETSc.Vec | None:

@@ -21,7 +21,7 @@ class MechanismMesh:
     """The reference mesh of all flexible links.
 
     Attributes:
-        mesh: the distributed mesh; its coordinates never change.
+        mesh: the distributed mesh; its coordinates change only while a file of the links at rest is written.
         link: index of the flexible link of each cell on this rank (ghosts last), (cells,).
         interface: index among all interfaces of the mechanism, −1 in free cells, (cells,).
         vertices, cells: the whole mesh as one array each, on every rank: (n, dim), (m, dim + 1).

@@ -1,4 +1,4 @@
-"""Plots and pictures of plain data; call them on one rank.
+"""Plots and pictures of plain data; all but ``plot_curve`` are local: call them on one rank.
 
 - ``curve``: load–displacement curves
 - ``mechanism``: mechanisms, deformed and not, side by side
@@ -9,7 +9,7 @@
 - ``style``: the look of all figures, and PNG files
 """
 
-from fenicsmech.plot.curve import CurveMark, CurveSeries, CurveTarget, plot_curve
+from fenicsmech.plot.curve import CurveMark, CurveSeries, CurveTarget, draw_curve, plot_curve
 from fenicsmech.plot.design import draw_designs
 from fenicsmech.plot.labels import Labels, Spot
 from fenicsmech.plot.layout import IN_PLACE, lay_out, lay_out_designs
@@ -49,6 +49,7 @@ __all__ = [
     "Spot",
     "Trace",
     "draw_configurations",
+    "draw_curve",
     "draw_designs",
     "house_style",
     "lay_out",

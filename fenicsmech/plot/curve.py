@@ -11,9 +11,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.lines import Line2D
+from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fenicsmech.checks import real_array
+from fenicsmech.collective import on_one
 from fenicsmech.errors import DescriptionError
 from fenicsmech.plot.style import INK, MUTED, PALETTE, house_style, new_figure, open_frame, save_png
 
@@ -102,6 +104,7 @@ def plot_curve(
     xlabel: str = "displacement [mm]",
     ylabel: str = "force [N]",
     title: str = "",
+    comm: MPI.Comm = MPI.COMM_WORLD,
 ) -> None:
     """Draws load–displacement curves, displacement across and force up, as a PNG.
 
@@ -115,10 +118,25 @@ def plot_curve(
         targets: target points; equal ones are drawn around each other.
         xlabel, ylabel: quantity and unit of the axes.
         title: a line above the plot.
+        comm: the processes that call it; one of them draws.
 
     Raises:
         DescriptionError: the name does not end in .png.
+        OSError: the file cannot be written.
     """
+    on_one(comm, lambda: draw_curve(path, series, targets=targets, xlabel=xlabel, ylabel=ylabel, title=title))
+
+
+def draw_curve(
+    path: str | Path,
+    series: Sequence[CurveSeries],
+    *,
+    targets: Sequence[CurveTarget] = (),
+    xlabel: str,
+    ylabel: str,
+    title: str,
+) -> None:
+    """Local. What ``plot_curve`` draws, on the process that calls it."""
     with house_style():
         figure = new_figure(6.4, 4.4)
         figure.set_layout_engine("constrained")

@@ -13,28 +13,30 @@
 
 from fenicsmech.simulation.buckling import BucklingLoad, BucklingPosition, ModeShape, SoftMode
 from fenicsmech.simulation.curve import Curve
-from fenicsmech.simulation.explanation import Explanation, ExplanationOptions, weight_influence
+from fenicsmech.simulation.explanation import Explanation, Hint, weight_influence
 from fenicsmech.simulation.fields import gather, rest_vertices
 from fenicsmech.simulation.following import FollowedCurve, PathEvent
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.friction import PinFriction
 from fenicsmech.simulation.picture import MechanismPlotter
-from fenicsmech.simulation.request import CurveRequest, Until, read_request
-from fenicsmech.simulation.simulation import Simulation
+from fenicsmech.simulation.request import Axis, CurveRequest, Until, read_request
+from fenicsmech.simulation.simulation import RestShape, Simulation
 
 __all__ = [
+    "Axis",
     "BucklingLoad",
     "BucklingPosition",
     "Curve",
     "CurveRequest",
     "Explanation",
-    "ExplanationOptions",
     "FollowedCurve",
     "Frame",
+    "Hint",
     "MechanismPlotter",
     "ModeShape",
     "PathEvent",
     "PinFriction",
+    "RestShape",
     "Simulation",
     "SoftMode",
     "Until",

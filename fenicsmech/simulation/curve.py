@@ -221,17 +221,21 @@ class Curve:
         """
         return friction_band(self.frames, pins, self.discretisation.linkage)
 
-    def explain(self, *, tolerance: float = 0.01) -> Explanation:
+    def explain(self, *, tolerance: float = 0.01, weight: float | None = None) -> Explanation:
         """What is simulated and what is left out, with figures of the last frame where that may matter.
 
         Args:
             tolerance: relative change of the displacement from which something matters.
+            weight: of the flexible links per volume, in units of the scene; in mm and N that of plastics and silicones,
+                1.2 g/cm³, by default.
 
         Raises:
-            DescriptionError: motors move along the curve, or the tolerance is not a positive number.
+            DescriptionError: motors move along the curve, or the tolerance or weight is not a positive number.
             EquilibriumError: the tangent of the frame is singular.
         """
-        options, frame = ExplanationOptions(tolerance=tolerance), self.frames[-1]
+        if weight is None and (self.units.length, self.units.force) == ("mm", "N"):
+            weight = 1.2e-9 * 9810.0  # N/mm³
+        options, frame = ExplanationOptions(tolerance=tolerance, weight=weight), self.frames[-1]
         self._need_force()
         return explain(
             self.discretisation.model, self._solver, self.equilibrium(frame), frame, self.units, options=options
@@ -265,15 +269,9 @@ class Curve:
 
     def plot(self, path: str | Path) -> None:
         """Draws force over displacement as a PNG."""
-        if self._writes:
-            across, up = self.axes
-            plot_curve(
-                Path(path),
-                [self.series()],
-                xlabel=across.label,
-                ylabel=up.label,
-                title=f"{self.part.name}, {self.configuration.name}",
-            )
+        (across, up), title = self.axes, f"{self.part.name}, {self.configuration.name}"
+        comm = self.discretisation.comm
+        plot_curve(path, [self.series()], xlabel=across.label, ylabel=up.label, title=title, comm=comm)
 
     def picture(
         self, path: str | Path, *, stress: bool = True, traces: Sequence[Trace] = (), beside: Sequence[Curve] = ()
@@ -342,19 +340,13 @@ class Curve:
             name, unit = self.quantity.value, force if self.quantity is Quantity.FORCE else length
             columns[f"finer elements add to the {name} [{unit}]"] = self.error_estimates()
             columns[f"corrected {name} [{unit}]"] = self.corrected
-        if self._writes:
-            write_csv(Path(path), columns)
+        on_one(self.discretisation.comm, lambda: write_csv(path, columns))
 
     # -- what the above need -------------------------------------------------------------------------------------
 
     def equilibrium(self, frame: Frame) -> Equilibrium:
         """That of one of the frames, under what was prescribed. Local."""
         return Equilibrium(frame.state, frame.design, self.quantity)
-
-    @property
-    def _writes(self) -> bool:
-        """Whether this process writes files."""
-        return self.discretisation.comm.rank == 0
 
     @property
     def _solver(self) -> Iteration:

@@ -30,18 +30,20 @@ class ExplanationOptions:
 
     Attributes:
         tolerance: relative change of the displacement.
-        weight: per volume, of plastics and silicones (1.2 g/cm³), N/mm³.
+        weight: per volume, of the flexible links, in the units of the scene; None is unknown.
         locking: Poisson's ratio from which displacement elements of an order lose accuracy.
         slender: of the out-of-plane buckling load, from which a link deserves a simulation in space.
     """
 
     tolerance: float = 0.01
-    weight: float = 1.2e-9 * 9810.0
+    weight: float | None = None
     locking: Mapping[int, float] = field(default_factory=lambda: {1: 0.40, 2: 0.48, 3: 0.49})
     slender: float = 0.2
 
     def __post_init__(self) -> None:
         positive("tolerance of an explanation", self.tolerance)
+        if self.weight is not None:
+            positive("weight per volume of an explanation", self.weight)
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,7 @@ def explain(
         model, solver: the discretised mechanism, and the solver that found the frame.
         at: the equilibrium of the frame.
         frame: of the curve.
-        units: of the description; weights are only known in N and mm.
+        units: of the description, for labels.
         options: from where on something matters.
 
     Raises:
@@ -120,13 +122,15 @@ def _weight_hint(
 ) -> Hint | None:
     if any(isinstance(effect, Gravity) for effect in model.effects):
         return None
-    if (units.length, units.force) != ("mm", "N"):
-        return Hint("weight", "list Gravity(…) with densities in your units to include it", False)
+    per_volume = f"{units.force}/{units.length}³"
+    if options.weight is None:
+        return Hint("weight", f"its influence needs explain(weight=…), the weight per volume in {per_volume}", False)
     change = options.weight * float(np.linalg.norm(weight_influence(model, solver, at)))
     part = change / max(abs(frame.displacement), 1e-300)
     return Hint(
         "weight",
-        f"flexible links of 1.2 g/cm³ would move the point by at most {change:.2g} mm, {part:.2%} of its way; "
+        f"flexible links of {options.weight:.3g} {per_volume} would move the point by at most {change:.2g} "
+        f"{units.length}, {part:.2%} of its way; "
         "list Gravity(…) to include it (one form to compile, a few per cent of a frame)",
         part > options.tolerance,
     )

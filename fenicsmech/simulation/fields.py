@@ -141,7 +141,10 @@ def _folder_beside(path: Path) -> Path:
 
 @contextmanager
 def _at_rest(model: MechanismModel, design: np.ndarray) -> Iterator[None]:
-    """Moves the nodes of the mesh to where ``design`` puts them for a while: files show the links at rest."""
+    """Moves the nodes of the mesh to where ``design`` puts them for a while: files show the links at rest.
+
+    The only place where the coordinates of a ``MechanismMesh`` change: dolfinx writes functions with their own mesh.
+    """
     x = model.mesh.mesh.geometry.x
     drawn = x.copy()
     with model.shaped(design):

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fenicsmech.joints import WELD
 from fenicsmech.mechanism import Force, Link, in_dimension
 from fenicsmech.model import MechanismModel
 from fenicsmech.plot import (
@@ -66,7 +65,7 @@ class MechanismPlotter:
 
     def _pins(self, poses: np.ndarray) -> tuple[Pin, ...]:
         return tuple(
-            Pin(self._moved(each.a, each.at, poses), welded=each.kind is WELD)
+            Pin(self._moved(each.a, each.at, poses), welded=each.kind.clamps)
             for each in self._linkage.joints.connections
         )
 

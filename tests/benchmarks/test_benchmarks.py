@@ -28,6 +28,7 @@ def test_a_written_table_is_what_was_printed(tmp_path, capsys):
     assert (tmp_path / "sizes.md").read_text() == capsys.readouterr().out.rstrip("\n") + "\n"
 
 
+@pytest.mark.thorough
 def test_curves_of_the_drawn_mechanisms():
     rows = {row[0]: row for row in printed("frames", "--space", "plane-stress", "--size", "0.8")}
     expected = {"truss": 1.7555, "claw": 11.907, "klann": 11.562}  # mm
@@ -35,6 +36,7 @@ def test_curves_of_the_drawn_mechanisms():
         assert float(rows[name][2]) == pytest.approx(displacement, rel=0.005)
 
 
+@pytest.mark.thorough
 def test_effects_move_the_finger_and_none_moves_nothing():
     rows = {row[0]: row for row in printed("effects", "--space", "plane-stress", "--size", "3")}
     moved = {name: float(row[-1]) for name, row in list(rows.items())[2:]}
@@ -72,6 +74,7 @@ def test_predictors_and_quadratures_give_the_same_displacement():
     assert max(shift for name, shift in shifts.items() if name.startswith("quadrature")) < 1e-2
 
 
+@pytest.mark.thorough
 def test_what_takes_too_long_is_stopped_and_said_so():
     *_, row = printed("solvers", "truss, whole load at once", "--limit", "0")
     assert row[1:] and set(row[1:]) == {"stopped after 0 s"}

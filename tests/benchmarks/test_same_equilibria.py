@@ -49,18 +49,21 @@ def assert_alike(solver: EquilibriumSolver, space: str, samples: dict, **options
         assert pulls[0] == pytest.approx(pulls[1], abs=1e-7 * np.abs(pulls[1]).max())
 
 
+@pytest.mark.thorough
 @each_solver
 @pytest.mark.parametrize("samples", [{"forces": [1.0, 3.0, -1.0]}, {"displacements": [2.0, 5.0]}])
 def test_curve_of_a_finger_in_the_plane(solver, samples):
     assert_alike(solver, "plane-stress", samples)
 
 
+@pytest.mark.thorough
 @pytest.mark.parallel
 @each_solver
 def test_curve_of_a_finger_in_space_on_any_number_of_ranks(solver):
     assert_alike(solver, "3d", {"forces": [0.5, 1.0]}, order=1, size=8.0, comm=MPI.COMM_WORLD)
 
 
+@pytest.mark.thorough
 @each_solver
 def test_joints_with_compliance(solver):
     """A constraint that gives way under its multiplier."""
@@ -72,6 +75,7 @@ def test_joints_with_compliance(solver):
     assert found[1] == pytest.approx(found[0], rel=1e-8)
 
 
+@pytest.mark.thorough
 @each_solver
 @pytest.mark.parametrize(
     # the legs let the force go 62 forth and 102 back; whatever its size, dead force has an equilibrium along them
@@ -87,6 +91,7 @@ def test_what_is_out_of_reach_is_refused_in_one_solve(solver, control):
     assert caught.value.reason
 
 
+@pytest.mark.thorough
 @each_solver
 def test_start_with_inverted_elements_is_refused(solver):
     simulation, push = finger("plane-stress", solver=solver)
@@ -96,6 +101,7 @@ def test_start_with_inverted_elements_is_refused(solver):
         simulation.newton(push).solve(torn, LoadControl(1.0))
 
 
+@pytest.mark.thorough
 @each_solver
 def test_failure_of_a_curve_is_an_error_with_the_frames_before(solver):
     simulation, push = finger("plane-stress", solver=solver)
@@ -105,6 +111,7 @@ def test_failure_of_a_curve_is_an_error_with_the_frames_before(solver):
     assert np.isfinite(caught.value.last.displacement)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("solver", [AugmentedLagrangian, KKTNewton, SNES])
 def test_linear_systems_on_two_levels_do_as_well(solver):
     curves = []

@@ -34,6 +34,7 @@ def study() -> Study:
     return run_study(case.scene, case.tip, levels, size=0.5 * THICKNESS, repeats=1, comm=MPI.COMM_SELF)
 
 
+@pytest.mark.thorough
 def test_limits_are_those_of_beam_theory(study):
     expected = cantilever().expected
     assert study.reference.value == pytest.approx(expected, rel=5e-3)

@@ -41,6 +41,7 @@ def test_demos_use_nothing_below_the_package():
         assert "from fenicsmech" not in path.read_text() and "import fenicsmech." not in path.read_text()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", DEMOS)
 def test_demo_leaves_a_summary_pictures_and_a_stable_curve(name, tmp_path):
     summary, printed = report(name, tmp_path, "--space", "plane-stress", "--simulate-only")
@@ -112,6 +113,7 @@ def test_quick_truss_reaches_its_targets_in_plane_stress(truss_alone):
     check_quick("truss", *truss_alone)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["claw", pytest.param("klann", marks=pytest.mark.slow)])
 def test_quick_demo_reaches_its_targets_in_plane_stress(name, tmp_path):
     check_quick(name, *report(name, tmp_path, *QUICK), tmp_path)
@@ -139,6 +141,7 @@ def test_two_ranks_give_the_same_curve_and_the_same_optimum(truss_alone, tmp_pat
         assert two["parameters"] == pytest.approx(one["parameters"], rel=1e-6, abs=1e-6)
 
 
+@pytest.mark.thorough
 def test_an_interrupted_optimisation_goes_on(truss_alone):
     alone, _, folder = truss_alone
     again, _ = report("truss", folder, *QUICK, "--resume")

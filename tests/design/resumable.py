@@ -54,8 +54,7 @@ def main(folder: Path, *, resume: bool) -> None:
         regulariser=Slow() + fm.ShapeBounds() + 1e-4 * fm.StayClose(),
     )
     result = problem.optimise(optimiser=Logged(), checkpoint=folder / "checkpoint.json", resume=resume)
-    if comm.rank == 0:
-        result.save(folder / "result.json")
+    result.save(folder / "result.json")
 
 
 if __name__ == "__main__":

@@ -73,6 +73,7 @@ def test_all_links_of_the_material_change_together():
     assert fit.youngs_modulus == pytest.approx(1500.0, rel=1e-6)
 
 
+@pytest.mark.thorough
 def test_interval_covers_the_truth_as_often_as_it_says():
     random, covered, rounds = np.random.default_rng(3), 0, 20
     true = exact()

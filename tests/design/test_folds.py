@@ -59,6 +59,7 @@ def nearly_snapping():
     return simulation, TargetEquilibria(simulation, [target])
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("fall", [0.012, 0.02, 0.05, 0.1, 0.3])
 def test_design_path_across_a_fold_is_reported(nearly_snapping, fall):
     simulation, equilibria = nearly_snapping

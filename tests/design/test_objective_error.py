@@ -19,6 +19,7 @@ def value(targets, reached) -> float:
     return float(np.array([0.5 * target.weight for target in targets]) @ target_errors(targets, reached) ** 2)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["cantilever", "arch", "truss", "claw", "klann"])
 def test_effectivity_is_between_a_half_and_two(name, monkeypatch):
     scene, push, load = case(name)

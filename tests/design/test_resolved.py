@@ -19,6 +19,7 @@ def errors(case: Case, simulation: fm.Simulation) -> np.ndarray:
     return np.abs(curve.error_estimates()) / [target.displacement for target in case.targets]
 
 
+@pytest.mark.thorough
 @pytest.mark.parallel
 def test_targets_move_by_less_than_the_error_of_the_elements_when_it_goes_on():
     case = truss(*TARGETS)

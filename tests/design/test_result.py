@@ -52,6 +52,15 @@ RESULT = DesignResult(
 )
 
 
+@pytest.mark.parallel
+def test_all_processes_save_one_file(shared_tmp_path):
+    RESULT.save(shared_tmp_path / "design.json")
+    assert DesignResult.load(shared_tmp_path / "design.json") == RESULT
+    with pytest.raises(OSError, match="design.json"):
+        RESULT.save(shared_tmp_path / "design.json" / "another.json")
+    assert [path.name for path in shared_tmp_path.iterdir()] == ["design.json"]
+
+
 def test_a_saved_design_is_read_back_equal(tmp_path):
     path = tmp_path / "new folder" / "design.json"
     RESULT.save(path)

@@ -76,6 +76,7 @@ def undisturbed(tmp_path_factory) -> tuple[fm.DesignResult, list[int]]:
     return run(tmp_path_factory.mktemp("undisturbed"), 1)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("ranks", "victim"), [(1, 0), (2, 1)])
 def test_killed_optimisation_goes_on_from_its_checkpoint(ranks, victim, tmp_path, undisturbed):
     expected, whole = undisturbed

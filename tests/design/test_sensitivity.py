@@ -100,6 +100,7 @@ def assert_slopes(travels: Callable[[float], np.ndarray], slopes: Sequence[float
         assert np.all(rates.with_gradient >= 1.95)
 
 
+@pytest.mark.thorough
 def test_derivatives_by_the_design_field_away_from_the_drawn_shape(bench):
     base, direction = bench.field(1), bench.field(2)
     gradients = bench.gradients(bench.state(base))
@@ -108,6 +109,7 @@ def test_derivatives_by_the_design_field_away_from_the_drawn_shape(bench):
     assert_slopes(lambda t: bench.travels(base + t * direction), slopes, [0.4, 0.2, 0.1, 0.05])
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("constant", "steps"), [("E", (16.0, 8.0, 4.0)), ("nu", (0.016, 0.008, 0.004))])
 def test_derivatives_by_the_moduli_of_one_link(bench, constant, steps):
     base, index = bench.field(1), 1
@@ -124,6 +126,7 @@ def test_derivatives_by_the_moduli_of_one_link(bench, constant, steps):
     assert_slopes(changed, [gradient.parameters[constant][index] for gradient in gradients], steps)
 
 
+@pytest.mark.thorough
 def test_derivatives_by_the_force(bench):
     base = bench.field(1)
     slopes = [gradient.force for gradient in bench.gradients(bench.state(base))]

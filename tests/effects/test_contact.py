@@ -82,6 +82,7 @@ def test_without_contact_no_boundary_is_looked_for():
     assert kinds == {"cell"}
 
 
+@pytest.mark.thorough
 @pytest.mark.parallel
 @pytest.mark.parametrize("comm", [MPI.COMM_SELF, MPI.COMM_WORLD], ids=["alone", "together"])
 @pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])

@@ -47,7 +47,7 @@ class Bars:
 
     def area(self, fields: LinkFields, part: Faces) -> float:
         """Of the whole depth."""
-        form = compile_form(fields.boundary_integral(fields.model.multiplier(DEPTH), part, degree=1))
+        form = compile_form(fields.boundary_integral(1.0, part, degree=1))
         return self.model.mesh.mesh.comm.allreduce(fem.assemble_scalar(form))
 
 

@@ -121,6 +121,7 @@ def test_angle_is_that_of_the_turn_even_beyond_half_a_turn(dim, full):
     assert coordinate.value(poses) == pytest.approx(full * np.pi, rel=1e-12)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("space", "frame"), [("plane-stress", UPRIGHT), ("3d", UPRIGHT), ("3d", TILTED)])
 @pytest.mark.parametrize("swapped", [False, True])
 def test_lever_on_a_torsion_spring_balances_its_load_up_to_170_degrees(space, frame, swapped):

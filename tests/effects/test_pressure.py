@@ -138,6 +138,7 @@ def beam(space: str, pressure: float, *, about=(0.0, 0.0), bow: float = 0.0) -> 
     return fm.Simulation(scene, space=space, size=2.0), push
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
 def test_a_clamped_beam_bends_under_pressure_from_above(space):
     simulation, push = beam(space, 0.001)
@@ -148,6 +149,7 @@ def test_a_clamped_beam_bends_under_pressure_from_above(space):
     assert frame.stable
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
 def test_displacements_under_pressure_are_differentiated_by_the_design_field(space):
     simulation, push = beam(space, 0.02, bow=6.0)

@@ -48,6 +48,7 @@ def bar(
     return fm.Simulation(scene, space=space, size=2.0), push
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("stretch", [0.7, 1.0 + 1e-6, 1.4])
 @pytest.mark.parametrize("space", SPACES)
 def test_a_free_bar_takes_its_strain_free_length(space, stretch):
@@ -90,6 +91,7 @@ def test_residuals_of_displacement_and_pressure_are_differentiated_by_the_load_f
     assert rates.with_gradient.min() > 1.9
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
 def test_a_bar_that_swells_in_all_directions_grows_as_long_as_it_would(space):
     # its ends are held across: away from them it is free
@@ -98,6 +100,7 @@ def test_a_bar_that_swells_in_all_directions_grows_as_long_as_it_would(space):
     assert frame.displacement == pytest.approx(0.1 * LENGTH, rel=0.02)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("space", SPACES)
 def test_a_held_bar_pushes_by_its_stiffness_times_the_strain_it_may_not_have(space):
     strain = 1e-5
@@ -108,6 +111,7 @@ def test_a_held_bar_pushes_by_its_stiffness_times_the_strain_it_may_not_have(spa
     assert frame.stable
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("along", [(0.8, 0.6), None])
 @pytest.mark.parametrize("space", SPACES)
 def test_energy_and_its_gradient_are_differentiated(space, along):
@@ -137,6 +141,7 @@ def test_energy_and_its_gradient_are_differentiated(space, along):
     assert rates.with_gradient.min() > 1.9
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
 def test_displacements_are_differentiated_by_the_design_field(space):
     simulation, push = bar(space, 1.1, held=True, bow=4.0)

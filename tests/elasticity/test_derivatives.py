@@ -49,6 +49,7 @@ def rates(function, compute, derivative):
     return found.with_gradient
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("parameter", PARAMETERS)
 def test_first_derivatives_of_the_energy(body, parameter):
     function = body.parameters[parameter] if parameter in body.parameters else getattr(body, parameter)

@@ -38,6 +38,7 @@ def stiffness(mixed):
     return dense
 
 
+@pytest.mark.thorough
 def test_step_that_turns_promises_no_stress_where_its_displacements_stretch(body, mixed):
     dim = body.model.dim
     skew = np.zeros((dim, dim))

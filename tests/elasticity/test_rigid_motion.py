@@ -35,6 +35,7 @@ def body_of(request):
     return build
 
 
+@pytest.mark.thorough
 @each_case
 @pytest.mark.parametrize("order", [1, 2])
 def test_rigid_motion_costs_no_energy_and_takes_no_force(body_of, model, law, order):

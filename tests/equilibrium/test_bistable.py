@@ -8,6 +8,7 @@ import fenicsmech as fm
 from .bistable import RISE, forces, four_bar
 
 
+@pytest.mark.thorough
 def test_four_bar_snaps_as_its_follower_bends_and_rests_in_the_mirror_image():
     case = four_bar()
     curve = case.simulation.follow(case.push, until=fm.Until(displacement=2.2 * RISE))

@@ -62,6 +62,7 @@ def parts_of(system: EquilibriumSystem) -> dict[str, np.ndarray]:
     return {"u": parts.nodes, "z": parts.poses, "λ": parts.multipliers, "f": parts.load}
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("kind", CONTROLS)
 @pytest.mark.parametrize("where", ["on_rigid", "on_flexible"])
 @pytest.mark.parametrize("space", SPACES)
@@ -90,6 +91,7 @@ def test_residual_is_the_gradient_of_the_lagrangian(space, where, kind):
         assert gradient[-1] == 0.0  # f is given, nothing is to be balanced
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("kind", CONTROLS)
 @pytest.mark.parametrize("where", ["on_rigid", "on_flexible"])
 @pytest.mark.parametrize("space", SPACES)

@@ -41,6 +41,7 @@ def extrapolated(value) -> np.ndarray:
     return (16.0 * finer[1] - finer[0]) / 15.0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("comm", COMMS.values(), ids=COMMS)
 @pytest.mark.parametrize("dim", [2, 3])
 def test_residual_and_kkt_matrix_are_derivatives_of_the_lagrangian(dim, comm):

@@ -242,6 +242,7 @@ def test_nor_do_they_suit_pressures_and_mid_planes_which_the_factor_solves_at_an
         simulation.load_displacement(tip, forces=[0.02])
 
 
+@pytest.mark.thorough
 def test_followed_paths_end_where_those_of_the_factor_do():
     ends = []
     for linear in (TwoLevel(), Direct()):

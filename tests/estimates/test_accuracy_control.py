@@ -96,6 +96,7 @@ def test_choice_prints_what_was_tried_and_what_ten_times_the_accuracy_would_cost
     assert text.rstrip().endswith(" s")
 
 
+@pytest.mark.thorough
 def test_curves_are_as_accurate_as_asked_for_with_their_corrections(tmp_path):
     scene, push = describe("truss")[:2]
     forces = [0.2, LOADS["truss"]]

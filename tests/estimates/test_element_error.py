@@ -33,6 +33,7 @@ def reference(name: str, space: str, size: float) -> float:
     return simulation.load_displacement(push, forces=[0.5 * load, load]).displacements[-1]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("order", "size"), [(1, 1.0), (2, 4.0), (2, 2.0), (2, 1.5)])
 @pytest.mark.parametrize("name", ["cantilever", "arch", "truss", "claw", "klann"])
 def test_effectivity_in_the_plane_is_between_a_half_and_two(name, order, size, monkeypatch):
@@ -42,6 +43,7 @@ def test_effectivity_in_the_plane_is_between_a_half_and_two(name, order, size, m
     assert 0.5 < estimate / error < 2.0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["cantilever", "arch", "truss", "claw", "klann"])
 def test_effectivity_of_forces_at_prescribed_displacements_is_between_a_half_and_two(name, monkeypatch):
     scene, push, load = case(name)
@@ -69,6 +71,7 @@ def test_errors_of_force_and_displacement_differ_by_the_stiffness():
     assert at_displacement == pytest.approx(-stiffness * at_force, rel=1e-4)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("held", ["force", "displacement"])
 def test_effectivity_of_the_displacement_of_an_output_is_between_a_half_and_two(held, monkeypatch):
     scene, push, load = arch()
@@ -106,6 +109,7 @@ def test_effectivity_in_space_is_between_a_half_and_two(name, size):
     assert 0.5 < estimate / (reference(name, "3d", size) - value) < 2.0
 
 
+@pytest.mark.thorough
 @pytest.mark.parallel
 @pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
 def test_estimate_is_the_same_on_any_number_of_processes(space):

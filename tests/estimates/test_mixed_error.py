@@ -52,6 +52,7 @@ def simulated(name: str, size: float, *, order: int, space: str = "plane-strain"
     return simulation, simulation.load_displacement(push, forces=[0.5 * load, load])
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("order", [2, 3])
 @pytest.mark.parametrize("name", list(CASES))
 def test_effectivity_is_between_a_half_and_two(name, order, monkeypatch):

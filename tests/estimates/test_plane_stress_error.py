@@ -21,6 +21,7 @@ def case(name: str):
     return scene, push, LOADS[name]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["cantilever", "truss", pytest.param("claw", marks=pytest.mark.slow), "klann"])
 def test_estimate_is_near_what_space_adds(name):
     scene, push, load = case(name)

@@ -47,6 +47,7 @@ CORNERS = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("size", [1.0, 1.73, 3.0])
 @pytest.mark.parametrize("shape", SHAPES)
 def test_the_outline_of_a_mesh_is_that_of_a_much_finer_mesh(shape, size):

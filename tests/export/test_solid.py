@@ -55,6 +55,7 @@ def holes_area(pins):
     return sum(0.25 * np.pi * pin.diameter**2 for pin in pins)
 
 
+@pytest.mark.thorough
 @each_dim
 @each_link
 def test_the_solid_has_the_volume_and_the_extent_of_a_fine_mesh(name, dim, tmp_path):
@@ -91,6 +92,7 @@ def test_edges_of_the_solid_run_through_every_boundary_vertex(name, tmp_path):
             assert nearest < 1e-6
 
 
+@pytest.mark.thorough
 @each_link
 def test_pins_leave_holes(name, tmp_path):
     make, pins = LINKS[name]

@@ -18,6 +18,7 @@ def _parameter(case: HardCase, space: str):
     return pytest.param(case, space, id=f"{case.name}, {space}", marks=[pytest.mark.slow] * case.slow)
 
 
+@pytest.mark.thorough
 @pytest.mark.parallel
 @pytest.mark.parametrize("case, space", [_parameter(case, space) for case in CASES for space in case.spaces])
 def test_hard_case(case, space):

@@ -22,6 +22,7 @@ def anywhere(case, rng):
     return poses, draw(case.space, rng), float(rng.uniform(-3.0, 3.0))
 
 
+@pytest.mark.thorough
 @EVERY_JOINT
 @SEEDS
 def test_gradient_passes_the_taylor_test(case, driven, seed):

@@ -28,6 +28,7 @@ def responses(c, drawn, z, body):
     return gradient @ np.stack([drawn.rigid_motion(z, motion, body) for motion in MOTIONS[drawn.space.dim]], axis=1)
 
 
+@pytest.mark.thorough
 @EVERY_JOINT
 @SEEDS
 def test_free_motions_keep_the_joint_closed(case, seed):
@@ -78,6 +79,7 @@ def test_moving_both_bodies_together_is_free(case, seed):
     assert together == pytest.approx(np.zeros_like(together), abs=1e-14)
 
 
+@pytest.mark.thorough
 @EVERY_MOTOR
 @pytest.mark.parametrize("value", [-2.5, -0.3, 0.0, 1e-9, 0.7, 3.0])
 def test_motor_takes_the_free_coordinate_to_its_value(case, value):

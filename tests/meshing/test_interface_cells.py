@@ -25,6 +25,7 @@ def boundary_vertices(cells):
     return np.unique(single[counts == 1])
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("size", [0.7, 2.0, 6.0])
 @pytest.mark.parametrize("ratio", [0.5, 0.9, 0.99, 1.0, 1.01, 1.1, 1.5, 2.0])
 @pytest.mark.parametrize("at", [BOW.centreline[0], BOW.centreline[1], BOW.centreline[2]])
@@ -75,6 +76,7 @@ def test_a_cylinder_lies_along_the_axis_whichever_way_it_points(axis):
     assert cell_measures(mesh.points, mesh.cells).sum() == pytest.approx(480.0 * 4.0, rel=1e-9)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("dim, extent", [(2, 1.0), (3, 10.0)])
 @pytest.mark.parametrize("radius", [2.5, 4.0])
 def test_around_the_hole_of_a_step_part_a_ring_is_held(dim, extent, radius):

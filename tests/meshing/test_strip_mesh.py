@@ -52,6 +52,7 @@ def test_eyes_add_the_part_of_their_disc_beyond_the_strip(ratio):
     assert exact - 1.1 * missing < area(mesh) < exact
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("half", [None, False, True])
 @pytest.mark.parametrize("thickness", [2.5, 1.0, 0.3])
 @pytest.mark.parametrize("points", [STRAIGHT, BENT, WAVY])
@@ -80,6 +81,7 @@ def test_pins_no_wider_than_the_strip_round_its_ends(ratio):
     assert area(mesh) == pytest.approx(exact, rel=1e-3)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("size", [0.6, 1.5, 3.0])
 @pytest.mark.parametrize("ratio", RATIOS)
 @pytest.mark.parametrize("points", [STRAIGHT, BENT, WAVY])

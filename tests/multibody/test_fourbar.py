@@ -14,6 +14,7 @@ CROSSED = FourBar((0.0, 0.0), (32.0, 4.0), crank=10.0, coupler=30.0, rocker=25.0
 DRAG_LINK = FourBar((0.0, 0.0), (10.0, 0.0), crank=25.0, coupler=22.0, rocker=28.0)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("oracle", [CRANK_ROCKER, CROSSED, DRAG_LINK], ids=["open", "crossed", "drag link"])
 def test_pivots_follow_the_closed_form_over_a_turn(oracle, dim):

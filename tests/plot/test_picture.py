@@ -145,9 +145,9 @@ def test_a_long_title_fits_above_a_slender_link():
 def test_neither_a_display_nor_pyplot_is_needed(tmp_path):
     code = (
         "import sys\n"
-        "from fenicsmech.plot import CurveSeries, MechanismShape, Panel, Pin, draw_configurations, plot_curve\n"
+        "from fenicsmech.plot import CurveSeries, MechanismShape, Panel, Pin, draw_configurations, draw_curve\n"
         "draw_configurations('picture.png', [Panel(MechanismShape(pins=(Pin((0, 0)),)))])\n"
-        "plot_curve('curve.png', [CurveSeries([0, 1], [0, 1])])\n"
+        "draw_curve('curve.png', [CurveSeries([0, 1], [0, 1])], xlabel='', ylabel='', title='')\n"
         "assert 'matplotlib.pyplot' not in sys.modules\n"
     )
     environment = {key: value for key, value in os.environ.items() if "DISPLAY" not in key}

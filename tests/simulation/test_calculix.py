@@ -38,6 +38,7 @@ def four_bar(quadrature: Quadrature | None):
     return simulation, push
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("quadrature", "tolerance"), [(Quadrature(2), 1e-5), (None, 1e-3)], ids=["as CalculiX", "default"]
 )

@@ -49,6 +49,7 @@ def test_dead_load_at_the_tip_in_space():
         assert across == pytest.approx(w * length, rel=5e-3)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "space, poisson, turn",
     [

@@ -65,6 +65,7 @@ def test_nothing_is_added_where_no_link_is_bulky(space):
     assert found[0] == found[1]
 
 
+@pytest.mark.thorough
 @pytest.mark.parallel
 @pytest.mark.parametrize("space", ["plane-strain", "3d"])
 def test_results_are_the_same_on_any_number_of_ranks(space):
@@ -80,6 +81,7 @@ def test_results_are_the_same_on_any_number_of_ranks(space):
     assert all(frame.stable for frame in curves[0].frames)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("space", ["plane-strain", "3d"])
 def test_limit_of_incompressibility_is_approached_without_trouble(space):
     """Newton's method needs as many iterations, and what is left of the way falls as 1 − 2ν."""

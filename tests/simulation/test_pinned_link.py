@@ -28,6 +28,7 @@ def pinned(space: str, poisson: float, radius: float):
     return fm.Simulation(fm.Scene(mechanism), space=space, size=0.5 * THICKNESS, comm=MPI.COMM_SELF), pull
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("radius", [0.5 * THICKNESS, 0.75 * THICKNESS], ids=["within", "wider"])
 @pytest.mark.parametrize("poisson", [0.0, 0.42])
 @pytest.mark.parametrize("space", ["plane-stress", "plane-strain"])

@@ -51,6 +51,7 @@ def strained(six_bar, angle):
     return frame, [centre + (x, y) + rotation @ (np.array(point) - centre) for point in (B, C, E)]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("angle", [-0.306, -0.32, -0.34, -0.38])
 def test_the_dyad_stays_stretched_while_the_rocker_yields(six_bar, angle):
     frame, (_, _, end) = strained(six_bar, angle)

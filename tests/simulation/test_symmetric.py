@@ -82,6 +82,7 @@ def assert_alike(whole: fm.Frame, half: fm.Frame, *, digits: float = 1e-9) -> No
     assert [*half.motors.values()] == pytest.approx([*whole.motors.values()], abs=10 * digits * torque)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("build", "order", "size", "forces", "position"),
     [
@@ -124,6 +125,7 @@ EFFECTS = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", EFFECTS)
 def test_effects_act_on_the_half_as_on_the_whole(name):
     def effects(mechanism: fm.Mechanism) -> list[Effect]:

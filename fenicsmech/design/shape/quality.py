@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 import ufl
 from dolfinx import fem
+from dolfinx.fem import petsc
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -92,7 +93,7 @@ class QualitySum:
         """∂²/∂d²; overwritten by the next call."""
         matrix = self._matrix
         matrix.zeroEntries()
-        fem.petsc.assemble_matrix(matrix, self._hessian_form)
+        petsc.assemble_matrix(matrix, self._hessian_form)
         matrix.assemble()
         return matrix
 
