@@ -65,7 +65,7 @@ def on_all(comm: MPI.Comm, work: Callable[[], T]) -> T:
 
 
 def mpi_abort_on_error() -> None:
-    """Ends all processes after an uncaught error on one; MPI by itself leaves the others waiting for ever.
+    """Ends all processes after an uncaught error on one; MPI by itself leaves the others waiting.
 
     A script calls it once, at its start. It replaces ``sys.excepthook`` where there are several processes. If all
     fail, each ends as usual.

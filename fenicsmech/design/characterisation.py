@@ -36,7 +36,7 @@ class Experiment:
         simulation: of the sample in its test rig.
         part: the force that was applied.
         forces: its magnitudes, (n,).
-        displacements: how far its point moved along it, (n,).
+        displacements: of its point along it, (n,).
         configuration: motor positions.
 
     Raises:
@@ -107,7 +107,7 @@ def fit_modulus(experiments: Sequence[Experiment], material: Material) -> Modulu
 
     Args:
         experiments: measurements, at least two readings in all.
-        material: that of some links; its modulus is where the fit starts.
+        material: that of some links; its modulus is the initial guess.
 
     Raises:
         DescriptionError: no link of an experiment is of this material, or there are fewer than two readings.

@@ -91,9 +91,9 @@ class Target:
     Attributes:
         part: the force that acts.
         force: its magnitude.
-        displacement: how far its point should move along it.
+        displacement: target displacement of its point along it.
         configuration: motor positions.
-        weight: how much its relative error counts beside those of other targets.
+        weight: of its squared relative error in the objective.
 
     Raises:
         DescriptionError: a number makes no sense.
@@ -114,7 +114,7 @@ class Target:
 
 
 def shape_request(design: SplineDesign, mechanism: Mechanism, linkage: Linkage) -> ShapeRequest:
-    """The handles and spline that ``design`` asks for.
+    """The handles and spline of ``design``.
 
     Raises:
         DescriptionError: no centreline is known, or there are fewer segments than gaps between joints.
@@ -194,7 +194,7 @@ def check_sensitivities(
     """Refuses targets that are missed and that no parameter moves.
 
     Args:
-        targets: what is wanted.
+        targets: wanted displacements.
         designs: the links that may change.
         sensitivities: relative change of each displacement when a parameter changes by its length ℓ,
             (targets, parameters).

@@ -1,4 +1,4 @@
-"""A design problem: which links of a simulation may change, and what is wanted of the mechanism."""
+"""A design problem: the links of a simulation that may change, and the targets of the mechanism."""
 
 from __future__ import annotations
 
@@ -44,17 +44,16 @@ DEFAULT_REGULARISER = MeshQuality() + ShapeBounds() + 1e-4 * StayClose()
 
 
 class DesignProblem:
-    """Shapes of some links that make points move as far as wanted.
+    """Optimisation of the shapes of some links for target displacements.
 
         min over p   Σ_k ½ w_k ((u_k(p) − ū_k) / ū_k)² + R(p)
 
     Nothing is meshed or compiled before it is needed; the description is checked at once.
 
     Args:
-        simulation: how displacements are computed; it keeps the shapes it has. ``simulation.with_design`` gives one of
-            a result.
+        simulation: of the displacements; it keeps its shapes. ``simulation.with_design`` gives one of a result.
         designs: the links that may change.
-        targets: what is wanted.
+        targets: wanted displacements.
         regulariser: R; by default mesh quality, bounds of fabrication, and closeness to the drawing with weight 1e-4,
             where the paper has 1: with 1 the targets of the demos are missed by 19–79 %.
 
@@ -110,8 +109,8 @@ class DesignProblem:
 
         Args:
             optimiser: Levenberg–Marquardt by default.
-            start: where to start, as the result of a cheaper simulation; the drawn shapes by default.
-            checkpoint: file that is brought up to date after each iteration.
+            start: initial design, as the result of a cheaper simulation; the drawn shapes by default.
+            checkpoint: file updated after each iteration.
             resume: go on from ``checkpoint`` if it exists.
 
         Raises:
@@ -190,7 +189,7 @@ class DesignProblem:
     # -- steps of ``optimise`` -------------------------------------------------------------------------------
 
     def _beginning(self, start: DesignResult | None, saved: Checkpoint | None) -> tuple[Start, HandlePlacement | None]:
-        """Where to start, and the handles there if they are known: from ``saved`` if its file exists."""
+        """The start, and its handles if known: those of ``saved`` if its file exists."""
         parameters, near = (self.initial, None) if start is None else self._given(start)
         begin = Start(parameters)
         if saved is not None and (found := saved.load_together(self.simulation.comm)) is not None:

@@ -1,8 +1,8 @@
 """Equilibria of targets, found once from zero load and then followed as the design changes.
 
 Near a fold, where a mechanism is about to snap, a small change of design may leave no equilibrium near the old one, and
-Newton's method lands on another branch. So each change of design is predicted backwards from where it led, with the
-factor that is there already:
+Newton's method lands on another branch. So each change of design is checked by a backward prediction with the same
+factor:
 
     ŷ₀ = y + δ,   δ = −K₁⁻¹ R(y; d₀),   y the state y₁ carried back,     |y₀ − ŷ₀| ≤ 2 |δ|
 
@@ -32,12 +32,12 @@ from fenicsmech.simulation import CurveRequest, Simulation
 
 @dataclass(frozen=True)
 class FollowOptions:
-    """When an equilibrium at one design is a continuation of the one at another.
+    """Criteria for an equilibrium at one design to continue the one at another.
 
     Attributes:
         halvings: of a change of design whose equilibrium is not found, or lies elsewhere.
         largest_miss: of the prediction, over |δ|: up to 1.7 on one branch, 3.8 and more across folds.
-        rounding: misses below this part of the mechanism's length, or rad, are none.
+        rounding: misses below this part of the mechanism's length, or rad, are rounding.
     """
 
     halvings: int = 2
@@ -86,7 +86,7 @@ class TargetEquilibria:
         self._sensitivities = {part: Sensitivity(self._model, newton) for part, newton in self._newtons.items()}
 
     def trace(self) -> Known:
-        """From zero load to every target, at the present design.
+        """The equilibria of all targets, from zero load, at the present design.
 
         Raises:
             Infeasible: an equilibrium is not found or is unstable.
@@ -101,7 +101,7 @@ class TargetEquilibria:
         return Known(self._model.elastic.d.x.array.copy(), tuple(samples[target] for target in self.targets))
 
     def follow(self, known: Known) -> Known:
-        """At the present design, from those of another one.
+        """The equilibria at the present design, from those of another one.
 
         Raises:
             Infeasible: an equilibrium is not found or is unstable.
@@ -122,7 +122,7 @@ class TargetEquilibria:
         return np.array(fields).reshape(len(fields), -1)
 
     def errors(self, known: Known) -> np.ndarray:
-        """What finer elements would add to the displacements, (targets,)."""
+        """Estimated discretisation errors of the displacements, (targets,)."""
         return np.array([self._error(*pair, known.design) for pair in zip(self.targets, known.samples, strict=True)])
 
     def _error(self, target: Target, sample: Sample, design: np.ndarray) -> float:

@@ -1,4 +1,4 @@
-"""The design objective: how far simulated displacements are from their targets, with derivatives.
+"""The design objective: squared relative errors of simulated displacements, with derivatives.
 
     O(p) = Σ ½ w_k r_k² + R(p),     r_k = (u_k(p) − ū_k) / |ū_k|,      k over targets
 
@@ -45,7 +45,7 @@ class Objective:
         targets: all of them.
         regulariser: R.
         group: this process's group.
-        clock: where time is counted: handles, regularisers, equilibria, gradients, estimates.
+        clock: of the phases: handles, regularisers, equilibria, gradients, estimates.
 
     Attributes:
         lengths: typical change ℓ of each parameter, (parameters,).
@@ -196,9 +196,9 @@ def objective_error(targets: Sequence[Target], reached: np.ndarray, errors: Sequ
     are met the second one is left, whose factor is the square of theirs. R depends on the design alone.
 
     Args:
-        targets: what is wanted.
+        targets: wanted displacements.
         reached: displacements u, (targets,).
-        errors: d, what finer elements would add to them, (targets,); None where that is not known.
+        errors: d, their estimated discretisation errors, (targets,); None where not known.
     """
     if any(error is None for error in errors):
         return None
@@ -226,12 +226,12 @@ class Group:
 
     @property
     def leads(self) -> bool:
-        """Whether this process speaks for its group."""
+        """Whether this process is the first of its group."""
         return self.comm.rank == 0
 
 
 def group_count(processes: int, targets: int) -> int:
-    """The number of groups that promises the shortest time.
+    """The number of groups with the shortest expected time.
 
     A group of n processes works off ⌈targets / groups⌉ equilibria, each in a time of 1 / √n: two are 1.4
     times as fast as one.

@@ -166,10 +166,10 @@ class MeshQuality(Regulariser):
     """R_mesh = Σ_e β(ρ_e), ρ a cell's circumradius over its inradius; infinite where cells are inverted.
 
     The constants are the paper's (appendix). A design with inverted cells has no placement at all and is refused
-    before R_mesh is asked for.
+    before R_mesh is evaluated.
 
     Attributes:
-        limit: aspect ratio up to which nothing is penalised.
+        limit: largest aspect ratio without penalty.
         width, strength: ε and m of the barrier.
 
     Raises:

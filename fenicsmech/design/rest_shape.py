@@ -30,7 +30,7 @@ class DesignedLink:
         name: of the link.
         place: its entries of p.
         spline: its centreline and thickness.
-        samples: where bounds are put on them.
+        samples: parameters at which they are bounded.
         thickness: in the plane, where δ = 1.
         bounds: of fabrication.
     """
@@ -92,7 +92,7 @@ class ParametricShape:
         return self._map.positions(placement.theta)
 
     def place(self, p: np.ndarray, near: HandlePlacement | None) -> HandlePlacement:
-        """Gives the links the shape of design ``p``, handles placed at their best.
+        """Gives the links the shape of design ``p`` with optimal handles.
 
         Args:
             p: the design, (parameters,).

@@ -1,4 +1,4 @@
-"""Designs as plain data: what was found, how well it meets its targets; its verification, and files of its links."""
+"""Results of designs as plain data, their verification, and files of their links."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class TargetResult:
     """A target and the displacement reached.
 
     Attributes:
-        force_name, configuration: what acts, and where the motors stand.
+        force_name, configuration: name of the force, motor positions.
         force: its magnitude.
         wanted, started, reached: displacement that is wanted, of the design the optimisation started from, and of
             the best design.
@@ -88,8 +88,8 @@ class DesignResult:
     Attributes:
         mechanism: its name.
         links: the best shapes found.
-        targets: how far each target was reached, in the order they were given.
-        reason: why the optimisation ended, in words.
+        targets: their results, in the order they were given.
+        reason: of the end of the optimisation, in words.
         converged: whether it ended at a minimum.
         verified: whether loading the mechanism from zero leads to the equilibria that were followed from design to
             design; the log says where not.
@@ -102,7 +102,7 @@ class DesignResult:
         seconds: wall-clock time.
         phases: the same by phase, on the first process: setup, weights, handles, regularisers, equilibria, gradients,
             verification; the rest is the optimiser's own.
-        processes, groups: how many worked, and in how many groups.
+        processes, groups: their numbers.
     """
 
     mechanism: str
@@ -221,7 +221,7 @@ def verified_targets(
 
     Args:
         simulation: its model has the shapes of the optimum.
-        targets: what was wanted.
+        targets: wanted displacements.
         started: displacements at the start, (targets,).
         followed: displacements of the equilibria that were followed from design to design, (targets,).
 

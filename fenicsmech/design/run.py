@@ -118,11 +118,11 @@ class Saved:
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """A checkpoint file of one problem: what a run needs to go on after its process was killed, as JSON.
+    """A checkpoint file of one problem, from which a run resumes after its process was killed, as JSON.
 
     Attributes:
         path: the file.
-        problem: what is minimised and how, as plain data; a checkpoint of anything else is refused.
+        problem: the problem and its optimiser as plain data; checkpoints of others are refused.
     """
 
     path: Path
@@ -144,7 +144,7 @@ class Checkpoint:
             file.write(json.dumps(data))
 
     def load(self) -> Saved:
-        """Local. Where to go on.
+        """Local. The start saved in the file.
 
         Raises:
             DescriptionError: the file does not exist, is not a checkpoint, or is one of another problem.
@@ -205,11 +205,11 @@ def fingerprint(
 class DesignProgress:
     """Shows iteration, objective, worst target error and time left on standard error; a context manager.
 
-    Time left is what the trend of the promised reduction over the last six iterations says, at most what the
-    optimiser's limit of iterations leaves.
+    Time left is extrapolated from the predicted reduction of the last six iterations, up to the optimiser's limit of
+    iterations.
 
     Args:
-        optimiser: says when it ends.
+        optimiser: gives the criteria of its end.
         leads: whether this process shows anything.
     """
 

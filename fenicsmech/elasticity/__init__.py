@@ -1,10 +1,10 @@
 """Strain energy of flexible links in UFL, on the fixed reference mesh with the design field in place.
 
-- ``models``: what is assumed about the third dimension (3D, whole or half; plane strain, plane stress)
-- ``formulation``: which links are in the u–p (mixed) formulation, and their pressure
+- ``models``: assumptions about the third dimension (3D, whole or half; plane strain, plane stress)
+- ``formulation``: links in the u–p (mixed) formulation, and their pressure
 - ``fields``: shape, displacement, pressure, parameters of laws, growth
 - ``body``: energy, residual, tangent and stress of all links
-- ``mixed_stress``: the stress that a step promises, for the next tangent
+- ``mixed_stress``: the stress predicted by a Newton step, for the next tangent
 """
 
 from fenicsmech.elasticity.body import ElasticBody, Quadrature

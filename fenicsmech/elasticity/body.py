@@ -163,7 +163,7 @@ class ElasticBody(BodyFields):
         return [[compile_form(ufl.derivative(row, field)) for field in self.fields] for row in self._residuals_ufl]
 
     def compile(self) -> None:
-        """Compiles what equilibria need."""
+        """Compiles all forms of equilibria."""
         _ = self.energy_form, self.residual_forms, self.tangent_forms
 
     def free(self, degree: int) -> ufl.Measure:
@@ -293,7 +293,7 @@ class ElasticBody(BodyFields):
 
     @cached_property
     def _sums(self) -> list[fem.Function]:
-        """Where vectors on the spaces of ``fields`` are assembled."""
+        """Functions on the spaces of ``fields`` in which vectors are assembled."""
         return [fem.Function(field.function_space) for field in self.fields]
 
 

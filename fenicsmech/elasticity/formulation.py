@@ -1,8 +1,8 @@
 """The u–p (mixed) formulation: links of nearly incompressible material whose pressure is an unknown.
 
-Displacements alone lock as ν goes to 0.5. In such links the energy W(F) of the law gives way to its Π(F, p), see
+Displacements alone lock as ν goes to 0.5. In such links the energy W(F) of the law is replaced by its Π(F, p), see
 ``SplitLaw``, a minimum in u and a maximum in the pressure p. With p continuous and one degree lower than u
-(Taylor–Hood), volumes are as free to stay constant as the material demands. Source: Boffi, Brezzi & Fortin
+(Taylor–Hood), the elements do not lock. Source: Boffi, Brezzi & Fortin
 (doi:10.1007/978-3-642-36519-5) for the elements.
 """
 

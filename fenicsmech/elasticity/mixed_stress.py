@@ -1,13 +1,13 @@
-"""The stress that a step of Newton's method promises, for the geometric part of the next tangent.
+"""The stress predicted by a step of Newton's method, for the geometric part of the next tangent.
 
 A step that turns a slender link also stretches it, at second order, and stretching is stiffer than bending by the
 square of length over thickness: the stress S(u + δu) of the displacements is then far larger than the one that the step
 solved for, S(u) + ∂S/∂E : δE with δE = sym(Fᵀ ∇δu). Newton's method with S as an unknown of its own at the
 integration points, S eliminated, has the same residual as the one in displacements, and the tangent
 
-    K + ∫ ∇v ΔS : ∇w dV,     ΔS = S(u) + ∂S/∂E : δE − S(u + δu),
+    K_uu + ∫ ∇v ΔS : ∇w dV,     ΔS = S(u) + ∂S/∂E : δE − S(u + δu),
 
-which is K once steps are small. Source: Magisano, Leonetti, Garcea, "How to improve efficiency and robustness of the
+which is K_uu once steps are small. Source: Magisano, Leonetti, Garcea, "How to improve efficiency and robustness of the
 Newton method in geometrically non-linear structural problem discretized via displacement-based finite elements"
 (Computer Methods in Applied Mechanics and Engineering 313, 2017, doi:10.1016/j.cma.2016.10.023), the MIP Newton.
 """

@@ -5,7 +5,7 @@ the plane, with j₂ = tr H + det H = J₂ − 1 and the contraction h = F₃₃
 
     J − 1 = j₂ + J₂ h,      tr FᵀF − 3 − 2 (J − 1) = H : H − 2 det H − 2 j₂ h + h².
 
-Plane strain has h = 0. Plane stress has S₃₃ = 0, which is ∂W/∂h = 0: in closed form where the law knows one, else by
+Plane strain has h = 0. Plane stress has S₃₃ = 0, which is ∂W/∂h = 0: in closed form where the law has one, else by
 Newton's method at every point.
 """
 
@@ -41,7 +41,7 @@ class ElasticModel(ABC):
 
     @abstractmethod
     def multiplier(self, depth: Expr | float) -> Expr | float:
-        """What integrals over the mesh of a link are multiplied by to be those over the link, from its ``depth``."""
+        """Factor from integrals over the mesh of a link to those over the link, from its ``depth``."""
 
     @abstractmethod
     def strain(self, law: Law, H: Expr) -> Strain:
@@ -63,10 +63,10 @@ class Solid(ElasticModel):
 class HalfSolid(Solid):
     """Three dimensions, the halves of all links on either side of the plane z = 0 mirror images of each other.
 
-    Only the half z ≥ 0 is meshed and counts twice; u₃ = 0 on the mid-plane, and bodies move in the plane. What joints
-    do and forces is taken to be symmetric, as in models in the plane, whatever heights links are stacked at.
-    Equilibria are those of the whole, as long as these are symmetric: motion out of the plane is not seen, nor
-    buckling out of the plane, so that an equilibrium called stable may give way there.
+    Only the half z ≥ 0 is meshed and counts twice; u₃ = 0 on the mid-plane, and bodies move in the plane. Joints and
+    forces are taken to be symmetric, as in models in the plane, whatever heights links are stacked at.
+    Equilibria are those of the whole, as long as these are symmetric: motion out of the plane is excluded, and so is
+    buckling, so that an equilibrium found stable may buckle out of the plane.
     """
 
     name, mechanism_dim = "3d-symmetric", 2

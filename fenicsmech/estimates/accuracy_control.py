@@ -1,12 +1,12 @@
-"""Accuracy control: the cheapest fidelity whose estimated error is below what is asked for.
+"""Accuracy control: the cheapest fidelity whose estimated error is below the required one.
 
 Fidelity levels are climbed from a coarse pilot. Errors of elements and of plane stress are estimated after each
-(``element_error``, ``plane_stress_error``), and the next level is the first that these let expect to do, by the gains
-that the levels of a model have over each other. Gains and work of levels were measured on claw, truss and Klann leg;
-they only say where to look: what counts is the estimate on the level itself.
+(``element_error``, ``plane_stress_error``), and the next level is the first whose expected error suffices, by the
+gains of the levels of a model over each other. Gains and work of levels were measured on claw, truss and Klann leg;
+they only guide the choice: the estimate on the level itself decides.
 
-Estimates are signed, and so they are added to the results (``Curve.corrected``). What is asked to be small is what they
-may leave,
+Estimates are signed, and so they are added to the results (``Curve.corrected``). The error required to be small
+is the one they may leave,
 
     |error| ≤ l |elements| + l_s |plane stress|,
 
@@ -44,13 +44,14 @@ _log = logger(__name__)
 
 @dataclass(frozen=True)
 class AccuracyOptions:
-    """What was measured once of error estimates and fidelity levels.
+    """Measured constants of error estimates and fidelity levels.
 
     Attributes:
-        plane_stress_left: of what space is estimated to add, once it is added.
+        plane_stress_left: error left of the plane-stress estimate once it is added, over the estimate.
         left_in_space: of the plane-stress error, what the coarsest level in space leaves.
-        caution: factor on what a level is expected to do.
-        first_order: of the largest displacement: larger estimates, as near limit points, mean nothing.
+        caution: factor on the expected error of a level.
+        first_order: largest valid estimate over the largest displacement: larger ones, as near limit points, are
+            meaningless.
         space_work: time of the coarsest level in space over that in plane stress.
     """
 
@@ -61,7 +62,7 @@ class AccuracyOptions:
     space_work: float = 5.0
 
     def corrections(self, errors: np.ndarray, values: np.ndarray) -> np.ndarray:
-        """What to add to the values of a curve, from the estimates of their errors, (frames,) each."""
+        """Corrections of the values of a curve, from the estimates of their errors, (frames,) each."""
         return np.where(np.abs(errors) > self.first_order * np.abs(values).max(), 0.0, errors)
 
 
@@ -75,7 +76,7 @@ class FidelityLevel:
         size: element size over the thickness of the links.
         layers: through half the depth, in space.
         segments: around pins.
-        left: what may be left of the error of the elements once its estimate is added, over the estimate.
+        left: error of the elements that may be left once its estimate is added, over the estimate.
         gain: error of the elements over that of the model's coarsest level.
         work: time over that of the model's coarsest level.
     """
@@ -91,7 +92,7 @@ class FidelityLevel:
 
     @property
     def name(self) -> str:
-        """In words."""
+        """The level as text."""
         where = self.model.name.replace("-", " ").replace("3d", "3D")
         layers = "1 layer" if self.layers == 1 else f"{self.layers} layers"
         through = "" if self.model is PLANE_STRESS else f", {layers} through half the depth"
@@ -124,8 +125,8 @@ class LevelErrors:
 
     Attributes:
         value: the displacement or force.
-        elements: what finer elements would add.
-        plane_stress: what space would add to plane stress; 0 in space.
+        elements: estimated discretisation error.
+        plane_stress: estimated error of plane stress; 0 in space.
         unknowns: of the level.
     """
 
@@ -141,8 +142,8 @@ class Trial:
 
     Attributes:
         level: the fidelity.
-        elements: estimate of what finer elements would add, over the displacement.
-        plane_stress: estimate of what space would add to plane stress, over the displacement; 0 in space.
+        elements: estimated discretisation error over the displacement.
+        plane_stress: estimated error of plane stress over the displacement; 0 in space.
         unknowns: of the level.
         seconds: for mesh, curve and estimates.
         options: of the control.
@@ -157,7 +158,7 @@ class Trial:
 
     @property
     def error(self) -> float:
-        """What may be left once both estimates are added."""
+        """Error that may be left once both estimates are added."""
         return self.level.left * abs(self.elements) + self.options.plane_stress_left * abs(self.plane_stress)
 
     def expected(self, level: FidelityLevel) -> float:
@@ -182,10 +183,10 @@ class Choice:
     """The level that was chosen; prints as plain text.
 
     Attributes:
-        accuracy: asked for, relative to the largest displacement of the curve.
+        accuracy: required, relative to the largest displacement of the curve.
         trials: levels that were tried, the one chosen last.
-        reached: whether what may be left of its error is below the accuracy.
-        finer: what ten times the accuracy would take, in words.
+        reached: whether the error that may be left is below the accuracy.
+        finer: level and time for a tenth of the error, as text.
     """
 
     accuracy: float
@@ -209,11 +210,11 @@ class AccuracyControl:
     """The levels of a scene, and the one that was chosen last.
 
     Args:
-        scene: what is simulated.
-        accuracy: relative error that is asked for.
+        scene: to be simulated.
+        accuracy: required relative error.
         thickness: of the links, all or each; None where their shapes have one.
         formulation: which links have the pressure as an unknown.
-        options: what was measured once.
+        options: measured constants.
 
     Attributes:
         level: the one chosen last; at first the coarsest.
@@ -253,7 +254,7 @@ class AccuracyControl:
         return Fidelity(level.model, level.order, sizes, rule, self._formulation, layers, level.segments)
 
     def choose(self, run: Callable[[FidelityLevel], LevelErrors]) -> Choice:
-        """Tries levels, from the last one on, until one will do; ``run`` simulates a level."""
+        """Tries levels, from the last one on, until one suffices; ``run`` simulates a level."""
         trials: list[Trial] = []
         following: FidelityLevel | None = self.level
         while following is not None:
@@ -271,12 +272,12 @@ class AccuracyControl:
         return Choice(self._accuracy, tuple(trials), reached, self._tenfold(trials[-1]))
 
     def _next(self, trial: Trial) -> FidelityLevel | None:
-        """The first finer level that should do, the finest if none should; None if no other is needed, or left."""
+        """The first finer level expected to suffice, else the finest; None if no other is needed, or left."""
         finer = [] if trial.error <= self._accuracy else self._finer(trial.level)
         return next((level for level in finer if self._should_do(trial.expected(level))), finer[-1] if finer else None)
 
     def _tenfold(self, trial: Trial) -> str:
-        """What a tenth of the error would take."""
+        """Level and time for a tenth of the error, as text."""
         for level in self._finer(trial.level):
             if self._should_do(10.0 * trial.expected(level)):
                 leap = self.options.space_work if level.model is not trial.level.model else 1.0

@@ -4,12 +4,12 @@ With the errors e_u of the displacement and e_z of the adjoint z of the quantity
 
     Q(u) − Q(u_h) = ∫ ∇e_u : ∂²W/∂F∂F : ∇e_z dV.
 
-Their gradients are estimated by what recovery by averaging adds: G is the L² projection of the gradient to continuous
+Their gradients are estimated by recovery by averaging: G is the L² projection of the gradient to continuous
 fields of the gradient's degree (at least 1), see ``recovery``,
 
     ∇e ≈ c (G(∇u_h) − ∇u_h),
 
-where only one half of the links is meshed with G₁₃ = G₂₃ = G₃₁ = G₃₂ = 0 on the mid-plane, as symmetry has it. Where
+where only one half of the links is meshed with G₁₃ = G₂₃ = G₃₁ = G₃₂ = 0 on the mid-plane, by symmetry. Where
 elements are mixed, Π(F, p) takes the place of W, and the other second derivatives follow, with the errors
 e_p of p and e_q of its adjoint q (``recovery``):
 
@@ -19,7 +19,7 @@ c² was measured once per order, see ``Calibration``. Sources: Zienkiewicz & Zhu
 recovery, Oden & Prudhomme (doi:10.1016/S0898-1221(00)00317-5) for goal-oriented estimates.
 
 Not included: the difference between models in the plane and in space, see ``plane_stress_error``; and, with elements of
-order 1, that polygons stand for curved outlines.
+order 1, the approximation of curved outlines by polygons.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from fenicsmech.model import MechanismModel
 
 
 class ElementError:
-    """What finer elements would add to quantities of one model, which holds the equilibrium in question.
+    """Discretisation errors of quantities of one model, which holds the equilibrium in question.
 
     Args:
         model: the discretised mechanism.

@@ -1,4 +1,4 @@
-"""Goal-oriented error estimates: how wrong a displacement or force at an equilibrium is, and why."""
+"""Goal-oriented error estimates of a displacement or force at an equilibrium, by kinds of error."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from fenicsmech.model import MechanismModel
 
 
 class ErrorKind(Enum):
-    """A reason why results are wrong."""
+    """Kinds of errors."""
 
     ELEMENTS = "elements"
     PLANE_STRESS = "plane stress"
@@ -40,8 +40,8 @@ class Calibration:
         displacement: c² of recovered gradients by the order of displacement elements, so that effectivities lie around
             1 (tests/estimates/test_element_error.py).
         mixed: the same of elements with a pressure (tests/estimates/test_mixed_error.py).
-        decay: c of the contraction that pins block: estimates are 0.6 to 1.4 times what space adds to cantilever, arch,
-            truss, claw and Klann leg.
+        decay: c of the contraction that pins block: estimates are 0.6 to 1.4 times the error of plane stress of
+            cantilever, arch, truss, claw and Klann leg.
     """
 
     displacement: Mapping[int, float] = field(default_factory=lambda: {1: 1.3, 2: 1.6, 3: 2.6})
@@ -51,7 +51,7 @@ class Calibration:
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """An equilibrium and what is prescribed there.
+    """An equilibrium and its prescribed quantity.
 
     Attributes:
         state: the equilibrium.
@@ -82,13 +82,13 @@ class Estimates:
         kinds: Sequence[ErrorKind] = (ErrorKind.ELEMENTS,),
         output: PointLoad | None = None,
     ) -> list[float]:
-        """What is to be added to the quantity of an equilibrium, by kinds of error, from one adjoint.
+        """Corrections of the quantity of an equilibrium, by kinds of error, from one adjoint.
 
         Args:
             solver: the solver that found it.
             equilibrium: of this model.
             kinds: of errors.
-            output: a point whose travel is asked for instead, while what is prescribed stays as it is.
+            output: a point whose travel is estimated instead, under the same control.
 
         Raises:
             DescriptionError: an error of plane stress is asked for and the model is another one.

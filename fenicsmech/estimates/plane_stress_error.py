@@ -4,12 +4,12 @@ Blocked contraction stores the energy
 
     V = ½ ∫ w E (F₃₃ − 1)² dV,     w = exp(−r / (c b)),
 
-r the distance from the nearest interface as drawn, b the depth of the link. With w = 1 and small strain it is what lies
-between plane stress and plane strain. By it a displacement changes, to first order with its adjoint z, by
+r the distance from the nearest interface as drawn, b the depth of the link. With w = 1 and small strain it is the
+difference between plane stress and plane strain. It changes a displacement, to first order with its adjoint z, by
 
     Q(space) − Q(plane stress) ≈ −∂V/∂u · z.
 
-c was measured once, see ``Calibration``. Source for estimates of what a model leaves out by an adjoint: Oden &
+c was measured once, see ``Calibration``. Source for estimates of modelling errors by an adjoint: Oden &
 Vemaganti (doi:10.1006/jcph.2000.6585). Not included: wide links that bend so sharply that they cannot bulge across
 their depth (b² times the curvature over the thickness far above 1), and motion out of the plane.
 """
@@ -31,7 +31,7 @@ from fenicsmech.model import MechanismModel
 
 
 class PlaneStressError:
-    """What a simulation in space would add to quantities in plane stress.
+    """Errors of quantities in plane stress relative to a simulation in space.
 
     Args:
         model: the discretised mechanism, which holds the equilibrium in question.

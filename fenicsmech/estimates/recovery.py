@@ -1,8 +1,8 @@
 """Recovery by averaging: discontinuous gradients as continuous fields, by L² projection over deformable cells.
 
 The gradient of a linear pressure p, recovered as a continuous linear field G and integrated along the edges of each
-cell from its vertices, where p is best, gives a quadratic p*. With w = p − ½ G · X and I w its interpolation at
-the vertices,
+cell from its vertices, where p is most accurate, gives a quadratic p*. With w = p − ½ G · X and I w its interpolation
+at the vertices,
 
     e_p ≈ p* − p = I w − w,
 
@@ -48,13 +48,13 @@ class Recovery:
         self._elastic, self._comm, self._degree = model.elastic, model.mesh.comm, degree
 
     def project(self, right_hand_side, field: fem.Function, work: fem.Function, odd: Sequence[bool]) -> None:
-        """Makes ``field`` the projection whose compiled right-hand side is given.
+        """Sets ``field`` to the projection with the given compiled right-hand side.
 
         Args:
             right_hand_side: a linear form on the field's space.
             field: of the degree of this projection, with any number of components.
             work: another one on the same space, for sums.
-            odd: which components are odd across the mid-plane: they vanish there where only one half is meshed.
+            odd: mask of components odd across the mid-plane: they vanish there where only one half is meshed.
         """
         right = assemble_vector(right_hand_side, work)
         values, part = self._mass.createVecs()

@@ -1,4 +1,4 @@
-"""Links as files to print or to machine: smooth curves through the mesh's boundary, extruded.
+"""Links as STEP and STL files for manufacture: smooth curves through the mesh's boundary, extruded.
 
 ``write_step``      the solid, with ``PinHole``s
 ``write_stl``       its surface

@@ -1,8 +1,8 @@
 """Smooth closed curves through the vertices of polygons: lines and arcs where these are exact, else splines.
 
 With edges l_i from vertex i to i + 1 a polygon turns by θ_i at vertex i, and per length by
-κ_i = 2 θ_i / (l_{i-1} + l_i). A smooth curve that bends on either side as it does at the next vertex there turns by
-(κ_{i-1} l_{i-1} + κ_{i+1} l_i) / 2; where much is left of θ_i, the shape has a true corner.
+κ_i = 2 θ_i / (l_{i-1} + l_i). A smooth curve with the curvatures of the neighbouring vertices turns by
+(κ_{i-1} l_{i-1} + κ_{i+1} l_i) / 2; where θ_i exceeds that by much, the shape has a true corner.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from fenicsmech.meshing import CircleArc, Curve, straight_line
 
 @dataclass(frozen=True)
 class OutlineTolerances:
-    """What counts as a corner, a straight line or an arc of a circle.
+    """Tolerances for corners, straight lines and arcs of circles.
 
     Attributes:
         sharp: turn (rad) of a corner, whatever its neighbours; more than that of a circle of eight vertices.
-        unexpected: what (rad) a smooth curve may turn unexpectedly.
+        unexpected: largest deviation (rad) of the turn of a smooth curve from the one expected.
         irregular: the same over the turns nearby: 1/4 where a curvature sets in, and up to 1/2 if the edges grow there.
-        exact: how far vertices on a line or an arc may lie off it, as CAD leaves them, over the polygon's extent.
+        exact: largest distance of vertices from their line or arc over the polygon's extent; some CAD rounding.
         widest_arc: greatest radius of an arc over the polygon's extent.
-        least_sweep: of an arc (rad) inside a smooth curve; a gentle curve is anywhere close to some circle.
+        least_sweep: of an arc (rad) inside a smooth curve; over shorter ones any curve is close to a circle.
     """
 
     sharp: float = math.radians(60.0)
@@ -135,7 +135,7 @@ def _is_arc(points: np.ndarray, allowed: float) -> bool:
 
 
 def _halves(polygon: np.ndarray, breaks: list[int]) -> dict[int, np.ndarray]:
-    """Where to divide a curve that has one break, or none, and its derivatives there."""
+    """Vertices at which a curve with at most one break is divided, and its derivatives there."""
     start, count = (breaks or [0])[0], len(polygon)
     around = polygon[np.arange(start, start + count + 1) % count]
     curve = CubicSpline(_chord_lengths(around), around, bc_type="not-a-knot" if breaks else "periodic")
@@ -169,7 +169,7 @@ def _chord_lengths(points: np.ndarray) -> np.ndarray:
 
 
 def corners_of(polygon: np.ndarray) -> np.ndarray:
-    """Which vertices of a closed polygon are corners of the shape that it stands for.
+    """Mask of the vertices of a closed polygon that are corners of the shape it approximates.
 
     The clearest corner (see the head of this file) is found first, and does not count as a bend of the curve for its
     neighbours any more. A single vertex between two corners that turn the other way is the middle of a small arc, not a
@@ -200,7 +200,7 @@ def corners_of(polygon: np.ndarray) -> np.ndarray:
 
 
 def _sharp_corners_of(polygon: np.ndarray) -> np.ndarray:
-    """Which vertices of a closed polygon ((n, 2)) turn more than any curve of its resolution does: (n,)."""
+    """Mask (n,) of the vertices of a closed polygon (n, 2) that turn more than any curve of its resolution."""
     return np.abs(_turns(polygon)) > TOLERANCES.sharp
 
 
@@ -212,7 +212,7 @@ def _turns(polygon: np.ndarray) -> np.ndarray:
 
 
 def _between(corner: np.ndarray) -> np.ndarray:
-    """Which vertices lie between two corners."""
+    """Mask of the vertices between two corners."""
     return np.roll(corner, 1) & np.roll(corner, -1)
 
 

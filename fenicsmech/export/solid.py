@@ -51,7 +51,7 @@ class PinHole:
 def write_step(
     path: str | Path, mesh: LinkMesh, *, depth: float, pins: Sequence[PinHole] = (), name: str | None = None
 ) -> None:
-    """Write a link as one solid in a STEP file.
+    """Writes a link as one solid in a STEP file.
 
     Its edges are B-spline curves through all boundary vertices of the mesh, divided at true corners, and straight
     lines and arcs of circles where the vertices are exactly on these; holes of pins are cylinders. Call it on one
@@ -89,7 +89,7 @@ def write_stl(
     tolerance: float = 0.01,
     name: str | None = None,
 ) -> None:
-    """Write the closed surface of a link as a binary STL file; arguments and errors as for ``write_step``.
+    """Writes the closed surface of a link as a binary STL file; arguments and errors as for ``write_step``.
 
     Args:
         tolerance: how far its facets may deviate from the solid in the STEP file.
@@ -134,13 +134,13 @@ def _written(kind: str) -> bytes:
 
 
 def _section(name: str, mesh: LinkMesh, depth: float, pins: Sequence[PinHole]) -> list[list[Curve]]:
-    """The section of the link ``mesh`` along z, smooth where the mesh stands for smooth curves.
+    """The section of the link ``mesh`` along z, smooth where the mesh approximates smooth curves.
 
     Args:
         name: the link's name, for messages.
         mesh: triangles, or tetrahedra in layers along z.
         depth: the link's extent along z.
-        pins: holes to be drilled; a narrower one that the mesh has around the same axis gives way.
+        pins: holes to be drilled; they replace narrower holes of the mesh around the same axis.
 
     Returns:
         Closed loops of curves: the outline, the mesh's own holes, and the circles of the pins, inside the outline and
@@ -191,7 +191,7 @@ def _plan(link: str, mesh: LinkMesh, depth: float) -> LinkMesh:
 
 
 def _check_simple(link: str, polygons: Sequence[np.ndarray]) -> None:
-    """Refuse loops that cross themselves, and holes that reach beyond the outline."""
+    """Refuses loops that cross themselves, and holes that reach beyond the outline."""
     outline, *holes = polygons
     crossings = [first_crossing(polygon) for polygon in polygons]
     crossings += [corner for hole in holes for corner in hole if not is_inside(outline, corner)]
@@ -210,13 +210,13 @@ def _checked(link: str, pin: PinHole) -> PinHole:
 
 
 def _drills(pin: PinHole, hole: np.ndarray) -> bool:
-    """Whether nothing is left of a hole of the mesh, up to 0.1 % wider than the pin's, once that is drilled."""
+    """Whether a pin's hole covers a hole of the mesh, to 0.1 % of its width."""
     reach = np.linalg.norm(hole - pin.centre, axis=1).max()
     return bool(is_inside(hole, np.array(pin.centre)) and reach <= 1.001 * 0.5 * pin.diameter)
 
 
 def _check_room(link: str, pin: PinHole, polygons: Sequence[np.ndarray], others: Sequence[PinHole]) -> None:
-    """Refuse a pin hole that the link does not surround."""
+    """Refuses a pin hole that the link does not surround."""
     centre, radius = np.array(pin.centre), 0.5 * pin.diameter
     part = f"pin hole at {point_text(centre)} in {link}"
     outline, *holes = polygons

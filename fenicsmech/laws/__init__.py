@@ -1,6 +1,6 @@
 """Material laws: strain energy densities in UFL, and the strain measures they are written in.
 
-- ``law``: the strain measures; what a law is, and laws that split off the change of volume
+- ``law``: strain measures, the interface of laws, and laws with a separate volumetric energy
 - ``neo_hookean``: four laws of two constants, E and ν
 """
 

@@ -16,8 +16,8 @@ written in them as in a textbook:
         E = property(lambda self: 18 * self.C1 * self.bulk / (3 * self.bulk + 2 * self.C1))
         nu = property(lambda self: (3 * self.bulk - 4 * self.C1) / (6 * self.bulk + 4 * self.C1))
 
-That is all: stress and tangent follow by differentiation, plane stress by a local solve. A law may add what it knows in
-closed form: ``mixed_energy``, the u–p (mixed) form for nearly incompressible materials, and ``contraction``, the
+That is all: stress and tangent follow by differentiation, plane stress by a local solve. A law may add
+closed forms: ``mixed_energy``, the u–p (mixed) form for nearly incompressible materials, and ``contraction``, the
 thickness in plane stress.
 
 In forms the parameters are fields with one value per cell, so that links of one law share compiled code and numbers
@@ -157,7 +157,7 @@ class Volumetric:
 
 
 class SplitLaw(Law):
-    """A law W = W̃(F) + M U(θ(J)) whose resistance to changes of volume stands apart, with a u–p form.
+    """A law W = W̃(F) + M U(θ(J)) with a separate volumetric energy and a u–p form.
 
     With the Legendre transform U*(q) = sup_θ q θ − U(θ), the perturbed Lagrangian
 

@@ -24,7 +24,7 @@ def elastic_constants(part: str, E: float | None, nu: float | None) -> tuple[flo
     """E and ν as floats.
 
     Raises:
-        DescriptionError: E ≤ 0, ν outside (−1, 0.5), or not numbers; ``part`` says of what.
+        DescriptionError: E ≤ 0, ν outside (−1, 0.5), or not numbers; ``part`` names the material.
     """
     young, poisson = positive(f"Young's modulus of {part}", E), finite(f"Poisson's ratio of {part}", nu)
     if not -1.0 < poisson < 0.5:

@@ -122,7 +122,7 @@ def mesh_fragments(
         bodies: faces or solids of the link.
         cutters: one face or solid per site of the request; only what lies in the link counts.
         size: element size, in the model's unit of length.
-        sites: where pins refine the mesh, in the model's unit of length.
+        sites: whose pins refine the mesh, in the model's unit of length.
         refinements: further, smaller element sizes, as gmsh expressions.
 
     Returns:

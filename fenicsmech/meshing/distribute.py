@@ -93,6 +93,6 @@ def bulge_field(mesh: MechanismMesh) -> fem.Function | None:
 
 
 def on_mid_plane(points: np.ndarray, comm: MPI.Comm) -> np.ndarray:
-    """Which of this rank's ``points`` (n, 3) of half links lie on their mid-plane, (n,)."""
+    """Mask (n,) of this rank's ``points`` (n, 3) of half links that lie on their mid-plane."""
     height = comm.allreduce(float(points[:, 2].max(initial=0.0)), op=MPI.MAX)
     return points[:, 2] <= 1e-9 * height  # but for rounding

@@ -4,8 +4,8 @@ With barycentric coordinates λ a cell covers the points X₀ + c,
 
     X₀ = Σ λ_i x_i,     c = Σ 4 λ_i λ_j w_ij,
 
-w_ij the bulge of the edge between corners i and j: what takes the middle of its chord onto the curve. Without it a
-polygon stands for the outline, an error that shrinks with the square of the element size whatever the order of the
+w_ij the bulge of the edge between corners i and j, from the middle of its chord to the curve. Without it a polygon
+approximates the outline, an error that shrinks with the square of the element size whatever the order of the
 elements. Source: Ciarlet & Raviart, Interpolation theory over curved elements (doi:10.1016/0045-7825(72)90018-0).
 """
 
@@ -30,7 +30,7 @@ _LEAST_VOLUME = 0.3  # least det ∂(X₀ + c)/∂X₀ in a cell
 
 @dataclass(frozen=True, eq=False)
 class LinkMesh:
-    """A conforming simplex mesh of one link, in arrays that cannot be written into.
+    """A conforming simplex mesh of one link, in read-only arrays.
 
     Attributes:
         points: vertex coordinates, shape (n, dim), in the user's unit of length. Every vertex belongs to a cell.
@@ -142,7 +142,7 @@ class CurvedEdges:
         return edges
 
     def _squeezed(self, points: np.ndarray, cells: np.ndarray) -> np.ndarray:
-        """Which cells the map compresses below the least volume at a corner or the middle of an edge, (m,)."""
+        """Mask (m,) of cells that the map compresses below the least volume at a corner or the middle of an edge."""
         dim = points.shape[1]
         bulges, corners = self.of_cells(cells), points[cells]
         bent = np.flatnonzero(np.any(bulges != 0.0, axis=(1, 2)))

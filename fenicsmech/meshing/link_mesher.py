@@ -39,7 +39,7 @@ def mesh_link(
     Args:
         name: the link's name, for messages.
         shape: the link's shape.
-        sites: where joints hold it; ``LinkMesh.interface`` counts them.
+        sites: of its interfaces, in the order of ``LinkMesh.interface``.
         dim: 2 (triangles) or 3 (tetrahedra).
         size: target edge length, in the plane for links that are extruded.
         layers: layers through the depth of an extruded link; None: one per two element sizes.
@@ -233,7 +233,7 @@ def _surrounds(offsets: np.ndarray, cells: np.ndarray) -> bool:
 
 
 def _check_apart(mesh: LinkMesh, request: MeshRequest) -> None:
-    """Two interfaces with a common vertex are refused: it could not follow both bodies."""
+    """Refuses two interfaces with a common vertex, which could not follow both bodies."""
     held = mesh.interface != FREE
     holder = np.repeat(mesh.interface[held], mesh.dim + 1)
     vertex = mesh.cells[held].reshape(-1)

@@ -1,4 +1,4 @@
-"""Meshing closed outlines of lines and arcs."""
+"""Meshes of closed outlines of lines and arcs."""
 
 from __future__ import annotations
 

@@ -130,7 +130,7 @@ def _moments(solids: list[DimTag], side: float) -> list[np.ndarray]:
 
 
 def _mesh_section(shape: StepPart, solid: DimTag, request: MeshRequest) -> LinkMesh:
-    """Mesh the section with the plane z = ``shape.section``.
+    """Meshes the section with the plane z = ``shape.section``.
 
     Raises:
         MeshingError: the plane misses the solid.

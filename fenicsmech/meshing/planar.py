@@ -44,7 +44,7 @@ def _in_units_of(described: Any, unit: float) -> Any:
 
 @dataclass(frozen=True)
 class PlaneDrawing:
-    """A link seen along z, as faces of the current gmsh model, in units of the element size.
+    """The plan of a link as faces of the current gmsh model, in units of the element size.
 
     Attributes:
         faces: faces of the plane z = 0 that make up the link.

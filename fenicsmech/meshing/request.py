@@ -76,7 +76,7 @@ class InterfaceSite:
         return (points - self.centre) @ self.frame[2]
 
     def contains(self, points: np.ndarray, tolerance: float) -> np.ndarray:
-        """Which of ``points`` ((n, 2) or (n, 3)) lie in the region or within ``tolerance`` of it, shape (n,)."""
+        """Mask (n,) of ``points`` ((n, 2) or (n, 3)) in the region or within ``tolerance`` of it."""
         offsets, region = self.across(points), self.region
         if isinstance(region, Disc):
             return np.hypot(*offsets.T) <= region.radius + tolerance
@@ -91,7 +91,7 @@ class MeshRequest:
 
     Attributes:
         link: the link's name, for messages.
-        sites: where joints hold the link; the mesh conforms to their regions.
+        sites: of its interfaces; the mesh conforms to their regions.
         dim: 2 or 3.
         size: target edge length in the plane of the link (everywhere, for a solid).
         layers: number of layers through the depth of an extruded link; None: chosen from depth and size.
@@ -109,11 +109,11 @@ class MeshRequest:
 
     @property
     def part(self) -> str:
-        """The link as messages name it."""
+        """The name of the link in messages."""
         return f"link {self.link!r}"
 
     def part_at(self, site: InterfaceSite) -> str:
-        """The joint and the link as messages name them."""
+        """The names of a joint and the link in messages."""
         return f"joint {site.name!r} on link {self.link!r}"
 
     def holder(self, candidates: Sequence[int]) -> int:

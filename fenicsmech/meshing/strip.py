@@ -1,4 +1,4 @@
-"""Meshing strips: constant thickness t along a centreline c(s), with round eyes at the pins.
+"""Meshes of strips: constant thickness t along a centreline c(s), with round eyes at the pins.
 
 The sides are the curves c(s) ∓ n(s) t/2, n the unit normal. The link is the union of the strip between them and of a
 disc around each pin, whose radius is that of the interface or t/2, whichever is larger. Between the sides the strip
@@ -80,7 +80,7 @@ def _check_sides(part: str, centreline: Centreline, thickness: float) -> None:
 
 
 def _check_on_strip(centreline: Centreline, thickness: float, site: InterfaceSite, request: MeshRequest) -> None:
-    """Refuses a joint off the strip, which its eye would hide.
+    """Refuses a joint off the strip.
 
     Raises:
         MeshingError: it lies farther than half the thickness from the centreline, or beyond an end.

@@ -1,4 +1,4 @@
-"""A scene discretised: how finely, and the meshed mechanism with its elastic links, bodies and loads.
+"""The discretised scene: its fidelity, and the meshed mechanism with its elastic links, bodies and loads.
 
 - ``fidelity``: space, order and element sizes, as users give them
 - ``model``: the discretised mechanism

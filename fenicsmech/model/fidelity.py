@@ -25,14 +25,14 @@ SPACES = {model.name: model for model in (SPATIAL, MID_PLANE_SYMMETRIC, PLANE_ST
 
 @dataclass(frozen=True)
 class Fidelity:
-    """How finely a scene is computed.
+    """Elastic model, elements and formulation of a simulation.
 
     Attributes:
         model: 3D, whole or half, plane strain or plane stress.
         order: degree of the displacement field.
         sizes: element size per flexible link.
         quadrature: quadrature degree.
-        formulation: which links are in the u–p (mixed) formulation.
+        formulation: the criterion for links in the u–p (mixed) formulation.
         layers: through the depth, or through half of it where half is meshed; None: chosen from depth and size.
         segments: around a pin, at least.
     """
@@ -78,10 +78,10 @@ def read_fidelity(
 
 
 def check_scene(scene: Scene, model: ElasticModel) -> None:
-    """Refuses a scene that has no form in ``model``.
+    """Checks that a scene can be simulated in ``model``.
 
     Raises:
-        DescriptionError: it has none.
+        DescriptionError: it cannot.
     """
     mechanism = scene.mechanism
     validate(mechanism, model.mechanism_dim)
@@ -94,7 +94,7 @@ def check_scene(scene: Scene, model: ElasticModel) -> None:
 
 
 def fits(scene: Scene, model: ElasticModel) -> bool:
-    """Whether a scene has a form in ``model``."""
+    """Whether a scene can be simulated in ``model``."""
     try:
         check_scene(scene, model)
     except DescriptionError:

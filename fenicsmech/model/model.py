@@ -36,16 +36,16 @@ class MechanismModel:
     """A mechanism at one fidelity, ready for equilibria.
 
     Attributes:
-        mechanism, linkage: what is simulated, and its bodies.
+        mechanism, linkage: the mechanism and its bodies.
         materials: of the flexible links.
         mesh: the reference mesh of all flexible links.
         elastic: their elastic energy.
         interfaces: interface nodes as functions of body poses.
         design_nodes: the design field at the nodes of the displacement.
         node_link: index of the flexible link of every local node.
-        clock: where time goes.
+        clock: of the phases.
         mixed: whether each flexible link is in the u–p formulation.
-        effects: what acts beside links, joints and forces.
+        effects: of the scene.
         potentials: potentials of body poses.
         spring_potentials: those of springs, which act from the start.
     """
@@ -124,7 +124,7 @@ class MechanismModel:
 
     @contextmanager
     def shaped(self, design: np.ndarray) -> Iterator[None]:
-        """Gives the links another rest shape for a while."""
+        """A context in which the links have another rest shape."""
         before = self.elastic.d.x.array.copy()
         self.reshape(design)
         try:
@@ -168,7 +168,7 @@ class MechanismModel:
         return self._point_loads[force]
 
     def travel(self, part: Force | Output, state: State) -> float:
-        """How far the point of a force or output has moved along its direction in the loaded ``state``."""
+        """Travel of the point of a force or output in the loaded ``state``."""
         load = self.point_load(part)
         return float(load.direction @ load.point.displacement(self.elastic.u, state.poses))
 
@@ -201,7 +201,7 @@ class MechanismModel:
 
     @property
     def fields(self) -> LinkFields:
-        """What link energies are written in."""
+        """The fields that link energies are written in."""
         return self._fields(self.elastic)
 
     def _fields(self, body: ElasticBody) -> LinkFields:
@@ -240,7 +240,7 @@ def _stretches(links: Sequence[FlexibleLink], model: ElasticModel, effects: Sequ
 
 
 def check_links(mechanism: Mechanism, linkage: Linkage, fidelity: Fidelity) -> None:
-    """Refuses links, joints and points that cannot be right, before anything is meshed."""
+    """Checks links, joints and points before anything is meshed."""
     for link in mechanism.flexible_links:
         points = {part.name: part.at for part in (*mechanism.forces, *mechanism.outputs) if part.on == link}
         sites, options = _mesh_request(link, linkage, fidelity)

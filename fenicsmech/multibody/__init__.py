@@ -1,7 +1,7 @@
 """The mechanism as bodies and constraints: interfaces, points, assembly, mobility.
 
 - ``constraints``: bodies that move rigidly, and all constraints between them: values, gradients, Hessians
-- ``linkage``: from the described mechanism to bodies and constraints; free coordinates of its joints
+- ``linkage``: bodies and constraints of the described mechanism; free coordinates of its joints
 - ``mobility``: motions that joints, motors and springs leave, and dependent constraints
 - ``assembly``: the rigid assembly of a configuration
 - ``interfaces``: interface nodes of the mesh as functions of body poses, and the design field at nodes

@@ -3,7 +3,7 @@
     C(z, φ) = 0,  motors moved from φ = 0 (as drawn) to the wanted position,
 
 by Gauss–Newton steps of least norm, z ← z − A⁺ C, which stay defined where A loses rank (redundant loops,
-dead centres). Freedoms that motors leave go where the energy of springs is least, by Newton steps with the absolute
+dead centres). Freedoms that motors leave minimise the energy of springs, by Newton steps with the absolute
 eigenvalues of its curvature (``mobility``), which descend. The assembled state carries no elastic energy in the links
 and starts every equilibrium.
 """
@@ -31,12 +31,11 @@ class AssemblyOptions:
         closed: largest scaled constraint residual of a closed assembly: some hundred roundings.
         largest_step: motor motion in one step; far below the turns at which a loop has several assemblies.
         smallest_step: part of the first step at which the motion ends: motors strain the mechanism there.
-        stray: largest distance from the extrapolation over the motion in the step; beyond it the assembly may have
-            changed to another branch.
+        stray: largest distance from the extrapolation, over the motion in the step, on one branch.
         relaxed: length of a step towards least energy of springs at which such steps end: rounding.
         largest_turn: of such a step, within which the energy is about quadratic.
         curved: part of the largest curvature above which a free motion counts as held by springs.
-        before_strain: part of the way to where links start to strain that ``assemble_before_strain`` goes.
+        before_strain: fraction of the strain-free motion at which ``assemble_before_strain`` ends.
     """
 
     closed: float = 1e-13
@@ -58,8 +57,8 @@ class Assembly:
 
     Attributes:
         poses: (bodies, pose_size).
-        fraction: how much of the motor motion was possible without deforming flexible links; 1 unless the
-            motors strain the mechanism.
+        fraction: fraction of the motor motion possible without deforming flexible links; 1 unless the motors strain
+            the mechanism.
     """
 
     poses: np.ndarray

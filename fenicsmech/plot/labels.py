@@ -1,4 +1,4 @@
-"""Labels of parts of a picture, placed where they hide least."""
+"""Labels of parts of a picture, placed by least cost."""
 
 from __future__ import annotations
 

@@ -1,14 +1,14 @@
-"""Simulations of a scene, and the curves they give.
+"""Simulations of a scene and their curves.
 
 - ``simulation``: the entry point, which computes curves
 - ``discretisation``: the meshed and compiled parts that simulations of several designs share
-- ``request``: what is prescribed and asked for
+- ``request``: the prescribed part of a curve, and its samples or ends
 - ``tracing``, ``following``: curves computed sample by sample, or along the path with its events
-- ``frame``, ``curve``: the results, and what can be asked of them
+- ``frame``, ``curve``: results and their evaluation
 - ``buckling``: buckling loads, buckling positions and soft modes of an equilibrium
-- ``friction``: how far friction in hinges holds a curve's load
-- ``explanation``: what is simulated and left out, in words
-- ``fields``, ``picture``: states gathered, written, drawn
+- ``friction``: bounds of a curve's load by friction in hinges
+- ``explanation``: assumptions of a simulation as text
+- ``fields``, ``picture``: gathering, files and pictures of states
 """
 
 from fenicsmech.simulation.buckling import BucklingLoad, BucklingPosition, ModeShape, SoftMode

@@ -1,4 +1,4 @@
-"""Loads and motor positions at which an equilibrium stops being the only one near, and the modes it gives way in."""
+"""Buckling loads and motor positions of an equilibrium, and its buckling modes."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class SoftMode:
 
 
 def mode_shape(model: MechanismModel, step: Step) -> ModeShape:
-    """The direction ``step``, and what stands out in it."""
+    """The direction ``step`` and its characteristics."""
     comm, links = model.mesh.mesh.comm, model.mechanism.flexible_links
     # where half is meshed, nodes move in space and bodies in the plane; pressures come behind
     dim = model.interfaces.block

@@ -31,14 +31,14 @@ from fenicsmech.simulation.request import Axis, axes, followed_control
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Curve:
-    """Frames of one configuration. What is asked of them later is computed at the rest shape that they belong to.
+    """Frames of one configuration; methods compute at the rest shape that these belong to.
 
     Attributes:
         part: the force that changes, or the motor or drive that moves.
         configuration: motor positions.
         freedom: mobility and redundancy of the assembled configuration.
         frames: one per sample, in the order asked for.
-        discretisation: what they were computed with.
+        discretisation: of the scene, with which they were computed.
         others: constant magnitudes of other forces.
         quantity: the unknown of the curve: displacements, or forces where displacements were prescribed or the curve
             was followed.
@@ -101,7 +101,7 @@ class Curve:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Where the mechanism snapped and which equilibria are unstable, a sentence each."""
+        """Warnings of snap-throughs and of unstable equilibria, a sentence each."""
         (across, up), name, said = self.axes, self.configuration.name, []
         for before, after in zip((None, *self.frames), self.frames, strict=False):
             if after.snapped_through:
@@ -118,10 +118,10 @@ class Curve:
     # -- errors --------------------------------------------------------------------------------------------------
 
     def error_estimates(self, *, output: Output | None = None) -> np.ndarray:
-        """What finer elements would add to ``values``, (frames,); computed once.
+        """Estimated discretisation errors of ``values``, (frames,), to be added to them; computed once.
 
         Args:
-            output: whose displacement is asked for instead, while what was prescribed stays as it is.
+            output: whose displacement is estimated instead, under the same control.
 
         Raises:
             DescriptionError: motors move along the curve.
@@ -130,7 +130,7 @@ class Curve:
         return self._estimated([ErrorKind.ELEMENTS], output)[0].copy()
 
     def modelling_errors(self, *, output: Output | None = None) -> np.ndarray:
-        """What a simulation in space would add to plane stress, (frames,); arguments as those of ``error_estimates``.
+        """Estimated errors of plane stress, (frames,), to be added; arguments as those of ``error_estimates``.
 
         Raises:
             DescriptionError: motors move along the curve, or it is not in plane stress.
@@ -147,7 +147,7 @@ class Curve:
 
     @cached_property
     def corrections(self) -> np.ndarray:
-        """Estimates of what finer elements and space would add to ``values``, (frames,); 0 where they are too large.
+        """Sums of the estimated errors, to be added to ``values``, (frames,); 0 where they are too large.
 
         Raises as ``error_estimates``.
         """
@@ -164,7 +164,7 @@ class Curve:
     def buckling_loads(self, *, frame: Frame | None = None, count: int = 3) -> tuple[BucklingLoad, ...]:
         """Forces at which the equilibrium would stop being unique, from the tangent and its rate.
 
-        Exact for columns and others that hardly move before they buckle; else the better the nearer the frame is.
+        Exact for columns and others that hardly move before they buckle; otherwise more accurate from closer frames.
 
         Args:
             frame: one of the curve's; the last one by default.
@@ -222,10 +222,10 @@ class Curve:
         return friction_band(self.frames, pins, self.discretisation.linkage)
 
     def explain(self, *, tolerance: float = 0.01, weight: float | None = None) -> Explanation:
-        """What is simulated and what is left out, with figures of the last frame where that may matter.
+        """The assumptions of the simulation as text, with figures of the last frame where these may matter.
 
         Args:
-            tolerance: relative change of the displacement from which something matters.
+            tolerance: relative change of the displacement from which an omitted effect matters.
             weight: of the flexible links per volume, in units of the scene; in mm and N that of plastics and silicones,
                 1.2 g/cm³, by default.
 

@@ -1,4 +1,4 @@
-"""A scene at one fidelity: its bodies at once, its mesh, equations and estimates when they are first needed."""
+"""A scene at one fidelity: bodies, mesh, equations and estimates, built on first use."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ class Discretisation:
     """The meshed and compiled parts of simulations, which simulations of several designs share, and curves refer to.
 
     Args:
-        scene: the mechanism and what acts on it.
-        fidelity: how finely.
-        solver: how equilibria are found.
-        predictor: how the next equilibrium on a curve is guessed.
-        clock: where time is counted.
+        scene: the mechanism and its effects.
+        fidelity: elements and formulation.
+        solver: of equilibria.
+        predictor: of the next equilibrium on a curve.
+        clock: of the phases.
         comm: processes that share the work.
 
     Attributes:

@@ -1,4 +1,4 @@
-"""Assumptions of a simulation in plain words, with figures where what is left out may matter."""
+"""Assumptions of a simulation as text, with figures where omitted effects may matter."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from fenicsmech.simulation.frame import Frame
 
 @dataclass(frozen=True)
 class ExplanationOptions:
-    """From where on something that is left out matters.
+    """Thresholds from which an omitted effect matters.
 
     Attributes:
         tolerance: relative change of the displacement.
         weight: per volume, of the flexible links, in the units of the scene; None is unknown.
         locking: Poisson's ratio from which displacement elements of an order lose accuracy.
-        slender: of the out-of-plane buckling load, from which a link deserves a simulation in space.
+        slender: fraction of the out-of-plane buckling load from which a link needs a simulation in space.
     """
 
     tolerance: float = 0.01
@@ -48,11 +48,11 @@ class ExplanationOptions:
 
 @dataclass(frozen=True)
 class Hint:
-    """Something that is left out.
+    """A hint on an omitted effect.
 
     Attributes:
         what: its name.
-        text: what leaving it out means here.
+        text: the consequence of omitting it.
         matters: whether it changes the displacement by more than the tolerance, or may change it altogether.
     """
 
@@ -63,7 +63,7 @@ class Hint:
 
 @dataclass(frozen=True)
 class Explanation:
-    """What is simulated, and hints on what is not; prints as plain text."""
+    """Assumptions of a simulation, and hints on omitted effects; prints as plain text."""
 
     simulated: tuple[str, ...]
     left_out: tuple[Hint, ...]
@@ -76,14 +76,14 @@ class Explanation:
 def explain(
     model: MechanismModel, solver: Iteration, at: Equilibrium, frame: Frame, units: Units, options: ExplanationOptions
 ) -> Explanation:
-    """What is simulated, and hints on what is left out, from one frame of a curve.
+    """The assumptions of a simulation, and hints on omitted effects, from one frame of a curve.
 
     Args:
         model, solver: the discretised mechanism, and the solver that found the frame.
         at: the equilibrium of the frame.
         frame: of the curve.
         units: of the description, for labels.
-        options: from where on something matters.
+        options: thresholds of the hints.
 
     Raises:
         EquilibriumError: the tangent of the frame is singular.

@@ -120,7 +120,7 @@ def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame])
             stress.x.array[: len(von_mises)] = von_mises
 
     def move_up() -> None:
-        """The heavy data first: the light file that names it must never point at nothing."""
+        """Moves the heavy data first, so that the light file never refers to a missing file."""
         for suffix in (".h5", ".xdmf"):
             os.replace(folder / target.with_suffix(suffix).name, target.with_suffix(suffix))
         folder.rmdir()

@@ -35,9 +35,9 @@ class PathEvent:
     Attributes:
         kind: limit point of the force, turning point of the displacement or of a motor, or bifurcation.
         frame: the equilibrium; also one of the curve's frames.
-        index: which.
-        null_space: how the mechanism gives way: at a bifurcation a basis of the tangent's null space, one direction for
-            each of the modes that change, else the direction of the path.
+        index: of that frame.
+        null_space: at a bifurcation a basis of the tangent's null space, one direction for each of the modes that
+            change; else the direction of the path.
         critical: the point of the path that branches start from.
     """
 
@@ -62,7 +62,7 @@ class PathEvent:
 
     @property
     def modes(self) -> int:
-        """By how many the unstable modes change there."""
+        """Number of modes that change their stability there."""
         return self.critical.modes
 
 
@@ -78,17 +78,17 @@ class FollowedCurve(Curve):
 
     @property
     def limit_points(self) -> tuple[PathEvent, ...]:
-        """Where a dead load would snap."""
+        """Limit points: a dead load snaps there."""
         return self._of(Critical.LIMIT)
 
     @property
     def turning_points(self) -> tuple[PathEvent, ...]:
-        """Where a held displacement would snap."""
+        """Turning points: a held displacement snaps there."""
         return self._of(Critical.TURNING)
 
     @property
     def bifurcations(self) -> tuple[PathEvent, ...]:
-        """Where other curves cross this one."""
+        """Bifurcations: other curves cross this one there."""
         return self._of(Critical.BIFURCATION)
 
     def series(self, label: str = "", *, colour: str | None = None, faint: bool = False) -> CurveSeries:
@@ -111,9 +111,9 @@ def follow(
 
     Args:
         discretisation: of the scene, at its present rest shape.
-        request: what is asked for.
+        request: of the curve.
         until: where the curve ends.
-        steps: how finely it is followed.
+        steps: options of the continuation.
         watch: called with the number of frames so far.
 
     Raises:
@@ -176,7 +176,7 @@ class CurveFollower:
         self._events: list[PathEvent] = []
 
     def curve(self) -> FollowedCurve:
-        """What was found."""
+        """The frames and events found."""
         tracer, request = self._tracer, self._tracer.request
         return FollowedCurve(
             request.part,
@@ -254,7 +254,7 @@ class CurveFollower:
         self._frames.append(frame)
 
     def _path(self, state: State) -> ArcLengthTracer:
-        """The path through ``state``, in units of what is asked for."""
+        """The path through ``state``, in units of its ends."""
         until, value, conjugate = self._until, self._followed.value(self._system, state), self._conjugate(state)
         values, conjugates = until.travels, until.forces
         if not self._followed.displaces:

@@ -1,4 +1,4 @@
-"""One equilibrium of a mechanism, as a record."""
+"""The record of one equilibrium of a mechanism."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from fenicsmech.mechanism import Motor, Output
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """An equilibrium and what was measured in it; prints its figures, not its arrays.
+    """An equilibrium and its measured quantities; prints numbers, not arrays.
 
     Attributes:
-        force: magnitude of the prescribed force, or what the prescribed motors exert.
+        force: magnitude of the prescribed force, or torque or force of the prescribed motors.
         displacement: of the force's point along it, from the assembled configuration, or the motors' position, from
             the drawing.
         stable: whether small disturbances die out under dead loads.
@@ -27,7 +27,7 @@ class Frame:
         strain_energy: elastic energy of all links.
         max_stress: largest von Mises stress at cell midpoints.
         outputs: displacement of each output of the mechanism, from the assembled configuration.
-        reactions: what each joint exerts on its second link, by joint name.
+        reactions: force and moment of each joint on its second link, by joint name.
         motors: torque or force of each motor.
         iterations: Newton iterations, load steps on the way included.
         residuals: relative residual before each iteration of the last step, and at the end.

@@ -1,11 +1,11 @@
 """Friction in hinges as bounds on the load, from a curve without friction.
 
 Dry friction of a pin of radius r turns the force R on it into a moment of at most μ r |R| against its turning. While
-the mechanism creeps along its curve, the power that the pins take is the force's surplus:
+the mechanism creeps along its curve, the power dissipated in the pins is that of the additional force:
 
     |Δf| |du| = Σ_j μ_j r_j |R_j| |dφ_j|,      f ∈ [f − Δf, f + Δf].
 
-Anywhere in this band the mechanism stays put; loaded it moves along the upper bound, unloaded along the lower one.
+Within this band the mechanism sticks; loaded it moves along the upper bound, unloaded along the lower one.
 Reactions are those without friction: bounds are of first order in μ. Source: Coulomb's law.
 """
 
@@ -30,7 +30,7 @@ class PinFriction:
 
     Attributes:
         coefficient: Coulomb's μ.
-        radius: of the pin, where it rubs.
+        radius: of the pin.
 
     Raises:
         DescriptionError: one of them is not positive.
@@ -80,7 +80,7 @@ def friction_band(
 
 
 def _arc(frames: Sequence[Frame], linkage: Linkage) -> np.ndarray:
-    """How far all bodies and the force's point have gone, in lengths of the mechanism and rad, (frames,).
+    """Length of the path of all bodies and the force's point, in lengths of the mechanism and rad, (frames,).
 
     Raises:
         DescriptionError: two frames are the same.

@@ -1,4 +1,4 @@
-"""From the state of a mechanism to the shapes a picture is made of."""
+"""Shapes of pictures from states of a mechanism."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class MechanismPlotter:
         self._faces = [self._visible(index) for index in range(len(model.mechanism.flexible_links))]
 
     def shape(self, snapshot: Snapshot, *, stress: bool) -> MechanismShape:
-        """The mechanism in the state of ``snapshot``, links coloured by von Mises stress if asked for."""
+        """The mechanism in the state of ``snapshot``, links optionally coloured by von Mises stress."""
         positions = (snapshot.rest + snapshot.displacement)[:, :2]
         flexible = tuple(
             FlexibleShape(positions, triangles, snapshot.von_mises[cells] if stress else None, name=link.name)
@@ -54,7 +54,7 @@ class MechanismPlotter:
         return Arrow(at, magnitude * np.array(force.direction[:2]), label=label)
 
     def position(self, link: Link, at: Sequence[float], poses: np.ndarray) -> np.ndarray:
-        """Where the point drawn at ``at`` of ``link`` is, (2,); of a flexible link, carried by its first interface."""
+        """Position of the point drawn at ``at`` of ``link``, (2,); a flexible link moves with its first interface."""
         return self._moved(self._linkage.body_of(link), in_dimension(tuple(at), self._linkage.dim), poses)
 
     def _places(self, link: Link, poses: np.ndarray) -> np.ndarray:
@@ -70,7 +70,7 @@ class MechanismPlotter:
         )
 
     def _moved(self, body: int, at: Sequence[float], poses: np.ndarray) -> np.ndarray:
-        """Where the point drawn at ``at`` of a body is, (2,)."""
+        """Position of the point drawn at ``at`` of a body, (2,)."""
         offset = np.array(at) - np.array(self._linkage.bodies[body].centre)
         return (np.array(at) + self._linkage.joints.space.displace(poses[body], offset[None])[0])[:2]
 

@@ -1,7 +1,6 @@
 """Requests: the prescribed part of a curve, its samples or ends, and constant loads, checked before anything is meshed.
 
-The prescribed part is a force, whose point moves, or motors, which exert something; both make a curve with a
-displacement across and a force up.
+The prescribed part is a force or motors; both give a curve of force (or torque) over displacement (or position).
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ class CurveRequest:
         part: the force that changes, or the motors that move.
         controls: samples of the force, as loads or as displacements counted from the unloaded configuration; none if
             the curve is followed.
-        configuration: motor positions; where motors that move start from.
+        configuration: motor positions; the initial ones of motors that move.
         others: constant magnitudes of other forces.
     """
 
@@ -50,7 +49,7 @@ class Until:
         displacement: of the point of the prescribed force, along it, counted as on curves; one value or several.
         position: of the prescribed motors, rad or length, counted from the drawing; one value or several.
         force: magnitude of the prescribed force, or torque or force of the motors; one value or several.
-        frames: most frames, critical points aside; the path ends there without complaint.
+        frames: most frames, critical points aside; the path ends there without error.
 
     Raises:
         DescriptionError: nothing to end at, displacement and position at once, or numbers that make no sense.
@@ -100,7 +99,7 @@ class Axis:
 
     @property
     def label(self) -> str:
-        """As on plots and over columns."""
+        """The label of plots and columns."""
         return f"{self.quantity} [{self.unit}]"
 
     def __call__(self, value: float, digits: int = 3) -> str:
@@ -109,7 +108,7 @@ class Axis:
 
 
 def quantities(part: PrescribedPart) -> tuple[str, str]:
-    """What lies across and up on the curve of a part."""
+    """Quantities on the axes of the curve of a part."""
     if isinstance(part, Force):
         return "displacement", "force"
     return ("position", "force") if _drive(part).sliding else ("angle", "torque")
@@ -199,10 +198,10 @@ def read_path(
 
 
 def check_until(until: object, part: PrescribedPart) -> None:
-    """Refuses an end that the path of ``part`` does not have.
+    """Checks that the path of ``part`` can end as in ``until``.
 
     Raises:
-        DescriptionError: it has none such.
+        DescriptionError: it cannot.
     """
     has, lacks = ("displacement", "position") if isinstance(part, Force) else ("position", "displacement")
     if not isinstance(until, Until):

@@ -1,4 +1,4 @@
-"""Simulation of a scene: how finely it is computed, and the curves it gives."""
+"""Simulation of a scene: its fidelity and its curves."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Simulation:
     Nothing is meshed or compiled until the first curve; the description is checked at once.
 
     Args:
-        scene: the mechanism and what acts on it.
+        scene: the mechanism and its effects.
         space: "3d", the default; "3d-symmetric", which meshes half the depth of links that joints and forces move in
             the plane; "plane-stress" or "plane-strain".
         order: degree of the displacement field, 1, 2 or 3; 2 by default.
@@ -70,12 +70,12 @@ class Simulation:
         quadrature: quadrature degree; the measured optimum by default.
         formulation: ``MixedFormulation()``: pressures are unknowns in nearly incompressible links;
             ``DisplacementFormulation()``: in none.
-        solver: how equilibria are found.
-        predictor: how the next equilibrium on a curve is guessed.
+        solver: of equilibria.
+        predictor: of the next equilibrium on a curve.
         comm: processes that share the work.
 
     Attributes:
-        choice: the fidelity that the accuracy asked for has led to; None before.
+        choice: the fidelity chosen for the required accuracy; None before.
 
     Raises:
         DescriptionError: the scene cannot be simulated as described.
@@ -250,7 +250,7 @@ class Simulation:
         return branches(curve, event, until, steps or ArcSteps(), mode)
 
     def path(self, part: Force | Output, configurations: Sequence[Configuration]) -> np.ndarray:
-        """Where the unloaded point of a force or output is in each configuration, (configurations, dim).
+        """Unloaded position of the point of a force or output in each configuration, (configurations, dim).
 
         Raises:
             AssemblyError: one of the configurations does not assemble, or its motors strain the links.
@@ -288,7 +288,7 @@ class Simulation:
 
         Args:
             drawn: the material of some links.
-            other: what these links are made of instead; effects, as the densities of ``Gravity``, keep what was drawn.
+            other: their new material; effects, as the densities of ``Gravity``, keep the drawn one.
 
         Raises:
             DescriptionError: no link is made of ``drawn``.
@@ -308,7 +308,7 @@ class Simulation:
 
     @property
     def fidelity(self) -> Fidelity:
-        """How finely is computed."""
+        """The present fidelity."""
         return self._discretisation.fidelity
 
     @property
@@ -346,7 +346,7 @@ class Simulation:
         """The curve of a checked request, as ``load_displacement`` without showing progress.
 
         Args:
-            request: what is asked for.
+            request: of the curve.
             watch: called with the number of frames so far.
         """
         with self._shaped():
@@ -354,7 +354,7 @@ class Simulation:
 
     @contextmanager
     def _shaped(self) -> Iterator[None]:
-        """Gives the model the design of this simulation for a while."""
+        """A context in which the model has the design of this simulation."""
         if self._design is None:
             yield
         else:
@@ -365,7 +365,7 @@ class Simulation:
         return Progress(frames, configuration.name) if self.comm.rank == 0 else Silent()
 
     def _use(self, fidelity: Fidelity) -> None:
-        """Goes on at another fidelity; curves keep what they were computed with."""
+        """Switches to another fidelity; curves keep theirs."""
         if fidelity != self.fidelity:
             self._discretisation, self.choice = self._discretisation.at(fidelity, self.clock, self.comm), None
 
@@ -379,7 +379,7 @@ class Simulation:
             )
 
     def _check_chosen(self, part: PrescribedPart) -> None:
-        """Refuses to follow anything as long as the accuracy asked for has chosen nothing."""
+        """Refuses to follow a path before a fidelity is chosen for the accuracy."""
         if self._control is not None and self.choice is None:
             raise DescriptionError(
                 f"curve of {part.name!r}",
@@ -412,5 +412,5 @@ def _refuse_beside_accuracy(**given: object) -> None:
 
 
 def _description(mechanism: Mechanism) -> tuple[tuple, ...]:
-    """What a simulation is built from; forces and outputs may be added later."""
+    """The arguments of a simulation; forces and outputs may be added later."""
     return tuple(mechanism.links), tuple(mechanism.joints), tuple(mechanism.motors)

@@ -1,7 +1,7 @@
 """Sampled curves: from the assembled configuration, under constant loads, through all samples, recording frames.
 
-Stiff links round their nodal forces by more than small loads exert, so that a residual as small as rounding says
-nothing about where a zero-energy mode comes to rest. The forces inside an element cancel along motions that deform no
+Rounding of the nodal forces of stiff links may exceed small loads, so that a residual of the size of rounding does not
+fix the rest position of a zero-energy mode. The forces inside an element cancel along motions that deform no
 link, and so do their errors: the work along these is precise, and samples whose loads do not balance along them are
 refused.
 """
@@ -55,13 +55,13 @@ class CurveTracer:
 
     Args:
         discretisation: of the scene, at its present rest shape.
-        request: what is asked for.
+        request: of the curve.
 
     Attributes:
         solver: for the request's forces.
         freedom: mobility of the configuration.
         followed: the control whose value changes along the curve.
-        origin: what displacements are counted from, that of the force's point in the unloaded configuration.
+        origin: zero of displacements: that of the force's point in the unloaded configuration.
 
     Raises:
         AssemblyError: the configuration does not assemble.
@@ -142,7 +142,7 @@ class CurveTracer:
         )
 
     def record(self, point: EquilibriumPoint) -> Frame:
-        """What is measured in an equilibrium; the caller adds what it cost."""
+        """The measured quantities of an equilibrium; the caller adds iterations and times."""
         model, state, followed = self._model, point.state, self.followed
         self._system.load(state)
         with model.clock.phase("measure"):
@@ -170,7 +170,7 @@ class CurveTracer:
             )
 
     def _unloaded(self, assembly: Assembly) -> State:
-        """The configuration without force or effect: the rigid assembly, or where motors that strain links lead."""
+        """The configuration without force or effect: the rigid assembly, or the equilibrium with strained links."""
         configuration, fraction = self.request.configuration, assembly.fraction
         motors = self._joints.motor_values(configuration.position)
         state = replace(
@@ -262,7 +262,7 @@ class CurveTracer:
         return None if failure.last is None else self.record(failure.last)
 
     def _is_held(self) -> bool:
-        """Whether no motion of the joints takes the force's point along its direction."""
+        """Whether no motion of the joints moves the force's point along its direction."""
         load, joints, poses = self._system.controlled, self._joints, self._state.poses
         if not isinstance(load.point, BodyPoint):
             return False
@@ -271,7 +271,7 @@ class CurveTracer:
         return is_held(joints, poses, self._state.motors, rate, self._system.rigid_rows)
 
     def _springs_are_lost(self) -> bool:
-        """Whether some freedom is held by springs that rounding of the links' stiffness, 1e-15 of it, outweighs."""
+        """Whether some freedom is held by springs softer than rounding, 1e-15 of the links' stiffness."""
         rigid, motors = self._model.linkage.rigid, self._joints.motor_values(self.request.configuration.position)
         motors = np.concatenate([motors, np.zeros(len(rigid.connections) - len(motors))])  # welds of links
         free = free_motions(rigid, self._poses, motors, self._model.spring_potentials)

@@ -1,4 +1,4 @@
-"""BFGS with backtracking: the quasi-Newton method of the paper this package follows (section V-B).
+"""BFGS with backtracking, the quasi-Newton method of section V-B of the paper.
 
     H_{k+1} = (I − ρ s yᵀ) H_k (I − ρ y sᵀ) + ρ s sᵀ,     ρ = 1 / yᵀ s,
 
@@ -32,7 +32,7 @@ class BFGS(Optimiser):
     The expected reduction depends on an approximate Hessian: with a large tolerance it ends far from a minimum.
 
     Attributes:
-        iterations: most of them.
+        iterations: largest number.
         tolerance: least reduction worth a step, over O.
         armijo: fraction of the decrease predicted by the slope that a step must reach.
         halvings: of a step, at most.
@@ -92,7 +92,7 @@ class BFGS(Optimiser):
 def _iterate(
     number: int, evaluations: int, evaluation: Evaluation, inverse: np.ndarray, reason: Reason | None = None
 ) -> Iterate:
-    """With the reduction that the quasi-Newton step promises."""
+    """The iterate with the reduction predicted for the quasi-Newton step."""
     gradient = evaluation.gradient
     promise = 0.5 * float(gradient @ inverse @ gradient) / max(evaluation.value, 1e-30)
     return Iterate(number, evaluations, evaluation, inverse.ravel(), promise, reason)

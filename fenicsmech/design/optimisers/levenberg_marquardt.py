@@ -1,11 +1,11 @@
-"""Levenberg–Marquardt for least squares with a regulariser that costs next to nothing to evaluate.
+"""Levenberg–Marquardt for least squares with a regulariser of negligible cost.
 
-Only the residuals r are made linear; the regulariser R, barriers included, enters each step as it is:
+Only the residuals r are linearised; the regulariser R, barriers included, enters each step exactly:
 
     s = argmin ½ |r + J s|² + R(p + s) + ½ μ |s / ℓ|²,     ℓ the lengths of the parameters.
 
-A step is accepted if it lowers O by a part of what this model promises; μ falls after good steps and grows after bad
-or infeasible ones. Sources: Nocedal & Wright, Numerical Optimization (doi:10.1007/978-0-387-40065-5), chapter 10; for
+A step is accepted if it lowers O by a part of the predicted reduction; μ falls after good steps and grows after bad or
+infeasible ones. Sources: Nocedal & Wright, Numerical Optimization (doi:10.1007/978-0-387-40065-5), chapter 10; for
 the composite model: Fletcher, Practical Methods of Optimization (doi:10.1002/9781118723203), chapter 14.
 
 Residuals have errors e_k, those of the finite elements. It is enough if the undamped step s would change no residual by
@@ -39,20 +39,19 @@ from fenicsmech.design.optimisers.problem import (
 
 @dataclass(frozen=True)
 class LevenbergMarquardt(Optimiser):
-    """Ends when the undamped step promises less than ``tolerance`` of O, or three steps in a row gained less.
+    """Ends when the predicted reduction is below ``tolerance`` times O, or three steps in a row gained less.
 
     Attributes:
-        iterations: most of them.
+        iterations: largest number.
         tolerance: least reduction worth a step, over O. By default 0.005, or earlier where the errors of the finite
-            elements hide what is left to gain.
+            elements exceed the remaining reduction.
         damping: μ at the start.
-        least_damping: least μ, at which parameters that change nothing stay where they are.
-        poor, good: actual over promised reduction; below the first a step is refused, above the second damping falls.
+        least_damping: least μ, which keeps parameters without influence in place.
+        poor, good: actual over predicted reduction; below the first a step is refused, above the second damping falls.
         refusals: most steps refused in a row.
         stalls: steps in a row that gain less than ``tolerance`` of O, after which it ends.
         resolved: φ, the part of a residual's error that the step to the minimum may change it by.
-        again: errors are estimated again once this part of what was left to gain remains: the design has changed, and
-            its errors with it.
+        again: fraction of the remaining reduction at the last estimate of errors, at which they are estimated again.
 
     Raises:
         DescriptionError: tolerance or damping is not a positive number.
@@ -126,13 +125,13 @@ class LevenbergMarquardt(Optimiser):
         metric: np.ndarray,
         reason: Reason | None = None,
     ) -> Iterate:
-        """With the reduction that the undamped step promises; memory: μ, and how many steps gained next to nothing."""
+        """The iterate with the reduction predicted for the undamped step; memory: μ, number of stalled steps."""
         promise = _step(evaluation, self.least_damping, metric)[1] / max(evaluation.value, 1e-30)
         return Iterate(number, evaluations, evaluation, np.array(memory, dtype=float), promise, reason)
 
 
 def _step(here: Evaluation, damping: float, metric: np.ndarray) -> tuple[np.ndarray, float]:
-    """The minimum p + s of the damped model by Newton's method, and the reduction that the model promises there."""
+    """The minimum p + s of the damped model by Newton's method, and the reduction that the model predicts."""
     p, value = here.parameters, here.value
     for _ in range(50):
         model, away = here.model(p), p - here.parameters
@@ -156,7 +155,7 @@ def _step(here: Evaluation, damping: float, metric: np.ndarray) -> tuple[np.ndar
 
 
 class Resolution:
-    """Whether errors hide what is left to gain; they are estimated a few times on the way from ``start``."""
+    """Test of the remaining reduction against the errors, which are estimated a few times from ``start`` on."""
 
     def __init__(self, options: LevenbergMarquardt, start: Iterate) -> None:
         self._options, self._errors = options, exact()
@@ -164,7 +163,7 @@ class Resolution:
         self._below = options.again * _gain(start)
 
     def reached(self, last: Iterate, metric: np.ndarray) -> bool:
-        """Whether the best point so far, ``last``, is as near to the minimum as errors let one see."""
+        """Whether the best point so far, ``last``, is as near to the minimum as the errors resolve."""
         if _gain(last) < self._below:
             self._estimate(last)
         if self._hidden(last, metric) and self._estimated is not last.evaluation:
@@ -184,5 +183,5 @@ class Resolution:
 
 
 def _gain(last: Iterate) -> float:
-    """O(p) − min O, as promised."""
+    """O(p) − min O, as predicted."""
     return last.promise * last.evaluation.value

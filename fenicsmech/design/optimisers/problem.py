@@ -22,7 +22,7 @@ class Infeasible(Exception):
 
 
 class TooHigh(Infeasible):
-    """The objective has a value, but one that is of no use to the optimiser."""
+    """The objective exceeds the optimiser's limit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +113,7 @@ class LeastSquaresProblem(Protocol):
 
 
 class Reason(Enum):
-    """Why a minimisation ended; the value says it in words."""
+    """Reasons for the end of a minimisation; the value is text."""
 
     CONVERGED = "the gradient vanishes or the objective no longer falls: a minimum was found"
     RESOLVED = "what is left to gain is small beside the error of the elements: refine them, or give a tolerance"
@@ -122,7 +122,7 @@ class Reason(Enum):
 
     @property
     def converged(self) -> bool:
-        """Whether a minimum was found, as far as errors let one see."""
+        """Whether a minimum was found within the errors."""
         return self in (Reason.CONVERGED, Reason.RESOLVED)
 
 
@@ -168,7 +168,7 @@ class Optimiser(ABC):
 
     Attributes:
         iterations: most iterations.
-        least_promise: promised reduction over the objective at which it ends at the latest.
+        least_promise: predicted reduction over the objective at which it ends at the latest.
     """
 
     iterations: int
@@ -179,7 +179,7 @@ class Optimiser(ABC):
 
     @abstractmethod
     def minimise(self, problem: LeastSquaresProblem, start: Start, *, watch: Callable[[Iterate], None]) -> Iterate:
-        """The last iterate; ``watch`` sees every one, the start as well.
+        """The last iterate; ``watch`` is called with every one, the start included.
 
         Raises:
             Infeasible: at the start.

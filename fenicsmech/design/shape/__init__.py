@@ -1,1 +1,1 @@
-"""From design parameters to the rest shape of links: splines, handles, weights, best handle positions."""
+"""The rest shape of links by design parameters: splines, handles, weights, optimal handle positions."""

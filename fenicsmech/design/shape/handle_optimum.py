@@ -1,4 +1,4 @@
-"""The handle positions that make the mesh best: min over θ of S(θ, p) = Σ_e ρ(e), and how they follow p.
+"""Optimal handle positions, min over θ of S(θ, p) = Σ_e ρ(e), and their derivatives by p.
 
 Links do not have cells in common, so S is a sum of functions of the θ of one link each. Newton's method with exact
 Hessians minimises them together, with a line search for each that refuses inverted cells. By the implicit function
@@ -36,7 +36,7 @@ class ShapeError(FenicsmechError):
 
 @dataclass(frozen=True)
 class HandleOptions:
-    """Numbers of the search for the best handle positions.
+    """Options of the search for optimal handle positions.
 
     Attributes:
         iterations: most Newton iterations; designs near by take two or three.
@@ -84,7 +84,7 @@ class HandleOptimum:
     Args:
         shape_map: from design and handle positions to the field.
         quality: Σρ in this field.
-        options: numbers of the search.
+        options: of the search.
     """
 
     def __init__(self, shape_map: ShapeMap, quality: QualitySum, options: HandleOptions | None = None) -> None:
@@ -337,7 +337,7 @@ def _along(handles: LinkHandles, theta: np.ndarray) -> np.ndarray:
 
 
 class _MomentHessian:
-    """The Hessian H of a sum over cells, seen by the maps of the handles: ∂²/∂T_j∂T_k = Σ_il r_ij ⊗ H_il ⊗ r_lk.
+    """The Hessian H of a sum over cells, reduced to the maps of the handles: ∂²/∂T_j∂T_k = Σ_il r_ij ⊗ H_il ⊗ r_lk.
 
     Vertices that all handles move alike (those on one column of an extruded link) are added up first, which leaves
     little to multiply.
@@ -375,7 +375,7 @@ class _MomentHessian:
         return self._map.sum_over_ranks(blocks)
 
     def _find_slots(self, hessian: PETSc.Mat, classes: np.ndarray, size: int) -> None:
-        """Where each entry of the owned rows goes in the matrix between classes."""
+        """Place of each entry of the owned rows in the matrix between classes."""
         dim = self._map.mesh.vertices.shape[1]
         original = self._map.original[: self._map.owned]
         starts, columns, _ = hessian.getValuesCSR()

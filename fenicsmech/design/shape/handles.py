@@ -1,11 +1,11 @@
-"""The handles of one link: where its spline takes hold of its mesh.
+"""The handles of one link, which couple its mesh to its spline.
 
 A handle at X moves a point v around it by T (v_x − X_x, v_y − X_y, 1), with T of shape (2, 3); the out-of-plane
 coordinate does not change:
 
     joint handles turn about their joint by θ = α:            T = [R(α) − I | 0],
-    intermediary ones ride on the spline at θ = t, and may
-    slide along; at x, with the unit tangent e and δ there:   T = [δ R(e) R(eᵢₙᵢₜ)ᵀ − I | x − X].
+    intermediary ones lie on the spline at θ = t, and may
+    slide along it; at x, with the unit tangent e and δ there:   T = [δ R(e) R(eᵢₙᵢₜ)ᵀ − I | x − X].
 
 The map T_j of handle j depends on p and on θ_j only. For intermediary handles, with q = (x, y, δ, x′, y′) at t and
 subscripts for derivatives,
@@ -48,7 +48,7 @@ class LinkHandles:
 
     @cached_property
     def slides(self) -> np.ndarray:
-        """Which handles are intermediary, (n,)."""
+        """Mask of the intermediary handles, (n,)."""
         return self.site == BETWEEN
 
     @cached_property

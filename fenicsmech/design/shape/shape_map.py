@@ -1,4 +1,4 @@
-"""Shape of the links: from spline parameters and handle positions to the design field, and back.
+"""The map from spline parameters and handle positions to the design field, and its transpose.
 
     d_i = Σ_j w_ij T_j(p, θ_j) (X_i − X_j, 1) = Σ_j T_j r_ij,     d linear in the maps T_j (2 × 3) of the handles.
 
@@ -31,7 +31,7 @@ class ShapeRequest:
     Attributes:
         link: index of the flexible link.
         name: its name, for messages.
-        centreline: what its spline follows.
+        centreline: approximated by its spline.
         joints: positions of its interfaces, in the order of the mesh, (sites, 2).
         turns: whether each interface may turn about its joint; a clamp may not, (sites,).
         interior: control points between each joint and the next along the centreline, (sites − 1,).
@@ -51,7 +51,7 @@ class ShapeRequest:
 
 @dataclass(frozen=True, eq=False)
 class LinkShape:
-    """The handles of one link and what they move.
+    """The handles of one link and their weights.
 
     Attributes:
         link: index of the flexible link.
@@ -100,7 +100,7 @@ def gather_links(mesh: MechanismMesh, vertices: np.ndarray | None = None) -> lis
 
     Args:
         mesh: the mechanism's mesh.
-        vertices: where its vertices are, (vertices, dim); as drawn by default.
+        vertices: positions of its vertices, (vertices, dim); as drawn by default.
     """
     points = mesh.vertices if vertices is None else vertices
     interface = np.full(len(mesh.cells), FREE)

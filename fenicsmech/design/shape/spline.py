@@ -51,7 +51,7 @@ class LinkSpline:
 
     @cached_property
     def entries(self) -> np.ndarray:
-        """Which of ``controls.ravel()`` the parameters are, (size,)."""
+        """Indices of the parameters in ``controls.ravel()``, (size,)."""
         free = np.ones(self.controls.shape, dtype=bool)
         free[self.is_joint, 0] = False
         return np.flatnonzero(free)
@@ -63,7 +63,7 @@ class LinkSpline:
 
     @property
     def is_thickness(self) -> np.ndarray:
-        """Which parameters belong to δ; the others are lengths, (size,)."""
+        """Mask of the parameters of δ; the others are lengths, (size,)."""
         return self.entries % 3 == 2
 
     def controls_at(self, p: np.ndarray) -> np.ndarray:
