@@ -99,10 +99,9 @@ def bad_interface(rng: Random, scene: Blueprint) -> Spoiled:
 
 
 def pin_bigger_than_link(rng: Random, scene: Blueprint) -> Spoiled:
-    """A pin is several times as thick as its strip."""
+    """A pin holds more than the whole mechanism: no part of its link bends."""
     joint = rng.choice([joint for joint in scene.joints if joint.interface is not None])
-    widest = max(link.thickness for link in scene.flexible if link.name in (joint.a, joint.b))
-    radius = widest * rng.uniform(1.5, 20.0)
+    radius = scene.length * rng.uniform(1.5, 20.0)
     return _refused(
         "pin bigger than link", _with_joint(scene, joint, interface=radius), joint.name, errors=(MeshingError,)
     )
