@@ -17,7 +17,7 @@ M the identity of the coordinates s and 0 for multipliers and force; it is an ei
 with an error of second order in that of φ. Near a bifurcation μ is by far the smallest of all, and one iteration does.
 
 The path that crosses at a simple bifurcation y_b is entered along the null vector φ of K, made orthogonal to the path,
-and looked for in the plane across φ: that meets the new path but, near the bifurcation, not the old one,
+and found in the plane normal to φ, which meets the new path but, near the bifurcation, not the old one,
 
     y = y_b ± ε φ,    ⟨φ, y − y_b⟩ = ± ε.
 
@@ -67,7 +67,7 @@ class CriticalPoint:
             cross.
         modes: number of modes that change their stability there.
         course: the direction of the path over the step in which it lies. The tangent in the point itself is another:
-            rounding and the asymmetry of meshes let it lean towards the paths that cross.
+            rounding and the asymmetry of meshes turn it towards the paths that cross.
     """
 
     kind: Critical
@@ -97,7 +97,7 @@ def null_space(path: ArcLengthTracer, critical: CriticalPoint) -> list[Step]:
 def crossing(path: ArcLengthTracer, critical: CriticalPoint, mode: Step, sense: Sense) -> EquilibriumPoint:
     """The first point of the path that crosses at ``critical``, with the null vector ``mode``.
 
-    Steps of ``path`` go on from there.
+    Steps of ``path`` continue from there.
 
     Raises:
         NotConverged: there is none near.
@@ -147,10 +147,10 @@ class _Piece:
         return samples[0], samples[1]
 
     def at(self, distance: float) -> _Sample:
-        """The equilibrium on the way, unless it strays off it by more than the way gone.
+        """The equilibrium ``distance`` along the step, unless it deviates from the step by more than ``distance``.
 
-        Meshes without a column's symmetry turn its bifurcation into two paths that pass each other closely; what turns
-        off from one to the other there is none of this path's points.
+        Meshes without a column's symmetry turn its bifurcation into two paths that pass each other closely; points
+        that lie on the other one are rejected.
         """
         point, metric = self.path.between(self.before, self.after, distance), self.path.metric
         chord = self.path.chord(self.before, point)

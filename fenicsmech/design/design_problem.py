@@ -86,7 +86,7 @@ class DesignProblem:
         """The design field of a result or of parameters (parameters,), as ``Simulation.with_design`` takes it.
 
         This rank's values, ghosts last, flat. Parameters alone fix displacements to about 1 % only: several positions
-        of the handles can be good, and results carry those that were found on the way.
+        of the handles can be good, and results hold those found.
 
         Raises:
             DescriptionError: the design is one of other links.
@@ -111,7 +111,7 @@ class DesignProblem:
             optimiser: Levenberg–Marquardt by default.
             start: initial design, as the result of a cheaper simulation; the drawn shapes by default.
             checkpoint: file updated after each iteration.
-            resume: go on from ``checkpoint`` if it exists.
+            resume: whether to continue from ``checkpoint`` if it exists.
 
         Raises:
             DescriptionError: the checkpoint or the start is one of another problem, or no shape that may change moves
@@ -241,7 +241,7 @@ class DesignProblem:
 
     @cached_property
     def _team(self) -> tuple[Group, Objective]:
-        """This process's group, and the objective as its simulation sees it."""
+        """This process's group, and the objective on its simulation."""
         rest = self._rest
         with self._clock.phase("setup"):
             group, simulation = split(self.simulation.comm, len(self.targets)), self.simulation

@@ -87,10 +87,10 @@ class _Shared:
 
 
 def _follow(comm: MPI.Comm, objective: Objective) -> None:
-    """Takes part until the first process is done.
+    """Evaluates with the first process until that is done.
 
     Raises:
-        Exception: the first error met on the way that the first process may not have seen.
+        Exception: the first error that may not have been raised on the first process.
     """
     failure = None
     while (request := comm.bcast(None, root=0)) is not None:
@@ -98,8 +98,8 @@ def _follow(comm: MPI.Comm, objective: Objective) -> None:
         try:
             getattr(objective, method)(*arguments)
         except Infeasible:
-            pass  # the first process has seen it too, and decides
-        except Exception as error:  # as a rule it has seen this as well, and ends; until then it needs answers
+            pass  # raised on the first process too, which decides
+        except Exception as error:  # as a rule raised there as well, which ends the run; until then it needs answers
             failure = failure or error
     if failure is not None:
         raise failure

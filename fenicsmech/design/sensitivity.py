@@ -2,13 +2,13 @@
 
 At an equilibrium F(y, p) = Gᵀ ∇L = 0 with y = (s, λ). For an output O(y), with its adjoint x,
 
-    KKT x = ∂O/∂y,     dO/dp = −xᵀ ∂F/∂p.
+    K x = ∂O/∂y,     dO/dp = −xᵀ ∂F/∂p.
 
 With û = ∂u/∂y · x at all nodes, pressures included where links have some of their own, and ẑ the poses' part of x,
 
-    xᵀ ∂F/∂d = ∂(r · û)/∂d  +  Σ_i over interface nodes [ (K û)_i · (R − I) + r_i · (ẑ_r ∂R/∂r) ] ∂X_i/∂d.
+    xᵀ ∂F/∂d = ∂(r · û)/∂d  +  Σ_i over interface nodes [ (K_uu û)_i · (R − I) + r_i · (ẑ_r ∂R/∂r) ] ∂X_i/∂d.
 
-The first part is a form, differentiated symbolically: elements know X₀ + d, and so do effects whose energy is a form.
+The first part is a form, differentiated symbolically: elements, and effects whose energy is a form, depend on X₀ + d.
 The second part is derived by hand. An interface node moves with its body, u_i = t + (R − I)(X_i − X_b): where it was
 drawn enters its displacement through G, which is not a form. Nor is the work of forces at points; they stay at
 the same place of their cell, or of their body, so that it depends on d through the displacements of nodes alone, and
@@ -77,7 +77,7 @@ class Sensitivity:
         )
 
     def _interface_terms(self, at: Linearisation, z: np.ndarray, stiff: np.ndarray) -> np.ndarray:
-        """(R − I)ᵀ (K û)_i + (ẑ_r ∂R/∂r)ᵀ r_i at owned interface nodes, (owned nodes, dim)."""
+        """(R − I)ᵀ (K_uu û)_i + (ẑ_r ∂R/∂r)ᵀ r_i at owned interface nodes, (owned nodes, dim)."""
         interfaces, joints = self._model.interfaces, self._model.linkage.joints
         dim = joints.space.dim
         stiff, forces = (values.reshape(-1, interfaces.block) for values in (stiff, at.residual.nodal))

@@ -76,9 +76,9 @@ class ElasticBody(BodyFields):
         link, materials, depths, model, order, bulge: as of ``BodyFields``.
         free: whether each local cell can deform (False inside interfaces), (cells,).
         quadrature: explicit degree; never UFL's estimate.
-        effects: energies beside the elastic one, as functions of this body; none costs nothing.
-        stretches: of the strain-free state of each link, None where it is as drawn; none costs nothing.
-        mixed: whether each link is in the u–p formulation; none costs nothing.
+        effects: energies beside the elastic one, as functions of this body.
+        stretches: of the strain-free state of each link, None where it is as drawn.
+        mixed: whether each link is in the u–p formulation.
 
     Attributes:
         dx: measure of all cells, interfaces included.
@@ -257,7 +257,7 @@ class ElasticBody(BodyFields):
     def _stresses(self) -> list[fem.Expression]:
         """The compiled von Mises stress at cell midpoints, per law."""
         midpoint, H = np.full((1, self.model.dim), 1.0 / (self.model.dim + 1)), self._elastic(self.gradient(self.u))
-        # without p, which no deviator sees
+        # without p, which does not change the deviator
         stresses = [ufl.dev(cauchy_stress(self.model, term.law, H)) for term in self._terms]
         return [compile_expression(ufl.sqrt(1.5 * ufl.inner(s, s)), midpoint, self.mesh.comm) for s in stresses]
 

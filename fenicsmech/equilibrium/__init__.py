@@ -6,7 +6,7 @@
 - ``border``: loads, potentials of poses and joints
 - ``kkt``: the distributed KKT matrix
 - ``system``: energy, residual and KKT matrix at a state
-- ``linear``: its factor LDLᵀ with inertia, or conjugate gradients on two levels where that is too large
+- ``linear``: its factor LDLᵀ with inertia, or conjugate gradients on two levels for large systems
 - ``solver``: the interface of equilibrium solvers, and the tangent at an equilibrium
 - ``newton``: the default solver, a primal–dual Newton iteration
 - ``adjoint``: of displacements and forces

@@ -16,7 +16,7 @@ A path may turn back in v and in q. Its arc length s is a control as well,
 
     ⟨n, y − y₀⟩ = s,      y the state with the value v of the control that is followed,
 
-whose equation takes the place of the one that prescribes v; any control that leaves K regular serves for solves with K:
+whose equation takes the place of the one that prescribes v; solves need any control that leaves K regular:
 v is held, or q where that changes more (Rheinboldt & Burkardt, doi:10.1145/357456.357460), so that limit points of the
 other do no harm. See ``solver`` for the bordering, which needs no row of the matrix. Sources: Riks
 (doi:10.1016/0020-7683(79)90081-7), Crisfield (doi:10.1016/0045-7949(81)90108-5).

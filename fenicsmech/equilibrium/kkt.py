@@ -8,8 +8,8 @@ total energy of links and effects,
          [0       , −A   , −ε−c, 0   ],
          [−a_uᵀ   , −a_zᵀ, 0   , 0   ]]
 
-and G the map from the scaled unknowns. K̂ is stored by the blocks of its nodes, into which element matrices go in half
-the time; products of sparse matrices want it by entries. The product over all unknowns is formed on
+and G the map from the scaled unknowns. K̂ is stored by blocks of one node each, which halves
+the time of assembly; products of sparse matrices need a copy by entries. The product over all unknowns is formed on
 demand. Two-level solvers need only its stiffness by blocks of nodes, its columns of the border, and
 Pᵀ K P = (G P)ᵀ K̂ (G P) for a narrow P.
 """

@@ -54,7 +54,7 @@ class EquilibriumPoint:
         stability: from the inertia of K.
         iterations: KKT systems factored and solved on the way.
         residuals: relative residual before each iteration and at the end.
-        linearisation: K, last factored on the way, which has served for stability and tangent.
+        linearisation: K, last factored on the way, of which stability and tangent are.
     """
 
     state: State

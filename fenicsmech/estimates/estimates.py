@@ -91,7 +91,7 @@ class Estimates:
             output: a point whose travel is estimated instead, under the same control.
 
         Raises:
-            DescriptionError: an error of plane stress is asked for and the model is another one.
+            DescriptionError: ``kinds`` hold the error of plane stress and the model is another one.
             EquilibriumError: the tangent is singular.
         """
         errors = [self._element_error if kind is ErrorKind.ELEMENTS else self._plane_stress_error for kind in kinds]

@@ -26,7 +26,7 @@ class CircleArc:
         centre: shape (2,).
         radius: of the circle.
         first: angle (rad) from x at which it begins.
-        sweep: angle that it goes on from there, positive if counter-clockwise.
+        sweep: angle covered from there, positive if counter-clockwise.
     """
 
     centre: np.ndarray

@@ -155,7 +155,7 @@ class MechanismModel:
         index = self.mechanism.flexible_links.index(part.on)
         cells = np.flatnonzero(self.mesh.link[:owned] == index)
         corners = self.mesh.corners(cells)
-        # seen from a model in the plane, a point at any height is on the mid-plane
+        # in a model in the plane, a point at any height is on the mid-plane
         at = np.array(in_dimension(in_dimension(part.at, self.linkage.dim), self.elastic.model.dim))
         return link_point(f"{part.name!r}", at, self.elastic.u, cells, corners, self._bulges(cells))
 
@@ -212,7 +212,7 @@ class MechanismModel:
         return effect.link_energy(self._fields(body))
 
     def _bulges(self, cells: np.ndarray) -> np.ndarray:
-        """Bulges of the edges of local ``cells``, as the displacement field sees them, (cells, pairs, dim)."""
+        """Bulges of the edges of local ``cells``, in the displacement field, (cells, pairs, dim)."""
         mesh = self.mesh.mesh
         bulges = self.mesh.curved.of_cells(original_nodes(mesh)[cell_nodes(mesh)[cells]])
         return bulges if self.elastic.bulge is not None else np.zeros_like(bulges)
@@ -262,7 +262,7 @@ def mesh_mechanism(comm: MPI.Comm, mechanism: Mechanism, linkage: Linkage, fidel
 
 
 def _mesh_request(link: FlexibleLink, linkage: Linkage, fidelity: Fidelity) -> tuple[list[InterfaceSite], dict]:
-    """Where joints hold ``link``, and how finely it is meshed."""
+    """Interface sites and element sizes of ``link``."""
     bodies = [linkage.bodies[index] for index in linkage.interfaces[link]]
     # a pin along z holds its link at whatever height the link is
     ats = [body.centre[:2] if body.axis[2] == 1.0 else body.centre for body in bodies]

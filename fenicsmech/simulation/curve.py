@@ -37,7 +37,7 @@ class Curve:
         part: the force that changes, or the motor or drive that moves.
         configuration: motor positions.
         freedom: mobility and redundancy of the assembled configuration.
-        frames: one per sample, in the order asked for.
+        frames: one per sample, in the order of the samples.
         discretisation: of the scene, with which they were computed.
         others: constant magnitudes of other forces.
         quantity: the unknown of the curve: displacements, or forces where displacements were prescribed or the curve

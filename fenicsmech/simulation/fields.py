@@ -141,7 +141,7 @@ def _folder_beside(path: Path) -> Path:
 
 @contextmanager
 def _at_rest(model: MechanismModel, design: np.ndarray) -> Iterator[None]:
-    """Moves the nodes of the mesh to where ``design`` puts them for a while: files show the links at rest.
+    """A context in which the mesh has the rest shape of ``design``, as in files.
 
     The only place where the coordinates of a ``MechanismMesh`` change: dolfinx writes functions with their own mesh.
     """

@@ -21,7 +21,7 @@ from fenicsmech.simulation.fields import Snapshot
 
 
 class MechanismPlotter:
-    """Draws states of one mechanism, seen along z; the triangles are those of the undeformed mesh.
+    """Draws states of one mechanism in plan view; the triangles are those of the undeformed mesh.
 
     Args:
         model: of the mechanism.

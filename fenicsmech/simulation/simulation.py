@@ -63,7 +63,7 @@ class Simulation:
         accuracy: instead of space, order, layers, segments and quadrature: relative error allowed in the largest
             displacement of every curve, or in the largest force where displacements are prescribed, once the estimates
             of its errors are added (``Curve.corrected``). ``load_displacement`` finds the cheapest fidelity that is
-            good enough, see ``choice``; ``follow`` and ``branches`` compute at the one chosen last, and refuse before.
+            good enough, see ``choice``; ``follow`` and ``branches`` use the one chosen last and raise an error before.
             With links known from files only, ``size`` stands for their thickness.
         layers: of elements through the depth, or half of it where half is meshed; by default from depth and size.
         segments: of elements around pins, at least; 8 by default.
@@ -205,7 +205,7 @@ class Simulation:
             steps: how finely it is followed.
 
         Raises:
-            DescriptionError: the request makes no sense, or an accuracy was asked for and no fidelity chosen yet.
+            DescriptionError: the request makes no sense, or no fidelity was chosen for an accuracy yet.
             AssemblyError: the configuration does not assemble.
             EquilibriumError: the curve ends early; carries the frames before that.
         """

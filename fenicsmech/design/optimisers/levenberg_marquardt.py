@@ -13,7 +13,7 @@ more than a tenth of its error, and O by no more than the errors do:
 
     |J s|_k ≤ φ e_k  for all k,     O(p) − min O ≤ Σ (|r_k| e_k + ½ e_k²),     φ = 0.1.
 
-So results move by less than their errors when the minimisation goes on, regularisers included: they are part of O.
+Further iterations would change results by less than their errors; regularisers count, as part of O.
 """
 
 from __future__ import annotations

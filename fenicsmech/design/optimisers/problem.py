@@ -128,7 +128,7 @@ class Reason(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """The start of a minimisation, or of one that goes on after an interruption.
+    """The start of a minimisation, or of one resumed after an interruption.
 
     Attributes:
         parameters: p, (n,).
@@ -150,9 +150,9 @@ class Iterate:
         number: iterations so far.
         evaluations: objective evaluations so far, infeasible ones included.
         evaluation: the best point.
-        memory: state of the optimiser, to go on with.
+        memory: state of the optimiser, for resuming.
         promise: the reduction that is still expected, over the objective; inf if that is not known.
-        reason: None while it goes on.
+        reason: None while it runs.
     """
 
     number: int

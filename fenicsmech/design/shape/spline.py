@@ -1,4 +1,4 @@
-"""Centreline and thickness of a link as a cubic Hermite spline of its design parameters; samples of it; the first one.
+"""Centreline and thickness of a link as a cubic Hermite spline of its design parameters; its samples and its fit.
 
 With control points C_k (position P_k and tangent M_k, three components each) and t = k + τ, 0 ≤ τ ≤ 1,
 
@@ -157,7 +157,7 @@ def _ratio() -> SmoothFunction:
 
 @dataclass(frozen=True, eq=False)
 class SplineFit:
-    """A spline and how well it follows its centreline.
+    """A spline fitted to a centreline.
 
     Attributes:
         spline: the spline.

@@ -1,10 +1,10 @@
-"""Bounded biharmonic weights: how much each handle of a link moves each vertex of its mesh.
+"""Bounded biharmonic weights of the handles of a link at the vertices of its mesh.
 
     min Σ_j ½ w_jᵀ (L M⁻¹ L + c D) w_j    with  0 ≤ w ≤ 1,  Σ_j w_j = 1,
     w_j = 1 at handle j and on the whole interface that it holds, 0 on those of all others,
 
 L, M: stiffness and lumped mass of linear elements, D = ∫ ∂N_i/∂z ∂N_k/∂z, c = 1000 / depth². The weights of an extruded
-link are sought on its plan, so that they do not change through its depth at all; D serves other solids. Handles between
+link are computed on its plan and constant through its depth; D is for other solids. Handles between
 joints are vertices of the mesh: the cells that hold them are split there. A. Jacobson, I. Baran, J. Popović,
 O. Sorkine: Bounded biharmonic weights for real-time deformation (doi:10.1145/1964921.1964973).
 """
@@ -228,7 +228,7 @@ def solve_partition(
             if np.abs(excess).max() < tolerance:
                 return w.array.reshape(n, k).copy()
     finally:
-        # at once: PETSc forgets what the functions of a solver hold if the solver itself was queued
+        # at once: PETSc does not free objects held by the callbacks of a solver that was queued
         for thing in (tao, w, lower, upper, slope, linear, H):
             thing.destroy()
     raise FenicsmechError(

@@ -84,7 +84,7 @@ class Factor(LinearSolver):
         """Factors the matrix's current values; whether this succeeded."""
         done = self._numeric()
         if not self._fresh and not (done and self.inertia().zero == 0):
-            # the analysis pairs unknowns by the values it sees: in other ones a pair may be zero, the matrix regular
+            # the analysis pairs unknowns by their present values: in later ones a pair may be zero, the matrix regular
             self._solver.destroy()
             self._analyse()
             done = self._numeric()

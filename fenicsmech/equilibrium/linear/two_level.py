@@ -1,18 +1,18 @@
-"""The KKT system without a factor of it: conjugate gradients between linear and higher-order displacements.
+"""Two-level solution of K x = b with the KKT matrix K: a factor for linear displacements, conjugate gradients beyond.
 
 P holds the linear displacements and the whole border,
 
-    P = D⁻¹ N G₁,     KKT₁ = Pᵀ KKT P,
+    P = D⁻¹ N G₁,     K₁ = Pᵀ K P,
 
 with G₁ the map ∂u/∂(s, λ, f) of linear elements, interfaces included, N their values at the nodes of the displacement,
-D the units of the unknowns. KKT₁ has an eighth of the unknowns or less, and is factored. What is left,
+D the units of the unknowns. K₁ has an eighth of the unknowns or less, and is factored. What is left,
 
-    W = {x : Pᵀ KKT x = 0},     In(KKT) = In(KKT₁) + In(KKT on W),
+    W = {x : Pᵀ K x = 0},     In(K) = In(K₁) + In(K on W),
 
-holds every constraint exactly, has no multipliers, and KKT is positive definite on it but for modes that linear
+holds every constraint exactly, has no multipliers, and K is positive definite on it but for modes that linear
 elements are too stiff to show. Conjugate gradients stay in W if the smoother S is followed by the coarse correction:
 
-    x ← P KKT₁⁻¹ Pᵀ b,     then with the preconditioner  (I − P KKT₁⁻¹ Pᵀ KKT) S.
+    x ← P K₁⁻¹ Pᵀ b,     then with the preconditioner  (I − P K₁⁻¹ Pᵀ K) S.
 
 S is a polynomial of the stiffness A of free nodes that damps what varies from node to node, PETSc's Chebyshev
 iteration: with D the 3 × 3 (2 × 2 in the plane) diagonal blocks of A and λ the largest eigenvalue of D⁻¹A,
@@ -21,7 +21,7 @@ iteration: with D the 3 × 3 (2 × 2 in the plane) diagonal blocks of A and λ t
 
 errors with eigenvalues in [a, b] shrink alike. S is symmetric, positive definite even if A is not.
 
-Directions p of conjugate gradients are conjugate, so that the number of negative pᵀ KKT p is that of the negative
+Directions p of conjugate gradients are conjugate, so that the number of negative pᵀ K p is that of the negative
 eigenvalues they have met. For the inertia they start from random vectors, until one meets none in the complement of
 those found. Those found are certain; that none is left is as likely as the iteration has converged.
 
@@ -106,7 +106,7 @@ class BySize(LinearMethod):
 
 @dataclass(frozen=True)
 class Direction:
-    """p with KKT p and pᵀ KKT p."""
+    """p with K p and pᵀ K p."""
 
     p: PETSc.Vec
     image: PETSc.Vec
@@ -159,7 +159,7 @@ class TwoLevelSolver(LinearSolver):
 
     @property
     def memory(self) -> float:
-        """Bytes of the factor of KKT₁ and of the blocked stiffness, on all ranks."""
+        """Bytes of the factor of K₁ and of the blocked stiffness, on all ranks."""
         blocks = self._stiffness.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"]
         size = self._stiffness.getBlockSize() ** 2
         return self._coarse.factor.memory + blocks * (8.0 + 4.0 / size)
@@ -193,7 +193,7 @@ class TwoLevelSolver(LinearSolver):
         return self.inertia() if self._met or curvature <= 0.0 else self._coarse.factor.inertia()
 
     def _start(self, right: PETSc.Vec, solution: PETSc.Vec) -> None:
-        """P KKT₁⁻¹ Pᵀ b and its residual."""
+        """P K₁⁻¹ Pᵀ b and its residual."""
         self._coarse.correction(right, solution)
         self._matrix.mult(solution, self._residual)
         self._residual.aypx(-1.0, right)
@@ -248,7 +248,7 @@ class TwoLevelSolver(LinearSolver):
     def _conjugate(
         self, r: PETSc.Vec, tolerance: float, found: Sequence[Direction] = (), *, least: float = 0.0
     ) -> Iterator[tuple[float, Direction]]:
-        """Conjugate directions for a residual r with Pᵀ r = 0: its energy rᵀ z, and where to go on.
+        """Conjugate directions for a residual r with Pᵀ r = 0: its energy rᵀ z, and the next direction.
 
         They end when the energy is ``least``² or has fallen by ``tolerance``². Each is valid until the next one.
         """
@@ -281,7 +281,7 @@ class TwoLevelSolver(LinearSolver):
         return r.dot(z)
 
     def _project(self, found: Sequence[Direction]) -> None:
-        """Makes z conjugate to P and to the directions ``found``, and its image KKT z."""
+        """Makes z conjugate to P and to the directions ``found``, and its image K z."""
         z, image = self._z, self._image
         self._matrix.mult(z, image)
         self._coarse.correction(image, self._work)
@@ -315,13 +315,13 @@ def _chebyshev(comm: MPI.Comm, options: TwoLevel) -> PETSc.KSP:
 
 
 class CoarseLevel:
-    """P and the factor of KKT₁.
+    """P and the factor of K₁.
 
     Args:
         system: whose KKT matrix it is.
 
     Attributes:
-        factor: of KKT₁, made by the first ``update``.
+        factor: of K₁, made by the first ``update``.
     """
 
     def __init__(self, system: EquilibriumSystem) -> None:
@@ -335,7 +335,7 @@ class CoarseLevel:
         self._prolongation, self._mapped, self._matrix = PETSc.Mat(), PETSc.Mat(), PETSc.Mat()
 
     def update(self) -> bool:
-        """Takes the values of the KKT matrix; whether KKT₁ could be factored."""
+        """Takes the values of the KKT matrix; whether K₁ could be factored."""
         system, unknowns, first = self._system, self._system.unknowns, not self._matrix
         self._interfaces.reshape(system.elastic.d.x.array.reshape(-1, system.joints.space.dim))
         self._map.turn(unknowns.poses)
@@ -348,7 +348,7 @@ class CoarseLevel:
         return self.factor.refactor()
 
     def correction(self, r: PETSc.Vec, x: PETSc.Vec) -> None:
-        """x = P KKT₁⁻¹ Pᵀ r."""
+        """x = P K₁⁻¹ Pᵀ r."""
         self._prolongation.multTranspose(r, self._right)
         self.factor.solve(self._right, self._solution)
         self._prolongation.mult(self._solution, x)
