@@ -137,7 +137,7 @@ class _Piece:
         self._mode = _SoftestMode(path.system)
 
     def ends(self) -> tuple[_Sample, _Sample]:
-        """Both ends."""
+        """Samples at both ends."""
         samples, held = [], self.path.held(self.before)
         for distance, point in ((0.0, self.before), (self.width, self.after)):
             self.path.system.load(point.state)

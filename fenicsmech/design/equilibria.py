@@ -199,7 +199,7 @@ class TargetEquilibria:
         return self._moved(target, state, control, halfway, after, halvings - 1)
 
     def _next(self, target: Target, start: State, control: LoadControl, before: np.ndarray, after: np.ndarray) -> State:
-        """The same in one step."""
+        """The equilibrium at design ``after``, in one step."""
         model, newton = self._model, self._newtons[target.part]
         model.reshape(before)
         guess = model.carry(start, after)

@@ -77,7 +77,7 @@ class ParametricShape:
 
     @staticmethod
     def of(simulation: Simulation, designs: Sequence[SplineDesign]) -> ParametricShape:
-        """That of a simulation, handles and weights computed on its mesh."""
+        """The rest shape of a simulation's links, handles and weights computed on its mesh."""
         requests = [shape_request(design, simulation.scene.mechanism, simulation.linkage) for design in designs]
         return ParametricShape(simulation.model, shape_links(simulation.model.mesh, requests), designs)
 

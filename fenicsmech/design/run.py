@@ -172,7 +172,7 @@ class Checkpoint:
         return Saved(start, np.array(data["handles"]))
 
     def load_together(self, comm: MPI.Comm) -> Saved | None:
-        """The same on all processes, errors too; None if the file does not exist yet."""
+        """The start on all processes, errors too; None if the file does not exist yet."""
         return from_one(comm, lambda: self.load() if self.path.exists() else None)
 
 

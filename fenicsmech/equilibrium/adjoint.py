@@ -44,12 +44,12 @@ class Adjoint:
 
     @staticmethod
     def of_travel(at: Linearisation, load: PointLoad) -> Adjoint:
-        """Of the travel of a load's point."""
+        """The adjoint of the travel of a load's point."""
         return Adjoint._of(at, at.solve(at.travel_gradient(load)))
 
     @staticmethod
     def of_force(at: Linearisation) -> Adjoint:
-        """Of the controlled force under displacement control."""
+        """The adjoint of the controlled force under displacement control."""
         # ∂f/∂y is the right-hand side of the rate with the prescribed displacement, but for its sign
         x = at.rate()
         x.scale(-1.0)

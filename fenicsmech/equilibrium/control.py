@@ -124,11 +124,11 @@ class LoadControl(Control):
         return DisplacementControl()
 
     def change(self, step: Step) -> float:
-        """That of the value in a change of state."""
+        """The change of the value in a change of state."""
         return step.force
 
     def conjugate(self, system, state: State) -> float:
-        """q of a loaded state."""
+        """The conjugate q of a loaded state."""
         return system.load_displacement(state)
 
     def moves(self, system, tangent: Step) -> bool:
@@ -192,11 +192,11 @@ class MotorControl(Control):
     opposite = None
 
     def change(self, step: Step) -> float:
-        """That of the value in a change of state."""
+        """The change of the value in a change of state."""
         return self._along(step.motors)
 
     def conjugate(self, system, state: State) -> float:
-        """q of a loaded state."""
+        """The conjugate q of a loaded state."""
         return self._exerted(system, state.multipliers)
 
     def moves(self, system, tangent: Step) -> bool:

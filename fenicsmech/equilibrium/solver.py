@@ -73,7 +73,7 @@ class EquilibriumPoint:
 
     @property
     def unstable_under_control(self) -> int:
-        """The same with the controlled quantity held; along a path, the displacement of the force's point."""
+        """The same number with the controlled quantity held; along a path, the displacement of the force's point."""
         return self.stability.under_displacement if self.control.constrained else self.stability.under_load
 
     def scaled(self, factor: float) -> EquilibriumPoint:

@@ -274,27 +274,27 @@ class EquilibriumSystem:
             moments = _added(residual.moments, self._moments(self._mixed.forces()))
         self.kkt.linearise(self._border.entries(state, control, moments, self._regularisation))
 
-    # -- right-hand sides whose KKT solutions are rates of x with … -------------------------------------------
+    # -- right-hand sides whose KKT solutions are rates of x -----------------------------------------------------
 
     def travel_gradient(self, load: PointLoad, state: State) -> PETSc.Vec:
-        """… the magnitude of a load: Gᵀ ∂(a · u_P), the gradient of its travel by x."""
+        """Right-hand side for the magnitude of a load: Gᵀ ∂(a · u_P), the gradient of its travel by x."""
         return self.unknowns.apply_transpose(*self._border.load_forces([(load, 1.0)], state))
 
     def load_factor_rate(self, state: State) -> PETSc.Vec:
-        """… the load factor of the constant loads."""
+        """Right-hand side for the load factor of the constant loads."""
         links, border = self._border.load_factor_rate(state)
         if self.elastic.depends_on_load_factor:
             links -= self.elastic.load_factor_residuals()
         return self.unknowns.apply_transpose(links, border)
 
     def target_rate(self) -> PETSc.Vec:
-        """… the controlled displacement."""
+        """Right-hand side for the controlled displacement."""
         border = np.zeros(self.blocks.border.size)
         self.blocks.restrict_border(border).load[:] = -1.0
         return self.unknowns.apply_transpose(np.zeros(self.numbering.rows.links.count), border)
 
     def motor_rate(self, state: State, direction: np.ndarray) -> PETSc.Vec:
-        """… motor values along ``direction``, (connections,)."""
+        """Right-hand side for motor values along ``direction``, (connections,)."""
         border = np.zeros(self.blocks.border.size)
         poses, multipliers, _ = self.blocks.restrict_border(border)
         multipliers[:], poses[:] = self.joints.motor_rate(state.poses, state.motors, state.multipliers, direction)

@@ -104,7 +104,7 @@ class ElementError:
 
     @cached_property
     def _pressures(self) -> list[PressureError]:
-        """Of p and its adjoint, where elements are mixed."""
+        """Errors of p and its adjoint, where elements are mixed."""
         elastic = self._model.elastic
         if elastic.pressure is None:
             return []
@@ -122,5 +122,5 @@ class ElementError:
 
     @property
     def _degree(self) -> int:
-        """Of the recovered gradient."""
+        """Degree of the recovered gradient."""
         return max(self._model.elastic.order - 1, 1)

@@ -94,7 +94,7 @@ class Recovery:
 
     @cached_property
     def _solver_off_mid_plane(self) -> PETSc.KSP:
-        """For components that vanish on the mid-plane."""
+        """Solver for components that vanish on the mid-plane."""
         mass = self._mass.copy()
         mass.zeroRowsColumns(mass.getOwnershipRange()[0] + self._mid_plane)
         return _solver_of(mass)

@@ -193,7 +193,7 @@ def _read(shape: MeshPart, request: MeshRequest) -> tuple[np.ndarray, np.ndarray
 
 
 def _interface(points: np.ndarray, cells: np.ndarray, request: MeshRequest) -> np.ndarray:
-    """For each cell the site whose region contains all its corners, or FREE."""
+    """The site whose region contains all corners of each cell, or FREE."""
     tolerance = _TOLERANCE * float(np.ptp(points[np.unique(cells)], axis=0).max())
     inside = np.array([site.contains(points, tolerance)[cells].all(axis=1) for site in request.sites], dtype=bool)
     inside = inside.reshape(-1, len(cells))

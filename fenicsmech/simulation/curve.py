@@ -66,7 +66,7 @@ class Curve:
 
     @property
     def units(self) -> Units:
-        """Of the scene."""
+        """Units of the scene."""
         return self.discretisation.scene.units
 
     @property
@@ -91,7 +91,7 @@ class Curve:
 
     @property
     def stable(self) -> np.ndarray:
-        """(frames,)."""
+        """Stability of the frames under dead loads, (frames,)."""
         return np.array([frame.stable for frame in self.frames])
 
     @property
@@ -345,7 +345,7 @@ class Curve:
     # -- what the above need -------------------------------------------------------------------------------------
 
     def equilibrium(self, frame: Frame) -> Equilibrium:
-        """That of one of the frames, under what was prescribed. Local."""
+        """The equilibrium of one of the frames, with its prescribed quantity. Local."""
         return Equilibrium(frame.state, frame.design, self.quantity)
 
     @property

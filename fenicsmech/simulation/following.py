@@ -57,7 +57,7 @@ class PathEvent:
 
     @property
     def value(self) -> float:
-        """Of the prescribed part, where the tangent is singular; the frame is the nearest equilibrium found."""
+        """Value of the prescribed part at the singular tangent; the frame is the nearest equilibrium found."""
         return self.critical.value
 
     @property
@@ -280,7 +280,7 @@ class CurveFollower:
         ]
 
     def _conjugate(self, state: State) -> float:
-        """As on curves, displacements from the unloaded configuration."""
+        """The conjugate of the followed value; displacements count from the unloaded configuration."""
         self._system.load(state)
         origin = 0.0 if self._followed.displaces else self._tracer.origin
         return self._followed.conjugate(self._system, state) - origin

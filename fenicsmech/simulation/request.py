@@ -115,7 +115,7 @@ def quantities(part: PrescribedPart) -> tuple[str, str]:
 
 
 def axes(part: PrescribedPart, units: Units) -> tuple[Axis, Axis]:
-    """The same with their units."""
+    """Quantities and units on the axes of the curve of a part."""
     across, up = quantities(part)
     if across == "angle":
         return Axis(across, "rad"), Axis(up, f"{units.force} {units.length}")

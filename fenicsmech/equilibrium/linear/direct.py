@@ -28,7 +28,7 @@ class LinearSolver(ABC):
 
     @abstractmethod
     def inertia(self) -> Inertia:
-        """Of the matrix last refactored."""
+        """Inertia of the matrix last refactored."""
 
     @abstractmethod
     def known_inertia(self) -> Inertia:
@@ -124,7 +124,7 @@ class Factor(LinearSolver):
         return False
 
     def inertia(self) -> Inertia:
-        """Of the matrix last factored."""
+        """Inertia of the matrix last factored."""
         mumps = self._solver.getPC().getFactorMatrix()
         return Inertia(mumps.getMumpsInfog(12), mumps.getMumpsInfog(28))
 

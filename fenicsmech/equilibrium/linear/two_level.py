@@ -217,7 +217,7 @@ class TwoLevelSolver(LinearSolver):
         return Inertia(coarse.negative + self._met, coarse.zero)
 
     def inertia(self) -> Inertia:
-        """Of the matrix last refactored."""
+        """Inertia of the matrix last refactored."""
         found: list[Direction] = []
         coarse, spent = self._coarse.factor.inertia(), 0
         while True:
