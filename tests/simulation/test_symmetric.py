@@ -267,7 +267,7 @@ def test_half_of_a_step_part_moves_as_the_whole_does_but_for_the_mesh():
 
 def test_mesh_files_are_refused():
     scene, _ = from_file(fm.gmsh_mesh(MESHES / "strip3d.msh", depth=10.0))
-    refused(lambda: simulate(scene, HALF), part="'link'", problem="symmetric about a mid-plane", remedy="space='3d'")
+    refused(lambda: simulate(scene, HALF), part="'link'", problem="symmetry of a mesh file", remedy="space='3d'")
 
 
 @pytest.mark.parametrize(("about", "problem"), [((20, 0, 1), "not on the mid-plane"), (None, "is open")])
