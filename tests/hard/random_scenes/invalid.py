@@ -103,7 +103,12 @@ def pin_bigger_than_link(rng: Random, scene: Blueprint) -> Spoiled:
     joint = rng.choice([joint for joint in scene.joints if joint.interface is not None])
     radius = scene.length * rng.uniform(1.5, 20.0)
     return _refused(
-        "pin bigger than link", _with_joint(scene, joint, interface=radius), joint.name, errors=(MeshingError,)
+        "pin bigger than link",
+        _with_joint(scene, joint, interface=radius),
+        joint.name,
+        joint.a,
+        joint.b,
+        errors=(MeshingError,),
     )
 
 
