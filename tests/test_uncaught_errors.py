@@ -26,6 +26,7 @@ def test_a_program_ends_when_an_error_is_not_caught_on(ranks, mpirun, tmp_path):
     assert done.stderr.count("ValueError: broken") == len(ranks)
 
 
+@pytest.mark.thorough
 def test_importing_the_package_changes_nothing_outside_it():
     script = """
 import logging, sys

@@ -108,6 +108,7 @@ def test_files_hold_every_level(study, tmp_path):
     assert "observed order" in text
 
 
+@pytest.mark.thorough
 def test_failures_and_levels_that_take_too_long_are_recorded(tmp_path):
     case = cantilever()
     (beam,) = case.scene.mechanism.flexible_links

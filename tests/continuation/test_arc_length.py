@@ -22,6 +22,7 @@ def extremum(function, low: float, high: float) -> float:
     ).x
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("space", ["plane-stress", "3d"])
 @pytest.mark.parametrize("modulus", [STIFF, SOFT])
 def test_toggle_goes_through_the_equilibria_of_the_closed_form_in_their_order(space, modulus):
@@ -102,6 +103,7 @@ def test_shallow_arch_follows_the_beam_through_both_limit_points():
     assert lower.frame.force == pytest.approx(fine.min(), rel=1e-2)
 
 
+@pytest.mark.thorough
 def test_deep_arch_reaches_the_limit_load_of_the_literature():
     simulation, push, drop = deep_arch()
     curve = simulation.follow(push, until=fm.Until(displacement=drop))

@@ -40,6 +40,7 @@ def test_first_two_bifurcations_of_a_column_are_those_of_euler():
     assert modes[:first] == [0] * first and set(modes[first + 1 : second]) == {1} and modes[-1] == 2
 
 
+@pytest.mark.thorough
 def test_buckled_column_follows_the_elastica_to_both_sides():
     case = column()
     curve = straight(case)
@@ -57,6 +58,7 @@ def test_buckled_column_follows_the_elastica_to_both_sides():
     assert np.abs(motion[0] + motion[1]).max() < THICKNESS  # the upper side is now the lower one
 
 
+@pytest.mark.thorough
 def test_second_branch_is_found_where_it_crosses():
     case = column()
     curve = case.simulation.follow(case.push, until=fm.Until(force=5.0 * EULER))
@@ -65,6 +67,7 @@ def test_second_branch_is_found_where_it_crosses():
     assert branch.frames[-1].unstable_modes == 1
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("size, most", [(THICKNESS, 3), (0.7 * THICKNESS, 10)])
 def test_bifurcation_is_located_by_few_equilibria_to_the_accuracy_of_the_eigenvalue(size, most, monkeypatch):
     # the finer mesh is not symmetric: it turns the bifurcation into two paths that pass each other
@@ -98,6 +101,7 @@ def test_what_is_no_bifurcation_of_the_curve_is_refused():
         case.simulation.branches(curve, event, until=1.0)
 
 
+@pytest.mark.thorough
 def test_two_columns_that_buckle_at_once_each_have_their_branches():
     mechanism = fm.Mechanism("two columns")
     base, head = mechanism.rigid("base", fixed=True), mechanism.rigid("head")

@@ -158,6 +158,7 @@ def test_ends_and_questions_that_do_not_fit_a_motor_are_refused():
     assert curve.soft_modes(count=1)[0].stiffness > 0.0
 
 
+@pytest.mark.thorough
 def test_clamps_that_turn_together_lead_the_bow_over_the_fold_of_the_beam_and_back():
     simulation, _, (left, right) = bow()
     clamps = fm.Drive("clamps", {left: -1.0, right: 1.0})

@@ -109,6 +109,7 @@ def check_quick(name: str, summary: dict, printed: str, folder: Path) -> None:
     assert "optimisation:" in printed
 
 
+@pytest.mark.thorough
 def test_quick_truss_reaches_its_targets_in_plane_stress(truss_alone):
     check_quick("truss", *truss_alone)
 
@@ -149,6 +150,7 @@ def test_an_interrupted_optimisation_goes_on(truss_alone):
     assert again["objective"]["final"] <= (1.0 + 1e-6) * alone["objective"]["final"]
 
 
+@pytest.mark.thorough
 def test_characterisation_finds_the_modulus_of_the_synthetic_data(tmp_path):
     printed = run("characterise", tmp_path, "--space", "plane-stress", "--size", "1.25")
     figures = json.loads((tmp_path / "summary.json").read_text())
@@ -165,6 +167,7 @@ def test_characterisation_in_space_holds_the_true_modulus_in_its_interval(tmp_pa
     assert figures["interval"][0] < figures["true"] < figures["interval"][1]
 
 
+@pytest.mark.thorough
 def test_switch_snaps_behind_its_spring_only(tmp_path):
     printed = run("snap", tmp_path, "--size", "2")
     direct, sprung = ([line for line in printed.splitlines() if line.startswith(f"{how}: limit point")]

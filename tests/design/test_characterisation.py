@@ -39,6 +39,7 @@ def experiment(displacements, thickness: float = 1.0, samples: int = 1) -> Exper
     return Experiment(simulation, push, FORCES, displacements)
 
 
+@pytest.mark.thorough
 @pytest.mark.parallel
 def test_modulus_of_exact_data_is_found_again():
     fit = fit_modulus([experiment(exact()), experiment(exact(2.0), 2.0)], GUESS)
@@ -68,6 +69,7 @@ def test_a_simulation_goes_on_with_the_fitted_material():
     assert fitted.load_displacement(push, forces=FORCES).displacements == pytest.approx(exact(), rel=1e-6)
 
 
+@pytest.mark.thorough
 def test_all_links_of_the_material_change_together():
     fit = fit_modulus([experiment(exact(samples=2), samples=2)], GUESS)
     assert fit.youngs_modulus == pytest.approx(1500.0, rel=1e-6)
@@ -85,6 +87,7 @@ def test_interval_covers_the_truth_as_often_as_it_says():
     assert 16 <= covered  # P(fewer of 20 at 95 %) = 0.3 %
 
 
+@pytest.mark.thorough
 def test_interval_shrinks_with_the_noise():
     pattern = np.array([1.0, -1.0, 1.0, -1.0])
     widths = []

@@ -54,6 +54,7 @@ def soft_truss() -> Case:
     return Case(fm.Scene(mechanism), [fm.SplineDesign(diagonal, 3, thickness=(1.5, 6.0))], [fm.Target(push, 0.4, 1.8)])
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("differs", "case", "options"),
     [
@@ -77,6 +78,7 @@ def test_checkpoints_of_another_problem_are_refused(differs, case, options, tmp_
     assert file.read_bytes() == before
 
 
+@pytest.mark.thorough
 def test_checkpoints_of_other_motor_positions_are_refused(tmp_path):
     file = tmp_path / "checkpoint.json"
     strained(1.0).problem().optimise(optimiser=fm.LevenbergMarquardt(iterations=1), checkpoint=file)

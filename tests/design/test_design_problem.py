@@ -123,6 +123,7 @@ def test_weights_shift_the_compromise():
     assert result.targets[0].reached == pytest.approx(2.8, rel=1e-3)
 
 
+@pytest.mark.thorough
 def test_the_optimum_found_from_a_coarser_one_is_the_same():
     exact, regulariser = fm.LevenbergMarquardt(tolerance=1e-10), fm.ShapeBounds() + 1e-2 * fm.StayClose()
     case = truss((0.4, 2.2))
@@ -149,6 +150,7 @@ def test_a_bfgs_run_reaches_the_targets_too():
     assert result.worst_error < 0.01
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("case", [bow(20.0, 60.0), strained(1.0, 3.0)], ids=["bow", "strained"])
 def test_links_that_carry_their_force_themselves_or_are_strained_by_motors_can_be_designed(case):
     drawn = case.problem()

@@ -12,6 +12,7 @@ from ..equilibrium.arch import RISE, SPAN, arch
 from ..oracles.dense import taylor_rates
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("gap", [1e-2, 1e-4])
 def test_displacement_sensitivities_hold_close_to_a_limit_point(gap):
     simulation, push = arch()

@@ -52,6 +52,7 @@ def test_penalty_sums_its_barrier_over_the_cells():
     assert value == pytest.approx(barrier.value(ratios).sum(), rel=1e-8)
 
 
+@pytest.mark.thorough
 @pytest.mark.parallel
 @pytest.mark.parametrize("comm", [MPI.COMM_SELF, MPI.COMM_WORLD], ids=["alone", "together"])
 @pytest.mark.parametrize(

@@ -38,6 +38,7 @@ class Squashed:
         model.reshape(self.design)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("space", ["plane-stress", "3d"])
 @pytest.mark.parametrize("ratio", [60.0, 100.0])
 def test_derivatives_by_the_design_hold_at_slivers(space, ratio):

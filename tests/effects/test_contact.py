@@ -17,6 +17,7 @@ from .touching import block, cantilever, finger
 PULLS = [0.05, 0.1, 0.2, 0.4]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
 def test_a_cantilever_rests_on_a_plane_first_at_its_tip_and_then_farther_in(space):
     # P at a = L / 2; R on the tip, or where the link touches with horizontal tangent, c = a + 6 EI gap / (P a²)
@@ -48,6 +49,7 @@ def test_a_block_sinks_in_by_force_over_area_and_stiffness(space):
         assert gap == pytest.approx(-force / (50.0 * stiffness), rel=1e-3 if space == "plane-stress" else 0.01)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
 def test_a_finger_closes_on_a_cylinder_and_penetrates_the_less_the_stiffer_it_is(space):
     depths = []
@@ -112,6 +114,7 @@ def _travel(case, frame) -> float:
     return case.simulation.model.travel(case.force, frame.state)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
 def test_a_rigid_link_rests_on_its_points(space):
     # a leaf that carries next to nothing holds a table, drawn with its feet a little below the plane

@@ -11,6 +11,7 @@ from fenicsmech.effects import Gravity, LinkFields
 DENSITY, G = 1e-6, 9810.0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("space", ["plane-stress", "3d"])
 def test_weight_and_energy_are_integrated_exactly_in_curved_cells(space):
     rig = fm.Mechanism("bow")

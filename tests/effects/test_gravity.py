@@ -27,6 +27,7 @@ def cantilever(space: str, effects, *, size: float = 2.0) -> tuple[fm.Simulation
     return fm.Simulation(fm.Scene(rig, effects=effects(block)), space=space, size=size), push
 
 
+@pytest.mark.thorough
 @pytest.mark.parallel
 @pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
 def test_a_cantilever_sags_as_a_beam_does_under_its_weight_and_that_of_its_end(space):

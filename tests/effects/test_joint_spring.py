@@ -65,6 +65,7 @@ def on_bodies(function, potential, poses):
     return of, poses[list(potential.bodies)].ravel()
 
 
+@pytest.mark.thorough
 @each_dim
 @each_joint
 @pytest.mark.parametrize("seed", range(3))
@@ -227,6 +228,7 @@ def sprung_truss(*effects_of, **design):
     return replace(case, scene=replace(case.scene, effects=[make(hinge) for make in effects_of]))
 
 
+@pytest.mark.thorough
 def test_design_gradient_with_a_spring_agrees_with_central_differences():
     case = sprung_truss(lambda hinge: JointSpring(hinge, 200.0, rest=0.02))
     whole, bench = objective(case, StayClose())

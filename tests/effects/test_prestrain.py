@@ -60,6 +60,7 @@ def test_a_free_bar_takes_its_strain_free_length(space, stretch):
     assert frame.stable
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("stretch", [0.7, 1.4])
 @pytest.mark.parametrize("space", ["plane-strain", "3d"])
 def test_a_free_bar_of_rubber_does_so_without_pressure(space, stretch):

@@ -59,6 +59,7 @@ def test_a_bare_scene_has_three_forms_and_one_term(space, monkeypatch):
     assert bare.body_potentials == 0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("space", SPACES)
 def test_each_effect_adds_only_its_own(space, monkeypatch):
     bare = counts(monkeypatch, space)

@@ -62,6 +62,7 @@ def test_a_single_cell_turned_inside_out_leaves_no_energy(model, law):
     assert np.isnan(body.energy())
 
 
+@pytest.mark.thorough
 @each_case
 @pytest.mark.parametrize("order", [1, 2])
 def test_units_do_not_matter(model, law, order):

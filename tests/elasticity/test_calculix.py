@@ -41,6 +41,7 @@ def same_mesh(body):
     return calculix.Mesh(nodes(body.u), cells[:, list(calculix.VTK_FROM_BASIX)], np.ones(count, dtype=int))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("quadrature", "tolerance"), [(CALCULIX, 1e-6), (Quadrature.for_order(2, 3), 1e-3)], ids=["as CalculiX", "default"]
 )

@@ -17,6 +17,7 @@ EXPECTED = {1: (2.0, 1.0), 2: (3.0, 2.0)}
 COUNTS = {(2, 1): (8, 16), (2, 2): (4, 8), (3, 1): (5, 10), (3, 2): (3, 6)}
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("order", EXPECTED)
 @pytest.mark.parametrize("model", [SPATIAL, PLANE_STRAIN, PLANE_STRESS], ids=name)
 def test_errors_fall_as_expected(model, order):

@@ -12,6 +12,7 @@ def test_panel_between_walls():
     assert displacement == pytest.approx(cook.BETWEEN_WALLS, rel=3e-3)
 
 
+@pytest.mark.thorough
 def test_solid_panel_with_free_faces():
     displacement = cook.upward_displacement(SPATIAL, cook.CORNER, count=16, order=2)
     assert displacement == pytest.approx(cook.FREE_FACES, rel=3e-3)

@@ -53,6 +53,7 @@ def test_values_computed_by_hand(law):
     assert in_plane == pytest.approx(HAND_COMPUTED[law][:2], rel=1e-14)
 
 
+@pytest.mark.thorough
 @each_case
 @pytest.mark.parametrize("size", [1e-12, 1e-9, 1e-6, 1e-3, 0.1, 0.8])
 def test_no_digits_are_lost_at_any_strain(model, law, size):

@@ -39,6 +39,7 @@ def error(poisson: float, **how) -> float:
     return abs(upward_displacement(poisson, **how) / reference - 1.0)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("count", [4, 8])
 def test_displacements_alone_lose_accuracy_with_every_nine_of_poissons_ratio_and_with_a_pressure_they_do_not(count):
     ratios = (0.49, 0.499)

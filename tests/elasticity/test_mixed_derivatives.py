@@ -23,6 +23,7 @@ def loaded(model, law, *, order: int = 2):
     return body, body.values(), random.uniform(-0.03, 0.03, len(body.values()))
 
 
+@pytest.mark.thorough
 @each_law
 @pytest.mark.parametrize("model", [PLANE_STRAIN, SPATIAL], ids=name)
 def test_residual_is_the_derivative_of_the_energy(model, law):
@@ -32,6 +33,7 @@ def test_residual_is_the_derivative_of_the_energy(model, law):
     assert rates.with_gradient.min() > 1.9
 
 
+@pytest.mark.thorough
 @each_law
 @pytest.mark.parametrize(("model", "order"), [(PLANE_STRAIN, 2), (PLANE_STRAIN, 3), (SPATIAL, 2)])
 def test_tangent_is_the_derivative_of_the_residual_and_symmetric(model, order, law):

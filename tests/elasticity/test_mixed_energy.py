@@ -47,6 +47,7 @@ def at_stationary_pressure(model, law: type[Law], H: np.ndarray, young: float, p
     return pointwise(build, arguments(H, young, poisson))
 
 
+@pytest.mark.thorough
 @each_bulky_case
 @pytest.mark.parametrize("size", [1e-9, 1e-4, 0.1, 0.8])
 @pytest.mark.parametrize("poisson", [0.3, 0.4999])

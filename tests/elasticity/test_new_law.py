@@ -107,6 +107,7 @@ def bar(law: fm.Law, space: str) -> tuple[fm.Simulation, Force]:
     return fm.Simulation(fm.Scene(mechanism), space=space, size=4.0), force
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("space", ["plane-strain", "3d"])
 def test_a_new_law_goes_through_simulations(space):
     # clamps hold the ends: softer than a free bar under the ends, stiffer by their hold, by at most some per cent

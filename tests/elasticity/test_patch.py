@@ -30,6 +30,7 @@ def test_homogeneous_strain_takes_no_force_inside(model, law, order):
     assert np.abs(force[inside]).max() < 1e-12 * np.abs(force).max()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("order", [1, 2])
 @each_case
 def test_homogeneous_strain_is_found_from_its_boundary_values(model, law, order):

@@ -48,6 +48,7 @@ def test_rigid_motion_costs_no_energy_and_takes_no_force(body_of, model, law, or
         assert np.abs(forces(body)).max() < 1e-12 * young
 
 
+@pytest.mark.thorough
 @each_case
 def test_energy_and_forces_turn_with_the_deformed_body(body_of, model, law):
     body = body_of(model, law)

@@ -26,6 +26,7 @@ def test_four_bar_snaps_as_its_follower_bends_and_rests_in_the_mirror_image():
     assert rest.strain_energy == pytest.approx(0.0, abs=1e-9) and rest.stable
 
 
+@pytest.mark.thorough
 def test_path_until_the_force_is_gone_passes_the_middle_and_the_next_one_rests():
     case = four_bar()
     middle = case.simulation.follow(case.push, until=fm.Until(displacement=1.2 * RISE))

@@ -13,6 +13,7 @@ from .finger import finger
 BEFORE = slice(0, 10)  # displacements up to the limit point and a little farther
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("space", ["plane-stress", "plane-strain", "3d"])
 def test_displacement_control_takes_the_forces_that_load_control_was_given(space):
     simulation, push = finger(space)
@@ -50,6 +51,7 @@ def test_snap_through_follows_the_beam_beyond_the_limit_point_and_back_to_stabil
     assert all(frame.stable_under_control for frame in curve.frames)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("fractions", [[0.95], [0.5, 0.8, 0.95]])
 def test_load_below_the_limit_stays_on_its_side_and_beyond_it_snaps_to_the_other(fractions):
     simulation, push = arch()

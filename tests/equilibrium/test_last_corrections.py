@@ -16,6 +16,7 @@ LOADS = {"plane-stress": [0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0], "3d": [0.5, 1
 ALWAYS_ANEW = fm.PrimalDualNewton(reuse_factor=0.0)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("space", LOADS)
 def test_fewer_factors_lead_to_the_same_curve(space):
     curves = []
@@ -30,6 +31,7 @@ def test_fewer_factors_lead_to_the_same_curve(space):
     assert counts[0] <= 0.9 * counts[1]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("space", LOADS)
 def test_rates_at_the_equilibria_are_as_good_as_those_of_a_new_factor(space):
     simulation, push = finger(space)

@@ -29,6 +29,7 @@ def test_number_of_correct_digits_nearly_doubles_in_each_of_the_last_iterations(
     assert np.median(growth) >= 1.7
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("space", SPACES)
 def test_residual_at_the_end_is_the_first_below_the_tolerance(space):
     simulation, push = finger(space, solver=fm.PrimalDualNewton(tolerance=1e-6))
@@ -51,6 +52,7 @@ def test_predictor_changes_the_cost_but_not_the_curve(predictor):
     assert sum(f.iterations for f in curve.frames) >= sum(f.iterations for f in reference.frames)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("space", SPACES[:2])
 def test_failure_carries_the_frames_before_it_and_names_force_configuration_value_and_remedy(space):
     simulation, push = finger(space)
@@ -77,6 +79,7 @@ def test_failure_at_the_first_sample_carries_the_last_equilibrium_on_the_way():
     assert 0.0 < caught.value.last.displacement < OUT_OF_REACH
 
 
+@pytest.mark.thorough
 def test_force_that_nothing_resists_is_refused():
     mechanism = fm.Mechanism("sled")
     base, sled = mechanism.rigid("base", fixed=True), mechanism.rigid("sled")

@@ -25,6 +25,7 @@ def test_column_is_stable_below_the_euler_load_and_has_one_unstable_mode_above_i
     assert not above.stable_under_control
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("size", [0.7, 1.0])
 def test_straight_column_in_space_stays_straight_beyond_its_euler_load_and_says_it_is_unstable(size):
     # meshes without symmetry push it aside by next to nothing, from which Newton's method must come back

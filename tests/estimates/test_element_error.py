@@ -87,6 +87,7 @@ def test_effectivity_of_the_displacement_of_an_output_is_between_a_half_and_two(
     assert 0.5 < estimate / error < 2.0
 
 
+@pytest.mark.thorough
 def test_curve_file_names_what_the_errors_are_of(tmp_path):
     scene, push, load = cantilever()
     simulation = fm.Simulation(scene, space="plane-stress", size=3.0)

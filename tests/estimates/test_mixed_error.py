@@ -64,6 +64,7 @@ def test_effectivity_is_between_a_half_and_two(name, order, monkeypatch):
     assert 0.5 < estimate / error < 2.0
 
 
+@pytest.mark.thorough
 def test_effectivity_in_half_the_depth_is_between_a_half_and_two():
     simulation, curve = simulated("thick cantilever", 5.0, order=2, space="3d-symmetric")
     estimate = curve.error_estimates()[-1]

@@ -70,6 +70,7 @@ def test_the_solid_has_the_volume_and_the_extent_of_a_fine_mesh(name, dim, tmp_p
     assert high - low == pytest.approx(extent, rel=3e-3)
 
 
+@pytest.mark.thorough
 def test_the_solid_of_a_coarse_mesh_is_that_of_a_fine_one(tmp_path):
     volumes = []
     for size in (2.5, 0.4):

@@ -20,6 +20,7 @@ def pin(*at, radius=1.0, name="hinge", axis=(0.0, 0.0, 1.0)):
     return InterfaceSite(at, Disc(radius), axis=axis, name=name)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize(
     "shape, at",

@@ -7,6 +7,7 @@ from ..oracles import klann as patent
 from .planar_machines import klann
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("dim", [2, 3])
 def test_every_pivot_and_the_foot_follow_the_closed_form_over_a_turn(dim):
     machine = klann()

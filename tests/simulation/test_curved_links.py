@@ -48,6 +48,7 @@ def move(model: MechanismModel) -> None:
     model.elastic.u.x.array[:] = turned(model.elastic.drawn_nodes).ravel()
 
 
+@pytest.mark.thorough
 @each_case
 def test_rigid_motion_stores_no_energy_and_takes_no_force(space, order):
     model = bow(space, order)[0].model

@@ -16,6 +16,7 @@ TIP = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "space, poisson, rigid_tip",
     [

@@ -16,6 +16,7 @@ def hint(explanation, what: str):
     return next((hint for hint in explanation.left_out if hint.what == what), None)
 
 
+@pytest.mark.thorough
 @pytest.mark.parallel
 @pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
 def test_hint_on_weight_is_what_gravity_does(space):

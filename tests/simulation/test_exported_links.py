@@ -40,6 +40,7 @@ def saved(mesh, path):
     return fm.gmsh_mesh(path, depth=DEPTH)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("holes", [(), (PinHole(CURVED[0], RADIUS), PinHole(CURVED[-1], RADIUS))])
 def test_a_strip_written_and_read_bends_as_it_did(holes, tmp_path):
     pins = CURVED[0], CURVED[-1]

@@ -15,6 +15,7 @@ STIFFNESS = 50.0
 PIN = PinFriction(0.2, 3.0)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("space", "frame"), [("plane-stress", UPRIGHT), ("3d", UPRIGHT), ("3d", TILTED)])
 @pytest.mark.parametrize("swapped", [False, True])
 def test_band_of_a_lever_on_a_torsion_spring(space, frame, swapped):

@@ -44,11 +44,13 @@ def simulate(**fidelity) -> tuple[fm.Simulation, fm.Curve]:
     return simulation, simulation.load_displacement(push, forces=[0.05])
 
 
+@pytest.mark.thorough
 def test_simulations_give_their_memory_back():
     # what one holds: 20 MB on one process, 10 MB on each of two; of a curve, 3 MB; of a design problem, 20 MB
     assert growth(lambda: simulate(space="3d", size=3.0), before=2, times=3) < 4.0
 
 
+@pytest.mark.thorough
 def test_curves_of_one_simulation_give_their_memory_back():
     simulation, curve = simulate(space="3d", size=3.0)
 
@@ -58,6 +60,7 @@ def test_curves_of_one_simulation_give_their_memory_back():
     assert growth(run, before=2, times=4) < 0.8
 
 
+@pytest.mark.thorough
 def test_designs_give_their_memory_back():
     case = truss((0.1, 6.0), (0.4, 9.0))
 

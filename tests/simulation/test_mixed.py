@@ -96,6 +96,7 @@ def test_limit_of_incompressibility_is_approached_without_trouble(space):
     assert max(iterations) <= min(iterations) + 1
 
 
+@pytest.mark.thorough
 def test_wherever_the_limit_is_set_compressible_links_bend_alike():
     curves = []
     for formulation in (fm.DisplacementFormulation(), fm.MixedFormulation(above=0.0), fm.MixedFormulation(above=0.36)):

@@ -69,6 +69,7 @@ def test_the_dyad_bends_again_once_the_coupler_is_in_line_with_the_rocker(six_ba
     assert frame.stable and not frame.snapped_through
 
 
+@pytest.mark.thorough
 def test_energy_is_the_work_of_the_motor(six_bar):
     """dE/dφ = M, by central differences along the path that was found."""
     step, angle = 1e-3, -0.34

@@ -18,6 +18,7 @@ def traced(name: str, space: str, **options) -> tuple[fm.Simulation, fm.Curve]:
     return simulation, simulation.load_displacement(force, forces=MECHANISMS[name])
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric"])
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_displacements_move_by_a_small_fraction_of_their_estimated_error_when_newton_goes_on(name, space):

@@ -23,6 +23,7 @@ def deflection(region, thickness, space, force):
     return simulation.load_displacement(push, forces=[force]).displacements[0]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("space", ["plane-stress", "3d"])
 @pytest.mark.parametrize("thickness", [2.5, 1.0])
 def test_a_cantilever_with_an_eye_is_one_with_a_rigid_end(thickness, space):

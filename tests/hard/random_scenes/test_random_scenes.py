@@ -123,6 +123,7 @@ def test_loads_and_springs_balance_however_stiff_the_links(sprung):
     assert check(potential, replace(frame, force=1.01 * frame.force), 0.0).idle_work > 10.0 * BALANCED
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", [17, 59, 538])
 def test_joints_are_not_opened_for_a_displacement_out_of_reach(seed):
     # reactions grow out of all bounds there, and with them what a residual of a billionth of them may hide
@@ -131,6 +132,7 @@ def test_joints_are_not_opened_for_a_displacement_out_of_reach(seed):
     assert verdict.outcome.startswith("true")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", [1097, pytest.param(3003, marks=pytest.mark.slow)])
 def test_a_limit_point_at_a_hundredth_of_the_load_is_told_where_it_is(seed):
     # of a led force, and of a constant one
