@@ -15,11 +15,10 @@ import pytest
 
 # Workers of pytest-xdist are given what MPI_Init put into the environment of the process that started them; neither
 # their own MPI_Init nor an mpirun under them gets along with it.
+SET_BY_MPI = ("PMIX_", "ORTE_", "OMPI_APP_", "OMPI_MCA_orte_", "OMPI_MCA_ess", "OMPI_MCA_pmix")
 if "PYTEST_XDIST_WORKER" in os.environ:
-    for name in [name for name in os.environ if name.startswith(("PMIX_", "ORTE_", "OMPI_APP_", "OMPI_MCA_orte_"))]:
+    for name in [name for name in os.environ if name.startswith(SET_BY_MPI)]:
         del os.environ[name]
-    for name in ("OMPI_MCA_ess", "OMPI_MCA_pmix"):
-        os.environ.pop(name, None)
 
 from mpi4py import MPI  # noqa: E402
 
