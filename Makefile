@@ -6,7 +6,7 @@ PYTHON := .venv/bin/python3
 RANKS := 2
 SELECT := not slow
 MECHANISMS := truss claw klann
-DEMOS := $(MECHANISMS) characterise
+DEMOS := $(MECHANISMS) characterise constant_force switch gripper
 
 # Debian's packages and nothing else: not the user's ~/.local, not a PYTHONPATH meant for another Python.
 export PYTHONNOUSERSITE := 1
@@ -36,7 +36,7 @@ help: ## list the targets
 demo: install ## install what is missing and run the truss finger; pictures and summary.json in results/truss/
 	$(PYTHON) demos/truss.py
 
-test: lint test-serial test-parallel demos-quick ## style, types, layers; fast tests on one process, on two ranks; quick demos
+test: lint test-serial test-parallel ## style, types, layers; fast tests, quick demos among them, on one process; on two ranks
 
 # What moves by itself, as Debian's newest, is no part of it.
 check: test-thorough test-slow hard-cases random-scenes-check docs test-debian13 ## everything that `make test` leaves out
@@ -60,10 +60,10 @@ lint: install-test ## style, types and layering: seconds
 	$(PYTHON) -m mypy
 	$(PYTHON) -m pytest -q tests/test_layering.py
 
-# Two processes side by side; the tests of one file stay together. What is marked `parallel` runs on ranks instead, and
-# on one process in `make test-thorough`.
+# Two processes side by side, half of the tests each; the one that is done first takes over tests of the other. What is
+# marked `parallel` runs on ranks instead, and on one process in `make test-thorough`.
 PYTEST = OPENBLAS_NUM_THREADS=1 $(PYTHON) -m pytest -p no:cacheprovider --durations=5 --durations-min=5
-SERIAL = $(PYTEST) -n 2 --dist loadfile --ignore tests/test_layering.py
+SERIAL = $(PYTEST) -n 2 --dist worksteal --ignore tests/test_layering.py
 TESTS := tests
 
 test-serial: install-test ## the fast tests on one process each
@@ -99,7 +99,7 @@ random-scenes-check: install-test ## the first hundred of them, afresh
 # What can differ between versions of dolfinx, PETSc, gmsh and Python; FULL=yes runs everything that is fast.
 FULL :=
 VERSION_TESTS := tests/elasticity tests/joints tests/multibody tests/mechanism tests/meshing \
-    tests/design/test_sensitivity.py tests/design/test_weights.py \
+    tests/quantities/test_sensitivity.py tests/design/test_weights.py \
     $(patsubst %,tests/test_%.py,collective compat kernel_cache uncaught_errors) \
     tests/effects/test_contact_derivatives.py \
     $(patsubst %,tests/equilibrium/test_%.py,blocks factor lagrangian mixed_lagrangian newton two_level) \
@@ -131,7 +131,7 @@ hard-cases: install-test ## every case of tests/hard/, slow ones too, as a table
 	$(PYTHON) -m tests.hard
 
 # The tables that pages of the documentation include; `make bench` measures one, `make tables` all (hours).
-BENCHMARKS := verification solvers work_precision accuracy_control large stopping performance effects optimisers
+BENCHMARKS := verification solvers work_precision accuracy_control large stopping performance effects optimisers constrained closeness handles
 BENCH = OPENBLAS_NUM_THREADS=1 $(PYTHON) -m benchmarks
 
 bench: install ## seconds per load step of every demo's initial design: 3D, on ranks, plane stress

@@ -11,6 +11,8 @@
 ``performance``       each choice in the solver, one at a time
 ``effects``           the time that each effect takes
 ``optimisers``        Levenberg–Marquardt beside BFGS
+``constrained``       SQP beside optimisers of scipy and NLopt, under inequalities
+``closeness``         targets missed where designs stay close to the drawing; designs given by parameters alone
 ``frames``            seconds per load step of the demos' mechanisms
 ``verification``      the tests that compare with exact solutions and other programs, as one table
 ``walk``              two calls whose files are counted

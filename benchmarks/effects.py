@@ -48,7 +48,7 @@ def joint_at(mechanism, place):
 
 
 EFFECTS = {
-    "gravity": lambda m: fm.Gravity((0, -9810), {fm.ONYX: 1.2e-9}),
+    "gravity": lambda m: fm.Gravity((0, -9810)),
     "joint spring": lambda m: fm.JointSpring(joint_at(m, WRIST), 50.0),
     "joint compliance": lambda m: fm.JointCompliance(joint_at(m, HIP), 1e-3),
     "contact": lambda m: fm.Contact(link(m, "guide"), fm.Cylinder((45, 62), 20.0)),

@@ -4,7 +4,7 @@ meshes of the claw.
     OPENBLAS_NUM_THREADS=1 python3 -m benchmarks.large [--sizes MM …] [--factor-up-to UNKNOWNS] [--compare]
     mpirun -n 2 python3 -m benchmarks.large
 
-One row per mesh, of a whole curve with its verdicts: conjugate gradients in the last solve, Newton iterations, seconds
+One row per mesh, of a whole curve with its stability: conjugate gradients in the last solve, Newton iterations, seconds
 of the processor for each of them (assembly and all else included) and gigabytes with either solver, and the largest
 relative difference between the two curves; then the exponents of time by unknowns. With --compare another table, at the
 last equilibrium: one system on two levels beside algebraic multigrid (PETSc's GAMG, hypre's BoomerAMG) on the finite
@@ -98,7 +98,7 @@ class Run:
     @property
     def system(self):
         """The equations at the last equilibrium, and their KKT matrix."""
-        system, state = self.simulation.newton(self.force).system, self.curve.frames[-1].state
+        system, state = self.simulation.solver(self.force).system, self.curve.frames[-1].state
         control = LoadControl(FORCES[-1])
         system.load(state)
         system.linearise(state, control, system.residual(state, control))

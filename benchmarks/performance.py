@@ -60,8 +60,7 @@ def timed(action, repeats=5):
 
 def factors(sim, curve):
     """Seconds to factor the KKT matrix of the last frame: symmetric or not, with and without the analysis."""
-    newton = sim.newton(curve.part)
-    system, frame = newton.system, curve.frames[-1]
+    system, frame = sim.solver(curve.part).system, curve.frames[-1]
     control = LoadControl(frame.force)
     system.load(frame.state)
     system.linearise(frame.state, control, system.residual(frame.state, control))

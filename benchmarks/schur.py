@@ -4,8 +4,8 @@ complement on bodies, joints and forces.
     KKT = [[K, Bᵀ], [B, C]],     S = C − B K⁻¹ Bᵀ,     S y = b_y − B K⁻¹ b_x,     K x = b_x − Bᵀ y
 
 K is solved with by conjugate gradients, preconditioned by one cycle that knows the rigid motions as near-null space.
-S is formed column by column: it holds what is left of stiff links when they are free to move with their pins, four to
-six orders of magnitude less than either term.
+S is formed column by column: it holds what is left of stiff links when they are free to move with their pins, a small
+difference of two large terms.
 """
 
 from __future__ import annotations

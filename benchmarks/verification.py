@@ -85,6 +85,16 @@ CASES = (
         "simulation/test_symmetric.py",
     ),
     Case("(mm, MPa) against (m, Pa)", "1e-8", "simulation/test_units.py"),
+    Case(
+        "error estimates of displacements and forces against finer meshes, in the plane",
+        "factor 2",
+        "estimates/test_element_error.py::test_effectivity",
+    ),
+    Case(
+        "estimate of what space adds to plane stress against space",
+        "factor 2",
+        "estimates/test_plane_stress_error.py::test_estimate_is_near_what_space_adds",
+    ),
     Case("link exported as STEP, imported and simulated again", "0.5 %", "simulation/test_exported_links.py"),
 )
 

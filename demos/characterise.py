@@ -1,10 +1,10 @@
-"""Characterisation: Young's modulus of Onyx from bending tests of a 1 mm and a 2 mm thick sample.
+"""Characterisation: Young's modulus of Onyx from bending tests of a 1 mm and a 2 mm thick specimen.
 
-Reads forces and displacements of each sample from a CSV file and fits one modulus to both, with its 95 % confidence
-interval. One end of a sample is clamped, a grip on the other is pushed across it. The data that come with the demo are
-synthetic (see demos/data/README.md).
+Reads forces and displacements of each specimen from a CSV file and fits one modulus to both, with its 95 % confidence
+interval. One end of a specimen is clamped, a grip on the other is pushed across it. The data that come with the demo
+are synthetic (see demos/data/README.md).
 
-    python3 demos/characterise.py [--data DIR] [--space SPACE] [--order 1|2] [--size MM] [--quick] [--out DIR]
+    python3 demos/characterise.py [--data DIR] [--space SPACE] [--size MM] [--quick] [--out DIR]
 """
 
 import argparse
@@ -25,14 +25,14 @@ def onyx(E):
 
 
 def bending_test(thickness, material):
-    """The scene for a sample ``thickness`` mm thick, and the force on its grip."""
-    rig = fm.Mechanism(f"{thickness:g} mm sample")
+    """The scene for a specimen ``thickness`` mm thick, and the force on its grip."""
+    rig = fm.Mechanism(f"{thickness:g} mm specimen")
     bench, grip = rig.rigid("bench", fixed=True), rig.rigid("grip")
     shape = fm.strip([(-CLAMP, 0), (LENGTH + CLAMP, 0)], thickness=thickness, depth=DEPTH)
-    sample = rig.flexible("sample", shape, material)
+    specimen = rig.flexible("specimen", shape, material)
     clamp = fm.Rectangle(CLAMP, 1.5 * thickness)
-    rig.weld(bench, sample, at=(-0.5 * CLAMP, 0), region=clamp)
-    rig.weld(sample, grip, at=(LENGTH + 0.5 * CLAMP, 0), region=clamp)
+    rig.weld(bench, specimen, at=(-0.5 * CLAMP, 0), region=clamp)
+    rig.weld(specimen, grip, at=(LENGTH + 0.5 * CLAMP, 0), region=clamp)
     return fm.Scene(rig), rig.force(on=grip, at=(LENGTH, 0), direction=(0, 1), name="push on grip")
 
 
@@ -41,9 +41,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, default=Path(__file__).parent / "data", metavar="DIR")
     parser.add_argument("--space", choices=list(fm.SPACES), default="3d")
-    parser.add_argument("--order", type=int, choices=(1, 2), default=2, help="degree of the displacement field")
     parser.add_argument("--size", type=float, default=1.0, metavar="MM", help="element size (default 1 mm)")
-    parser.add_argument("--quick", action="store_true", help="coarse: element size 1.25 mm")
+    parser.add_argument("--quick", dest="size", action="store_const", const=1.25, help="elements of 1.25 mm")
     parser.add_argument("--out", type=Path, default=Path("results/characterise"), metavar="DIR")
     options = parser.parse_args()
 
@@ -51,8 +50,7 @@ def main():
     for thickness, name in FILES.items():
         read = fm.read_csv(options.data / name)
         scene, push = bending_test(thickness, onyx(GUESS))
-        size = 1.25 if options.quick else options.size
-        sim = fm.Simulation(scene, space=options.space, order=options.order, size=size)
+        sim = fm.Simulation(scene, space=options.space, size=options.size)
         experiments.append(fm.Experiment(sim, push, read["force [N]"], read["displacement [mm]"]))
     fit = fm.fit_modulus(experiments, onyx(GUESS))
 

@@ -2,47 +2,34 @@
 
 The linkage is that of US patent 6,260,862. Its foot runs along a nearly straight ground stroke while the crank turns;
 the links are shaped until 5 N lift the foot by 10 mm in three configurations of the stroke. Shapes of the links and
-targets are this project's own; tables set the time of a frame of this drawn design beside that of the article's
-optimised one.
+targets are this project's own.
 
-    python3 demos/klann.py [--space SPACE] [--order 1|2] [--size MM] [--quick] [--simulate-only] [--out DIR]
-    mpirun -n 2 python3 demos/klann.py
+    python3 demos/klann.py [--space SPACE] [--quick] [--simulate-only] [--resume] [--out DIR]
 """
 
 import argparse
-from math import radians
+from math import hypot, radians
 from pathlib import Path
-
-import numpy as np
 
 import fenicsmech as fm
 
 SIZE, QUICK = 1.71, 2.2  # mm, elements
 FORCES = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]  # N
-SCALE = 150.0 / 19.2  # mm per unit of the patent: 150 mm from foot to hip
-THICKNESS, DEPTH, PIN = 3.0, 8.5, 3.0
-SEGMENTS = {"crank": 2, "connecting rod": 2, "first rocker": 3, "second rocker": 3}
-
-
-def pivot(x, y):
-    """A pivot of the patent, in mm; the foot is the origin."""
-    return (SCALE * x, SCALE * y)
-
-
-SHAFT, FIRST_AXLE, SECOND_AXLE = pivot(17.607, 11.807), pivot(17.818, 16.076), pivot(12.101, 10.186)
-CRANK_PIN, ELBOW, KNEE, HIP = pivot(14.631, 11.807), pivot(9.125, 11.807), pivot(3.024, 13.099), pivot(11.119, 19.200)
-FOOT = pivot(0.0, 0.0)
+THICKNESS, DEPTH, PIN, FOOT = 3.0, 8.5, 3.0, (0.0, 0.0)  # mm
+PATENT = ((17.607, 11.807), (17.818, 16.076), (12.101, 10.186), (14.631, 11.807), (9.125, 11.807), (3.024, 13.099))
+AXES = [(150.0 / 19.2 * x, 150.0 / 19.2 * y) for x, y in (*PATENT, (11.119, 19.200))]  # mm: 150 from foot to hip
+SHAFT, FIRST_AXLE, SECOND_AXLE, CRANK_PIN, ELBOW, KNEE, HIP = AXES
 
 
 def bowed(start, end, rise):
-    """A strip of Onyx from ``start`` to ``end`` that bows by ``rise`` to the left."""
-    start, end = np.array(start), np.array(end)
-    across = np.array([start[1] - end[1], end[0] - start[0]]) / np.hypot(*(end - start))
-    return fm.strip([start, (start + end) / 2 + rise * across, end], thickness=THICKNESS, depth=DEPTH)
+    """A strip from ``start`` to ``end`` that bows by ``rise`` to the left."""
+    (x, y), (dx, dy) = start, (end[0] - start[0], end[1] - start[1])
+    middle = x + dx / 2 - rise * dy / hypot(dx, dy), y + dy / 2 + rise * dx / hypot(dx, dy)
+    return fm.strip([start, middle, end], thickness=THICKNESS, depth=DEPTH)
 
 
 def describe():
-    """The scene, the force of an obstacle on the foot, and the configurations of the stroke."""
+    """The scene, the force of an obstacle on the foot, and the configurations of the stroke; drawn is 180°."""
     leg = fm.Mechanism("Klann leg")
     base, foot = leg.rigid("base", fixed=True), leg.rigid("leg")
     crank = leg.flexible("crank", bowed(SHAFT, CRANK_PIN, 3.0), fm.ONYX)
@@ -50,26 +37,19 @@ def describe():
     first = leg.flexible("first rocker", bowed(FIRST_AXLE, HIP, 10.0), fm.ONYX)
     second = leg.flexible("second rocker", bowed(SECOND_AXLE, ELBOW, 5.0), fm.ONYX)
     shaft = leg.revolute(base, crank, at=SHAFT, interface_radius=PIN)
-    leg.revolute(crank, rod, at=CRANK_PIN, interface_radius=PIN)
-    leg.revolute(base, second, at=SECOND_AXLE, interface_radius=PIN)
-    leg.revolute(second, rod, at=ELBOW, interface_radius=PIN)
-    leg.revolute(base, first, at=FIRST_AXLE, interface_radius=PIN)
-    leg.revolute(first, foot, at=HIP, interface_radius=PIN)
-    leg.revolute(rod, foot, at=KNEE, interface_radius=PIN)
+    pins = ((crank, rod, CRANK_PIN), (base, second, SECOND_AXLE), (second, rod, ELBOW), (base, first, FIRST_AXLE))
+    for a, b, at in (*pins, (first, foot, HIP), (rod, foot, KNEE)):
+        leg.revolute(a, b, at=at, interface_radius=PIN)
     motor = leg.motor(shaft, name="crank motor")
     lift = leg.force(on=foot, at=FOOT, direction=(0, 1), name="obstacle under foot")
     scene = fm.Scene(leg)
-    # crank angles of the patent; the drawn one is 180°
-    stroke = [scene.configuration(f"crank {angle} deg", {motor: radians(angle - 180)}) for angle in (45, 95, 145)]
-    return scene, lift, stroke
+    return scene, lift, [scene.configuration(f"crank {a} deg", {motor: radians(a - 180)}) for a in (45, 95, 145)]
 
 
 def wanted(scene, lift, stroke):
     """The links that may change, and the targets."""
-    designs = [
-        fm.SplineDesign(link, segments=SEGMENTS[link.name], thickness=(1.0, 9.0))
-        for link in scene.mechanism.flexible_links
-    ]
+    counts = zip(scene.mechanism.flexible_links, (2, 2, 3, 3), strict=True)
+    designs = [fm.SplineDesign(link, segments=count, thickness=(1.0, 9.0)) for link, count in counts]
     targets = [fm.Target(lift, force=5.0, displacement=10.0, configuration=place) for place in stroke]
     return {"designs": designs, "targets": targets}
 
@@ -78,37 +58,25 @@ def main():
     fm.mpi_abort_on_error()
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--space", choices=list(fm.SPACES), default="3d")
-    parser.add_argument("--order", type=int, choices=(1, 2), default=2, help="degree of the displacement field")
-    parser.add_argument("--size", type=float, metavar="MM", help=f"element size (default {SIZE} mm)")
-    parser.add_argument("--quick", action="store_true", help=f"coarse: element size {QUICK} mm")
+    parser.add_argument("--quick", action="store_true", help=f"elements of {QUICK} mm instead of {SIZE} mm")
     parser.add_argument("--simulate-only", action="store_true", help="simulate the drawn design only")
     parser.add_argument("--resume", action="store_true", help="go on with an optimisation that was interrupted")
     parser.add_argument("--out", type=Path, default=Path("results/klann"), metavar="DIR", help="folder for files")
     options = parser.parse_args()
-    fidelity = {"order": options.order, "size": options.size or (QUICK if options.quick else SIZE)}
 
-    scene, lift, stroke = task = describe()
-    sim = fm.Simulation(scene, space=options.space, **fidelity)
-    before = [sim.load_displacement(lift, forces=FORCES, configuration=place) for place in stroke]
+    scene, lift, stroke = describe()
+    sim = fm.Simulation(scene, space=options.space, size=QUICK if options.quick else SIZE)
+    curves = [sim.load_displacement(lift, forces=FORCES, configuration=place) for place in stroke]
     if options.simulate_only:
-        return fm.write_report(options.out, sim, before).show()
-    start = None
-    if options.space.startswith("3d"):  # the optimum in plane stress takes seconds and is close to the one in space
-        flat = fm.Simulation(scene, space="plane-stress", **fidelity)
-        saved = {"checkpoint": options.out / "checkpoint-plane-stress.json", "resume": options.resume}
-        start = fm.DesignProblem(flat, **wanted(*task)).optimise(**saved)
-    problem = fm.DesignProblem(sim, **wanted(*task))
-    saved = {"checkpoint": options.out / f"checkpoint-{options.space}.json", "resume": options.resume}
-    result = problem.optimise(start=start, **saved)
-    sim = sim.with_design(result)
-    after = [sim.load_displacement(lift, forces=FORCES, configuration=place) for place in stroke]
-    found = fm.Optimisation(problem, result, before=before, start=start, pin_diameter=PIN)
-    fm.write_report(options.out, sim, after, optimisation=found).show()
+        return fm.write_report(options.out, sim, curves).show()
+    problem = fm.DesignProblem(sim, **wanted(scene, lift, stroke))
+    report = fm.design_study(options.out, problem, curves, resume=options.resume, pin_diameter=PIN)
+    report.show()
 
     motor = scene.mechanism.motors[0]
-    turn = [scene.configuration(f"turned by {angle} deg", {motor: radians(angle)}) for angle in range(0, 361, 4)]
+    turn = [scene.configuration(f"turned by {a} deg", {motor: radians(a)}) for a in range(0, 361, 4)]
     path = fm.Trace(sim.path(lift, turn)[:, :2], "foot path", sim.path(lift, stroke)[:, :2])
-    after[1].picture(options.out / "foot-path.png", stress=False, traces=[path])
+    report.curves[1].picture(options.out / "foot-path.png", stress=False, traces=[path])
 
 
 if __name__ == "__main__":

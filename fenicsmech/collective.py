@@ -6,7 +6,7 @@ import pickle
 import sys
 import time
 from collections.abc import Callable
-from typing import TypeVar
+from typing import TypeVar, cast
 
 from mpi4py import MPI
 
@@ -14,18 +14,9 @@ T = TypeVar("T")
 
 
 def on_one(comm: MPI.Comm, work: Callable[[], T], *, root: int = 0) -> T | None:
-    """Calls ``work`` on one process while the others wait.
+    """What ``work`` returns on ``root``, None elsewhere; all processes raise what it raises.
 
-    Args:
-        comm: the processes.
-        work: calls nothing collective.
-        root: the rank that calls it.
-
-    Returns:
-        What ``work`` returned, on ``root``; None elsewhere.
-
-    Raises:
-        Exception: what ``work`` raised, on all processes.
+    ``work`` calls nothing collective; the others wait for it.
     """
     return on_all(comm, lambda: work() if comm.rank == root else None)
 
@@ -36,19 +27,13 @@ def from_one(comm: MPI.Comm, work: Callable[[], T], *, root: int = 0) -> T:
 
 
 def on_all(comm: MPI.Comm, work: Callable[[], T]) -> T:
-    """Calls ``work`` on every process, and fails on all if it fails on one.
+    """What ``work`` returns on each process; if it fails on one, all raise the error of the lowest rank.
 
-    Args:
-        comm: the processes.
-        work: what in it is collective on ``comm`` must fail on all processes or on none; all else may fail on some.
-
-    Raises:
-        Exception: what ``work`` raised on the lowest rank where it did.
+    What in ``work`` is collective on ``comm`` must fail on all processes or on none; all else may fail on some.
     """
-    results: list[T] = []
-    failure: Exception | None = None
+    result, failure = None, None
     try:
-        results.append(work())
+        result = work()
     except Exception as error:
         failure = error
     failures = comm.allgather(_sendable(failure))
@@ -61,7 +46,7 @@ def on_all(comm: MPI.Comm, work: Callable[[], T]) -> T:
     finally:
         # an error that its own traceback refers to would keep its frames alive until the next garbage collection
         del failure, failures, other
-    return results[0]
+    return cast(T, result)
 
 
 def mpi_abort_on_error() -> None:

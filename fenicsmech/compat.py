@@ -1,11 +1,24 @@
-"""Differences between the supported versions of dolfinx (0.5.2, 0.9 and 0.11) and their companions."""
+"""The calls of dolfinx and PETSc that differ between versions (dolfinx 0.5.2, 0.9 and 0.11) or are missing from Python.
+
+Forms are compiled into a cache on disk. FFCx marks a form as being compiled by its C file, and other processes wait
+until it is finished. A process killed while compiling leaves an unfinished file, for which later ones would wait
+indefinitely. Processes therefore compile under a shared lock on the folder; one that gets the exclusive lock removes
+unfinished files.
+"""
 
 from __future__ import annotations
 
+import ctypes
+import fcntl
+import hashlib
 import logging
 import math
-from collections.abc import Mapping
-from contextlib import contextmanager
+import os
+import platform
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from functools import cache
+from pathlib import Path
 
 import dolfinx
 import dolfinx.fem.petsc
@@ -17,11 +30,12 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
-from fenicsmech.kernel_cache import compiling, options
+from fenicsmech.log import logger
+
+_log = logger(__name__)
 
 _VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
 _LEGACY = _VERSION < (0, 6)
-
 
 if not _LEGACY:
     import basix.ufl
@@ -33,16 +47,62 @@ _DUPLICATES: list[PETSc.Comm] = []
 
 _ADD = (dolfinx.la.ScatterMode if _LEGACY else dolfinx.la.InsertMode).add
 
+# Strict IEEE arithmetic (no -ffast-math): energies rely on cancellation-free forms and on NaN where J ≤ 0.
+# Without -fno-schedule-insns2 some versions of gcc take half a minute for the tangent of solids; the code is as fast.
+_FLAGS = "-O3 -march=native -fno-math-errno -fno-trapping-math -fno-schedule-insns2 -g0"
+
+
+def _processor() -> str:
+    """A short name for the instruction set of this processor: compiled kernels run on their own only."""
+    try:
+        text = Path("/proc/cpuinfo").read_text()
+    except OSError:
+        text = platform.processor()
+    flags = next((line for line in text.splitlines() if line.startswith(("flags", "Features"))), text)
+    return hashlib.sha256(flags.encode()).hexdigest()[:12]
+
+
+_KERNELS = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "fenicsmech" / "kernels" / _processor()
+
+
+def _options() -> dict:
+    """FFCx's options, a new dictionary."""
+    return {"cffi_extra_compile_args": _FLAGS.split(), "cache_dir": _KERNELS, "timeout": 300}
+
 
 @contextmanager
-def _compiling():
-    """A context for compiling forms, without the commands that its build tools log on the root logger."""
+def compiling(folder: Path = _KERNELS) -> Iterator[None]:
+    """A context for code that may compile into ``folder``; the build tools' commands on the root logger are muted."""
+    _remove_unfinished(folder)
     logging.disable(logging.INFO)
     try:
-        with compiling():
+        with _lock(folder, fcntl.LOCK_SH):
             yield
     finally:
         logging.disable(logging.NOTSET)
+
+
+@contextmanager
+def _lock(folder: Path, how: int) -> Iterator[bool]:
+    """A context that holds the lock; yields False without it: some network and read-only file systems have none."""
+    with ExitStack() as stack:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            fcntl.flock(stack.enter_context(open(folder / "lock", "w")), how)
+            locked = True
+        except OSError:
+            locked = False
+        yield locked
+
+
+@cache
+def _remove_unfinished(folder: Path) -> None:
+    """Removes unfinished C files, once per process and unless another process compiles."""
+    with _lock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB) as alone:
+        for source in folder.glob("libffcx_*.c") if alone else ():
+            if not source.with_suffix(".c.cached").exists():
+                _log.warning("%s was left unfinished by a process that was stopped; it is compiled anew", source.name)
+                source.unlink(missing_ok=True)
 
 
 def create_mesh(comm: MPI.Comm, cells: np.ndarray, points: np.ndarray) -> dmesh.Mesh:
@@ -84,11 +144,7 @@ def cell_dofs(space: fem.FunctionSpace) -> np.ndarray:
 
 
 def interpolation_matrix(coarse: fem.FunctionSpace, fine: fem.FunctionSpace) -> csr_matrix:
-    """Interpolation of functions on ``coarse`` by functions on ``fine``.
-
-    Returns:
-        This rank's owned DOFs of ``fine`` by all DOFs of ``coarse``, numbered over all ranks.
-    """
+    """Interpolation: this rank's owned DOFs of ``fine`` by all DOFs of ``coarse``, numbered over all ranks."""
     matrix = dolfinx.cpp.fem.petsc.interpolation_matrix(coarse._cpp_object, fine._cpp_object)
     matrix.assemble()
     starts, columns, values = matrix.getValuesCSR()
@@ -100,43 +156,40 @@ def interpolation_matrix(coarse: fem.FunctionSpace, fine: fem.FunctionSpace) -> 
     return found
 
 
-def vector_space(mesh: dmesh.Mesh, degree: int) -> fem.FunctionSpace:
-    """Continuous vector fields of ``degree``."""
-    if _LEGACY:
-        return _space(mesh, ufl.VectorElement("Lagrange", mesh.ufl_cell(), degree))
-    return _space(mesh, ("Lagrange", degree, (mesh.geometry.dim,)))
-
-
 def scalar_space(mesh: dmesh.Mesh, degree: int) -> fem.FunctionSpace:
     """Continuous scalar fields of ``degree``."""
-    return _space(mesh, ("Lagrange", degree))
+    return _space(mesh, "Lagrange", degree)
+
+
+def vector_space(mesh: dmesh.Mesh, degree: int) -> fem.FunctionSpace:
+    """Continuous vector fields of ``degree``."""
+    return _space(mesh, "Lagrange", degree, rank=1)
 
 
 def tensor_space(mesh: dmesh.Mesh, degree: int) -> fem.FunctionSpace:
     """Continuous fields of square tensors, of ``degree``."""
-    if _LEGACY:
-        return _space(mesh, ufl.TensorElement("Lagrange", mesh.ufl_cell(), degree))
-    return _space(mesh, ("Lagrange", degree, (mesh.geometry.dim, mesh.geometry.dim)))
+    return _space(mesh, "Lagrange", degree, rank=2)
 
 
-def cellwise_space(mesh: dmesh.Mesh) -> fem.FunctionSpace:
-    """Scalars, one per cell."""
-    return _space(mesh, ("DG", 0))
+def cellwise_space(mesh: dmesh.Mesh, degree: int = 0) -> fem.FunctionSpace:
+    """Scalars that are polynomials of ``degree`` on each cell."""
+    return _space(mesh, "DG", degree)
 
 
-def _space(mesh: dmesh.Mesh, element) -> fem.FunctionSpace:
-    with _compiling():
+def _space(mesh: dmesh.Mesh, family: str, degree: int, *, rank: int = 0) -> fem.FunctionSpace:
+    with compiling():
         if _LEGACY:
-            return fem.FunctionSpace(mesh, element, jit_params=options())
-        if _VERSION < (0, 10):
-            return fem.functionspace(mesh, element, jit_options=options())
-        return fem.functionspace(mesh, element)
+            element = (ufl.FiniteElement, ufl.VectorElement, ufl.TensorElement)[rank]
+            return fem.FunctionSpace(mesh, element(family, mesh.ufl_cell(), degree), jit_params=_options())
+        options = {"jit_options": _options()} if _VERSION < (0, 10) else {}
+        shape = ((mesh.geometry.dim,) * rank,) if rank else ()
+        return fem.functionspace(mesh, (family, degree, *shape), **options)
 
 
 def compile_form(form: ufl.Form):
     """``form`` compiled to machine code (cached on disk)."""
-    with _compiling():
-        return fem.form(form, jit_params=options()) if _LEGACY else fem.form(form, jit_options=options())
+    with compiling():
+        return fem.form(form, jit_params=_options()) if _LEGACY else fem.form(form, jit_options=_options())
 
 
 def interpolation_points(V: fem.FunctionSpace) -> np.ndarray:
@@ -147,10 +200,10 @@ def interpolation_points(V: fem.FunctionSpace) -> np.ndarray:
 
 def compile_expression(expression, points: np.ndarray, comm: MPI.Comm) -> fem.Expression:
     """``expression`` compiled for evaluation at ``points`` of the reference cell."""
-    with _compiling():
+    with compiling():
         if _LEGACY:
-            return fem.Expression(expression, points, jit_params=options())
-        return fem.Expression(expression, points, comm=comm, jit_options=options())
+            return fem.Expression(expression, points, jit_params=_options())
+        return fem.Expression(expression, points, comm=comm, jit_options=_options())
 
 
 def evaluate_expression(expression: fem.Expression, mesh: dmesh.Mesh, cells: np.ndarray) -> np.ndarray:
@@ -173,12 +226,7 @@ def add_ghosts(function: fem.Function) -> None:
 
 
 def assemble_vector(form, work: fem.Function) -> np.ndarray:
-    """A compiled linear form, this rank's owned values, flat.
-
-    Args:
-        form: the form.
-        work: on the space of its test function; holds the result until it is used again.
-    """
+    """A compiled linear form, this rank's owned values, flat; a view of ``work``, on the space of the test function."""
     work.x.array[:] = 0.0
     fem.assemble_vector(work.x.array, form)
     add_ghosts(work)
@@ -206,6 +254,35 @@ def add_blocks(matrix: PETSc.Mat, forms) -> None:
     assemble(matrix, forms)
 
 
+# petsc4py shows the arrays of values of neither format, hence functions of PETSc's library, to which it is linked
+_LIBRARY = ctypes.CDLL(PETSc.__file__)
+
+
+def stored_values(matrix: PETSc.Mat) -> list[np.ndarray]:
+    """This rank's values in an AIJ or BAIJ matrix as views: those in its own columns and in those of other ranks."""
+    kind = matrix.getType().removeprefix("seq").removeprefix("mpi").upper()
+    pointer = ctypes.c_void_p
+    parts = [pointer(matrix.handle)]
+    if matrix.comm.size > 1:
+        parts = [pointer(), pointer()]
+        # the columns' numbers are of no interest
+        _call_petsc(f"MatMPI{kind}GetSeq{kind}", pointer(matrix.handle), *map(ctypes.byref, parts), None)
+    found = []
+    for part in parts:
+        # MatInfo is ten doubles, nz_used the third; 1 is MAT_LOCAL
+        info, values = (ctypes.c_double * 10)(), ctypes.POINTER(ctypes.c_double)()
+        _call_petsc("MatGetInfo", part, ctypes.c_int(1), info)
+        _call_petsc(f"MatSeq{kind}GetArray", part, ctypes.byref(values))
+        count = int(info[2])
+        found.append(np.ctypeslib.as_array(values, (count,)) if count else np.empty(0))
+    return found
+
+
+def _call_petsc(name: str, *arguments) -> None:
+    if code := getattr(_LIBRARY, name)(*arguments):
+        raise RuntimeError(f"{name} of PETSc failed with code {code}")
+
+
 def destroy_garbage(comm: MPI.Comm) -> None:
     """Destroys the PETSc objects on ``comm`` that no Python object refers to any more.
 
@@ -224,15 +301,9 @@ def destroy_garbage(comm: MPI.Comm) -> None:
 
 
 def write_series(path, mesh: dmesh.Mesh, functions: Mapping[str, fem.Function], steps, update, comm: MPI.Comm) -> None:
-    """Writes an XDMF time series for ParaView.
+    """Writes an XDMF time series of named functions, P1 or cellwise, for ParaView.
 
-    Args:
-        path: the .xdmf file.
-        mesh: the mesh of all functions.
-        functions: name → function, P1 or cellwise.
-        steps: the time of each step.
-        update: called with the step's index before it is written, sets the functions.
-        comm: communicator of the mesh.
+    ``steps`` holds the time of each step; ``update`` is called with its index before it is written, sets the functions.
     """
     with io.XDMFFile(comm, str(path), "w") as file:
         file.write_mesh(mesh)

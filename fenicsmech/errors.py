@@ -1,6 +1,17 @@
-"""Exceptions: each names the part, shows the offending value and gives the remedy."""
+"""Exceptions and the checks of a user's numbers that raise them.
+
+An exception names the part, shows the offending value and gives the remedy. A check returns plain, finite data, or
+raises a ``DescriptionError`` that starts with ``part``.
+"""
 
 from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 
 class FenicsmechError(Exception):
@@ -44,3 +55,111 @@ class EquilibriumError(FenicsmechError):
     def __init__(self, part: str, problem: str, remedy: str, *, last=None, frames=()) -> None:
         super().__init__(part, problem, remedy)
         self.last, self.frames = last, tuple(frames)
+
+
+def finite(part: str, value: Any) -> float:
+    """``value`` as a float."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise DescriptionError(part, f"{value!r} is not a number", "Give a finite number") from None
+    if not math.isfinite(number):
+        raise DescriptionError(part, f"the value is {number}", "Give a finite number")
+    return number
+
+
+def positive(part: str, value: Any) -> float:
+    """``value`` as a float greater than zero."""
+    number = finite(part, value)
+    if number <= 0.0:
+        raise DescriptionError(part, f"{number:g} is not positive", "Give a number greater than zero")
+    return number
+
+
+def point(part: str, values: Sequence[float], *, dimensions: tuple[int, ...] = (2, 3)) -> tuple[float, ...]:
+    """``values`` as a tuple of finite coordinates."""
+    try:
+        coordinates = tuple(values)
+    except TypeError:
+        coordinates = ()
+    if len(coordinates) not in dimensions:
+        wanted = " or ".join(str(d) for d in dimensions)
+        raise DescriptionError(part, f"{values!r} does not have {wanted} coordinates", f"Give {wanted} numbers")
+    return tuple(finite(part, c) for c in coordinates)
+
+
+def point_text(point: Iterable[float]) -> str:
+    """A point as messages show it: ``(1, 2.5)``."""
+    return f"({', '.join(f'{c:g}' for c in point)})"
+
+
+def points(
+    part: str, values: Sequence[Sequence[float]], *, least: int, dimensions: tuple[int, ...]
+) -> tuple[tuple[float, ...], ...]:
+    """``values`` as a tuple of at least ``least`` points."""
+    try:
+        values = tuple(values)
+    except TypeError:
+        raise DescriptionError(part, f"{values!r} is not a list of points", "Give a list of points") from None
+    checked = tuple(point(part, p, dimensions=dimensions) for p in values)
+    if len(checked) < least:
+        raise DescriptionError(part, f"{len(checked)} point(s) given", f"Give at least {least} points")
+    return checked
+
+
+def direction(part: str, values: Sequence[float]) -> tuple[float, ...]:
+    """``values`` scaled to unit length."""
+    vector = point(part, values)
+    length = math.hypot(*vector)
+    if length == 0.0:
+        raise DescriptionError(part, "the direction has zero length", "Give a vector that points somewhere")
+    return tuple(c / length for c in vector)
+
+
+def in_plane(part: str, vector: Sequence[float], dim: int) -> None:
+    """Checks that a vector of two or three coordinates stays in the plane, where ``dim`` is 2."""
+    if dim == 2 and any(vector[2:]):
+        raise DescriptionError(part, f"{vector} leaves the plane", "Simulate in space, or give two coordinates")
+
+
+def real_array(part: str, values: ArrayLike, *shape: int | None) -> NDArray[np.float64]:
+    """``values`` as a read-only copy of finite floats; ``shape`` has None where an axis may have any length."""
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise DescriptionError(part, "the values are not an array of numbers", "Give an array of numbers") from None
+    _check_shape(part, array, shape)
+    if not np.isfinite(array).all():
+        where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        raise DescriptionError(part, f"entry {list(where)} is {array[where]}", "Give finite numbers")
+    array.setflags(write=False)
+    return array
+
+
+def index_array(part: str, values: ArrayLike, *shape: int | None, below: int) -> NDArray[np.int64]:
+    """``values`` as a read-only copy of indices in 0, ..., ``below`` − 1."""
+    array = np.array(values)
+    if array.size and not np.issubdtype(array.dtype, np.integer):
+        raise DescriptionError(part, f"the indices are {array.dtype}", "Give integers")
+    array = array.astype(np.int64)
+    _check_shape(part, array, shape)
+    if array.size and (array.min() < 0 or array.max() >= below):
+        found = f"indices run from {array.min()} to {array.max()}"
+        raise DescriptionError(part, found, f"Only 0 to {below - 1} exist; check the numbering")
+    array.setflags(write=False)
+    return array
+
+
+def _check_shape(part: str, array: NDArray, shape: tuple[int | None, ...]) -> None:
+    fits = array.ndim == len(shape) and all(
+        want is None or have == want for have, want in zip(array.shape, shape, strict=True)
+    )
+    if not fits:
+        wanted = ", ".join("any" if n is None else str(n) for n in shape)
+        raise DescriptionError(part, f"the array has shape {array.shape}", f"Give shape ({wanted})")
+
+
+def set_fields(frozen: object, **values: Any) -> None:
+    """Sets fields of a frozen dataclass to what its checks returned, for its ``__post_init__``."""
+    for name, value in values.items():
+        object.__setattr__(frozen, name, value)

@@ -15,26 +15,15 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fenicsmech.checks import finite, real_array
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, finite, real_array
 
 
 @contextmanager
 def atomic_write(path: str | Path, *, binary: bool = False) -> Iterator[IO]:
-    """Opens ``path`` for writing; it is replaced only when the block ends without an error.
+    """Opens ``path`` for UTF-8 text or bytes; it is replaced only when the block ends without an error.
 
     The data go to a hidden file in the same folder, synchronised with the disk and then renamed: an interrupted run
-    leaves the old file untouched and nothing beside it.
-
-    Args:
-        path: the file; missing parent folders are created.
-        binary: bytes instead of UTF-8 text.
-
-    Yields:
-        the open file.
-
-    Raises:
-        OSError: the folder or the file cannot be written.
+    leaves the old file untouched and nothing beside it. Missing parent folders are created.
     """
     target = Path(path)
     text: dict[str, Any] = {} if binary else {"encoding": "utf-8", "newline": "\n"}
@@ -54,15 +43,7 @@ def atomic_write(path: str | Path, *, binary: bool = False) -> Iterator[IO]:
 
 
 def write_json(path: str | Path, data: Mapping[str, object]) -> None:
-    """Writes ``data`` as JSON, keys in the order given, indented by two.
-
-    Args:
-        path: the file.
-        data: mappings, sequences, arrays, numbers, strings, flags, None and paths, nested.
-
-    Raises:
-        DescriptionError: a number is not finite, or a value has no JSON form; the message gives its key.
-    """
+    """Writes ``data`` as JSON: mappings, sequences, arrays, finite numbers, strings, flags, None and paths, nested."""
     text = json.dumps(_plain("", data), indent=2, ensure_ascii=False, allow_nan=False)
     with atomic_write(path) as file:
         file.write(text + "\n")
@@ -75,9 +56,9 @@ def _plain(key: str, value: object) -> object:
     if value is None or isinstance(value, bool | int | str):
         return value
     if isinstance(value, float):
-        if not math.isfinite(value):
-            raise _error(key, f"the value is {value}", "Use None for unknown values")
-        return value
+        if math.isfinite(value):
+            return value
+        raise _error(key, f"the value is {value}", "Use None for unknown values")
     if isinstance(value, Path):
         return str(value)
     if isinstance(value, Mapping):
@@ -95,15 +76,7 @@ def _error(key: str, problem: str, remedy: str) -> DescriptionError:
 
 
 def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> None:
-    """Writes columns of numbers under their headers; floats keep every digit.
-
-    Args:
-        path: the CSV file.
-        columns: header with unit ("force [N]") to (n,) values; flags become 0 and 1.
-
-    Raises:
-        DescriptionError: no column, columns of different length, or a value that is not finite.
-    """
+    """Writes ``columns``, (n,) finite numbers by header; floats keep every digit, flags become 0 and 1."""
     if not columns:
         raise DescriptionError(f"table '{path}'", "there are no columns", "Give at least one")
     rows = None
@@ -142,9 +115,8 @@ def read_csv(path: str | Path) -> dict[str, NDArray[np.float64]]:
         raise DescriptionError(f"table '{path}'", f"the headers are {headers}", "Give each column its own name")
     values = np.empty((len(rows) - 1, len(headers)))
     for index, (line, row) in enumerate(rows[1:]):
+        part = f"table '{path}', line {line}"
         if len(row) != len(headers):
-            raise DescriptionError(
-                f"table '{path}', line {line}", f"{len(row)} fields for {len(headers)} columns", "Complete the line"
-            )
-        values[index] = [finite(f"table '{path}', line {line}", field) for field in row]
+            raise DescriptionError(part, f"{len(row)} fields for {len(headers)} columns", "Complete the line")
+        values[index] = [finite(part, field) for field in row]
     return {header: values[:, k].copy() for k, header in enumerate(headers)}

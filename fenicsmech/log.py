@@ -1,4 +1,4 @@
-"""Messages of a run: the standard library's logging, on MPI rank 0 only, and progress lines of long runs."""
+"""Messages of a run on MPI rank 0 only, by the standard library's logging; progress and time of long work."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import logging
 import math
 import shutil
 import sys
-import time
-from collections.abc import Callable
-from types import TracebackType
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from time import monotonic, perf_counter
 from typing import TextIO
 
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import positive
 
 ROOT = "fenicsmech"
 
@@ -28,20 +28,9 @@ class _RankZero(logging.LoggerAdapter):
 class _Console(logging.StreamHandler):
     """The handler `configure_logging` installs; a class of its own, so that configuring again replaces it."""
 
-    def __init__(self) -> None:
-        super().__init__()  # standard error as it is now
-        self.setFormatter(logging.Formatter("%(asctime)s %(levelname)-7s %(name)s: %(message)s", "%H:%M:%S"))
-
 
 def logger(name: str) -> logging.LoggerAdapter:
-    """The logger of a module.
-
-    Args:
-        name: the module's `__name__`.
-
-    Returns:
-        The standard logger of that name, which emits on rank 0 of MPI.COMM_WORLD only.
-    """
+    """The standard logger of ``name``, a module's `__name__`, which emits on rank 0 of MPI.COMM_WORLD only."""
     return _RankZero(logging.getLogger(name), {})
 
 
@@ -54,7 +43,9 @@ def configure_logging(level: int = logging.INFO) -> None:
     package = logging.getLogger(ROOT)
     for handler in [handler for handler in package.handlers if isinstance(handler, _Console)]:
         package.removeHandler(handler)
-    package.addHandler(_Console())
+    console = _Console()  # standard error as it is now
+    console.setFormatter(logging.Formatter("%(asctime)s %(levelname)-7s %(name)s: %(message)s", "%H:%M:%S"))
+    package.addHandler(console)
     package.setLevel(level)
     package.propagate = False
     # Importing FFCx gives the root logger a handler, and compiling a form makes it show every compiler command.
@@ -81,16 +72,21 @@ _TERMINAL_PAUSE = 0.5  # s between redrawn lines
 _LOG_PAUSE = 5.0  # s between lines in a file or pipe
 
 
+_outer: list[Progress] = []  # contexts that are open
+
+
 class Progress:
     """The progress of one task, shown on a stream.
 
     A terminal gets one line that is redrawn at most twice a second, a file or pipe a line every five seconds. The last
-    update is always shown. Use it as a context manager, or call :meth:`close` at the end.
+    update is always shown. Use it as a context manager, or call :meth:`close` at the end; tasks within the context of
+    another one are not shown.
 
     Args:
         total: of the task; None if it is not known.
         label: name of the task.
         stream: the output; None is the standard error stream.
+        shown: whether this process shows anything; with several, one of them should.
         clock: seconds from an arbitrary start, increasing.
 
     Raises:
@@ -103,24 +99,24 @@ class Progress:
         label: str,
         stream: TextIO | None = None,
         *,
-        clock: Callable[[], float] = time.monotonic,
+        shown: bool = True,
+        clock: Callable[[], float] = monotonic,
     ) -> None:
-        if total is not None and not (total > 0 and math.isfinite(total)):
-            raise DescriptionError(f"progress of '{label}'", f"the total is {total}", "Give a positive total or None")
-        self._total, self._label, self._clock = total, label, clock
+        self._total = None if total is None else positive(f"progress of '{label}'", total)
+        self._label, self._clock, self._shows = label, clock, shown
         self._stream = sys.stderr if stream is None else stream
         self._terminal = self._stream.isatty()
-        self._start = clock()
-        self._shown = -math.inf
-        self._pending = ""
-        self._open_line = False
+        self._start, self._last = clock(), -math.inf
+        self._pending, self._open_line = "", False
 
     def update(self, done: float, note: str = "") -> None:
         """Reports that ``done`` of the total is finished; ``note`` is a remark on the latest step."""
+        if not self._shows or any(other is not self for other in _outer[:1]):
+            return
         now = self._clock()
         self._pending = self._describe(done, note, now - self._start)
         complete = self._total is not None and done >= self._total
-        if complete or now - self._shown >= (_TERMINAL_PAUSE if self._terminal else _LOG_PAUSE):
+        if complete or now - self._last >= (_TERMINAL_PAUSE if self._terminal else _LOG_PAUSE):
             self._show(now)
 
     def close(self) -> None:
@@ -133,11 +129,11 @@ class Progress:
             self._open_line = False
 
     def __enter__(self) -> Progress:
+        _outer.append(self)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
+        _outer.remove(self)
         self.close()
 
     def _describe(self, done: float, note: str, elapsed: float) -> str:
@@ -150,7 +146,7 @@ class Progress:
         return f"{line}  {note}" if note else line
 
     def _show(self, now: float) -> None:
-        line, self._pending, self._shown = self._pending, "", now
+        line, self._pending, self._last = self._pending, "", now
         if self._terminal:
             width = shutil.get_terminal_size().columns - 1  # a full line would wrap and not be overwritten
             self._stream.write(f"\r{line[:width]}\x1b[K")
@@ -158,24 +154,6 @@ class Progress:
         else:
             self._stream.write(f"{line}\n")
         self._stream.flush()
-
-
-class Silent:
-    """A :class:`Progress` that shows nothing, for every rank but the first."""
-
-    def update(self, done: float, note: str = "") -> None:
-        """Does nothing."""
-
-    def close(self) -> None:
-        """Does nothing."""
-
-    def __enter__(self) -> Silent:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def _duration(seconds: float) -> str:
@@ -186,3 +164,31 @@ def _duration(seconds: float) -> str:
     if minutes < 60:
         return f"{minutes}:{rest:02d} min"
     return f"{minutes // 60}:{minutes % 60:02d}:{rest:02d} h"
+
+
+class Clock:
+    """A stopwatch with named phases.
+
+    Attributes:
+        seconds: phase → seconds so far.
+    """
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._inner = 0.0  # s, of phases inside the present one
+
+    @contextmanager
+    def phase(self, name: str) -> Iterator[None]:
+        """Adds the time inside the block to phase ``name``, less that of the phases inside it."""
+        outer, self._inner = self._inner, 0.0
+        start = perf_counter()
+        try:
+            yield
+        finally:
+            spent = perf_counter() - start
+            self.seconds[name] = self.seconds.get(name, 0.0) + spent - self._inner
+            self._inner = outer + spent
+
+    def since(self, before: dict[str, float]) -> dict[str, float]:
+        """Seconds per phase since ``before``, an earlier copy of ``seconds``."""
+        return {name: total - before.get(name, 0.0) for name, total in self.seconds.items()}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
+
 import numpy as np
 
 
@@ -53,21 +55,18 @@ def first_crossing(polygon: np.ndarray) -> np.ndarray | None:
 
 
 def edge_loops(triangles: np.ndarray) -> list[np.ndarray]:
-    """The closed loops of edges that belong to one triangle only: outlines and holes alike.
+    """The closed loops of edges that belong to one triangle only: outlines and holes alike; loops may touch.
 
-    Args:
-        triangles: (m, 3) vertex numbers; loops follow their orientation where it is consistent. Loops may touch.
-
-    Returns:
-        Vertex numbers (k,) of each loop from its lowest one on, in the order of these.
+    Each is the vertex numbers (k,) from its lowest one on, in the orientation of ``triangles`` (m, 3) where that is
+    consistent; loops are in the order of these lowest numbers.
     """
     edges = triangles[:, ((0, 1), (1, 2), (2, 0))].reshape(-1, 2)
     _, first, count = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
     edges = edges[np.sort(first[count == 1])]
-    edges_at: dict[int, list[int]] = {}
+    edges_at = defaultdict(list)
     for index, ends in enumerate(edges.tolist()):
         for end in ends:
-            edges_at.setdefault(end, []).append(index)
+            edges_at[end].append(index)
     unused, loops = dict.fromkeys(range(len(edges))), []
     while unused:
         index = next(iter(unused))

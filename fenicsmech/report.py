@@ -8,6 +8,7 @@
 ``links.png``          the links before and after an optimisation
 ``links/``             STEP and STL of every link that has changed
 ``design.json``        the design, for ``DesignResult.load``
+``checkpoint.json``    the last iterate of an optimisation by ``design_study``
 ``summary.json``       all figures
 =====================  ===========================================================================================
 
@@ -18,7 +19,7 @@ from __future__ import annotations
 
 import resource
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from numbers import Integral, Real
 from pathlib import Path
 from statistics import median
@@ -28,10 +29,12 @@ from mpi4py import MPI
 
 from fenicsmech.collective import on_one
 from fenicsmech.design import DesignProblem, DesignResult
+from fenicsmech.equilibrium import Unknown
 from fenicsmech.errors import DescriptionError
 from fenicsmech.files import write_json
 from fenicsmech.log import print_once
-from fenicsmech.plot import PALETTE, CurveTarget, draw_configurations, draw_curve
+from fenicsmech.mechanism import Force
+from fenicsmech.plot import PALETTE, CurveTarget, draw_configurations, plot_curve
 from fenicsmech.simulation import Curve, Frame, Simulation
 
 
@@ -42,10 +45,12 @@ class Report:
     Attributes:
         folder: of its files.
         summary: all figures, as in ``summary.json``.
+        curves: what it reports on, those of the optimum after an optimisation.
     """
 
     folder: Path
     summary: dict
+    curves: Sequence[Curve]
 
     def __str__(self) -> str:
         return _text(self.summary, self.folder)
@@ -63,14 +68,12 @@ class Optimisation:
         problem: the design problem.
         result: its optimum.
         before: curves of the drawn design.
-        start: the optimum of a cheaper simulation that the optimisation started from.
         pin_diameter: of the holes for pins in the exported links.
     """
 
     problem: DesignProblem
     result: DesignResult
     before: Sequence[Curve] = ()
-    start: DesignResult | None = None
     pin_diameter: float | None = None
 
 
@@ -97,10 +100,10 @@ def write_report(
         raise DescriptionError(f"report on {name!r}", "there are no curves", "Give at least one")
     units = simulation.scene.units
     panels = [panel for curve in curves if (panel := curve.panel()) is not None]  # on rank 0
-    paths = [_suffixed(curve, curves) for curve in curves]
-    for curve, path in zip(curves, paths, strict=True):
-        curve.write(folder / f"deformed{path}.xdmf")
-        curve.write_csv(folder / f"curve{path}.csv", errors=True)
+    for curve in curves:
+        suffix = f"-{curve.configuration.name.replace(' ', '-')}" if len(curves) > 1 else ""
+        curve.write(folder / f"deformed{suffix}.xdmf")
+        curve.write_csv(folder / f"curve{suffix}.csv", errors=True)
     if optimisation is not None:
         optimisation.problem.picture(folder / "links.png", optimisation.result)
         optimisation.problem.export(folder / "links", optimisation.result, pin_diameter=optimisation.pin_diameter)
@@ -114,11 +117,57 @@ def write_report(
         write_json(folder / "summary.json", summary)
 
     on_one(comm, write)
-    return Report(folder, summary)
+    return Report(folder, summary, tuple(curves))
 
 
-def _suffixed(curve: Curve, curves: Sequence[Curve]) -> str:
-    return f"-{curve.configuration.name.replace(' ', '-')}" if len(curves) > 1 else ""
+def design_study(
+    folder: str | Path,
+    problem: DesignProblem,
+    curves: Sequence[Curve],
+    *,
+    resume: bool = False,
+    pin_diameter: float | None = None,
+) -> Report:
+    """Optimises the links, verifies them in the exported parts, computes the curves of the optimum, and reports.
+
+    Args:
+        folder: of the files; created if it does not exist.
+        problem: what is optimised.
+        curves: of the drawn design, by ``load_displacement``; at least one.
+        resume: whether to continue an optimisation that was interrupted.
+        pin_diameter: of the holes for pins in the exported links; there are none by default.
+
+    Returns:
+        the figures and the curves of the optimum.
+
+    Raises:
+        DescriptionError: there are no curves, or a checkpoint in the folder belongs to another problem.
+        EquilibriumError: the drawn design does not carry its loads.
+        OSError: the folder or a file cannot be written.
+    """
+    result = problem.verify(problem.optimise(checkpoint=Path(folder) / "checkpoint.json", resume=resume))
+    sim = problem.simulation.with_design(result)
+    after = [_again(sim, curve) for curve in curves]
+    found = Optimisation(problem, result, before=curves, pin_diameter=pin_diameter)
+    return write_report(folder, sim, after, optimisation=found)
+
+
+def _again(sim: Simulation, curve: Curve) -> Curve:
+    """The curve with the same prescribed values in another simulation."""
+    if not isinstance(curve.part, Force):
+        raise DescriptionError(
+            f"design study of {sim.scene.mechanism.name!r}",
+            f"the curve of {curve.part.name!r} has no prescribed forces or displacements",
+            "Give curves of load_displacement",
+        )
+    held = curve.unknown is Unknown.FORCE
+    return sim.load_displacement(
+        curve.part,
+        forces=None if held else curve.forces.tolist(),
+        displacements=curve.displacements.tolist() if held else None,
+        configuration=curve.configuration,
+        others=dict(curve.others),
+    )
 
 
 def _plot(path: Path, name: str, curves: Sequence[Curve], optimisation: Optimisation | None) -> None:
@@ -129,10 +178,12 @@ def _plot(path: Path, name: str, curves: Sequence[Curve], optimisation: Optimisa
     for curve in curves:
         label = "optimised" if optimisation is not None and len(curves) == 1 else curve.configuration.name
         series.append(curve.series(label, colour=colours[curve.configuration]))
-    wanted = [CurveTarget(t.displacement, t.force, colours.get(t.configuration)) for t in targets]
+    points = [point for target in targets if (point := target.on_curve)]
+    wanted = [CurveTarget(displacement, force, colours.get(place)) for force, displacement, place in points]
     across, up = curves[0].axes
     title = name if optimisation else f"{name}: initial design"
-    draw_curve(path, series, targets=wanted, xlabel=across.label, ylabel=up.label, title=title)
+    labels = {"xlabel": across.label, "ylabel": up.label, "title": title}
+    plot_curve(path, series, targets=wanted, comm=MPI.COMM_SELF, **labels)
 
 
 # -- figures ---------------------------------------------------------------------------------------------------------
@@ -150,14 +201,11 @@ def _summarise(sim: Simulation, curves: Sequence[Curve], optimisation: Optimisat
         "dofs": {"rigid": sim.model.rigid_dofs, "flexible": sim.model.flexible_dofs},
         "parameters": result and result.parameters,
         "targets": [],
-        "frames": [
-            frame | {"displacement_error": float(error)}  # the forces are prescribed
-            for frame, error in zip(_frames(curves), errors, strict=True)
-        ],
+        "frames": [f | {f"{f['unknown']}_error": float(e)} for f, e in zip(_frames(curves), errors, strict=True)],
         "seconds": {
             "setup": sim.setup_seconds,
             "frame_median": median(frame.seconds for frame in _loaded(curves)),
-            "optimise": None if optimisation is None else _seconds(optimisation),
+            "optimise": None if optimisation is None else optimisation.result.seconds,
             "phases": sim.clock.seconds,
         },
         "iterations": sum(frame.iterations for frame in _loaded(curves)) if result is None else result.iterations,
@@ -172,44 +220,39 @@ def _summarise(sim: Simulation, curves: Sequence[Curve], optimisation: Optimisat
     return summary if optimisation is None else summary | _summarise_design(optimisation)
 
 
-def _seconds(optimisation: Optimisation) -> float:
-    """The time of an optimisation, with that of the cheaper one before."""
-    return optimisation.result.seconds + (optimisation.start.seconds if optimisation.start else 0.0)
-
-
 def _summarise_design(optimisation: Optimisation) -> dict[str, object]:
     """The figures of an optimisation."""
     result = optimisation.result
-    figures = {
+    return {
         "targets": [
             {
+                "target": target.name,
                 "configuration": target.configuration,
                 "force": target.force,
+                "unit": target.unit,
+                "relation": target.relation,
                 "wanted": target.wanted,
                 "reached": target.reached,
                 "reached_error": target.finer_elements_add,
+                "corrected": target.corrected,
                 "relative_error": target.error,
+                "met": target.met,
+                "part": target.part and asdict(target.part) | {"met": target.part.met},
             }
             for target in result.targets
         ],
         "worst_error": result.worst_error,
+        "part_fidelity": result.part_fidelity,
+        "worst_part_error": result.worst_part_error,
         "verified": result.verified,
         "curvature_ratio_max": max(link.bend for link in result.links),
         "active_bounds": result.active,
         "ended": result.reason,
         "optimise_phases": result.phases,
+        "surrogate": result.surrogate,
+        "corrections": result.corrections,
         "initial_frames": _frames(optimisation.before),
     }
-    if optimisation.start is not None:
-        start = optimisation.start
-        figures["start"] = {
-            "seconds": start.seconds,
-            "iterations": start.iterations,
-            "evaluations": start.evaluations,
-            "reached": [target.reached for target in start.targets],
-            "reached_here": [target.started for target in result.targets],
-        }
-    return figures
 
 
 def _frames(curves: Sequence[Curve]) -> list[dict]:
@@ -218,6 +261,7 @@ def _frames(curves: Sequence[Curve]) -> list[dict]:
             "configuration": curve.configuration.name,
             "force": frame.force,
             "displacement": frame.displacement,
+            "unknown": "force" if curve.unknown is Unknown.FORCE else "displacement",
             "seconds": frame.seconds,
             "iterations": frame.iterations,
             "stable": frame.stable,
@@ -243,11 +287,19 @@ def _loaded(curves: Sequence[Curve]) -> list[Frame]:
 
 def _text(summary: dict, folder: Path) -> str:
     """Equilibria, targets, size of the problem and times, for the console."""
-    keys = ("configuration", "force", "displacement", "displacement_error", "stable", "iterations", "seconds")
     length, force = summary["units"]["length"], summary["units"]["force"]
-    headers = ["configuration", f"force [{force}]", f"displacement [{length}]", f"finer elements add [{length}]"]
+    units = {"displacement": length, "force": force}
+    added = ", ".join(units[unknown] for unknown in dict.fromkeys(frame["unknown"] for frame in summary["frames"]))
+    headers = ["configuration", f"force [{force}]", f"displacement [{length}]", f"finer elements add [{added}]"]
     headers += ["stable", "iterations", "seconds"]
-    lines = [format_table(headers, [[frame[key] for key in keys] for frame in summary["frames"]])]
+    rows = [
+        [
+            *(frame["configuration"], frame["force"], frame["displacement"], frame[f"{frame['unknown']}_error"]),
+            *(frame["stable"], frame["iterations"], frame["seconds"]),
+        ]
+        for frame in summary["frames"]
+    ]
+    lines = [format_table(headers, rows)]
     if summary["parameters"] is not None:
         lines += _design_text(summary)
     lines += summary["remarks"]
@@ -264,66 +316,60 @@ def _text(summary: dict, folder: Path) -> str:
 
 
 def _design_text(summary: dict) -> list[str]:
-    length, force = summary["units"]["length"], summary["units"]["force"]
-    headers = ["configuration", f"force [{force}]", *(f"{name} [{length}]" for name in ("wanted", "reached"))]
-    headers += [f"finer elements add [{length}]", "error [%]"]
+    length = summary["units"]["length"]
+    headers = ["target", "unit", "relation", "wanted", "reached", "finer elements add", "error [%]", "met"]
     rows = [
-        [t["configuration"], t["force"], t["wanted"], t["reached"], t["reached_error"], 100.0 * t["relative_error"]]
+        [
+            *(t["target"], t["unit"], t["relation"], t["wanted"], t["reached"], t["reached_error"]),
+            *(100.0 * t["relative_error"], t["met"]),
+        ]
         for t in summary["targets"]
     ]
-    start = summary.get("start")
-    if start is not None:
-        headers += [f"optimum of the start [{length}]", f"the same here [{length}]"]
-        rows = [[*row, *pair] for row, *pair in zip(rows, start["reached"], start["reached_here"], strict=True)]
+    if summary["part_fidelity"]:
+        headers += ["in the part", "finer elements add", "error there [%]"]
+        parts = [t["part"] or dict.fromkeys(("value", "finer_elements_add", "error")) for t in summary["targets"]]
+        rows = [
+            [*row, own["value"], own["finer_elements_add"], own["error"] and 100.0 * own["error"]]
+            for row, own in zip(rows, parts, strict=True)
+        ]
     (least, most), objective, error = summary["thickness"], summary["objective"], summary["objective_error"]
-    finer = "" if error is None else f", to which finer elements add {error:.2g}"
     phases, seconds = summary["optimise_phases"], summary["seconds"]["optimise"]
-    parts = ("weights", "handles", "equilibria", "gradients", "verification")
+    phase_names = ("weights", "handles", "equilibria", "gradients", "verification")
     return [
         format_table(headers, rows),
+        *([f"parts: {summary['part_fidelity']}"] if summary["part_fidelity"] else []),
         f"{summary['parameters']} parameters, {summary['iterations']} iterations, {summary['evaluations']} "
-        f"evaluations: objective {objective['initial']:.3g} -> {objective['final']:.3g}{finer} ({summary['ended']})",
+        f"evaluations: objective {objective['initial']:.3g} -> {objective['final']:.3g} "
+        f"(corrections make {error:.2g} of it; {summary['ended']})",
+        f"corrections changed by {', '.join(f'{change:.2%}' for change in summary['corrections'])} in as many rounds"
+        + (f" of a surrogate in {summary['surrogate']}" if summary["surrogate"] else ""),
         f"thickness {least:.2f} to {most:.2f} {length}, curvature ratio up to {summary['curvature_ratio_max']:.3f}, "
         f"aspect ratio of cells up to {summary['mesh_ratio_max']:.1f}; "
         f"active: {', '.join(summary['active_bounds']) or 'no bound'}",
-        f"optimisation: {seconds:.1f} s" + (f", {start['seconds']:.1f} s of it for the start" if start else ""),
-        "of the time: " + ", ".join(f"{name} {phases[name] / seconds:.0%}" for name in parts if name in phases),
+        f"optimisation: {seconds:.1f} s",
+        "of the time: " + ", ".join(f"{name} {phases[name] / seconds:.0%}" for name in phase_names if name in phases),
     ]
 
 
 def format_table(headers: Sequence[str], rows: Sequence[Sequence[object]], *, digits: int = 4) -> str:
-    """``rows`` laid out under ``headers``; numbers are right-aligned, text left.
+    """``rows`` of numbers, text, flags or None for unknown values, laid out in Markdown under ``headers``.
 
-    Args:
-        headers: (k,) column names.
-        rows: each of k cells: numbers, text, flags, or None for unknown values.
-        digits: significant digits of floats.
-
-    Returns:
-        the lines, joined, without a newline at the end.
-
-    Raises:
-        DescriptionError: a row has another number of cells.
+    Numbers are right-aligned, floats have ``digits`` significant digits. There is no newline at the end.
     """
     for index, row in enumerate(rows):
         if len(row) != len(headers):
-            raise DescriptionError(
-                f"row {index} of the table", f"{len(row)} cells for {len(headers)} columns", "Give one cell per column"
-            )
-    cells = [[_cell(cell, digits) for cell in line] for line in (headers, *rows)]
-    widths = [max(3, *(len(line[k]) for line in cells)) for k in range(len(headers))]
-    right = [bool(rows) and all(_stands_right(row[k]) for row in rows) for k in range(len(headers))]
-    rule = ["-" * (w - 1) + ":" if r else "-" * w for w, r in zip(widths, right, strict=True)]
-    return "\n".join(_line(line, widths, right) for line in (cells[0], rule, *cells[1:]))
-
-
-def _line(cells: Sequence[str], widths: Sequence[int], right: Sequence[bool]) -> str:
-    padded = [c.rjust(w) if r else c.ljust(w) for c, w, r in zip(cells, widths, right, strict=True)]
-    return "| " + " | ".join(padded) + " |"
-
-
-def _stands_right(cell: object) -> bool:
-    return cell is None or (isinstance(cell, Real) and not isinstance(cell, bool))
+            problem = f"{len(row)} cells for {len(headers)} columns"
+            raise DescriptionError(f"row {index} of the table", problem, "Give one cell per column")
+    columns = []
+    for k, header in enumerate(headers):
+        column = [_cell(cell, digits) for cell in (header, *(row[k] for row in rows))]
+        width = max(3, *map(len, column))
+        if rows and all(row[k] is None or (isinstance(row[k], Real) and not isinstance(row[k], bool)) for row in rows):
+            column = [cell.rjust(width) for cell in (column[0], "-" * (width - 1) + ":", *column[1:])]
+        else:
+            column = [cell.ljust(width) for cell in (column[0], "-" * width, *column[1:])]
+        columns.append(column)
+    return "\n".join(f"| {' | '.join(line)} |" for line in zip(*columns, strict=True))
 
 
 def _cell(cell: object, digits: int) -> str:
@@ -335,4 +381,6 @@ def _cell(cell: object, digits: int) -> str:
         return str(int(cell))
     if isinstance(cell, Real):
         return f"{float(cell):.{digits}g}"
+    if isinstance(cell, tuple | list):
+        return f"({', '.join(_cell(own, digits) for own in cell)})"
     return str(cell).replace("|", "\\|").replace("\n", " ")

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import sympy
+from sympy import Symbol
 
 
 @dataclass(frozen=True)
@@ -20,34 +21,20 @@ class SmoothFunction:
 
     Every function takes the variables (n,) and the constants (k,). With ``many`` points at once every array has
     a leading axis, of the points.
-
-    Attributes:
-        size: m.
-        value: f, (m,).
-        gradient: ∂f/∂x, (m, n).
-        hessian: takes weights w (m,) last; Σ_k w_k ∂²f_k/∂x², (n, n).
     """
 
-    size: int
-    value: Callable[..., np.ndarray]
-    gradient: Callable[..., np.ndarray]
-    hessian: Callable[..., np.ndarray]
+    size: int  # m
+    value: Callable[..., np.ndarray]  # f, (m,)
+    gradient: Callable[..., np.ndarray]  # ∂f/∂x, (m, n)
+    hessian: Callable[..., np.ndarray]  # takes weights w (m,) last; Σ_k w_k ∂²f_k/∂x², (n, n)
 
 
 def derive(
-    formulae: Sequence[sympy.Expr],
-    variables: Sequence[sympy.Symbol],
-    constants: Sequence[sympy.Symbol],
-    *,
-    many: bool = False,
+    formulae: Sequence[sympy.Expr], variables: Sequence[Symbol], constants: Sequence[Symbol], *, many: bool = False
 ) -> SmoothFunction:
-    """Compiles ``formulae``, their gradients and their Hessians.
+    """Compiles f(x; c), one formula per component, with its gradients and Hessians.
 
-    Args:
-        formulae: f, one expression per component.
-        variables: x; the names x0, x1, … are reserved for common subexpressions.
-        constants: c.
-        many: whether the function is for many points at once; it is fastest for one point otherwise.
+    The names x0, x1, … are reserved for common subexpressions. Without ``many`` it is for one point, and fastest there.
     """
     n, m = len(variables), len(formulae)
     weights = sympy.symbols(f"w0:{m}", real=True)
@@ -68,19 +55,13 @@ def derive(
     )
 
 
-def _at_one_point(expressions: list[sympy.Expr], arguments: tuple, shape: tuple[int, ...]) -> Callable[..., np.ndarray]:
+def _at_one_point(expressions: list[sympy.Expr], arguments: tuple, shape: tuple) -> Callable[..., np.ndarray]:
     # plain floats are several times faster than arrays of no dimension
     formula = _lambdify(arguments, expressions, "math")
-
-    def evaluate(*point: np.ndarray) -> np.ndarray:
-        return np.array(formula(*[numbers.tolist() for numbers in point]), dtype=float).reshape(shape)
-
-    return evaluate
+    return lambda *point: np.array(formula(*[numbers.tolist() for numbers in point]), dtype=float).reshape(shape)
 
 
-def _at_many_points(
-    expressions: list[sympy.Expr], arguments: tuple, shape: tuple[int, ...]
-) -> Callable[..., np.ndarray]:
+def _at_many_points(expressions: list[sympy.Expr], arguments: tuple, shape: tuple) -> Callable[..., np.ndarray]:
     formula = _lambdify(arguments, expressions, "numpy")
 
     def evaluate(*points: np.ndarray) -> np.ndarray:

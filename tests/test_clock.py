@@ -2,15 +2,15 @@
 
 import pytest
 
-from fenicsmech import clock as module
-from fenicsmech.clock import Clock
+from fenicsmech import log
+from fenicsmech.log import Clock
 
 
 @pytest.fixture
 def wait(monkeypatch):
     """Lets time pass, and nothing else does."""
     now = [0]
-    monkeypatch.setattr(module, "perf_counter", lambda: now[0])
+    monkeypatch.setattr(log, "perf_counter", lambda: now[0])
 
     def wait(seconds: int) -> None:
         now[0] += seconds

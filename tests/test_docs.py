@@ -95,15 +95,16 @@ def test_every_module_of_the_theory_stands_on_one_page():
     folders = (
         "equilibrium",
         "continuation",
-        "laws",
         "elasticity",
         "effects",
         "joints",
         "multibody",
+        "quantities",
         "estimates",
         "design",
     )
-    files = (file for folder in folders for file in (ROOT / "fenicsmech" / folder).rglob("*.py"))
+    files = [file for folder in folders for file in (ROOT / "fenicsmech" / folder).rglob("*.py")]
+    files.append(ROOT / "fenicsmech" / "laws.py")
     modules = {".".join(file.relative_to(ROOT).with_suffix("").parts) for file in files if file.stem != "__init__"}
     listed = [
         name

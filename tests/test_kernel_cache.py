@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from fenicsmech.kernel_cache import compiling
+from fenicsmech.compat import compiling
 
 # compiles for ever
 BUSY = """
 import sys, time
 from pathlib import Path
-from fenicsmech.kernel_cache import compiling
+from fenicsmech.compat import compiling
 folder = Path(sys.argv[1])
 with compiling(folder):
     (folder / "libffcx_forms_busy.c").touch()
@@ -45,7 +45,7 @@ def test_a_form_is_left_to_the_process_that_compiles_it_until_that_is_killed(tmp
 def visit(folder: Path) -> list[str]:
     """The sources that another process finds as it begins to compile."""
     code = (
-        "import sys; from pathlib import Path; from fenicsmech.kernel_cache import compiling\n"
+        "import sys; from pathlib import Path; from fenicsmech.compat import compiling\n"
         "with compiling(Path(sys.argv[1])): print(*sorted(path.name for path in Path(sys.argv[1]).glob('*.c')))"
     )
     found = subprocess.run([sys.executable, "-c", code, folder], capture_output=True, text=True, check=True)

@@ -3,7 +3,7 @@ import io
 import pytest
 
 from fenicsmech.errors import DescriptionError
-from fenicsmech.log import Progress, Silent
+from fenicsmech.log import Progress
 
 
 class Clock:
@@ -75,6 +75,18 @@ def test_fractions_and_an_unknown_total_are_shown():
     assert stream.getvalue() == "load: 0.5/2.5  1:30 min, 6:00 min left\n"
 
 
+def test_tasks_within_another_one_are_not_shown():
+    outer, inner = io.StringIO(), io.StringIO()
+    with Progress(2, "search", outer) as search:
+        with Progress(1, "design", inner) as design:
+            design.update(1)
+        search.update(2)
+    with Progress(1, "design", inner) as design:
+        assert inner.getvalue() == ""
+        design.update(1)
+    assert "search: 2/2" in outer.getvalue() and inner.getvalue().count("design: 1/1") == 1
+
+
 def test_the_error_stream_is_the_default(capsys):
     with Progress(1, "frames") as progress:
         progress.update(1)
@@ -82,8 +94,8 @@ def test_the_error_stream_is_the_default(capsys):
     assert captured.out == "" and captured.err.startswith("frames: 1/1")
 
 
-def test_silent_takes_the_same_calls_and_shows_nothing(capsys):
-    with Silent() as progress:
+def test_other_processes_make_the_same_calls_and_show_nothing(capsys):
+    with Progress(1, "frames", shown=False) as progress:
         progress.update(1, "note")
     progress.close()
     assert capsys.readouterr() == ("", "")

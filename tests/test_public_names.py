@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import re
 import typing
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import fenicsmech as fm
 
@@ -26,11 +28,12 @@ INNER = {
     "InterfaceMap",
     "Iterate",
     "JointSystem",
-    "LeastSquaresProblem",
+    "Problem",
     "LinearSolver",
     "Linearisation",
     "MechanismModel",
-    "Newton",
+    "NewtonSolver",
+    "Observable",
     "Panel",
     "ParametricShape",
     "PointLoad",
@@ -72,3 +75,8 @@ def classes(hint: object) -> Iterator[type]:
 def test_what_signatures_name_is_public():
     named = {found for public in PUBLIC for hint in hints(public) for found in classes(hint)}
     assert {found.__name__ for found in named if found not in PUBLIC} == INNER
+
+
+def test_every_public_name_stands_under_one_theme_of_the_api_page():
+    page = (Path(__file__).parents[1] / "docs" / "api.md").read_text()
+    assert sorted(re.findall(r"^\.\. (?:auto\w+|py:data):: (\w+)$", page, flags=re.M)) == sorted(fm.__all__)

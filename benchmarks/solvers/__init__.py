@@ -1,4 +1,4 @@
-"""Other solvers of equilibria, to compare the default one with: they implement ``EquilibriumSolver`` from outside.
+"""Other methods for equilibria, to compare the default one with: they implement ``EquilibriumMethod`` from outside.
 
 - ``augmented_lagrangian``: the method of the article, by Nocedal and Wright
 - ``kkt_newton``: Newton's method on the KKT equations, nothing else

@@ -18,7 +18,7 @@ import numpy as np
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.equilibrium import EquilibriumPoint, EquilibriumSolver, Iteration, LoadControl, NotConverged
+from fenicsmech.equilibrium import EquilibriumMethod, EquilibriumPoint, EquilibriumSolver, LoadControl, NotConverged
 from fenicsmech.report import format_table
 
 from ..mechanisms import mechanism
@@ -58,15 +58,15 @@ class Count:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Counted(EquilibriumSolver):
-    """Another solver, counted."""
+class Counted(EquilibriumMethod):
+    """Another method, counted."""
 
-    solver: EquilibriumSolver
+    method: EquilibriumMethod
     count: Count = field(default_factory=Count)
 
-    def on(self, system) -> Iteration:
-        iteration = self.solver.on(system)
-        solve = iteration.solve
+    def solver(self, system) -> EquilibriumSolver:
+        bound = self.method.solver(system)
+        solve = bound.solve
 
         def counted(*arguments, **options) -> EquilibriumPoint:
             if perf_counter() > self.count.deadline:
@@ -80,8 +80,8 @@ class Counted(EquilibriumSolver):
             self.count.iterations += solution.iterations
             return solution
 
-        iteration.solve = counted
-        return iteration
+        bound.solve = counted
+        return bound
 
 
 Run = Callable[[], list[float]]  # solves a case, returns the displacements it found
@@ -109,15 +109,15 @@ def at_once(scene, force, load, *, size, space="plane-stress", seeds=(None,)):
     def prepare(solver) -> Run:
         sim = fm.Simulation(scene, space=space, size=size, solver=solver)
         rest = sim.load_displacement(force, forces=[0.0]).frames[0].state
-        iteration = sim.newton(force)
+        bound = sim.solver(force)
 
         def run():
             found = []
             for seed in seeds:
                 start = rest if seed is None else disturbed(sim, rest, load, seed)
-                state = iteration.solve(start, LoadControl(load)).state
+                state = bound.solve(start, LoadControl(load)).state
                 sim.model.load(state)
-                found.append(iteration.system.load_displacement(state))
+                found.append(bound.system.load_displacement(state))
             return found
 
         return run
@@ -261,7 +261,7 @@ def measure(name, prepare, limit):
     """One row of the table; no run takes longer than ``limit`` seconds."""
     runs, seconds, counts, found, ends = {}, {}, {}, {}, {}
     for solver, options in SOLVERS.items():
-        counted = Counted(solver=options)
+        counted = Counted(method=options)
         counted.count.start(COMPILING + limit)
         with judged(ends, solver, limit):
             runs[solver] = counted, prepare(counted)

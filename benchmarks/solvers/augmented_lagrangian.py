@@ -30,10 +30,10 @@ import numpy as np
 from fenicsmech.equilibrium import (
     Border,
     Control,
+    EquilibriumMethod,
     EquilibriumPoint,
     EquilibriumSolver,
     EquilibriumSystem,
-    Iteration,
     NotConverged,
     Residual,
     State,
@@ -49,7 +49,7 @@ _ROUNDING = 1e-10  # of L_A: a change below this says nothing
 
 
 @dataclass(frozen=True, kw_only=True)
-class AugmentedLagrangian(EquilibriumSolver):
+class AugmentedLagrangian(EquilibriumMethod):
     """Minimisation of augmented Lagrangians by Newton's method, multipliers updated between.
 
     Attributes:
@@ -62,7 +62,7 @@ class AugmentedLagrangian(EquilibriumSolver):
     penalty: float = 10.0
     growth: float = 100.0
 
-    def on(self, system: EquilibriumSystem) -> AugmentedLagrangianIteration:
+    def solver(self, system: EquilibriumSystem) -> AugmentedLagrangianSolver:
         if system.blocks.pressures.size:
             raise DescriptionError(
                 "solver",
@@ -70,16 +70,19 @@ class AugmentedLagrangian(EquilibriumSolver):
                 "has a maximum",
                 "Give formulation=DisplacementFormulation(), or use PrimalDualNewton()",
             )
-        return AugmentedLagrangianIteration(system, self)
+        return AugmentedLagrangianSolver(system, self)
 
 
-class AugmentedLagrangianIteration(Iteration):
-    """The iteration, with the linear solver it keeps between solves."""
+class AugmentedLagrangianSolver(EquilibriumSolver):
+    """The solver, with the linear solver it keeps between solves."""
 
     options: AugmentedLagrangian
 
     def iterate(self, start: State, control: Control) -> EquilibriumPoint:
         system, options, minimum_shift = self.system, self.options, start.minimum_shift
+        if control.along_path:
+            problem = "the augmented Lagrangian method corrects no arc-length steps"
+            raise DescriptionError("solver", problem, "Follow paths with PrimalDualNewton()")
         state = start
         penalty = options.penalty
         omega, eta = 1.0 / penalty, penalty**-0.1

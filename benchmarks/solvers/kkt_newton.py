@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 from fenicsmech.equilibrium import (
     Control,
+    EquilibriumMethod,
     EquilibriumPoint,
     EquilibriumSolver,
     EquilibriumSystem,
-    Iteration,
     NotConverged,
     Residual,
     State,
@@ -29,7 +29,7 @@ _HALVINGS = 20
 
 
 @dataclass(frozen=True, kw_only=True)
-class KKTNewton(EquilibriumSolver):
+class KKTNewton(EquilibriumMethod):
     """Newton's method on the KKT equations, nothing else.
 
     Attributes:
@@ -40,12 +40,12 @@ class KKTNewton(EquilibriumSolver):
     iterations: int = 25
     backtracking: bool = False
 
-    def on(self, system: EquilibriumSystem) -> KKTIteration:
-        return KKTIteration(system, self)
+    def solver(self, system: EquilibriumSystem) -> KKTNewtonSolver:
+        return KKTNewtonSolver(system, self)
 
 
-class KKTIteration(Iteration):
-    """The iteration, with the linear solver it keeps between solves."""
+class KKTNewtonSolver(EquilibriumSolver):
+    """The solver, with the linear solver it keeps between solves."""
 
     options: KKTNewton
 
@@ -66,10 +66,9 @@ class KKTIteration(Iteration):
             x = self.try_solve(residual.vector, self.step_accuracy(residual))
             if x is None:
                 raise NotConverged("the linear solver stalled", iteration)
-            x.scale(-1.0)
-            before = residual.norm
+            step, before = self.newton_step(x, state, control, residual), residual.norm
             try:
-                state, residual = self._advance(state, control, system.unknowns.step(x), residual, iteration)
+                state, residual = self._advance(state, control, step, residual, iteration)
             except NotConverged as failure:
                 return self.accept_best(*best, control, residuals, failure)
             if residual.norm < best[1].norm:

@@ -15,13 +15,14 @@ from petsc4py import PETSc
 
 from fenicsmech.equilibrium import (
     Control,
+    EquilibriumMethod,
     EquilibriumPoint,
     EquilibriumSolver,
     EquilibriumSystem,
-    Iteration,
     NotConverged,
     State,
 )
+from fenicsmech.errors import DescriptionError
 
 _PREFIX = "fenicsmech_"
 _FIRST_RADIUS = 0.1  # of the trust region: mean motion over the mechanism's length
@@ -42,7 +43,7 @@ class Globalisation(Enum):
 
 
 @dataclass(frozen=True, kw_only=True)
-class SNES(EquilibriumSolver):
+class SNES(EquilibriumMethod):
     """Newton's method of PETSc's SNES on the KKT equations.
 
     Attributes:
@@ -53,16 +54,20 @@ class SNES(EquilibriumSolver):
     iterations: int = 50
     globalisation: Globalisation = Globalisation.BACKTRACKING
 
-    def on(self, system: EquilibriumSystem) -> SNESIteration:
-        return SNESIteration(system, self)
+    def solver(self, system: EquilibriumSystem) -> SNESSolver:
+        return SNESSolver(system, self)
 
 
-class SNESIteration(Iteration):
-    """The iteration, with the linear solver it keeps between solves."""
+class SNESSolver(EquilibriumSolver):
+    """The solver, with the linear solver it keeps between solves."""
 
     options: SNES
 
     def iterate(self, start: State, control: Control) -> EquilibriumPoint:
+        if control.along_path:
+            raise DescriptionError(
+                "solver", "SNES corrects no arc-length steps", "Follow paths with PrimalDualNewton()"
+            )
         equations = _Equations(self, start, control)
         if self.converged(equations.residual):  # there is nothing that a line search could lower
             equations.test(None, 0, (0.0, 0.0, equations.residual.norm))
@@ -112,8 +117,8 @@ class _Equations:
         norm: of the last iterate's residual.
     """
 
-    def __init__(self, iteration: SNESIteration, base: State, control: Control) -> None:
-        self._iteration, self._system, self._base = iteration, iteration.system, base
+    def __init__(self, solver: SNESSolver, base: State, control: Control) -> None:
+        self._solver, self._system, self._base = solver, solver.system, base
         self._control = control
         self.state, self.residual = base, self._system.residual(base, control)
         self._system.linearise(base, control, self.residual)
@@ -151,19 +156,19 @@ class _Equations:
     def test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
         """Convergence as the other solvers see it."""
         before, self.norm = self.norm, self.residual.norm
-        self.residuals.append(self._iteration.relative(self.residual))
+        self.residuals.append(self._solver.relative(self.residual))
         if not math.isfinite(norms[2]):
             return PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
-        if iteration > 0 and self._iteration.converged(self.residual, before):
+        if iteration > 0 and self._solver.converged(self.residual, before):
             return PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE
         return PETSc.SNES.ConvergedReason.ITERATING
 
     def setUp(self, pc: PETSc.PC) -> None:
-        self.factored = self._iteration.factor(self._base.minimum_shift)
+        self.factored = self._solver.factor(self._base.minimum_shift)
 
     def apply(self, pc: PETSc.PC, right: PETSc.Vec, x: PETSc.Vec) -> None:
-        accuracy = self._iteration.step_accuracy(self.residual)
-        solution = self._iteration.try_solve(right, accuracy) if self.factored else None
+        accuracy = self._solver.step_accuracy(self.residual)
+        solution = self._solver.try_solve(right, accuracy) if self.factored else None
         if solution is None:
             x.set(math.nan)
         else:

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
-from fenicsmech.checks import positive
 from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRAIN, PLANE_STRESS, SPATIAL, ElasticModel, Quadrature
 from fenicsmech.equilibrium import PrimalDualNewton
+from fenicsmech.errors import positive
 from fenicsmech.mechanism import Scene
 from fenicsmech.model import check_scene, fits
 

@@ -10,10 +10,9 @@ from time import perf_counter
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fenicsmech.checks import finite
 from fenicsmech.elasticity import Quadrature
 from fenicsmech.equilibrium import PrimalDualNewton
-from fenicsmech.errors import DescriptionError, FenicsmechError
+from fenicsmech.errors import DescriptionError, FenicsmechError, finite, set_fields
 from fenicsmech.mechanism import DRAWN, Configuration, FlexibleLink, Force, Scene
 from fenicsmech.multibody import assemble, build_linkage
 from fenicsmech.simulation import Simulation
@@ -43,7 +42,7 @@ class Quantity:
 
     def __post_init__(self) -> None:
         part = f"load of {self.part.name!r}"
-        object.__setattr__(self, "load", finite(part, self.load))
+        set_fields(self, load=finite(part, self.load))
         if self.load == 0.0:
             raise DescriptionError(part, "it is zero: nothing would move", "Give another magnitude")
 

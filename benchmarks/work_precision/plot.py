@@ -12,8 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import ArrayLike, NDArray
 
-from fenicsmech.checks import real_array
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, real_array, set_fields
 from fenicsmech.plot import INK, PALETTE, Labels, Spot, house_style, new_figure, open_frame, save_png, text_size
 
 _MARKERS = ("o", "s", "^", "D", "v", "P")
@@ -56,8 +55,7 @@ class WorkSeries:
             raise DescriptionError(part, "seconds or errors have no logarithm", "Give positive ones")
         if len(self.names) != len(seconds):
             raise DescriptionError(part, f"{len(self.names)} names for {len(seconds)} points", "Give one per point")
-        object.__setattr__(self, "seconds", seconds)
-        object.__setattr__(self, "errors", errors)
+        set_fields(self, seconds=seconds, errors=errors)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from mpi4py import MPI
 
 from fenicsmech.elasticity import SPATIAL, ElasticModel
 from fenicsmech.errors import DescriptionError
-from fenicsmech.log import Progress, Silent
+from fenicsmech.log import Progress
 from fenicsmech.mechanism import FlexibleLink, Scene
 
 from .extrapolation import Limit, extrapolate
@@ -160,7 +160,7 @@ def run_study(
         )
     done: list[Measurement] = []
     label = f"levels of {scene.mechanism.name}"
-    with Progress(len(levels), label) if comm.rank == 0 else Silent() as progress:
+    with Progress(len(levels), label, shown=comm.rank == 0) as progress:
         for level in levels:
             expected = _expected_seconds(level, done)
             if expected is not None and expected > longest:

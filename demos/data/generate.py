@@ -1,4 +1,4 @@
-"""Makes the synthetic measurements of the samples: cubic elements on a finer mesh than the fit's, and noise.
+"""Makes the synthetic measurements of the specimens: cubic elements on a finer mesh than the fit's, and noise.
 
 python3 demos/data/generate.py
 """
@@ -16,7 +16,7 @@ from fenicsmech.files import write_csv
 
 LARGEST = {1.0: 0.225, 2.0: 1.75}  # N
 READINGS = 12
-NOISE = 0.007  # standard deviation of a displacement, relative to the sample's largest
+NOISE = 0.007  # standard deviation of a displacement, relative to the specimen's largest
 SEED = 20
 
 

@@ -1,5 +1,6 @@
 """Continuation of paths of equilibria: prediction, correction by an equilibrium solver, step control.
 
+- ``stepper``: a step along a path: prediction, correction, acceptance
 - ``load_steps``: natural continuation, past dead centres of motors too
 - ``arc_length``: arc-length continuation, past limit points and folds
 - ``critical``: limit points, turning points and bifurcations, and the paths that cross there
@@ -9,16 +10,8 @@
 from fenicsmech.continuation.arc_length import ArcLengthTracer, ArcSteps, Finish
 from fenicsmech.continuation.critical import Critical, CriticalPoint, Sense, crossing, locate, null_space
 from fenicsmech.continuation.eigen import Mode, critical_changes, softest_modes
-from fenicsmech.continuation.load_steps import (
-    Constant,
-    Hermite,
-    LoadStepper,
-    LoadSteps,
-    LoadStepsFailed,
-    MotorStepper,
-    Predictor,
-    Tangent,
-)
+from fenicsmech.continuation.load_steps import LoadStepper, LoadSteps, LoadStepsFailed, MotorStepper
+from fenicsmech.continuation.stepper import Constant, Hermite, Predictor, Tangent
 
 __all__ = [
     "ArcLengthTracer",

@@ -1,10 +1,7 @@
 """Arc-length continuation: steps along a path that may turn back in load and in displacement.
 
-An equilibrium is predicted along the tangent and its curvature, corrected in a plane across the path, and accepted if
-the path turns little enough; steps are as long as its curvature allows. With the tangents y′ by arc length at the last
-two points and the step h,
-
-    y = y₁ + h y₁′ + ½ h² (y₁′ − y₀′) / |y₁ − y₀|,      ⟨y₁′, y₂ − y⟩ = 0.
+An equilibrium is predicted along the tangent y′ and its curvature, corrected in the plane ⟨y₁′, y₂ − y⟩ = 0 through the
+prediction y, and accepted if the path turns little enough; steps are as long as its curvature allows.
 
 Sources: Riks (doi:10.1016/0020-7683(79)90081-7), Crisfield (doi:10.1016/0045-7949(81)90108-5).
 """
@@ -15,20 +12,20 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from fenicsmech.checks import positive
+from fenicsmech.continuation.stepper import Parabola, Stepper, on_cubic
 from fenicsmech.equilibrium import (
     ArcLengthControl,
     ArcMetric,
+    DisplacementControl,
     EquilibriumPoint,
-    Iteration,
+    EquilibriumSolver,
     LoadControl,
     MotorControl,
     NotConverged,
     State,
     Step,
-    mean_product,
 )
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, positive
 from fenicsmech.log import logger
 
 _log = logger(__name__)
@@ -72,14 +69,7 @@ class ArcSteps:
 
 @dataclass(frozen=True)
 class Finish:
-    """A value of some quantity at which a path ends.
-
-    Attributes:
-        value: of the quantity at a point.
-        rate: of the quantity along the path at a point.
-        target: where the path ends.
-        scale: of the quantity.
-    """
+    """A quantity whose ``target`` ends a path: its value at a point, its rate along the path there, and its scale."""
 
     value: Callable[[EquilibriumPoint], float]
     rate: Callable[[EquilibriumPoint], float]
@@ -92,7 +82,7 @@ class Finish:
         return a * b < 0.0 or (b == 0.0 and a != 0.0)
 
 
-class ArcLengthTracer:
+class ArcLengthTracer(Stepper):
     """Steps along the path through one equilibrium.
 
     Distances are in units of the arc on which a linear mechanism reaches ``value`` or ``conjugate``.
@@ -116,7 +106,7 @@ class ArcLengthTracer:
 
     def __init__(
         self,
-        solver: Iteration,
+        solver: EquilibriumSolver,
         followed: LoadControl | MotorControl,
         state: State,
         *,
@@ -124,20 +114,19 @@ class ArcLengthTracer:
         value: float | None,
         conjugate: float | None,
     ) -> None:
-        self.solver, self.system, self.followed, self.steps = solver, solver.system, followed, steps
+        system, self.followed, self.steps, self.length = solver.system, followed, steps, steps.first
         self._conjugate_reference = conjugate or math.inf
-        self.length = steps.first
-        self._before: EquilibriumPoint | None = None
-        at = solver.linearise(state, followed.at(followed.value(self.system, state)))
+        at = solver.linearise(state, followed.at(followed.value(system, state)))
         point = at.point((solver.relative(at.residual),), 0)
-        speed, motion = abs(point.conjugate_rate), math.sqrt(mean_product(self.system, point.tangent, point.tangent))
-        if not followed.moves(self.system, point.tangent) or not (followed.displaces or value or speed > 0.0):
+        speed, motion = abs(point.conjugate_rate), math.sqrt(system.mean_product(point.tangent, point.tangent))
+        if not followed.moves(system, point.tangent) or not (followed.displaces or value or speed > 0.0):
             raise NotConverged("it moves nothing")
         reach = min(abs(value) if value else math.inf, abs(conjugate) / speed if conjugate and speed else math.inf)
         if math.isinf(reach):
             reach = 0.01 / motion  # of the mechanism's length, or rad: of interest if nothing else is said
-        self.metric = ArcMetric(self.system, followed, reach * motion, reach, reach * speed or math.inf)
+        self.metric = ArcMetric(system, followed, reach * motion, reach, reach * speed or math.inf)
         self.start = point.scaled(1.0 / self.metric.norm(point.tangent))
+        super().__init__(solver, Parabola(self.metric, steps.turn))
 
     # -- points ------------------------------------------------------------------------------------------------
 
@@ -152,17 +141,11 @@ class ArcLengthTracer:
     def correct(self, guess: State, normal: Step, near: EquilibriumPoint) -> EquilibriumPoint:
         """The equilibrium in the plane through ``guess`` across ``normal``, its tangent oriented along that.
 
-        Args:
-            guess: a state near it.
-            normal: of the plane.
-            near: an equilibrium nearby, which decides which value is held.
-
-        Raises:
-            NotConverged: there is none near.
+        Solves hold what changes more along the path at ``near``, an equilibrium nearby.
         """
         return self.solver.solve(guess, ArcLengthControl(0.0, self.metric, guess, normal, self.held(near)))
 
-    def held(self, near: EquilibriumPoint):
+    def held(self, near: EquilibriumPoint) -> LoadControl | DisplacementControl | MotorControl:
         """The control that leaves K regular: whichever value changes more along the path at ``near``."""
         conjugate = abs(near.conjugate_rate) / self.metric.conjugate
         if self.followed.opposite and conjugate > abs(self.value_rate(near)) / self.metric.value:
@@ -178,80 +161,50 @@ class ArcLengthTracer:
         return self.metric.dot(start.tangent, self.chord(start, end))
 
     def between(self, start: EquilibriumPoint, end: EquilibriumPoint, distance: float) -> EquilibriumPoint:
-        """The equilibrium ``distance`` ahead of ``start``, which lies before ``end`` on the same piece of the path.
-
-        It is predicted on the cubic through both ends, with the rates by the distance,
-
-            y = y₀ + t² (3 − 2 t) (y₁ − y₀) + w t (1 − t)² y₀′ − w t² (1 − t) y₁′.
-
-        Raises:
-            NotConverged: the cubic does not lead there.
-        """
+        """The equilibrium ``distance`` ahead of ``start``, predicted on the cubic from there to ``end``."""
         width = self.along(start, end)
-        t = distance / width
-        slope = self.metric.dot(start.tangent, end.tangent)
-        ahead = (
-            self.chord(start, end).scaled(t * t * (3.0 - 2.0 * t))
-            + start.tangent.scaled(width * t * (1.0 - t) ** 2)
-            + end.tangent.scaled(-width * t * t * (1.0 - t) / slope)
-        )
-        return self.correct(self.system.moved(start.state, ahead), start.tangent, start)
+        # the rate of the end by the distance along the start's tangent
+        rate = end.tangent.scaled(1.0 / self.metric.dot(start.tangent, end.tangent))
+        guess = on_cubic(self.system, (start.state, end.state), (start.tangent, rate), width, distance / width)
+        return self.correct(guess, start.tangent, start)
 
     # -- steps -------------------------------------------------------------------------------------------------
-
-    def advance(self, point: EquilibriumPoint) -> EquilibriumPoint:
-        """The next point of the path, as far ahead as its curvature allows.
-
-        Raises:
-            NotConverged: not even the shortest step succeeded.
-        """
-        steps, longest = self.steps, self._longest(point)
-        self.length = min(self.length, longest)
-        while True:
-            reason = "the path bends too sharply, or another one is too near"
-            try:
-                found = self.correct(self._guess(point), point.tangent, point)
-                turn = self._turn(point, found)
-                _log.debug("arc %.2e: turn %.2f, %d iterations", self.length, turn, found.iterations)
-                if turn <= steps.largest_turn:
-                    ease = min(steps.turn / max(turn, 1e-12), math.sqrt(steps.iterations / found.iterations))
-                    self.length *= min(max(ease, 0.5), 2.0)
-                    self._before = point
-                    return found
-            except NotConverged as failure:
-                reason = str(failure)
-            self.length *= 0.5
-            if self.length < steps.smallest * min(longest / steps.largest, 1.0):
-                raise NotConverged(reason)
 
     def follow(
         self, start: EquilibriumPoint, finishes: Sequence[Finish], *, most: int
     ) -> Iterator[tuple[EquilibriumPoint, EquilibriumPoint]]:
-        """Both ends of each step along the path from ``start`` until a finish is passed, or of ``most`` steps.
-
-        Raises:
-            NotConverged: the path cannot be followed further.
-        """
-        point = start
+        """Both ends of each step from ``start`` until a finish is passed, or of ``most`` steps."""
+        self._points = [start]
         for _ in range(most):
-            following = self.advance(point)
+            point, following = self._points[-1], self._advance()
             ends = [self._end(point, following, finish) for finish in finishes if finish.passed(point, following)]
             if ends:
                 following = min(ends, key=lambda end: self.along(point, end))
             yield point, following
             if ends:
                 return
-            point = following
 
-    def _guess(self, point: EquilibriumPoint) -> State:
-        """Prediction along the tangent, and along the curvature if that bends it little."""
-        ahead, before = point.tangent.scaled(self.length), self._before
-        if before is not None:
-            width = self.metric.norm(self.chord(before, point))
-            bend = point.tangent + before.tangent.scaled(-1.0)
-            if width > 0.0 and self.length * self.metric.norm(bend) <= 2.0 * self.steps.turn * width:
-                ahead = ahead + bend.scaled(0.5 * self.length**2 / width)
-        return self.system.moved(point.state, ahead)
+    def _advance(self) -> EquilibriumPoint:
+        """The next point of the path, as far ahead as its curvature allows."""
+        steps, point = self.steps, self._points[-1]
+        longest = self._longest(point)
+        self.length = min(self.length, longest)
+        while True:
+            reason = "the path bends too sharply, or another one is too near"
+            try:
+                found = self.correct(self._predict(self.length), point.tangent, point)
+                turn = self._turn(point, found)
+                _log.debug("arc %.2e: turn %.2f, %d iterations", self.length, turn, found.iterations)
+                if turn <= steps.largest_turn:
+                    growth = min(steps.turn / max(turn, 1e-12), math.sqrt(steps.iterations / found.iterations))
+                    self.length *= min(max(growth, 0.5), 2.0)
+                    self._accept(found, self.metric.norm(self.chord(point, found)))
+                    return found
+            except NotConverged as failure:
+                reason = str(failure)
+            self.length *= 0.5
+            if self.length < steps.smallest * min(longest / steps.largest, 1.0):
+                raise NotConverged(reason)
 
     def _longest(self, point: EquilibriumPoint) -> float:
         """The longest arc within the limits on the value, its conjugate and motions."""

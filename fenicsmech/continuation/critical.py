@@ -34,7 +34,7 @@ import numpy as np
 
 from fenicsmech.continuation.arc_length import ArcLengthTracer
 from fenicsmech.continuation.eigen import softest_modes
-from fenicsmech.equilibrium import EquilibriumPoint, EquilibriumSystem, Linearisation, NotConverged, Step
+from fenicsmech.equilibrium import EquilibriumPoint, Linearisation, NotConverged, Step
 from fenicsmech.log import logger
 
 _log = logger(__name__)
@@ -90,8 +90,8 @@ def null_space(path: ArcLengthTracer, critical: CriticalPoint) -> list[Step]:
 
     As many vectors as modes change their stability there.
     """
-    modes = softest_modes(path.solver, path.followed, critical.point.state, count=critical.modes)
-    return [mode.step for mode in modes]
+    found = softest_modes(path.solver, path.followed, critical.point.state, count=critical.modes)
+    return [mode.step for mode in found]
 
 
 def crossing(path: ArcLengthTracer, critical: CriticalPoint, mode: Step, sense: Sense) -> EquilibriumPoint:
@@ -119,7 +119,7 @@ def crossing(path: ArcLengthTracer, critical: CriticalPoint, mode: Step, sense: 
 
 
 @dataclass(frozen=True)
-class _Sample:
+class _PiecePoint:
     """A point of a piece, its distance along it, and the stiffness of its softest mode."""
 
     distance: float
@@ -128,25 +128,29 @@ class _Sample:
 
 
 class _Piece:
-    """A step of the path."""
+    """A step of the path, with the softest mode found last."""
 
     def __init__(self, path: ArcLengthTracer, before: EquilibriumPoint, after: EquilibriumPoint) -> None:
         self.path, self.before, self.after = path, before, after
         self.width = path.along(before, after)
         self.course = path.metric.unit(path.chord(before, after))
-        self._mode = _SoftestMode(path.system)
+        self._mask = path.system.unknowns.coordinates_mask()
+        self._mode = self._mask.duplicate()
+        # without symmetry, so that it has a component in every mode
+        self._mode.array_w[:] = np.random.default_rng(path.system.comm.rank).standard_normal(self._mode.local_size)
 
-    def ends(self) -> tuple[_Sample, _Sample]:
-        """Samples at both ends."""
-        samples, held = [], self.path.held(self.before)
-        for distance, point in ((0.0, self.before), (self.width, self.after)):
-            self.path.system.load(point.state)
-            control = held.at(held.value(self.path.system, point.state))
-            at = self.path.solver.linearise(point.state, control)
-            samples.append(_Sample(distance, point, self._mode.stiffness(at)))
-        return samples[0], samples[1]
+    def ends(self) -> tuple[_PiecePoint, _PiecePoint]:
+        """Both ends."""
+        path, held = self.path, self.path.held(self.before)
 
-    def at(self, distance: float) -> _Sample:
+        def end(distance: float, point: EquilibriumPoint) -> _PiecePoint:
+            path.system.load(point.state)
+            at = path.solver.linearise(point.state, held.at(held.value(path.system, point.state)))
+            return _PiecePoint(distance, point, self._stiffness(at))
+
+        return end(0.0, self.before), end(self.width, self.after)
+
+    def at(self, distance: float) -> _PiecePoint:
         """The equilibrium ``distance`` along the step, unless it deviates from the step by more than ``distance``.
 
         Meshes without a column's symmetry turn its bifurcation into two paths that pass each other closely; points
@@ -156,34 +160,22 @@ class _Piece:
         chord = self.path.chord(self.before, point)
         ahead = metric.dot(chord, self.course)
         if metric.norm(chord + self.course.scaled(-ahead)) > ahead:
-            raise NotConverged("it strays off the path", point.iterations)
-        return _Sample(distance, point, self._mode.stiffness(point.linearisation))
+            raise NotConverged("it leaves the path", point.iterations)
+        return _PiecePoint(distance, point, self._stiffness(point.linearisation))
 
-
-class _SoftestMode:
-    """The softest mode, kept from one state of a path to the next."""
-
-    def __init__(self, system: EquilibriumSystem) -> None:
-        self._mask = system.unknowns.coordinates_mask()
-        self._mode = self._mask.duplicate()
-        # without symmetry, so that it has a component in every mode
-        self._mode.array_w[:] = np.random.default_rng(system.comm.rank).standard_normal(self._mode.local_size)
-
-    def stiffness(self, at: Linearisation) -> float:
+    def _stiffness(self, at: Linearisation) -> float:
         """μ of a tangent, to a relative change of 1e-3.
 
         Twelve iterations at most: where two modes are equally soft, either suffices.
         """
         mask, mode, before = self._mask, self._mode, math.inf
-        right = mask.duplicate()
+        right, masked = mask.duplicate(), mask.duplicate()
         for _ in range(12):
             right.pointwiseMult(mask, mode)
             right.normalize()
             mode = at.solve(right)
-            product = mode.dot(right)
-            masked = mask.duplicate()
             masked.pointwiseMult(mask, mode)
-            value = product / masked.norm() ** 2
+            value = mode.dot(right) / masked.norm() ** 2
             if abs(value - before) <= 1e-3 * abs(value):
                 break
             before = value
@@ -191,11 +183,11 @@ class _SoftestMode:
         return value
 
 
-def _search(piece: _Piece, low: _Sample, high: _Sample, tolerance: float) -> list[CriticalPoint]:
-    """The critical points between two samples of ``piece``.
+def _search(piece: _Piece, low: _PiecePoint, high: _PiecePoint, tolerance: float) -> list[CriticalPoint]:
+    """The critical points between two points of ``piece``.
 
-    Equilibria are sampled 0.4 tolerances beside the estimated root, so that it is bracketed; eight times farther off
-    after a sample without equilibrium.
+    Equilibria are found 0.4 tolerances beside the estimated root, so that it is bracketed; eight times farther off
+    where there is none.
     """
     path, least, before = piece.path, 0.4 * tolerance, None
     while (width := high.distance - low.distance) > tolerance and least < width:
@@ -218,51 +210,49 @@ def _search(piece: _Piece, low: _Sample, high: _Sample, tolerance: float) -> lis
     return _classified(piece, low, high)
 
 
-def _root(path: ArcLengthTracer, low: _Sample, high: _Sample) -> float:
+def _root(path: ArcLengthTracer, low: _PiecePoint, high: _PiecePoint) -> float:
     """Root of the line through the quantity that changes sign; the middle if none does."""
-    pairs = [(rate(path, low.point), rate(path, high.point)) for rate in (_value_rate, _conjugate_rate)]
-    for first, second in (*pairs, (low.stiffness, high.stiffness)):
+    pairs = zip((*_rates(path, low.point), low.stiffness), (*_rates(path, high.point), high.stiffness), strict=True)
+    for first, second in pairs:
         if first * second < 0.0:
             return low.distance + (high.distance - low.distance) * first / (first - second)
     return 0.5 * (low.distance + high.distance)
 
 
-def _value_rate(path: ArcLengthTracer, point: EquilibriumPoint) -> float:
-    """v̇ over its reference, without rounding."""
-    rate = path.value_rate(point) / path.metric.value
-    return rate if abs(rate) > 1e-9 else 0.0
+def _rates(path: ArcLengthTracer, point: EquilibriumPoint) -> tuple[float, float]:
+    """v̇ and q̇ over their references, without rounding; extrema of the torques of motors, q̇, are not critical."""
+    value = path.value_rate(point) / path.metric.value
+    conjugate = 0.0 if path.followed.displaces else point.conjugate_rate / path.metric.conjugate
+    return value if abs(value) > 1e-9 else 0.0, conjugate if abs(conjugate) > 1e-9 else 0.0
 
 
-def _conjugate_rate(path: ArcLengthTracer, point: EquilibriumPoint) -> float:
-    """q̇ of a displacement, likewise; extrema of motor torques are not critical."""
-    rate = 0.0 if path.followed.displaces else point.conjugate_rate / path.metric.conjugate
-    return rate if abs(rate) > 1e-9 else 0.0
+def _turns(path: ArcLengthTracer, a: EquilibriumPoint, b: EquilibriumPoint) -> tuple[bool, bool]:
+    """Whether v̇ and q̇ change sign between two points."""
+    (value, conjugate), (other, other_conjugate) = _rates(path, a), _rates(path, b)
+    return value * other < 0.0, conjugate * other_conjugate < 0.0
 
 
 def _changes(path: ArcLengthTracer, a: EquilibriumPoint, b: EquilibriumPoint) -> bool:
-    return (
-        a.unstable_modes != b.unstable_modes
-        or _value_rate(path, a) * _value_rate(path, b) < 0.0
-        or _conjugate_rate(path, a) * _conjugate_rate(path, b) < 0.0
-    )
+    return a.unstable_modes != b.unstable_modes or any(_turns(path, a, b))
 
 
-def _classified(piece: _Piece, low: _Sample, high: _Sample) -> list[CriticalPoint]:
-    """Critical points between two samples within the tolerance."""
+def _classified(piece: _Piece, low: _PiecePoint, high: _PiecePoint) -> list[CriticalPoint]:
+    """Critical points between two points within the tolerance."""
     path, course, a, b = piece.path, piece.course, low.point, high.point
     found, modes = [], abs(b.unstable_modes - a.unstable_modes)
-    if _value_rate(path, a) * _value_rate(path, b) < 0.0:
+    value_turns, conjugate_turns = _turns(path, a, b)
+    if value_turns:
         nearer = min(a, b, key=lambda point: abs(path.value_rate(point)))
         kind = Critical.TURNING if path.followed.displaces else Critical.LIMIT
         found.append(CriticalPoint(kind, nearer, path.value(nearer), 1, course))
         modes = abs(modes - 1)
     if modes:
-        nearer = min(low, high, key=lambda sample: abs(sample.stiffness)).point
+        nearer = min(low, high, key=lambda end: abs(end.stiffness)).point
         value, p, q = path.value(nearer), path.value(a), path.value(b)
         if low.stiffness * high.stiffness < 0.0:
             value = p + (q - p) * low.stiffness / (low.stiffness - high.stiffness)
         found.append(CriticalPoint(Critical.BIFURCATION, nearer, value, modes, course))
-    if _conjugate_rate(path, a) * _conjugate_rate(path, b) < 0.0:
+    if conjugate_turns:
         nearer = min(a, b, key=lambda point: abs(point.conjugate_rate))
         found.append(CriticalPoint(Critical.TURNING, nearer, path.value(nearer), 0, course))
     return found

@@ -26,8 +26,8 @@ from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from fenicsmech.equilibrium import (
+    EquilibriumSolver,
     EquilibriumSystem,
-    Iteration,
     LoadControl,
     MotorControl,
     NotConverged,
@@ -44,24 +44,27 @@ class Mode:
     step: Step
 
 
-def softest_modes(solver: Iteration, held: LoadControl | MotorControl, state: State, *, count: int) -> list[Mode]:
+def softest_modes(
+    solver: EquilibriumSolver, held: LoadControl | MotorControl, state: State, *, count: int
+) -> list[Mode]:
     """The ``count`` modes with the stiffnesses μ nearest to zero under the control ``held``, nearest first.
 
     Stiffnesses are in units of the mean stiffness of the links; negative ones are unstable.
     """
     at = solver.linearise(state, held.at(held.value(solver.system, state)))
     mask = solver.system.unknowns.coordinates_mask()
-    own = len(mask.array_r)
 
-    def apply(x: np.ndarray, y: np.ndarray) -> None:
+    def apply(x: np.ndarray) -> np.ndarray:
         right = mask.duplicate()
         right.array_w[:] = mask.array_r * x
-        y[:] = at.solve(right).array_r
+        return at.solve(right).array_r.copy()
 
-    return _largest(solver.system, own, lambda x: x, apply, count)
+    return _largest(solver.system, mask.local_size, apply, count)
 
 
-def critical_changes(solver: Iteration, held: LoadControl | MotorControl, state: State, *, count: int) -> list[Mode]:
+def critical_changes(
+    solver: EquilibriumSolver, held: LoadControl | MotorControl, state: State, *, count: int
+) -> list[Mode]:
     """The ``count`` changes Δ of a control's value that make the tangent singular, nearest first.
 
     Both senses count. Exact to second order in Δ.
@@ -93,21 +96,19 @@ def critical_changes(solver: Iteration, held: LoadControl | MotorControl, state:
     weight = 0.5 * (unit / amount) ** 2
     second = _combined([(weight, later), (-2.0 * weight, here), (weight, earlier)])
     at = solver.linearise(state, control)
-    own = len(x.array_r)
 
-    def apply(x: np.ndarray, y: np.ndarray) -> None:
-        v, shape = template.duplicate(), template.duplicate()
-        v.array_w[:], shape.array_w[:] = x[:own], x[own:]
+    def apply(values: np.ndarray) -> np.ndarray:
+        v, shape = x.duplicate(), x.duplicate()
+        v.array_w[:], shape.array_w[:] = np.split(values, 2)
         right = first * v + second * shape
         right.scale(-1.0)
-        y[:own], y[own:] = at.solve(right).array_r, v.array_r
+        return np.concatenate([at.solve(right).array_r, v.array_r])
 
-    template = system.unknowns.control_row()
-    values = _largest(system, 2 * own, lambda x: x[own:], apply, count)
-    return [Mode(unit * mode.value, mode.step) for mode in values]
+    modes = _largest(system, 2 * x.local_size, apply, count)
+    return [Mode(unit * mode.value, mode.step) for mode in modes]
 
 
-def _tangent(solver: Iteration, control: LoadControl | MotorControl, state: State) -> PETSc.Mat:
+def _tangent(solver: EquilibriumSolver, control: LoadControl | MotorControl, state: State) -> PETSc.Mat:
     """A copy of K at a loaded state."""
     solver.system.linearise(state, control, solver.system.residual(state, control))
     return solver.system.kkt.matrix().copy()
@@ -125,28 +126,22 @@ def _combined(terms: Sequence[tuple[float, PETSc.Mat]]) -> PETSc.Mat:
 class _Operator:
     """A linear map of this rank's values, for SLEPc."""
 
-    def __init__(self, apply: Callable[[np.ndarray, np.ndarray], None]) -> None:
+    def __init__(self, apply: Callable[[np.ndarray], np.ndarray]) -> None:
         self._apply = apply
 
     def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        self._apply(x.array_r, y.array_w)
+        y.array_w[:] = self._apply(x.array_r)
 
 
 def _largest(
     system: EquilibriumSystem,
     size: int,
-    part: Callable[[np.ndarray], np.ndarray],
-    apply: Callable[[np.ndarray, np.ndarray], None],
+    apply: Callable[[np.ndarray], np.ndarray],
     count: int,
 ) -> list[Mode]:
     """Modes with the values 1 / θ, θ the ``count`` real eigenvalues of a map that are largest in size.
 
-    Args:
-        system: whose scaled unknowns are the ``part`` of an eigenvector.
-        size: of the map on this rank.
-        part: takes the unknowns from this rank's values of an eigenvector.
-        apply: the map.
-        count: how many.
+    The map, ``apply``, has ``size`` values on this rank; the unknowns of a mode are the last ones of an eigenvector.
     """
     comm = system.comm
     total = comm.allreduce(size)
@@ -163,7 +158,7 @@ def _largest(
     for index in range(solver.getConverged()):
         theta = solver.getEigenpair(index, vector)
         if theta != 0.0 and abs(theta.imag) <= 1e-6 * abs(theta):  # rounding may make a real one complex
-            shape.array_w[:] = part(vector.array_r)
+            shape.array_w[:] = vector.array_r[-shape.local_size :]
             step = system.unknowns.step(shape)
             largest = system.size(step)
             if largest > 0.0:

@@ -23,19 +23,10 @@ x held:
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from fenicsmech.equilibrium import (
-    Control,
-    EquilibriumPoint,
-    EquilibriumSystem,
-    Iteration,
-    NotConverged,
-    State,
-    Step,
-)
+from fenicsmech.continuation.stepper import Predictor, Stepper, Tangent
+from fenicsmech.equilibrium import Control, EquilibriumPoint, EquilibriumSolver, NotConverged, State, Step
 from fenicsmech.log import logger
 
 _log = logger(__name__)
@@ -48,33 +39,32 @@ class LoadSteps:
     Attributes:
         smallest: smallest step, over the distance to the target, or the distance covered if that is less.
         motion: largest motion of a step along the tangent (measured).
-        meaningless: smallest step that the tangent may impose, over the distance to the target; smaller ones arise in
-            singular positions, where the tangent is ignored.
-        runaway: motion from which on a prediction is discarded.
-        reach: longest extrapolation by the cubic, over the width between its equilibria: its error grows as t⁴.
-        easy: iterations up to which the next step is twice as long.
-        off_tangent: deviation from the tangents, over the largest rate, that counts as a snap; kinks stay below.
-        bend: largest rate of a step off a bifurcation, over the rate at its end.
-        least_snap: smallest motion that counts as a snap; bifurcations stay below.
-        smallest_snap: smallest step, as ``smallest``, that is halved because of a snap.
+        smallest_limited: smallest step that ``motion`` may impose, over the distance to the target; smaller ones arise
+            in singular positions, where the tangent is ignored.
+        largest_prediction: motion from which on a prediction is discarded.
+        iterations: target number per step; after as many or fewer the next step is twice as long.
+        deviation: of the rate over a step from the tangents at its ends, over the largest rate, that counts as a snap;
+            kinks stay below.
+        branching_rate: largest rate of a step off a bifurcation, over the rate at its end.
+        smallest_snap: smallest motion that counts as a snap; bifurcations stay below.
+        smallest_snap_step: smallest step, as ``smallest``, that is halved because of a snap.
         minimum_shift: least shift of the tangent, in units of the mean stiffness, where a mechanism has zero-energy
             modes, which would leave it singular.
-        shifts: factors of ``minimum_shift``, tried in order: a shift slows Newton's method down where soft springs or
+        shift_factors: of ``minimum_shift``, tried in order: a shift slows Newton's method down where soft springs or
             forces hold zero-energy modes with a smaller stiffness.
     """
 
     smallest: float = 1.0 / 1024.0
     motion: float = 0.2
-    meaningless: float = 1e-6
-    runaway: float = 1.0
-    reach: float = 4.0
-    easy: int = 5
-    off_tangent: float = 0.2
-    bend: float = 2.2
-    least_snap: float = 1e-4
-    smallest_snap: float = 1.0 / 64.0
+    smallest_limited: float = 1e-6
+    largest_prediction: float = 1.0
+    iterations: int = 5
+    deviation: float = 0.2
+    branching_rate: float = 2.2
+    smallest_snap: float = 1e-4
+    smallest_snap_step: float = 1.0 / 64.0
     minimum_shift: float = 1e-10
-    shifts: tuple[float, ...] = (1.0, 1e-3, 0.0)
+    shift_factors: tuple[float, ...] = (1.0, 1e-3, 0.0)
 
 
 class LoadStepsFailed(Exception):
@@ -92,56 +82,7 @@ class LoadStepsFailed(Exception):
         self.last, self.reached, self.reason, self.tried = last, reached, reason, tried
 
 
-class Predictor(ABC):
-    """Extrapolates a path."""
-
-    @abstractmethod
-    def predict(
-        self, system: EquilibriumSystem, points: Sequence[EquilibriumPoint], value: float, reach: float
-    ) -> State:
-        """The guess at ``value`` from at most the last two points, whose cubic extrapolates ``reach`` widths."""
-
-
-class Constant(Predictor):
-    """The last equilibrium again."""
-
-    def predict(self, system, points, value, reach):
-        return points[-1].state
-
-
-class Tangent(Predictor):
-    """y(v) = y₀ + (v − v₀) y₀′."""
-
-    def predict(self, system, points, value, reach):
-        last = points[-1]
-        return system.moved(last.state, last.tangent.scaled(value - last.control.target))
-
-
-class Hermite(Predictor):
-    """The cubic through the last two equilibria and their tangents.
-
-    The tangent replaces it while there is only one, and where the two lie close together compared with the step.
-
-    With t = (v − v₀) / w, w = v₀ − v₋₁:
-
-        y(v) = y₀ + t² (3 + 2 t) (y₋₁ − y₀) + w t² (1 + t) y₋₁′ + w t (1 + t)² y₀′.
-    """
-
-    def predict(self, system, points, value, reach):
-        before, last = points[0], points[-1]
-        width = last.control.target - before.control.target
-        if len(points) == 1 or abs(value - last.control.target) > reach * abs(width):
-            return Tangent().predict(system, points, value, reach)
-        t = (value - last.control.target) / width
-        step = (
-            system.difference(before.state, last.state).scaled(t * t * (3.0 + 2.0 * t))
-            + before.tangent.scaled(width * t * t * (1.0 + t))
-            + last.tangent.scaled(width * t * (1.0 + t) ** 2)
-        )
-        return system.moved(last.state, step)
-
-
-class LoadStepper:
+class LoadStepper(Stepper):
     """Follows equilibria as the target of one control changes.
 
     Args:
@@ -158,18 +99,19 @@ class LoadStepper:
 
     def __init__(
         self,
-        solver: Iteration,
+        solver: EquilibriumSolver,
         start: State,
         control: Control,
         *,
         predictor: Predictor,
         steps: LoadSteps = LoadSteps(),  # noqa: B008 (frozen)
     ) -> None:
-        self._solver, self._system, self._predictor, self._steps = solver, solver.system, predictor, steps
-        self._start, self._value = start, control.value(solver.system, start)
-        self._origin, self._way = self._value, 0.0  # farthest from there so far
-        self._shifts = tuple(part * start.minimum_shift for part in steps.shifts) if start.minimum_shift else (0.0,)
-        self._points: list[EquilibriumPoint] = []  # the last two, at different values
+        super().__init__(solver, predictor)
+        self._steps, self._start, self._value = steps, start, control.value(solver.system, start)
+        self._origin, self._covered = self._value, 0.0  # farthest from there so far
+        self._shifts = (
+            tuple(factor * start.minimum_shift for factor in steps.shift_factors) if start.minimum_shift else (0.0,)
+        )
         self._rate: Step | None = None  # of the last step, by the control value
         self.iterations = self.snaps = 0
 
@@ -185,11 +127,11 @@ class LoadStepper:
         step, tried = distance, []
         while True:
             remaining = control.target - self._value
-            step = self._shortened(step, least=steps.meaningless * abs(distance))
+            step = self._limited(step, distance)
             arrives = abs(step) >= abs(remaining) * (1.0 - 1e-9)
             value = control.target if arrives else self._value + step
             try:
-                point = self._solve(self._guess(value), control.at(value))
+                point = self._correct(self._predict(value - self._value), control.at(value))
             except NotConverged as failure:
                 tried.append(value)
                 step = 0.5 * (value - self._value)
@@ -197,16 +139,16 @@ class LoadStepper:
                     raise LoadStepsFailed(self._last, self._value, failure.reason, tuple(tried)) from failure
                 continue
             if self._snapped(point):
-                if abs(value - self._value) > steps.smallest_snap * self._scale(distance):
+                if abs(value - self._value) > steps.smallest_snap_step * self._scale(distance):
                     step = 0.5 * (value - self._value)
                     continue
                 self.snaps += 1
                 self._rate = None
                 _log.warning("between %g and %g the path turns back; what follows is another one", self._value, value)
-            self._accept(point)
+            self._accept_at(point)
             if arrives:
                 return point
-            if point.iterations <= steps.easy:
+            if point.iterations <= steps.iterations:
                 step *= 2.0
 
     @property
@@ -216,19 +158,15 @@ class LoadStepper:
     def _settle(self, control: Control) -> None:
         """The equilibrium at the start, whose tangent limits the first step."""
         try:
-            self._accept(self._solve(self._start, control))
+            self._accept_at(self._correct(self._start, control))
         except NotConverged:
             pass
 
-    def _solve(self, guess: State, control: Control) -> EquilibriumPoint:
-        """The equilibrium near ``guess``, with the largest shift for zero-energy modes that leads there.
-
-        Raises:
-            NotConverged: none leads there.
-        """
+    def _correct(self, guess: State, control: Control) -> EquilibriumPoint:
+        """The equilibrium near ``guess``, with the largest shift for zero-energy modes that leads there."""
         for place, shift in enumerate(self._shifts):
             try:
-                point = self._solver.solve(replace(guess, minimum_shift=shift), control)
+                point = self.solver.solve(replace(guess, minimum_shift=shift), control)
             except NotConverged as failure:
                 self.iterations += failure.iterations
                 reason = failure.reason
@@ -238,32 +176,31 @@ class LoadStepper:
             return point
         raise NotConverged(reason)
 
-    def _guess(self, value: float) -> State:
-        """The prediction at ``value``; where it moves too far that of the tangent, then the last equilibrium."""
+    def _predict(self, ahead: float) -> State:
+        """The prediction; where it moves too far that of the tangent, then the last equilibrium."""
         if not self._points:
             return self._start
-        system, last = self._system, self._points[-1].state
-        for predictor in (self._predictor, Tangent()):
-            guess = predictor.predict(system, self._points, value, self._steps.reach)
-            if system.size(system.difference(guess, last)) <= self._steps.runaway:
+        system, last = self.system, self._points[-1].state
+        for predictor in (self.predictor, Tangent()):
+            guess = predictor.predict(system, self._points, self._width, ahead)
+            if system.size(system.difference(guess, last)) <= self._steps.largest_prediction:
                 return guess
         return last
 
-    def _shortened(self, step: float, *, least: float) -> float:
-        """``step``, shortened to the largest ``motion`` unless that is less than ``least``."""
+    def _limited(self, step: float, distance: float) -> float:
+        """``step``, shortened to the largest ``motion`` unless next to nothing of the ``distance`` is left of it."""
         if not self._points:
             return step
-        motion = self._system.size(self._points[-1].tangent) * abs(step)
-        shortened = step * min(1.0, self._steps.motion / max(motion, self._steps.motion))
-        return shortened if abs(shortened) > least else step
+        motion = self.system.size(self._points[-1].tangent) * abs(step)
+        limited = step * min(1.0, self._steps.motion / max(motion, self._steps.motion))
+        return limited if abs(limited) > self._steps.smallest_limited * abs(distance) else step
 
     def _scale(self, distance: float) -> float:
         """Reference length of steps: the distance covered so far, at first the first step, whatever the target.
 
         A limit load is located as closely by a load a thousand times as large as by one just beyond it.
         """
-        way = self._way or abs(self._shortened(distance, least=self._steps.meaningless * abs(distance)))
-        return min(abs(distance), way)
+        return min(abs(distance), self._covered or abs(self._limited(distance, distance)))
 
     def _snapped(self, point: EquilibriumPoint) -> bool:
         """Whether the rate of the step to ``point`` lies outside the range of the tangents at its ends.
@@ -279,26 +216,29 @@ class LoadStepper:
         distance = point.control.target - self._value
         if not self._points or distance == 0.0:
             return False
-        system, last, steps = self._system, self._points[-1], self._steps
+        system, last, steps = self.system, self._points[-1], self._steps
         before = last.tangent if self._rate is None else last.tangent.slower(self._rate)
         rate = system.difference(point.state, last.state).scaled(1.0 / distance)
-        span = (before, point.tangent, point.tangent.scaled(steps.bend))
-        beyond = system.size(system.independent(rate.beyond(span)))
+        beyond = self._beyond(rate, (before, point.tangent, point.tangent.scaled(steps.branching_rate)))
         largest = max(system.size(before), system.size(point.tangent))
         grown = system.size(last.tangent + before.scaled(-1.0)) * abs(distance)
         if (
-            beyond > max(steps.off_tangent * largest, steps.least_snap / abs(distance))
-            or grown > steps.off_tangent * steps.motion
+            beyond > max(steps.deviation * largest, steps.smallest_snap / abs(distance))
+            or grown > steps.deviation * steps.motion
         ):
             return True
         self._rate = rate
         return False
 
-    def _accept(self, point: EquilibriumPoint) -> None:
-        """Keeps ``point`` and the one before it at another value."""
+    def _beyond(self, rate: Step, span: tuple[Step, ...]) -> float:
+        """How far ``rate`` lies outside the ``span`` of others, without nodes that bodies move."""
+        return self.system.size(self.system.independent(rate.beyond(span)))
+
+    def _accept_at(self, point: EquilibriumPoint) -> None:
+        """Keeps ``point``, at the value of its control."""
+        self._accept(point, point.control.target - self._value)
         self._value = point.control.target
-        self._points = [*(p for p in self._points[-1:] if p.control.target != self._value), point]
-        self._way = max(self._way, abs(self._value - self._origin))
+        self._covered = max(self._covered, abs(self._value - self._origin))
 
 
 class MotorStepper(LoadStepper):
@@ -308,13 +248,13 @@ class MotorStepper(LoadStepper):
         try:
             return super().advance(control)
         except LoadStepsFailed as failure:
-            if failure.last is None or not self._strain(failure.last, control):
+            if failure.last is None or not self._pass_dead_centre(failure.last, control):
                 raise
         return super().advance(control)
 
-    def _strain(self, last: EquilibriumPoint, control: Control) -> bool:
+    def _pass_dead_centre(self, last: EquilibriumPoint, control: Control) -> bool:
         """Continues from the ``last`` equilibrium by straining links; whether this succeeded."""
-        system, steps, distance = self._system, self._steps, control.target - self._value
+        system, steps, distance = self.system, self._steps, control.target - self._value
         try:
             rate = self._held_rate(last, control.at(self._value))
         except NotConverged:
@@ -323,24 +263,23 @@ class MotorStepper(LoadStepper):
         while abs(step) > steps.smallest * self._scale(distance):
             guess = system.moved(last.state, rate.scaled(step))
             try:
-                point = self._solve(guess, control.at(self._value + step))
+                point = self._correct(guess, control.at(self._value + step))
             except NotConverged:
                 point = None
-            if point is None or self._strayed(last, rate, step, point):
+            if point is None or self._left_path(last, rate, step, point):
                 step *= 0.5
                 continue
             _log.info("links strain beyond a dead centre near %g", self._value)
             self._rate, self._points = None, []
-            self._accept(point)
+            self._accept_at(point)
             return True
         return False
 
-    def _strayed(self, last: EquilibriumPoint, held: Step, step: float, point: EquilibriumPoint) -> bool:
+    def _left_path(self, last: EquilibriumPoint, held: Step, step: float, point: EquilibriumPoint) -> bool:
         """Whether a coordinate's rate over ``step`` lies outside the range of ``held`` and the tangents at its ends."""
-        system = self._system
-        rate = system.difference(point.state, last.state).scaled(1.0 / step)
-        beyond = system.size(system.independent(rate.beyond((held, last.tangent, point.tangent))))
-        return beyond > self._steps.off_tangent * max(system.size(held), system.size(point.tangent))
+        rate = self.system.difference(point.state, last.state).scaled(1.0 / step)
+        largest = max(self.system.size(held), self.system.size(point.tangent))
+        return self._beyond(rate, (held, last.tangent, point.tangent)) > self._steps.deviation * largest
 
     def _held_rate(self, last: EquilibriumPoint, control: Control) -> Step:
         """Rate of the state with the target of ``control``, the dominant motion x held.
@@ -348,10 +287,10 @@ class MotorStepper(LoadStepper):
         Raises:
             NotConverged: the tangent cannot be factored or solved with, or is not positive along the motion.
         """
-        at = self._solver.linearise(last.state, control)
+        at = self.solver.linearise(last.state, control)
         rate = at.rate()
         motion = rate.duplicate()
-        motion.pointwiseMult(self._system.unknowns.coordinates_mask(), rate)
+        motion.pointwiseMult(self.system.unknowns.coordinates_mask(), rate)
         motion.normalize()
         strain = at.solve(motion)
         compliance = motion.dot(strain)

@@ -1,34 +1,42 @@
 """Shape design of flexible links.
 
 A ``DesignProblem`` is described as plain data (``description``), minimised by one of the ``optimisers`` in a ``run``,
-and ends in a ``DesignResult``. Its ``objective`` is made of the targets' ``equilibria`` with their adjoint
-``sensitivity``, and of ``regularisers``. The ``rest_shape`` of the links follows the parameters through ``shape``:
-``spline``, ``handles`` on it, ``weights`` by which handles move the mesh, the ``shape_map`` of these, and the
-``handle_optimum`` of the mesh ``quality``. ``characterisation`` fits Young's modulus to measurements.
+round by round with a ``correction`` that brings values near the truth, and ends in a ``DesignResult``; a ``search``
+scatters starts and ends in several. Its ``objective`` compares the quantities of each ``target`` at its ``equilibria``
+with what is wanted, and adds ``regularisers``. The ``rest_shape`` of the links follows the parameters through
+``shape``: ``spline``, ``handles`` on it, ``weights`` by which handles move the mesh, the ``shape_map`` of these, and
+the ``handle_optimum`` of the mesh ``quality``. ``characterisation`` fits Young's modulus to measurements.
 """
 
 from fenicsmech.design.characterisation import Experiment, ModulusFit, fit_modulus
-from fenicsmech.design.description import Bounds, SplineDesign, Target, shape_request
+from fenicsmech.design.correction import Correction
+from fenicsmech.design.description import Bounds, SplineDesign, shape_request
 from fenicsmech.design.design_problem import DesignProblem
-from fenicsmech.design.equilibria import Known, TargetEquilibria
-from fenicsmech.design.objective import Objective, group_count, objective_error, split, target_errors, target_scales
+from fenicsmech.design.equilibria import Known, SampleEquilibria
+from fenicsmech.design.objective import Objective, group_count, sample_numbers, split
 from fenicsmech.design.optimisers.bfgs import BFGS
 from fenicsmech.design.optimisers.levenberg_marquardt import LevenbergMarquardt, Resolution
 from fenicsmech.design.optimisers.problem import (
     Evaluation,
+    Inequalities,
     Infeasible,
     Iterate,
     Optimiser,
+    Plain,
+    Problem,
     Quadratic,
     Reason,
     Start,
     TooHigh,
+    merit,
 )
+from fenicsmech.design.optimisers.sqp import SQP
 from fenicsmech.design.regularisers import MeshQuality, Model, Regulariser, ShapeBounds, StayClose
 from fenicsmech.design.rest_shape import DesignedLink, ParametricShape
-from fenicsmech.design.result import DesignResult, LinkDesign, TargetResult
-from fenicsmech.design.run import Checkpoint, DesignProgress, minimise_together
-from fenicsmech.design.sensitivity import Gradient, Sensitivity
+from fenicsmech.design.result import DesignResult, LinkDesign, PartValue, TargetResult, rest_meshes
+from fenicsmech.design.run import Checkpoint, DesignProgress, Round, minimise_together
+from fenicsmech.design.search import Scatter, Search, SearchResult, StartResult
+from fenicsmech.design.shape.edges import edge_weights
 from fenicsmech.design.shape.handle_optimum import (
     HandleOptimum,
     MapDerivatives,
@@ -39,8 +47,9 @@ from fenicsmech.design.shape.handle_optimum import (
 from fenicsmech.design.shape.handles import BETWEEN, LinkHandles
 from fenicsmech.design.shape.quality import Barrier, QualitySum
 from fenicsmech.design.shape.shape_map import ShapeMap, ShapeRequest, shape_link, shape_links
-from fenicsmech.design.shape.spline import LinkSpline, SplineSamples, fit_spline
+from fenicsmech.design.shape.spline import ControlLayout, LinkSpline, SplineSamples, fit_spline, lay_out
 from fenicsmech.design.shape.weights import insert, lumped_mass, pierced, solve_partition, stiffness
+from fenicsmech.design.target import Comparison, Target
 
 __all__ = [
     "BETWEEN",
@@ -48,14 +57,17 @@ __all__ = [
     "Barrier",
     "Bounds",
     "Checkpoint",
+    "Comparison",
+    "ControlLayout",
+    "Correction",
     "DesignProblem",
     "DesignProgress",
     "DesignResult",
     "DesignedLink",
     "Evaluation",
     "Experiment",
-    "Gradient",
     "HandleOptimum",
+    "Inequalities",
     "Infeasible",
     "Iterate",
     "Known",
@@ -70,12 +82,19 @@ __all__ = [
     "Objective",
     "Optimiser",
     "ParametricShape",
+    "PartValue",
+    "Plain",
+    "Problem",
     "Quadratic",
     "QualitySum",
     "Reason",
     "Regulariser",
     "Resolution",
-    "Sensitivity",
+    "Round",
+    "SQP",
+    "Scatter",
+    "Search",
+    "SearchResult",
     "ShapeBounds",
     "ShapeError",
     "ShapeMap",
@@ -83,27 +102,30 @@ __all__ = [
     "SplineDesign",
     "SplineSamples",
     "Start",
+    "StartResult",
     "StayClose",
     "Target",
-    "TargetEquilibria",
+    "SampleEquilibria",
     "TargetResult",
     "TooHigh",
     "by_positions",
+    "edge_weights",
     "fit_modulus",
     "fit_spline",
     "follow_spline",
     "group_count",
     "insert",
+    "lay_out",
     "lumped_mass",
+    "merit",
     "minimise_together",
-    "objective_error",
     "pierced",
+    "rest_meshes",
+    "sample_numbers",
     "shape_link",
     "shape_links",
     "shape_request",
     "solve_partition",
     "split",
     "stiffness",
-    "target_errors",
-    "target_scales",
 ]

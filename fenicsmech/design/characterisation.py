@@ -1,11 +1,11 @@
 """Young's modulus of a material from measured forces and displacements.
 
-Displacements u_k(E) of samples under the measured forces are fitted to the measured ū_k by Gauss–Newton on ln E:
+Displacements u_k(E) of specimens under the measured forces are fitted to the measured ū_k by Gauss–Newton on ln E:
 
-    min Σ_k ((u_k(E) − ū_k) / s_k)²,     s_k the largest |ū| of the sample's measurements,
+    min Σ_k ((u_k(E) − ū_k) / s_k)²,     s_k the largest |ū| of the specimen's measurements,
 
 which is maximum likelihood if forces are exact and displacements are read with independent normal errors of one size
-relative to each sample's range. With the residuals' standard deviation σ and J = ∂(u/s)/∂ln E from the adjoint,
+relative to each specimen's range. With the residuals' standard deviation σ and J = ∂(u/s)/∂ln E from the adjoint,
 
     standard error of ln E = σ / |J|,     interval  E exp(± t σ / |J|),     t Student's quantile for n − 1.
 
@@ -20,27 +20,27 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import t as student
 
-from fenicsmech.checks import finite
-from fenicsmech.design.sensitivity import Sensitivity
 from fenicsmech.equilibrium import LoadControl
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, finite, set_fields
 from fenicsmech.mechanism import DRAWN, Configuration, Force, Material
+from fenicsmech.quantities import Displacement, Sensitivity
 from fenicsmech.simulation import Curve, CurveRequest, Simulation, read_request
 
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """Measurements on one sample.
+    """Measurements on one specimen.
 
     Attributes:
-        simulation: of the sample in its test rig.
+        simulation: of the specimen in its test rig.
         part: the force that was applied.
         forces: its magnitudes, (n,).
         displacements: of its point along it, (n,).
         configuration: motor positions.
 
     Raises:
-        DescriptionError: the numbers do not pair, are not finite, or hold no information.
+        DescriptionError: there are not as many forces as displacements, a number is not finite, or no force moves
+            anything.
     """
 
     simulation: Simulation
@@ -59,8 +59,7 @@ class Experiment:
             )
         if not np.any(forces * displacements):
             raise DescriptionError(part, "no force moves anything", "Give readings under load")
-        object.__setattr__(self, "forces", forces)
-        object.__setattr__(self, "displacements", displacements)
+        set_fields(self, forces=forces, displacements=displacements)
 
     @property
     def request(self) -> CurveRequest:
@@ -85,7 +84,7 @@ class ModulusFit:
         youngs_modulus: E.
         standard_error: of E.
         interval: the 95 % confidence interval of E.
-        spread: standard deviation of the residuals, relative to each sample's largest displacement.
+        spread: standard deviation of the residuals, relative to each specimen's largest displacement.
         curves: simulated at the fitted modulus, one per experiment.
         residuals: simulated minus measured displacement, per experiment.
         iterations: of Gauss–Newton.
@@ -160,13 +159,14 @@ class _Rig:
     def compare(self, modulus: float) -> tuple[Curve, np.ndarray, np.ndarray]:
         """The curve at ``modulus`` E, u − ū (n,) and ∂u/∂ln E (n,)."""
         simulation, part = self._simulation, self._request.part
-        model, newton = simulation.model, simulation.newton(part)
+        assert isinstance(part, Force), "experiments prescribe forces"
+        model, solver = simulation.model, simulation.solver(part)
         model.set_parameter(self._links, "E", modulus)
         curve = simulation.trace(self._request)
-        adjoint = Sensitivity(model, newton)
+        adjoint, travel = Sensitivity(model), [Displacement(part).on(model)]
         slopes, travels = {}, {}
         for frame in curve.frames:
-            (gradient,) = adjoint.gradients(frame.state, [newton.system.controlled])
+            (gradient,) = adjoint.gradients(solver, frame.state, LoadControl(frame.force), travel)
             travels[frame.force] = frame.displacement
             slopes[frame.force] = modulus * float(gradient.parameters["E"][self._links].sum())
         measured = self._experiment

@@ -1,4 +1,4 @@
-"""Equilibria of targets, found once from zero load and then followed as the design changes.
+"""Equilibria of targets' samples, found once from zero load and then followed as the design changes.
 
 Near a fold, where a mechanism is about to snap, a small change of design may leave no equilibrium near the old one, and
 Newton's method lands on another branch. So each change of design is checked by a backward prediction with the same
@@ -8,26 +8,38 @@ factor:
 
 on one branch if d₁ − d₀ is small enough, and halved if that fails. Halves that fail too mean a fold.
 
-A displacement counts from the unloaded configuration. Where that moves with the design (the force acts on a flexible
-link, or motors strain the links), it is an equilibrium that is followed too.
+Displacements q count from the unloaded configuration y°. Where that moves with the design (a point lies on a flexible
+link, or motors strain the links), it is an equilibrium that is followed too. A prescribed displacement v = v̄ + q_v(y°)
+moves with it:
+
+    Q = g(q(y) − q(y°)),     dQ/dp = ∂g/∂q (dq/dp + dq/dv dq_v°/dp − dq°/dp).
+
+Stability is that under the sample's own control: with a prescribed displacement, parts of a path are stable that are
+not under a prescribed force.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from fenicsmech.design.description import Target
 from fenicsmech.design.optimisers.problem import Infeasible
-from fenicsmech.design.sensitivity import Sensitivity
-from fenicsmech.equilibrium import LoadControl, NotConverged, Quantity, State
+from fenicsmech.design.target import Target, sample_request
+from fenicsmech.equilibrium import (
+    Adjoint,
+    Control,
+    DisplacementControl,
+    EquilibriumSolver,
+    LoadControl,
+    NotConverged,
+    State,
+)
 from fenicsmech.errors import EquilibriumError
-from fenicsmech.estimates import Equilibrium
-from fenicsmech.mechanism import FlexibleLink
 from fenicsmech.multibody import assemble
-from fenicsmech.simulation import CurveRequest, Simulation
+from fenicsmech.quantities import Displacement, Gradient, Observable, Partial, RestObservable, Sample, Sensitivity
+from fenicsmech.simulation import Simulation
 
 
 @dataclass(frozen=True)
@@ -46,59 +58,91 @@ class FollowOptions:
 
 
 @dataclass(frozen=True, eq=False)
-class Sample:
-    """The equilibrium of a target at one design.
+class SampleState:
+    """The equilibrium of a sample at one design.
 
     Attributes:
-        state: under the target's force.
-        origin: unloaded; None if it does not depend on the design.
-        start: travel of the target's point there.
-        displacement: of the target's point, from there.
+        state: the equilibrium.
+        control: what is prescribed.
+        unloaded: without loads, from which displacements count.
     """
 
     state: State
-    origin: State | None
-    start: float
-    displacement: float
+    control: Control
+    unloaded: State
 
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """Equilibria of some targets at one design.
+    """Equilibria of samples, and values of targets' quantities, at one design.
 
     Attributes:
         design: this rank's values of the design field, flat.
-        samples: one per target.
+        samples: the equilibrium of each sample.
+        raw: values of each target's observable, from the unloaded configuration where they count from there.
     """
 
     design: np.ndarray
-    samples: tuple[Sample, ...]
+    samples: dict[Sample, SampleState]
+    raw: tuple[np.ndarray, ...]
 
 
-class TargetEquilibria:
-    """The equilibria of ``targets`` in one simulation."""
+class _Path:
+    """A sample in one simulation.
+
+    Attributes:
+        sample: its description.
+        solver: of its equilibria.
+        moves: whether its unloaded configuration moves with the design.
+    """
+
+    def __init__(self, simulation: Simulation, sample: Sample, observables: Iterable[Observable]) -> None:
+        self.sample, self._model = sample, simulation.model
+        self.solver: EquilibriumSolver = simulation.solver(sample.part, sample.others)
+        self.moved = None if sample.moved is None else Displacement(sample.moved[0]).on(simulation.model)
+        strained = assemble(simulation.linkage, sample.configuration).fraction < 1.0
+        own = observables if self.moved is None else (*observables, self.moved)
+        self.moves = strained or any(observable.on_link for observable in own)
+
+    def control(self, unloaded: State) -> Control:
+        """What is prescribed, at the design that the model holds."""
+        if self.moved is None or self.sample.moved is None:
+            return LoadControl(self.sample.magnitude)
+        self._model.load(unloaded)
+        return DisplacementControl(self.sample.moved[1] + float(self.moved.values(unloaded)[0]))
+
+
+class SampleEquilibria:
+    """The equilibria of the samples of ``targets`` in one simulation, and the values of their quantities."""
 
     def __init__(self, simulation: Simulation, targets: Sequence[Target], options: FollowOptions | None = None) -> None:
         self._simulation, self._model, self._options = simulation, simulation.model, options or FollowOptions()
-        self.targets = tuple(targets)
-        forces = dict.fromkeys(target.part for target in targets)
-        self._newtons = {part: simulation.newton(part) for part in forces}
-        self._sensitivities = {part: Sensitivity(self._model, newton) for part, newton in self._newtons.items()}
+        self.targets, self._sensitivity = tuple(targets), Sensitivity(simulation.model)
+        kinds = {target.quantity: target.quantity.on(simulation.model) for target in targets}
+        self._observables = [kinds[target.quantity] for target in targets]
+        self._at_rest = {k: own for k, own in enumerate(self._observables) if isinstance(own, RestObservable)}
+        self._paths: dict[Sample, _Path] = {}
+        for sample in dict.fromkeys(target.sample for target in targets if target.sample is not None):
+            counted = [o for o, own in self._of(sample) if self.targets[own].quantity.from_unloaded]
+            self._paths[sample] = _Path(simulation, sample, counted)
+
+    # -- equilibria ----------------------------------------------------------------------------------------------
 
     def trace(self) -> Known:
-        """The equilibria of all targets, from zero load, at the present design.
+        """The equilibria of all samples, from zero load, at the present design.
 
         Raises:
             Infeasible: an equilibrium is not found or is unstable.
         """
-        samples: dict[Target, Sample] = {}
-        paths: dict[tuple, list[Target]] = {}
-        for target in self.targets:
-            key = target.part, target.configuration, target.force < 0.0
-            paths.setdefault(key, []).append(target)
-        for targets in paths.values():
-            samples.update(self._traced(targets))
-        return Known(self._model.elastic.d.x.array.copy(), tuple(samples[target] for target in self.targets))
+        groups: dict[tuple, list[Sample]] = {}
+        for sample in self._paths:
+            value = sample.magnitude if sample.moved is None else sample.moved[1]
+            key = sample.part, sample.others, sample.configuration, sample.moved is None, value < 0.0
+            groups.setdefault(key, []).append(sample)
+        found: dict[Sample, SampleState] = {}
+        for samples in groups.values():
+            found.update(self._traced(samples))
+        return self._known({sample: found[sample] for sample in self._paths})
 
     def follow(self, known: Known) -> Known:
         """The equilibria at the present design, from those of another one.
@@ -108,136 +152,211 @@ class TargetEquilibria:
         """
         design = self._model.elastic.d.x.array.copy()
         try:
-            samples = [
-                self._followed(target, sample, known.design, design)
-                for target, sample in zip(self.targets, known.samples, strict=True)
-            ]
+            samples = {
+                path.sample: self._followed(path, known.samples[path.sample], known.design, design)
+                for path in self._paths.values()
+            }
         finally:
             self._model.reshape(design)
-        return Known(design, tuple(samples))
+        return self._known(samples)
 
-    def gradients(self, known: Known) -> np.ndarray:
-        """Derivatives of the displacements by the design field that the model holds, (targets, owned values)."""
-        fields = [self._gradient(*pair) for pair in zip(self.targets, known.samples, strict=True)]
-        return np.array(fields).reshape(len(fields), -1)
+    # -- values of the targets' quantities -----------------------------------------------------------------------
+
+    def values(self, known: Known) -> np.ndarray:
+        """The components that are wanted, target by target, (components,)."""
+        reduced = [t.quantity.reduce(raw)[0][: t.size] for t, raw in zip(self.targets, known.raw, strict=True)]
+        return np.concatenate([*reduced, np.zeros(0)])
+
+    def gradients(self, known: Known) -> list[Gradient]:
+        """Derivatives of the components at the design that the model holds."""
+        found = {k: [self._sensitivity.at_rest(own)] for k, own in self._at_rest.items()}
+        for path in self._paths.values():
+            own = self._of(path.sample)
+            at = known.samples[path.sample]
+            places, partials = self._partials(known, path, at.state, own)
+            loaded = self._sensitivity.of(path.solver, at.state, at.control, partials)
+            if path.moves:
+                loaded = self._less_unloaded(known, path, places, loaded)
+            for k, gradient in zip(places, loaded, strict=True):
+                found.setdefault(k, []).append(gradient)
+        return [gradient for k in range(len(self.targets)) for gradient in found[k]]
 
     def errors(self, known: Known) -> np.ndarray:
-        """Estimated discretisation errors of the displacements, (targets,)."""
-        return np.array([self._error(*pair, known.design) for pair in zip(self.targets, known.samples, strict=True)])
+        """Estimated discretisation errors of the components, to be added, (components,)."""
+        found = {k: [0.0] for k in self._at_rest}
+        with self._model.shaped(known.design):
+            for path in self._paths.values():
+                at = known.samples[path.sample]
+                places, partials = self._partials(known, path, at.state, self._of(path.sample))
+                adjoints = self._sensitivity.adjoints(path.solver, at.state, at.control, partials)
+                errors, slopes = self._estimated(adjoints), [own.by_control() if own else 0.0 for own in adjoints]
+                if path.moves:
+                    from_there, counted, prescribed = self._unloaded_partials(known, path, places)
+                    origin = known.samples[path.sample].unloaded
+                    unloaded = self._estimated(
+                        self._sensitivity.adjoints(path.solver, origin, LoadControl(0.0), from_there)
+                    )
+                    for place, error in zip(counted, unloaded, strict=False):
+                        errors[place] -= error
+                    if prescribed:
+                        errors = [own + slope * unloaded[-1] for own, slope in zip(errors, slopes, strict=True)]
+                for k, error in zip(places, errors, strict=True):
+                    found.setdefault(k, []).append(error)
+        return np.array([error for k in range(len(self.targets)) for error in found[k]])
 
-    def _error(self, target: Target, sample: Sample, design: np.ndarray) -> float:
-        newton = self._newtons[target.part]
+    # -- values and derivatives of one sample --------------------------------------------------------------------
 
-        def error(state: State) -> float:
-            (added,) = self._simulation.estimates.at(newton, Equilibrium(state, design, Quantity.DISPLACEMENT))
-            return added
+    def _of(self, sample: Sample) -> list[tuple[Observable, int]]:
+        """The observables asked of a sample, with the places of their targets."""
+        pairs = enumerate(zip(self.targets, self._observables, strict=True))
+        return [(observable, k) for k, (target, observable) in pairs if target.sample == sample]
 
-        return error(sample.state) - (0.0 if sample.origin is None else error(sample.origin))
+    def _known(self, samples: dict[Sample, SampleState]) -> Known:
+        raw = {k: np.array([observable.value()]) for k, observable in self._at_rest.items()}
+        for sample, at in samples.items():
+            own = self._of(sample)
+            counted = [pair for pair in own if self.targets[pair[1]].quantity.from_unloaded]
+            for state, pairs, sign in ((at.unloaded, counted, -1.0), (at.state, own, 1.0)):
+                self._model.load(state)
+                for observable, k in pairs:
+                    raw[k] = raw.get(k, 0.0) + sign * observable.values(state)
+        design = self._model.elastic.d.x.array.copy()
+        return Known(design, samples, tuple(raw[k] for k in range(len(self.targets))))
 
-    def _gradient(self, target: Target, sample: Sample) -> np.ndarray:
-        adjoint = self._sensitivities[target.part]
-        outputs = [self._newtons[target.part].system.controlled]
-        (loaded,) = adjoint.gradients(sample.state, outputs)
-        if sample.origin is None:
-            return loaded.design
-        (unloaded,) = adjoint.gradients(sample.origin, outputs)
-        return loaded.design - unloaded.design
+    def _partials(
+        self, known: Known, path: _Path, state: State, own: Sequence[tuple[Observable, int]]
+    ) -> tuple[list[int], list[Partial]]:
+        """The partial derivatives of the wanted components at a state, each with the place of its target."""
+        self._model.load(state)
+        places, partials = [], []
+        for observable, k in own:
+            target = self.targets[k]
+            _, slopes = target.quantity.reduce(known.raw[k])
+            parts = observable.partials(path.solver.system, state)
+            for row in slopes[: target.size]:
+                places.append(k)
+                pairs = zip(row, parts, strict=True)
+                partials.append(sum((float(s) * part for s, part in pairs if s), start=Partial()))
+        return places, partials
 
-    def _traced(self, targets: Sequence[Target]) -> dict[Target, Sample]:
-        """The samples of targets on one path, which differ in the size of their force alone."""
-        part, configuration = targets[0].part, targets[0].configuration
-        moving = self._origin_moves(targets[0])
-        loads = {0.0} if moving else set()
-        loads |= {target.force for target in targets}
-        controls = tuple(LoadControl(load) for load in sorted(loads, key=abs))
-        request = CurveRequest(part, controls, configuration, others=())
+    def _unloaded_partials(
+        self, known: Known, path: _Path, places: Sequence[int]
+    ) -> tuple[list[Partial], list[int], bool]:
+        """Partial derivatives in the unloaded configuration: of the components that count from there, then of the
+        prescribed displacement; which components these are; and whether a displacement is prescribed.
+        """
+        unloaded, quantities = known.samples[path.sample].unloaded, [self.targets[k].quantity for k in places]
+        counted = [place for place, quantity in enumerate(quantities) if quantity.from_unloaded]
+        own = [pair for pair in self._of(path.sample) if self.targets[pair[1]].quantity.from_unloaded]
+        _, partials = self._partials(known, path, unloaded, own)
+        if path.moved is not None:
+            partials += path.moved.partials(path.solver.system, unloaded)
+        return partials, counted, path.moved is not None
+
+    def _less_unloaded(
+        self, known: Known, path: _Path, places: Sequence[int], loaded: Sequence[Gradient]
+    ) -> list[Gradient]:
+        """Derivatives of components with those of the unloaded configuration."""
+        partials, counted, prescribed = self._unloaded_partials(known, path, places)
+        origin = known.samples[path.sample].unloaded
+        unloaded = self._sensitivity.of(path.solver, origin, LoadControl(0.0), partials)
+        found = list(loaded)
+        for place, gradient in zip(counted, unloaded, strict=False):
+            found[place] = found[place] + -1.0 * gradient
+        if prescribed:
+            found = [own + given.control * unloaded[-1] for own, given in zip(found, loaded, strict=True)]
+        return found
+
+    def _estimated(self, adjoints: Sequence[Adjoint | None]) -> list[float]:
+        """Discretisation errors of quantities at the state that the model holds, from their adjoints."""
+        return [self._simulation.estimates.of(adjoint)[0] if adjoint else 0.0 for adjoint in adjoints]
+
+    # -- paths from zero load ------------------------------------------------------------------------------------
+
+    def _traced(self, samples: Sequence[Sample]) -> dict[Sample, SampleState]:
+        """The states of samples on one path, which differ in the size of their load alone."""
+        ordered = sorted(samples, key=lambda own: abs(own.magnitude if own.moved is None else own.moved[1]))
         try:
-            curve = self._simulation.trace(request)
+            curve = self._simulation.trace(sample_request(self._simulation, *ordered))
         except EquilibriumError as error:
             raise Infeasible(str(error)) from error
-        frames = {frame.force: frame for frame in curve.frames}
-        samples = {}
-        for target in targets:
-            frame = frames[target.force]
-            if not frame.stable:
-                raise Infeasible(_unstable(target))
-            if any(before.snapped_through for before in curve.frames if abs(before.force) <= abs(frame.force)):
-                raise Infeasible(_folded(target, "the mechanism snaps on the way there from zero load"))
-            start = self._travel(target, frame.state) - frame.displacement
-            origin = self._unloaded(target, curve.frames[0].state) if moving else None
-            samples[target] = Sample(frame.state, origin, start, frame.displacement)
-        return samples
+        found, snapped = {}, False
+        for sample, frame in zip(ordered, curve.frames, strict=True):
+            snapped = snapped or frame.snapped_through
+            if not frame.stable_under_control:
+                raise Infeasible(_unstable(sample))
+            if snapped:
+                raise Infeasible(_lost(sample, "the mechanism snaps on the way there from zero load"))
+            control = self._paths[sample].control(curve.unloaded)
+            found[sample] = SampleState(frame.state, control, curve.unloaded)
+        return found
 
-    def _unloaded(self, target: Target, state: State) -> State:
-        """The equilibrium without force and without effects, from one without force."""
-        newton = self._newtons[target.part]
-        try:
-            return newton.solve(replace(state, load_factor=0.0), LoadControl(0.0)).state
-        except NotConverged as failure:
-            raise Infeasible(f"no equilibrium without loads ({failure.reason})") from failure
+    # -- from one design to another ------------------------------------------------------------------------------
 
-    def _followed(self, target: Target, sample: Sample, before: np.ndarray, after: np.ndarray) -> Sample:
-        halvings, origin, start = self._options.halvings, sample.origin, sample.start
-        state = self._moved(target, sample.state, LoadControl(target.force), before, after, halvings)
-        reached = self._travel(target, state)
-        if origin is not None:
-            origin = self._moved(target, origin, LoadControl(0.0), before, after, halvings)
-            start = self._travel(target, origin)
-        return Sample(state, origin, start, reached - start)
+    def _followed(self, path: _Path, at: SampleState, before: np.ndarray, after: np.ndarray) -> SampleState:
+        unloaded, halvings, nothing = at.unloaded, self._options.halvings, LoadControl(0.0)
+        if path.moves:
+            unloaded = self._moved(path, unloaded, _Design(before, nothing), _Design(after, nothing), halvings)
+        self._model.reshape(after)
+        control = path.control(unloaded)
+        state = self._moved(path, at.state, _Design(before, at.control), _Design(after, control), halvings)
+        return SampleState(state, control, unloaded)
 
-    def _moved(
-        self, target: Target, state: State, control: LoadControl, before: np.ndarray, after: np.ndarray, halvings: int
-    ) -> State:
+    def _moved(self, path: _Path, state: State, before: _Design, after: _Design, halvings: int) -> State:
         """The equilibrium at design ``after``, from the one at ``before``, halfway first if need be."""
         try:
-            return self._next(target, state, control, before, after)
+            return self._next(path, state, before, after)
         except _Lost:
             if halvings == 0:
                 raise
-        halfway = 0.5 * (before + after)
-        state = self._moved(target, state, control, before, halfway, halvings - 1)
-        return self._moved(target, state, control, halfway, after, halvings - 1)
+        halfway = before.halfway(after)
+        state = self._moved(path, state, before, halfway, halvings - 1)
+        return self._moved(path, state, halfway, after, halvings - 1)
 
-    def _next(self, target: Target, start: State, control: LoadControl, before: np.ndarray, after: np.ndarray) -> State:
+    def _next(self, path: _Path, start: State, before: _Design, after: _Design) -> State:
         """The equilibrium at design ``after``, in one step."""
-        model, newton = self._model, self._newtons[target.part]
-        model.reshape(before)
-        guess = model.carry(start, after)
+        model, solver = self._model, path.solver
+        model.reshape(before.field)
+        guess = model.carry(start, after.field)
         try:
-            found = newton.solve(guess, control)
+            found = solver.solve(guess, after.control)
         except NotConverged as failure:
-            raise _Lost(f"no equilibrium at {target.force:g} ({failure.reason})") from failure
-        if found.unstable_modes:
-            raise Infeasible(_unstable(target))
+            raise _Lost(f"no equilibrium under {path.sample} ({failure.reason})") from failure
+        if found.unstable_under_control:
+            raise Infeasible(_unstable(path.sample))
         # δ = −K₁⁻¹ R(y; d₀) with y the state carried back, and how far ŷ₀ = y + δ misses y₀
-        system, back = newton.system, model.carry(found.state, before)
+        system, back = solver.system, before.control.prepare(model.carry(found.state, before.field))
         model.load(back)
-        x = found.linearisation.solve(system.residual(back, control).vector)
+        x = found.linearisation.solve(system.residual(back, before.control).vector)
         x.scale(-1.0)
         step = system.unknowns.step(x)
         miss = system.size(system.difference(start, system.moved(back, step)))
-        model.reshape(after)
+        model.reshape(after.field)
         if miss > max(self._options.largest_miss * system.size(step), self._options.rounding):
-            raise _Lost(_folded(target, "a fold lies between this design and the last one"))
+            raise _Lost(_lost(path.sample, "a fold lies between this design and the last one"))
         return found.state
 
-    def _origin_moves(self, target: Target) -> bool:
-        """Whether the unloaded position of the target's point depends on the design."""
-        on_link = isinstance(target.part.on, FlexibleLink)
-        return on_link or assemble(self._simulation.linkage, target.configuration).fraction < 1.0
 
-    def _travel(self, target: Target, state: State) -> float:
-        self._model.load(state)
-        return self._model.travel(target.part, state)
+@dataclass(frozen=True, eq=False)
+class _Design:
+    """A design field, this rank's values with ghosts, flat; and what is prescribed there."""
+
+    field: np.ndarray
+    control: Control
+
+    def halfway(self, other: _Design) -> _Design:
+        """Their mean."""
+        target = 0.5 * (self.control.target + other.control.target)
+        return _Design(0.5 * (self.field + other.field), self.control.at(target))
 
 
 class _Lost(Infeasible):
     """The equilibrium at another design is not found, or is not a continuation."""
 
 
-def _unstable(target: Target) -> str:
-    return f"the equilibrium at {target.force:g} in configuration {target.configuration.name!r} is unstable"
+def _unstable(sample: Sample) -> str:
+    return f"the equilibrium under {sample} is unstable"
 
 
-def _folded(target: Target, where: str) -> str:
-    return f"the equilibrium at {target.force:g} in configuration {target.configuration.name!r} is lost: {where}"
+def _lost(sample: Sample, where: str) -> str:
+    return f"the equilibrium under {sample} is lost: {where}"

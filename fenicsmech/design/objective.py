@@ -1,10 +1,12 @@
-"""The design objective: squared relative errors of simulated displacements, with derivatives.
+"""The design objective: targets as residuals, inequalities and a plain objective, with derivatives.
 
-    O(p) = Σ ½ w_k r_k² + R(p),     r_k = (u_k(p) − ū_k) / |ū_k|,      k over targets
+    O(p) = Σ ½ w_k r_k² + Σ w_k Q_k(p) / s_k + R(p),     r_k = (Q_k(p) − Q̄_k) / s_k,     c_k = ± (Q_k(p) − Q̄_k) / s_k
 
-(the paper's equation 5 and section V-A, relative to the targets and so free of units). Each evaluation places the
-handles, reshapes the links, follows the equilibria of all targets from those of the best design so far, and takes
-their adjoint derivatives to p. Targets are spread over groups of processes, each with a communicator of its own.
+(the paper's equation 5 and section V-A, relative to the targets and so free of units), where Q_k are the simulation's
+values plus a correction that is held fixed (``correction``). Each evaluation places the
+handles, reshapes the links, follows the equilibria of all samples from those of the best design so far, and takes
+the adjoint derivatives of all targets to p. Samples are spread over groups of processes, each with a communicator of
+its own.
 """
 
 from __future__ import annotations
@@ -15,14 +17,14 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from fenicsmech.clock import Clock
 from fenicsmech.collective import on_all
-from fenicsmech.design.description import Target
-from fenicsmech.design.equilibria import Known, TargetEquilibria
-from fenicsmech.design.optimisers.problem import Evaluation, Infeasible, TooHigh
+from fenicsmech.design.equilibria import Known, SampleEquilibria
+from fenicsmech.design.optimisers.problem import Evaluation, Inequalities, Infeasible, Plain, TooHigh, merit
 from fenicsmech.design.regularisers import Model, Regulariser
 from fenicsmech.design.rest_shape import ParametricShape
 from fenicsmech.design.shape.handle_optimum import HandlePlacement, ShapeError
+from fenicsmech.design.target import Comparison, Target
+from fenicsmech.log import Clock
 
 _PARTS = MPI.Comm.Create_keyval()  # attribute of a communicator: its parts by their number, split once
 
@@ -31,7 +33,6 @@ _PARTS = MPI.Comm.Create_keyval()  # attribute of a communicator: its parts by t
 class _Base:
     """The best design so far, from which others are reached."""
 
-    value: float
     placement: HandlePlacement
     known: Known
 
@@ -42,93 +43,124 @@ class Objective:
     Args:
         rest: from p to the rest shape of this group's simulation.
         equilibria: of this group's targets.
-        targets: all of them.
+        comparison: of values with all targets.
         regulariser: R.
         group: this process's group.
         clock: of the phases: handles, regularisers, equilibria, gradients, estimates.
 
     Attributes:
         lengths: typical change ℓ of each parameter, (parameters,).
-        reached: displacement of each target at the last evaluation, (targets,).
+        comparison: of values with targets.
+        correction: added to the simulation's values before they are compared, (components,).
+        reached: the simulation's values at the last evaluation, (components,).
     """
 
     def __init__(
         self,
         rest: ParametricShape,
-        equilibria: TargetEquilibria,
+        equilibria: SampleEquilibria,
         *,
-        targets: Sequence[Target],
+        comparison: Comparison,
         regulariser: Regulariser,
         group: Group,
         clock: Clock,
     ) -> None:
         self._rest, self._equilibria, self._regulariser, self._group = rest, equilibria, regulariser, group
-        self._wanted = np.array([target.displacement for target in targets])
-        self._root_weights = np.sqrt([target.weight for target in targets])
-        self._scale = target_scales(targets) / self._root_weights
+        self.comparison = comparison
         self._base: _Base | None = None
         self._near: HandlePlacement | None = None
+        self._scaled = False
         self.lengths, self._clock = rest.lengths, clock
-        self.reached = np.full(len(targets), np.nan)
+        self._rows = np.zeros((comparison.size, len(rest.lengths)))
+        self.reached, self.correction = np.full(comparison.size, np.nan), np.zeros(comparison.size)
+
+    @property
+    def compared(self) -> np.ndarray:
+        """What targets are compared with at the last evaluation, (components,)."""
+        return self.reached + self.correction
 
     @property
     def placement(self) -> HandlePlacement:
         """Handle positions of the best design so far."""
         return self._best.placement
 
-    def begin(self, near: HandlePlacement | None) -> None:
-        """Starts afresh: the next evaluation finds its equilibria from zero load, its handles near ``near``."""
-        self._base, self._near = None, near
+    def begin(self, near: HandlePlacement | None, drawn: np.ndarray | None = None) -> None:
+        """Starts afresh: the next evaluation finds its equilibria from zero load.
 
-    def evaluate(self, parameters: np.ndarray, below: float = np.inf) -> Evaluation:
-        """O and its derivatives.
+        Args:
+            near: handle positions to start from.
+            drawn: components to which the least quantities are relative; by default those of the next evaluation.
+        """
+        self._base, self._near, self._scaled = None, near, drawn is not None
+        if drawn is not None:
+            self.comparison = self.comparison.relative_to(drawn)
+
+    def loaded(self, parameters: np.ndarray) -> np.ndarray:
+        """The simulation's values at a design, its handles near the drawn ones, loaded from zero, (components,).
+
+        Raises:
+            Infeasible: cells invert, or a target's equilibrium is not found or is unstable.
+        """
+        self.begin(None)
+        return self._values(on_all(self._group.everyone, lambda: self._solve(parameters, None))[2])
+
+    def evaluate(
+        self, parameters: np.ndarray, below: float = np.inf, penalties: np.ndarray | float = 0.0
+    ) -> Evaluation:
+        """O and its derivatives; the design becomes the best so far.
 
         Args:
             parameters: p, (parameters,).
-            below: the largest value of use to the caller.
+            below: the largest merit of use to the caller.
+            penalties: ν of the inequalities in the merit, (inequalities,).
 
         Raises:
             Infeasible: cells invert, or a target's equilibrium is not found or is unstable.
-            TooHigh: the value is above ``below``; derivatives were not computed.
+            TooHigh: the merit is above ``below``; derivatives were not computed.
         """
-        placement, model, known = on_all(self._group.everyone, lambda: self._solve(parameters, self._base))
-        reached = self._displacements(known)
-        value = self._value(parameters, model, reached)
-        if value > below:
-            raise TooHigh(f"the objective is {value:.3g}")
+        everyone = self._group.everyone
+        placement, model, known = on_all(everyone, lambda: self._solve(parameters, self._base))
+        reached = self._values(known)
+        if not self._scaled:
+            self.comparison, self._scaled = self.comparison.relative_to(reached), True
+        compared, values = self.comparison, reached + self.correction
+        residuals, inequalities = compared.residuals(values), compared.inequalities(values)
+        value = 0.5 * float(residuals @ residuals) + compared.plain(values) + model(parameters).value
+        # decisions may depend on its last bit
+        height = everyone.bcast(merit(value, inequalities, penalties), root=0)
+        if height > below:
+            raise TooHigh(height)
         with self._clock.phase("gradients"):
-            everyone = self._group.everyone
-            rows = on_all(everyone, lambda: self._rest.gradient(placement, self._equilibria.gradients(known)))
-            jacobian = self._gathered(rows) / self._scale[:, None]
-        if self._base is None or value < self._base.value:
-            self._base = _Base(value, placement, known)
-        self.reached = reached
+            try:
+                rows = self._gathered(on_all(everyone, lambda: self._rest.gradient(placement, self._fields(known))))
+            except ShapeError as error:
+                raise Infeasible(str(error)) from error
+        self._base = _Base(placement, known)
+        self.reached, self._rows = reached, rows
+        by_residuals, by_plain, by_inequalities = compared.slopes(rows)
         return Evaluation(
             parameters=np.array(parameters),
-            residuals=self._residuals(reached),
-            jacobian=jacobian,
+            residuals=residuals,
+            jacobian=by_residuals,
             regulariser=model,
             errors=self.errors,
+            plain=Plain(compared.plain(values), by_plain),
+            inequalities=Inequalities(compared.bounded(), inequalities, by_inequalities),
         )
 
     def errors(self) -> np.ndarray:
-        """Estimated errors |e| of the residuals of the best design so far, those of the finite elements, (targets,)."""
+        """Estimated errors |e| of the residuals of the best design so far, those of the finite elements."""
+        return self.comparison.residual_errors(self.estimates())
+
+    def estimates(self) -> np.ndarray:
+        """What infinitely fine elements would add to the components of the best design so far, (components,)."""
         with self._clock.phase("estimates"):
             estimates = on_all(self._group.everyone, lambda: self._equilibria.errors(self._best.known))
-        return np.abs(self._gathered(estimates[:, None])[:, 0]) / self._scale
+        return self._gathered(estimates[:, None])[:, 0]
 
-    def traced(self, parameters: np.ndarray) -> float:
-        """O, its handles placed near the drawn ones and its equilibria found from zero load.
-
-        Raises:
-            Infeasible: cells invert, or a target's equilibrium is not found or is unstable.
-        """
-        _, model, known = on_all(self._group.everyone, lambda: self._solve(parameters, None))
-        return self._value(parameters, model, self._displacements(known))
-
-    def sensitivities(self, evaluation: Evaluation) -> np.ndarray:
-        """Relative change of each displacement when a parameter changes by its length ℓ, (targets, parameters)."""
-        return evaluation.jacobian * self.lengths / self._root_weights[:, None]
+    def sensitivities(self) -> np.ndarray:
+        """Relative change of each component when a parameter changes by its length ℓ, (components, parameters)."""
+        return self.comparison.relative_slopes(self._rows) * self.lengths
 
     def active(self, parameters: np.ndarray) -> tuple[str, ...]:
         """The bounds that hold the design ``parameters`` back, in words."""
@@ -140,16 +172,11 @@ class Objective:
         assert self._base is not None, "no design was evaluated yet"
         return self._base
 
-    def _residuals(self, reached: np.ndarray) -> np.ndarray:
-        return (reached - self._wanted) / self._scale
+    def _values(self, known: Known) -> np.ndarray:
+        return self._gathered(self._equilibria.values(known)[:, None])[:, 0]
 
-    def _value(self, parameters: np.ndarray, model: Model, reached: np.ndarray) -> float:
-        residuals = self._residuals(reached)
-        value = 0.5 * float(residuals @ residuals) + model(parameters).value
-        return self._group.everyone.bcast(value, root=0)  # decisions may depend on its last bit
-
-    def _displacements(self, known: Known) -> np.ndarray:
-        return self._gathered(np.array([[sample.displacement] for sample in known.samples]))[:, 0]
+    def _fields(self, known: Known) -> np.ndarray:
+        return np.array([gradient.design for gradient in self._equilibria.gradients(known)])
 
     def _solve(self, parameters: np.ndarray, base: _Base | None) -> tuple[HandlePlacement, Model, Known]:
         """Handle placement, model of R and this group's equilibria, followed from those of ``base`` if there is one."""
@@ -165,46 +192,16 @@ class Objective:
         return placement, model, known
 
     def _gathered(self, rows: np.ndarray) -> np.ndarray:
-        """One row per target from the rows of each group's targets, (targets, n)."""
+        """One row per component from the rows of each group's targets, (components, n)."""
         everyone = self._group.everyone
         parts = everyone.allgather((self._group.mine, rows) if self._group.leads else ((), rows[:0]))
-        gathered = np.empty((len(self._wanted), rows.shape[1]))
+        gathered = np.empty((self.comparison.size, rows.shape[1]))
         for mine, part in parts:
-            gathered[list(mine)] = part
+            first = 0
+            for place in (self.comparison.places[k] for k in mine):
+                size = place.stop - place.start
+                gathered[place], first = part[first : first + size], first + size
         return gathered
-
-
-def target_scales(targets: Sequence[Target]) -> np.ndarray:
-    """|ū_k|, or a tenth of the largest where ū_k is less, (targets,)."""
-    wanted = np.abs([target.displacement for target in targets])
-    return np.maximum(wanted, 0.1 * wanted.max()) if wanted.any() else np.ones(len(wanted))
-
-
-def target_errors(targets: Sequence[Target], reached: np.ndarray) -> np.ndarray:
-    """Errors of displacements ``reached`` (targets,) relative to these scales, (targets,)."""
-    return (reached - [target.displacement for target in targets]) / target_scales(targets)
-
-
-def objective_error(targets: Sequence[Target], reached: np.ndarray, errors: Sequence[float | None]) -> float | None:
-    """Discretisation error of the objective, O(u + d) − O(u).
-
-    With the errors d_k of the targets' displacements, of scale s_k, and with residuals r_k,
-
-        O(u + d) − O(u) = Σ w_k (r_k d_k / s_k + ½ (d_k / s_k)²).
-
-    Far from the targets the first term counts, and the estimate is as good as those of displacements; where targets
-    are met the second one is left, whose factor is the square of theirs. R depends on the design alone.
-
-    Args:
-        targets: wanted displacements.
-        reached: displacements u, (targets,).
-        errors: d, their estimated discretisation errors, (targets,); None where not known.
-    """
-    if any(error is None for error in errors):
-        return None
-    weights = np.array([target.weight for target in targets])
-    relative = np.asarray(errors) / target_scales(targets)
-    return float(weights @ (target_errors(targets, reached) * relative + 0.5 * relative**2))
 
 
 # -- groups of processes ---
@@ -230,21 +227,27 @@ class Group:
         return self.comm.rank == 0
 
 
-def group_count(processes: int, targets: int) -> int:
+def group_count(processes: int, samples: int) -> int:
     """The number of groups with the shortest expected time.
 
-    A group of n processes works off ⌈targets / groups⌉ equilibria, each in a time of 1 / √n: two are 1.4
+    A group of n processes works off ⌈samples / groups⌉ equilibria, each in a time of 1 / √n: two are 1.4
     times as fast as one.
     """
-    choices = range(1, min(processes, targets) + 1)
-    return min(choices, key=lambda groups: -(-targets // groups) / (processes // groups) ** 0.5)
+    choices = range(1, min(processes, max(samples, 1)) + 1)
+    return min(choices, key=lambda groups: -(-samples // groups) / (processes // groups) ** 0.5)
 
 
-def split(comm: MPI.Comm, targets: int) -> Group:
-    """Groups of neighbouring processes of ``comm``; target k goes to group k modulo their number."""
-    count = group_count(comm.size, targets)
+def split(comm: MPI.Comm, samples: Sequence[int]) -> Group:
+    """Groups of neighbouring processes of ``comm``; targets of sample k go to group k modulo their number.
+
+    Args:
+        comm: all processes.
+        samples: the number of each target's sample, as of ``sample_numbers``; targets of links at rest, which cost
+            little, go to the first group.
+    """
+    count = group_count(comm.size, len(set(samples) - {-1}))
     if count == 1:
-        return Group(comm, comm, tuple(range(targets)))
+        return Group(comm, comm, tuple(range(len(samples))))
     mine = comm.rank * count // comm.size
     parts = comm.Get_attr(_PARTS)
     if not isinstance(parts, dict):
@@ -252,4 +255,10 @@ def split(comm: MPI.Comm, targets: int) -> Group:
         comm.Set_attr(_PARTS, parts)
     if count not in parts:
         parts[count] = comm.Split(color=mine, key=comm.rank)
-    return Group(comm, parts[count], tuple(range(mine, targets, count)))
+    return Group(comm, parts[count], tuple(k for k, own in enumerate(samples) if max(own, 0) % count == mine))
+
+
+def sample_numbers(targets: Sequence[Target]) -> list[int]:
+    """The number of each target's sample among all, −1 for links at rest."""
+    numbers = {own: k for k, own in enumerate(dict.fromkeys(t.sample for t in targets if t.sample is not None))}
+    return [-1 if target.sample is None else numbers[target.sample] for target in targets]

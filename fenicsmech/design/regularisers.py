@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenicsmech.checks import finite, positive
 from fenicsmech.design.optimisers.problem import Quadratic
 from fenicsmech.design.rest_shape import DesignedLink, ParametricShape
 from fenicsmech.design.shape.handle_optimum import HandlePlacement
 from fenicsmech.design.shape.quality import Barrier
+from fenicsmech.errors import finite, positive
 
 Model = Callable[[np.ndarray], Quadratic]
 
@@ -73,7 +73,8 @@ class StayClose(Regulariser):
     """R_init = ½ Σ ((p − p₀) / h)², h the thickness of each link (the paper's equation 7, made free of units).
 
     Thickness parameters δ are relative to h already. Design problems weight it 1e-4 by default where the paper's
-    equation has 1: with 1 the designs stay so close to the drawing that the demos' targets are missed by 19–79 %.
+    equation has 1: with 1 the designs stay so close to the drawing that the demos miss their targets
+    (benchmarks/closeness.py).
     """
 
     def around(self, rest, placement):

@@ -1,8 +1,10 @@
 """The rest shape of a simulation's links as a function of the design p, with optimal handles.
 
-    p → θ*(p) → d(p, θ*(p)) → X = X₀ + d
+    p → θ*(p) → d(p, θ*(p)) → X = X₀ + c + d
 
-with the handle positions θ and the design field d.
+with the handle positions θ, the design field d and the bulge c of the drawn edges. Handle positions are best for the
+straight cells between the vertices. Edges of the outline follow the design between them too; a design whose curved
+cells are squeezed too much has no rest shape.
 """
 
 from __future__ import annotations
@@ -11,13 +13,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from dolfinx import fem
 from mpi4py import MPI
 
+from fenicsmech.compat import cell_dofs, vector_space
 from fenicsmech.design.description import Bounds, SplineDesign, shape_request
-from fenicsmech.design.shape.handle_optimum import HandleOptimum, HandlePlacement
+from fenicsmech.design.shape.handle_optimum import HandleOptimum, HandlePlacement, ShapeError
 from fenicsmech.design.shape.quality import Barrier, QualitySum
 from fenicsmech.design.shape.shape_map import LinkShape, ShapeMap, shape_links
 from fenicsmech.design.shape.spline import LinkSpline, SplineSamples
+from fenicsmech.meshing import edge_corners, least_stretches
 from fenicsmech.model import MechanismModel
 from fenicsmech.simulation import Simulation
 
@@ -43,6 +48,9 @@ class DesignedLink:
     bounds: Bounds
 
 
+_LEAST_STRETCH = 0.1  # least det ∂X/∂X₁ in a cell, X₁ the straight cell; of the drawn shape it is at least 0.3
+
+
 class ParametricShape:
     """The rest shape of one model.
 
@@ -63,8 +71,12 @@ class ParametricShape:
     def __init__(self, model: MechanismModel, shapes: Sequence[LinkShape], designs: Sequence[SplineDesign]) -> None:
         self._model, design = model, model.elastic.d
         self._map = ShapeMap(model.mesh, design, shapes)
-        self._ratio = QualitySum(design, comm=model.mesh.comm)
-        self._optimum = HandleOptimum(self._map, self._ratio)
+        self._cells = np.flatnonzero(np.isin(model.mesh.link, [shape.link for shape in shapes]))
+        # the vertices' part, which handles are placed for
+        self._straight = fem.Function(vector_space(model.mesh.mesh, 1))
+        self._vertex_map = ShapeMap(model.mesh, self._straight, shapes)
+        self._ratio = QualitySum(self._straight, comm=model.mesh.comm)
+        self._optimum = HandleOptimum(self._vertex_map, self._ratio)
         self._penalties: dict[Barrier, QualitySum] = {}
         self.initial = self._map.initial
         links, first = [], 0
@@ -99,18 +111,29 @@ class ParametricShape:
             near: placement of a design near by.
 
         Raises:
-            ShapeError: cells stay inverted however the handles are placed.
+            ShapeError: cells stay inverted however the handles are placed, or curved ones are squeezed.
         """
         placement = self._optimum.solve(p, near)
-        self._model.reshape(self._model.elastic.d.x.array)
+        self._model.reshape(self._placed(placement))
         return placement
 
     def field(self, p: np.ndarray, near: HandlePlacement | None) -> np.ndarray:
         """This rank's values of the design field for ``p``, ghosts last, flat; the links keep the shape they have."""
-        before = self._model.elastic.d.x.array.copy()
-        with self._model.shaped(before):
-            self.place(p, near)
-            return self._model.elastic.d.x.array.copy()
+        return self._placed(self._optimum.solve(p, near))
+
+    def _placed(self, placement: HandlePlacement) -> np.ndarray:
+        """The design field of a placement, this rank's values, ghosts last, flat."""
+        field, elastic, mesh = self._map.field(placement.p, placement.theta), self._model.elastic, self._model.mesh
+        if elastic.order > 1:
+            bent = field if elastic.bulge is None else field + elastic.bulge.x.array.reshape(field.shape)
+            corners, pairs = field.shape[1] + 1, edge_corners(field.shape[1] + 1)
+            values = bent[cell_dofs(elastic.d.function_space)[self._cells]]
+            bulges = values[:, corners:] - values[:, pairs].mean(axis=2)
+            squeezed = least_stretches(mesh.corners(self._cells) + values[:, :corners], bulges[:, ::-1])
+            least = mesh.mesh.comm.allreduce(float(squeezed.min(initial=1.0)), op=MPI.MIN)
+            if least < _LEAST_STRETCH:
+                raise ShapeError("rest shape", "its curved edges squeeze cells", "Change it by less, or mesh it finer")
+        return field.ravel()
 
     def gradient(self, placement: HandlePlacement, nodal: np.ndarray) -> np.ndarray:
         """dO/dp (…, parameters) from ∂O/∂d (…, owned values) of the design placed as in ``placement``."""
@@ -120,12 +143,15 @@ class ParametricShape:
 
     def worst_ratio(self) -> float:
         """Largest ρ among the cells of the present rest shape."""
+        self._straight.interpolate(self._model.elastic.d)
         worst = float(self._ratio.cell_values().max(initial=0.0))
         return self._model.mesh.mesh.comm.allreduce(worst, op=MPI.MAX)
 
     def quality_penalty(self, barrier: Barrier, placement: HandlePlacement) -> tuple[float, np.ndarray]:
         """Σ_e β(ρ_e) of the present rest shape, and its derivative by p."""
         if barrier not in self._penalties:
-            self._penalties[barrier] = QualitySum(self._model.elastic.d, barrier.symbolic)
+            self._penalties[barrier] = QualitySum(self._straight, barrier.symbolic)
         total = self._penalties[barrier]
-        return total.value(), self.gradient(placement, total.gradient().ravel())
+        self._straight.interpolate(self._model.elastic.d)
+        by_p, by_theta = self._vertex_map.apply_transpose(placement.p, placement.theta, total.gradient())
+        return total.value(), self._optimum.total_gradient(placement, by_p, by_theta)

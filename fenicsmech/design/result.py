@@ -1,4 +1,4 @@
-"""Results of designs as plain data, their verification, and files of their links."""
+"""Results of designs as plain data, and files of their links."""
 
 from __future__ import annotations
 
@@ -11,25 +11,21 @@ import numpy as np
 from mpi4py import MPI
 
 from fenicsmech.collective import on_one
-from fenicsmech.design.description import SplineDesign, Target
-from fenicsmech.design.equilibria import TargetEquilibria
-from fenicsmech.design.objective import target_errors, target_scales
-from fenicsmech.design.optimisers.problem import Infeasible
+from fenicsmech.design.description import SplineDesign
 from fenicsmech.design.rest_shape import DesignedLink, ParametricShape
 from fenicsmech.design.shape.handle_optimum import HandlePlacement
 from fenicsmech.design.shape.shape_map import gather_links
-from fenicsmech.errors import DescriptionError
+from fenicsmech.design.target import Comparison
+from fenicsmech.errors import DescriptionError, point_text
 from fenicsmech.export import PinHole, write_step, write_stl
 from fenicsmech.files import atomic_write
-from fenicsmech.log import logger
-from fenicsmech.mechanism import DRAWN, Disc, FlexibleLink
-from fenicsmech.meshing import LinkMesh, boundary_loops, plan_of
+from fenicsmech.mechanism import DRAWN, Disc, FlexibleLink, Units
+from fenicsmech.meshing import LinkMesh, boundary_polygons, plan_of
 from fenicsmech.multibody import Linkage, assemble
 from fenicsmech.plot import DesignShape, LinkOutline, draw_designs
-from fenicsmech.simulation import MechanismPlotter, Simulation, rest_vertices
+from fenicsmech.simulation import MechanismPlotter, Simulation, rest_geometry
 
-_log = logger(__name__)
-_FORMAT = "fenicsmech design 1"
+_FORMAT = "fenicsmech design 3"
 
 
 @dataclass(frozen=True)
@@ -40,7 +36,7 @@ class LinkDesign:
         name: of the link.
         parameters: its part of p.
         handles: positions θ of its handles, the best near those of the designs on the way. Several can be good: the
-            parameters alone fix displacements to about 1 % only.
+            parameters alone need not fix the shape.
         controls: position and thickness (x, y, δ), then tangent, of every control point, (points, 2, 3).
         thickness: least and largest thickness in the plane.
         bend: largest curvature ratio.
@@ -56,29 +52,88 @@ class LinkDesign:
     centreline: tuple[tuple[float, ...], ...] | None = None
 
 
+Value = float | tuple[float, ...]
+
+
 @dataclass(frozen=True)
-class TargetResult:
-    """A target and the displacement reached.
+class PartValue:
+    """A target's quantity in the exported parts, meshed anew and finer.
 
     Attributes:
-        force_name, configuration: name of the force, motor positions.
-        force: its magnitude.
-        wanted, started, reached: displacement that is wanted, of the design the optimisation started from, and of
-            the best design.
-        error: of the reached displacement, relative to the wanted one, or to a tenth of the largest wanted one where
-            that is more.
-        finer_elements_add: estimate of what infinitely fine elements would add to the reached displacement; None if
-            loading the mechanism from zero does not lead there.
+        value: of the quantity.
+        finer_elements_add: estimate of what infinitely fine elements would add.
+        error: of the value with this estimate, relative as that of the target.
     """
 
-    force_name: str
-    configuration: str
-    force: float
-    wanted: float
-    started: float
-    reached: float
+    value: Value
+    finer_elements_add: Value
     error: float
-    finer_elements_add: float | None
+
+    @property
+    def met(self) -> bool:
+        """Whether the error is at most one per cent."""
+        return abs(self.error) <= 0.01
+
+
+@dataclass(frozen=True)
+class TargetResult:
+    """A target and what was reached of it; vectors are tuples.
+
+    Attributes:
+        name: the quantity and its sample, in words.
+        configuration: motor positions of the sample; empty for links at rest.
+        force: magnitude of the sample's force, of the first one of several; None where a displacement is prescribed.
+        unit: of the values.
+        relation: "equals", "at most", "at least" or "least".
+        wanted: value or bound; None of a quantity that is to be as small as possible.
+        started: value of the design the optimisation started from, as the optimiser saw it: that of a surrogate.
+        reached: value of the best design on the simulation's mesh.
+        finer_elements_add: estimate of what infinitely fine elements would add to the reached value.
+        corrected: their sum, with which the target is compared; the reached value alone of an optimisation without
+            estimates.
+        error: of the corrected value, relative to the target's scale; of a bound how far it is missed, of a vector the
+            length of its error.
+        part: the same in the exported parts; None before ``DesignProblem.verify``, and of quantities that parts do not
+            have, as the length of a centreline.
+    """
+
+    name: str
+    configuration: str
+    force: float | None
+    unit: str
+    relation: str
+    wanted: Value | None
+    started: Value
+    reached: Value
+    finer_elements_add: Value
+    corrected: Value
+    error: float
+    part: PartValue | None = None
+
+    @property
+    def met(self) -> bool:
+        """Whether the error is at most one per cent."""
+        return abs(self.error) <= 0.01
+
+    def __str__(self) -> str:
+        unit, reached = f" {self.unit}" if self.unit else "", _text(self.corrected)
+        part = "" if self.part is None else f"; in the part {_text(self.part.value)}{unit}"
+        if self.part is not None:
+            part += f", to which finer elements add {_text(self.part.finer_elements_add)}"
+        if self.wanted is None:
+            return f"{self.name}: {reached}{unit}, from {_text(self.started)}{unit}{part}"
+        if self.part is not None:
+            part += f", {_verdict(self.part)}"
+        wanted = f"{'' if self.relation == 'equals' else self.relation + ' '}{_text(self.wanted)}"
+        return f"{self.name}: {reached}{unit} of {wanted}{unit}, {_verdict(self)}{part}"
+
+
+def _verdict(found: TargetResult | PartValue) -> str:
+    return f"{'met' if found.met else 'missed'} ({found.error:+.2%})"
+
+
+def _text(value: Value) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else point_text(value)
 
 
 @dataclass(frozen=True)
@@ -94,15 +149,18 @@ class DesignResult:
         verified: whether loading the mechanism from zero leads to the equilibria that were followed from design to
             design; the log says where not.
         active: the bounds that hold the design back, in words.
-        objective: of the initial and of the final design.
-        objective_error: estimate of what infinitely fine elements would add to the final one; None if one of its
-            targets' displacements is not known.
+        objective: of the design at the start as the optimiser saw it, and of the best one with corrected values.
+        objective_error: what the corrections add to the latter.
+        surrogate: the space of the surrogate that led there; None if the simulation itself was minimised.
+        corrections: largest change of the corrections after each round, over the targets' scales; of a surrogate that
+            was given up first.
         iterations, evaluations: of the objective.
         mesh_ratio_max: largest circumradius over inradius among the cells.
         seconds: wall-clock time.
         phases: the same by phase, on the first process: setup, weights, handles, regularisers, equilibria, gradients,
             verification; the rest is the optimiser's own.
         processes, groups: their numbers.
+        part_fidelity: at which the exported parts were simulated, in words; empty if they were not.
     """
 
     mechanism: str
@@ -113,7 +171,9 @@ class DesignResult:
     verified: bool
     active: tuple[str, ...]
     objective: tuple[float, float]
-    objective_error: float | None
+    objective_error: float
+    surrogate: str | None
+    corrections: tuple[float, ...]
     iterations: int
     evaluations: int
     mesh_ratio_max: float
@@ -121,18 +181,21 @@ class DesignResult:
     phases: Mapping[str, float]
     processes: int
     groups: int
+    part_fidelity: str = ""
 
     def __str__(self) -> str:
-        reached = (
-            f"  {t.force_name!r} of {t.force:g}, {t.configuration}: {t.reached:.4g} of {t.wanted:.4g} ({t.error:+.2%})"
-            for t in self.targets
-        )
+        reached = (f"  {target}" for target in self.targets)
         return "\n".join([f"design of {self.mechanism!r} after {self.iterations} iterations: {self.reason}", *reached])
 
     @property
     def worst_error(self) -> float:
         """Largest relative error among the targets."""
         return max(abs(target.error) for target in self.targets)
+
+    @property
+    def worst_part_error(self) -> float | None:
+        """Largest relative error among the targets in the exported parts; None if they were not simulated."""
+        return max((abs(target.part.error) for target in self.targets if target.part is not None), default=None)
 
     @property
     def thickness(self) -> tuple[float, float]:
@@ -200,69 +263,72 @@ class DesignResult:
         if not isinstance(data, dict) or data.pop("format", None) != _FORMAT:
             raise DescriptionError(part, "it does not hold a design", "Give a file written by DesignResult.save")
         try:
-            return _read(data)
+            return read_result(data)
         except (KeyError, TypeError) as error:
             raise DescriptionError(part, f"it is incomplete ({error})", "Give an unchanged file") from None
 
 
-def _read(data: dict) -> DesignResult:
+def read_result(data: dict) -> DesignResult:
+    """A result from what ``dataclasses.asdict`` and JSON made of it; ``data`` is used up."""
+
     def frozen(value):
         return tuple(map(frozen, value)) if isinstance(value, list) else value
 
     links = tuple(LinkDesign(**{key: frozen(value) for key, value in link.items()}) for link in data.pop("links"))
-    targets = tuple(TargetResult(**target) for target in data.pop("targets"))
-    return DesignResult(links=links, targets=targets, **{key: frozen(value) for key, value in data.items()})
+    targets = []
+    for own in data.pop("targets"):
+        part = own.pop("part", None)
+        part = part and PartValue(**{key: frozen(value) for key, value in part.items()})
+        targets.append(TargetResult(**{key: frozen(value) for key, value in own.items()}, part=part))
+    return DesignResult(links=links, targets=tuple(targets), **{key: frozen(value) for key, value in data.items()})
 
 
-def verified_targets(
-    simulation: Simulation, targets: Sequence[Target], started: np.ndarray, followed: np.ndarray
-) -> tuple[tuple[TargetResult, ...], bool]:
-    """Results of the targets, each loaded from zero as a user will do; logs those that are not reached.
+@dataclass(frozen=True, eq=False)
+class Reached:
+    """Values at one design of the simulation that counts.
 
-    Args:
-        simulation: its model has the shapes of the optimum.
-        targets: wanted displacements.
-        started: displacements at the start, (targets,).
-        followed: displacements of the equilibria that were followed from design to design, (targets,).
-
-    Returns:
-        The targets' results, with the displacements as followed and without an estimate if one of them is not reached,
-        and whether loading leads to the equilibria that were followed.
+    Attributes:
+        values: of the components, (components,).
+        errors: what infinitely fine elements add, estimated, (components,).
+        compared: what targets are compared with, (components,).
     """
-    equilibria, same = TargetEquilibria(simulation, targets), False
-    reached, finer = followed, [None] * len(targets)
-    try:
-        traced = equilibria.trace()
-    except Infeasible as failure:
-        _log.warning("loaded from zero, the optimum does not reach all its targets: %s", failure)
-    else:
-        reached, finer = (
-            np.array([sample.displacement for sample in traced.samples]),
-            equilibria.errors(traced).tolist(),
-        )
-        # displacements of one equilibrium differ by less
-        different = np.flatnonzero(np.abs(reached - followed) > 1e-6 * target_scales(targets))
-        same = len(different) == 0
-        for k in different:
-            _log.warning(
-                "target %d of the optimum: %.6g when loaded from zero, %.6g when followed from the drawn design",
-                *(k + 1, reached[k], followed[k]),
-            )
-    errors = target_errors(targets, reached)
-    results = tuple(
+
+    values: np.ndarray
+    errors: np.ndarray
+    compared: np.ndarray
+
+
+def target_results(
+    comparison: Comparison, units: Units, started: np.ndarray, reached: Reached
+) -> tuple[TargetResult, ...]:
+    """Results of all targets, from their components at the start and at the end."""
+
+    def of(values: np.ndarray, k: int) -> Value:
+        return component_values(values[comparison.places[k]])
+
+    errors = comparison.errors(reached.compared)
+    return tuple(
         TargetResult(
-            force_name=target.part.name,
-            configuration=target.configuration.name,
-            force=target.force,
-            wanted=target.displacement,
-            started=float(started[k]),
-            reached=float(reached[k]),
+            name=target.name,
+            configuration="" if target.sample is None else target.sample.configuration.name,
+            force=None if target.sample is None or target.sample.moved else target.sample.magnitude,
+            unit=target.quantity.unit(units),
+            relation=target.relation,
+            wanted=(target.wanted[0] if target.size == 1 else target.wanted) if target.wanted else None,
+            started=of(started, k),
+            reached=of(reached.values, k),
+            finer_elements_add=of(reached.errors, k),
+            corrected=of(reached.compared, k),
             error=float(errors[k]),
-            finer_elements_add=finer[k],
         )
-        for k, target in enumerate(targets)
+        for k, target in enumerate(comparison.targets)
     )
-    return results, same
+
+
+def component_values(components: np.ndarray) -> Value:
+    """A number, or the tuple of several."""
+    own = tuple(components.tolist())
+    return own[0] if len(own) == 1 else own
 
 
 def link_designs(
@@ -292,7 +358,7 @@ def rest_meshes(simulation: Simulation, links: Sequence[FlexibleLink]) -> list[L
 
     Links of which one half is meshed are given by their plan.
     """
-    meshes = gather_links(simulation.model.mesh, rest_vertices(simulation.model))
+    meshes = gather_links(simulation.model.mesh, rest_geometry(simulation.model))
     everyone, halves = simulation.scene.mechanism.flexible_links, simulation.fidelity.model.half
     chosen = [meshes[everyone.index(link)] for link in links]
     return on_one(simulation.comm, lambda: [plan_of(mesh).mesh for mesh in chosen] if halves else chosen) or []
@@ -301,7 +367,7 @@ def rest_meshes(simulation: Simulation, links: Sequence[FlexibleLink]) -> list[L
 def _outline(link: DesignedLink, mesh: LinkMesh, p: np.ndarray) -> LinkOutline:
     """The outline of a link, with centreline, thickness and control points of its parameters ``p``."""
     plan = plan_of(mesh).mesh
-    loops = [plan.points[loop] for loop in boundary_loops(f"link {link.name!r}", plan)]
+    loops = boundary_polygons(f"link {link.name!r}", plan)
     return LinkOutline(
         loops,
         centreline=link.spline.evaluate(p, link.samples.t)[:, :2],
@@ -339,6 +405,10 @@ def write_solids(
     for link, mesh in zip(links, meshes, strict=True):
         regions = [linkage.bodies[i] for i in linkage.interfaces[link]]
         pins = [PinHole((b.centre[0], b.centre[1]), hole) for b in regions if hole and isinstance(b.region, Disc)]
-        stem = Path(folder) / link.name.replace(" ", "-")
         for suffix, write in ((".step", write_step), (".stl", write_stl)):
-            write(stem.with_suffix(suffix), mesh, depth=link.shape.depth, pins=pins, name=link.name)
+            write(solid_path(folder, link, suffix), mesh, depth=link.shape.depth, pins=pins, name=link.name)
+
+
+def solid_path(folder: str | Path, link: FlexibleLink, suffix: str) -> Path:
+    """The file of an exported link."""
+    return Path(folder) / f"{link.name.replace(' ', '-')}{suffix}"

@@ -9,23 +9,24 @@ from __future__ import annotations
 import json
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from math import inf, log
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
 from fenicsmech.collective import from_one, on_all
-from fenicsmech.design.description import Target
 from fenicsmech.design.objective import Objective
 from fenicsmech.design.optimisers.problem import Evaluation, Infeasible, Iterate, Optimiser, Reason, Start
 from fenicsmech.design.regularisers import Regulariser
 from fenicsmech.design.rest_shape import ParametricShape
+from fenicsmech.design.target import Target
 from fenicsmech.errors import DescriptionError
 from fenicsmech.files import atomic_write
-from fenicsmech.log import Progress, Silent
+from fenicsmech.log import Progress
 from fenicsmech.simulation import Simulation
 
 
@@ -35,14 +36,14 @@ class Optimum:
 
     Attributes:
         number, evaluations, parameters, reason: as in ``Iterate`` and its evaluation.
-        started: displacement of each target at the start, (targets,).
+        regulariser: R there.
     """
 
     number: int
     evaluations: int
     parameters: np.ndarray
     reason: Reason
-    started: np.ndarray
+    regulariser: float
 
 
 def minimise_together(
@@ -56,18 +57,13 @@ def minimise_together(
     """
 
     def decide() -> Optimum:
-        started = []
-
-        def watch_first(iterate: Iterate) -> None:
-            started.append(objective.reached)
-            watch(iterate)
-
         try:
-            last = optimiser.minimise(_Shared(comm, objective), start, watch=watch_first)
+            last = optimiser.minimise(_Shared(comm, objective), start, watch=watch)
         finally:
             comm.bcast(None, root=0)
         assert last.reason is not None, "an optimiser ends for a reason"
-        return Optimum(last.number, last.evaluations, last.evaluation.parameters, last.reason, started[0])
+        here = last.evaluation
+        return Optimum(last.number, last.evaluations, here.parameters, last.reason, here.penalty.value)
 
     return comm.bcast(on_all(comm, lambda: decide() if comm.rank == 0 else _follow(comm, objective)), root=0)
 
@@ -78,8 +74,10 @@ class _Shared:
     def __init__(self, comm: MPI.Comm, objective: Objective) -> None:
         self._comm, self._objective, self.lengths = comm, objective, objective.lengths
 
-    def evaluate(self, parameters: np.ndarray, below: float = np.inf) -> Evaluation:
-        return replace(self._ask("evaluate", parameters, below), errors=lambda: self._ask("errors"))
+    def evaluate(
+        self, parameters: np.ndarray, below: float = np.inf, penalties: np.ndarray | float = 0.0
+    ) -> Evaluation:
+        return replace(self._ask("evaluate", parameters, below, penalties), errors=lambda: self._ask("errors"))
 
     def _ask(self, method: str, *arguments):
         self._comm.bcast((method, arguments), root=0)
@@ -105,15 +103,47 @@ def _follow(comm: MPI.Comm, objective: Objective) -> None:
         raise failure
 
 
-_FORMAT = "fenicsmech checkpoint 1"
+_FORMAT = "fenicsmech checkpoint 3"
+
+
+@dataclass(frozen=True)
+class Round:
+    """The minimisation of one simulation's values plus a correction.
+
+    Attributes:
+        surrogate: whether the simulation is a surrogate.
+        correction: of its values, (components,).
+        changes: of the corrections so far, over what is allowed.
+        largest: the same over the scales of the targets.
+        started, initial: components at the start of the optimisation, (components,), and the objective there; empty
+            and None before.
+        drawn: components to which the least quantities are relative, (components,); empty before the start.
+    """
+
+    surrogate: bool
+    correction: tuple[float, ...]
+    changes: tuple[float, ...] = ()
+    largest: tuple[float, ...] = ()
+    started: tuple[float, ...] = ()
+    initial: float | None = None
+    drawn: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class Saved:
-    """Contents of a checkpoint: the start of the next run, and the handle positions θ there."""
+    """Contents of a checkpoint.
+
+    Attributes:
+        start: of the next run.
+        handles: positions θ there.
+        round: that was going on.
+        ended: reason for the end of its minimisation, and the optimiser; None if it was interrupted.
+    """
 
     start: Start
     handles: np.ndarray
+    round: Round
+    ended: tuple[str, str] | None
 
 
 @dataclass(frozen=True)
@@ -128,26 +158,49 @@ class Checkpoint:
     path: Path
     problem: Mapping[str, object]
 
-    def save(self, iterate: Iterate, handles: np.ndarray) -> None:
+    def save(self, iterate: Iterate, handles: np.ndarray, round: Round, optimiser: Optimiser) -> None:
         """Local. Writes an iterate and its handle positions; the file before stays until this one is complete."""
         data = {
-            "format": _FORMAT,
-            "problem": self.problem,
             "number": iterate.number,
             "evaluations": iterate.evaluations,
             "objective": iterate.evaluation.value,
             "parameters": iterate.evaluation.parameters.tolist(),
             "handles": handles.tolist(),
             "memory": iterate.memory.tolist(),
+            "round": asdict(round),
+            "ended": None if iterate.reason is None else [iterate.reason.name, repr(optimiser)],
         }
-        with atomic_write(self.path) as file:
-            file.write(json.dumps(data))
+        self.write(data)
 
     def load(self) -> Saved:
         """Local. The start saved in the file.
 
         Raises:
             DescriptionError: the file does not exist, is not a checkpoint, or is one of another problem.
+        """
+        data = self.read()
+        start = Start(
+            np.array(data["parameters"]), data["number"], data["evaluations"], np.array(data["memory"], dtype=float)
+        )
+        own: dict[str, Any] = {
+            name: tuple(value) if isinstance(value, list) else value for name, value in data["round"].items()
+        }
+        return Saved(start, np.array(data["handles"]), Round(**own), data["ended"] and tuple(data["ended"]))
+
+    def load_together(self, comm: MPI.Comm) -> Saved | None:
+        """The start on all processes, errors too; None if the file does not exist yet."""
+        return from_one(comm, lambda: self.load() if self.path.exists() else None)
+
+    def write(self, data: Mapping[str, object]) -> None:
+        """Local. Writes plain data; the file before stays until this one is complete."""
+        with atomic_write(self.path) as file:
+            file.write(json.dumps({"format": _FORMAT, "problem": self.problem, **data}))
+
+    def read(self) -> dict:
+        """Local. The data in the file.
+
+        Raises:
+            DescriptionError: as ``load``.
         """
         part = f"checkpoint {str(self.path)!r}"
         try:
@@ -166,14 +219,7 @@ class Checkpoint:
                 f"it belongs to another problem: {', '.join(other)} differ(s)",
                 "Resume with the options of the first run, or start anew",
             )
-        start = Start(
-            np.array(data["parameters"]), data["number"], data["evaluations"], np.array(data["memory"], dtype=float)
-        )
-        return Saved(start, np.array(data["handles"]))
-
-    def load_together(self, comm: MPI.Comm) -> Saved | None:
-        """The start on all processes, errors too; None if the file does not exist yet."""
-        return from_one(comm, lambda: self.load() if self.path.exists() else None)
+        return data
 
 
 def fingerprint(
@@ -182,8 +228,9 @@ def fingerprint(
     targets: Sequence[Target],
     regulariser: Regulariser,
     optimiser: Optimiser,
+    surrogate: Simulation | None,
 ) -> dict[str, object]:
-    """The problem and its optimiser as plain data, with which a checkpoint must agree."""
+    """The problem, its optimiser and surrogate as plain data, with which a checkpoint must agree."""
     fidelity, mechanism = simulation.fidelity, simulation.scene.mechanism
     return {
         "mechanism": mechanism.name,
@@ -194,11 +241,10 @@ def fingerprint(
         "drawing": [repr(link) for link in mechanism.flexible_links],
         "links": [[link.name, link.spline.initial.tolist()] for link in rest.links],
         "bounds": [repr(link.bounds) for link in rest.links],
-        "forces": [[t.part.name, *t.part.at, *t.part.direction] for t in targets],
-        "configurations": [[t.configuration.name, *(at for _, at in t.configuration.positions)] for t in targets],
-        "targets": [[t.force, t.displacement, t.weight] for t in targets],
+        "targets": [repr(target) for target in targets],
         "regulariser": repr(regulariser),
         "optimiser": type(optimiser).__name__,
+        "surrogate": None if surrogate is None else surrogate.fidelity.model.name,
     }
 
 
@@ -211,11 +257,12 @@ class DesignProgress:
     Args:
         optimiser: gives the criteria of its end.
         leads: whether this process shows anything.
+        name: of what is shown.
     """
 
-    def __init__(self, optimiser: Optimiser, *, leads: bool) -> None:
+    def __init__(self, optimiser: Optimiser, *, leads: bool, name: str = "design") -> None:
         self._minimiser = optimiser
-        self._progress = Progress(None, "design") if leads else Silent()
+        self._progress = Progress(None, name, shown=leads)
         self._recent: deque[tuple[float, float]] = deque(maxlen=6)
 
     def update(self, iterate: Iterate, errors: np.ndarray) -> None:

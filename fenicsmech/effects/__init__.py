@@ -1,43 +1,31 @@
 """Effects on a mechanism beside its links, joints and forces, one per file.
 
-- ``energies``: of fields of links and poses of bodies; ``faces``: parts of links' boundaries
+- ``link_fields``: what energies of links are written in, and parts of links' boundaries
+- ``force_region``: averages over regions of links, which forces act on
 - ``gravity``: weight
 - ``joint_spring``: springs in revolute and prismatic joints
 - ``joint_compliance``: elastic pins
 - ``pressure``: of a fluid on the boundary of a link
 - ``prestrain``: links whose strain-free length is not the drawn one
-- ``contact``: frictionless contact with ``obstacles``
+- ``contact``: obstacles, and frictionless contact with them
 
 Each is an ``Effect`` of the ``mechanism`` layer in a file of its own. An effect that a scene does not list costs
 nothing: no form, no unknown, no entry of a matrix.
 """
 
-from fenicsmech.effects.contact import Contact, ContactGauge
-from fenicsmech.effects.energies import LinkFields, PosePotential, spring_potentials
-from fenicsmech.effects.faces import Boundary, Faces, find_boundaries
+from fenicsmech.effects.contact import Contact, Cylinder, HalfPlane, Obstacle
+from fenicsmech.effects.force_region import region_average
 from fenicsmech.effects.gravity import Gravity, Mass
 from fenicsmech.effects.joint_compliance import JointCompliance
 from fenicsmech.effects.joint_spring import JointSpring
-from fenicsmech.effects.obstacles import Cylinder, HalfPlane, Obstacle
+from fenicsmech.effects.link_fields import Boundary, Faces, LinkFields, find_boundaries
 from fenicsmech.effects.pressure import Pressure
 from fenicsmech.effects.prestrain import Prestrain
 
+# fmt: off
 __all__ = [
-    "Boundary",
-    "Contact",
-    "ContactGauge",
-    "Cylinder",
-    "Faces",
-    "Gravity",
-    "HalfPlane",
-    "JointCompliance",
-    "JointSpring",
-    "LinkFields",
-    "Mass",
-    "Obstacle",
-    "PosePotential",
-    "Pressure",
-    "Prestrain",
-    "find_boundaries",
-    "spring_potentials",
+    "Gravity", "Mass", "JointSpring", "JointCompliance", "Pressure", "Prestrain",
+    "Contact", "Cylinder", "HalfPlane", "Obstacle",
+    "Boundary", "Faces", "LinkFields", "find_boundaries", "region_average",
 ]
+# fmt: on

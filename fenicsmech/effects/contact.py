@@ -1,29 +1,128 @@
 """Frictionless contact with rigid obstacles, by a penalty on penetration.
 
-    V = Σ_links ∫ ½ κ ⟨−g(x)⟩² dA + Σ_points ½ k ⟨−g(x)⟩²,     x = X₀ + d + u,
+    V = Σ_links ∫ ½ κ ⟨−g(x)⟩² dA + Σ_points ½ k ⟨−g(x)⟩²,     x = X + u,
 
-g the signed gap and ⟨·⟩ the positive part. The pressure κ ⟨−g⟩ pushes a link out along ∇g. V is once continuously
-differentiable, its second derivative jumps where points come into contact: Newton's method is semismooth there.
+g the signed gap, positive outside, 0 on the surface, negative inside an obstacle, and ⟨·⟩ the positive part. The
+pressure κ ⟨−g⟩ pushes a link out along ∇g. V is once continuously differentiable, its second derivative jumps where
+points come into contact: Newton's method is semismooth there.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+import sympy
 import ufl
 from dolfinx import fem
-from mpi4py import MPI
 
-from fenicsmech.checks import points, positive
-from fenicsmech.compat import assemble_vector, compile_form
-from fenicsmech.effects.energies import LinkFields, PosePotential
-from fenicsmech.effects.faces import Faces
-from fenicsmech.effects.obstacles import Obstacle
-from fenicsmech.errors import DescriptionError
-from fenicsmech.joints import RigidSpace
+from fenicsmech.effects.link_fields import Faces, LinkFields
+from fenicsmech.errors import DescriptionError, direction, in_plane, point, points, positive, set_fields
 from fenicsmech.mechanism import Effect, FlexibleLink, Link, RigidLink, in_dimension
+from fenicsmech.multibody import Linkage, PosePotential
+from fenicsmech.symbolic import SmoothFunction, derive
+
+
+class Obstacle(ABC):
+    """A rigid, fixed obstacle."""
+
+    @property
+    @abstractmethod
+    def numbers(self) -> tuple[float, ...]:
+        """What ``gap`` depends on; constants in forms, so that obstacles of one kind share their compiled code."""
+
+    @abstractmethod
+    def gap(self, x, numbers, sqrt):
+        """g at the coordinates ``x``, two or three, with ``numbers`` and ``sqrt``: of NumPy, UFL or SymPy."""
+
+    @property
+    def core(self) -> float | None:
+        """Penetration beyond which the direction of the gap's gradient is ambiguous; None if it never is."""
+        return None
+
+    @abstractmethod
+    def check(self, dim: int) -> None:
+        """Checks the description in ``dim`` dimensions.
+
+        Raises:
+            DescriptionError: it is invalid.
+        """
+
+
+@dataclass(frozen=True)
+class HalfPlane(Obstacle):
+    """Everything behind a plane: g = (x − p) · n.
+
+    Attributes:
+        point: p, on the plane.
+        normal: n, out of the obstacle; any length.
+
+    Raises:
+        DescriptionError: they are not a point and a direction.
+    """
+
+    point: tuple[float, ...]
+    normal: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        set_fields(self, point=point("point of a half-plane", self.point))
+        set_fields(self, normal=direction("normal of a half-plane", self.normal))
+
+    def check(self, dim):
+        in_plane("normal of a half-plane", self.normal, dim)
+
+    @property
+    def numbers(self):
+        normal = in_dimension(self.normal, 3)
+        return (float(np.dot(normal, in_dimension(self.point, 3))), *normal)
+
+    def gap(self, x, numbers, sqrt):
+        offset, *normal = numbers
+        return sum(normal[k] * x[k] for k in range(len(x))) - offset
+
+    def __str__(self) -> str:
+        return f"a plane through {self.point} that faces {self.normal}"
+
+
+@dataclass(frozen=True)
+class Cylinder(Obstacle):
+    """An infinite cylinder along z: g = |(x − c)_xy| − R.
+
+    Attributes:
+        centre: c, two coordinates.
+        radius: R.
+
+    Raises:
+        DescriptionError: they are not a point and a positive number.
+    """
+
+    centre: tuple[float, float]
+    radius: float
+
+    def __post_init__(self) -> None:
+        set_fields(self, centre=point("centre of a cylinder", self.centre, dimensions=(2,)))
+        set_fields(self, radius=positive("radius of a cylinder", self.radius))
+
+    def check(self, dim):
+        pass
+
+    @property
+    def numbers(self):
+        return (*self.centre, self.radius)
+
+    def gap(self, x, numbers, sqrt):
+        a, b, radius = numbers
+        return sqrt((x[0] - a) ** 2 + (x[1] - b) ** 2) - radius
+
+    @property
+    def core(self):
+        return 0.25 * self.radius  # what gets deeper might leave on the other side
+
+    def __str__(self) -> str:
+        return f"a cylinder of radius {self.radius:g} at {self.centre}"
 
 
 @dataclass(frozen=True)
@@ -58,8 +157,8 @@ class Contact(Effect):
             raise DescriptionError("contact", f"{self.link!r} is not a link", "Give a rigid or a flexible link")
         part = f"contact of {self.link.name!r}"
         if self.stiffness is not None:
-            object.__setattr__(self, "stiffness", positive(f"stiffness of {part}", self.stiffness))
-        object.__setattr__(self, "points", points(f"points of {part}", self.points, least=0, dimensions=(2, 3)))
+            set_fields(self, stiffness=positive(f"stiffness of {part}", self.stiffness))
+        set_fields(self, points=points(f"points of {part}", self.points, least=0, dimensions=(2, 3)))
         if not isinstance(self.obstacle, Obstacle):
             raise DescriptionError(part, f"{self.obstacle!r} is not an obstacle", "Give a Cylinder(…) or HalfPlane(…)")
         match self.link:
@@ -68,7 +167,7 @@ class Contact(Effect):
                     part, "a rigid link touches at points only", "Give points=… and their stiffness=…"
                 )
             case FlexibleLink() if self.points:
-                raise DescriptionError(part, "a flexible link touches anywhere", "Leave points out")
+                raise DescriptionError(part, "a flexible link touches along its whole surface", "Leave points out")
 
     def check(self, mechanism, dim):
         super().check(mechanism, dim)
@@ -84,7 +183,8 @@ class Contact(Effect):
     def link_energy(self, fields):
         if not isinstance(self.link, FlexibleLink):
             return None
-        gap = self.obstacle.gap_form(fields.position, fields.mesh)
+        numbers = [fem.Constant(fields.mesh, number) for number in self.obstacle.numbers]
+        gap = self.obstacle.gap([fields.position[k] for k in range(fields.dim)], numbers, ufl.sqrt)
         inside = -gap
         if self.obstacle.core is not None:
             # NaN, as in an inverted element: no solution lies beyond
@@ -103,74 +203,45 @@ class Contact(Effect):
         return fem.Constant(fields.mesh, 0.1 * link.material.law.E) / height
 
     def pose_potentials(self, linkage):
-        if not isinstance(self.link, RigidLink):
-            return []
-        body = linkage.body_of(self.link)
-        drawn = np.array([in_dimension(p, linkage.dim) for p in self.points])
-        return [_Points(self, body, drawn, np.array(linkage.bodies[body].centre), linkage.joints.space)]
+        return [_Points(self, linkage)] if isinstance(self.link, RigidLink) else []
 
 
 class _Points(PosePotential):
-    """½ k Σ ⟨−g⟩² at points of one body."""
+    """½ k Σ ⟨−g⟩² at points of a rigid link."""
 
-    def __init__(self, contact: Contact, body: int, drawn: np.ndarray, centre: np.ndarray, space: RigidSpace) -> None:
-        self.bodies, self._drawn, self._offsets, self._space = (body,), drawn, drawn - centre, space
-        self._obstacle, self._stiffness = contact.obstacle, contact.stiffness
+    def __init__(self, contact: Contact, linkage: Linkage) -> None:
+        body = linkage.body_of(contact.link)
+        self._drawn = np.array([in_dimension(p, linkage.dim) for p in contact.points])
+        self._offsets, self._space = self._drawn - linkage.bodies[body].centre, linkage.joints.space
+        self.bodies, self._obstacle, self._stiffness = (body,), contact.obstacle, contact.stiffness
 
     def value(self, poses):
-        _, inside, _ = self._touching(poses)
+        inside = self._touching(poses)[1]
         return 0.5 * self._stiffness * float(inside @ inside)
 
     def gradient(self, poses):
-        where, inside, offsets = self._touching(poses)
-        slope = np.einsum("ni,nia->na", self._obstacle.gap_gradient(where), self._motion(poses, offsets))
+        point, inside, _, motion = self._touching(poses)
+        slope = np.einsum("ni,nia->na", self._gap.gradient(*point)[:, 0], motion)
         return -self._stiffness * inside @ slope
 
     def hessian(self, poses):
-        where, inside, offsets = self._touching(poses)
-        normal, motion = self._obstacle.gap_gradient(where), self._motion(poses, offsets)
+        point, inside, offsets, motion = self._touching(poses)
+        normal = self._gap.gradient(*point)[:, 0]
         slope = np.einsum("ni,nia->na", normal, motion)
-        bend = np.einsum("n,nij,nia,njb->ab", inside, self._obstacle.gap_hessian(where), motion, motion)
+        bend = np.einsum("nij,nia,njb->ab", self._gap.hessian(*point, inside[:, None]), motion, motion)
         turn = self._space.displacement_hessian(poses[self.bodies[0]], (inside[:, None] * normal).T @ offsets)
         return self._stiffness * (slope.T @ slope - bend - turn)
 
-    def _touching(self, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Positions of the points inside the obstacle, −g, and their offsets from the body's centre."""
-        where = self._drawn + self._space.displace(poses[self.bodies[0]], self._offsets)
-        gap = self._obstacle.gap(where)
+    @cached_property
+    def _gap(self) -> SmoothFunction:
+        x, numbers = sympy.symbols(f"x:{self._space.dim}"), sympy.symbols(f"c:{len(self._obstacle.numbers)}")
+        return derive([self._obstacle.gap(x, numbers, sympy.sqrt)], x, numbers, many=True)
+
+    def _touching(self, poses: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray, np.ndarray, np.ndarray]:
+        """Of the points inside: arguments of g, −g, offsets from the body's centre, and ∂u/∂z."""
+        pose, numbers = poses[self.bodies[0]], np.array([self._obstacle.numbers])
+        where = self._drawn + self._space.displace(pose, self._offsets)
+        gap = self._gap.value(where, numbers)[:, 0]
         inside = gap < 0.0
-        return where[inside], -gap[inside], self._offsets[inside]
-
-    def _motion(self, poses: np.ndarray, offsets: np.ndarray) -> np.ndarray:
-        return self._space.displacement_gradient(poses[self.bodies[0]], offsets)
-
-
-class ContactGauge:
-    """Measures the contact of a flexible link in the state that its fields hold.
-
-    Args:
-        contact: of a flexible link.
-        fields: of a simulation whose scene lists ``contact``.
-    """
-
-    def __init__(self, contact: Contact, fields: LinkFields) -> None:
-        self._obstacle, self._fields = contact.obstacle, fields
-        self._form = compile_form(-ufl.derivative(contact.link_energy(fields), fields.u))
-        (faces,) = contact.faces
-        V = fields.u.function_space
-        self._design, self._forces = fem.Function(V), fem.Function(V)
-        self._nodes = fem.locate_dofs_topological(V, fields.dim - 1, fields.boundaries[faces].facets)
-
-    def force(self) -> np.ndarray:
-        """The force of the obstacle on the link, (dim,)."""
-        # shape functions sum up to one: so do nodal forces to the resultant
-        force = assemble_vector(self._form, self._forces).reshape(-1, self._fields.dim).sum(axis=0)
-        return self._fields.mesh.comm.allreduce(force, op=MPI.SUM)
-
-    def gap(self) -> float:
-        """The smallest gap at nodes of the link's boundary; where negative, the largest penetration."""
-        fields = self._fields
-        self._design.interpolate(fields.body.d)
-        moved = fields.body.drawn_nodes + (self._design.x.array + fields.u.x.array).reshape(-1, fields.dim)
-        gaps = self._obstacle.gap(moved[self._nodes])
-        return fields.mesh.comm.allreduce(float(gaps.min(initial=np.inf)), op=MPI.MIN)
+        offsets = self._offsets[inside]
+        return (where[inside], numbers), -gap[inside], offsets, self._space.displacement_gradient(pose, offsets)

@@ -13,11 +13,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import ufl
 
-from fenicsmech.checks import point, positive
-from fenicsmech.effects.energies import PosePotential
-from fenicsmech.errors import DescriptionError
-from fenicsmech.joints import RigidSpace
-from fenicsmech.mechanism import Effect, Material, RigidLink, in_dimension
+from fenicsmech.errors import DescriptionError, in_plane, point, positive, set_fields
+from fenicsmech.mechanism import Effect, RigidLink, in_dimension
+from fenicsmech.multibody import BodyPoint, PosePotential
 
 
 @dataclass(frozen=True)
@@ -36,81 +34,64 @@ class Mass:
     at: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mass", positive("mass of a rigid link", self.mass))
-        object.__setattr__(self, "at", point("centre of mass of a rigid link", self.at))
+        set_fields(self, mass=positive("mass of a rigid link", self.mass))
+        set_fields(self, at=point("centre of mass of a rigid link", self.at))
 
 
 @dataclass(frozen=True, eq=False)
 class Gravity(Effect):
-    """Weight of all links whose density or mass is given.
+    """Weight of flexible links whose material has a density, and of rigid links whose mass is given.
 
     Attributes:
-        acceleration: g, (9810 mm/s² downwards: (0, −9810)).
-        densities: of materials; with N and mm in t/mm³ (water: 1e-9).
+        acceleration: g; 9810 mm/s² downwards is (0, −9810).
         masses: of rigid links.
 
     Raises:
-        DescriptionError: a number makes no sense, or nothing has weight.
+        DescriptionError: the acceleration is not a vector; when it is simulated: nothing has weight, or the mass of a
+            link is given that is no rigid link of the mechanism.
     """
 
     acceleration: tuple[float, ...]
-    densities: Mapping[Material, float] = field(default_factory=dict)
     masses: Mapping[RigidLink, Mass] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "acceleration", point("acceleration of gravity", self.acceleration))
-        densities = {m: positive(f"density of {m.name!r}", value) for m, value in self.densities.items()}
-        object.__setattr__(self, "densities", densities)
-        if not self.densities and not self.masses:
-            raise DescriptionError("gravity", "nothing has weight", "Give densities of materials or masses of links")
+        set_fields(self, acceleration=point("acceleration of gravity", self.acceleration))
 
     def check(self, mechanism, dim):
-        used = {link.material for link in mechanism.flexible_links}
-        for material in self.densities:
-            if material not in used:
-                raise DescriptionError(
-                    "gravity", f"no link of {mechanism.name!r} is made of {material.name!r}", "Leave it out"
-                )
+        if not self.masses and not any(link.material.density for link in mechanism.flexible_links):
+            remedy = "Give a material its density=…, or masses of rigid links"
+            raise DescriptionError("gravity", f"nothing of {mechanism.name!r} has weight", remedy)
         for link in self.masses:
             if link not in mechanism.rigid_links:
                 raise DescriptionError("gravity", f"{link!r} is not a rigid link of {mechanism.name!r}", "Leave it out")
-        if dim == 2 and in_dimension(self.acceleration, 3)[2] != 0.0:
-            raise DescriptionError(
-                "gravity", f"{self.acceleration} leaves the plane", "Simulate in space, or give two coordinates"
-            )
+        in_plane("acceleration of gravity", self.acceleration, dim)
 
     def explain(self):
-        heavy = [material.name for material in self.densities] + [link.name for link in self.masses]
-        return f"weight of {', '.join(heavy)}"
+        return ", ".join(["weight of flexible links by their density", *(f"of {link.name}" for link in self.masses)])
 
     def link_energy(self, fields):
-        if not self.densities:
+        densities = [link.material.density or 0.0 for link in fields.links]
+        if not any(densities):
             return None
-        g = ufl.as_vector(in_dimension(self.acceleration, fields.dim))
-        density = fields.cellwise([self.densities.get(link.material, 0.0) for link in fields.links])
+        g, density = ufl.as_vector(in_dimension(self.acceleration, fields.dim)), fields.cellwise(densities)
         return fields.integral(-density * ufl.dot(g, fields.u), degree=fields.order)
 
     def pose_potentials(self, linkage):
-        g, space = np.array(in_dimension(self.acceleration, linkage.dim)), linkage.joints.space
-        found = []
-        for link, mass in self.masses.items():
-            body = linkage.body_of(link)
-            offset = np.array(in_dimension(mass.at, linkage.dim)) - np.array(linkage.bodies[body].centre)
-            found.append(_Weight(body, mass.mass * g, offset, space))
-        return found
+        g = np.array(in_dimension(self.acceleration, linkage.dim))
+        return [_Weight(linkage.point(link, mass.at), mass.mass * g) for link, mass in self.masses.items()]
 
 
 class _Weight(PosePotential):
-    """−m g · u of one body's centre of mass."""
+    """−m g · u of a rigid link's centre of mass."""
 
-    def __init__(self, body: int, weight: np.ndarray, offset: np.ndarray, space: RigidSpace) -> None:
-        self.bodies, self._weight, self._offset, self._space = (body,), weight, offset, space
+    def __init__(self, point: BodyPoint, weight: np.ndarray) -> None:
+        self.bodies, self._point, self._weight = (point.body,), point, weight
 
     def value(self, poses):
-        return -float(self._weight @ self._space.displace(poses[self.bodies[0]], self._offset[None])[0])
+        return -float(self._weight @ self._point.displacement(None, poses))
 
     def gradient(self, poses):
-        return -self._weight @ self._space.displacement_gradient(poses[self.bodies[0]], self._offset[None])[0]
+        return -self._weight @ self._point.gradient(poses)
 
     def hessian(self, poses):
-        return -self._space.displacement_hessian(poses[self.bodies[0]], np.outer(self._weight, self._offset))
+        return -self._point.hessian(poses, self._weight)

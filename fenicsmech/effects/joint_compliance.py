@@ -11,8 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fenicsmech.checks import positive
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, positive, set_fields
 from fenicsmech.mechanism import Effect, Joint
 
 
@@ -34,7 +33,7 @@ class JointCompliance(Effect):
     compliance: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "compliance", positive(f"compliance of {self.joint.name!r}", self.compliance))
+        set_fields(self, compliance=positive(f"compliance of {self.joint.name!r}", self.compliance))
 
     def check(self, mechanism, dim):
         super().check(mechanism, dim)

@@ -13,11 +13,9 @@ from math import pi
 
 import numpy as np
 
-from fenicsmech.checks import finite, positive
-from fenicsmech.effects.energies import PosePotential
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, finite, positive, set_fields
 from fenicsmech.mechanism import Effect, Joint
-from fenicsmech.multibody import JointCoordinate
+from fenicsmech.multibody import JointCoordinate, PosePotential
 
 
 @dataclass(frozen=True)
@@ -41,8 +39,8 @@ class JointSpring(Effect):
     rest: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "stiffness", positive(f"stiffness of {self._name}", self.stiffness))
-        object.__setattr__(self, "rest", finite(f"rest position of {self._name}", self.rest))
+        set_fields(self, stiffness=positive(f"stiffness of {self._name}", self.stiffness))
+        set_fields(self, rest=finite(f"rest position of {self._name}", self.rest))
 
     def check(self, mechanism, dim):
         super().check(mechanism, dim)
@@ -65,44 +63,31 @@ class JointSpring(Effect):
 
     def pose_potentials(self, linkage):
         coordinate = JointCoordinate(linkage, self.joint)
-        preload = [_Preload(coordinate, self.stiffness * self.rest)] if self.rest else []
-        return [_Stiffness(coordinate, self.stiffness), *preload]
+        preload = [_Spring(coordinate, moment=self.stiffness * self.rest, holds=False)] if self.rest else []
+        return [_Spring(coordinate, stiffness=self.stiffness, holds=True), *preload]
 
     @property
     def _name(self) -> str:
         return f"spring in {self.joint.name!r}"
 
 
-class _Stiffness(PosePotential):
-    """½ k φ² of one joint's coordinate."""
+class _Spring(PosePotential):
+    """½ k φ² − M φ of a joint's coordinate, with a torque or force M."""
 
-    holds = True
-
-    def __init__(self, coordinate: JointCoordinate, stiffness: float) -> None:
-        self.bodies, self._coordinate, self._stiffness = coordinate.bodies, coordinate, stiffness
+    def __init__(
+        self, coordinate: JointCoordinate, *, stiffness: float = 0.0, moment: float = 0.0, holds: bool
+    ) -> None:
+        self.bodies, self.holds, self._coordinate = coordinate.bodies, holds, coordinate
+        self._stiffness, self._moment = stiffness, moment
 
     def value(self, poses):
-        return 0.5 * self._stiffness * self._coordinate.value(poses) ** 2
+        position = self._coordinate.value(poses)
+        return (0.5 * self._stiffness * position - self._moment) * position
 
     def gradient(self, poses):
-        return self._stiffness * self._coordinate.value(poses) * self._coordinate.gradient(poses)
+        return (self._stiffness * self._coordinate.value(poses) - self._moment) * self._coordinate.gradient(poses)
 
     def hessian(self, poses):
         slope, bend = self._coordinate.gradient(poses), self._coordinate.hessian(poses)
-        return self._stiffness * (np.outer(slope, slope) + self._coordinate.value(poses) * bend)
-
-
-class _Preload(PosePotential):
-    """−M φ with the constant torque or force M = k φ₀ of a spring in the drawn position."""
-
-    def __init__(self, coordinate: JointCoordinate, size: float) -> None:
-        self.bodies, self._coordinate, self._size = coordinate.bodies, coordinate, size
-
-    def value(self, poses):
-        return -self._size * self._coordinate.value(poses)
-
-    def gradient(self, poses):
-        return -self._size * self._coordinate.gradient(poses)
-
-    def hessian(self, poses):
-        return -self._size * self._coordinate.hessian(poses)
+        pull = self._stiffness * self._coordinate.value(poses) - self._moment
+        return self._stiffness * np.outer(slope, slope) + pull * bend

@@ -9,7 +9,7 @@ vanishes
 - where the rim is held,
 - in the plane, where its ends move along lines through x₀, as on an axis of symmetry,
 - in space, where it moves within planes through x₀ that it lies in, as on a plane of symmetry; with an axis x₀, within
-  planes z = const. that it lies in: to motions along z the load is that on a hole that plugs close.
+  planes z = const. that it lies in: motions along z meet the load on a hole closed by plugs.
 
 With other rims the load has no potential: its work depends on the path.
 """
@@ -23,9 +23,8 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from fenicsmech.checks import finite, point
-from fenicsmech.effects.faces import Faces
-from fenicsmech.errors import DescriptionError
+from fenicsmech.effects.link_fields import Faces
+from fenicsmech.errors import DescriptionError, finite, point, set_fields
 from fenicsmech.mechanism import Effect, FlexibleLink, in_dimension
 
 
@@ -54,9 +53,9 @@ class Pressure(Effect):
     def __post_init__(self) -> None:
         if not isinstance(self.link, FlexibleLink):
             raise DescriptionError("pressure", f"{self.link!r} is not a flexible link", "Give one")
-        object.__setattr__(self, "pressure", finite(f"pressure on {self.link.name!r}", self.pressure))
+        set_fields(self, pressure=finite(f"pressure on {self.link.name!r}", self.pressure))
         if self.about is not None:
-            object.__setattr__(self, "about", point(f"centre of the pressure on {self.link.name!r}", self.about))
+            set_fields(self, about=point(f"centre of the pressure on {self.link.name!r}", self.about))
 
     def explain(self):
         part = "the whole boundary" if self.where is None else "part of the boundary"
@@ -74,10 +73,10 @@ class Pressure(Effect):
                 "the part it acts on is open: its load has an energy only if the rim is held",
                 "Hold the rim and give about=…, or press on a closed part",
             )
-        if fields.model.half and self.about is not None and in_dimension(self.about, 3)[2] != 0.0:
+        if fields.body.model.half and self.about is not None and in_dimension(self.about, 3)[2] != 0.0:
             raise DescriptionError(
                 f"pressure on {self.link.name!r}",
-                f"the point {self.about} it goes about is not on the mid-plane",
+                f"the point {self.about} of its potential is not on the mid-plane",
                 "Give about=… with two coordinates or z = 0, or use space='3d'",
             )
         dim, order = fields.dim, fields.order

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fenicsmech.checks import direction, positive
 from fenicsmech.elasticity import PLANE_STRAIN, Stretch
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, direction, in_plane, positive, set_fields
 from fenicsmech.mechanism import Effect, FlexibleLink, in_dimension
 
 
@@ -25,7 +24,7 @@ class Prestrain(Effect):
         along: direction of the drawn link in which it is stretched; None: in all directions, depth included.
 
     Raises:
-        DescriptionError: this is not a flexible link, the stretch is not positive, or the direction is none.
+        DescriptionError: this is not a flexible link, the stretch is not positive, or the direction is zero.
     """
 
     link: FlexibleLink
@@ -35,18 +34,13 @@ class Prestrain(Effect):
     def __post_init__(self) -> None:
         if not isinstance(self.link, FlexibleLink):
             raise DescriptionError("prestrain", f"{self.link!r} is not a flexible link", "Give one")
-        object.__setattr__(self, "stretch", positive(f"prestrain of {self.link.name!r}", self.stretch))
+        set_fields(self, stretch=positive(f"prestrain of {self.link.name!r}", self.stretch))
         if self.along is not None:
-            object.__setattr__(self, "along", direction(f"direction of prestrain of {self.link.name!r}", self.along))
+            set_fields(self, along=direction(f"direction of prestrain of {self.link.name!r}", self.along))
 
     def check(self, mechanism, dim):
         super().check(mechanism, dim)
-        if dim == 2 and self.along is not None and in_dimension(self.along, 3)[2] != 0.0:
-            raise DescriptionError(
-                "prestrain",
-                f"its direction {self.along} leaves the plane",
-                "Simulate in space, or give two coordinates",
-            )
+        in_plane("direction of prestrain", self.along or (), dim)
 
     def explain(self):
         where = "in all directions" if self.along is None else f"along {self.along}"
@@ -56,7 +50,7 @@ class Prestrain(Effect):
         if self.along is None and model is PLANE_STRAIN:
             raise DescriptionError(
                 f"prestrain of {self.link.name!r}",
-                "in all directions it would also strain the depth, which plane strain holds",
+                "in all directions it would also strain the depth, which plane strain forbids",
                 "Give along=…, or simulate in plane stress or in space",
             )
         return {self.link: Stretch(self.stretch, self.along and in_dimension(self.along, model.dim))}

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import ufl
@@ -26,10 +27,87 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from petsc4py import PETSc
 
-from fenicsmech.compat import cellwise_space, compile_expression, interpolation_points, owned_values, vector_space
-from fenicsmech.elasticity.formulation import PressureField
-from fenicsmech.elasticity.models import ElasticModel
+from fenicsmech.compat import (
+    add_ghosts,
+    cell_dofs,
+    cellwise_space,
+    compile_expression,
+    interpolation_points,
+    owned_values,
+    scalar_space,
+    vector_space,
+)
+from fenicsmech.elasticity.models import ElasticModel, Quadrature
+from fenicsmech.laws import Law
 from fenicsmech.mechanism import Material
+
+
+class PressureField:
+    """p, of ``degree`` in local ``cells``, zero elsewhere.
+
+    Attributes:
+        unknown: whether each owned node is an unknown: those that only touch other cells are not, (owned,).
+        count: number of unknowns on all ranks.
+    """
+
+    def __init__(self, mesh: dmesh.Mesh, degree: int, cells: np.ndarray) -> None:
+        V = scalar_space(mesh, degree)
+        self.p = fem.Function(V, name="pressure")
+        marker = fem.Function(V)
+        marker.x.array[cell_dofs(V)[cells]] = 1.0
+        # a node may touch such a cell only on another rank
+        add_ghosts(marker)
+        self.unknown = owned_values(marker) > 0.0
+        self.count = int(mesh.comm.allreduce(int(self.unknown.sum())))
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """The strain-free length of a link over the drawn one.
+
+    Attributes:
+        ratio: λ.
+        along: e, a unit vector of the drawn link, (dim,); None for all directions.
+    """
+
+    ratio: float
+    along: tuple[float, ...] | None
+
+
+class Growth:
+    """F_p, one value per cell, from the ``stretches`` of links; only cells that are ``free`` to deform grow."""
+
+    def __init__(self, fields: BodyFields, stretches: Sequence[Stretch | None], free: np.ndarray) -> None:
+        every, dim = [stretch or Stretch(1.0, None) for stretch in stretches], fields.model.dim
+        self.load_factor = ufl.variable(fields.load_factor)
+        self._excess = fields.cellwise([stretch.ratio - 1.0 for stretch in every])
+        self._excess.x.array[np.flatnonzero(~free)] = 0.0
+        # planar links are free to grow in depth
+        self._power = fields.cellwise([3.0 if stretch.along is None else 1.0 for stretch in every])
+        tensors = np.array([np.eye(dim) if s.along is None else np.outer(s.along, s.along) for s in every])
+        parts = {(i, j): fields.cellwise(tensors[:, i, j]) for i in range(dim) for j in range(i, dim)}
+        self._tensor = ufl.as_matrix([[parts[min(i, j), max(i, j)] for j in range(dim)] for i in range(dim)])
+
+    def elastic(self, H):
+        """H_e in UFL."""
+        grown = self.load_factor * self._excess
+        inverse = -grown / (1 + grown) * self._tensor
+        return H + inverse + ufl.dot(H, inverse)
+
+    @property
+    def volume(self):
+        """det F_p in UFL, the growth of depth included."""
+        return (1 + self.load_factor * self._excess) ** self._power
+
+
+@dataclass(frozen=True)
+class Term:
+    """The cells of one kind of law, all in the u–p formulation or none; parameters of the law are fields."""
+
+    law: Law
+    mixed: bool
+    dx: ufl.Measure
+    cells: np.ndarray
 
 
 class BodyFields:
@@ -38,21 +116,28 @@ class BodyFields:
     Args:
         mesh: reference mesh.
         link: index of the link of each local cell, (cells,).
+        free: whether each local cell can deform (False inside interfaces), (cells,).
         materials: material of each link.
         depths: depth of each link, used by planar models.
         model: 3D, whole or half, plane strain or plane stress.
         order: degree of the displacement field.
+        quadrature: explicit degree; never UFL's estimate.
+        effects: energies beside the elastic one, as functions of this body.
+        stretches: of the strain-free state of each link, None where it is as drawn.
         bulge: c, by which curved cells differ from straight ones; None if all are straight.
-        pressed: local cells in the u–p formulation; None if there are none on any rank.
+        mixed: whether each link is in the u–p formulation.
 
     Attributes:
         u: displacement field, vector P_order.
-        d: design field, vector P1.
+        d: design field, vector, of the same degree as c where that counts: P2, or P1 with linear displacements.
         bulge: c, vector P2, or None.
         pressure: of the links in the u–p formulation, P_(order − 1); None if no link is.
         parameters: of the links' laws by name, each with one value per cell; changing them needs no compiling.
         depth: one value per cell.
         load_factor: of the effects.
+        growth: of the strain-free state; None if all links are as drawn.
+        dx: measure of all cells, interfaces included.
+        terms: the cells that can deform, by kind of law.
     """
 
     def __init__(
@@ -60,24 +145,46 @@ class BodyFields:
         mesh: dmesh.Mesh,
         *,
         link: np.ndarray,
+        free: np.ndarray,
         materials: Sequence[Material],
         depths: Sequence[float],
         model: ElasticModel,
         order: int,
-        bulge: fem.Function | None,
-        pressed: np.ndarray | None,
+        quadrature: Quadrature,
+        effects: Sequence[Callable[[Any], ufl.Form | None]] = (),
+        stretches: Sequence[Stretch | None] = (),
+        bulge: fem.Function | None = None,
+        mixed: Sequence[bool] = (),
     ) -> None:
         self.mesh, self.model, self.order, self.bulge, self._link = mesh, model, order, bulge, link
+        self.effects = tuple(effects)
         self.u = fem.Function(vector_space(mesh, order), name="displacement")
-        self.d = fem.Function(vector_space(mesh, 1), name="design")
+        self.d = fem.Function(vector_space(mesh, min(order, 2)), name="design")
         numbers = [material.law.parameters for material in materials]
         self.parameters = {
             name: self.cellwise([known.get(name, 0.0) for known in numbers])
             for name in dict.fromkeys(name for known in numbers for name in known)
         }
         self.depth = self.cellwise(depths)
-        self.pressure = None if pressed is None else PressureField(mesh, order - 1, pressed)
         self.load_factor = fem.Constant(mesh, PETSc.ScalarType(1.0))
+        mixed = tuple(mixed) or (False,) * len(materials)
+        self.pressure = None
+        if any(mixed):
+            self.pressure = PressureField(mesh, order - 1, np.flatnonzero(free & np.array(mixed)[link]))
+        self.growth = Growth(self, stretches, free) if any(stretches) else None
+
+        kinds = [(str(type(m.law)), *m.law.parameters, own) for m, own in zip(materials, mixed, strict=True)]
+        known = sorted(set(kinds), key=str)
+        kind_of_cell = np.array([known.index(kind) for kind in kinds])[link]
+        cells = np.flatnonzero(free).astype(np.int32)
+        tags = dmesh.meshtags(mesh, mesh.topology.dim, cells, kind_of_cell[cells].astype(np.int32))
+        self.dx = ufl.Measure("dx", domain=mesh, subdomain_data=tags, metadata={"quadrature_degree": quadrature.degree})
+        self.terms = []
+        for tag, kind in enumerate(known):
+            first = kinds.index(kind)
+            law = materials[first].law.with_parameters(self.parameters)
+            where = np.flatnonzero(kind_of_cell == tag).astype(np.int32)
+            self.terms.append(Term(law, mixed[first], self.dx(tag), where))
 
     def cellwise(self, per_link: Sequence[float] | np.ndarray) -> fem.Function:
         """A field with one value per cell from one value per link, (links,)."""
@@ -90,10 +197,15 @@ class BodyFields:
         return ufl.dot(ufl.grad(field), ufl.inv(self.rest_gradient))
 
     @property
+    def drawn_gradient(self):
+        """I + ∇c, symbolic."""
+        identity = ufl.Identity(self.model.dim)
+        return identity if self.bulge is None else identity + ufl.grad(self.bulge)
+
+    @property
     def rest_gradient(self):
         """∇X = I + ∇c + ∇d, symbolic."""
-        gradient = ufl.Identity(self.model.dim) + ufl.grad(self.d)
-        return gradient if self.bulge is None else gradient + ufl.grad(self.bulge)
+        return self.drawn_gradient + ufl.grad(self.d)
 
     @property
     def rest(self):
@@ -112,12 +224,10 @@ class BodyFields:
         bulge.interpolate(self.bulge)
         return nodes + bulge.x.array.reshape(-1, dim)
 
-    def take(self, values: np.ndarray) -> None:
-        """Sets the owned values of u, and of p behind them, flat; ghosts follow in ``update``."""
-        displacements, *pressures = self.split(values)
-        owned_values(self.u)[:] = displacements
-        if self.pressure is not None:
-            owned_values(self.pressure.p)[:] = pressures[0]
+    @property
+    def fields(self) -> list[fem.Function]:
+        """u, and p where links have one."""
+        return [self.u] if self.pressure is None else [self.u, self.pressure.p]
 
     def values(self) -> np.ndarray:
         """This rank's owned values of u, and of p behind them, flat."""
@@ -128,97 +238,32 @@ class BodyFields:
         ends = np.cumsum([len(owned_values(field)) for field in self.fields])
         return np.split(values, ends[:-1])
 
-    @property
-    def fields(self) -> list[fem.Function]:
-        """u, and p where links have one."""
-        return [self.u] if self.pressure is None else [self.u, self.pressure.p]
-
-    def carried(self, change: np.ndarray) -> np.ndarray:
-        """Displacements after the rest shape changes by δ, every node's change carried along by the deformation:
-
-            x(X + δ) ≈ x(X) + F δ,     u ← u + H δ,
-
-        a first guess of the displacement from the new rest shape. Where links only move rigidly it is exact.
-
-        Args:
-            change: δ, this rank's P1 values with ghosts, flat.
-
-        Returns:
-            This rank's values of u, ghosts last, flat.
-        """
-        self._change.x.array[:] = change
-        self._carried.interpolate(self._carrying)
-        return self.u.x.array + self._carried.x.array
+    def take(self, values: np.ndarray) -> None:
+        """Sets the owned values of u, and of p behind them, flat; ghosts follow in ``update``."""
+        for field, own in zip(self.fields, self.split(values), strict=True):
+            owned_values(field)[:] = own
 
     def update(self) -> None:
         """Makes ghost values of u and p agree with their owners."""
         for field in self.fields:
             field.x.scatter_forward()
 
-    @cached_property
-    def _change(self) -> fem.Function:
-        return fem.Function(self.d.function_space, name="change_of_design")
+    def carried(self, change: np.ndarray) -> np.ndarray:
+        """Displacements after the rest shape changes by δ, every node's change carried along by the deformation:
+
+            x(X + δ) ≈ x(X) + F δ,     u ← u + H δ,
+
+        a first guess of the displacement from the new rest shape. Where links only move rigidly it is exact. ``change``
+        are this rank's values of δ, the result its values of u, with ghosts, flat.
+        """
+        moved, by, expression = self._carrying
+        by.x.array[:] = change
+        moved.interpolate(expression)
+        return self.u.x.array + moved.x.array
 
     @cached_property
-    def _carried(self) -> fem.Function:
-        return fem.Function(self.u.function_space, name="carried_change")
-
-    @cached_property
-    def _carrying(self) -> fem.Expression:
-        """H δ at the nodes of u."""
-        V = self.u.function_space
-        return compile_expression(ufl.dot(self.gradient(self.u), self._change), interpolation_points(V), self.mesh.comm)
-
-
-@dataclass(frozen=True)
-class Stretch:
-    """The strain-free length of a link over the drawn one.
-
-    Attributes:
-        ratio: λ.
-        along: e, a unit vector of the drawn link, (dim,); None for all directions.
-    """
-
-    ratio: float
-    along: tuple[float, ...] | None
-
-
-class Growth:
-    """F_p, one value per cell.
-
-    Args:
-        stretches: of each link; None where it is as drawn.
-        cellwise: makes a field with one value per cell from one value per link, (links,).
-        free: whether each local cell can deform; the others do not grow, (cells,).
-        dim: of the model; planar ones are free to grow in depth.
-        load_factor: σ.
-    """
-
-    def __init__(
-        self,
-        stretches: Sequence[Stretch | None],
-        cellwise: Callable[[Sequence[float] | np.ndarray], fem.Function],
-        *,
-        free: np.ndarray,
-        dim: int,
-        load_factor: fem.Constant,
-    ) -> None:
-        every = [stretch or Stretch(1.0, None) for stretch in stretches]
-        self.load_factor = ufl.variable(load_factor)
-        self._excess = cellwise([stretch.ratio - 1.0 for stretch in every])
-        self._excess.x.array[np.flatnonzero(~free)] = 0.0
-        self._power = cellwise([3.0 if stretch.along is None else 1.0 for stretch in every])
-        tensors = np.array([np.eye(dim) if s.along is None else np.outer(s.along, s.along) for s in every])
-        parts = {(i, j): cellwise(tensors[:, i, j]) for i in range(dim) for j in range(i, dim)}
-        self._tensor = ufl.as_matrix([[parts[min(i, j), max(i, j)] for j in range(dim)] for i in range(dim)])
-
-    def elastic(self, H):
-        """H_e in UFL."""
-        grown = self.load_factor * self._excess
-        inverse = -grown / (1 + grown) * self._tensor
-        return H + inverse + ufl.dot(H, inverse)
-
-    @property
-    def volume(self):
-        """det F_p in UFL, the growth of depth included."""
-        return (1 + self.load_factor * self._excess) ** self._power
+    def _carrying(self) -> tuple[fem.Function, fem.Function, fem.Expression]:
+        """A field for H δ, one for δ, and H δ at the nodes of u, compiled."""
+        V, change = self.u.function_space, fem.Function(self.d.function_space)
+        moved = ufl.dot(self.gradient(self.u), change)
+        return fem.Function(V), change, compile_expression(moved, interpolation_points(V), self.mesh.comm)

@@ -1,4 +1,4 @@
-"""The elastic models: three dimensions, whole or half; plane strain, plane stress.
+"""The assumptions of elastic models: about the third dimension, nearly incompressible links, and quadrature.
 
 A model completes the gradient H = F − I of a mesh to three dimensions and gives the strain that laws are written in. In
 the plane, with j₂ = tr H + det H = J₂ − 1 and the contraction h = F₃₃ − 1,
@@ -7,16 +7,29 @@ the plane, with j₂ = tr H + det H = J₂ − 1 and the contraction h = F₃₃
 
 Plane strain has h = 0. Plane stress has S₃₃ = 0, which is ∂W/∂h = 0: in closed form where the law has one, else by
 Newton's method at every point.
+
+Displacements alone lock as ν goes to 0.5. In links in the u–p (mixed) formulation the energy W(F) of the law is
+replaced by its Π(F, p), see ``SplitLaw``, a minimum in u and a maximum in the pressure p. With p continuous and one
+degree lower than u (Taylor–Hood), the elements do not lock. Source: Boffi, Brezzi & Fortin
+(doi:10.1007/978-3-642-36519-5) for the elements.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from numbers import Integral
 
 from ufl import Identity, as_matrix, det, diff, dot, inner, tr, variable
 from ufl.core.expr import Expr
 
+from fenicsmech.errors import DescriptionError
 from fenicsmech.laws import Law, NeoHookean, Strain, spatial_strain
+from fenicsmech.mechanism import Material
+
+LOCKING = 0.49
+"""ν above which quadratic displacements alone are too stiff (measured, tests/elasticity/test_locking.py)."""
 
 
 class ElasticModel(ABC):
@@ -106,7 +119,7 @@ class PlaneStress(PlaneStrain):
 
         The error of the energy is the square of that of h, and each step squares this in turn: three leave rounding
         up to stretches of 1.5, and 1e-8 of the stress at 2 (tests/elasticity/test_new_law.py). h is an expression:
-        tangents are those of these energies, and take some ten seconds to compile.
+        tangents are those of these energies, and take long to compile.
         """
         h = NeoHookean(1.0, 0.0).with_parameters({"E": law.E, "nu": law.nu}).contraction(H)
         for _ in range(3):
@@ -135,3 +148,78 @@ def _embed(H: Expr, h: Expr | float) -> Expr:
 
 
 SPATIAL, MID_PLANE_SYMMETRIC, PLANE_STRAIN, PLANE_STRESS = Solid(), HalfSolid(), PlaneStrain(), PlaneStress()
+
+
+class Formulation(ABC):
+    """Treatment of links of nearly incompressible material."""
+
+    @abstractmethod
+    def mixed(self, materials: Sequence[Material], model: ElasticModel, order: int) -> tuple[bool, ...]:
+        """Whether links of ``materials`` are in the u–p formulation, at displacements of degree ``order``.
+
+        Raises:
+            DescriptionError: the law of one that should be has no u–p form.
+        """
+
+
+@dataclass(frozen=True)
+class DisplacementFormulation(Formulation):
+    """Displacements alone, whatever Poisson's ratio is."""
+
+    def mixed(self, materials, model, order):
+        return (False,) * len(materials)
+
+
+@dataclass(frozen=True)
+class MixedFormulation(Formulation):
+    """Displacement and pressure in links whose Poisson's ratio is above a limit, displacements alone in all others.
+
+    In plane stress, where depths adjust to keep the volume, and for order 1, which has no stable partner for its
+    displacements, displacements are alone.
+
+    Attributes:
+        above: the limit, at least 0: a pressure needs resistance to changes of volume.
+
+    Raises:
+        DescriptionError: the limit is not in [0, 0.5).
+    """
+
+    above: float = LOCKING
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.above < 0.5:
+            raise DescriptionError(
+                "mixed formulation", f"its limit of Poisson's ratio is {self.above!r}", "Give one from 0 to below 0.5"
+            )
+
+    def mixed(self, materials, model, order):
+        found = tuple(model.confined and order > 1 and material.law.nu > self.above for material in materials)
+        for material, mixed in zip(materials, found, strict=True):
+            if mixed and not material.law.has_mixed_energy:
+                raise DescriptionError(
+                    f"material {material.name!r}",
+                    f"ν = {material.law.nu:g} asks for the u–p formulation, and its law "
+                    f"{type(material.law).__name__} has no mixed_energy",
+                    "Derive the law from SplitLaw, or use formulation=DisplacementFormulation()",
+                )
+        return found
+
+
+@dataclass(frozen=True)
+class Quadrature:
+    """Degree of the quadrature over cells.
+
+    Raises:
+        DescriptionError: it is not a whole number of at least 1.
+    """
+
+    degree: int
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.degree, Integral) or self.degree < 1:
+            raise DescriptionError("quadrature", f"degree {self.degree!r}", "Give a whole number of at least 1")
+
+    @staticmethod
+    def for_order(order: int, dim: int) -> Quadrature:
+        """The cheapest degree whose error lies well below the discretisation error (measured), by order of u."""
+        return Quadrature({1: 1, 2: 3 if dim == 3 else 4}.get(order, 2 * order))

@@ -1,20 +1,17 @@
 """Equilibria of a mechanism: finite elements coupled with rigid bodies and joints.
 
-- ``state``: displacements, poses, multipliers, controlled force
+- ``state``: displacements, poses, multipliers, controlled force; reactions of joints and torques of motors
 - ``control``: the prescribed force, displacement, motors or arc length
-- ``blocks``, ``unknowns``: numbering of the unknowns, and the change of state they stand for
+- ``unknowns``: blocks, numbers and scales of the unknowns, and the change of state they stand for
 - ``border``: loads, potentials of poses and joints
 - ``kkt``: the distributed KKT matrix
 - ``system``: energy, residual and KKT matrix at a state
-- ``linear``: its factor LDLᵀ with inertia, or conjugate gradients on two levels for large systems
-- ``solver``: the interface of equilibrium solvers, and the tangent at an equilibrium
-- ``newton``: the default solver, a primal–dual Newton iteration
-- ``adjoint``: of displacements and forces
-- ``reactions``: forces and moments of joints, torques of motors
+- ``linearisation``: its factor LDLᵀ with inertia; rates, stability and adjoints at an equilibrium
+- ``two_level``: conjugate gradients on two levels for large systems
+- ``solver``: the interface of equilibrium solvers
+- ``newton``: the default method, a primal–dual Newton iteration
 """
 
-from fenicsmech.equilibrium.adjoint import Adjoint, Quantity
-from fenicsmech.equilibrium.blocks import Block, Blocks, Border
 from fenicsmech.equilibrium.border import REGULARISATION, PointLoad
 from fenicsmech.equilibrium.control import (
     ArcLengthControl,
@@ -25,22 +22,40 @@ from fenicsmech.equilibrium.control import (
     LoadFactorControl,
     MotorControl,
     Stability,
-    mean_product,
 )
 from fenicsmech.equilibrium.kkt import EntryCopy, KktMatrix
-from fenicsmech.equilibrium.linear import BySize, Direct, Factor, LinearMethod, LinearSolver, TwoLevel, TwoLevelSolver
-from fenicsmech.equilibrium.newton import Newton, PrimalDualNewton
-from fenicsmech.equilibrium.reactions import Reaction, joint_reactions, motor_torques
-from fenicsmech.equilibrium.solver import EquilibriumPoint, EquilibriumSolver, Iteration, Linearisation, NotConverged
-from fenicsmech.equilibrium.state import State, Step, load_fields
+from fenicsmech.equilibrium.linearisation import (
+    Adjoint,
+    Direct,
+    EquilibriumPoint,
+    Factor,
+    Linearisation,
+    LinearMethod,
+    LinearSolver,
+    NotConverged,
+    Unknown,
+)
+from fenicsmech.equilibrium.newton import NewtonSolver, PrimalDualNewton
+from fenicsmech.equilibrium.solver import EquilibriumMethod, EquilibriumSolver
+from fenicsmech.equilibrium.state import (
+    Reaction,
+    ReactionSlopes,
+    State,
+    Step,
+    joint_reaction,
+    joint_reaction_slopes,
+    joint_reactions,
+    load_fields,
+    motor_torques,
+)
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
+from fenicsmech.equilibrium.two_level import BySize, TwoLevel, TwoLevelSolver
+from fenicsmech.equilibrium.unknowns import Border
 
 __all__ = [
     "Adjoint",
     "ArcLengthControl",
     "ArcMetric",
-    "Block",
-    "Blocks",
     "Border",
     "BySize",
     "Control",
@@ -48,10 +63,10 @@ __all__ = [
     "DisplacementControl",
     "EntryCopy",
     "EquilibriumPoint",
-    "EquilibriumSolver",
+    "EquilibriumMethod",
     "EquilibriumSystem",
     "Factor",
-    "Iteration",
+    "EquilibriumSolver",
     "KktMatrix",
     "LinearMethod",
     "LinearSolver",
@@ -59,11 +74,11 @@ __all__ = [
     "LoadControl",
     "LoadFactorControl",
     "MotorControl",
-    "Newton",
+    "NewtonSolver",
     "NotConverged",
     "PointLoad",
     "PrimalDualNewton",
-    "Quantity",
+    "Unknown",
     "REGULARISATION",
     "Reaction",
     "Residual",
@@ -72,8 +87,10 @@ __all__ = [
     "Step",
     "TwoLevel",
     "TwoLevelSolver",
+    "ReactionSlopes",
+    "joint_reaction",
+    "joint_reaction_slopes",
     "joint_reactions",
     "load_fields",
-    "mean_product",
     "motor_torques",
 ]

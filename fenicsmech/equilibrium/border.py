@@ -8,17 +8,17 @@ always acts in full. A load acts on a point of a body, whose displacement u_P is
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from dolfinx import fem
 
-from fenicsmech.effects import PosePotential
 from fenicsmech.elasticity import ElasticBody
-from fenicsmech.equilibrium.blocks import Numbering
 from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadControl
 from fenicsmech.equilibrium.state import State
-from fenicsmech.multibody import BodyPoint, JointSystem, LinkPoint
+from fenicsmech.equilibrium.unknowns import Numbering
+from fenicsmech.multibody import BodyPoint, JointSystem, LinkPoint, PosePotential
 
 REGULARISATION = 1e-8
 """ε = 1/ρ of the multipliers, the proximal term of the augmented Lagrangian: keeps redundant constraints regular. In
@@ -29,50 +29,45 @@ Entries = Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]
 
 @dataclass(frozen=True)
 class PointLoad:
-    """A dead force along ``direction``, of as many coordinates as u(point): work f · direction · u(point)."""
+    """Dead forces that share one magnitude f: work f Σ direction · u(point).
+
+    Attributes:
+        name: for messages.
+        acting: points and directions, of as many coordinates as u(point), times the ratio of each force to f.
+    """
 
     name: str
-    point: BodyPoint | LinkPoint
-    direction: np.ndarray
+    acting: tuple[tuple[BodyPoint | LinkPoint, np.ndarray], ...]
+
+    def travel(self, u: fem.Function, poses: np.ndarray) -> float:
+        """Σ direction · u(point)."""
+        return sum(float(direction @ point.displacement(u, poses)) for point, direction in self.acting)
 
 
 class BorderTerms:
-    """Values, gradients and Hessian entries of L_b.
-
-    Args:
-        elastic: the flexible links.
-        joints: the constraints.
-        numbering: of rows.
-        controlled: the load whose magnitude f is controlled.
-        constant: the other loads, with their magnitudes.
-        potentials: V, of the poses of bodies.
-        compliances: c by constraint row; 0 where none is given.
-
-    Attributes:
-        compliances: c, (rows,).
-    """
+    """Values, gradients and Hessian entries of L_b, of a ``controlled`` load and ``constant`` ones with magnitudes."""
 
     def __init__(
         self,
         elastic: ElasticBody,
         joints: JointSystem,
         numbering: Numbering,
-        *,
         controlled: PointLoad,
         constant: tuple[tuple[PointLoad, float], ...],
+        *,
         potentials: Sequence[PosePotential],
-        compliances: Mapping[int, float],
+        compliances: np.ndarray,
     ) -> None:
         self._elastic, self._joints, self._numbering = elastic, joints, numbering
         self._controlled, self._constant = controlled, constant
         self._potentials = [(potential, self._places(potential)) for potential in potentials]
-        self.compliances = np.array([compliances.get(row, 0.0) for row in range(joints.rows)])
+        self._compliances = compliances
 
     # -- values --------------------------------------------------------------------------------------------
 
     def travel(self, load: PointLoad, state: State) -> float:
         """a · u_P, the travel of a load's point in the loaded ``state``."""
-        return float(load.direction @ load.point.displacement(self._elastic.u, state.poses))
+        return load.travel(self._elastic.u, state.poses)
 
     def work(self, state: State, force: float) -> float:
         """Σ f_k (a_k · u_k) + f (a · u_P) with ``force`` for f."""
@@ -82,10 +77,6 @@ class BorderTerms:
     def pose_potential(self, state: State) -> float:
         """V. Local."""
         return sum(_factor(potential, state) * potential.value(state.poses) for potential, _ in self._potentials)
-
-    def constraints(self, state: State, multipliers: np.ndarray) -> np.ndarray:
-        """C + c λ at ``multipliers`` λ, (rows,). Local."""
-        return self._joints.value(state.poses, state.motors) + self.compliances * multipliers
 
     # -- gradients: by this rank's (u, p), (owned dofs,), and by (z, λ, f), (border,) --------------------------
 
@@ -98,33 +89,36 @@ class BorderTerms:
         numbering = self._numbering
         links, border = np.zeros(numbering.rows.links.count), np.zeros(numbering.rows.border.size)
         nodal = links[numbering.rows.nodes.local].reshape(-1, numbering.per_node)
-        for load, magnitude in loads:
-            match load.point:
-                case BodyPoint(body=body) as point:
+        for point, direction in ((point, size * along) for load, size in loads for point, along in load.acting):
+            match point:
+                case BodyPoint(body=body):
                     if body in self._joints.columns:
-                        border[self._joints.columns[body]] += magnitude * load.direction @ point.gradient(state.poses)
+                        border[self._joints.columns[body]] += direction @ point.gradient(state.poses)
                 case LinkPoint(global_nodes=nodes, weights=weights):
                     own = nodes - numbering.first_node
                     mine = (own >= 0) & (own < len(nodal))
-                    np.add.at(nodal, own[mine], magnitude * np.outer(weights[mine], load.direction))
+                    np.add.at(nodal, own[mine], np.outer(weights[mine], direction))
         return links, border
 
     def pose_gradient(self, state: State) -> np.ndarray:
         """∂V/∂z, (poses,). Local."""
-        total = np.zeros(self._joints.size)
-        for potential, places in self._potentials:
-            _add(total, places, _factor(potential, state) * potential.gradient(state.poses))
-        return total
+        return self._pose_gradient(state, lambda potential: _factor(potential, state))
 
     def load_factor_rate(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """−∂²L_b/∂(u, z)∂σ. Local."""
         links, border = self.load_forces(self._constant, state)
-        weights = np.zeros(self._joints.size)
-        for potential, places in self._potentials:
-            if not potential.holds:
-                _add(weights, places, potential.gradient(state.poses))
+        weights = self._pose_gradient(state, lambda potential: float(not potential.holds))
         self._numbering.rows.restrict_border(border).poses[:] -= weights
         return links, border
+
+    def _pose_gradient(self, state: State, factor: Callable[[PosePotential], float]) -> np.ndarray:
+        """Σ factor · ∂V/∂z over the potentials."""
+        total = np.zeros(self._joints.size)
+        for potential, places in self._potentials:
+            gradient = factor(potential) * potential.gradient(state.poses)
+            for local, columns in places:
+                total[columns] += gradient[local]
+        return total
 
     # -- Hessian: entries of K̂ as (global rows, global columns, values) ------------------------------------------
 
@@ -135,11 +129,8 @@ class BorderTerms:
 
             B = Σ_i r_i · ∂²u_i/∂z² − Σ f_k a_k · ∂²u_k/∂z² + ∂²V/∂z² − Σ λ_k ∂²C_k/∂z²
 
-        Args:
-            state: displacements, poses and multipliers.
-            control: of the load.
-            moments: Σ r_i ⊗ (X_i − c) over the nodes on the interfaces of each body.
-            regularisation: ε by constraint row and that of a given load, in the units of K̂, (rows + 1,).
+        ``moments`` are Σ r_i ⊗ (X_i − c) over the nodes on the interfaces of each body, ``regularisation`` is ε by
+        constraint row and that of a given load, in the units of K̂, (rows + 1,).
         """
         joints, rows = self._joints, self._numbering.rows
         z, multipliers, load = rows.poses.first, rows.multipliers.first, np.array([rows.load.first])
@@ -147,9 +138,10 @@ class BorderTerms:
             columns = z + joints.columns[body]
             yield columns, columns, joints.space.displacement_hessian(state.poses[body], moment)
         for acting, magnitude in self.loads(state):
-            if isinstance(acting.point, BodyPoint) and acting.point.body in joints.columns:
-                columns = z + joints.columns[acting.point.body]
-                yield columns, columns, -acting.point.hessian(state.poses, magnitude * acting.direction)
+            for point, direction in acting.acting:
+                if isinstance(point, BodyPoint) and point.body in joints.columns:
+                    columns = z + joints.columns[point.body]
+                    yield columns, columns, -point.hessian(state.poses, magnitude * direction)
         for potential, places in self._potentials:
             curvature = _factor(potential, state) * potential.hessian(state.poses)
             for one, columns in places:
@@ -160,12 +152,12 @@ class BorderTerms:
         for constraints, columns, block in joints.gradient_blocks(state.poses, state.motors):
             yield multipliers + constraints, z + columns, -block
             yield z + columns, multipliers + constraints, -block.T
-        for row, value in enumerate(-regularisation[:-1] - self.compliances, start=multipliers):
+        for row, value in enumerate(-regularisation[:-1] - self._compliances, start=multipliers):
             yield np.array([row]), np.array([row]), np.array([[value]])
         if control.constrained:
-            values = -self._travel_row(state)
-            yield load, self._loaded(), values
-            yield self._loaded(), load, values.T
+            for loaded, travel in self._travel_rows(state):
+                yield load, loaded, -travel
+                yield loaded, load, -travel.T
         else:  # f is given: its equation is f = f
             yield load, load, np.array([[-regularisation[-1]]])
 
@@ -178,22 +170,15 @@ class BorderTerms:
             for rows, columns, _ in self.entries(drawn, control, moments, np.zeros(joints.rows + 1)):
                 yield rows, columns
 
-    def _travel_row(self, state: State) -> np.ndarray:
-        """∂(a · u_P) of the controlled load by the unknowns in rows ``_loaded``, (1, n)."""
-        direction = self._controlled.direction
-        match self._controlled.point:
-            case BodyPoint() as point:
-                return (direction @ point.gradient(state.poses))[None]
-            case LinkPoint(weights=weights):
-                return np.outer(weights, direction).reshape(1, -1)
-
-    def _loaded(self) -> np.ndarray:
-        """Global rows of K̂ on which the controlled load acts."""
-        match self._controlled.point:
-            case BodyPoint(body=body):
-                return self._numbering.rows.poses.first + self._joints.columns[body]
-            case LinkPoint(global_nodes=nodes):
-                return self._numbering.rows_of(nodes)
+    def _travel_rows(self, state: State) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """∂(a · u_P) of the controlled load by the unknowns in some global rows of K̂, (1, n)."""
+        for point, direction in self._controlled.acting:
+            match point:
+                case BodyPoint(body=body):
+                    rows = self._numbering.rows.poses.first + self._joints.columns[body]
+                    yield rows, (direction @ point.gradient(state.poses))[None]
+                case LinkPoint(global_nodes=nodes, weights=weights):
+                    yield self._numbering.rows_of(nodes), np.outer(weights, direction).reshape(1, -1)
 
     def _places(self, potential: PosePotential) -> list[tuple[slice, np.ndarray]]:
         """Parts of a potential's derivatives, and the pose unknowns they belong to; fixed bodies have none."""
@@ -208,9 +193,3 @@ class BorderTerms:
 def _factor(potential: PosePotential, state: State) -> float:
     """The load factor that a potential counts with."""
     return 1.0 if potential.holds else state.load_factor
-
-
-def _add(total: np.ndarray, places: list[tuple[slice, np.ndarray]], gradient: np.ndarray) -> None:
-    """Adds a potential's gradient at its pose unknowns."""
-    for local, columns in places:
-        total[columns] += gradient[local]

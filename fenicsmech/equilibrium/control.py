@@ -12,14 +12,17 @@ The rate of the scaled unknowns x with v solves K x′ = r, K the KKT matrix. Th
     motors          φ, the motors standing at φ d      their torques, Σ d λ
     load factor     σ of the constant loads            their work
 
-A path may turn back in v and in q. Its arc length s is a control as well,
+A path may turn back in v and in q. Its arc length s is a control as well, with the residual
 
-    ⟨n, y − y₀⟩ = s,      y the state with the value v of the control that is followed,
+    ⟨n, y − y₀⟩ − s,      y the state with the value v of the control that is followed,
 
-whose equation takes the place of the one that prescribes v; solves need any control that leaves K regular:
-v is held, or q where that changes more (Rheinboldt & Burkardt, doi:10.1145/357456.357460), so that limit points of the
-other do no harm. See ``solver`` for the bordering, which needs no row of the matrix. Sources: Riks
-(doi:10.1016/0020-7683(79)90081-7), Crisfield (doi:10.1016/0045-7949(81)90108-5).
+in place of the equation that prescribes v. It needs no row of the matrix: solves hold v, or q where that changes more
+(Rheinboldt & Burkardt, doi:10.1145/357456.357460), which leaves K regular at limit points of the other, and the Newton
+step is led into the plane by bordering, with r the rate of what is held,
+
+    K x₀ = −R,    K x₁ = r,    x = x₀ + τ x₁,    τ such that y + x lies in the plane.
+
+Sources: Riks (doi:10.1016/0020-7683(79)90081-7), Crisfield (doi:10.1016/0045-7949(81)90108-5).
 """
 
 from __future__ import annotations
@@ -27,7 +30,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from petsc4py import PETSc
@@ -37,11 +40,11 @@ from fenicsmech.equilibrium.state import State, Step
 
 @dataclass(frozen=True)
 class Stability:
-    """Numbers of directions in which the energy has a maximum.
+    """Numbers of directions in which the energy has a maximum, all motors held.
 
     Attributes:
-        under_load: while the force and all motors are held.
-        under_displacement: while the displacement of the force's point is held, and all motors are.
+        under_load: while the force is held.
+        under_displacement: while the displacement of the force's point is held.
     """
 
     under_load: int
@@ -52,16 +55,21 @@ class Stability:
 class Control(ABC):
     """A prescribed value.
 
-    The controls whose value a path can be followed by, ``LoadControl`` and ``MotorControl``, also have ``opposite``
-    (LoadControl only), ``change``, ``conjugate`` and ``moves``.
+    The controls whose value a path can be followed by, ``LoadControl`` and ``MotorControl``, also have ``opposite``,
+    the control that prescribes their conjugate, ``change``, ``conjugate`` and ``moves``.
 
     Attributes:
         target: the value.
-        constrained: whether f is the multiplier of a constraint on the displacement.
+        along_path: whether a plane across a path is prescribed, where equilibria of any stability are wanted.
     """
 
     target: float
-    constrained = False
+    along_path = False
+
+    @property
+    def constrained(self) -> bool:
+        """Whether f is the multiplier of a constraint on the displacement."""
+        return False
 
     def at(self, target: float) -> Self:
         """The same control with another target."""
@@ -71,9 +79,13 @@ class Control(ABC):
     def value(self, system, state: State) -> float:
         """v of a state that the ``EquilibriumSystem`` has loaded."""
 
-    @abstractmethod
     def prepare(self, state: State) -> State:
         """``state`` with what the control prescribes directly."""
+        return state
+
+    def gap(self, system, state: State) -> float:
+        """Residual of the constraint on the displacement, at a loaded state."""
+        return system.load_displacement(state) - self.target
 
     @abstractmethod
     def rate(self, system, state: State) -> PETSc.Vec:
@@ -87,7 +99,12 @@ class Control(ABC):
         """Rate q′ of the conjugate with the target: r · x′ if q = −∂L/∂v."""
         return right.dot(x)
 
-    def stability(self, excess: int, conjugate_rate: float) -> Stability:
+    def rates(self, system, right: PETSc.Vec, x: PETSc.Vec) -> tuple[Step, float]:
+        """The tangent and q′ from the solution ``x`` of K x = r = ``right``."""
+        tangent = self.tangent(system.unknowns.step(x))
+        return tangent, self.conjugate_rate(system, right, x, tangent)
+
+    def stability(self, excess: int, tangent: Step, conjugate_rate: float) -> Stability:
         """Stability from the number of negative eigenvalues in ``excess`` of a stable equilibrium's, and q′."""
         return Stability(max(excess, 0), max(excess, 0))
 
@@ -110,7 +127,7 @@ class LoadControl(Control):
     def tangent(self, step):
         return replace(step, force=1.0)
 
-    def stability(self, excess, conjugate_rate):
+    def stability(self, excess, tangent, conjugate_rate):
         # a point that moves back as the force grows: holding it takes one unstable mode away
         return Stability(max(excess, 0), max(excess - int(conjugate_rate < 0.0), 0))
 
@@ -141,21 +158,21 @@ class DisplacementControl(Control):
     """The force makes its point move by ``target`` along its direction."""
 
     target: float = 0.0
-    constrained = True
+
+    @property
+    def constrained(self):
+        return True
 
     def value(self, system, state):
         return system.load_displacement(state)
 
-    def prepare(self, state):
-        return state
-
     def rate(self, system, state):
-        return system.target_rate()
+        return system.border_rate(load=-1.0)
 
     def conjugate_rate(self, system, right, x, tangent):
         return tangent.force
 
-    def stability(self, excess, conjugate_rate):
+    def stability(self, excess, tangent, conjugate_rate):
         # x′ = −K⁻¹ e, and e · K⁻¹ e < 0 exactly if removing the control's row e leaves stability as it is
         return Stability(max(excess + int(conjugate_rate <= 0.0), 0), max(excess, 0))
 
@@ -178,13 +195,14 @@ class MotorControl(Control):
         return replace(state, motors=np.where(self.direction, self.target * self.direction, state.motors))
 
     def rate(self, system, state):
-        return system.motor_rate(state, self.direction)
+        constraints, poses = system.joints.motor_rate(state.poses, state.motors, state.multipliers, self.direction)
+        return system.border_rate(poses=poses, multipliers=constraints)
 
     def tangent(self, step):
         return replace(step, motors=self.direction)
 
     def conjugate_rate(self, system, right, x, tangent):
-        return self._exerted(system, tangent.multipliers)
+        return self.conjugate(system, tangent)
 
     # -- of a path that is followed by its motors ---------------------------------------------------------------------
 
@@ -195,9 +213,11 @@ class MotorControl(Control):
         """The change of the value in a change of state."""
         return self._along(step.motors)
 
-    def conjugate(self, system, state: State) -> float:
-        """The conjugate q of a loaded state."""
-        return self._exerted(system, state.multipliers)
+    def conjugate(self, system, state: State | Step) -> float:
+        """The conjugate q of a state, Σ d λ of the motors' equations."""
+        joints = system.joints
+        driven = [(k, joints.motor_rows[c.motor]) for k, c in enumerate(joints.connections) if c.motor is not None]
+        return float(sum(self.direction[k] * state.multipliers[row] for k, row in driven))
 
     def moves(self, system, tangent: Step) -> bool:
         """Whether the motors move any node or body."""
@@ -205,12 +225,6 @@ class MotorControl(Control):
 
     def _along(self, motors: np.ndarray | float) -> float:
         return float(np.sum(self.direction * motors) / np.sum(self.direction**2))
-
-    def _exerted(self, system, multipliers: np.ndarray) -> float:
-        """Σ d λ of the motors' equations."""
-        joints = system.joints
-        driven = [(k, joints.motor_rows[c.motor]) for k, c in enumerate(joints.connections) if c.motor is not None]
-        return float(sum(self.direction[k] * multipliers[row] for k, row in driven))
 
 
 @dataclass(frozen=True)
@@ -234,17 +248,14 @@ class LoadFactorControl(Control):
 
 @dataclass(frozen=True)
 class ArcMetric:
-    """Inner product ⟨a, b⟩ of changes of state: mean motion, followed value and conjugate, each over its reference.
+    """Inner product ⟨a, b⟩ of changes of state: mean motion, and value of the followed control, over their references.
 
     Attributes:
-        system: whose unknowns are compared.
-        followed: the control whose value counts.
         motion: reference of displacement over the mechanism's length, and of rotation.
-        value: reference of the value.
-        conjugate: reference of its conjugate; infinite where that does not change with the value.
+        value, conjugate: references of v and q; that of q is infinite where it does not change with v.
     """
 
-    system: object
+    system: Any
     followed: LoadControl | MotorControl
     motion: float
     value: float
@@ -253,7 +264,7 @@ class ArcMetric:
     def dot(self, a: Step, b: Step) -> float:
         """⟨a, b⟩."""
         values = self.followed.change(a) * self.followed.change(b)
-        return mean_product(self.system, a, b) / self.motion**2 + values / self.value**2
+        return self.system.mean_product(a, b) / self.motion**2 + values / self.value**2
 
     def norm(self, a: Step) -> float:
         """√⟨a, a⟩."""
@@ -264,16 +275,6 @@ class ArcMetric:
         return a.scaled(1.0 / self.norm(a))
 
 
-def mean_product(system, a: Step, b: Step) -> float:
-    """Mean product of two motions of free nodes and bodies, displacements over the mechanism's length."""
-    comm, joints = system.comm, system.joints
-    free = system.numbering.free[system.blocks.nodes.local]
-    own = np.array([float(a.u[free] @ b.u[free]) / joints.length**2, float(len(free))])
-    nodes, count = comm.allreduce(own)
-    bodies = float(np.sum(a.z * b.z / joints.pose_scale**2))
-    return nodes / max(count, 1.0) + bodies / max(len(a.z), 1)
-
-
 @dataclass(frozen=True, eq=False)
 class ArcLengthControl(Control):
     """The state lies in a plane normal to a path: ⟨n, y − y₀⟩ = ``target``.
@@ -281,8 +282,8 @@ class ArcLengthControl(Control):
     Attributes:
         metric: ⟨·, ·⟩.
         origin: y₀.
-        normal: n; the path's tangent is oriented along it.
-        held: the control that solves for corrections: that of the followed value, or of its conjugate.
+        normal: n; the path's tangent, of norm one, is oriented along it.
+        held: what solves hold, that the equation of the plane replaces: the followed value, or its conjugate.
     """
 
     target: float
@@ -290,23 +291,37 @@ class ArcLengthControl(Control):
     origin: State
     normal: Step
     held: LoadControl | DisplacementControl | MotorControl
-    constrained = True
+    along_path = True
+
+    @property
+    def constrained(self) -> bool:
+        return self.held.constrained
 
     def value(self, system, state):
         return self.metric.dot(self.normal, system.difference(state, self.origin))
 
-    def prepare(self, state):
-        return state
+    def gap(self, system, state):
+        return 0.0  # held where it is
 
     def rate(self, system, state):
         return self.held.rate(system, state)
 
-    def hold(self, system, state: State) -> Control:
-        """``held`` at the value it has in a loaded state."""
-        return self.held.at(self.held.value(system, state))
+    def rates(self, system, right, x):
+        tangent, rate = self.held.rates(system, right, x)
+        if not isinstance(self.held, type(self.metric.followed)):
+            rate = 1.0  # of the conjugate, which is held itself
+        scale = 1.0 / self.metric.norm(tangent)
+        if not self.metric.dot(tangent, self.normal) > 0.0:
+            scale = -scale
+        return tangent.scaled(scale), scale * rate
 
-    def onto(self, system, state: State, correction: Step, rate: Step) -> Step:
-        """``correction`` + τ ``rate``, which leads from ``state`` into the plane."""
+    def stability(self, excess, tangent, conjugate_rate):
+        held_rate = tangent.force * conjugate_rate  # of the same sign
+        return self.held.stability(excess, tangent, held_rate)
+
+    def into_plane(self, system, state: State, correction: Step, x: PETSc.Vec) -> Step:
+        """``correction`` + τ x₁, which leads from ``state`` into the plane; ``x`` solves K x = r."""
+        rate = self.held.tangent(system.unknowns.step(x))
         # the value that the correction itself changes is left to the next iteration
         off = system.difference(state, self.origin) + replace(correction, force=0.0)
         gap = self.metric.dot(self.normal, off) - self.target

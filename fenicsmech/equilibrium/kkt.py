@@ -8,27 +8,26 @@ total energy of links and effects,
          [0       , −A   , −ε−c, 0   ],
          [−a_uᵀ   , −a_zᵀ, 0   , 0   ]]
 
-and G the map from the scaled unknowns. K̂ is stored by blocks of one node each, which halves
-the time of assembly; products of sparse matrices need a copy by entries. The product over all unknowns is formed on
+and G the map from the scaled unknowns. K̂ is stored by blocks of one node each, which speeds
+assembly up; products of sparse matrices need a copy by entries. The product over all unknowns is formed on
 demand. Two-level solvers need only its stiffness by blocks of nodes, its columns of the border, and
 Pᵀ K P = (G P)ᵀ K̂ (G P) for a narrow P.
 """
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Iterable
 
 import numpy as np
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
-from fenicsmech.clock import Clock
+from fenicsmech.compat import stored_values
 from fenicsmech.elasticity import ElasticBody
-from fenicsmech.equilibrium.blocks import Numbering
 from fenicsmech.equilibrium.border import REGULARISATION, Entries
 from fenicsmech.equilibrium.control import Control
-from fenicsmech.equilibrium.unknowns import ScaledUnknowns
+from fenicsmech.equilibrium.unknowns import Numbering, ScaledUnknowns
+from fenicsmech.log import Clock
 
 
 class KktMatrix:
@@ -36,15 +35,8 @@ class KktMatrix:
 
     Products are of the K̂ last linearised, with the G of ``unknowns``: take them before either changes.
 
-    Args:
-        elastic: the flexible links.
-        numbering: of rows and unknowns.
-        unknowns: of its rows and columns.
-        extended: K̂, with the pattern of all its entries.
-        clock: of the phases.
-
     Attributes:
-        linearised: number of linearisations so far.
+        version: number of linearisations and shifts so far.
         extended: K̂, to which elastic stiffness may be added between ``tangent`` and ``linearise``.
     """
 
@@ -53,7 +45,7 @@ class KktMatrix:
     ) -> None:
         self._elastic, self._numbering, self._unknowns = elastic, numbering, unknowns
         self._rows, self._blocks = numbering.rows, numbering.unknowns
-        self.extended, self._clock, self.linearised = extended, clock, 0
+        self.extended, self._clock, self.version = extended, clock, 0
         # what shift and soften add to the diagonal, and whether that is nothing
         self._added, self._shift, self._plain = unknowns.zeros(), 0.0, True
         # K̂ by entries: its copy, whether it is up to date, its diagonal, and whether that is without what is added
@@ -85,13 +77,14 @@ class KktMatrix:
                         addv=PETSc.InsertMode.ADD,
                     )
             self.extended.assemble()
-        self.linearised += 1
+        self.version += 1
         self._converted = self._formed = False
         self._added.set(0.0)
         self._shift, self._plain = 0.0, True
 
     def shift(self, shift: float) -> None:
         """Sets the δ = ``shift`` of the δI added to the matrix in displacements and poses."""
+        self.version += 1
         self._shift, self._plain = shift, self._plain and shift == 0.0
         parts = self._blocks.restrict(self._added.array_w)
         parts.nodes[:] = parts.poses[:] = shift
@@ -216,13 +209,10 @@ def create_extended_matrix(
 
 
 class EntryCopy:
-    """A matrix by entries that follows one by blocks of the same pattern.
+    """A matrix by entries that follows one ``blocked`` by nodes, whose pattern does not change any more.
 
-    PETSc's conversion finds the place of each entry anew, which takes a third as long as assembling them all. Here it
+    PETSc's conversion finds the place of each entry anew, which is slow beside the assembly. Here it
     is asked once, with the numbers of the entries for values; from then on values are copied in that order.
-
-    Args:
-        blocked: the matrix by blocks, assembled, whose pattern does not change any more.
 
     Attributes:
         matrix: its copy by entries, valid after an ``update``.
@@ -230,46 +220,17 @@ class EntryCopy:
 
     def __init__(self, blocked: PETSc.Mat) -> None:
         self._blocked, self.matrix = blocked, PETSc.Mat()
-        kept = [values.copy() for values in _values(blocked, "BAIJ")]
-        for values in _values(blocked, "BAIJ"):
+        kept = [values.copy() for values in stored_values(blocked)]
+        for values in stored_values(blocked):
             values[:] = np.arange(len(values))
         blocked.convert(PETSc.Mat.Type.AIJ, self.matrix)
-        self._order = [numbers.astype(np.int32) for numbers in _values(self.matrix, "AIJ")]
-        for values, before in zip(_values(blocked, "BAIJ"), kept, strict=True):
+        self._order = [numbers.astype(np.int32) for numbers in stored_values(self.matrix)]
+        for values, before in zip(stored_values(blocked), kept, strict=True):
             values[:] = before
 
     def update(self) -> None:
         """Takes the values of the matrix by blocks."""
-        pairs = zip(_values(self._blocked, "BAIJ"), _values(self.matrix, "AIJ"), self._order, strict=True)
+        pairs = zip(stored_values(self._blocked), stored_values(self.matrix), self._order, strict=True)
         for values, entries, order in pairs:
             np.take(values, order, out=entries, mode="clip")  # the only mode that takes without a copy
         self.matrix.stateIncrease()
-
-
-# petsc4py shows the arrays of values of neither format, hence functions of PETSc's library, to which it is linked
-_LIBRARY = ctypes.CDLL(PETSc.__file__)
-
-
-def _values(matrix: PETSc.Mat, kind: str) -> list[np.ndarray]:
-    """This rank's values in a matrix of ``kind``: those in its own columns and in those of other ranks."""
-    pointer = ctypes.c_void_p
-    parts = [pointer(matrix.handle)]
-    if matrix.comm.size > 1:
-        parts = [pointer(), pointer()]
-        # the columns' numbers are of no interest
-        _call(f"MatMPI{kind}GetSeq{kind}", pointer(matrix.handle), *map(ctypes.byref, parts), None)
-    found = []
-    for part in parts:
-        # MatInfo is ten doubles, nz_used the third; 1 is MAT_LOCAL
-        info, values = (ctypes.c_double * 10)(), ctypes.POINTER(ctypes.c_double)()
-        _call("MatGetInfo", part, ctypes.c_int(1), info)
-        _call(f"MatSeq{kind}GetArray", part, ctypes.byref(values))
-        count = int(info[2])
-        found.append(np.ctypeslib.as_array(values, (count,)) if count else np.empty(0))
-    return found
-
-
-def _call(name: str, *arguments) -> None:
-    """Calls one of PETSc's functions."""
-    if code := getattr(_LIBRARY, name)(*arguments):
-        raise RuntimeError(f"{name} of PETSc failed with code {code}")

@@ -17,14 +17,17 @@ and at the new pressures p, with ½ ρ_m |∂E/∂p|² beside it.
 Slender links are far softer in bending than in tension, so a good step may raise every merit for a few iterations:
 steps are taken in full as long as a watchdog allows, then the iteration returns to its best state and searches the
 line. For the same reason ∇²L holds, far from equilibrium, the stress that the last step solved for
-instead of the one its displacements led to (``elasticity.mixed_stress``): iterations halve, and steps ten times as
-long converge.
+instead of the one its displacements led to (``elasticity.MixedStress``): fewer iterations, and longer
+steps converge.
 
 Close to convergence the factor of the KKT matrix K is reused (simplified Newton method),
 
     y ← y − K(y₁)⁻¹ r(y),
 
 as long as corrections contract by a factor of 1000 or more; otherwise, as next to a limit point, K is factored anew.
+
+Across a path (see ``control``) equilibria of any stability are wanted and a good guess is near: steps are taken in
+full, led into the plane by bordering; where they diverge, a shorter step along the path is tried instead of descent.
 
 Sources: Nocedal & Wright, Numerical Optimization (doi:10.1007/978-0-387-40065-5), chapters 17–19; Chamberlain et al. on
 the watchdog (Mathematical Programming Studies 16, 1982); Deuflhard on the simplified Newton method
@@ -39,11 +42,12 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
-from fenicsmech.checks import positive
 from fenicsmech.equilibrium.control import Control
-from fenicsmech.equilibrium.solver import EquilibriumPoint, EquilibriumSolver, Iteration, NotConverged
+from fenicsmech.equilibrium.linearisation import EquilibriumPoint, NotConverged
+from fenicsmech.equilibrium.solver import EquilibriumMethod, EquilibriumSolver
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
+from fenicsmech.errors import positive
 from fenicsmech.log import logger
 
 _log = logger(__name__)
@@ -51,7 +55,7 @@ _LEAST_SHIFT = 1e-9  # in units of the mean stiffness; slender links bend with 1
 
 
 @dataclass(frozen=True, kw_only=True)
-class PrimalDualNewton(EquilibriumSolver):
+class PrimalDualNewton(EquilibriumMethod):
     """Newton's method on the KKT system with inertia control, the default solver.
 
     Attributes:
@@ -64,6 +68,8 @@ class PrimalDualNewton(EquilibriumSolver):
         largest_turn: largest rotation (rad), or displacement over the mechanism's length, of one step.
         reuse_factor: largest contraction rate of corrections at which the last factor of K is reused, also for
             stability and the tangent of the path; 0: never.
+        path_iterations: most iterations of an arc-length step, after which a shorter one is tried.
+        divergence: growth of the residual, over its least value or ``near``, at which a shorter step is tried too.
 
     Raises:
         DescriptionError: a limit is not a positive number, or ``reuse_factor`` is negative.
@@ -75,92 +81,109 @@ class PrimalDualNewton(EquilibriumSolver):
     mixed_stress: bool = True
     largest_turn: float = 0.5
     reuse_factor: float = 1e-3
+    path_iterations: int = 10
+    divergence: float = 1e3
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for limit in ("near", "largest_turn"):
+        for limit in ("near", "largest_turn", "divergence"):
             positive(f"Newton's {limit}", getattr(self, limit))
         if self.reuse_factor != 0.0:
             positive("Newton's reuse_factor", self.reuse_factor)
 
-    def on(self, system: EquilibriumSystem) -> Newton:
-        return Newton(system, self)
+    def solver(self, system: EquilibriumSystem) -> NewtonSolver:
+        return NewtonSolver(system, self)
 
 
-class Newton(Iteration):
-    """The iteration, with the linear solver it keeps between solves."""
+class NewtonSolver(EquilibriumSolver):
+    """Newton's method for one system."""
 
     options: PrimalDualNewton
 
     def iterate(self, start: State, control: Control) -> EquilibriumPoint:
-        system, options, least = self.system, self.options, start.minimum_shift
+        system, options, path = self.system, self.options, control.along_path
+        limit, least = options.path_iterations if path else options.iterations, start.minimum_shift
         state, residual = start, system.residual(start, control)
-        best, spent, careful, missed = (state, residual), 0, False, None
-        passed: tuple[State, np.ndarray] | None = None
-        residuals, shift, trusted, mixed, norm = [], least, True, False, math.inf
-        for iteration in range(options.iterations + 1):
+        best, not_better, line_search, diverged = (state, residual), 0, False, None
+        last: tuple[State, np.ndarray] | None = None  # where the last step began, and its motion of the nodes
+        residuals, shift, any_stability, mixed, norm = [], least, True, False, math.inf
+        for iteration in range(limit + 1):
             residuals.append(self.relative(residual))
             if self.converged(residual, norm) and iteration > 0:
+                if path:  # critical points are located by its tangent and inertia
+                    return self.linearise(state, control, residual).point(residuals, iteration + 1)
                 if mixed or shift > least or options.reuse_factor == 0.0:  # stability is of the true matrix
                     self.linearise(state, control, residual, iterations=iteration)
                 return self.accept(state, control, residual, residuals, iteration)
-            if iteration == options.iterations:
+            if iteration == limit:
                 break
-            near = trusted and residuals[-1] < options.near
-            kept = None if near else passed
-            mixed = kept is not None
-            if kept is not None:
-                system.linearise_mixed(state, control, residual, *kept)
-            else:
-                system.linearise(state, control, residual)
-            x, shift = self._direction(residual, least, last=shift, any_inertia=near)
-            step, motion = system.unknowns.step(x), system.unknowns.apply(x)
+            near = path or (any_stability and residuals[-1] < options.near)
+            mixed = last is not None and not near
+            system.linearise(state, control, residual, last if mixed else None)
+            x, shift = self._direction(residual, least, last=shift, any_stability=near)
+            step = self.newton_step(x, state, control, residual)
             _log.debug("iteration %d: residual %.2e, shift %.1e", iteration, residuals[-1], shift)
-            before, norm = state, residual.norm
-            advance = self._search if careful else self._full_step
+            if path:
+                norm = residual.norm
+                state, residual = self._path_step(state, control, step, residuals)
+                continue
+            before, norm, motion = state, residual.norm, system.unknowns.apply(x)
+            advance = self._search if line_search else self._full_step
             try:
                 state, residual, length = advance(state, control, step, residual, iteration)
             except NotConverged as failure:
                 return self.accept_best(*best, control, residuals, failure)
             # pressures of mixed elements are stresses that the step solves for already
-            passed = (before, length * motion) if options.mixed_stress and not system.blocks.pressures.size else None
+            last = (before, -length * motion) if options.mixed_stress and not system.blocks.pressures.size else None
             if near and residual.norm > norm and not self.converged(residual, norm):
-                if missed is None and self.relative(residual) < options.near:
-                    missed = before  # once may happen: just beyond a bifurcation small residuals hide large motions
+                if diverged is None and self.relative(residual) < options.near:
+                    diverged = before  # once may happen: just beyond a bifurcation small residuals hide large motions
                 else:
                     # no contraction: near a limit or bifurcation point, where only descent leads on
-                    state, trusted, careful, passed = missed or before, False, True, None
+                    state, any_stability, line_search, last = diverged or before, False, True, None
                     system.load(state)
                     residual = system.residual(state, control)
             elif near and shift == least and length == 1.0:
                 state, residual, norm = self._finish(state, control, residual, norm, step)
             if residual.norm < best[1].norm:
-                best, spent = (state, residual), 0
+                best, not_better = (state, residual), 0
             else:
-                spent += 1
-            if spent > options.watchdog and not careful:
-                state, careful, passed = best[0], True, None
+                not_better += 1
+            if not_better > options.watchdog and not line_search:
+                state, line_search, last = best[0], True, None
                 system.load(state)
                 residual = system.residual(state, control)
-        return self.accept_best(*best, control, residuals, self.exhausted(residuals, options.iterations))
+        return self.accept_best(*best, control, residuals, self.exhausted(residuals, limit))
 
     def _direction(
-        self, residual: Residual, least: float, *, last: float, any_inertia: bool
+        self, residual: Residual, least: float, *, last: float, any_stability: bool
     ) -> tuple[PETSc.Vec, float]:
-        """The Newton step; unless ``any_inertia`` will do, raises δ until the inertia guarantees descent.
+        """x with K x the residual, and δ, raised until the inertia guarantees descent unless ``any_stability`` will do.
 
         δ = ``least`` is tried first; then a third of the ``last`` successful one, and eight times that, …
         """
         shift, following = least, max(_LEAST_SHIFT, last / 3.0)
         for _ in range(20):
             x = self.try_solve(residual.vector, self.step_accuracy(residual)) if self.factor(shift) else None
-            if x is not None and (any_inertia or self.descends()):
+            if x is not None and (any_stability or self.descends()):
                 break
             shift, following = following, 8.0 * following
         else:
             raise NotConverged("no shift of the tangent gives a direction of descent", 0)
-        x.scale(-1.0)
         return x, shift
+
+    def _path_step(self, state: State, control: Control, step: Step, residuals: list[float]) -> tuple[State, Residual]:
+        """The whole step across a path, unless it is too large or diverges: then a shorter one along it is due."""
+        iteration, system, options = len(residuals), self.system, self.options
+        if not system.size(step) <= options.largest_turn:
+            raise self.exhausted(residuals, iteration)
+        state = system.moved(state, step)
+        residual = system.residual(state, control)
+        if not math.isfinite(residual.norm):
+            raise NotConverged("elements are inverted", iteration)
+        if self.relative(residual) > options.divergence * max(min(residuals), options.near):
+            raise self.exhausted(residuals, iteration)
+        return state, residual
 
     def _finish(
         self, state: State, control: Control, residual: Residual, before: float, step: Step
@@ -169,22 +192,15 @@ class Newton(Iteration):
 
         Their lengths fall by the factor's relative error: |K⁻¹ r(y₁)| / |K⁻¹ r(y₀)| ≈ |K⁻¹ (K(y) − K)| as y₁ → y.
 
-        Args:
-            state, residual: where the step led.
-            control: the prescribed value.
-            before: residual norm before the step.
-            step: the step.
-
-        Returns:
-            State and residual after the corrections, and the residual norm before the last one.
+        Returns state and residual after them, and the residual norm before the last one; ``before`` is that before the
+        step.
         """
         system, size = self.system, self.system.size(step)
         while not self.converged(residual, before):
             x = self.try_solve(residual.vector, self.step_accuracy(residual))
             if x is None:
                 break
-            x.scale(-1.0)
-            correction = system.unknowns.step(x)
+            correction = self.newton_step(x, state, control, residual)
             length = system.size(correction)
             if not length <= self.options.reuse_factor * size:
                 break
@@ -236,6 +252,6 @@ class Newton(Iteration):
         value = system.potential(state, force) - multipliers @ system.joints.value(state.poses, state.motors)
         value += 0.5 * stiffness * float(violation @ violation) + 5.0 * system.volume_violation() ** 2
         if control.constrained:
-            gap = (system.load_displacement(state) - control.target) / system.joints.length
+            gap = control.gap(system, state) / system.joints.length
             value += force * control.target + 0.5 * stiffness * gap**2
         return value

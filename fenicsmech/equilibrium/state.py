@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fenicsmech.elasticity import ElasticBody
-from fenicsmech.multibody import InterfaceMap
+from fenicsmech.mechanism import Motor
+from fenicsmech.multibody import InterfaceMap, JointSystem
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,18 +60,15 @@ class Step:
     def slower(self, other: Step) -> Step:
         """This step with the smaller change of the two for every displacement and pose."""
 
-        def smaller(one: np.ndarray, two: np.ndarray) -> np.ndarray:
-            return np.where(np.abs(one) < np.abs(two), one, two)
-
-        return replace(self, u=smaller(self.u, other.u), z=smaller(self.z, other.z))
+        pairs = ((self.u, other.u), (self.z, other.z))
+        u, z = (np.where(np.abs(one) < np.abs(two), one, two) for one, two in pairs)
+        return replace(self, u=u, z=z)
 
     def beyond(self, steps: Sequence[Step]) -> Step:
         """This step with how far every displacement and pose lies outside the span of those of ``steps``."""
 
-        def outside(value: np.ndarray, others: list[np.ndarray]) -> np.ndarray:
-            return value - np.clip(value, np.minimum.reduce(others), np.maximum.reduce(others))
-
-        u, z = outside(self.u, [step.u for step in steps]), outside(self.z, [step.z for step in steps])
+        spans = ((self.u, [step.u for step in steps]), (self.z, [step.z for step in steps]))
+        u, z = (value - np.clip(value, np.minimum.reduce(span), np.maximum.reduce(span)) for value, span in spans)
         return replace(self, u=u, z=z)
 
 
@@ -80,3 +78,84 @@ def load_fields(elastic: ElasticBody, interfaces: InterfaceMap, state: State) ->
     elastic.load_factor.value = state.load_factor
     elastic.update()
     interfaces.place(state.poses)
+
+
+@dataclass(frozen=True)
+class Reaction:
+    """Force and moment, about the joint's point, that a joint exerts on its second link.
+
+    Attributes:
+        force: (dim,).
+        moment: (1,) in the plane, (3,) in space.
+    """
+
+    force: np.ndarray
+    moment: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class ReactionSlopes:
+    """Derivatives of a reaction by all pose unknowns z, (n, size), and by the multipliers, (n, rows)."""
+
+    force: tuple[np.ndarray, np.ndarray]
+    moment: tuple[np.ndarray, np.ndarray]
+
+
+def joint_reactions(joints: JointSystem, state: State) -> dict[str, Reaction]:
+    """The reaction of every joint, by name."""
+    held = (k for k, own in enumerate(joints.connections) if own.a in joints.columns or own.b in joints.columns)
+    return {joints.connections[k].name: joint_reaction(joints, k, state) for k in held}
+
+
+def joint_reaction(joints: JointSystem, k: int, state: State) -> Reaction:
+    """The reaction of connection ``k``, one of whose bodies can move.
+
+    With the generalised force g = (g_t, g_r) on the pose of the body, ∂r/∂ω = B and the lever R a:
+
+        F = g_t,     M = Bᵀ g_r − (R a) × F.
+    """
+    space, (body, sign) = joints.space, _acted_on(joints, k)
+    pose, on_pose = state.poses[body], (state.poses, state.motors, state.multipliers)
+    g = sign * joints.generalised_force(k, body, *on_pose)
+    force, lever = g[: space.dim], space.rotate(pose, _arm(joints, k, body))
+    return Reaction(force, space.rotation_rates(pose).T @ g[space.dim :] - _cross(lever, force))
+
+
+def joint_reaction_slopes(joints: JointSystem, k: int, state: State) -> ReactionSlopes:
+    """The derivatives of the reaction of connection ``k``."""
+    space, (body, sign) = joints.space, _acted_on(joints, k)
+    pose, on_pose, dim = state.poses[body], (state.poses, state.motors, state.multipliers), joints.space.dim
+    g = sign * joints.generalised_force(k, body, *on_pose)
+    arm, rates = _arm(joints, k, body), space.rotation_rates(pose)
+    lever, force, moment = space.rotate(pose, arm), [], []
+    for by in joints.generalised_force_slopes(k, body, *on_pose):
+        force.append(sign * by[:dim])
+        across = np.column_stack([_cross(lever, column) for column in force[-1].T])
+        moment.append(sign * rates.T @ by[dim:] - across)
+    # the body's own rotation changes B and its lever
+    own = joints.columns[body][dim:]
+    turned = [_cross(spin @ arm, g[:dim]) for spin in space.rotation_gradient(pose)]
+    moment[0][:, own] += (np.einsum("abk,b->ka", space.rotation_rates_gradient(pose), g[dim:])) - np.transpose(turned)
+    return ReactionSlopes((force[0], force[1]), (moment[0], moment[1]))
+
+
+def _acted_on(joints: JointSystem, k: int) -> tuple[int, float]:
+    """The body whose pose gives the reaction of a connection, and the sign of the force on it."""
+    connection = joints.connections[k]
+    return (connection.b, 1.0) if connection.b in joints.columns else (connection.a, -1.0)
+
+
+def _arm(joints: JointSystem, k: int, body: int) -> np.ndarray:
+    """The joint's point from the centre of a body, as drawn."""
+    return np.array(joints.connections[k].at) - np.array(joints.bodies[body].centre)
+
+
+def motor_torques(joints: JointSystem, state: State) -> dict[Motor, float]:
+    """Torque of each revolute motor and force of each prismatic one, positive if it drives its coordinate up."""
+    return {motor: float(state.multipliers[row]) for motor, row in joints.motor_rows.items()}
+
+
+def _cross(lever: np.ndarray, force: np.ndarray) -> np.ndarray:
+    if len(lever) == 2:
+        return np.array([lever[0] * force[1] - lever[1] * force[0]])
+    return np.cross(lever, force)

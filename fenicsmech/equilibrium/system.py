@@ -5,7 +5,7 @@
     residual   Gᵀ ∇L,     KKT matrix   Gᵀ ∇²L G,     x ↦ (u, z, λ, f) = G x
 
 E is the energy of links and effects; where links are in u–p form, u stands for (u, p) and E is a saddle. The terms of
-L beside E are those of ``border``, the blocks of the equations those of ``blocks``, their matrix that of ``kkt``.
+L beside E are those of ``border``, the blocks of the equations those of ``unknowns``, their matrix that of ``kkt``.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fenicsmech.clock import Clock
 from fenicsmech.compat import destroy_garbage
-from fenicsmech.effects import PosePotential
 from fenicsmech.elasticity import ElasticBody, MixedStress
-from fenicsmech.equilibrium.blocks import Numbering
 from fenicsmech.equilibrium.border import REGULARISATION, BorderTerms, PointLoad
 from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.kkt import KktMatrix, create_extended_matrix
 from fenicsmech.equilibrium.state import State, Step, load_fields
-from fenicsmech.equilibrium.unknowns import ScaledUnknowns
-from fenicsmech.multibody import InterfaceMap, JointSystem
+from fenicsmech.equilibrium.unknowns import Numbering, ScaledUnknowns
+from fenicsmech.log import Clock
+from fenicsmech.multibody import InterfaceMap, JointSystem, PosePotential
+
+_SHARED = ("u", "multipliers", "force", "motors", "load_factor")  # of states and steps
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class EquilibriumSystem:
         interfaces: interface nodes as functions of poses.
         joints: the constraints.
         controlled: the load whose magnitude f is controlled.
-        loads: fixed loads, with their magnitudes.
+        loads: constant ones, with their magnitudes.
         potentials: of body poses.
         compliances: c by constraint row; 0 where none is given.
         clock: of the phases.
@@ -74,6 +74,7 @@ class EquilibriumSystem:
     Attributes:
         numbering: of rows and unknowns.
         blocks: of the unknowns.
+        compliances: c, (rows,).
         unknowns: x and G, at the poses of the last ``residual``.
         kkt: the KKT matrix last linearised; take it before another ``residual``.
     """
@@ -96,14 +97,9 @@ class EquilibriumSystem:
         self.controlled, self.clock, self.comm = controlled, clock, comm
         self.numbering = numbering = Numbering(comm, interfaces, joints, elastic.pressure)
         self.blocks = numbering.unknowns
+        self.compliances = np.array([compliances.get(row, 0.0) for row in range(joints.rows)])
         self._border = BorderTerms(
-            elastic,
-            joints,
-            numbering,
-            controlled=controlled,
-            constant=loads,
-            potentials=potentials,
-            compliances=compliances,
+            elastic, joints, numbering, controlled, loads, potentials=potentials, compliances=self.compliances
         )
         with clock.phase("compile"):
             elastic.compile()
@@ -121,29 +117,22 @@ class EquilibriumSystem:
         return MixedStress(self.elastic)
 
     @property
-    def compliances(self) -> np.ndarray:
-        """c, (rows,)."""
-        return self._border.compliances
-
-    @property
     def rigid_rows(self) -> np.ndarray:
         """Constraints without compliance, (n,)."""
         return np.flatnonzero(self.compliances == 0.0)
+
+    @property
+    def negative_where_stable(self) -> int:
+        """Negative eigenvalues of K where stable: one per multiplier and pressure, one for the controlled force."""
+        return self.joints.rows + 1 + self.blocks.pressures.size
 
     # -- states --------------------------------------------------------------------------------------------
 
     def moved(self, state: State, step: Step) -> State:
         """``state`` after ``step``: rotations back on their manifold, interface nodes on their bodies."""
+        sums = {name: getattr(state, name) + getattr(step, name) for name in _SHARED}
         poses = self.joints.with_unknowns(state.poses, self.joints.unknowns(state.poses) + step.z)
-        moved = replace(
-            state,
-            u=state.u + step.u,
-            poses=poses,
-            multipliers=state.multipliers + step.multipliers,
-            force=state.force + step.force,
-            motors=state.motors + step.motors,
-            load_factor=state.load_factor + step.load_factor,
-        )
+        moved = replace(state, poses=poses, **sums)
         self.load(moved)
         return replace(moved, u=self.elastic.values())
 
@@ -162,14 +151,8 @@ class EquilibriumSystem:
 
     def difference(self, later: State, earlier: State) -> Step:
         """``later`` − ``earlier``. Local."""
-        return Step(
-            later.u - earlier.u,
-            self.joints.unknowns(later.poses) - self.joints.unknowns(earlier.poses),
-            later.multipliers - earlier.multipliers,
-            later.force - earlier.force,
-            later.motors - earlier.motors,
-            later.load_factor - earlier.load_factor,
-        )
+        z = self.joints.unknowns(later.poses) - self.joints.unknowns(earlier.poses)
+        return Step(z=z, **{name: getattr(later, name) - getattr(earlier, name) for name in _SHARED})
 
     def independent(self, step: Step) -> Step:
         """``step`` without the displacements of nodes that bodies move. Local."""
@@ -183,6 +166,14 @@ class EquilibriumSystem:
         nodes = float(np.max(np.abs(displacements), initial=0.0)) / self.joints.length
         bodies = float(np.max(np.abs(step.z / self.joints.pose_scale), initial=0.0))
         return max(self.comm.allgather(max(nodes, bodies)))
+
+    def mean_product(self, a: Step, b: Step) -> float:
+        """Mean product of two motions of free nodes and bodies, displacements over the mechanism's length."""
+        free, joints = self.numbering.free[self.blocks.nodes.local], self.joints
+        own = np.array([float(a.u[free] @ b.u[free]) / joints.length**2, float(len(free))])
+        nodes, count = self.comm.allreduce(own)
+        bodies = float(np.sum(a.z * b.z / joints.pose_scale**2))
+        return nodes / max(count, 1.0) + bodies / max(len(a.z), 1)
 
     # -- values at the loaded state ------------------------------------------------------------------------
 
@@ -209,7 +200,7 @@ class EquilibriumSystem:
 
     def constraints(self, state: State, multipliers: np.ndarray) -> np.ndarray:
         """C(s) + c λ at ``multipliers`` λ, (rows,). Local."""
-        return self._border.constraints(state, multipliers)
+        return self.joints.value(state.poses, state.motors) + self.compliances * multipliers
 
     def residual(self, state: State, control: Control) -> Residual:
         """Gᵀ ∇L. Brings G to the poses of ``state``.
@@ -232,53 +223,46 @@ class EquilibriumSystem:
             violation = self.constraints(state, state.multipliers)
             multipliers[:] = -violation
             if control.constrained:
-                load[:] = -(self.load_displacement(state) - control.target)
+                load[:] = -control.gap(self, state)
             vector = self.unknowns.apply_transpose(r, border)
 
             forces = np.linalg.norm(rigid_loads * scale) ** 2
             forces += np.linalg.norm(reactions * self.blocks.restrict_border(scale).poses) ** 2
             forces += self.comm.allreduce(float(np.linalg.norm(loads * self.unknowns.unit_u) ** 2))
+            gap = float(np.max(np.abs(joints.row_scale * violation), initial=0.0))
+            z = joints.unknowns(state.poses) - joints.unknowns(joints.drawn)
+            motion = self.size(Step(state.u, z, state.multipliers, state.force))
             nodal = r[self.numbering.rows.nodes.local]
-            return Residual(
-                vector,
-                vector.norm(),
-                float(np.sqrt(forces)),
-                float(np.max(np.abs(joints.row_scale * violation), initial=0.0)),
-                self._motion(state),
-                self._moments(nodal),
-                nodal,
-                poses.copy(),
-            )
+            moments = self._moments(nodal)
+            return Residual(vector, vector.norm(), float(np.sqrt(forces)), gap, motion, moments, nodal, poses.copy())
 
     # -- derivatives at the loaded state -------------------------------------------------------------------
 
-    def linearise(self, state: State, control: Control, residual: Residual) -> None:
-        """Brings ``kkt`` to the loaded ``state``."""
-        self.kkt.tangent()
-        self.kkt.linearise(self._border.entries(state, control, residual.moments, self._regularisation))
-
-    def linearise_mixed(
-        self, state: State, control: Control, residual: Residual, before: State, motion: np.ndarray
+    def linearise(
+        self, state: State, control: Control, residual: Residual, last: tuple[State, np.ndarray] | None = None
     ) -> None:
-        """``linearise``, with the stress predicted by the step δu = ``motion`` from ``before``.
+        """Brings ``kkt`` to the loaded ``state``, with the stress predicted by the ``last`` step if that is given.
 
-        Args:
-            state, control, residual: as in ``linearise``.
-            before: the state before the step.
-            motion: δu of owned nodes, linear in the step on interface nodes too, (owned dofs,).
+        It is the state before the step and δu of owned nodes, linear in it on interface nodes too, (owned dofs,).
         """
-        with self.clock.phase("assemble"):
-            self._mixed.follow(before.u, motion)
-            self.kkt.tangent()
-            self._mixed.tangent(self.kkt.extended)
-            moments = _added(residual.moments, self._moments(self._mixed.forces()))
+        self.kkt.tangent()
+        moments = residual.moments
+        if last is not None:
+            with self.clock.phase("assemble"):
+                self._mixed.follow(last[0].u, last[1])
+                self._mixed.tangent(self.kkt.extended)
+                moments = _added(moments, self._moments(self._mixed.forces()))
         self.kkt.linearise(self._border.entries(state, control, moments, self._regularisation))
 
     # -- right-hand sides whose KKT solutions are rates of x -----------------------------------------------------
 
     def travel_gradient(self, load: PointLoad, state: State) -> PETSc.Vec:
         """Right-hand side for the magnitude of a load: Gᵀ ∂(a · u_P), the gradient of its travel by x."""
-        return self.unknowns.apply_transpose(*self._border.load_forces([(load, 1.0)], state))
+        return self.unknowns.apply_transpose(*self.travel_slopes(load, state))
+
+    def travel_slopes(self, load: PointLoad, state: State) -> tuple[np.ndarray, np.ndarray]:
+        """The gradient of a load's travel by this rank's (u, p), (owned dofs,), and by (z, λ, f), (border,). Local."""
+        return self._border.load_forces([(load, 1.0)], state)
 
     def load_factor_rate(self, state: State) -> PETSc.Vec:
         """Right-hand side for the load factor of the constant loads."""
@@ -287,25 +271,12 @@ class EquilibriumSystem:
             links -= self.elastic.load_factor_residuals()
         return self.unknowns.apply_transpose(links, border)
 
-    def target_rate(self) -> PETSc.Vec:
-        """Right-hand side for the controlled displacement."""
+    def border_rate(self, *, poses=0.0, multipliers=0.0, load=0.0) -> PETSc.Vec:
+        """Right-hand side that acts on the border alone, by its blocks."""
         border = np.zeros(self.blocks.border.size)
-        self.blocks.restrict_border(border).load[:] = -1.0
+        for part, values in zip(self.blocks.restrict_border(border), (poses, multipliers, load), strict=True):
+            part[:] = values
         return self.unknowns.apply_transpose(np.zeros(self.numbering.rows.links.count), border)
-
-    def motor_rate(self, state: State, direction: np.ndarray) -> PETSc.Vec:
-        """Right-hand side for motor values along ``direction``, (connections,)."""
-        border = np.zeros(self.blocks.border.size)
-        poses, multipliers, _ = self.blocks.restrict_border(border)
-        multipliers[:], poses[:] = self.joints.motor_rate(state.poses, state.motors, state.multipliers, direction)
-        return self.unknowns.apply_transpose(np.zeros(self.numbering.rows.links.count), border)
-
-    # -- pieces --------------------------------------------------------------------------------------------
-
-    def _motion(self, state: State) -> float:
-        """Largest displacement from the drawn configuration over the mechanism's length, or rotation."""
-        z = self.joints.unknowns(state.poses) - self.joints.unknowns(self.joints.drawn)
-        return self.size(Step(state.u, z, state.multipliers, state.force))
 
     def _moments(self, nodal: np.ndarray) -> dict[int, np.ndarray]:
         """Σ f_i ⊗ (X_i − c) of each interface body, from forces on owned nodes, (owned displacements,)."""

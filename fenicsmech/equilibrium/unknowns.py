@@ -1,4 +1,30 @@
-"""The scaled unknowns x of the KKT system, and the map G from these to the change of state they stand for.
+"""The unknowns of the equilibrium system: their blocks, numbers and scales, and the change of state they stand for.
+
+Nodes of links, poses of bodies, multipliers of joints and the controlled load are unknowns of one symmetric matrix:
+
+                 nodes  pressures │ poses  multipliers  load
+    nodes       ⎡ K_uu   Kᵀ_pu    │  Kᵀ_zu      0       −a_u ⎤      K_uu  elastic block: links at their free nodes
+    pressures   ⎢ K_pu    −M      │  K_pz       0        0   ⎥      K_pu, M  volume and compliance of links in u–p form
+                ⎢─────────────────┼──────────────────────────⎥
+    poses       ⎢ K_zu   Kᵀ_pz    │   B        −Aᵀ      −a_z ⎥      B     curvature of rigid motions, A = ∂C/∂z
+    multipliers ⎢  0       0      │  −A       −ε − c     0   ⎥      c, ε  compliance of joints, regularisation
+    load        ⎣ −a_uᵀ    0      │ −a_zᵀ       0        0   ⎦      a     direction of the load at its point
+
+It is 2 × 2 blocks: links (thousands of unknowns, sparse, distributed) and the border (dozens, on the last rank). Nodes
+on interfaces are functions of the poses of their bodies, which couples both: K_zu, K_pz and a part of B come from the
+links. Where the load is given instead of the displacement of its point, the load's row is −f alone.
+
+All blocks stand in one matrix, factored as LDLᵀ: by Sylvester's law its pivots have the signs of the eigenvalues, and
+at a stable equilibrium as many of these are negative as there are pressures, multipliers and the load (Gould,
+doi:10.1007/BF02592103). The factor that solves for a step decides on stability at no extra cost. Elimination of the
+nodes would leave a Schur complement of the border, in which small stiffnesses are differences of large ones.
+
+Every block is a named index set, enough for PETSc's fieldsplit preconditioners:
+
+    pc.setFieldSplitIS(("links", blocks.links.index_set()), ("border", blocks.border.index_set()))
+
+Two vectors have these blocks: the scaled unknowns x, and the rows of the extended matrix K̂ (see ``kkt``), which holds
+nodes on interfaces too. They are related by the map G from x to the change of state it stands for,
 
     x ↦ (u, z, λ, f) = G x,     G = diag(∂u/∂s, 1) · D,     D = (ℓ, ℓ or 1, …) / (ℓ √k),
 
@@ -7,38 +33,170 @@ with the mechanism's length ℓ and the mean diagonal k of the stiffness; D make
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import NamedTuple
+
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
-from fenicsmech.elasticity import ElasticBody
-from fenicsmech.equilibrium.blocks import Numbering
+from fenicsmech.elasticity import ElasticBody, PressureField
 from fenicsmech.equilibrium.state import Step
 from fenicsmech.multibody import InterfaceMap, JointSystem
 
 
-class UnknownMap:
-    """G as a sparse matrix, whose pattern never changes: the identity times ``units`` and ``scale``, and ∂u/∂z.
-
-    Args:
-        numbering: of rows and unknowns.
-        interfaces: interface nodes as functions of poses.
-        joints: the constraints.
-        units: of the free degrees of freedom of links, (unknowns.links.count,).
-        scale: of the border, (border,).
+@dataclass(frozen=True)
+class Block:
+    """Unknowns of one kind.
 
     Attributes:
-        matrix: G, with zeros for ∂u/∂z until the first ``turn``.
+        local: this rank's unknowns among its values of a vector.
+        first: global number of this rank's first unknown; of the block's first one on ranks without the border.
+        size: number on all ranks.
+        comm: the processes.
+    """
+
+    local: slice
+    first: int
+    size: int
+    comm: MPI.Comm
+
+    @property
+    def count(self) -> int:
+        """Number on this rank. Local."""
+        return self.local.stop - self.local.start
+
+    def index_set(self) -> PETSc.IS:
+        """Global numbers of those of each rank."""
+        return PETSc.IS().createStride(self.count, self.first, 1, comm=self.comm)
+
+
+class Parts(NamedTuple):
+    """The values of each block."""
+
+    nodes: np.ndarray
+    pressures: np.ndarray
+    poses: np.ndarray
+    multipliers: np.ndarray
+    load: np.ndarray
+
+
+class Border(NamedTuple):
+    """The values of each block of the border."""
+
+    poses: np.ndarray
+    multipliers: np.ndarray
+    load: np.ndarray
+
+
+class Blocks:
+    """Named index sets of a distributed vector: links, rank by rank, then the border on the last rank.
+
+    Numbers of ``nodes`` and ``pressures`` are those on this rank; ``padding`` values after the border belong to no
+    block. ``links`` are nodes and pressures, ``border`` poses, multipliers and load.
+
+    Attributes:
+        local, size: lengths of the vector, on this rank and on all.
+        last: whether this rank holds the border.
     """
 
     def __init__(
-        self,
-        numbering: Numbering,
-        interfaces: InterfaceMap,
-        joints: JointSystem,
-        units: np.ndarray,
-        scale: np.ndarray,
+        self, comm: MPI.Comm, *, nodes: int, pressures: int, poses: int, multipliers: int, padding: int = 0
     ) -> None:
-        self._numbering, self._interfaces, self._joints, self._scale = numbering, interfaces, joints, scale
+        self.comm, self.last = comm, comm.rank == comm.size - 1
+        counts = np.array(comm.allgather((nodes, pressures)))  # by rank
+        here, first = nodes + pressures, int(counts[: comm.rank].sum())
+        totals = counts.sum(axis=0)
+        start, border = int(totals.sum()), poses + multipliers + 1
+
+        def on_last(begin: int, size: int) -> Block:
+            held = slice(here + begin, here + begin + size) if self.last else slice(here, here)
+            return Block(held, start + begin, size, comm)
+
+        self.nodes = Block(slice(0, nodes), first, int(totals[0]), comm)
+        self.pressures = Block(slice(nodes, here), first + nodes, int(totals[1]), comm)
+        self.links = Block(slice(0, here), first, start, comm)
+        self.poses, self.multipliers = on_last(0, poses), on_last(poses, multipliers)
+        self.load, self.border = on_last(border - 1, 1), on_last(0, border)
+        self.local = here + (border + padding if self.last else 0)
+        self.size = start + border + padding
+
+    def restrict(self, values: np.ndarray) -> Parts:
+        """Views of this rank's ``values`` by block. Local."""
+        blocks = (self.nodes, self.pressures, self.poses, self.multipliers, self.load)
+        return Parts(*(values[block.local] for block in blocks))
+
+    def restrict_border(self, border: np.ndarray) -> Border:
+        """Views of the values of a whole ``border``, (border,), by block. Local."""
+        return Border(*np.split(border, [self.poses.size, self.poses.size + self.multipliers.size]))
+
+    def join(self, links: np.ndarray, border: np.ndarray) -> np.ndarray:
+        """This rank's values from those of its ``links`` and of the whole ``border``, known to all ranks. Local."""
+        values = np.zeros(self.local)
+        values[self.links.local] = links
+        values[self.border.local] = border[: self.border.count]
+        return values
+
+    def gather_border(self, values: np.ndarray) -> np.ndarray:
+        """The values of the border on every rank, (border,), from those of each rank."""
+        return self.comm.bcast(values[self.border.local] if self.last else None, root=self.comm.size - 1)
+
+
+class Numbering:
+    """Numbers of the rows of K̂ and of the unknowns.
+
+    Attributes:
+        rows: blocks of the rows of K̂: all finite-element degrees of freedom of each rank, and the border.
+        unknowns: blocks of the scaled unknowns x: the free ones, and the border.
+        free: rows of this rank's links that are unknowns, (unknowns.links.count,).
+        per_node: displacements per node.
+        block: rows of K̂ come in blocks of this size.
+        whole_nodes: whether all components of every node with an unknown are unknowns, and there are no pressures.
+        first_node: global number of this rank's first node.
+    """
+
+    def __init__(
+        self, comm: MPI.Comm, interfaces: InterfaceMap, joints: JointSystem, pressure: PressureField | None = None
+    ) -> None:
+        self.per_node = self.block = interfaces.block
+        nodes, pressures = interfaces.owned * interfaces.block, 0
+        self.free = np.flatnonzero(interfaces.unknown)
+        displacements = len(self.free)
+        if pressure is not None:
+            pressures, self.block = len(pressure.unknown), 1
+            self.free = np.concatenate([self.free, nodes + np.flatnonzero(pressure.unknown)])
+        whole = pressure is None and np.all(interfaces.unknown.all(axis=1) == interfaces.unknown.any(axis=1))
+        self.whole_nodes = comm.allreduce(int(not whole)) == 0
+        border = {"poses": joints.size, "multipliers": joints.rows}
+        padding = -(sum(border.values()) + 1) % self.block
+        self.rows = Blocks(comm, nodes=nodes, pressures=pressures, **border, padding=padding)
+        self.unknowns = Blocks(comm, nodes=displacements, pressures=len(self.free) - displacements, **border)
+        # first node of every rank, and the pressures that stand before its displacements
+        ends = np.cumsum(comm.allgather(interfaces.owned))
+        self.first_node, self._starts = int(ends[comm.rank] - interfaces.owned), ends[:-1]
+        self._before = np.concatenate([[0], np.cumsum(comm.allgather(pressures))[:-1]])
+
+    def rows_of(self, nodes: np.ndarray) -> np.ndarray:
+        """Rows of K̂ of the displacements of ``nodes``, numbered over all ranks, (nodes · per_node,). Local."""
+        rank = np.searchsorted(self._starts, nodes, side="right")
+        return (self.per_node * nodes[:, None] + self._before[rank][:, None] + np.arange(self.per_node)).ravel()
+
+
+class UnknownMap:
+    """G as a sparse matrix, whose pattern never changes: the identity times units, and ∂u/∂z.
+
+    ``units`` are those of the free degrees of freedom of links, ``scale`` those of the border.
+
+    Attributes:
+        map: G, with zeros for ∂u/∂z until the first ``turn``.
+        poses: at which G is taken.
+    """
+
+    def __init__(
+        self, numbering: Numbering, interfaces: InterfaceMap, joints: JointSystem, units: np.ndarray, scale: np.ndarray
+    ) -> None:
+        self.numbering, self.scale, self.poses = numbering, scale, joints.drawn
+        self._interfaces, self._joints = interfaces, joints
         rows, unknowns, free = numbering.rows, numbering.unknowns, numbering.free
         counts = np.zeros(rows.local, dtype=int)
         counts[free] = counts[rows.border.local] = 1
@@ -56,50 +214,39 @@ class UnknownMap:
         border = starts[:-1][rows.border.local]
         columns[border] = unknowns.border.first + np.arange(len(border))
         values[border] = scale[: len(border)]
-        self.matrix = PETSc.Mat().createAIJ(
-            [(rows.local, rows.size), (unknowns.local, unknowns.size)],
-            csr=(starts.astype(PETSc.IntType), columns, values),
-            comm=rows.comm,
-        )
+        size = [(rows.local, rows.size), (unknowns.local, unknowns.size)]
+        self.map = PETSc.Mat().createAIJ(size, csr=(starts.astype(PETSc.IntType), columns, values), comm=rows.comm)
 
     def turn(self, poses: np.ndarray) -> None:
         """Brings ∂u/∂z to ``poses``."""
-        numbering, joints = self._numbering, self._joints
+        self.poses = poses
+        numbering, joints = self.numbering, self._joints
         for body in self._interfaces.nodes:
             nodes, gradient = self._interfaces.gradient_rows(poses, body)
             if not len(nodes):
                 continue
             columns, rows = joints.columns[body], self._rows_of(nodes)
-            self.matrix.setValuesIJV(
+            self.map.setValuesIJV(
                 np.arange(0, len(columns) * len(rows) + 1, len(columns), dtype=PETSc.IntType),
                 np.tile(numbering.unknowns.poses.first + columns, len(rows)).astype(PETSc.IntType),
-                (gradient * self._scale[columns]).ravel(),
+                (gradient * self.scale[columns]).ravel(),
                 rowmap=(numbering.rows.links.first + rows).astype(PETSc.IntType),
             )
-        self.matrix.assemble()
+        self.map.assemble()
 
     def _rows_of(self, nodes: np.ndarray) -> np.ndarray:
         """Local rows of the displacements of owned ``nodes`` that bodies move, (nodes · dim,)."""
-        return (self._numbering.per_node * nodes[:, None] + np.arange(self._joints.space.dim)).ravel()
+        return (self.numbering.per_node * nodes[:, None] + np.arange(self._joints.space.dim)).ravel()
 
 
-class ScaledUnknowns:
-    """D and G.
-
-    Args:
-        elastic: the flexible links.
-        numbering: of rows and unknowns.
-        interfaces: interface nodes as functions of poses.
-        joints: the constraints.
-        diagonal: of K̂ at rest, (local rows,).
+class ScaledUnknowns(UnknownMap):
+    """x, with D from the ``diagonal`` of K̂ at rest, (local rows,).
 
     Attributes:
         unit: a residual of this norm is a displacement of the mechanism's length against the mean stiffness.
         unit_u: the displacement that a unit of a scaled unknown stands for.
         units: D of this rank's unknowns, (local unknowns,).
         scale: D of the border, (border,).
-        map: G.
-        poses: at which G is taken.
     """
 
     def __init__(
@@ -110,31 +257,23 @@ class ScaledUnknowns:
         joints: JointSystem,
         diagonal: np.ndarray,
     ) -> None:
-        self._numbering, self._blocks = numbering, numbering.unknowns
-        displacements = self._blocks.nodes
-        own = float(diagonal[numbering.free[displacements.local]].sum())
-        mean = self._blocks.comm.allreduce(own) / displacements.size
+        self._blocks = blocks = numbering.unknowns
+        own = float(diagonal[numbering.free[blocks.nodes.local]].sum())
+        mean = blocks.comm.allreduce(own) / blocks.nodes.size
         self.unit = float(np.sqrt(mean)) * joints.length
         self.unit_u = joints.length / self.unit
         links = np.full(len(numbering.free), self.unit_u)
         if elastic.pressure is not None:
-            links[self._blocks.pressures.local] = elastic.pressure_unit
-        self.scale = np.concatenate(
-            [joints.pose_scale / self.unit, joints.row_scale * self.unit, [self.unit / joints.length]]
-        )
-        self.units = self._blocks.join(links, self.scale)
-        self._map = UnknownMap(numbering, interfaces, joints, links, self.scale)
-        self.map, self.poses = self._map.matrix, joints.drawn
+            links[blocks.pressures.local] = elastic.pressure_unit
+        load = np.array([self.unit / joints.length])
+        scale = np.concatenate([joints.pose_scale / self.unit, joints.row_scale * self.unit, load])
+        super().__init__(numbering, interfaces, joints, links, scale)
+        self.units = blocks.join(links, self.scale)
         self._rows = self.map.createVecLeft()
-
-    def turn(self, poses: np.ndarray) -> None:
-        """Brings G to ``poses``."""
-        self._map.turn(poses)
-        self.poses = poses
 
     def apply_transpose(self, links: np.ndarray, border: np.ndarray) -> PETSc.Vec:
         """Gᵀ of a gradient by this rank's (u, p), (owned dofs,), and by (z, λ, f), (border,)."""
-        self._rows.array_w[:] = self._numbering.rows.join(links, border)
+        self._rows.array_w[:] = self.numbering.rows.join(links, border)
         vector = self.zeros()
         self.map.multTranspose(self._rows, vector)
         return vector
@@ -142,13 +281,13 @@ class ScaledUnknowns:
     def apply(self, x: PETSc.Vec) -> np.ndarray:
         """∂u/∂x · x as in ``State.u``, interface nodes too, (owned dofs,)."""
         self.map.mult(x, self._rows)
-        return self._rows.array_r[self._numbering.rows.links.local].copy()
+        return self._rows.array_r[self.numbering.rows.links.local].copy()
 
     def step(self, x: PETSc.Vec) -> Step:
         """The change of state D x that ``x`` stands for, without the displacements of interface nodes."""
         local = self.units * x.array_r
-        u = np.zeros(self._numbering.rows.links.count)
-        u[self._numbering.free] = local[self._blocks.links.local]
+        u = np.zeros(self.numbering.rows.links.count)
+        u[self.numbering.free] = local[self._blocks.links.local]
         poses, multipliers, load = self._blocks.restrict_border(self._blocks.gather_border(local))
         return Step(u, poses, multipliers, float(load[0]))
 

@@ -1,8 +1,6 @@
 """Estimates of the errors of elements and of plane stress, and the fidelity chosen by them.
 
-- ``estimates``: goal-oriented error estimates at equilibria
-- ``element_error``: of elements, by ``recovery`` of gradients
-- ``plane_stress_error``: of plane stress
+- ``estimates``: goal-oriented error estimates at equilibria, of elements and of plane stress
 - ``accuracy_control``: the cheapest fidelity whose estimated error is small enough
 """
 
@@ -15,8 +13,16 @@ from fenicsmech.estimates.accuracy_control import (
     Trial,
     fidelity_levels,
 )
-from fenicsmech.estimates.estimates import Calibration, Equilibrium, ErrorKind, Estimates, adjoint_at
-from fenicsmech.estimates.recovery import PressureError, Recovery
+from fenicsmech.estimates.estimates import (
+    Calibration,
+    Equilibrium,
+    ErrorKind,
+    Estimates,
+    PressureError,
+    Recovery,
+    adjoint_at,
+)
+from fenicsmech.estimates.point_forces import cause_of_growth, growth_by_halving
 
 __all__ = [
     "AccuracyControl",
@@ -32,5 +38,7 @@ __all__ = [
     "Recovery",
     "Trial",
     "adjoint_at",
+    "cause_of_growth",
     "fidelity_levels",
+    "growth_by_halving",
 ]

@@ -1,19 +1,18 @@
 """Accuracy control: the cheapest fidelity whose estimated error is below the required one.
 
 Fidelity levels are climbed from a coarse pilot. Errors of elements and of plane stress are estimated after each
-(``element_error``, ``plane_stress_error``), and the next level is the first whose expected error suffices, by the
-gains of the levels of a model over each other. Gains and work of levels were measured on claw, truss and Klann leg;
+(``estimates``), and the next level is the first whose expected error suffices, by the gains of the levels of a model
+over each other. Gains and work of levels were measured on claw, truss and Klann leg;
 they only guide the choice: the estimate on the level itself decides.
 
 Estimates are signed, and so they are added to the results (``Curve.corrected``). The error required to be small
 is the one they may leave,
 
-    |error| ≤ l |elements| + l_s |plane stress|,
+    |error| ≤ r |elements| + r_s |plane stress|,
 
-with l by level (``FidelityLevel.left``) and l_s = ``AccuracyOptions.plane_stress_left``: measured on cantilever, arch,
-truss, claw and Klann leg, where what space adds is 0.7 to 1.6 times its estimate, and what finer elements add 0.5 to
-1.5 times, but on the coarsest level up to 2.7 times. Source for corrections by adjoints: Pierce & Giles
-(doi:10.1137/S0036144598349423).
+with r by level (``FidelityLevel.remainder``) and r_s = ``AccuracyOptions.plane_stress_remainder``: measured on
+cantilever, arch, truss, claw and Klann leg, as what finer elements and space add beside their estimates. Source
+for corrections by adjoints: Pierce & Giles (doi:10.1137/S0036144598349423).
 """
 
 from __future__ import annotations
@@ -25,15 +24,8 @@ from time import perf_counter
 
 import numpy as np
 
-from fenicsmech.checks import positive
-from fenicsmech.elasticity import (
-    MID_PLANE_SYMMETRIC,
-    PLANE_STRESS,
-    SPATIAL,
-    ElasticModel,
-    Formulation,
-    Quadrature,
-)
+from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRESS, SPATIAL, ElasticModel, Formulation, Quadrature
+from fenicsmech.errors import positive
 from fenicsmech.log import logger
 from fenicsmech.mechanism import FlexibleLink, MeshPart, Scene, StepPart
 from fenicsmech.meshing import typical_thickness
@@ -47,17 +39,17 @@ class AccuracyOptions:
     """Measured constants of error estimates and fidelity levels.
 
     Attributes:
-        plane_stress_left: error left of the plane-stress estimate once it is added, over the estimate.
-        left_in_space: of the plane-stress error, what the coarsest level in space leaves.
-        caution: factor on the expected error of a level.
+        plane_stress_remainder: error that remains once the plane-stress estimate is added, over the estimate.
+        remainder_in_space: of the plane-stress error, what the coarsest level in space leaves.
+        safety: factor on the expected error of a level.
         first_order: largest valid estimate over the largest displacement: larger ones, as near limit points, are
             meaningless.
         space_work: time of the coarsest level in space over that in plane stress.
     """
 
-    plane_stress_left: float = 0.6
-    left_in_space: float = 0.55
-    caution: float = 1.3
+    plane_stress_remainder: float = 0.6
+    remainder_in_space: float = 0.55
+    safety: float = 1.3
     first_order: float = 0.1
     space_work: float = 5.0
 
@@ -76,7 +68,7 @@ class FidelityLevel:
         size: element size over the thickness of the links.
         layers: through half the depth, in space.
         segments: around pins.
-        left: error of the elements that may be left once its estimate is added, over the estimate.
+        remainder: error of the elements that may remain once its estimate is added, over the estimate.
         gain: error of the elements over that of the model's coarsest level.
         work: time over that of the model's coarsest level.
     """
@@ -86,7 +78,7 @@ class FidelityLevel:
     size: float
     layers: int
     segments: int
-    left: float
+    remainder: float
     gain: float
     work: float
 
@@ -99,24 +91,22 @@ class FidelityLevel:
         return f"{where} P{self.order}, elements of {self.size:g} thicknesses, {self.segments} around pins{through}"
 
 
-_PLANAR = (
-    (2, 2.5, 1, 8, 1.7, 1.0, 1.0),
-    (2, 1.3, 1, 8, 0.6, 0.55, 1.2),
-    (3, 2.5, 1, 8, 0.6, 0.15, 2.0),
-    (3, 0.8, 1, 16, 0.6, 0.03, 5.0),
-)
-_SPATIAL = (
-    (2, 2.5, 1, 8, 0.6, 1.0, 1.0),
-    (3, 2.5, 1, 8, 0.6, 0.11, 5.0),
-    (3, 2.5, 1, 16, 0.6, 0.055, 9.0),
-    (3, 2.5, 2, 16, 0.6, 0.03, 20.0),
-    (3, 1.2, 2, 24, 0.6, 0.02, 45.0),
-)
-
-
 def fidelity_levels(model: ElasticModel) -> list[FidelityLevel]:
     """The levels of a model, from coarse to fine."""
-    return [FidelityLevel(model, *rest) for rest in (_PLANAR if model is PLANE_STRESS else _SPATIAL)]
+    planar = (
+        (2, 2.5, 1, 8, 1.7, 1.0, 1.0),
+        (2, 1.3, 1, 8, 0.6, 0.55, 1.2),
+        (3, 2.5, 1, 8, 0.6, 0.15, 2.0),
+        (3, 0.8, 1, 16, 0.6, 0.03, 5.0),
+    )
+    spatial = (
+        (2, 2.5, 1, 8, 0.6, 1.0, 1.0),
+        (3, 2.5, 1, 8, 0.6, 0.11, 5.0),
+        (3, 2.5, 1, 16, 0.6, 0.055, 9.0),
+        (3, 2.5, 2, 16, 0.6, 0.03, 20.0),
+        (3, 1.2, 2, 24, 0.6, 0.02, 45.0),
+    )
+    return [FidelityLevel(model, *rest) for rest in (planar if model is PLANE_STRESS else spatial)]
 
 
 @dataclass(frozen=True)
@@ -128,12 +118,14 @@ class LevelErrors:
         elements: estimated discretisation error.
         plane_stress: estimated error of plane stress; 0 in space.
         unknowns: of the level.
+        growth: what each halving of the elements adds without end, under forces at points of flexible links.
     """
 
     value: float
     elements: float
     plane_stress: float
     unknowns: int
+    growth: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -158,16 +150,17 @@ class Trial:
 
     @property
     def error(self) -> float:
-        """Error that may be left once both estimates are added."""
-        return self.level.left * abs(self.elements) + self.options.plane_stress_left * abs(self.plane_stress)
+        """Error that may remain once both estimates are added."""
+        return self.expected(self.level)
 
     def expected(self, level: FidelityLevel) -> float:
         """The error to be expected of another level."""
+        elements, plane_stress = abs(self.elements), abs(self.plane_stress)
         if level.model is self.level.model:
-            gain = level.gain / self.level.gain
-            return level.left * abs(self.elements) * gain + self.options.plane_stress_left * abs(self.plane_stress)
-        in_space = self.options.left_in_space * abs(self.plane_stress) + abs(self.elements) / self.level.gain
-        return level.left * in_space * level.gain
+            elements *= level.gain / self.level.gain
+            return level.remainder * elements + self.options.plane_stress_remainder * plane_stress
+        in_space = self.options.remainder_in_space * plane_stress + elements / self.level.gain
+        return level.remainder * in_space * level.gain
 
     def __str__(self) -> str:
         blocked = f" + {abs(self.plane_stress):.2%} for contraction that pins block"
@@ -185,14 +178,16 @@ class Choice:
     Attributes:
         accuracy: required, relative to the largest displacement of the curve.
         trials: levels that were tried, the one chosen last.
-        reached: whether the error that may be left is below the accuracy.
+        reached: whether the error that may remain is below the accuracy.
         finer: level and time for a tenth of the error, as text.
+        cause: why no elements are fine enough; empty if there is no such cause.
     """
 
     accuracy: float
     trials: tuple[Trial, ...]
     reached: bool
     finer: str
+    cause: str = ""
 
     @property
     def chosen(self) -> Trial:
@@ -202,22 +197,16 @@ class Choice:
     def __str__(self) -> str:
         lines = [f"{self.accuracy:.2g} of the largest displacement asked for"]
         lines += [f"  not enough: {trial}" for trial in self.trials[:-1]]
+        if self.cause:
+            return "\n".join([*lines, f"  no finer one helps: {self.chosen}", f"  cause: {self.cause}"])
         lines += [f"  {'chosen' if self.reached else 'the finest there is'}: {self.chosen}"]
         return "\n".join([*lines, f"  ten times the accuracy: {self.finer}"])
 
 
 class AccuracyControl:
-    """The levels of a scene, and the one that was chosen last.
+    """The levels of a scene for a required relative error, and the ``level`` chosen last; at first the coarsest.
 
-    Args:
-        scene: to be simulated.
-        accuracy: required relative error.
-        thickness: of the links, all or each; None where their shapes have one.
-        formulation: which links have the pressure as an unknown.
-        options: measured constants.
-
-    Attributes:
-        level: the one chosen last; at first the coarsest.
+    The ``thickness`` is that of all links or of each; None where their shapes have one.
 
     Raises:
         DescriptionError: the scene cannot be simulated, or the thickness of a link is not known.
@@ -241,8 +230,10 @@ class AccuracyControl:
             else positive(f"thickness of {link.name!r}", given[link])
             for link in links
         }
-        self._planar = fidelity_levels(PLANE_STRESS) if _fits(scene, PLANE_STRESS) else []
-        self._spatial = fidelity_levels(MID_PLANE_SYMMETRIC if _fits(scene, MID_PLANE_SYMMETRIC) else SPATIAL)
+        self._planar = fidelity_levels(PLANE_STRESS) if fits(scene, PLANE_STRESS) else []
+        # files hold whole links
+        half = fits(scene, MID_PLANE_SYMMETRIC) and not any(isinstance(x.shape, StepPart | MeshPart) for x in links)
+        self._spatial = fidelity_levels(MID_PLANE_SYMMETRIC if half else SPATIAL)
         check_scene(scene, self._spatial[0].model)
         self.level = (self._planar or self._spatial)[0]
 
@@ -253,49 +244,48 @@ class AccuracyControl:
         rule = Quadrature.for_order(level.order, level.model.dim)
         return Fidelity(level.model, level.order, sizes, rule, self._formulation, layers, level.segments)
 
-    def choose(self, run: Callable[[FidelityLevel], LevelErrors]) -> Choice:
-        """Tries levels, from the last one on, until one suffices; ``run`` simulates a level."""
+    def choose(self, run: Callable[[FidelityLevel], LevelErrors], cause: str = "") -> Choice:
+        """Tries levels, from the last one on, until one suffices; ``run`` simulates a level.
+
+        None does where each halving of the elements adds more than the accuracy: the first is kept, for this ``cause``.
+        """
         trials: list[Trial] = []
-        following: FidelityLevel | None = self.level
-        while following is not None:
-            self.level, start = following, perf_counter()
-            found = run(self.level)
+        level: FidelityLevel | None = self.level
+        while level is not None:
+            self.level, start = level, perf_counter()
+            found = run(level)
             scale = max(abs(found.value), sys.float_info.min)
-            elements, plane_stress = found.elements / scale, found.plane_stress / scale
-            spent = perf_counter() - start
-            trials.append(Trial(self.level, elements, plane_stress, found.unknowns, spent, self.options))
+            errors, seconds = (found.elements / scale, found.plane_stress / scale), perf_counter() - start
+            trials.append(Trial(level, *errors, found.unknowns, seconds, self.options))
             _log.info("%s", trials[-1])
-            following = self._next(trials[-1])
+            growth = abs(found.growth) / scale
+            if growth > self._accuracy:
+                _log.warning("accuracy %g: %s (each halving adds %.2g)", self._accuracy, cause, growth)
+                return Choice(self._accuracy, tuple(trials), False, "beyond any level", cause)
+            level = self._next(trials[-1])
         reached = trials[-1].error <= self._accuracy
         if not reached:
             _log.warning("accuracy %g: the error of the finest level is about %.2g", self._accuracy, trials[-1].error)
         return Choice(self._accuracy, tuple(trials), reached, self._tenfold(trials[-1]))
 
     def _next(self, trial: Trial) -> FidelityLevel | None:
-        """The first finer level expected to suffice, else the finest; None if no other is needed, or left."""
+        """The first finer level expected to suffice, else the finest; None if no other is needed, or exists."""
         finer = [] if trial.error <= self._accuracy else self._finer(trial.level)
-        return next((level for level in finer if self._should_do(trial.expected(level))), finer[-1] if finer else None)
+        return next((level for level in finer if self._suffices(trial.expected(level))), finer[-1] if finer else None)
 
     def _tenfold(self, trial: Trial) -> str:
         """Level and time for a tenth of the error, as text."""
         for level in self._finer(trial.level):
-            if self._should_do(10.0 * trial.expected(level)):
-                leap = self.options.space_work if level.model is not trial.level.model else 1.0
-                return f"{level.name}, about {leap * level.work / trial.level.work * trial.seconds:.2g} s"
+            if self._suffices(10.0 * trial.expected(level)):
+                work = level.work * (1.0 if level.model is trial.level.model else self.options.space_work)
+                return f"{level.name}, about {work / trial.level.work * trial.seconds:.2g} s"
         return "beyond the finest level; give size=… and order=3, and extrapolate"
 
-    def _should_do(self, error: float) -> bool:
-        return self.options.caution * error <= self._accuracy
+    def _suffices(self, error: float) -> bool:
+        return self.options.safety * error <= self._accuracy
 
     def _finer(self, level: FidelityLevel) -> list[FidelityLevel]:
         """Levels above, cheap ones first."""
-        if level.model is not PLANE_STRESS:
-            return [other for other in self._spatial if other.gain < level.gain]
-        return [*(other for other in self._planar if other.gain < level.gain), *self._spatial]
-
-
-def _fits(scene: Scene, model: ElasticModel) -> bool:
-    """Whether the scene can be simulated in ``model``, and its links be meshed for it."""
-    if model.half and any(isinstance(link.shape, StepPart | MeshPart) for link in scene.mechanism.flexible_links):
-        return False
-    return fits(scene, model)
+        planar = level.model is PLANE_STRESS
+        finer = [other for other in (self._planar if planar else self._spatial) if other.gain < level.gain]
+        return finer + self._spatial if planar else finer

@@ -4,10 +4,10 @@
 ``write_stl``       its surface
 ``smooth_outline``  the curves through a closed polygon
 
-``solid`` writes the section of a link between curves from corner to corner of its boundary (``smooth_outline``).
+``solid`` writes the section of a link between curves from corner to corner of its boundary (``outlines``).
 """
 
-from fenicsmech.export.smooth_outline import corners_of, smooth_outline
+from fenicsmech.export.outlines import corners_of, smooth_outline
 from fenicsmech.export.solid import PinHole, write_step, write_stl
 
 __all__ = ["PinHole", "corners_of", "smooth_outline", "write_step", "write_stl"]

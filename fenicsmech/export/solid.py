@@ -9,20 +9,20 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from fenicsmech.checks import point, point_text, positive
-from fenicsmech.errors import MeshingError
-from fenicsmech.export.smooth_outline import smooth_outline
+from fenicsmech.errors import MeshingError, point, point_text, positive
+from fenicsmech.export.outlines import smooth_outline
 from fenicsmech.files import atomic_write
 from fenicsmech.meshing import (
     CircleArc,
     Curve,
     LinkMesh,
-    boundary_loops,
+    boundary_polygons,
     cell_measures,
     draw_loop,
     gmsh,
@@ -53,9 +53,9 @@ def write_step(
 ) -> None:
     """Writes a link as one solid in a STEP file.
 
-    Its edges are B-spline curves through all boundary vertices of the mesh, divided at true corners, and straight
-    lines and arcs of circles where the vertices are exactly on these; holes of pins are cylinders. Call it on one
-    process only. The file appears complete or not at all.
+    Its edges are B-spline curves through all boundary vertices of the mesh and the middles of its curved edges, divided
+    at true corners, and straight lines and arcs of circles where these points are exactly on such; holes of pins are
+    cylinders. Call it on one process only. The file appears complete or not at all.
 
     Args:
         path: the file; missing parent folders are created.
@@ -95,15 +95,14 @@ def write_stl(
         tolerance: how far its facets may deviate from the solid in the STEP file.
     """
     name = name or Path(path).stem
-    depth, tolerance = (
-        positive(f"{what}, link {name!r}", value) for what, value in (("depth", depth), ("tolerance", tolerance))
-    )
+    depth, tolerance = positive(f"depth, link {name!r}", depth), positive(f"tolerance, link {name!r}", tolerance)
     polygons = [sampled(loop, tolerance) for loop in _section(name, mesh, depth, pins)]
     with gmsh_session(f"link {name!r}"):
         gmsh.option.setNumber("Mesh.Binary", 1)
         gmsh.option.setNumber("Mesh.MeshSizeMax", 2.0 * math.hypot(*np.ptp(polygons[0], axis=0)))  # no edge is divided
         gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
-        solid = _extrude([_edges(polygon) for polygon in polygons], depth, layers=[1])
+        loops = [[straight_line(*ends) for ends in pairwise([*polygon, polygon[0]])] for polygon in polygons]
+        solid = _extrude(loops, depth, layers=[1])
         gmsh.model.mesh.setOutwardOrientation(solid)
         gmsh.model.mesh.generate(2)
         content = _written("stl")
@@ -120,10 +119,6 @@ def _extrude(loops: Sequence[Sequence[Curve]], depth: float, layers: Sequence[in
     return next(tag for dim, tag in entities if dim == 3)
 
 
-def _edges(polygon: np.ndarray) -> list[Curve]:
-    return [straight_line(*ends) for ends in zip(polygon, np.roll(polygon, -1, axis=0), strict=True)]
-
-
 def _written(kind: str) -> bytes:
     """The current gmsh model as the content of a file."""
     with TemporaryDirectory() as folder:
@@ -136,27 +131,20 @@ def _written(kind: str) -> bytes:
 def _section(name: str, mesh: LinkMesh, depth: float, pins: Sequence[PinHole]) -> list[list[Curve]]:
     """The section of the link ``mesh`` along z, smooth where the mesh approximates smooth curves.
 
-    Args:
-        name: the link's name, for messages.
-        mesh: triangles, or tetrahedra in layers along z.
-        depth: the link's extent along z.
-        pins: holes to be drilled; they replace narrower holes of the mesh around the same axis.
-
     Returns:
         Closed loops of curves: the outline, the mesh's own holes, and the circles of the pins, inside the outline and
-        apart from each other and from the others.
-
-    Raises:
-        MeshingError: cells are turned over, the outline crosses itself, the tetrahedra do not stand in layers or have
-            another depth, or a pin hole leaves the link or meets another.
-        DescriptionError: a pin's centre or diameter is not finite or not positive.
+        apart from each other and from the others. Pins replace narrower holes of the mesh around the same axis.
     """
     link = f"link {name!r}"
     plan = _plan(link, mesh, depth)
-    loops = [smooth_outline(plan.points[loop]) for loop in boundary_loops(link, plan)]
+    loops = [smooth_outline(polygon) for polygon in boundary_polygons(link, plan)]
     polygons = [sampled(loop, 1e-5 * float(np.ptp(plan.points, axis=0).max())) for loop in loops]
     _check_simple(link, polygons)
-    pins = tuple(_checked(link, pin) for pin in pins)
+    part = f"pin hole of {link}"
+    pins = tuple(
+        PinHole(point(f"centre, {part}", pin.centre, dimensions=(2,)), positive(f"diameter, {part}", pin.diameter))
+        for pin in pins
+    )
     kept = [0, *(k for k in range(1, len(loops)) if not any(_drills(pin, polygons[k]) for pin in pins))]
     for number, pin in enumerate(pins):
         _check_room(link, pin, [polygons[k] for k in kept], pins[:number])
@@ -168,45 +156,29 @@ def _plan(link: str, mesh: LinkMesh, depth: float) -> LinkMesh:
     """The triangles of the section."""
     flat = np.count_nonzero(cell_measures(mesh.points, mesh.cells) <= 0.0)
     if flat:
-        raise MeshingError(
-            link,
-            f"{flat} of its {len(mesh.cells)} cells are turned over",
-            "Choose a design that deforms the mesh less",
-        )
+        problem = f"{flat} of its {len(mesh.cells)} cells are turned over"
+        raise MeshingError(link, problem, "Choose a design that deforms the mesh less")
     if mesh.dim == 2:
         return mesh
     plan = plan_of(mesh).mesh
     if plan.dim == 3:
-        raise MeshingError(
-            link,
-            "its tetrahedra do not stand in layers along z, so it has no section to extrude",
-            "Mesh it with the axes of all its joints along z, or in the plane",
-        )
+        problem = "its tetrahedra do not stand in layers along z, so it has no section to extrude"
+        raise MeshingError(link, problem, "Mesh it with the axes of all its joints along z, or in the plane")
     meshed = float(np.ptp(mesh.points[:, 2]))
     if not math.isclose(meshed, depth, rel_tol=1e-6):
-        raise MeshingError(
-            link, f"the mesh is {meshed:g} deep, not {depth:g}", "Give the depth that the link was meshed with"
-        )
+        problem = f"the mesh is {meshed:g} deep, not {depth:g}"
+        raise MeshingError(link, problem, "Give the depth that the link was meshed with")
     return plan
 
 
 def _check_simple(link: str, polygons: Sequence[np.ndarray]) -> None:
     """Refuses loops that cross themselves, and holes that reach beyond the outline."""
     outline, *holes = polygons
-    crossings = [first_crossing(polygon) for polygon in polygons]
+    crossings = [at for polygon in polygons if (at := first_crossing(polygon)) is not None]
     crossings += [corner for hole in holes for corner in hole if not is_inside(outline, corner)]
-    where = next((at for at in crossings if at is not None), None)
-    if where is not None:
-        raise MeshingError(
-            link,
-            f"its outline crosses itself near {point_text(where)}",
-            "Choose a design that does not run into itself",
-        )
-
-
-def _checked(link: str, pin: PinHole) -> PinHole:
-    part = f"pin hole of {link}"
-    return PinHole(point(f"centre, {part}", pin.centre, dimensions=(2,)), positive(f"diameter, {part}", pin.diameter))
+    if crossings:
+        problem = f"its outline crosses itself near {point_text(crossings[0])}"
+        raise MeshingError(link, problem, "Choose a design that does not run into itself")
 
 
 def _drills(pin: PinHole, hole: np.ndarray) -> bool:
@@ -221,16 +193,13 @@ def _check_room(link: str, pin: PinHole, polygons: Sequence[np.ndarray], others:
     part = f"pin hole at {point_text(centre)} in {link}"
     outline, *holes = polygons
     room = min(distance_to(polygon, centre) for polygon in polygons)
-    if not is_inside(outline, centre) or any(
-        is_inside(hole, centre) and distance_to(hole, centre) > radius for hole in holes
-    ):
+    around = [hole for hole in holes if is_inside(hole, centre)]
+    if not is_inside(outline, centre) or any(distance_to(hole, centre) > radius for hole in around):
         raise MeshingError(part, "its centre is not on the link", "Leave it out, or give the joint's place")
     if room <= radius:
-        raise MeshingError(
-            part,
-            f"its diameter {pin.diameter:g} is too large: the link's edge is {room:g} away from its centre",
-            f"Choose a pin of less than {2.0 * room:g} in diameter, or a link that is wider there",
-        )
+        problem = f"its diameter {pin.diameter:g} is too large: the link's edge is {room:g} away from its centre"
+        remedy = f"Choose a pin of less than {2.0 * room:g} in diameter, or a link that is wider there"
+        raise MeshingError(part, problem, remedy)
     for other in others:
         if math.dist(other.centre, pin.centre) <= radius + 0.5 * other.diameter:
             raise MeshingError(part, f"it meets the one at {point_text(other.centre)}", "Choose thinner pins")

@@ -1,19 +1,25 @@
-"""Joints: constraints between two bodies, each a few symbolic lines in a file of its own.
+"""Joints: constraints between two bodies, each a class of a few symbolic lines.
 
 - ``rotations``: poses, rotations and the derivatives of a placed point
-- ``joint``: the joint kind, the markers of its equations, and their derivatives
-- ``revolute``, ``prismatic``, ``cylindrical``, ``spherical``, ``universal``, ``planar``, ``weld``: the joints
+- ``joint``: revolute, prismatic, cylindrical, spherical, universal and planar joints, the weld; the joint kind, the
+  markers of its equations, and their derivatives
 """
 
-from fenicsmech.joints.cylindrical import CYLINDRICAL
-from fenicsmech.joints.joint import JointKind, PlanarMarker, SpatialMarker, constraint, free_coordinate
-from fenicsmech.joints.planar import PLANAR_JOINT
-from fenicsmech.joints.prismatic import PRISMATIC
-from fenicsmech.joints.revolute import REVOLUTE
+from fenicsmech.joints.joint import (
+    CYLINDRICAL,
+    PLANAR_JOINT,
+    PRISMATIC,
+    REVOLUTE,
+    SPHERICAL,
+    UNIVERSAL,
+    WELD,
+    JointKind,
+    PlanarMarker,
+    SpatialMarker,
+    constraint,
+    free_coordinate,
+)
 from fenicsmech.joints.rotations import RIGID_SPACES, RigidSpace
-from fenicsmech.joints.spherical import SPHERICAL
-from fenicsmech.joints.universal import UNIVERSAL
-from fenicsmech.joints.weld import WELD
 
 __all__ = [
     "CYLINDRICAL",

@@ -1,4 +1,4 @@
-"""A joint: equations between a marker on body a and a marker on body b, from which all its numbers are derived.
+"""Joints: equations between a marker on body a and a marker on body b, from which all their numbers are derived.
 
 With the poses z = (z_a, z_b) of both bodies and the value φ of a motor,
 
@@ -7,7 +7,7 @@ With the poses z = (z_a, z_b) of both bodies and the value φ of a motor,
 Both markers coincide in the drawn configuration. Equations are written so that the derivative of a motor
 equation with respect to the joint's free coordinate is one: its multiplier is then the motor's force or torque.
 
-A new joint is one subclass of ``JointKind`` and its instance:
+Another joint is one subclass of ``JointKind`` and its instance:
 
     class PinInSlot(JointKind):
         name = "pin in slot"
@@ -44,7 +44,8 @@ class PlanarMarker:
 
     Attributes:
         origin: displacement of its origin from where it was drawn.
-        axis, normal: unit vectors: the joint's axis if that lies in the plane, else x; and a quarter turn from it.
+        axis: unit vector, the joint's axis if that lies in the plane, else x.
+        normal: unit vector, a quarter turn from ``axis``.
         angle: by which the body has turned.
     """
 
@@ -68,7 +69,9 @@ class SpatialMarker:
 
     Attributes:
         origin: displacement of its origin from where it was drawn.
-        e1, e2, e3: triad; e3 is the joint's axis.
+        e1: first vector of an orthonormal triad.
+        e2: second vector.
+        e3: third vector, the joint's axis.
         drawn_axis: e3 as drawn.
         quaternion: rotation of the body, (w, v) with v of shape (3, 1).
     """
@@ -99,6 +102,9 @@ class SpatialMarker:
         return other.e1.dot(sympy.cos(value) * self.e2 - sympy.sin(value) * self.e1)
 
 
+Marker = PlanarMarker | SpatialMarker
+
+
 class JointKind(ABC):
     """A kind of joint between two bodies, given by its equations.
 
@@ -110,7 +116,7 @@ class JointKind(ABC):
         axis_in_plane: whether its axis lies in the plane of a planar model; otherwise it is normal to the plane.
         pin_along_axis: whether it holds flexible links by a pin along its axis; otherwise along z.
         shares_point: whether its first equations are x_b − x_a = 0.
-        clamps: whether it clamps flexible links, whose direction there an optimisation keeps.
+        clamps: whether it clamps flexible links; pictures show it as a weld.
     """
 
     name: str
@@ -133,15 +139,115 @@ class JointKind(ABC):
         """C in the plane (only for joints with ``planar``)."""
         raise NotImplementedError(f"a {self.name} joint has no planar form")
 
-    def coordinate(self, a: SpatialMarker | PlanarMarker, b: SpatialMarker | PlanarMarker) -> sympy.Expr:
+    def coordinate(self, a: Marker, b: Marker) -> sympy.Expr:
         """The free coordinate φ, zero as drawn (only for joints with ``motorised``)."""
         raise NotImplementedError(f"a {self.name} joint takes no motor")
 
-    def motor(
-        self, a: SpatialMarker | PlanarMarker, b: SpatialMarker | PlanarMarker, value: sympy.Symbol
-    ) -> sympy.Expr:
+    def motor(self, a: Marker, b: Marker, value: sympy.Symbol) -> sympy.Expr:
         """Motor equation, by default φ − ``value``."""
         return self.coordinate(a, b) - value
+
+
+class Revolute(JointKind):
+    """x_b = x_a, e3_b ⟂ e1_a, e2_a; a motor prescribes the angle φ, in space by sin(angle − φ) = 0."""
+
+    name = "revolute"
+    planar = motorised = pin_along_axis = shares_point = True
+
+    def equations(self, a, b):
+        return [*(b.origin - a.origin), a.e1.dot(b.e3), a.e2.dot(b.e3)]
+
+    def planar_equations(self, a, b):
+        return [*(b.origin - a.origin)]
+
+    def coordinate(self, a, b):
+        return a.angle_to(b)
+
+    def motor(self, a, b, value):
+        return a.angle_beyond(b, value)
+
+
+class Prismatic(JointKind):
+    """(x_b − x_a) ⟂ e1_a, e2_a and equal orientation; a motor prescribes the travel along e3_a."""
+
+    name = "prismatic"
+    planar = motorised = sliding = axis_in_plane = True
+
+    def equations(self, a, b):
+        apart = b.origin - a.origin
+        return [apart.dot(a.e1), apart.dot(a.e2), a.e3.dot(b.e2), a.e1.dot(b.e3), a.e2.dot(b.e1)]
+
+    def planar_equations(self, a, b):
+        return [(b.origin - a.origin).dot(a.normal), b.angle - a.angle]
+
+    def coordinate(self, a, b):
+        return (b.origin - a.origin).dot(a.axis)
+
+
+class Cylindrical(JointKind):
+    """(x_b − x_a) ⟂ e1_a, e2_a and e3_b ⟂ e1_a, e2_a: both bodies slide along a common axis and turn about it."""
+
+    name = "cylindrical"
+    pin_along_axis = True
+
+    def equations(self, a, b):
+        apart = b.origin - a.origin
+        return [apart.dot(a.e1), apart.dot(a.e2), a.e1.dot(b.e3), a.e2.dot(b.e3)]
+
+
+class Spherical(JointKind):
+    """x_b = x_a."""
+
+    name = "spherical"
+    shares_point = True
+
+    def equations(self, a, b):
+        return [*(b.origin - a.origin)]
+
+
+class Universal(JointKind):
+    """x_b = x_a and e1_a ⟂ e2_b (Cardan): arm e1 turns in body a, arm e2 in body b; e3 is the shaft as drawn."""
+
+    name = "universal"
+    shares_point = True
+
+    def equations(self, a, b):
+        return [*(b.origin - a.origin), a.e1.dot(b.e2)]
+
+
+class PlanarJoint(JointKind):
+    """(x_b − x_a) ⟂ e3_a and e3_b ⟂ e1_a, e2_a; e3 is the normal. In a planar model nothing remains."""
+
+    name = "planar"
+    planar = True
+
+    def equations(self, a, b):
+        return [(b.origin - a.origin).dot(a.e3), a.e1.dot(b.e3), a.e2.dot(b.e3)]
+
+    def planar_equations(self, a, b):
+        return []
+
+
+class Weld(JointKind):
+    """x_b = x_a and equal orientation."""
+
+    name = "weld"
+    planar = shares_point = clamps = True
+
+    def equations(self, a, b):
+        return [*(b.origin - a.origin), a.e3.dot(b.e2), a.e1.dot(b.e3), a.e2.dot(b.e1)]
+
+    def planar_equations(self, a, b):
+        return [*(b.origin - a.origin), b.angle - a.angle]
+
+
+REVOLUTE = Revolute()
+PRISMATIC = Prismatic()
+CYLINDRICAL = Cylindrical()
+SPHERICAL = Spherical()
+UNIVERSAL = Universal()
+PLANAR_JOINT = PlanarJoint()
+WELD = Weld()
 
 
 @cache

@@ -62,17 +62,11 @@ class RigidSpace(ABC):
 
     @abstractmethod
     def rotation_rates(self, pose: np.ndarray) -> np.ndarray:
-        """∂r/∂ω for a small rotation vector ω in space, (rotation_size, 1 or 3)."""
+        """B = ∂r/∂ω for a small rotation vector ω in space, (rotation_size, 1 or 3)."""
 
     @abstractmethod
-    def compose(self, outer: np.ndarray, inner: np.ndarray, lever: np.ndarray) -> np.ndarray:
-        """Pose of a body that first moves by ``inner`` and is then carried along by ``outer``.
-
-        Args:
-            outer: pose of the carrying body, referred to its own centre.
-            inner: pose of the carried body before.
-            lever: reference centre of the carried body minus that of the carrying one, (dim,).
-        """
+    def rotation_rates_gradient(self, pose: np.ndarray) -> np.ndarray:
+        """∂B/∂r_a, (rotation_size, rotation_size, 1 or 3)."""
 
     def retract(self, poses: np.ndarray) -> np.ndarray:
         """``poses`` (..., pose_size) put back on the manifold of rotations, to first order unchanged."""
@@ -140,9 +134,8 @@ class PlanarSpace(RigidSpace):
     def rotation_rates(self, pose):
         return np.ones((1, 1))
 
-    def compose(self, outer, inner, lever):
-        carried = self.displace(outer, (lever + inner[:2])[None])[0] + inner[:2]
-        return np.append(carried, outer[2] + inner[2])
+    def rotation_rates_gradient(self, pose):
+        return np.zeros((1, 1, 1))
 
 
 def _quaternion_hessian() -> np.ndarray:
@@ -189,10 +182,9 @@ class SpatialSpace(RigidSpace):
         cross = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
         return 0.5 * np.vstack([-v, w * np.eye(3) - cross])
 
-    def compose(self, outer, inner, lever):
-        carried = self.displace(outer, (lever + inner[:3])[None])[0] + inner[:3]
-        (a, b), (v, w) = (outer[3], inner[3]), (outer[4:], inner[4:])
-        return self.retract(np.concatenate([carried, [a * b - v @ w], a * w + b * v + np.cross(v, w)]))
+    def rotation_rates_gradient(self, pose):
+        # linear in q
+        return np.array([self.rotation_rates(np.append(np.zeros(3), unit)) for unit in np.eye(4)])
 
     def retract(self, poses):
         poses = np.array(poses)

@@ -1,25 +1,22 @@
 """The description of a mechanism, as pure data.
 
-- ``materials``: names and laws with their numbers
 - ``shapes``: strips and their centrelines, outlines, STEP parts, meshes; interface regions, clamps
-- ``parts``: links, joints, motors, forces, outputs, and their positions
+- ``parts``: materials, links, joints, motors, forces, outputs, and their positions
 - ``mechanism``: the builder that collects parts
-- ``scene``: effects, configurations and names of units
-- ``validation``: checks of the whole
+- ``scene``: effects, configurations, names of units, and checks of the whole
 """
 
-from fenicsmech.mechanism.materials import (
-    ONYX,
-    SMOOTH_SIL_950,
-    Material,
-)
 from fenicsmech.mechanism.mechanism import Mechanism
 from fenicsmech.mechanism.parts import (
+    ONYX,
+    SMOOTH_SIL_950,
     Drive,
     FlexibleLink,
     Force,
+    ForceGroup,
     Joint,
     Link,
+    Material,
     Motor,
     Output,
     PrescribedPart,
@@ -27,11 +24,12 @@ from fenicsmech.mechanism.parts import (
     in_dimension,
     same_place,
 )
-from fenicsmech.mechanism.scene import DRAWN, Configuration, Effect, Scene, Units
+from fenicsmech.mechanism.scene import DRAWN, Configuration, Effect, Scene, Units, validate
 from fenicsmech.mechanism.shapes import (
     Arc,
     Centreline,
     Disc,
+    Face,
     Line,
     MeshPart,
     Outline,
@@ -46,7 +44,6 @@ from fenicsmech.mechanism.shapes import (
     step_file,
     strip,
 )
-from fenicsmech.mechanism.validation import validate
 
 __all__ = [
     "Arc",
@@ -56,8 +53,10 @@ __all__ = [
     "Disc",
     "Drive",
     "Effect",
+    "Face",
     "FlexibleLink",
     "Force",
+    "ForceGroup",
     "Joint",
     "PrescribedPart",
     "Line",

@@ -7,9 +7,8 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import TypeVar
 
-from fenicsmech.checks import direction as unit
-from fenicsmech.checks import finite, point, positive
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, finite, point, positive
+from fenicsmech.errors import direction as unit
 from fenicsmech.joints import (
     CYLINDRICAL,
     PLANAR_JOINT,
@@ -20,11 +19,20 @@ from fenicsmech.joints import (
     WELD,
     JointKind,
 )
-from fenicsmech.mechanism.materials import Material
-from fenicsmech.mechanism.parts import FlexibleLink, Force, Joint, Link, Motor, Output, RigidLink, in_dimension
-from fenicsmech.mechanism.shapes import Disc, Point, Rectangle, Region, Shape, Strip, end_clamp
+from fenicsmech.mechanism.parts import (
+    FlexibleLink,
+    Force,
+    Joint,
+    Link,
+    Material,
+    Motor,
+    Output,
+    RigidLink,
+    in_dimension,
+)
+from fenicsmech.mechanism.shapes import Disc, Face, Rectangle, Region, Shape, Strip, end_clamp
 
-Part = TypeVar("Part")
+Load = TypeVar("Load", Force, Output)
 AnyLink = TypeVar("AnyLink", RigidLink, FlexibleLink)
 
 _Z = (0.0, 0.0, 1.0)
@@ -83,17 +91,11 @@ class Mechanism:
             DescriptionError: ``shape`` is not a shape, ``material`` is not a material, or the name is taken.
         """
         if not isinstance(shape, Shape):
-            raise DescriptionError(
-                f"link {name!r}",
-                f"its shape is {shape!r}",
-                "Make one with strip(), polygon(), outline(), step_file() or gmsh_mesh()",
-            )
+            remedy = "Make one with strip(), polygon(), outline(), step_file() or gmsh_mesh()"
+            raise DescriptionError(f"link {name!r}", f"its shape is {shape!r}", remedy)
         if not isinstance(material, Material):
-            raise DescriptionError(
-                f"link {name!r}",
-                f"its material is {material!r}",
-                "Give a Material(name, E, ν) or one that exists, as ONYX",
-            )
+            remedy = "Give a Material(name, E, ν) or one that exists, as ONYX"
+            raise DescriptionError(f"link {name!r}", f"its material is {material!r}", remedy)
         return self._add_link(FlexibleLink(name, shape, material))
 
     def join(
@@ -140,11 +142,8 @@ class Mechanism:
         regions = tuple(region if isinstance(link, FlexibleLink) else None for link in (a, b))
         for link in (a, b):
             if isinstance(link, FlexibleLink) and region is None:
-                raise DescriptionError(
-                    part,
-                    f"no interface on flexible link {link.name!r}",
-                    "Give interface_radius=… (pin) or region=… (clamp)",
-                )
+                remedy = "Give interface_radius=… (pin) or region=… (clamp)"
+                raise DescriptionError(part, f"no interface on flexible link {link.name!r}", remedy)
         axis = unit(f"axis of {part}", axis)
         joint = Joint(kind, a, b, at, (*axis, 0.0)[:3], (regions[0], regions[1]), name)
         self.joints.append(joint)
@@ -193,9 +192,8 @@ class Mechanism:
         """
         part = f"{name or f'clamp {a.name}–{strip.name}'!r}"
         if not isinstance(strip, FlexibleLink) or not isinstance(strip.shape, Strip):
-            raise DescriptionError(
-                part, f"link {strip.name!r} is not a strip", "Use weld(…, at=…, region=Rectangle(…)) for other shapes"
-            )
+            remedy = "Use weld(…, at=…, region=Rectangle(…)) for other shapes"
+            raise DescriptionError(part, f"link {strip.name!r} is not a strip", remedy)
         at, region = end_clamp(strip.shape, end, length, part=part)
         return self.weld(a, strip, at=at, region=region, name=name)
 
@@ -211,51 +209,84 @@ class Mechanism:
         if joint not in self.joints:
             raise DescriptionError(part, f"{joint.name!r} is not a joint of {self.name!r}", "Add the joint first")
         if not joint.kind.motorised:
-            raise DescriptionError(
-                part,
-                f"a {joint.kind.name} joint takes no motor",
-                "Use a joint with one free coordinate, as a revolute or a prismatic one",
-            )
+            remedy = "Use a joint with one free coordinate, as a revolute or a prismatic one"
+            raise DescriptionError(part, f"a {joint.kind.name} joint takes no motor", remedy)
         if joint in {motor.joint for motor in self.motors}:
             raise DescriptionError(part, f"{joint.name!r} has a motor already", "Give each joint one motor")
         motor = Motor(joint, name)
         self.motors.append(motor)
         return motor
 
-    def force(self, *, on: Link, at: Sequence[float], direction: Sequence[float], name: str | None = None) -> Force:
-        """Adds a dead force along ``direction`` at the material point ``at`` of link ``on``."""
-        return self._add(Force(*self._at_point("force", self.forces, on, at, direction, name)), self.forces)
+    def force(
+        self,
+        *,
+        on: Link,
+        at: Sequence[float],
+        direction: Sequence[float],
+        region: Region | Face | None = None,
+        name: str | None = None,
+    ) -> Force:
+        """Adds a dead force along ``direction`` at the material point ``at``, or on a region, of link ``on``.
 
-    def output(self, *, on: Link, at: Sequence[float], direction: Sequence[float], name: str | None = None) -> Output:
-        """Adds an output: the displacement along ``direction`` of the material point ``at`` of link ``on``."""
-        return self._add(Output(*self._at_point("output", self.outputs, on, at, direction, name)), self.outputs)
+        Its displacement is that of the point, or the average over the region, on which it does work. As elements
+        shrink, the displacement under a force at a point of a flexible link grows without limit: give a region where
+        the displacement near the force matters.
+
+        Args:
+            on: the link.
+            at: a drawn point of the link, 2 or 3 coordinates.
+            direction: 2 or 3 coordinates, of any length.
+            region: of a flexible link, over whose drawn area or volume the force is spread evenly: ``Disc`` or
+                ``Rectangle`` about the point, through the depth of the link, or ``Face``. It moves with the link; where
+                its shape is designed, each part of the region keeps its share of the force. In half models it stands
+                for both halves.
+            name: for messages; unique.
+
+        Raises:
+            DescriptionError: the link is not in the mechanism, a number makes no sense, the region is none or is one of
+                a rigid link, or the name is taken. Later, when the link is meshed: the region holds none of it.
+        """
+        return self._add_at_point(Force, self.forces, on, at, direction, region, name)
+
+    def output(
+        self,
+        *,
+        on: Link,
+        at: Sequence[float],
+        direction: Sequence[float],
+        region: Region | Face | None = None,
+        name: str | None = None,
+    ) -> Output:
+        """Adds an output: the displacement along ``direction`` of a point, or the average over a region, of ``on``.
+
+        Arguments and errors as those of ``force``.
+        """
+        return self._add_at_point(Output, self.outputs, on, at, direction, region, name)
 
     def _counts(self) -> list[str]:
-        """Number of parts of each sort, in words."""
         sorts = [*("rigid link" if isinstance(link, RigidLink) else "flexible link" for link in self.links)]
         sorts += [f"{joint.kind.name} joint" for joint in self.joints]
         sorts += ["motor"] * len(self.motors) + ["force"] * len(self.forces) + ["output"] * len(self.outputs)
         return [f"{count} {sort}{'s' if count > 1 else ''}" for sort, count in Counter(sorts).items()]
 
-    def _at_point(
+    def _add_at_point(
         self,
-        what: str,
-        taken: Sequence[Force] | Sequence[Output],
+        sort: type[Load],
+        taken: list[Load],
         on: Link,
         at: Sequence[float],
         direction: Sequence[float],
+        region: Region | Face | None,
         name: str | None,
-    ) -> tuple[Link, Point, Point, str]:
-        """The checked attributes of a new force or output."""
+    ) -> Load:
+        what = sort.__name__.lower()
         self._check_member(f"{name or what!r}", on)
         name = name or f"{what} on {on.name}"
         self._check_name(f"{name!r}", name, taken)
-        return on, point(f"position of {name!r}", at), unit(f"direction of {name!r}", direction), name
-
-    @staticmethod
-    def _add(part: Part, parts: list[Part]) -> Part:
-        parts.append(part)
-        return part
+        region = _load_region(f"{name!r}", on, region)
+        load = sort(on, point(f"position of {name!r}", at), unit(f"direction of {name!r}", direction), name, region)
+        taken.append(load)
+        return load
 
     def _add_link(self, link: AnyLink) -> AnyLink:
         self._check_name(f"link {link.name!r}", link.name, self.links)
@@ -273,18 +304,35 @@ class Mechanism:
 
 
 def _interface(part: str, radius: float | None, region: Region | None) -> Region | None:
-    """The interface region given as a radius or as a region, checked."""
     if radius is not None and region is not None:
         raise DescriptionError(part, "both an interface radius and a region are given", "Give one of the two")
-    match region if radius is None else Disc(radius):
-        case None:
-            return None
+    if radius is None and region is None:
+        return None
+    return _plane_region(part, "interface", region if radius is None else Disc(radius))
+
+
+def _plane_region(part: str, sort: str, region: object) -> Region:
+    match region:
         case Disc(radius=value):
             return Disc(positive(f"radius of {part}", value))
         case Rectangle(length=length, width=width, angle=angle):
+            of = f"of the {sort} of {part}"
             return Rectangle(
-                positive(f"length of the interface of {part}", length),
-                positive(f"width of the interface of {part}", width),
-                finite(f"angle of the interface of {part}", angle),
+                positive(f"length {of}", length), positive(f"width {of}", width), finite(f"angle {of}", angle)
             )
-    raise DescriptionError(part, f"{region!r} is not an interface region", "Give region=Disc(…) or region=Rectangle(…)")
+    raise DescriptionError(part, f"{region!r} is not its {sort}", "Give Disc(…) or Rectangle(…)")
+
+
+def _load_region(part: str, on: Link, region: object) -> Region | Face | None:
+    if region is None:
+        return None
+    if not isinstance(on, FlexibleLink):
+        problem = f"link {on.name!r} is rigid, on which forces on a region act like their resultant"
+        raise DescriptionError(part, problem, "Leave out region, and give the point that the resultant acts at")
+    if isinstance(region, Face):
+        within = region.within
+        return region if within is None else Face(_plane_region(part, "region", within))
+    if not isinstance(region, Disc | Rectangle):
+        remedy = "Give region=Disc(…), Rectangle(…) or Face(…)"
+        raise DescriptionError(part, f"its region is {region!r}", remedy)
+    return _plane_region(part, "region", region)

@@ -1,4 +1,4 @@
-"""Parts of a mechanism as plain data: links, joints, motors, forces and output points, and their positions."""
+"""Parts of a mechanism as plain data: materials, links, joints, motors, forces, output points, and their positions."""
 
 from __future__ import annotations
 
@@ -6,11 +6,62 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from fenicsmech.checks import finite, point_text
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, finite, point_text, positive, set_fields
 from fenicsmech.joints import JointKind
-from fenicsmech.mechanism.materials import Material
-from fenicsmech.mechanism.shapes import Point, Region, Shape
+from fenicsmech.laws import Law, NeoHookean
+from fenicsmech.mechanism.shapes import Face, Point, Region, Shape
+
+
+@dataclass(frozen=True, init=False)
+class Material:
+    """A hyperelastic material: ``Material("PLA", 2000.0, 0.35)`` or ``Material("rubber", law=Yeoh(…))``.
+
+    Args:
+        name: for messages.
+        E, nu: Young's modulus (force per area) and Poisson's ratio of the law ``NeoHookean(E, nu)``.
+        law: any law, instead of E and nu.
+        density: mass per volume, for its weight; with forces in N and lengths in mm in t/mm³ (water: 1e-9).
+
+    Raises:
+        DescriptionError: E ≤ 0, ν outside (−1, 0.5), the density not positive, or not numbers; a law and numbers are
+            given, or neither.
+    """
+
+    name: str
+    law: Law
+    density: float | None
+
+    def __init__(
+        self,
+        name: str,
+        E: float | None = None,
+        nu: float | None = None,
+        *,
+        law: Law | None = None,
+        density: float | None = None,
+    ) -> None:
+        part = f"material {name!r}"
+        if law is None:
+            try:
+                law = NeoHookean(E, nu)  # type: ignore[arg-type]  # which refuses None
+            except DescriptionError as error:
+                raise DescriptionError(f"{error.part} of {part}", error.problem, error.remedy) from None
+        elif E is not None or nu is not None:
+            raise DescriptionError(
+                part, "both a law and numbers are given", f"Give the numbers to the law, {type(law).__name__}(…)"
+            )
+        if not isinstance(law, Law):
+            raise DescriptionError(part, f"its law is {law!r}", "Give a law with its numbers, as NeoHookean(E, nu)")
+        if density is not None:
+            density = positive(f"density of {part}", density)
+        set_fields(self, name=name, law=law, density=density)
+
+
+ONYX = Material("Onyx", 1770.0, 0.42, density=1.2e-9)
+"""Carbon-filled nylon, MPa and t/mm³; modulus fitted by the authors of the method (section VII-B)."""
+
+SMOOTH_SIL_950 = Material("Smooth-Sil 950", 1.90, 0.475, density=1.24e-9)
+"""Platinum-cure silicone, MPa and t/mm³; elastic constants used by the authors of the method (section VII-B)."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +101,8 @@ class Joint:
 
     Attributes:
         kind: its constraint equations.
-        a, b: the links; motions are counted of b relative to a.
+        a: one link.
+        b: the other; motions are counted of b relative to a.
         at: its drawn position (2 or 3 coordinates).
         axis: unit vector of its axis, 3 coordinates (revolute: z by default).
         regions: interface region on a and on b; None on rigid links.
@@ -79,6 +131,16 @@ class Motor:
     def __repr__(self) -> str:
         return f"Motor({self.name!r} on {self.joint.name!r})"
 
+    @property
+    def sliding(self) -> bool:
+        """Whether it slides."""
+        return self.joint.kind.sliding
+
+    @property
+    def ratios(self) -> tuple[tuple[Motor, float], ...]:
+        """As of a ``Drive`` of this motor alone."""
+        return ((self, 1.0),)
+
 
 @dataclass(frozen=True)
 class Drive:
@@ -101,9 +163,9 @@ class Drive:
         checked = tuple((motor, finite(f"ratio of a motor of {part}", ratio)) for motor, ratio in pairs)
         if not checked or not all(isinstance(motor, Motor) and ratio for motor, ratio in checked):
             raise DescriptionError(part, f"its ratios are {given!r}", "Give motors with ratios other than zero")
-        if len({motor.joint.kind.sliding for motor, _ in checked}) > 1:
-            raise DescriptionError(part, "some of its motors turn and others slide", "Give motors of one sort")
-        object.__setattr__(self, "ratios", checked)
+        if len({motor.sliding for motor, _ in checked}) > 1:
+            raise DescriptionError(part, "some of its motors turn and others slide", "Give motors of one kind")
+        set_fields(self, ratios=checked)
 
     def __repr__(self) -> str:
         return f"Drive({self.name!r}: {', '.join(f'{ratio:g} × {motor.name!r}' for motor, ratio in self.ratios)})"
@@ -111,32 +173,66 @@ class Drive:
     @property
     def sliding(self) -> bool:
         """Whether its motors slide."""
-        return self.ratios[0][0].joint.kind.sliding
+        return self.ratios[0][0].sliding
 
 
 @dataclass(frozen=True)
 class _AtPoint:
-    """A direction at a material point of a link."""
+    """A direction at a material point of a link, or on a ``region`` of a flexible link about or through this point."""
 
     on: Link
     at: Point
     direction: Point
     name: str
+    region: Region | Face | None = None
 
     def __repr__(self) -> str:
         sort, at, direction = type(self).__name__, point_text(self.at), point_text(self.direction)
-        return f"{sort}({self.name!r} on {self.on.name!r} at {at} along {direction})"
+        region = "" if self.region is None else f" over {self.region}"
+        return f"{sort}({self.name!r} on {self.on.name!r} at {at}{region} along {direction})"
 
 
 class Force(_AtPoint):
-    """A dead force along ``direction`` (unit vector) at the material point ``at`` of link ``on``."""
+    """A dead force along ``direction`` (unit vector) at the material point ``at``, or on a region, of link ``on``."""
+
+    @property
+    def ratios(self) -> tuple[tuple[Force, float], ...]:
+        """As of a ``ForceGroup`` of this force alone."""
+        return ((self, 1.0),)
 
 
 class Output(_AtPoint):
-    """The displacement of the material point ``at`` of link ``on`` along ``direction`` (unit vector)."""
+    """The displacement along ``direction`` (unit vector) of the point ``at``, or average over a region, of ``on``."""
 
 
-PrescribedPart = Force | Motor | Drive
+@dataclass(frozen=True)
+class ForceGroup:
+    """Forces that grow together: at its magnitude f each has ratio · f.
+
+    Attributes:
+        name: for messages, plots and tables.
+        ratios: (force, ratio) pairs, or a mapping.
+
+    Raises:
+        DescriptionError: a part is not a force, or a ratio is not a number.
+    """
+
+    name: str
+    ratios: tuple[tuple[Force, float], ...]
+
+    def __post_init__(self) -> None:
+        part, given = f"forces {self.name!r}", self.ratios
+        pairs = tuple(given.items()) if isinstance(given, Mapping) else tuple(given)
+        if not all(isinstance(force, Force) for force, _ in pairs):
+            raise DescriptionError(part, f"its ratios are {given!r}", "Give forces with their ratios")
+        checked = tuple((force, finite(f"ratio of {force.name!r} in {part}", ratio)) for force, ratio in pairs)
+        object.__setattr__(self, "ratios", checked)
+
+    def __repr__(self) -> str:
+        return f"ForceGroup({self.name!r}: {', '.join(f'{ratio:g} × {force.name!r}' for force, ratio in self.ratios)})"
+
+
+PrescribedPart = Force | ForceGroup | Motor | Drive
 """A part whose value is prescribed along an equilibrium path."""
 
 

@@ -1,4 +1,4 @@
-"""The scene of a mechanism: the effects simulated, its configurations, and names of units.
+"""The scene of a mechanism: the effects simulated, its configurations, names of units, and the checks of the whole.
 
 Effects add to the potential energy
 
@@ -14,10 +14,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 
-from fenicsmech.checks import finite
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, finite, set_fields
 from fenicsmech.mechanism.mechanism import Mechanism
-from fenicsmech.mechanism.parts import Joint, Link, Motor
+from fenicsmech.mechanism.parts import FlexibleLink, Joint, Link, Motor, RigidLink, same_place
+from fenicsmech.mechanism.shapes import Region
 
 
 @dataclass(frozen=True)
@@ -47,11 +47,8 @@ class Effect(ABC):
             part = getattr(self, field.name)
             if isinstance(part, Link | Joint) and part not in (*mechanism.links, *mechanism.joints):
                 kind = "joint" if isinstance(part, Joint) else "link"
-                raise DescriptionError(
-                    f"effect {type(self).__name__}",
-                    f"{part.name!r} is not a {kind} of {mechanism.name!r}",
-                    f"Name a {kind} of the mechanism",
-                )
+                problem = f"{part.name!r} is not a {kind} of {mechanism.name!r}"
+                raise DescriptionError(f"effect {type(self).__name__}", problem, f"Name a {kind} of the mechanism")
 
     def link_energy(self, fields):
         """A potential energy of flexible links in UFL, a form in the ``LinkFields``; None if no link is concerned."""
@@ -103,7 +100,7 @@ class Configuration:
             (motor, finite(f"position of motor {motor.name!r} in configuration {self.name!r}", value))
             for motor, value in self.positions
         )
-        object.__setattr__(self, "positions", tuple(checked))
+        set_fields(self, positions=tuple(checked))
 
     def __repr__(self) -> str:
         positions = ", ".join(f"{motor.name!r} at {position:g}" for motor, position in self.positions)
@@ -131,7 +128,7 @@ class Scene:
     units: Units = Units()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "effects", tuple(self.effects))
+        set_fields(self, effects=tuple(self.effects))
         if not isinstance(self.mechanism, Mechanism):
             raise DescriptionError("scene", f"{self.mechanism!r} is not a mechanism", "Pass a Mechanism")
         for effect in self.effects:
@@ -150,9 +147,83 @@ class Scene:
         """
         for motor in positions:
             if motor not in self.mechanism.motors:
-                raise DescriptionError(
-                    f"configuration {name!r}",
-                    f"{motor.name!r} is not a motor of {self.mechanism.name!r}",
-                    "Add it with motor(), and name motors, not joints",
-                )
+                problem = f"{motor.name!r} is not a motor of {self.mechanism.name!r}"
+                remedy = "Add it with motor(), and name motors, not joints"
+                raise DescriptionError(f"configuration {name!r}", problem, remedy)
         return Configuration(name, tuple(positions.items()))
+
+
+def validate(mechanism: Mechanism, dim: int) -> None:
+    """Checks that ``mechanism`` can be simulated in ``dim`` dimensions.
+
+    Raises:
+        DescriptionError: no ground, an unconnected link, no load path to ground, a force on a fixed link, a joint
+            or direction that does not exist in the plane, two interfaces of different shape at one place of a link.
+    """
+    _check_ground(mechanism)
+    _check_forces(mechanism)
+    _check_interfaces(mechanism, dim)
+    if dim == 2:
+        _check_planar(mechanism)
+
+
+def _check_ground(mechanism: Mechanism) -> None:
+    part = f"mechanism {mechanism.name!r}"
+    if not mechanism.links:
+        raise DescriptionError(part, "it has no links", "Add links with rigid() and flexible()")
+    grounded: set[Link] = {link for link in mechanism.rigid_links if link.fixed}
+    if not grounded:
+        remedy = "Make one rigid link the ground: rigid(name, fixed=True)"
+        raise DescriptionError(part, "no link is fixed, so no load has a path to ground", remedy)
+    pairs = [{joint.a, joint.b} for joint in mechanism.joints]
+    for link in mechanism.links:
+        if link not in grounded.union(*pairs):
+            problem = "it is not connected: no joint holds it"
+            raise DescriptionError(f"link {link.name!r}", problem, "Join it to another link or remove it")
+    while reached := [pair for pair in pairs if pair & grounded and pair - grounded]:
+        grounded = grounded.union(*reached)
+    if apart := [link.name for link in mechanism.links if link not in grounded]:
+        problem = f"no load path to ground: no joint connects {', '.join(map(repr, apart))} with a fixed link"
+        raise DescriptionError(f"link {apart[0]!r}", problem, "Join one of them to a fixed link")
+
+
+def _check_forces(mechanism: Mechanism) -> None:
+    for force in mechanism.forces:
+        if isinstance(force.on, RigidLink) and force.on.fixed:
+            problem = f"it acts on the fixed link {force.on.name!r}"
+            raise DescriptionError(f"force {force.name!r}", problem, "Give a link that moves")
+
+
+def _check_interfaces(mechanism: Mechanism, dim: int) -> None:
+    found: list[tuple[FlexibleLink, Joint, Region]] = []
+    for joint in mechanism.joints:
+        for link, region in zip((joint.a, joint.b), joint.regions, strict=True):
+            if not isinstance(link, FlexibleLink) or region is None:
+                continue
+            for owner, first, known in found:
+                same = owner == link and same_place(first.at, joint.at, dim=dim, length=mechanism.length)
+                if same and known != region:
+                    problem = (
+                        f"its interface on {link.name!r} is {region}, but {first.name!r} has {known} at the same place"
+                    )
+                    remedy = "Give joints at one place of a link the same interface radius or region"
+                    raise DescriptionError(f"{joint.name!r}", problem, remedy)
+            found.append((link, joint, region))
+
+
+def _check_planar(mechanism: Mechanism) -> None:
+    for joint in mechanism.joints:
+        part = f"{joint.name!r}"
+        if not joint.kind.planar:
+            problem = f"a {joint.kind.name} joint does not exist in a planar model"
+            raise DescriptionError(part, problem, "Use space='3d' or a planar joint")
+        axis, out_of_plane = f"its axis {joint.axis}", abs(joint.axis[2])
+        if joint.kind.axis_in_plane and out_of_plane > 1e-12:
+            raise DescriptionError(part, f"{axis} leaves the plane", "Give an axis (x, y) or use space='3d'")
+        if not joint.kind.axis_in_plane and out_of_plane < 1.0 - 1e-12:
+            remedy = "Leave it at (0, 0, 1) or use space='3d'"
+            raise DescriptionError(part, f"{axis} is not normal to the plane", remedy)
+    for load in (*mechanism.forces, *mechanism.outputs):
+        if len(load.direction) == 3 and abs(load.direction[2]) > 1e-12:
+            problem = f"its direction {load.direction} leaves the plane"
+            raise DescriptionError(f"{load.name!r}", problem, "Give (x, y) or use space='3d'")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
@@ -13,22 +13,21 @@ from scipy.integrate import fixed_quad
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from fenicsmech.checks import finite, point, point_text, points, positive
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, finite, point, point_text, points, positive
 
 Point = tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class Disc:
-    """Interface region of a pin: all points within ``radius`` of the joint's axis."""
+    """All points within ``radius`` of an axis along z: interface region of a pin, or region that a force acts on."""
 
     radius: float
 
 
 @dataclass(frozen=True)
 class Rectangle:
-    """Interface region of a clamp: a rectangle centred on the joint.
+    """A rectangle centred on a joint or a force: interface region of a clamp, or region that a force acts on.
 
     ``length`` runs along the direction at ``angle`` (rad) from x, ``width`` across it. At the end of a strip
     ``Mechanism.clamp`` finds position, angle and width.
@@ -40,6 +39,28 @@ class Rectangle:
 
 
 Region = Disc | Rectangle
+
+
+@dataclass(frozen=True)
+class Face:
+    """Part of the boundary of a flexible link, an edge in plane models, that a force acts on.
+
+    Attributes:
+        within: the part of the flat face through the force's point within a disc or rectangle about that point, through
+            the depth of the link; None for the whole flat face.
+        where: instead of the flat face, which may be curved then: predicate of points on the drawn boundary,
+            (n, dim) → (n,) bool; a facet belongs to the part if it holds at all its corners.
+
+    Raises:
+        DescriptionError: both are given.
+    """
+
+    within: Region | None = None
+    where: Callable[[np.ndarray], np.ndarray] | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        if self.within is not None and self.where is not None:
+            raise DescriptionError("face", "within and where are both given", "Give one of the two")
 
 
 @dataclass(frozen=True)
@@ -147,14 +168,10 @@ class Centreline:
     line, three the parabola.
 
     Args:
-        points: (n, dim) with n ≥ 2; neighbours must differ.
-        part: the owner of the curve, for messages.
+        points: (n, dim) with n ≥ 2; neighbours must differ, else a DescriptionError names ``part``.
 
     Attributes:
         knots: parameters s_k of the points, shape (n,).
-
-    Raises:
-        DescriptionError: two neighbouring points coincide.
     """
 
     def __init__(self, points: Sequence[Sequence[float]], *, part: str = "centreline") -> None:
@@ -162,9 +179,8 @@ class Centreline:
         chords = np.linalg.norm(np.diff(through, axis=0), axis=1)
         if not np.all(chords > 0.0):
             k = int(np.argmin(chords))
-            raise DescriptionError(
-                part, f"points {k} and {k + 1} coincide at {point_text(through[k])}", "Remove one of them"
-            )
+            problem = f"points {k} and {k + 1} coincide at {point_text(through[k])}"
+            raise DescriptionError(part, problem, "Remove one of them")
         self.knots = np.concatenate([[0.0], np.cumsum(chords)])
         self._curve = CubicSpline(self.knots, through, bc_type="not-a-knot")
 
@@ -232,31 +248,18 @@ def end_clamp(shape: Strip, end: str, length: float, *, part: str = "clamp") -> 
     """The place of a clamp at an end of a strip, and the region that it holds: the strip up to its inner face.
 
     The inner face is normal to the centreline at the arc length ``length`` from the end. The rectangle is centred on
-    the end, aligned with the strip at the inner face, and wider than the strip.
-
-    Args:
-        shape: the strip.
-        end: "start" or "end" of its centreline.
-        length: of the clamped piece, along the centreline.
-        part: the clamp's name, for messages.
-
-    Raises:
-        DescriptionError: an argument is out of its range, or the strip bends so much that no rectangle holds the
-            piece and nothing else.
+    the end, aligned with the strip at the inner face, and wider than the strip. It is refused where the strip bends so
+    much that no rectangle holds the piece and nothing else.
     """
     curve = Centreline(shape.centreline, part=f"centreline of {part}")
     if end not in ("start", "end"):
         raise DescriptionError(part, f"the end of the strip is {end!r}", "Give end='start' or end='end'")
     length = positive(f"length of {part}", length)
     if length >= curve.length:
-        raise DescriptionError(
-            part, f"its length {length:g} is not less than that of the strip, {curve.length:g}", "Give a shorter one"
-        )
-    last, inner, beyond, inward = (
-        (0.0, curve.parameter_at(length), curve.end, 1.0)
-        if end == "start"
-        else (curve.end, curve.parameter_at(curve.length - length), 0.0, -1.0)
-    )
+        problem = f"its length {length:g} is not less than that of the strip, {curve.length:g}"
+        raise DescriptionError(part, problem, "Give a shorter one")
+    last, beyond, inward = (0.0, curve.end, 1.0) if end == "start" else (curve.end, 0.0, -1.0)
+    inner = curve.parameter_at(length if end == "start" else curve.length - length)
     centre, direction = curve.evaluate(last), curve.tangent(inner)
     normal = np.array([-direction[1], direction[0]])
 
@@ -274,8 +277,7 @@ def end_clamp(shape: Strip, end: str, length: float, *, part: str = "clamp") -> 
     holds_all = reach > 0.0 and np.all(np.abs(along) <= reach + slack)
     along, across = sides(inner, beyond)
     if not holds_all or np.any((np.abs(along) < reach - slack) & (np.abs(across) <= half_width)):
-        raise DescriptionError(
-            part, f"the strip bends too much for a clamp of the length {length:g}", "Make the clamp shorter"
-        )
+        problem = f"the strip bends too much for a clamp of length {length:g}"
+        raise DescriptionError(part, problem, "Make the clamp shorter")
     angle = float(np.arctan2(direction[1], direction[0]))
     return tuple(centre.tolist()), Rectangle(2.0 * reach, 2.0 * half_width, angle)

@@ -13,36 +13,36 @@ Geometry that other layers use too
     ``boundary_loops``  outline and holes of a plane mesh
     ``plan_of``         the plane mesh that an extruded one repeats
 
-Each kind of link has its file: ``strip``, ``outline`` (with ``plane_curves``) and ``part_files``. It implements the
-functions of ``request``, which ``link_mesher`` calls before it checks what every mesh must satisfy. Links that are the
-same all through their depth are drawn in the plane, cut by their interfaces (``cutting``) and extruded (``planar``).
-Only ``gmsh_session`` starts gmsh; only ``distribute`` makes dolfinx meshes, over parallel ranks.
+Each kind of link has its file: ``strip``, ``outline`` and ``part_files``. It registers the functions with which
+``link_mesher`` checks and meshes it. Links that are the same all through their depth are drawn in the plane, cut by
+their interfaces (``cutting``) and extruded. Only ``session`` starts gmsh; ``link_mesh`` holds the arrays
+and makes dolfinx meshes of them, over parallel ranks.
 """
 
 from fenicsmech.meshing import outline, part_files, strip  # noqa: F401  (each registers its shapes)
 from fenicsmech.meshing.cutting import circle_segments
-from fenicsmech.meshing.distribute import MechanismMesh, bulge_field, distribute, on_mid_plane
-from fenicsmech.meshing.gmsh_session import gmsh, gmsh_session, muted_output
 from fenicsmech.meshing.link_mesh import (
     FREE,
     CurvedEdges,
     LinkMesh,
+    MechanismMesh,
     boundary_loops,
+    boundary_polygons,
+    bulge_field,
     cell_measures,
     count_pieces,
+    distribute,
+    edge_corners,
+    extrude,
+    least_stretches,
+    node_ends,
+    on_mid_plane,
+    plan_of,
     radius_ratios,
 )
-from fenicsmech.meshing.link_mesher import check_link, mesh_link, typical_thickness
-from fenicsmech.meshing.planar import extrude, extrude_half, layer_count, plan_of
-from fenicsmech.meshing.plane_curves import (
-    CircleArc,
-    Curve,
-    draw_loop,
-    sampled,
-    start_of,
-    straight_line,
-)
-from fenicsmech.meshing.request import LEAST_SEGMENTS, InterfaceSite
+from fenicsmech.meshing.link_mesher import LEAST_SEGMENTS, InterfaceSite, check_link, mesh_link, typical_thickness
+from fenicsmech.meshing.outline import CircleArc, Curve, draw_loop, sampled, start_of, straight_line
+from fenicsmech.meshing.session import gmsh, gmsh_session, muted_output
 
 __all__ = [
     "CircleArc",
@@ -54,6 +54,7 @@ __all__ = [
     "LinkMesh",
     "MechanismMesh",
     "boundary_loops",
+    "boundary_polygons",
     "bulge_field",
     "cell_measures",
     "check_link",
@@ -61,13 +62,14 @@ __all__ = [
     "count_pieces",
     "distribute",
     "draw_loop",
+    "edge_corners",
     "extrude",
-    "extrude_half",
     "gmsh",
     "gmsh_session",
-    "layer_count",
+    "least_stretches",
     "mesh_link",
     "muted_output",
+    "node_ends",
     "on_mid_plane",
     "plan_of",
     "radius_ratios",

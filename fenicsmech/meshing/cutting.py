@@ -2,20 +2,26 @@
 
 The element size is the requested one, finer only where small features need it: around pins, for enough segments of
 the circle, and in narrow gaps.
+
+Links that are the same all through their depth are drawn, cut and meshed in the plane, then extruded. CAD kernels
+compare lengths with absolute tolerances, so a link in metres would not be meshed like the same link in millimetres.
+Their shapes are therefore built in units of the element size, rounded to 1e-10 of it: descriptions that differ by their
+unit only give the same numbers, and the same mesh but for rounding.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from fenicsmech.mechanism import Disc
-from fenicsmech.meshing.gmsh_session import gmsh
-from fenicsmech.meshing.link_mesh import CurvedEdges, LinkMesh
-from fenicsmech.meshing.request import LEAST_SEGMENTS, InterfaceSite, MeshRequest
+from fenicsmech.meshing.link_mesh import FREE, CurvedEdges, LinkMesh, extrude
+from fenicsmech.meshing.link_mesher import LEAST_SEGMENTS, InterfaceSite, MeshRequest
+from fenicsmech.meshing.session import gmsh, gmsh_session
 
 DimTag = tuple[int, int]
 
@@ -44,16 +50,11 @@ def circle_segments(radius: float, size: float) -> int:
 
 
 def gap_refinement(at: Sequence[float], gap: float, radius: float, widening: Sequence[Iterable[float]]) -> str:
-    """Element size, as a gmsh expression, in the narrow gap around a disc. Lengths are in element sizes.
+    """Element size, as a gmsh expression, in the narrow ``gap`` around a disc. Lengths are in element sizes.
 
-    Where the gap widens along straight sides, it has grown to gap + a²/(2 radius) at the distance a; the element
-    size follows it, down to a least size, and grows with the distance from the gap.
-
-    Args:
-        at: centre of the disc.
-        gap: width of the gap where it is narrowest.
-        radius: radius of the disc.
-        widening: unit vectors along which the gap widens; none if it goes evenly all around.
+    Where the gap widens along straight sides, it has grown to gap + a²/(2 radius) at the distance a along the unit
+    vectors ``widening`` (none if it goes evenly all around); the element size follows it, down to a least size, and
+    grows with the distance from the gap.
     """
     dx, dy = (f"({name} - ({float(c)!r}))" for name, c in zip("xy", at, strict=True))
     widened = "".join(
@@ -66,12 +67,9 @@ def gap_refinement(at: Sequence[float], gap: float, radius: float, widening: Seq
 
 
 def region_face(site: InterfaceSite, *, corners: Sequence[float] = (0.0,), height: float = 0.0) -> DimTag:
-    """The site's region as a face of the plane z = ``height`` in the current gmsh model.
+    """The region of a site with its axis along z, as a face of the plane z = ``height`` in the current gmsh model.
 
-    Args:
-        site: the site; its axis must be along z.
-        corners: angles (rad) from x at which the outline of a disc has vertices.
-        height: z of the face.
+    The outline of a disc has vertices at the angles (rad) ``corners`` from x.
     """
     occ, region = gmsh.model.occ, site.region
     if isinstance(region, Disc):
@@ -120,16 +118,10 @@ def mesh_fragments(
 
     Args:
         bodies: faces or solids of the link.
-        cutters: one face or solid per site of the request; only what lies in the link counts.
-        size: element size, in the model's unit of length.
-        sites: whose pins refine the mesh, in the model's unit of length.
+        cutters: one face or solid per site of the request, which may overlap outside the link only.
+        size: element size; lengths are in the model's unit.
+        sites: whose pins refine the mesh.
         refinements: further, smaller element sizes, as gmsh expressions.
-
-    Returns:
-        The mesh in the model's coordinates; ``interface`` counts the cutters.
-
-    Raises:
-        MeshingError: two cutters overlap in the link.
     """
     occ = gmsh.model.occ
     pieces, origins = occ.fragment(bodies, cutters) if cutters else (bodies, [[body] for body in bodies])
@@ -138,41 +130,34 @@ def mesh_fragments(
     # parts of cutters outside the link go, with their boundaries; recursion spares entities of the link
     occ.remove(sorted(set(pieces) - set(link)), recursive=True)
     occ.synchronize()
-    holders = [request.holder([k for k, origin in enumerate(held) if piece in origin]) for piece in link]
-    _set_element_size(size, [*refinements, *_pin_refinements(sites, size, request.segments)])
-    dim = bodies[0][0]
-    gmsh.model.mesh.generate(dim)
-    gmsh.model.mesh.setOrder(2)  # puts the middles of edges on the curves and surfaces they belong to
-    return _collect(dim, link, holders)
-
-
-def _set_element_size(size: float, refinements: Sequence[str]) -> None:
-    """Makes the smallest of ``size`` and ``refinements`` the element size of the current gmsh model."""
-    field = gmsh.model.mesh.field
+    holders = [[k for k, origin in enumerate(held) if piece in origin] for piece in link]
+    if double := [numbers for numbers in holders if len(numbers) > 1]:
+        raise request.overlap(*double[0][:2])
+    refinements = [*refinements, *_pin_refinements(sites, size, request.segments)]
+    field, dim = gmsh.model.mesh.field, bodies[0][0]
     tag = field.add("MathEval")
     field.setString(tag, "F", f"min({', '.join([repr(float(size)), *refinements])})" if refinements else repr(size))
     field.setAsBackgroundMesh(tag)
     gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+    gmsh.model.mesh.generate(dim)
+    gmsh.model.mesh.setOrder(2)  # puts the middles of edges on the curves and surfaces they belong to
+    return _collect(dim, link, [numbers[0] if numbers else FREE for numbers in holders])
 
 
 def _pin_refinements(sites: Sequence[InterfaceSite], size: float, segments: int) -> list[str]:
     """Element sizes, as gmsh expressions, that give pins at least ``segments`` segments."""
     expressions = []
     for site in sites:
-        if isinstance(site.region, Disc) and (longest := 2.0 * math.pi * site.region.radius / segments) < size:
-            distance = _distance_from_axis(site)
-            # just below the longest segment, whose number gmsh rounds
-            fine = 0.999 * longest
-            expressions.append(f"{fine!r} + {GRADING.growth} * max(0, {distance} - {site.region.radius!r})")
+        if not isinstance(site.region, Disc) or (longest := 2.0 * math.pi * site.region.radius / segments) >= size:
+            continue
+        squares = []
+        for row in site.frame[:2]:
+            terms = zip(row, "xyz", site.centre, strict=True)
+            squares.append("(" + " + ".join(f"({float(c)!r}) * ({x} - ({float(o)!r}))" for c, x, o in terms) + ")^2")
+        away = f"max(0, sqrt({' + '.join(squares)}) - {site.region.radius!r})"
+        # just below the longest segment, whose number gmsh rounds
+        expressions.append(f"{0.999 * longest!r} + {GRADING.growth} * {away}")
     return expressions
-
-
-def _distance_from_axis(site: InterfaceSite) -> str:
-    squares = []
-    for row in site.frame[:2]:
-        terms = zip(row, "xyz", site.centre, strict=True)
-        squares.append("(" + " + ".join(f"({float(c)!r}) * ({x} - ({float(o)!r}))" for c, x, o in terms) + ")^2")
-    return f"sqrt({' + '.join(squares)})"
 
 
 def _collect(dim: int, link: Sequence[DimTag], holders: Sequence[int]) -> LinkMesh:
@@ -197,3 +182,61 @@ def mesh_nodes() -> tuple[np.ndarray, np.ndarray]:
     row_of = np.zeros(int(tags.max()) + 1, dtype=np.int64)
     row_of[tags.astype(np.int64)] = np.arange(len(tags))
     return coordinates.reshape(-1, 3), row_of
+
+
+def in_units_of(described: Any, unit: float) -> Any:
+    """``described`` (a length, a point, a region, a site or a shape) with its lengths divided by ``unit``."""
+    if is_dataclass(described) and not isinstance(described, type):
+        lengths = [field.name for field in fields(described) if field.name not in ("angle", "axis", "name")]
+        return replace(described, **{name: in_units_of(getattr(described, name), unit) for name in lengths})
+    if isinstance(described, tuple):
+        return tuple(in_units_of(item, unit) for item in described)
+    return round(described / unit, 10)
+
+
+@dataclass(frozen=True)
+class PlaneDrawing:
+    """The plan of a link as faces of the plane z = 0 in the current gmsh model, in units of the element size.
+
+    Attributes:
+        faces: that make up the link.
+        sites: the sites, with the regions to be cut.
+        corners: for each site the angles (rad) at which the outline of its disc has vertices.
+        refinements: element sizes for small features, as gmsh expressions.
+    """
+
+    faces: list[DimTag]
+    sites: tuple[InterfaceSite, ...]
+    corners: tuple[tuple[float, ...], ...]
+    refinements: tuple[str, ...] = ()
+
+
+def mesh_planar(
+    request: MeshRequest, depth: float, draw: Callable[[tuple[InterfaceSite, ...]], PlaneDrawing]
+) -> LinkMesh:
+    """Meshes a link of constant section: as a solid where a joint's axis is not along z, else in the plane.
+
+    Args:
+        request: the mesh wanted.
+        depth: extent along z, symmetric about z = 0.
+        draw: draws the link in the current gmsh model in units of the element size, given the sites in these units.
+    """
+    occ = gmsh.model.occ
+    sites = in_units_of(request.sites, request.size)
+    with gmsh_session(request.part):
+        drawing = draw(sites)
+        bodies = drawing.faces
+        if all(site.is_planar for site in sites):
+            cutters = [region_face(s, corners=c) for s, c in zip(drawing.sites, drawing.corners, strict=True)]
+        else:
+            height = in_units_of(depth, request.size)
+            occ.translate(bodies, 0.0, 0.0, -0.5 * height)
+            bodies = [entity for entity in occ.extrude(bodies, 0.0, 0.0, height) if entity[0] == 3]
+            cutters = [region_prism(site, bodies) for site in drawing.sites]
+        mesh = mesh_fragments(request, bodies, cutters, size=1.0, sites=drawing.sites, refinements=drawing.refinements)
+    mesh = replace(mesh, points=mesh.points * request.size, curved=mesh.curved.times(request.size))
+    if request.dim == mesh.dim:
+        return mesh
+    # by default layers are about twice as high as the triangles are wide
+    layers = request.layers or max(1, round((0.5 if request.half else 1.0) * depth / (2.0 * request.size)))
+    return extrude(mesh, depth, layers, half=request.half)

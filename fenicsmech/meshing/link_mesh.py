@@ -1,4 +1,5 @@
-"""The mesh of one link as plain arrays: simplices, the interface that holds each, and edges that follow curves.
+"""The mesh of one link as plain arrays: simplices, the interface that holds each, and edges that follow curves; the
+meshes of all links as one distributed dolfinx mesh of disconnected components.
 
 With barycentric coordinates λ a cell covers the points X₀ + c,
 
@@ -12,15 +13,21 @@ elements. Source: Ciarlet & Raviart, Interpolation theory over curved elements (
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
-from fenicsmech.checks import point_text
-from fenicsmech.errors import MeshingError
+from fenicsmech.collective import from_one
+from fenicsmech.compat import cell_dofs, cell_nodes, create_mesh, original_cells, original_nodes, vector_space
+from fenicsmech.errors import MeshingError, point_text
 from fenicsmech.polygons import edge_loops, signed_area
 
 FREE = -1
@@ -57,12 +64,8 @@ class LinkMesh:
     def from_cells(
         cls, points: np.ndarray, cells: np.ndarray, interface: np.ndarray, curved: CurvedEdges | None = None
     ) -> LinkMesh:
-        """The mesh of ``cells``, turned to positive orientation, without the points that no cell uses.
-
-        Args:
-            points: (n, dim) coordinates; cells: (m, dim + 1) rows of ``points``; interface: (m,) site numbers;
-                curved: edges between rows of ``points`` that bulge.
-        """
+        """The mesh of ``cells`` (rows of ``points``), turned to positive orientation, without the points that no cell
+        uses."""
         used, renumbered = np.unique(cells, return_inverse=True)
         numbers = np.full(len(points), -1)
         numbers[used] = np.arange(len(used))
@@ -143,22 +146,7 @@ class CurvedEdges:
 
     def _squeezed(self, points: np.ndarray, cells: np.ndarray) -> np.ndarray:
         """Mask (m,) of cells that the map compresses below the least volume at a corner or the middle of an edge."""
-        dim = points.shape[1]
-        bulges, corners = self.of_cells(cells), points[cells]
-        bent = np.flatnonzero(np.any(bulges != 0.0, axis=(1, 2)))
-        # ∇λ_1 … ∇λ_dim are the rows of the inverse of the edges from corner 0, (cells, corners, dim)
-        inverse = np.linalg.inv((corners[bent, 1:] - corners[bent, :1]).transpose(0, 2, 1))
-        slopes = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
-        pairs = list(combinations(range(dim + 1), 2))
-        places = np.vstack([np.eye(dim + 1), [(np.eye(dim + 1)[i] + np.eye(dim + 1)[j]) / 2 for i, j in pairs]])
-        squeezed = np.zeros(len(cells), dtype=bool)
-        for place in places:
-            gradient = np.tile(np.eye(dim), (len(bent), 1, 1))
-            for number, (i, j) in enumerate(pairs):
-                slope = 4.0 * (place[i] * slopes[:, j] + place[j] * slopes[:, i])
-                gradient += bulges[bent, number, :, None] * slope[:, None, :]
-            squeezed[bent] |= np.linalg.det(gradient) < _LEAST_VOLUME
-        return squeezed
+        return least_stretches(points[cells], self.of_cells(cells)) < _LEAST_VOLUME
 
     def _scaled(self, cells: np.ndarray, factor: float) -> CurvedEdges:
         """The bulges of the edges of ``cells`` times ``factor``."""
@@ -172,25 +160,59 @@ def _edges(cells: np.ndarray) -> np.ndarray:
     return np.sort(cells[:, list(combinations(range(cells.shape[1]), 2))], axis=2)
 
 
+def edge_corners(corners: int) -> np.ndarray:
+    """Corners at the ends of the edges of a cell with so many, in the order of its quadratic nodes, (edges, 2).
+
+    Edges of the reference simplex are numbered by the corners that they do not touch, from the last pair to the first.
+    """
+    return np.array(list(combinations(range(corners), 2)))[::-1]
+
+
+def node_ends(space: fem.FunctionSpace) -> np.ndarray:
+    """Vertices of the whole mesh at the ends of the edge of every local node of linear or quadratic fields, (nodes, 2).
+
+    The lower one is first; nodes at vertices have theirs twice.
+    """
+    numbers, nodes = original_nodes(space.mesh)[cell_nodes(space.mesh)], cell_dofs(space)
+    index, corners = space.dofmap.index_map, numbers.shape[1]
+    ends = np.empty((index.size_local + index.num_ghosts, 2), dtype=np.int64)
+    ends[nodes[:, :corners]] = numbers[..., None]
+    if nodes.shape[1] > corners:
+        ends[nodes[:, corners:]] = np.sort(numbers[:, edge_corners(corners)], axis=2)
+    return ends
+
+
+def least_stretches(corners: np.ndarray, bulges: np.ndarray) -> np.ndarray:
+    """The least det ∂(X₀ + c)/∂X₀ at corners and middles of edges of each cell, (m,).
+
+    Args:
+        corners: X₀ of the cells' corners, (m, dim + 1, dim).
+        bulges: of their edges, pairs of corners in lexical order, (m, pairs, dim).
+    """
+    dim = corners.shape[2]
+    bent = np.flatnonzero(np.any(bulges != 0.0, axis=(1, 2)))
+    # ∇λ_1 … ∇λ_dim are the rows of the inverse of the edges from corner 0, (cells, corners, dim)
+    inverse = np.linalg.inv((corners[bent, 1:] - corners[bent, :1]).transpose(0, 2, 1))
+    slopes = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
+    corner, (i, j) = np.eye(dim + 1), np.transpose(list(combinations(range(dim + 1), 2)))
+    places = np.vstack([corner, 0.5 * (corner[i] + corner[j])])
+    # ∇(4 λ_i λ_j) = Σ_c weight_c ∇λ_c at each place
+    weights = 4.0 * (places[:, i, None] * corner[j] + places[:, j, None] * corner[i])
+    gradient = np.eye(dim) + np.einsum("mek,pec,mcl->mpkl", bulges[bent], weights, slopes, optimize=True)
+    least = np.ones(len(corners))
+    least[bent] = np.linalg.det(gradient).min(axis=1)
+    return least
+
+
 def cell_measures(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """Signed areas or volumes det(x₁ − x₀, …, x_d − x₀) / d! of ``cells`` ((m, d + 1)), shape (m,)."""
     corners = points[cells]
-    edges = corners[:, 1:] - corners[:, :1]
-    return np.linalg.det(edges) / math.factorial(points.shape[1])
+    return np.linalg.det(corners[:, 1:] - corners[:, :1]) / math.factorial(points.shape[1])
 
 
 def radius_ratios(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Inradius over circumradius times dim: 1 for the equilateral cell, towards 0 for a sliver.
-
-    Args:
-        points: (n, dim) coordinates.
-        cells: (m, dim + 1) vertex numbers.
-
-    Returns:
-        (m,) values in [0, 1].
-    """
-    dim = points.shape[1]
-    corners = points[cells]
+    """Inradius over circumradius times dim of ``cells`` (m, dim + 1): 1 where equilateral, towards 0 for a sliver."""
+    dim, corners = points.shape[1], points[cells]
     facets = sum(_facet_measures(corners[:, list(kept)]) for kept in combinations(range(dim + 1), dim))
     inradius = dim * np.abs(cell_measures(points, cells)) / facets
     # circumcentre c (relative to the first corner): 2 e_k · c = e_k · e_k for every edge e_k from that corner
@@ -220,11 +242,7 @@ def count_pieces(cells: np.ndarray) -> int:
 
 
 def boundary_loops(part: str, mesh: LinkMesh) -> tuple[np.ndarray, ...]:
-    """The closed polygons that bound a link in the plane.
-
-    Args:
-        part: what the mesh belongs to, for messages.
-        mesh: triangles.
+    """The closed polygons that bound the triangles ``mesh`` of ``part``.
 
     Returns:
         Vertex numbers (k,) of each polygon, the first not repeated at the end: the outline, counter-clockwise, then
@@ -245,19 +263,27 @@ def boundary_loops(part: str, mesh: LinkMesh) -> tuple[np.ndarray, ...]:
         raise _turned_over(part, mesh, int(first[np.argmax(repeats)]) // 3, np.count_nonzero(repeats > 1))
     vertices, visits = np.unique(edges[~np.isin(forth, back), 0], return_counts=True)
     if np.any(visits > 1):
-        raise MeshingError(
-            part,
-            f"the link touches itself in the single point {point_text(mesh.points[vertices[np.argmax(visits)]])}",
-            "Give its shape some width there",
-        )
+        where = point_text(mesh.points[vertices[np.argmax(visits)]])
+        problem = f"the link touches itself in the single point {where}"
+        raise MeshingError(part, problem, "Give its shape some width there")
     loops = edge_loops(mesh.cells)
     areas = [signed_area(mesh.points[loop]) for loop in loops]
     outlines = sum(area > 0.0 for area in areas)
     if outlines > 1:
-        raise MeshingError(
-            part, f"the link falls into {outlines} separate pieces", "Describe each piece as a link of its own"
-        )
+        problem = f"the link falls into {outlines} separate pieces"
+        raise MeshingError(part, problem, "Describe each piece as a link of its own")
     return tuple(loops[k] for k in sorted(range(len(loops)), key=lambda k: -areas[k]))
+
+
+def boundary_polygons(part: str, mesh: LinkMesh) -> list[np.ndarray]:
+    """The polygons (k, 2) of ``boundary_loops``, with the middles of curved edges between their ends."""
+    polygons = []
+    for loop in boundary_loops(part, mesh):
+        points, bulges = mesh.points[loop], mesh.curved.of_cells(np.column_stack([loop, np.roll(loop, -1)]))[:, 0]
+        middles = 0.5 * (points + np.roll(points, -1, axis=0)) + bulges
+        shown = np.column_stack([np.ones(len(loop), dtype=bool), np.any(bulges != 0.0, axis=1)])
+        polygons.append(np.stack([points, middles], axis=1)[shown])
+    return polygons
 
 
 def _turned_over(part: str, mesh: LinkMesh, cell: int, count: int) -> MeshingError:
@@ -267,3 +293,155 @@ def _turned_over(part: str, mesh: LinkMesh, cell: int, count: int) -> MeshingErr
         f"{point_text(mesh.points[mesh.cells[cell]].mean(axis=0))}",
         "Choose a design that deforms the mesh less",
     )
+
+
+def extrude(plan: LinkMesh, depth: float, layers: int, *, half: bool = False) -> LinkMesh:
+    """The tetrahedra over ``plan`` between z = −depth/2 and z = depth/2, in ``layers`` equal layers.
+
+    Fields that are the same all through the depth are fields on the plan: on tetrahedra whose vertices stand on the
+    three corners of a triangle such a field has exactly no gradient along z.
+
+    A prism over the triangle a < b < c (numbers of its vertices in ``plan``), with a′, b′, c′ above them, is cut
+    into abcc′, abb′c′ and aa′b′c′. The diagonal of a side then joins the lower number below with the higher above,
+    in both of its neighbours. Layers above the middle are mirror images of those below, so with an
+    even number of layers the mesh is symmetric about z = 0, and plane loads cause no motion out of the plane.
+
+    Args:
+        plan: the triangulation; its ``interface`` numbers pass on to the cells above.
+        depth: extent along z.
+        layers: number of layers, at least 1.
+        half: only the upper half, z ≥ 0, of what twice as many layers would be.
+    """
+    heights = np.linspace(0.0 if half else -0.5 * depth, 0.5 * depth, layers + 1)
+    count, middle = len(plan.points), 0 if half else (layers + 1) // 2
+    points = np.column_stack([np.tile(plan.points, (layers + 1, 1)), np.repeat(heights, count)])
+    a, b, c = np.sort(plan.cells, axis=1).T
+    sides = [(layer, layer + 1) if layer < middle else (layer + 1, layer) for layer in range(layers)]
+    cells = []
+    for near, far in sides:
+        below, above = near * count, far * count
+        cells += [
+            np.column_stack([a + below, b + below, c + below, c + above]),
+            np.column_stack([a + below, b + below, b + above, c + above]),
+            np.column_stack([a + below, a + above, b + above, c + above]),
+        ]
+    return LinkMesh.from_cells(
+        points, np.concatenate(cells), np.tile(plan.interface, 3 * layers), _walls(plan.curved, sides, count)
+    )
+
+
+def _walls(plan: CurvedEdges, sides: list[tuple[int, int]], count: int) -> CurvedEdges:
+    """Curved edges of an extruded mesh: copies at every height, and the diagonals of the walls between them."""
+    lower, upper = plan.ends.T
+    ends = [plan.ends + height * count for height in range(len(sides) + 1)]
+    ends += [np.column_stack([lower + near * count, upper + far * count]) for near, far in sides]
+    bulges = np.column_stack([plan.bulges, np.zeros(len(plan.ends))])
+    return CurvedEdges(np.sort(np.concatenate(ends), axis=1), np.tile(bulges, (len(ends), 1)))
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """The plane mesh of a link and the columns of vertices above it.
+
+    Attributes:
+        mesh: triangles; the link's own mesh if it is not extruded along z.
+        column: vertex of ``mesh`` that stands for each vertex of the link, (n,).
+    """
+
+    mesh: LinkMesh
+    column: np.ndarray
+
+
+def plan_of(link: LinkMesh) -> Plan:
+    """The plan of a link."""
+    if link.dim == 3:
+        flat = link.points[:, :2]
+        same = 1e-8 * np.ptp(flat, axis=0).max()  # vertices this close in the plan stand on one column
+        pairs = cKDTree(flat).query_pairs(same, output_type="ndarray")
+        graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(flat),) * 2)
+        count, column = connected_components(graph, directed=False)
+        corners = np.sort(column[link.cells], axis=1)
+        first = np.diff(corners, axis=1, prepend=-1) > 0
+        if np.all(first.sum(axis=1) == 3):
+            triangles, below = np.unique(corners[first].reshape(-1, 3), axis=0, return_index=True)
+            points = np.empty((count, 2))
+            points[column] = flat
+            ends = column[link.curved.ends]
+            middles = points[ends].mean(axis=1) + link.curved.bulges[:, :2]
+            curved = CurvedEdges.through(points, ends, middles)
+            return Plan(LinkMesh.from_cells(points, triangles, link.interface[below], curved), column)
+    return Plan(link, np.arange(len(link.points)))
+
+
+@dataclass(frozen=True)
+class MechanismMesh:
+    """The reference mesh of all flexible links.
+
+    Attributes:
+        mesh: the distributed mesh; its coordinates change only while a file of the links at rest is written.
+        link: index of the flexible link of each cell on this rank (ghosts last), (cells,).
+        interface: index among all interfaces of the mechanism, −1 in free cells, (cells,).
+        vertices, cells: the whole mesh as one array each, on every rank: (n, dim), (m, dim + 1).
+        link_of_cell: index of the flexible link of each of ``cells``, (m,).
+        curved: edges of the whole mesh that follow curves, on every rank.
+        comm: the communicator; the mesh itself keeps a duplicate.
+    """
+
+    mesh: dmesh.Mesh
+    link: np.ndarray
+    interface: np.ndarray
+    vertices: np.ndarray
+    cells: np.ndarray
+    link_of_cell: np.ndarray
+    curved: CurvedEdges
+    comm: MPI.Comm
+
+    def corners(self, cells: np.ndarray) -> np.ndarray:
+        """Corner coordinates of local ``cells``, (cells, dim + 1, dim)."""
+        return self.mesh.geometry.x[cell_nodes(self.mesh)[cells]][..., : self.vertices.shape[1]]
+
+
+def distribute(comm: MPI.Comm, link_meshes: Sequence[LinkMesh] | None, *, root: int = 0) -> MechanismMesh:
+    """Distributes ``link_meshes`` (given on ``root`` only) over ``comm``; interfaces are numbered link after link."""
+    vertices, cells, link, interface, curved = from_one(comm, lambda: _joined(link_meshes or ()), root=root)
+    here = slice(None) if comm.rank == root else slice(0)
+    mesh = create_mesh(comm, cells[here], vertices[here])
+    own = original_cells(mesh)
+    return MechanismMesh(mesh, link[own], interface[own], vertices, cells, link, curved, comm)
+
+
+def _joined(meshes: Sequence[LinkMesh]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, CurvedEdges]:
+    """Vertices, cells, link and interface of each cell, and curved edges of all ``meshes``."""
+    nodes = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
+    sites = np.cumsum([0, *(int(mesh.interface.max(initial=-1)) + 1 for mesh in meshes)])
+    return (
+        np.concatenate([mesh.points for mesh in meshes]),
+        np.concatenate([mesh.cells + first for mesh, first in zip(meshes, nodes, strict=False)]).astype(np.int64),
+        np.repeat(np.arange(len(meshes)), [len(mesh.cells) for mesh in meshes]),
+        np.concatenate(
+            [np.where(m.interface >= 0, m.interface + k, FREE) for m, k in zip(meshes, sites, strict=False)]
+        ),
+        CurvedEdges(
+            np.concatenate([mesh.curved.ends + first for mesh, first in zip(meshes, nodes, strict=False)]),
+            np.concatenate([mesh.curved.bulges for mesh in meshes]),
+        ),
+    )
+
+
+def bulge_field(mesh: MechanismMesh) -> fem.Function | None:
+    """c of curved cells (see ``link_mesh``) as a quadratic vector field; None if all edges are straight."""
+    if not len(mesh.curved.ends):
+        return None
+    bulge = fem.Function(vector_space(mesh.mesh, 2), name="bulge")
+    dim = mesh.vertices.shape[1]
+    values, nodes = bulge.x.array.reshape(-1, dim), cell_dofs(bulge.function_space)
+    found = mesh.curved.of_cells(original_nodes(mesh.mesh)[cell_nodes(mesh.mesh)])
+    curved = np.flatnonzero(np.any(found != 0.0, axis=(1, 2)))
+    values[nodes[curved, dim + 1 :]] = found[curved][:, ::-1]  # see ``edge_corners``
+    return bulge
+
+
+def on_mid_plane(points: np.ndarray, comm: MPI.Comm) -> np.ndarray:
+    """Mask (n,) of this rank's ``points`` (n, 3) of half links that lie on their mid-plane."""
+    height = comm.allreduce(float(points[:, 2].max(initial=0.0)), op=MPI.MAX)
+    return points[:, 2] <= 1e-9 * height  # but for rounding

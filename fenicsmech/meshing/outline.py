@@ -1,22 +1,133 @@
-"""Meshes of closed outlines of lines and arcs."""
+"""Closed curves in the plane (B-splines, straight lines among them, and arcs of circles), and links bounded by them.
+
+A loop is a list of curves, each of which begins where the one before ends.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
+from scipy.interpolate import BSpline
 
-from fenicsmech.checks import point_text
-from fenicsmech.errors import MeshingError
+from fenicsmech.errors import MeshingError, point_text
 from fenicsmech.mechanism import Arc, Line, Outline
-from fenicsmech.meshing.gmsh_session import gmsh
+from fenicsmech.meshing.cutting import PlaneDrawing, in_units_of, mesh_planar
 from fenicsmech.meshing.link_mesh import LinkMesh
-from fenicsmech.meshing.planar import PlaneDrawing, in_units_of, mesh_planar
-from fenicsmech.meshing.plane_curves import CircleArc, Curve, draw_loop, sampled, straight_line
-from fenicsmech.meshing.request import InterfaceSite, MeshRequest, check_shape, holds, mesh_shape
+from fenicsmech.meshing.link_mesher import LEAST_SEGMENTS, InterfaceSite, MeshRequest, check_shape, holds, mesh_shape
+from fenicsmech.meshing.session import gmsh
 from fenicsmech.polygons import distance_to, first_crossing, is_inside
 
 _SAMPLED = 0.02  # of the element size: how far the polygons that checks look at deviate from the outline
+
+
+@dataclass(frozen=True, eq=False)
+class CircleArc:
+    """A part of a circle.
+
+    Attributes:
+        centre: shape (2,).
+        radius: of the circle.
+        first: angle (rad) from x at which it begins.
+        sweep: angle covered from there, positive if counter-clockwise.
+    """
+
+    centre: np.ndarray
+    radius: float
+    first: float
+    sweep: float
+
+    @classmethod
+    def through(cls, start: Sequence[float], via: Sequence[float], end: Sequence[float]) -> CircleArc:
+        """The arc from ``start`` through ``via`` to ``end``, points (2,) that are not in line."""
+        points = np.array([start, via, end], dtype=float)
+        # |c − start| = |c − via| = |c − end|
+        (a, b), (c, d) = points[1:] - points[0]
+        p, q = a * a + b * b, c * c + d * d
+        centre = points[0] + np.array([p * d - q * b, q * a - p * c]) / (2.0 * (a * d - b * c))
+        first, between, last = (math.atan2(y, x) for x, y in points - centre)
+        turn = 2.0 * math.pi
+        sweep = (last - first) % turn
+        if (between - first) % turn > sweep:
+            sweep -= turn
+        return cls(centre, math.dist(points[0], centre), first, sweep)
+
+    def at(self, fraction: np.ndarray) -> np.ndarray:
+        """The points (k, 2) at the given fractions (k,) of the sweep."""
+        angles = self.first + self.sweep * np.asarray(fraction)
+        return self.centre + self.radius * np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+Curve: TypeAlias = BSpline | CircleArc  # a B-spline is clamped to its ends; one of degree 1 is a single straight line
+
+
+def straight_line(start: Sequence[float], end: Sequence[float]) -> BSpline:
+    """The straight line between two points (2,)."""
+    return BSpline([0.0, 0.0, 1.0, 1.0], np.array([start, end], dtype=float), 1)
+
+
+def start_of(curve: Curve) -> np.ndarray:
+    """The point (2,) in which a curve begins."""
+    return curve.at(np.zeros(1))[0] if isinstance(curve, CircleArc) else curve.c[0]
+
+
+def sampled(loop: Sequence[Curve], tolerance: float) -> np.ndarray:
+    """The closed polygon (m, 2) with vertices on ``loop``, from which it deviates by at most ``tolerance``."""
+    return np.concatenate([_samples(curve, tolerance) for curve in loop])
+
+
+def _samples(curve: Curve, tolerance: float) -> np.ndarray:
+    """Points of a curve, from its start to before its end."""
+    if isinstance(curve, CircleArc):
+        # a chord over the angle 2 φ misses the arc by r (1 − cos φ)
+        widest = max(math.cos(math.pi / LEAST_SEGMENTS), 1.0 - tolerance / curve.radius)
+        parts = math.ceil(abs(curve.sweep) / (2.0 * math.acos(widest)))
+        return curve.at(np.arange(parts) / parts)
+    knots = np.unique(curve.t)
+    # the chord over a piece of length h in the parameter misses the curve by at most h² max|C''| / 8
+    second = np.linalg.norm(curve(knots, 2), axis=1) if curve.k > 1 else np.zeros(len(knots))
+    most = np.maximum(second[:-1], second[1:])
+    counts = np.maximum(1, np.ceil(np.diff(knots) * np.sqrt(most / (8.0 * tolerance)))).astype(int)
+    pieces = zip(knots[:-1], knots[1:], counts, strict=True)
+    return curve(np.concatenate([np.linspace(a, b, n, endpoint=False) for a, b, n in pieces]))
+
+
+def draw_loop(loop: Sequence[Curve], height: float = 0.0) -> int:
+    """The tag of ``loop`` as a curve loop of the plane z = ``height`` in the current gmsh model.
+
+    A single curve is a whole circle.
+    """
+    if len(loop) == 1:
+        circle = gmsh.model.occ.addCircle(*loop[0].centre, height, loop[0].radius)
+        return gmsh.model.occ.addCurveLoop([circle])
+    starts = [gmsh.model.occ.addPoint(*start_of(curve), height) for curve in loop]
+    ends = zip(starts, [*starts[1:], starts[0]], strict=True)
+    edges = [edge for curve, pair in zip(loop, ends, strict=True) for edge in _draw(curve, pair, height)]
+    return gmsh.model.occ.addCurveLoop(edges)
+
+
+def _draw(curve: Curve, ends: tuple[int, int], height: float) -> list[int]:
+    """The edges that draw a curve between two points of the current gmsh model."""
+    occ = gmsh.model.occ
+    if isinstance(curve, CircleArc):
+        # in pieces below a half turn, whose ends say on which side they run
+        pieces = math.ceil(abs(curve.sweep) / (0.75 * math.pi))
+        between = [occ.addPoint(*at, height) for at in curve.at(np.arange(1, pieces) / pieces)]
+        helpers = [occ.addPoint(*curve.centre, height)]
+        edges = [occ.addCircleArc(a, helpers[0], b) for a, b in pairwise([ends[0], *between, ends[1]])]
+    elif curve.k == 1:
+        return [occ.addLine(*ends)]
+    else:
+        helpers = [occ.addPoint(*at, height) for at in curve.c[1:-1]]
+        knots, repeats = (a.tolist() for a in np.unique(curve.t, return_counts=True))
+        edges = [occ.addBSpline([ends[0], *helpers, ends[1]], degree=curve.k, knots=knots, multiplicities=repeats)]
+    # points that no edge begins or ends in would go into files
+    occ.remove([(0, at) for at in helpers])
+    return edges
 
 
 @mesh_shape.register
@@ -34,18 +145,12 @@ def _(shape: Outline, request: MeshRequest) -> LinkMesh:
 def _(shape: Outline, request: MeshRequest) -> None:
     crossing = first_crossing(sampled(_loop(shape, request), _SAMPLED))
     if crossing is not None:
-        raise MeshingError(
-            request.part,
-            f"the outline crosses itself near {point_text(crossing * request.size)}",
-            "Lead its segments apart there",
-        )
+        problem = f"the outline crosses itself near {point_text(crossing * request.size)}"
+        raise MeshingError(request.part, problem, "Lead its segments apart there")
     for site in request.sites:
         if not holds(shape, request, site.at):
-            raise MeshingError(
-                request.part_at(site),
-                f"the point {point_text(site.at[:2])} is not on the link",
-                "Move the joint into the outline",
-            )
+            problem = f"the point {point_text(site.at[:2])} is not on the link"
+            raise MeshingError(request.part_at(site), problem, "Move the joint into the outline")
 
 
 @holds.register
@@ -56,33 +161,22 @@ def _(shape: Outline, request: MeshRequest, at: tuple[float, ...]) -> bool:
 
 
 def _loop(outline: Outline, request: MeshRequest) -> list[Curve]:
-    """The curves of an outline, closed by a line if they do not end where they began, in units of the element size.
-
-    Raises:
-        MeshingError: fewer than two segments are left, or an arc's three points are in line.
-    """
+    """The curves of an outline, closed by a line if they do not end where they began, in units of the element size."""
     scaled, loop = in_units_of(outline, request.size), []
     start = scaled.start
     for segment in (*scaled.segments, Line(scaled.start)):
         if isinstance(segment, Arc):
-            loop.append(_arc(start, segment, request))
+            (a, b), (c, d) = np.subtract(segment.via, start), np.subtract(segment.end, start)
+            if abs(a * d - b * c) <= 1e-9 * math.hypot(a, b) * math.hypot(c, d):
+                places = (start, segment.via, segment.end)
+                first, via, last = (tuple(round(x * request.size, 9) for x in place) for place in places)
+                problem = f"the arc from {first} through {via} to {last} has its three points in line"
+                raise MeshingError(request.part, problem, "Use a line, or move the point in between")
+            loop.append(CircleArc.through(start, segment.via, segment.end))
         elif math.dist(start, segment.end) > 1e-8:  # ends this near are one point
             loop.append(straight_line(start, segment.end))
         start = segment.end
     if len(loop) < 2:
-        raise MeshingError(
-            request.part, f"an outline of {len(loop)} segment(s) encloses nothing", "Give at least two segments"
-        )
+        problem = f"an outline of {len(loop)} segment(s) encloses nothing"
+        raise MeshingError(request.part, problem, "Give at least two segments")
     return loop
-
-
-def _arc(start: tuple[float, ...], arc: Arc, request: MeshRequest) -> CircleArc:
-    a, b = np.subtract(arc.via, start), np.subtract(arc.end, start)
-    if abs(a[0] * b[1] - a[1] * b[0]) <= 1e-9 * np.hypot(*a) * np.hypot(*b):
-        first, via, last = (tuple(round(c * request.size, 9) for c in p) for p in (start, arc.via, arc.end))
-        raise MeshingError(
-            request.part,
-            f"the arc from {first} through {via} to {last} has its three points in line",
-            "Use a line, or move the point in between",
-        )
-    return CircleArc.through(start, arc.via, arc.end)

@@ -10,9 +10,9 @@ import numpy as np
 from fenicsmech.errors import DescriptionError, MeshingError
 from fenicsmech.mechanism import MeshPart, StepPart
 from fenicsmech.meshing.cutting import DimTag, mesh_fragments, mesh_nodes, region_face, region_prism
-from fenicsmech.meshing.gmsh_session import gmsh, gmsh_session
 from fenicsmech.meshing.link_mesh import FREE, LinkMesh
-from fenicsmech.meshing.request import MeshRequest, check_shape, mesh_shape
+from fenicsmech.meshing.link_mesher import MeshRequest, check_shape, mesh_shape
+from fenicsmech.meshing.session import gmsh, gmsh_session
 
 _TOLERANCE = 1e-6  # of the extent of a mesh from a file, whose coordinates are rounded
 
@@ -25,37 +25,22 @@ def _(shape: StepPart, request: MeshRequest) -> None:
 @check_shape.register
 def _(shape: MeshPart, request: MeshRequest) -> None:
     if request.half:
-        raise DescriptionError(
-            request.part,
-            "the symmetry of a mesh file about its mid-plane is not known",
-            "Use space='3d', or give the link as a strip, an outline or a STEP file",
-        )
+        remedy = "Use space='3d', or give the link as a strip, an outline or a STEP file"
+        raise DescriptionError(request.part, "the symmetry of a mesh file about its mid-plane is not known", remedy)
     _require_header(shape.path, "$MeshFormat", kind="gmsh mesh file", part=request.part)
 
 
 def _require_header(path: Path, header: str, *, kind: str, part: str) -> None:
-    """Checks that ``path`` is a file of the right kind; gmsh would guess.
-
-    Args:
-        path: the file.
-        header: text with which such files begin.
-        kind: what the file should be, for messages.
-        part: the link, for messages.
-
-    Raises:
-        MeshingError: the file cannot be read, or begins otherwise.
-    """
+    """Refuses a file that does not begin with ``header``; gmsh would guess its kind."""
     try:
         with open(path, "rb") as file:
             start = file.read(len(header) + 64).lstrip()
     except OSError as failure:
-        raise MeshingError(
-            part, f"the {kind} {str(path)!r} cannot be read ({failure.strerror})", "Check the path"
-        ) from failure
+        problem = f"the {kind} {str(path)!r} cannot be read ({failure.strerror})"
+        raise MeshingError(part, problem, "Check the path") from failure
     if not start.startswith(header.encode()):
-        raise MeshingError(
-            part, f"{str(path)!r} is not a {kind}: it does not begin with {header!r}", f"Give the path of a {kind}"
-        )
+        problem = f"{str(path)!r} is not a {kind}: it does not begin with {header!r}"
+        raise MeshingError(part, problem, f"Give the path of a {kind}")
 
 
 @mesh_shape.register
@@ -66,18 +51,11 @@ def _(shape: StepPart, request: MeshRequest) -> LinkMesh:
 
 
 def _only_solid(path: Path, request: MeshRequest) -> DimTag:
-    """The one solid of the file, in mm.
-
-    Raises:
-        MeshingError: there is none, or more than one.
-    """
+    """The one solid of the file, in mm."""
     solids = [entity for entity in gmsh.model.occ.importShapes(str(path), format="step") if entity[0] == 3]
     if len(solids) != 1:
-        raise MeshingError(
-            request.part,
-            f"the STEP file {str(path)!r} holds {len(solids) or 'no'} solids",
-            "Export exactly one solid body per link",
-        )
+        problem = f"the STEP file {str(path)!r} holds {len(solids) or 'no'} solids"
+        raise MeshingError(request.part, problem, "Export exactly one solid body per link")
     return solids[0]
 
 
@@ -96,9 +74,6 @@ def _upper_half(shape: StepPart, solid: DimTag, request: MeshRequest) -> list[Di
     """The part of the solid above its centroid, which moves to z = 0.
 
     The halves are mirror images if their volumes, centroids and moments of inertia agree.
-
-    Raises:
-        DescriptionError: the halves differ.
     """
     occ = gmsh.model.occ
     x, y, bottom, right, far, top = occ.getBoundingBox(*solid)
@@ -111,11 +86,8 @@ def _upper_half(shape: StepPart, solid: DimTag, request: MeshRequest) -> list[Di
     occ.remove(lower, recursive=True)
     # to 1e-6: modellers round
     if not all(np.abs(a - b).max() <= 1e-6 * np.abs(a).max() for a, b in zip(*halves, strict=True)):
-        raise DescriptionError(
-            request.part,
-            f"the solid in {str(shape.path)!r} is not symmetric about its mid-plane",
-            "Use space='3d'",
-        )
+        problem = f"the solid in {str(shape.path)!r} is not symmetric about its mid-plane"
+        raise DescriptionError(request.part, problem, "Use space='3d'")
     return upper
 
 
@@ -130,11 +102,7 @@ def _moments(solids: list[DimTag], side: float) -> list[np.ndarray]:
 
 
 def _mesh_section(shape: StepPart, solid: DimTag, request: MeshRequest) -> LinkMesh:
-    """Meshes the section with the plane z = ``shape.section``.
-
-    Raises:
-        MeshingError: the plane misses the solid.
-    """
+    """Meshes the section with the plane z = ``shape.section``."""
     occ = gmsh.model.occ
     x, y, bottom, right, far, top = occ.getBoundingBox(*solid)
     width, breadth = right - x, far - y
@@ -160,11 +128,7 @@ def _(shape: MeshPart, request: MeshRequest) -> LinkMesh:
 
 
 def _read(shape: MeshPart, request: MeshRequest) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n, dim) and simplices (m, dim + 1) of the current gmsh model.
-
-    Raises:
-        MeshingError: there are cells of another kind, or none; the mesh of a plane model is not in the plane.
-    """
+    """Vertices (n, dim) and simplices (m, dim + 1) of the current gmsh model, which holds no other cells."""
     dim = request.dim
     family, plural = {2: ("Triangle", "triangles"), 3: ("Tetrahedron", "tetrahedra")}[dim]
     kinds = {dimension: gmsh.model.mesh.getElements(dimension) for dimension in range(dim, 4)}
@@ -195,9 +159,10 @@ def _read(shape: MeshPart, request: MeshRequest) -> tuple[np.ndarray, np.ndarray
 def _interface(points: np.ndarray, cells: np.ndarray, request: MeshRequest) -> np.ndarray:
     """The site whose region contains all corners of each cell, or FREE."""
     tolerance = _TOLERANCE * float(np.ptp(points[np.unique(cells)], axis=0).max())
-    inside = np.array([site.contains(points, tolerance)[cells].all(axis=1) for site in request.sites], dtype=bool)
-    inside = inside.reshape(-1, len(cells))
-    shared = np.flatnonzero(inside.sum(axis=0) > 1)
-    if len(shared):
-        raise request.overlap(*np.flatnonzero(inside[:, shared[0]])[:2])
-    return np.select(list(inside), list(range(len(inside))), FREE) if len(inside) else np.full(len(cells), FREE)
+    interface = np.full(len(cells), FREE)
+    for number, site in enumerate(request.sites):
+        inside = site.contains(points, tolerance)[cells].all(axis=1)
+        if (taken := interface[inside & (interface != FREE)]).size:
+            raise request.overlap(int(taken[0]), number)
+        interface[inside] = number
+    return interface

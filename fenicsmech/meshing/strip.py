@@ -10,18 +10,25 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from fenicsmech.checks import point_text
-from fenicsmech.errors import MeshingError
+from fenicsmech.errors import MeshingError, point_text
 from fenicsmech.mechanism import Centreline, Disc, Rectangle, Strip
-from fenicsmech.meshing.cutting import DimTag, circle_segments, gap_refinement, region_face
-from fenicsmech.meshing.gmsh_session import gmsh
+from fenicsmech.meshing.cutting import (
+    DimTag,
+    PlaneDrawing,
+    circle_segments,
+    gap_refinement,
+    in_units_of,
+    mesh_planar,
+    region_face,
+)
 from fenicsmech.meshing.link_mesh import LinkMesh
-from fenicsmech.meshing.planar import PlaneDrawing, in_units_of, mesh_planar
-from fenicsmech.meshing.request import InterfaceSite, MeshRequest, check_shape, holds, mesh_shape
+from fenicsmech.meshing.link_mesher import InterfaceSite, MeshRequest, check_shape, clamp_defect, holds, mesh_shape
+from fenicsmech.meshing.session import gmsh
 from fenicsmech.polygons import first_crossing
 
 _ON_CENTRELINE = 1e-3  # of the thickness: deviation of rounded coordinates
@@ -35,10 +42,33 @@ def _(shape: Strip, request: MeshRequest) -> LinkMesh:
 
 @check_shape.register
 def _(shape: Strip, request: MeshRequest) -> None:
-    centreline = Centreline(shape.centreline, part=f"centreline of {request.part}")
-    _check_sides(request.part, centreline, shape.thickness)
+    centreline, thickness = Centreline(shape.centreline, part=f"centreline of {request.part}"), shape.thickness
+    s = centreline.samples(32)
+    bend = np.abs(centreline.curvature(s))
+    sharpest = int(np.argmax(bend))
+    if bend[sharpest] * 0.5 * thickness >= 1.0:
+        raise MeshingError(
+            request.part,
+            f"the centreline bends with radius {1.0 / bend[sharpest]:g} near "
+            f"{point_text(centreline.evaluate(s[sharpest]))}, which is not more than half the thickness {thickness:g}",
+            "Make the strip thinner or its centreline smoother",
+        )
+    right, left = (_parallel(centreline, s, offset * thickness) for offset in (-0.5, 0.5))
+    crossing = first_crossing(np.concatenate([right, left[::-1]]))
+    if crossing is not None:
+        remedy = "Lead the centreline apart there, or make the strip thinner"
+        raise MeshingError(request.part, f"the strip crosses itself near {point_text(crossing)}", remedy)
     for site in request.sites:
-        _check_on_strip(centreline, shape.thickness, site, request)
+        station = centreline.closest(site.at[:2])
+        away = np.asarray(site.at[:2]) - centreline.evaluate(station)
+        beyond, tolerance = abs(away @ centreline.tangent(station)), _ON_CENTRELINE * thickness
+        if np.linalg.norm(away) > 0.5 * thickness + tolerance or beyond > tolerance:
+            raise MeshingError(
+                request.part_at(site),
+                f"the point {point_text(site.at[:2])} is not on the link: it is {np.linalg.norm(away):g} away from the "
+                f"centreline of a strip of thickness {thickness:g}",
+                "Move the joint onto the centreline, or lead the centreline through the joint",
+            )
 
 
 @holds.register
@@ -53,57 +83,10 @@ def _(shape: Strip, request: MeshRequest, at: tuple[float, ...]) -> bool:
     return max([beside, *eyes]) >= -_ON_CENTRELINE * shape.thickness
 
 
-def _check_sides(part: str, centreline: Centreline, thickness: float) -> None:
-    """Refuses a strip whose sides fold over or cross.
-
-    Raises:
-        MeshingError: a side folds over where the centreline bends too sharply, or the outline crosses itself.
-    """
-    s = centreline.samples(32)
-    bend = np.abs(centreline.curvature(s))
-    sharpest = int(np.argmax(bend))
-    if bend[sharpest] * 0.5 * thickness >= 1.0:
-        raise MeshingError(
-            part,
-            f"the centreline bends with radius {1.0 / bend[sharpest]:g} near "
-            f"{point_text(centreline.evaluate(s[sharpest]))}, which is not more than half the thickness {thickness:g}",
-            "Make the strip thinner or its centreline smoother",
-        )
-    right, left = (_parallel(centreline, s, offset * thickness) for offset in (-0.5, 0.5))
-    crossing = first_crossing(np.concatenate([right, left[::-1]]))
-    if crossing is not None:
-        raise MeshingError(
-            part,
-            f"the strip crosses itself near {point_text(crossing)}",
-            "Lead the centreline apart there, or make the strip thinner",
-        )
-
-
-def _check_on_strip(centreline: Centreline, thickness: float, site: InterfaceSite, request: MeshRequest) -> None:
-    """Refuses a joint off the strip.
-
-    Raises:
-        MeshingError: it lies farther than half the thickness from the centreline, or beyond an end.
-    """
-    tolerance = _ON_CENTRELINE * thickness
-    s = centreline.closest(site.at[:2])
-    away = np.asarray(site.at[:2]) - centreline.evaluate(s)
-    beyond = abs(away @ centreline.tangent(s))
-    if np.linalg.norm(away) > 0.5 * thickness + tolerance or beyond > tolerance:
-        raise MeshingError(
-            request.part_at(site),
-            f"the point {point_text(site.at[:2])} is not on the link: it is {np.linalg.norm(away):g} away from the "
-            f"centreline of a strip of thickness {thickness:g}",
-            "Move the joint onto the centreline, or lead the centreline through the joint",
-        )
-
-
-def clamp_defect(shape: Strip, site: InterfaceSite) -> tuple[str, str] | None:
-    """The way in which the rectangle of ``site`` differs from a clamp across the strip, and a remedy; or None.
-
-    A clamp's inner face, where the centreline leaves the rectangle, stands across the strip (to 1°, more than rounded
-    angles miss it by) and is at least as wide.
-    """
+@clamp_defect.register
+def _(shape: Strip, site: InterfaceSite) -> tuple[str, str] | None:
+    # a clamp's inner face, where the centreline leaves the rectangle, stands across the strip (to 1°, more than rounded
+    # angles miss it by) and is at least as wide
     if not isinstance(site.region, Rectangle) or not site.is_planar:
         return None
     curve, halves = Centreline(shape.centreline), 0.5 * np.array([site.region.length, site.region.width])
@@ -146,23 +129,16 @@ def clamp_defect(shape: Strip, site: InterfaceSite) -> tuple[str, str] | None:
 class _Pin:
     """A pin in a strip, in units of the element size.
 
-    Attributes:
-        site: the site, moved onto the centreline, and its disc to the strip's sides, where it almost meets them.
-        radius: of the disc that the pin holds.
-        half_thickness: of the strip.
-        inward: unit vector along the strip, away from its nearer end, shape (2,).
-        station: parameter of the centreline's point nearest to the pin.
-        offset: how far the pin lies left of the centreline.
-        to_end: distance from the nearer end of the centreline.
+    The site is moved onto the centreline, and its disc to the strip's sides, where it almost meets them.
     """
 
     site: InterfaceSite
-    radius: float
-    half_thickness: float
-    inward: np.ndarray
-    station: float
-    offset: float
-    to_end: float
+    radius: float  # of the disc that the pin holds
+    half_thickness: float  # of the strip
+    inward: np.ndarray  # unit vector along the strip, away from its nearer end
+    station: float  # parameter of the centreline's point nearest to the pin
+    offset: float  # of the pin to the left of the centreline
+    to_end: float  # distance from the nearer end of the centreline
 
     @classmethod
     def place(cls, site: InterfaceSite, radius: float, centreline: Centreline, thickness: float) -> _Pin:
@@ -194,7 +170,7 @@ class _Pin:
 
     @property
     def touches_sides(self) -> bool:
-        """Whether the disc, or an eye as wide as the strip, may touch the strip's sides along the way."""
+        """Whether the disc, or an eye as wide as the strip, may touch the strip's sides."""
         return self.radius <= self.half_thickness and self.offset == 0.0
 
     @property
@@ -249,38 +225,36 @@ def _face(centreline: Centreline, thickness: float, breaks: Sequence[float], rou
     rights, lefts = _points(right), _points(left)
     end = _end(centreline, centreline.end, right[-1][-1], (rights[-1][-1], lefts[-1][-1]), rounded)
     start = _end(centreline, 0.0, left[0][0], (lefts[0][0], rights[0][0]), rounded)
-    up = [_curve(points) for points in rights]
-    down = [_curve(points[::-1]) for points in lefts[::-1]]
     occ = gmsh.model.occ
+    # two points give a line, more the interpolating spline
+    up, down = (
+        [occ.addLine(*points) if len(points) == 2 else occ.addSpline(points) for points in side]
+        for side in (rights, [points[::-1] for points in lefts[::-1]])
+    )
     return 2, occ.addPlaneSurface([occ.addCurveLoop([*up, *end, *down, *start])])
 
 
 def _side(centreline: Centreline, offset: float, stations: np.ndarray) -> list[np.ndarray]:
-    """The curve parallel to a centreline, in pieces between the parameters ``stations``.
+    """Points of the curve parallel to a centreline, in pieces between the parameters ``stations``.
 
-    Returns:
-        Points (k, 2) of each piece: the ends of a straight line, or as many as the interpolating cubic spline through
-        them needs to follow the curve between them to 1e-6 of its distance from the centreline. Pieces share their
-        end points.
+    A straight piece has its two ends, a curved one as many points as the interpolating cubic spline through them needs
+    to follow the curve between them to 1e-6 of the thickness. Pieces share their end points.
     """
-    pairs = zip(stations[:-1], stations[1:], strict=True)
-    bend = np.abs(centreline.curvature(centreline.samples(32))).max()
-    if bend * centreline.end < 1e-9:  # straight but for rounding
-        return [_parallel(centreline, np.array(pair), offset) for pair in pairs]
-    return [_curved_piece(centreline, offset, *pair) for pair in pairs]
-
-
-def _curved_piece(centreline: Centreline, offset: float, start: float, end: float) -> np.ndarray:
-    knots, margin = centreline.knots, 1e-6 * (end - start)
-    stations = np.concatenate([[start], knots[(knots > start + margin) & (knots < end - margin)], [end]])
-    spans = len(stations) - 1
-    for parts in (8, 16, 32, 64, 128):  # between two knots
-        s = np.interp(np.arange(2 * parts * spans + 1) / (2 * parts), np.arange(spans + 1), stations)
-        points = _parallel(centreline, s, offset)
-        error = np.linalg.norm(CubicSpline(s[::2], points[::2])(s[1::2]) - points[1::2], axis=1).max()
-        if error <= 1e-6 * 2.0 * abs(offset):
-            break
-    return points[::2]
+    straight = np.abs(centreline.curvature(centreline.samples(32))).max() * centreline.end < 1e-9  # but for rounding
+    pieces = []
+    for start, end in pairwise(stations):
+        knots, margin = centreline.knots, 1e-6 * (end - start)
+        ends = np.concatenate([[start], knots[(knots > start + margin) & (knots < end - margin)], [end]])
+        spans = len(ends) - 1
+        points = _parallel(centreline, np.array([start, end]), offset)
+        for parts in () if straight else (8, 16, 32, 64, 128):  # between two knots
+            s = np.interp(np.arange(2 * parts * spans + 1) / (2 * parts), np.arange(spans + 1), ends)
+            fine = _parallel(centreline, s, offset)
+            points, between = fine[::2], fine[1::2]
+            if np.linalg.norm(CubicSpline(s[::2], points)(s[1::2]) - between, axis=1).max() <= 2e-6 * abs(offset):
+                break
+        pieces.append(points)
+    return pieces
 
 
 def _parallel(centreline: Centreline, s: np.ndarray, offset: float) -> np.ndarray:
@@ -295,11 +269,6 @@ def _points(side: Sequence[np.ndarray]) -> list[list[int]]:
         shared = pieces[-1][-1:] if pieces else []
         pieces.append(shared + [gmsh.model.occ.addPoint(x, y, 0.0) for x, y in piece[len(shared) :]])
     return pieces
-
-
-def _curve(points: list[int]) -> int:
-    """The line through two points, or the interpolating spline through more."""
-    return gmsh.model.occ.addLine(*points) if len(points) == 2 else gmsh.model.occ.addSpline(points)
 
 
 def _end(

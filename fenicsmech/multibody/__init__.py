@@ -1,51 +1,39 @@
-"""The mechanism as bodies and constraints: interfaces, points, assembly, mobility.
+"""The mechanism as bodies and constraints.
 
-- ``constraints``: bodies that move rigidly, and all constraints between them: values, gradients, Hessians
-- ``linkage``: bodies and constraints of the described mechanism; free coordinates of its joints
-- ``mobility``: motions that joints, motors and springs leave, and dependent constraints
-- ``assembly``: the rigid assembly of a configuration
-- ``interfaces``: interface nodes of the mesh as functions of body poses, and the design field at nodes
-- ``points``: material points: position, gradient and Hessian with respect to the state
+- ``points``: interface nodes of the mesh as functions of body poses, the design field at nodes, material points
+- ``linkage``: bodies, constraints between them and potentials of their poses
+- ``assembly``: the rigid assembly of a configuration, and the motions that joints, motors and springs leave
 """
 
-from fenicsmech.multibody.assembly import Assembly, AssemblyOptions, assemble, assemble_before_strain
-from fenicsmech.multibody.constraints import Body, Connection, JointSystem
-from fenicsmech.multibody.interfaces import DesignAtNodes, InterfaceMap
-from fenicsmech.multibody.linkage import JointCoordinate, Linkage, build_linkage
-from fenicsmech.multibody.mobility import (
+from fenicsmech.multibody.assembly import (
+    Assembly,
     Freedom,
     Motion,
-    SpringPotential,
+    assemble,
+    assemble_before_strain,
     count_freedom,
     free_motions,
     is_held,
     stiff_motions,
 )
-from fenicsmech.multibody.points import BodyPoint, LinkPoint, MaterialPoint, body_point, link_point
+from fenicsmech.multibody.linkage import (
+    Body,
+    Connection,
+    JointCoordinate,
+    JointSystem,
+    Linkage,
+    PosePotential,
+    build_linkage,
+    spring_potentials,
+)
+from fenicsmech.multibody.points import BodyPoint, DesignAtNodes, InterfaceMap, LinkPoint, link_point
 
+# fmt: off
 __all__ = [
-    "Assembly",
-    "AssemblyOptions",
-    "Body",
-    "BodyPoint",
-    "Connection",
-    "DesignAtNodes",
-    "Freedom",
-    "InterfaceMap",
-    "JointCoordinate",
-    "JointSystem",
-    "LinkPoint",
-    "Linkage",
-    "MaterialPoint",
-    "Motion",
-    "SpringPotential",
-    "assemble",
-    "assemble_before_strain",
-    "body_point",
-    "build_linkage",
-    "count_freedom",
-    "free_motions",
-    "is_held",
-    "link_point",
-    "stiff_motions",
+    "Assembly", "assemble", "assemble_before_strain",
+    "Freedom", "Motion", "count_freedom", "free_motions", "is_held", "stiff_motions",
+    "Body", "Connection", "JointCoordinate", "JointSystem", "Linkage", "build_linkage",
+    "PosePotential", "spring_potentials",
+    "BodyPoint", "DesignAtNodes", "InterfaceMap", "LinkPoint", "link_point",
 ]
+# fmt: on

@@ -1,11 +1,31 @@
-"""Rigid assembly of a configuration: every link moved as a rigid body until all joints close.
+"""Rigid assembly of a configuration, and the motions that it leaves.
+
+Every link is moved as a rigid body until all joints close,
 
     C(z, φ) = 0,  motors moved from φ = 0 (as drawn) to the wanted position,
 
 by Gauss–Newton steps of least norm, z ← z − A⁺ C, which stay defined where A loses rank (redundant loops,
-dead centres). Freedoms that motors leave minimise the energy of springs, by Newton steps with the absolute
-eigenvalues of its curvature (``mobility``), which descend. The assembled state carries no elastic energy in the links
-and starts every equilibrium.
+dead centres). The assembled state carries no elastic energy in the links and starts every equilibrium.
+
+Motions that joints and locked motors leave, and constraints that depend on each other, follow from the rank of
+A = ∂C/∂z; flexible links taken as rigid,
+
+    mobility = unknowns − rank A,     redundancy = rows − rank A.
+
+Motions without effect (a two-ball link spinning about itself) count as mobility, dependent equations (a planar loop
+of spatial hinges) as redundancy.
+
+Springs are potentials V(z). Along the null space N of A they have the slope and the curvature
+
+    Nᵀ ∂V/∂z,     Nᵀ (∂²V/∂z² − Σ λ_k ∂²C_k/∂z²) N,     Aᵀλ = ∂V/∂z,
+
+and hold the motions along which this curvature is not zero. The others are the zero-energy modes. In an assembly
+the energy of springs is least, by Newton steps with the absolute eigenvalues of the curvature, which descend.
+
+Where flexible links are bent, but move as rigid bodies, a link with the velocity v of a point x₀ and the spin ω takes
+its bodies along:
+
+    ẋ_i = v + ω × (x_i − x₀),     ṙ_i = (∂r/∂ω)(r_i) ω,     A ż = 0.
 """
 
 from __future__ import annotations
@@ -15,78 +35,36 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import breadth_first_order
 
 from fenicsmech.errors import AssemblyError
 from fenicsmech.mechanism import Configuration
-from fenicsmech.multibody.constraints import JointSystem
-from fenicsmech.multibody.linkage import Linkage
-from fenicsmech.multibody.mobility import SpringPotential, free_motions
+from fenicsmech.multibody.linkage import JointSystem, Linkage, PosePotential
 
-
-@dataclass(frozen=True)
-class AssemblyOptions:
-    """Steps and tolerances of the assembly; lengths are in those of the mechanism, angles in rad.
-
-    Attributes:
-        closed: largest scaled constraint residual of a closed assembly: some hundred roundings.
-        largest_step: motor motion in one step; far below the turns at which a loop has several assemblies.
-        smallest_step: part of the first step at which the motion ends: motors strain the mechanism there.
-        stray: largest distance from the extrapolation, over the motion in the step, on one branch.
-        relaxed: length of a step towards least energy of springs at which such steps end: rounding.
-        largest_turn: of such a step, within which the energy is about quadratic.
-        curved: part of the largest curvature above which a free motion counts as held by springs.
-        before_strain: fraction of the strain-free motion at which ``assemble_before_strain`` ends.
-    """
-
-    closed: float = 1e-13
-    largest_step: float = 0.1
-    smallest_step: float = 1e-4
-    stray: float = 0.2
-    relaxed: float = 1e-14
-    largest_turn: float = 0.3
-    curved: float = 1e-9
-    before_strain: float = 0.98
-
-
-_DEFAULT = AssemblyOptions()
+_RANK = 1e-9  # singular values of A below this are zero: rows and unknowns are scaled to one
 
 
 @dataclass(frozen=True)
 class Assembly:
-    """Poses of all bodies in a configuration.
+    """``poses`` of all bodies in a configuration, (bodies, pose_size).
 
-    Attributes:
-        poses: (bodies, pose_size).
-        fraction: fraction of the motor motion possible without deforming flexible links; 1 unless the motors strain
-            the mechanism.
+    ``fraction`` of the motor motion is possible without deforming flexible links; 1 unless motors strain the mechanism.
     """
 
     poses: np.ndarray
     fraction: float
 
 
-def assemble(
-    linkage: Linkage,
-    configuration: Configuration,
-    springs: Sequence[SpringPotential] = (),
-    options: AssemblyOptions = _DEFAULT,
-) -> Assembly:
-    """The rigid assembly of ``configuration``.
-
-    If the motion strains flexible links, the assembly stops at the last position free of strain.
-
-    Args:
-        linkage: bodies and constraints.
-        configuration: motor positions.
-        springs: their potentials.
-        options: steps and tolerances.
+def assemble(linkage: Linkage, configuration: Configuration, springs: Sequence[PosePotential] = ()) -> Assembly:
+    """The rigid assembly of ``configuration``; it stops at the last position free of strain of flexible links.
 
     Raises:
         AssemblyError: a loop does not close even with freely deformable links.
     """
-    poses, fraction, _ = _Assembler(linkage.rigid, springs, options).follow(configuration)
+    poses, fraction, _ = _Assembler(linkage.rigid, springs).follow(configuration)
     if fraction < 1.0:
-        _, closing, worst = _Assembler(linkage.joints, (), options).follow(configuration)
+        _, closing, worst = _Assembler(linkage.joints).follow(configuration)
         if closing < 1.0:
             raise AssemblyError(
                 f"configuration {configuration.name!r}",
@@ -98,44 +76,51 @@ def assemble(
 
 
 def assemble_before_strain(
-    linkage: Linkage,
-    configuration: Configuration,
-    springs: Sequence[SpringPotential] = (),
-    options: AssemblyOptions = _DEFAULT,
+    linkage: Linkage, configuration: Configuration, springs: Sequence[PosePotential] = (), *, part: float = 0.98
 ) -> Assembly:
-    """As ``assemble``, but a little before the last position free of strain where motors strain the links.
+    """As ``assemble``, but ``part`` of the way to the last position free of strain where motors strain the links.
 
     That one is a dead centre as a rule, where the tangent is not unique and freedoms count twice.
-
-    Raises:
-        AssemblyError: as ``assemble``.
     """
-    assembly = assemble(linkage, configuration, springs, options)
+    assembly = assemble(linkage, configuration, springs)
     if assembly.fraction == 1.0:
         return assembly
-    fraction = options.before_strain * assembly.fraction
-    poses, _, _ = _Assembler(linkage.rigid, springs, options).follow(configuration, fraction)
+    fraction = part * assembly.fraction
+    poses, _, _ = _Assembler(linkage.rigid, springs).follow(configuration, fraction)
     return Assembly(poses, fraction)
 
 
 @dataclass(frozen=True)
 class _Assembler:
-    """Moves the motors of one set of constraints."""
+    """Motion of the motors of one set of constraints; lengths are in that of the mechanism, angles in rad.
+
+    Attributes:
+        closed: largest scaled constraint residual of a closed assembly: some hundred roundings.
+        largest_step: motor motion in one step; far below the turns at which a loop has several assemblies.
+        smallest_step: part of the first step at which the motion ends: motors strain the mechanism there.
+        deviation: largest distance from the extrapolation, over the motion in the step, on one branch.
+        relaxed: length of a step towards least energy of springs at which such steps end: rounding.
+        largest_turn: of such a step, within which the energy is about quadratic.
+        curved: part of the largest curvature above which a free motion counts as held by springs.
+    """
 
     system: JointSystem
-    springs: Sequence[SpringPotential]
-    options: AssemblyOptions
+    springs: Sequence[PosePotential] = ()
+    closed: float = 1e-13
+    largest_step: float = 0.1
+    smallest_step: float = 1e-4
+    deviation: float = 0.2
+    relaxed: float = 1e-14
+    largest_turn: float = 0.3
+    curved: float = 1e-9
 
     def follow(self, configuration: Configuration, part: float = 1.0) -> tuple[np.ndarray, float, int]:
-        """Moves the motors ``part`` of the way to ``configuration``.
-
-        Returns:
-            Poses, the fraction reached, and the row with the largest residual where the motion ends early.
-        """
-        system, options = self.system, self.options
+        """Poses ``part`` of the way to ``configuration``, the fraction reached, and the row with the largest residual
+        where the motion ends early."""
+        system = self.system
         target = part * system.motor_values(configuration.position)
         travel = system.travel(target)
-        largest = 1.0 if travel <= options.largest_step else options.largest_step / travel
+        largest = 1.0 if travel <= self.largest_step else self.largest_step / travel
         poses, residual = self._close(system.drawn, np.zeros_like(target))
         if not self._is_closed(residual):
             return poses, 0.0, int(np.argmax(np.abs(residual)))
@@ -147,15 +132,15 @@ class _Assembler:
             motors = (fraction + step) * target
             trial, residual = self._relax(*self._close(system.with_unknowns(poses, guess), motors), motors)
             there = system.unknowns(trial)
-            astray = np.linalg.norm((there - guess) / system.pose_scale)
-            onward = np.linalg.norm((there - here) / system.pose_scale)
-            shortest = step < options.smallest_step * largest
+            missed = np.linalg.norm((there - guess) / system.pose_scale)
+            moved = np.linalg.norm((there - here) / system.pose_scale)
+            shortest = step < self.smallest_step * largest
             if not self._is_closed(residual):
                 worst = int(np.argmax(np.abs(residual)))
                 if shortest:
                     return poses, fraction, worst
                 step *= 0.5
-            elif last_step > 0.0 and astray > options.stray * onward and not shortest:
+            elif last_step > 0.0 and missed > self.deviation * moved and not shortest:
                 step *= 0.5
             else:
                 before, poses, last_step = poses, trial, step
@@ -164,7 +149,7 @@ class _Assembler:
         return poses, 1.0, worst
 
     def _is_closed(self, residual: np.ndarray) -> bool:
-        return np.max(np.abs(residual), initial=0.0) <= self.options.closed
+        return np.max(np.abs(residual), initial=0.0) <= self.closed
 
     def _close(self, poses: np.ndarray, motors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Gauss–Newton from ``poses``; returns the best poses and their scaled residual."""
@@ -173,7 +158,7 @@ class _Assembler:
         for _ in range(25):
             if np.max(np.abs(residual), initial=0.0) <= 1e-15 or not system.rows:
                 break
-            scaled = system.row_scale[:, None] * system.gradient(poses, motors) * system.pose_scale
+            scaled = system.scaled_gradient(poses, motors)
             step = system.pose_scale * np.linalg.lstsq(scaled, -residual, rcond=1e-10)[0]
             trial = system.with_unknowns(poses, system.unknowns(poses) + step)
             new = system.row_scale * system.value(trial, motors)
@@ -184,18 +169,18 @@ class _Assembler:
 
     def _relax(self, poses: np.ndarray, residual: np.ndarray, motors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The closed assembly near ``poses`` where the energy of springs is least, and its residual."""
-        system, options = self.system, self.options
+        system = self.system
         for _ in range(30 if self.springs else 0):
             if not self._is_closed(residual):
                 break
             free = free_motions(system, poses, motors, self.springs)
             stiffness, modes = np.linalg.eigh(free.curvature)
-            kept = np.abs(stiffness) > options.curved * np.max(np.abs(stiffness), initial=0.0)
+            kept = np.abs(stiffness) > self.curved * np.max(np.abs(stiffness), initial=0.0)
             step = -((modes.T @ free.slope)[kept] / np.abs(stiffness[kept])) @ modes[:, kept].T @ free.motions
             size = float(np.max(np.abs(step), initial=0.0))
-            if size <= options.relaxed:
+            if size <= self.relaxed:
                 break
-            moved = system.unknowns(poses) + system.pose_scale * step * min(1.0, options.largest_turn / size)
+            moved = system.unknowns(poses) + system.pose_scale * step * min(1.0, self.largest_turn / size)
             trial, missed = self._close(system.with_unknowns(poses, moved), motors)
             if not self._is_closed(missed):
                 break
@@ -209,15 +194,156 @@ def _loop(system: JointSystem, row: int) -> str:
     closing = next((c for c in system.connections if c.name == name), None)
     if closing is None:
         return name
-    paths = {closing.a: [closing.a]}
-    frontier = [closing.a]
-    while frontier and closing.b not in paths:
-        body = frontier.pop(0)
-        for c in system.connections:
-            if c is not closing and body in (c.a, c.b):
-                other = c.b if body == c.a else c.a
-                if other not in paths:
-                    paths[other] = [*paths[body], other]
-                    frontier.append(other)
-    links = dict.fromkeys(system.bodies[i].link.name for i in paths.get(closing.b, [closing.a, closing.b]))
+    others = np.array([(c.a, c.b) for c in system.connections if c is not closing], dtype=int).reshape(-1, 2)
+    graph = csr_matrix((np.ones(len(others)), others.T), shape=(len(system.bodies),) * 2)
+    _, previous = breadth_first_order(graph, closing.a, directed=False)
+    path = [closing.b]
+    while previous[path[-1]] >= 0:
+        path.append(previous[path[-1]])
+    links = dict.fromkeys(system.bodies[i].link.name for i in (closing.a, *reversed(path)))
     return f"{name!r} ({' – '.join(links)})"
+
+
+@dataclass(frozen=True)
+class FreeMotions:
+    """Slope (n,) and curvature (n, n) of the potential of springs along the motions N that joints and motors leave.
+
+    ``motions`` are orthonormal rows, (n, size), in units of ``JointSystem.pose_scale``.
+    """
+
+    motions: np.ndarray
+    slope: np.ndarray
+    curvature: np.ndarray
+
+
+def free_motions(
+    system: JointSystem, poses: np.ndarray, motors: np.ndarray, springs: Sequence[PosePotential]
+) -> FreeMotions:
+    """Slope and curvature of all ``springs`` at ``poses`` (bodies, pose_size), motors at ``motors``."""
+    scale, size = system.pose_scale, system.space.pose_size
+    scaled = system.scaled_gradient(poses, motors)
+    motions = _null_space(scaled)
+    slope, curvature = np.zeros(system.size), np.zeros((system.size, system.size))
+    for spring in springs:
+        # fixed bodies have no columns
+        own = np.repeat([body in system.columns for body in spring.bodies], size)
+        columns = [column for body in spring.bodies for column in system.columns.get(body, ())]
+        slope[columns] += spring.gradient(poses)[own]
+        curvature[np.ix_(columns, columns)] += spring.hessian(poses)[np.ix_(own, own)]
+    multipliers = system.row_scale * np.linalg.lstsq(scaled.T, scale * slope, rcond=_RANK)[0]
+    for rows, columns, block in system.hessian_blocks(poses, motors, multipliers):
+        curvature[np.ix_(rows, columns)] -= block
+    along = motions @ (curvature * np.outer(scale, scale)) @ motions.T
+    return FreeMotions(motions, motions @ (scale * slope), 0.5 * (along + along.T))
+
+
+@dataclass(frozen=True)
+class Freedom:
+    """Mobility and redundancy of one configuration.
+
+    Attributes:
+        mobility: number of free directions left.
+        mobile: names of the links that can move.
+        zero_energy: names of the links that move in zero-energy modes; empty if springs hold all.
+        redundancy: number of dependent constraint equations.
+        redundant: names of the joints whose equations depend on each other.
+    """
+
+    mobility: int
+    mobile: tuple[str, ...]
+    zero_energy: tuple[str, ...]
+    redundancy: int
+    redundant: tuple[str, ...]
+
+
+def count_freedom(
+    system: JointSystem, poses: np.ndarray, motors: np.ndarray, springs: Sequence[PosePotential] = ()
+) -> Freedom:
+    """Mobility and redundancy at ``poses`` (bodies, pose_size), motors at ``motors`` (connections,)."""
+    dependent = _null_space(system.scaled_gradient(poses, motors).T)
+    free = free_motions(system, poses, motors, springs)
+    curvatures, modes = np.linalg.eigh(free.curvature)
+    # along these the curvature is that of rounding, beside that of the stiffest motion
+    flat = np.abs(curvatures) <= 1e-12 * np.max(np.abs(curvatures), initial=0.0)
+
+    def moving(motions: np.ndarray) -> tuple[str, ...]:
+        moves = _takes_part(motions)
+        names = [system.bodies[body].link.name for body in system.free_bodies if moves[system.columns[body]].any()]
+        return tuple(dict.fromkeys(names))
+
+    return Freedom(
+        mobility=len(free.motions),
+        mobile=moving(free.motions),
+        zero_energy=moving(modes[:, flat].T @ free.motions),
+        redundancy=len(dependent),
+        redundant=tuple(dict.fromkeys(np.array(system.row_names)[_takes_part(dependent)].tolist())),
+    )
+
+
+def is_held(system: JointSystem, poses: np.ndarray, motors: np.ndarray, rate: np.ndarray, rows: np.ndarray) -> bool:
+    """Whether a function of the poses with the gradient ``rate`` (size,) is constant in every motion that the
+    constraints ``rows`` leave."""
+    scaled = system.scaled_gradient(poses, motors)[rows]
+    wanted = rate * system.pose_scale
+    left = wanted - scaled.T @ np.linalg.lstsq(scaled.T, wanted, rcond=_RANK)[0]
+    return bool(np.linalg.norm(left) <= _RANK * np.linalg.norm(wanted))
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Velocities of the pose unknowns ``z`` (size,), of bodies' centres (bodies, dim), and spins (bodies, 1 or 3)."""
+
+    z: np.ndarray
+    velocity: np.ndarray
+    spin: np.ndarray
+
+    def at(self, body: int, offsets: np.ndarray) -> np.ndarray:
+        """Velocities of points at ``offsets`` (n, dim) from the centre of a body, as placed now."""
+        return self.velocity[body] + _cross(self.spin[body], offsets)
+
+    def fastest(self, length: float) -> float:
+        """The largest velocity of a body's centre, or of a point at the distance ``length`` from it."""
+        spins = np.linalg.norm(self.spin, axis=1) * length
+        return float(max(np.max(np.linalg.norm(self.velocity, axis=1)), np.max(spins)))
+
+
+def stiff_motions(linkage: Linkage, poses: np.ndarray, motors: np.ndarray) -> list[Motion]:
+    """A basis of the motions that keep joints closed at ``poses`` (bodies, pose_size) and deform no link.
+
+    Velocities are of the order of the mechanism's length or below, spins of the order of one.
+    """
+    joints, dim, space = linkage.joints, linkage.dim, linkage.joints.space
+    rigid = [i for i, body in enumerate(linkage.bodies) if body.region is None and not body.fixed]
+    places = np.array([body.centre for body in linkage.bodies]) + poses[:, :dim]
+    turns = space.freedoms - dim
+    basis = []
+    for bodies in [*((i,) for i in rigid), *linkage.interfaces.values()]:
+        for direction in np.diag([linkage.length] * dim + [1.0] * turns):
+            slide, turn = direction[:dim], direction[dim:]
+            z, velocity, spin = np.zeros(joints.size), np.zeros((len(poses), dim)), np.zeros((len(poses), turns))
+            for body in bodies:
+                spin[body] = turn
+                velocity[body] = slide + _cross(turn, (places[body] - places[bodies[0]])[None])[0]
+                z[joints.columns[body]] = np.concatenate([velocity[body], space.rotation_rates(poses[body]) @ turn])
+            basis.append((z, velocity, spin))
+    parts = [np.array(part) for part in zip(*basis, strict=True)]
+    rates = joints.row_scale[:, None] * (joints.gradient(poses, motors) @ parts[0].T)
+    return [Motion(*(np.tensordot(weights, part, 1) for part in parts)) for weights in _null_space(rates)]
+
+
+def _null_space(matrix: np.ndarray) -> np.ndarray:
+    """Orthonormal rows that span the null space of a matrix whose rows and unknowns are scaled to one."""
+    _, values, right = np.linalg.svd(matrix, full_matrices=True)
+    return right[int(np.sum(values > _RANK)) :]
+
+
+def _takes_part(vectors: np.ndarray) -> np.ndarray:
+    """Which entries of any of some unit vectors, (n, size), are beyond rounding."""
+    return (np.abs(vectors) > 1e-6).any(axis=0)
+
+
+def _cross(spin: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+    """ω × ``offsets`` (n, dim)."""
+    if len(spin) == 1:
+        return spin[0] * np.column_stack([-offsets[:, 1], offsets[:, 0]])
+    return np.cross(spin, offsets)

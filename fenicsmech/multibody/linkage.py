@@ -1,14 +1,219 @@
-"""Bodies and constraints of a described mechanism."""
+"""Bodies and constraints of a described mechanism: C(z), A = ∂C/∂z, Σ λ_k ∂²C_k/∂z²; potentials of poses.
+
+Bodies are the rigid links and the interfaces of flexible ones. Rows: the connections in order (a motor's row last in
+its connection), then the norm constraints of the unfixed bodies. Columns: the poses of the unfixed bodies in order.
+Fixed bodies carry no columns.
+"""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from fenicsmech.joints import WELD, free_coordinate
-from fenicsmech.mechanism import FlexibleLink, Joint, Link, Mechanism, in_dimension, same_place
-from fenicsmech.multibody.constraints import Body, Connection, JointSystem
+from fenicsmech.joints import RIGID_SPACES, WELD, JointKind, constraint, free_coordinate
+from fenicsmech.mechanism import (
+    Effect,
+    FlexibleLink,
+    Joint,
+    Link,
+    Mechanism,
+    Motor,
+    Region,
+    in_dimension,
+    same_place,
+)
+from fenicsmech.multibody.points import BodyPoint
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid link, or one interface of a flexible link, with the reference centre c of its pose.
+
+    Its ``name``, for messages, is that of the rigid link, or of the first joint that an interface belongs to.
+    Interfaces have a ``region`` around an ``axis``. What is ``fixed`` never moves and carries no unknowns.
+    """
+
+    name: str
+    link: Link
+    centre: tuple[float, ...]
+    fixed: bool
+    region: Region | None = None
+    axis: tuple[float, ...] = (0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Connection:
+    """One joint between body ``a`` and body ``b`` (indices), drawn at ``at`` with unit vectors ``triad`` (rows)."""
+
+    name: str
+    kind: JointKind
+    a: int
+    b: int
+    at: tuple[float, ...]
+    triad: tuple[tuple[float, ...], ...]
+    motor: Motor | None = None
+
+    def drawn(self, bodies: Sequence[Body]) -> np.ndarray:
+        """The constants of the connection's equations: ``at`` from the centres of both bodies, then the triad."""
+        anchors = np.array(self.at) - np.array([bodies[self.a].centre, bodies[self.b].centre])
+        return np.concatenate([anchors.ravel(), np.ravel(self.triad)])
+
+
+class JointSystem:
+    """Constraints of ``connections`` between ``bodies`` in ``dim`` dimensions; ``length`` scales positions.
+
+    Attributes:
+        size: number of pose unknowns.
+        rows: number of constraints.
+        pose_scale: typical size of each pose unknown (``length`` or 1), (size,).
+        row_scale: factors that make each constraint dimensionless and of unit gradient as drawn, (rows,).
+    """
+
+    def __init__(self, bodies: Sequence[Body], connections: Sequence[Connection], *, dim: int, length: float) -> None:
+        self.bodies, self.connections, self.length = tuple(bodies), tuple(connections), length
+        self.space = RIGID_SPACES[dim]
+        self._constraints = [constraint(c.kind, dim, c.motor is not None) for c in self.connections]
+        self._drawn = [c.drawn(self.bodies) for c in self.connections]
+
+        pose_size = self.space.pose_size
+        # both bodies of each connection, with the places of their poses among the variables of its equations
+        first, second = slice(0, pose_size), slice(pose_size, 2 * pose_size)
+        self._ends = [((c.a, first), (c.b, second)) for c in self.connections]
+        self.free_bodies = [i for i, body in enumerate(self.bodies) if not body.fixed]
+        self.columns = {body: np.arange(pose_size) + pose_size * k for k, body in enumerate(self.free_bodies)}
+        self.size = pose_size * len(self.free_bodies)
+        norms = len(self.space.norm_residual(self.space.identity))
+        names = [(c.name, equations.size) for c, equations in zip(self.connections, self._constraints, strict=True)]
+        names += [(f"norm of {self.bodies[i].name}", norms) for i in self.free_bodies]
+        self.row_names = [name for name, count in names for _ in range(count)]
+        self.rows = len(self.row_names)
+        ends = np.cumsum([count for _, count in names], dtype=int)
+        rows = [np.arange(end - count, end) for end, (_, count) in zip(ends, names, strict=True)]
+        self._joint_rows = rows[: len(self.connections)]
+        self._norm_rows = dict(zip(self.free_bodies, rows[len(self.connections) :], strict=True))
+        own = zip(self.connections, self._joint_rows, strict=True)
+        self.motor_rows = {c.motor: int(rows[-1]) for c, rows in own if c.motor is not None}
+
+        one = np.concatenate([np.full(dim, length), np.ones(self.space.rotation_size)])
+        self.pose_scale = np.tile(one, len(self.free_bodies))
+        as_drawn = self.gradient(self.drawn, np.zeros(len(self.connections))) * self.pose_scale
+        norm = np.linalg.norm(as_drawn, axis=1)
+        self.row_scale = 1.0 / np.where(norm > 0.0, norm, 1.0)
+
+    @property
+    def drawn(self) -> np.ndarray:
+        """Poses of all bodies as drawn, (bodies, pose_size)."""
+        return np.tile(self.space.identity, (len(self.bodies), 1))
+
+    def motor_values(self, positions) -> np.ndarray:
+        """φ per connection from ``positions``, a function of a motor; 0 where there is none."""
+        return np.array([0.0 if c.motor is None else positions(c.motor) for c in self.connections])
+
+    def unknowns(self, poses: np.ndarray) -> np.ndarray:
+        """The pose unknowns z of the free bodies, (size,)."""
+        return poses[self.free_bodies].ravel()
+
+    def with_unknowns(self, poses: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """``poses`` with those of the free bodies replaced by ``z`` (size,), put back on the rotations."""
+        moved = poses.copy()
+        moved[self.free_bodies] = self.space.retract(z.reshape(-1, self.space.pose_size))
+        return moved
+
+    def travel(self, motors: np.ndarray) -> float:
+        """The largest of ``motors`` (values per connection): rad, or travel over the mechanism's length."""
+        scale = [self.length if connection.kind.sliding else 1.0 for connection in self.connections]
+        return float(np.max(np.abs(motors / np.array(scale)), initial=0.0))
+
+    def value(self, poses: np.ndarray, motors: np.ndarray) -> np.ndarray:
+        """C, (rows,)."""
+        residual = np.empty(self.rows)
+        for k, rows in enumerate(self._joint_rows):
+            residual[rows] = self._constraints[k].value(*self._arguments(k, poses, motors))
+        for body, rows in self._norm_rows.items():
+            residual[rows] = self.space.norm_residual(poses[body])
+        if self.space.dim == 3:
+            # products of unit vectors and quaternions: their rounding of some ε would outweigh the smallest loads
+            residual[np.abs(self.row_scale * residual) <= 4.0 * np.finfo(float).eps] = 0.0
+        return residual
+
+    def gradient(self, poses: np.ndarray, motors: np.ndarray) -> np.ndarray:
+        """A, (rows, size)."""
+        matrix = np.zeros((self.rows, self.size))
+        for rows, columns, block in self.gradient_blocks(poses, motors):
+            matrix[np.ix_(rows, columns)] += block
+        return matrix
+
+    def scaled_gradient(self, poses: np.ndarray, motors: np.ndarray) -> np.ndarray:
+        """A in units of ``pose_scale``, rows of the order of one."""
+        return self.row_scale[:, None] * self.gradient(poses, motors) * self.pose_scale
+
+    def gradient_blocks(self, poses: np.ndarray, motors: np.ndarray):
+        """A as (rows, columns, block) triples; which blocks there are never changes."""
+        for k, (ends, rows) in enumerate(zip(self._ends, self._joint_rows, strict=True)):
+            both = self._constraints[k].gradient(*self._arguments(k, poses, motors))
+            for body, own in ends:
+                if body in self.columns:
+                    yield rows, self.columns[body], both[:, own]
+        for body, rows in self._norm_rows.items():
+            yield rows, self.columns[body], self.space.norm_gradient(poses[body])
+
+    def hessian_blocks(self, poses: np.ndarray, motors: np.ndarray, multipliers: np.ndarray):
+        """Σ λ_k ∂²C_k/∂z² as (columns, columns, block) triples; which blocks there are never changes."""
+        for k, (ends, rows) in enumerate(zip(self._ends, self._joint_rows, strict=True)):
+            both = self._constraints[k].hessian(*self._arguments(k, poses, motors), multipliers[rows])
+            for i, own_i in ends:
+                for j, own_j in ends:
+                    if i in self.columns and j in self.columns:
+                        yield self.columns[i], self.columns[j], both[own_i, own_j]
+        for body, rows in self._norm_rows.items():
+            curvature = np.einsum("k,kij->ij", multipliers[rows], self.space.norm_hessian())
+            yield self.columns[body], self.columns[body], curvature
+
+    def generalised_force(
+        self, k: int, body: int, poses: np.ndarray, motors: np.ndarray, multipliers: np.ndarray
+    ) -> np.ndarray:
+        """Generalised force Aᵀλ of connection ``k`` on the pose of ``body``, (pose_size,)."""
+        both = self._constraints[k].gradient(*self._arguments(k, poses, motors))
+        return both[:, dict(self._ends[k])[body]].T @ multipliers[self._joint_rows[k]]
+
+    def generalised_force_slopes(
+        self, k: int, body: int, poses: np.ndarray, motors: np.ndarray, multipliers: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of ``generalised_force`` by z, (pose_size, size), and by λ, (pose_size, rows)."""
+        arguments, rows, own = self._arguments(k, poses, motors), self._joint_rows[k], dict(self._ends[k])[body]
+        curvature = self._constraints[k].hessian(*arguments, multipliers[rows])[own]
+        by_poses, by_multipliers = np.zeros((len(curvature), self.size)), np.zeros((len(curvature), self.rows))
+        for other, place in self._ends[k]:
+            if other in self.columns:
+                by_poses[:, self.columns[other]] += curvature[:, place]
+        by_multipliers[:, rows] = self._constraints[k].gradient(*arguments)[:, own].T
+        return by_poses, by_multipliers
+
+    def motor_rate(
+        self, poses: np.ndarray, motors: np.ndarray, multipliers: np.ndarray, direction: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """∂C/∂φ (rows,) and ∂(Aᵀλ)/∂φ (size,), times ``direction`` (per connection)."""
+        rate, force_rate = np.zeros(self.rows), np.zeros(self.size)
+        for k in np.flatnonzero(direction):
+            if self.connections[k].motor is None:
+                continue
+            # φ is the last variable of the connection's equations
+            arguments, rows = self._arguments(k, poses, motors), self._joint_rows[k]
+            rate[rows] = self._constraints[k].gradient(*arguments)[:, -1] * direction[k]
+            mixed = self._constraints[k].hessian(*arguments, multipliers[rows])[-1] * direction[k]
+            for body, own in self._ends[k]:
+                if body in self.columns:
+                    force_rate[self.columns[body]] += mixed[own]
+        return rate, force_rate
+
+    def _arguments(self, k: int, poses: np.ndarray, motors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Variables and constants of the equations of connection ``k``."""
+        c = self.connections[k]
+        motor = [] if c.motor is None else [motors[k : k + 1]]
+        return np.concatenate([poses[c.a], poses[c.b], *motor]), self._drawn[k]
 
 
 @dataclass(frozen=True)
@@ -34,6 +239,54 @@ class Linkage:
     def body_of(self, link: Link) -> int:
         """Index of the body that carries ``link``: itself if rigid, its first interface if flexible."""
         return next(i for i, body in enumerate(self.bodies) if body.link == link)
+
+    def point(self, link: Link, at: Sequence[float]) -> BodyPoint:
+        """The point drawn at ``at``, of two or three coordinates, that moves with the body that carries ``link``."""
+        body = self.body_of(link)
+        return BodyPoint(body, np.array(in_dimension(at, self.dim)) - self.bodies[body].centre, self.joints.space)
+
+    def turns_about_z(self, body: int) -> bool:
+        """Whether all joints of a body stay closed while it alone turns about the parallel to z through its centre.
+
+        Motors do not count: they drive a freedom that the joint has.
+        """
+        joints, motors = self.joints, np.zeros(len(self.joints.connections))
+        for spin in (0.3, 1.0, -2.0):  # several, since a single angle may close a joint by chance
+            poses = joints.drawn
+            poses[body, self.dim :] += joints.space.rotation_rates(poses[body])[:, -1] * spin
+            residual = joints.row_scale * joints.value(joints.space.retract(poses), motors)
+            if np.any(np.abs(np.delete(residual, list(joints.motor_rows.values()))) > 1e-12):
+                return False
+        return True
+
+
+class PosePotential(ABC):
+    """A potential V(z) of the poses of a few bodies.
+
+    Attributes:
+        bodies: indices of the bodies.
+        holds: whether it acts in full from the start, as springs do, instead of growing with the load factor.
+    """
+
+    bodies: tuple[int, ...]
+    holds: bool = False
+
+    @abstractmethod
+    def value(self, poses: np.ndarray) -> float:
+        """V; ``poses`` are those of all bodies, (bodies, pose_size)."""
+
+    @abstractmethod
+    def gradient(self, poses: np.ndarray) -> np.ndarray:
+        """∂V/∂z of ``bodies``, one after the other, (n · pose_size,)."""
+
+    @abstractmethod
+    def hessian(self, poses: np.ndarray) -> np.ndarray:
+        """∂²V/∂z², (n · pose_size, n · pose_size)."""
+
+
+def spring_potentials(effects: Sequence[Effect], linkage: Linkage) -> tuple[PosePotential, ...]:
+    """The potentials of ``effects`` that act in full from the start."""
+    return tuple(found for effect in effects for found in effect.pose_potentials(linkage) if found.holds)
 
 
 class JointCoordinate:
@@ -67,40 +320,35 @@ class JointCoordinate:
 
 def build_linkage(mechanism: Mechanism, dim: int) -> Linkage:
     """The bodies and constraints of ``mechanism`` in ``dim`` dimensions."""
-    bodies = [Body(link.name, link, _centre(mechanism, link, dim), link.fixed) for link in mechanism.rigid_links]
-    length = mechanism.length
-    interfaces: dict[FlexibleLink, tuple[int, ...]] = {}
-    for link in mechanism.flexible_links:
-        first = len(bodies)
-        for joint in mechanism.joints:
-            known = any(same_place(body.centre, joint.at, dim=dim, length=length) for body in bodies[first:])
-            if link in (joint.a, joint.b) and not known:
-                region = joint.regions[(joint.a, joint.b).index(link)]
-                axis = joint.axis if joint.kind.pin_along_axis else (0.0, 0.0, 1.0)
-                at = in_dimension(joint.at, dim)
-                bodies.append(Body(joint.name, link, at, False, region, axis))
-        interfaces[link] = tuple(range(first, len(bodies)))
+    length, joints = mechanism.length, mechanism.joints
+    bodies: list[Body] = []
+    for link in mechanism.rigid_links:
+        places = [in_dimension(joint.at, dim) for joint in joints if link in (joint.a, joint.b)]
+        centre = tuple(np.mean(places, axis=0)) if places else (0.0,) * dim
+        bodies.append(Body(link.name, link, centre, link.fixed))
 
     def body(joint: Joint, link: Link) -> int:
-        return next(
-            i
-            for i, body in enumerate(bodies)
-            if body.link == link and (body.region is None or same_place(body.centre, joint.at, dim=dim, length=length))
-        )
+        """The body of ``link`` that a joint is on, −1 if there is none yet."""
+        for i, known in enumerate(bodies):
+            here = known.region is None or same_place(known.centre, joint.at, dim=dim, length=length)
+            if known.link == link and here:
+                return i
+        return -1
 
+    interfaces: dict[FlexibleLink, tuple[int, ...]] = {}
+    for flexible in mechanism.flexible_links:
+        first = len(bodies)
+        for joint in joints:
+            if flexible in (joint.a, joint.b) and body(joint, flexible) < 0:
+                region = joint.regions[(joint.a, joint.b).index(flexible)]
+                axis = joint.axis if joint.kind.pin_along_axis else (0.0, 0.0, 1.0)
+                bodies.append(Body(joint.name, flexible, in_dimension(joint.at, dim), False, region, axis))
+        interfaces[flexible] = tuple(range(first, len(bodies)))
     driven = {motor.joint: motor for motor in mechanism.motors}
-    connections = [
-        Connection(
-            joint.name,
-            joint.kind,
-            body(joint, joint.a),
-            body(joint, joint.b),
-            in_dimension(joint.at, dim),
-            _triad(joint, dim),
-            driven.get(joint),
-        )
-        for joint in mechanism.joints
-    ]
+    connections = []
+    for joint in joints:
+        a, b, at = body(joint, joint.a), body(joint, joint.b), in_dimension(joint.at, dim)
+        connections.append(Connection(joint.name, joint.kind, a, b, at, _triad(joint, dim), driven.get(joint)))
     identity = tuple(map(tuple, np.eye(dim)))
     welds = [
         Connection(f"link {link.name!r}", WELD, group[0], other, bodies[other].centre, identity)
@@ -108,18 +356,13 @@ def build_linkage(mechanism: Mechanism, dim: int) -> Linkage:
         for other in group[1:]
     ]
     return Linkage(
-        dim=dim,
-        length=length,
-        bodies=tuple(bodies),
-        interfaces=interfaces,
+        dim,
+        length,
+        tuple(bodies),
+        interfaces,
         joints=JointSystem(bodies, connections, dim=dim, length=length),
         rigid=JointSystem(bodies, [*connections, *welds], dim=dim, length=length),
     )
-
-
-def _centre(mechanism: Mechanism, link: Link, dim: int) -> tuple[float, ...]:
-    places = [in_dimension(joint.at, dim) for joint in mechanism.joints if link in (joint.a, joint.b)]
-    return tuple(np.mean(places, axis=0)) if places else (0.0,) * dim
 
 
 def _triad(joint: Joint, dim: int) -> tuple[tuple[float, ...], ...]:

@@ -1,41 +1,153 @@
-"""Material points that forces act on and displacements are read from.
+"""Nodes and material points as functions of body poses, nodal displacements and the design.
+
+Interface nodes follow body poses, with the pose (t, R) and the centre c of a body and the node X_i at rest:
+
+    u_i = t + (R − I)(X_i − c).
+
+All nodes of the cells in an interface are eliminated from the unknowns; each follows the pose of its body. Where bodies
+move in the plane while the mesh is one half of the links in space, that is u_z = 0, as it is on the mid-plane z = 0.
+
+Rest positions of all nodes follow the design field d, d_i = Σ_k N_k(X_i) d_k.
+
+Material points that forces act on and displacements are read from:
 
     on a rigid link:     u(z) = t + (R − I)(P − c)
     on a flexible link:  u = Σ_i N_i(P) u_i
 
-with the pose (t, R) and the centre c of a body, and the shape functions N_i of the cell that holds P.
+with the shape functions N_i of the cell that holds P, or their averages over a region.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from itertools import combinations, product
+from itertools import combinations
 
+import basix
 import numpy as np
 from dolfinx import fem
+from scipy.sparse import csr_matrix
 
+from fenicsmech.compat import add_ghosts, cell_dofs, interpolation_matrix, owned_values
 from fenicsmech.errors import DescriptionError
 from fenicsmech.joints import RigidSpace
+from fenicsmech.meshing import on_mid_plane
 
 
-class MaterialPoint(ABC):
-    """A point that moves with the mechanism."""
+class InterfaceMap:
+    """The nodes of each interface body on this rank.
 
-    @abstractmethod
-    def displacement(self, u: fem.Function, poses: np.ndarray) -> np.ndarray:
-        """Displacement from the drawn configuration, (dim,)."""
+    Args:
+        u: displacement field, whose local nodes are ``drawn`` at (nodes, dim).
+        cell_body: index of the body each local cell belongs to, −1 if it is free, (cells,).
+        centres: reference centre of every body, (bodies, dim).
+        space: rigid-body coordinates.
+
+    Attributes:
+        body: body of every local node of u, −1 if free, (owned + ghost nodes,); the same on all ranks.
+        owned: number of owned nodes.
+        block: displacements per node.
+        unknown: whether each owned displacement is an unknown, (owned nodes, block).
+        nodes: local eliminated nodes, owned and ghost, per body.
+        offsets: X_i − c of these nodes.
+    """
+
+    def __init__(
+        self, u: fem.Function, drawn: np.ndarray, cell_body: np.ndarray, centres: np.ndarray, space: RigidSpace
+    ) -> None:
+        self.space, self._u, self._cell_body, self._centres = space, u, cell_body, centres
+        V = u.function_space
+        self.block, self.owned = V.dofmap.index_map_bs, V.dofmap.index_map.size_local
+        self.body = self._body_of_nodes()
+        self.nodes = {int(b): np.flatnonzero(self.body == b) for b in np.unique(self.body[self.body >= 0])}
+        self._drawn = {b: drawn[nodes, : space.dim] - centres[b] for b, nodes in self.nodes.items()}
+        self.offsets = dict(self._drawn)
+        self._mid_plane = np.zeros(len(self.body), dtype=bool)
+        if space.dim < self.block:
+            self._mid_plane = on_mid_plane(V.tabulate_dof_coordinates(), V.mesh.comm)
+        self.unknown = np.tile(self.body[: self.owned, None] < 0, self.block)
+        self.unknown[self._mid_plane[: self.owned], space.dim :] = False
+
+    def on(self, u: fem.Function) -> InterfaceMap:
+        """The same interfaces of a field of order 1, whose nodes are vertices."""
+        drawn = u.function_space.tabulate_dof_coordinates()
+        return InterfaceMap(u, drawn, self._cell_body, self._centres, self.space)
+
+    def reshape(self, design: np.ndarray) -> None:
+        """Takes the design at all local nodes, (nodes, dim): added to the drawn positions."""
+        self.offsets = {b: self._drawn[b] + design[nodes, : self.space.dim] for b, nodes in self.nodes.items()}
+
+    def _body_of_nodes(self) -> np.ndarray:
+        """Body of every local node; a node may touch an interface cell only on another rank."""
+        marker = fem.Function(self._u.function_space)
+        local = marker.x.array.reshape(-1, self.block)
+        cells = np.flatnonzero(self._cell_body >= 0)
+        nodes = cell_dofs(self._u.function_space)[cells]
+        local[nodes, 0] = self._cell_body[cells, None] + 1
+        local[nodes, 1] = 1
+        # sums over ranks of (body + 1) and of the number of ranks that marked the node
+        add_ghosts(marker)
+        marker.x.scatter_forward()
+        return np.rint(local[:, 0] / np.maximum(local[:, 1], 1.0)).astype(int) - 1
+
+    def place(self, poses: np.ndarray) -> None:
+        """Sets the eliminated displacements from ``poses`` (bodies, pose_size)."""
+        values, dim = self._u.x.array.reshape(-1, self.block), self.space.dim
+        for body, nodes in self.nodes.items():
+            values[nodes, :dim] = self.space.displace(poses[body], self.offsets[body])
+            values[nodes, dim:] = 0.0
+        values[self._mid_plane, dim:] = 0.0
+
+    def gradient_rows(self, poses: np.ndarray, body: int) -> tuple[np.ndarray, np.ndarray]:
+        """∂u/∂z for the owned nodes of ``body``: local nodes (n,) and (n, dim, pose_size), dim that of the space."""
+        mine = self.nodes[body] < self.owned
+        return self.nodes[body][mine], self.space.displacement_gradient(poses[body], self.offsets[body][mine])
+
+    def moments(self, forces: np.ndarray) -> dict[int, np.ndarray]:
+        """Σ f_i ⊗ (X_i − c) over the owned nodes of each body, from nodal ``forces`` (owned nodes, block)."""
+        moments = {}
+        for body, nodes in self.nodes.items():
+            mine = nodes < self.owned
+            moments[body] = forces[nodes[mine], : self.space.dim].T @ self.offsets[body][mine]
+        return moments
+
+
+class DesignAtNodes:
+    """Interpolation of the vector field ``d`` at the nodes of the Lagrange field ``u`` on the same mesh."""
+
+    def __init__(self, d: fem.Function, u: fem.Function) -> None:
+        coarse, fine = d.function_space, u.function_space
+        self._d, self._at_vertices, self._at_nodes = d, fem.Function(coarse), fem.Function(fine)
+        index, self._dim = coarse.dofmap.index_map, coarse.dofmap.index_map_bs
+        # every component alike
+        weights = interpolation_matrix(coarse, fine)[:: self._dim]
+        vertices = index.local_to_global(np.arange(index.size_local + index.num_ghosts, dtype=np.int32))
+        order = np.argsort(vertices)
+        columns = order[np.searchsorted(vertices[order], weights.indices // self._dim)]
+        self._matrix = csr_matrix((weights.data, columns, weights.indptr), shape=(weights.shape[0], len(vertices)))
+
+    def values(self) -> np.ndarray:
+        """d at all local nodes of u, (nodes, dim)."""
+        owned_values(self._at_nodes)[:] = (self._matrix @ self._d.x.array.reshape(-1, self._dim)).ravel()
+        self._at_nodes.x.scatter_forward()
+        return self._at_nodes.x.array.reshape(-1, self._dim).copy()
+
+    def transpose(self, nodal: np.ndarray) -> np.ndarray:
+        """Nᵀ ``nodal`` ((owned nodes of u, dim)), this rank's owned values on the space of d, flat."""
+        self._at_vertices.x.array[:] = (self._matrix.T @ nodal).ravel()
+        add_ghosts(self._at_vertices)
+        return owned_values(self._at_vertices).copy()
 
 
 @dataclass(frozen=True)
-class BodyPoint(MaterialPoint):
+class BodyPoint:
     """A point at ``offset`` (dim,) from the centre of body ``body``."""
 
     body: int
     offset: np.ndarray
     space: RigidSpace
 
-    def displacement(self, u, poses):
+    def displacement(self, u: fem.Function | None, poses: np.ndarray) -> np.ndarray:
+        """u from the drawn configuration, (dim,)."""
         return self.space.displace(poses[self.body], self.offset[None])[0]
 
     def gradient(self, poses: np.ndarray) -> np.ndarray:
@@ -48,33 +160,22 @@ class BodyPoint(MaterialPoint):
 
 
 @dataclass(frozen=True)
-class LinkPoint(MaterialPoint):
-    """A point in a cell of a flexible link, which one rank owns.
+class LinkPoint:
+    """A point of a flexible link, or the average over a region of it.
 
-    Attributes:
-        owner: rank that holds the cell.
-        nodes: local nodes of the cell on the owner, global nodes are in ``global_nodes``; (n,).
-        global_nodes: the same nodes numbered over all ranks, on every rank, (n,).
-        weights: N_i(P), on every rank, (n,).
+    ``global_nodes`` are numbered over all ranks, ``weights`` are N_i(P), or the averages of N_i, on every rank, (n,).
     """
 
-    owner: int
-    nodes: np.ndarray
     global_nodes: np.ndarray
     weights: np.ndarray
 
-    def displacement(self, u, poses):
-        comm = u.function_space.mesh.comm
-        here = None
-        if comm.rank == self.owner:
-            block = u.function_space.dofmap.index_map_bs
-            here = self.weights @ u.x.array.reshape(-1, block)[self.nodes]
-        return comm.bcast(here, root=self.owner)
-
-
-def body_point(position: np.ndarray, body: int, centre: np.ndarray, space: RigidSpace) -> BodyPoint:
-    """The point drawn at ``position`` on a body."""
-    return BodyPoint(body, np.asarray(position) - np.asarray(centre), space)
+    def displacement(self, u: fem.Function, poses: np.ndarray) -> np.ndarray:
+        """As that of ``BodyPoint``."""
+        V = u.function_space
+        own = self.global_nodes - V.dofmap.index_map.local_range[0]
+        mine = (own >= 0) & (own < V.dofmap.index_map.size_local)
+        here = self.weights[mine] @ u.x.array.reshape(-1, V.dofmap.index_map_bs)[own[mine]]
+        return V.mesh.comm.allreduce(here)
 
 
 def link_point(
@@ -85,7 +186,7 @@ def link_point(
     Args:
         part: for messages.
         position: (dim,).
-        u: displacement field; its order fixes the interpolation.
+        u: displacement field.
         cells: owned cells of the link on this rank.
         vertices: their corner coordinates, (cells, dim + 1, dim).
         bulges: of their edges, pairs of corners in lexical order, (cells, pairs, dim).
@@ -93,23 +194,24 @@ def link_point(
     Raises:
         DescriptionError: the point lies outside the link by more than a hundredth of a cell.
     """
-    comm = u.function_space.mesh.comm
-    dim = len(position)
-    barycentric = _barycentric(position, vertices, bulges) if len(cells) else np.full((1, dim + 1), -np.inf)
+    V, comm, corners = u.function_space, u.function_space.mesh.comm, len(position) + 1
+    barycentric = _barycentric(position, vertices, bulges) if len(cells) else np.full((1, corners), -np.inf)
     k = int(np.argmax(barycentric.min(axis=1)))  # the cell that the point lies deepest in
-    depth, owner = max((depth, -rank) for rank, depth in enumerate(comm.allgather(float(barycentric[k].min()))))
-    owner = -owner
-    if depth < -0.01:
+    depths = comm.allgather(float(barycentric[k].min()))
+    owner = int(np.argmax(depths))
+    if depths[owner] < -0.01:
         raise DescriptionError(
             part, f"the point {tuple(map(float, position))} is not on the link", "Move it onto the link"
         )
-    found, nodes = None, np.zeros(0, dtype=np.int32)
+    found = None
     if comm.rank == owner:
-        V = u.function_space
         nodes = V.dofmap.cell_dofs(cells[k])
-        weights = _lagrange(barycentric[k], V.tabulate_dof_coordinates()[nodes, :dim], vertices[k])
+        order = {corners: 1, corners * (corners + 1) // 2: 2}.get(len(nodes), 3)
+        shape = basix.CellType.triangle if corners == 3 else basix.CellType.tetrahedron
+        element = basix.create_element(basix.ElementFamily.P, shape, order, basix.LagrangeVariant.gll_warped)
+        weights = element.tabulate(0, barycentric[k][None, 1:])[0, 0, :, 0]
         found = (V.dofmap.index_map.local_to_global(nodes.astype(np.int32)), weights)
-    return LinkPoint(owner, nodes, *comm.bcast(found, root=owner))
+    return LinkPoint(*comm.bcast(found, root=owner))
 
 
 def _barycentric(position: np.ndarray, vertices: np.ndarray, bulges: np.ndarray) -> np.ndarray:
@@ -127,13 +229,3 @@ def _barycentric(position: np.ndarray, vertices: np.ndarray, bulges: np.ndarray)
         within = np.clip(found, 0.0, 1.0)  # a cell's map is defined inside it
         found = in_straight_cells(position - np.einsum("ke,ked->kd", 4.0 * within[:, i] * within[:, j], bulges))
     return found
-
-
-def _lagrange(at: np.ndarray, nodes: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Lagrange basis on a simplex at barycentric coordinates ``at``, node positions decide the order."""
-    inverse = np.linalg.inv(np.vstack([corners.T, np.ones(len(corners))]))
-    barycentric = (inverse @ np.vstack([nodes.T, np.ones(len(nodes))])).T
-    order = {len(at): 1, len(at) * (len(at) + 1) // 2: 2}.get(len(nodes), 3)
-    powers = np.array([powers for powers in product(range(order + 1), repeat=len(at)) if sum(powers) == order])
-    vandermonde = np.array([np.prod(point**powers, axis=1) for point in barycentric])
-    return np.linalg.solve(vandermonde.T, np.prod(at**powers, axis=1))

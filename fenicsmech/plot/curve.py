@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,10 +13,9 @@ from matplotlib.lines import Line2D
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fenicsmech.checks import real_array
 from fenicsmech.collective import on_one
-from fenicsmech.errors import DescriptionError
-from fenicsmech.plot.style import INK, MUTED, PALETTE, house_style, new_figure, open_frame, save_png
+from fenicsmech.errors import DescriptionError, real_array, set_fields
+from fenicsmech.plot.page import INK, MUTED, PALETTE, house_style, new_figure, open_frame, save_png
 
 _DASHES = (0, (3.0, 1.6))  # of unstable parts
 _DOTS = (0, (1.0, 1.6))  # of snap-throughs
@@ -46,10 +44,10 @@ class CurveSeries:
         force: (n,) ordinates.
         label: its name in the legend.
         stable: (n,) whether each equilibrium is stable; empty: all are.
-        snapped_through: (n,) whether the mechanism snapped through on the way to each sample; empty: nowhere.
-        joined: draw the line through the samples; False for measurements.
+        snapped_through: (n,) whether the mechanism snapped through on the way to each point; empty: nowhere.
+        joined: draw the line through the points; False for measurements.
         colour: a matplotlib colour; None takes the next of the palette.
-        faint: draw it thin and light behind the others, as a curve of before.
+        faint: draw it thin and light behind the others, as a curve before a change.
         marks: points with a marker.
 
     Raises:
@@ -70,18 +68,14 @@ class CurveSeries:
         part = f"curve '{self.label}'"
         displacement = real_array(f"displacements of {part}", self.displacement, None)
         force = real_array(f"forces of {part}", self.force, len(displacement))
-        stable = np.array(self.stable, dtype=bool) if np.size(self.stable) else np.ones(len(force), bool)
-        snapped = np.zeros(len(force), bool)
-        if np.size(self.snapped_through):
-            snapped = np.array(self.snapped_through, dtype=bool)
-        for what, flags in (("stability", stable), ("snaps", snapped)):
+        set_fields(self, displacement=displacement, force=force)
+        for name, what, absent in (("stable", "stability", True), ("snapped_through", "snaps", False)):
+            given = np.array(getattr(self, name), dtype=bool)
+            flags = given if given.size else np.full(len(force), absent)
             if flags.shape != force.shape:
-                raise DescriptionError(
-                    f"{what} of {part}", f"{flags.size} flags for {force.size} samples", "Give one flag per sample"
-                )
-        checked = {"displacement": displacement, "force": force, "stable": stable, "snapped_through": snapped}
-        for name, value in checked.items():
-            object.__setattr__(self, name, value)
+                problem = f"{flags.size} flags for {force.size} points"
+                raise DescriptionError(f"{what} of {part}", problem, "Give one flag per point")
+            set_fields(self, **{name: flags})
 
 
 @dataclass(frozen=True)
@@ -108,7 +102,7 @@ def plot_curve(
 ) -> None:
     """Draws load–displacement curves, displacement across and force up, as a PNG.
 
-    Stable parts are solid, unstable parts dashed, snap-throughs dotted arrows, samples dots, targets open diamonds. For
+    Stable parts are solid, unstable parts dashed, snap-throughs dotted arrows, points dots, targets open diamonds. For
     curves before and after a change, give both the same colour and make the first faint; curves with the same label
     appear once in the legend, in grey if their colours differ.
 
@@ -124,40 +118,28 @@ def plot_curve(
         DescriptionError: the name does not end in .png.
         OSError: the file cannot be written.
     """
-    on_one(comm, lambda: draw_curve(path, series, targets=targets, xlabel=xlabel, ylabel=ylabel, title=title))
 
+    def draw() -> None:
+        with house_style():
+            figure = new_figure(6.4, 4.4)
+            figure.set_layout_engine("constrained")
+            axes = figure.add_subplot()
+            colours = [curve.colour or PALETTE[index % len(PALETTE)] for index, curve in enumerate(series)]
+            for curve, colour in zip(series, colours, strict=True):
+                _draw_series(axes, curve, colour)
+            _draw_targets(axes, targets)
+            _draw_marks(axes, series)
+            axes.margins(0.05)
+            axes.axhline(0.0, color="#bbbbbb", lw=0.8, zorder=0.5)
+            axes.axvline(0.0, color="#bbbbbb", lw=0.8, zorder=0.5)
+            axes.grid(True)
+            open_frame(axes)
+            axes.set(xlabel=xlabel, ylabel=ylabel)
+            axes.set_title(title, loc="left")
+            _draw_legend(axes, series, colours, targets)
+            save_png(figure, path)
 
-def draw_curve(
-    path: str | Path,
-    series: Sequence[CurveSeries],
-    *,
-    targets: Sequence[CurveTarget] = (),
-    xlabel: str,
-    ylabel: str,
-    title: str,
-) -> None:
-    """Local. What ``plot_curve`` draws, on the process that calls it."""
-    with house_style():
-        figure = new_figure(6.4, 4.4)
-        figure.set_layout_engine("constrained")
-        axes = figure.add_subplot()
-        for index, curve in enumerate(series):
-            _draw_series(axes, curve, _colour(curve, index))
-        _draw_targets(axes, targets)
-        _draw_marks(axes, series)
-        axes.margins(0.05)
-        axes.axhline(0.0, color="#bbbbbb", lw=0.8, zorder=0.5)
-        axes.axvline(0.0, color="#bbbbbb", lw=0.8, zorder=0.5)
-        axes.grid(True)
-        open_frame(axes)
-        axes.set(xlabel=xlabel, ylabel=ylabel)
-        axes.set_title(title, loc="left")
-        _draw_legend(axes, series, targets)
-        save_png(figure, path)
-
-
-def _colour(curve: CurveSeries, index: int) -> str:
-    return curve.colour or PALETTE[index % len(PALETTE)]
+    on_one(comm, draw)
 
 
 def _line_style(colour: str, *, faint: bool) -> tuple[str, float, float]:
@@ -168,7 +150,7 @@ def _line_style(colour: str, *, faint: bool) -> tuple[str, float, float]:
 
 
 def _draw_series(axes: Axes, curve: CurveSeries, colour: str) -> None:
-    x, y, stable = curve.displacement, curve.force, curve.stable
+    points, stable = np.column_stack((curve.displacement, curve.force)), curve.stable
     colour, width, size = _line_style(colour, faint=curve.faint)
     behind = 1.0 if curve.faint else 0.0
     if curve.joined:
@@ -176,35 +158,29 @@ def _draw_series(axes: Axes, curve: CurveSeries, colour: str) -> None:
         solid, snaps = stable[:-1] & stable[1:], curve.snapped_through[1:]
         for part, style in ((solid & ~snaps, "-"), (~solid & ~snaps, _DASHES)):
             # breaking the line with NaN keeps one artist per style
-            runs = [np.array([[np.nan, np.nan]])]
-            edges = np.flatnonzero(np.diff(np.concatenate(([0], part.astype(int), [0]))))
-            for start, stop in edges.reshape(-1, 2):
-                runs += [np.column_stack((x[start : stop + 1], y[start : stop + 1])), runs[0]]
-            line = np.concatenate(runs)
-            axes.plot(line[:, 0], line[:, 1], ls=style, color=colour, lw=width, zorder=3 - behind)
+            line = np.insert(points, np.flatnonzero(~part) + 1, np.nan, axis=0)
+            axes.plot(*line.T, ls=style, color=colour, lw=width, zorder=3 - behind)
         for index in np.flatnonzero(snaps):
-            start, end = np.array([x[index], y[index]]), np.array([x[index + 1], y[index + 1]])
-            axes.plot(*np.array([start, end]).T, ls=_DOTS, color=colour, lw=0.7 * width, zorder=3 - behind)
+            start, end = points[index : index + 2]
+            axes.plot(*points[index : index + 2].T, ls=_DOTS, color=colour, lw=0.7 * width, zorder=3 - behind)
             tip = {"arrowstyle": "-|>", "shrinkA": 0.0, "shrinkB": 3.0, "color": colour, "lw": 0.7 * width}
             axes.annotate("", xy=end, xytext=end - 0.1 * (end - start), arrowprops=tip, zorder=3 - behind)
-    size = size if len(x) <= 40 else 0.55 * size
+    size = size if len(points) <= 40 else 0.55 * size
     for part, face in ((stable, colour), (~stable, "white")):
-        axes.plot(x[part], y[part], "o", ms=size, mfc=face, mec=colour, mew=1.0, zorder=4 - 1.5 * behind)
+        axes.plot(*points[part].T, "o", ms=size, mfc=face, mec=colour, mew=1.0, zorder=4 - 1.5 * behind)
 
 
 def _draw_targets(axes: Axes, targets: Sequence[CurveTarget]) -> None:
-    seen: Counter[tuple[float, float]] = Counter()
-    for target in targets:
-        place = target.displacement, target.force
-        size = 8.0 + 5.0 * seen[place]
-        seen[place] += 1
+    places = [(target.displacement, target.force) for target in targets]
+    for index, (target, place) in enumerate(zip(targets, places, strict=True)):
+        size = 8.0 + 5.0 * places[:index].count(place)
         axes.plot(*place, "D", ms=size, mfc="none", mec=target.colour or INK, mew=1.5, clip_on=False, zorder=5)
 
 
 def _markers(series: Sequence[CurveSeries]) -> dict[str, str]:
     """The marker of each kind of marks."""
     kinds = sorted({mark.kind for curve in series for mark in curve.marks})
-    return {kind: _MARKERS[index % len(_MARKERS)] for index, kind in enumerate(kinds)}
+    return dict(zip(kinds, _MARKERS * len(kinds), strict=False))
 
 
 def _draw_marks(axes: Axes, series: Sequence[CurveSeries]) -> None:
@@ -215,26 +191,21 @@ def _draw_marks(axes: Axes, series: Sequence[CurveSeries]) -> None:
             axes.plot(*place, markers[mark.kind], ms=8.0, mfc="white", mec=INK, mew=1.5, zorder=6)
 
 
-def _draw_legend(axes: Axes, series: Sequence[CurveSeries], targets: Sequence[CurveTarget]) -> None:
-    same: dict[str, list[tuple[CurveSeries, str]]] = {}  # curves and colours of each label
-    for index, curve in enumerate(series):
-        if curve.label:
-            same.setdefault(curve.label, []).append((curve, _colour(curve, index)))
+def _draw_legend(
+    axes: Axes, series: Sequence[CurveSeries], colours: Sequence[str], targets: Sequence[CurveTarget]
+) -> None:
     handles = []
-    for label, group in same.items():
+    for label in dict.fromkeys(curve.label for curve in series if curve.label):
+        group = [(curve, colour) for curve, colour in zip(series, colours, strict=True) if curve.label == label]
         curve = group[0][0]
         colour, width, size = _line_style(_common([colour for _, colour in group]), faint=curve.faint)
-        handles.append(
-            Line2D([], [], color=colour, label=label, lw=width if curve.joined else 0.0, marker="o", ms=size)
-        )
+        handles.append(Line2D([], [], color=colour, label=label, lw=width * curve.joined, marker="o", ms=size))
     if any(curve.joined and not curve.stable.all() for curve in series):
-        handles.append(
-            Line2D([], [], color=MUTED, ls=_DASHES, lw=2.0, marker="o", ms=4.5, mfc="white", label="unstable")
-        )
+        look = {"ls": _DASHES, "lw": 2.0, "marker": "o", "ms": 4.5, "mfc": "white"}
+        handles.append(Line2D([], [], color=MUTED, label="unstable", **look))
     if any(curve.joined and curve.snapped_through.any() for curve in series):
-        handles.append(
-            Line2D([], [], color=MUTED, ls=_DOTS, lw=1.4, marker=">", markevery=(1, 1), ms=5, label="snap-through")
-        )
+        look = {"ls": _DOTS, "lw": 1.4, "marker": ">", "markevery": (1, 1), "ms": 5}
+        handles.append(Line2D([], [], color=MUTED, label="snap-through", **look))
     for kind, marker in _markers(series).items():
         handles.append(Line2D([], [], lw=0, marker=marker, ms=8, mfc="white", mec=INK, mew=1.5, label=kind))
     if targets:

@@ -1,8 +1,12 @@
-"""Pictures of a mechanism: its links, their deformation, forces and paths of points."""
+"""Pictures of mechanisms side by side: links, their deformation, forces and paths of points.
+
+All panels have the same limits, the same scale in x and y, and the same scale of forces.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,13 +18,27 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch, PathPatch, Polygon
 from matplotlib.path import Path as Outline
 from matplotlib.ticker import FuncFormatter, MaxNLocator
-from matplotlib.tri import Triangulation
 
 from fenicsmech.errors import DescriptionError
-from fenicsmech.plot.layout import MechanismLayout, arrow_ends, lay_out
-from fenicsmech.plot.outlines import path_of
-from fenicsmech.plot.shapes import Arrow, FlexibleShape, MechanismShape, Panel, RigidShape
-from fenicsmech.plot.style import FLEXIBLE, FLEXIBLE_RIM, HALO, PALETTE, draw_pin, house_style, save_png
+from fenicsmech.plot.page import (
+    FLEXIBLE,
+    FLEXIBLE_RIM,
+    HALO,
+    HEADING,
+    LENGTHS,
+    NAME,
+    PALETTE,
+    TITLE,
+    Page,
+    draw_pin,
+    house_style,
+    legend_width,
+    normalised,
+    path_of,
+    save_png,
+    text_size,
+)
+from fenicsmech.plot.shapes import Arrow, FlexibleShape, MechanismShape, Panel, Reals, RigidShape
 from fenicsmech.polygons import edge_loops
 
 _RIGID, _RIGID_RIM = "#c9ccd1", "#6b7078"
@@ -28,9 +46,8 @@ _FIXED, _FIXED_RIM, _FIXED_HATCH = "#565b63", "#2e3238", "#7d838d"
 _PALE = "#c4c4c4"
 _FORCE = "#1d4f9c"
 _TRACES = (PALETTE[2], PALETTE[4], PALETTE[5])
-_STRESS = LinearSegmentedColormap.from_list(
-    "stress", ("#fff3d6", "#fdd28a", "#f6983f", "#d9542b", "#a01c3b", "#5c0b3e")
-)
+_HEAT = ("#fff3d6", "#fdd28a", "#f6983f", "#d9542b", "#a01c3b", "#5c0b3e")
+_STRESS = LinearSegmentedColormap.from_list("stress", _HEAT)
 
 
 def draw_configurations(
@@ -39,7 +56,6 @@ def draw_configurations(
     *,
     title: str = "",
     colour_label: str = "",
-    colour_limits: tuple[float, float] | None = None,
     unit: str = "mm",
 ) -> None:
     """Draws mechanisms side by side, with the same limits, scale of forces and colours.
@@ -47,23 +63,21 @@ def draw_configurations(
     The undeformed state is a pale outline under the deformed one. Flexible links are orange or coloured by their
     values, rigid links grey, fixed ones dark and hatched; the largest force has the longest arrow.
 
+    Colours span from zero, or the least value, to the 99th percentile: the few peaks at the edge of an interface would
+    leave the rest without contrast. A pointed end of the bar shows that larger values exist.
+
     Args:
         path: the PNG file.
         panels: from left to right.
         title: a line above all.
         colour_label: quantity and unit of the values ("von Mises stress [MPa]").
-        colour_limits: least and largest colour; None spans from zero (or the least value) to the 99th percentile:
-            the few peaks at the edge of an interface would leave the rest without contrast. The bar shows with a
-            pointed end that larger values exist.
         unit: of lengths, for the axes.
-
-    Raises:
-        DescriptionError: the panels are empty, the colour limits are not in order, or the name does not end in .png.
     """
     if not any(s.flexible or s.rigid or s.pins for panel in panels for s in (panel.undeformed, *panel.deformed)):
         raise DescriptionError(f"picture '{path}'", "there is nothing to draw", "Give at least one shape")
-    values = [v for panel in panels for shape in _filled(panel).flexible for v in _values(shape)]
-    norm = _normalise(values, colour_limits) if values else None
+    coloured = [shape.values for panel in panels for shape in _filled(panel).flexible if shape.values is not None]
+    values = np.concatenate(coloured) if coloured else None
+    norm = None if values is None else _normalise(values)
     with house_style():
         legend = _legend(panels)
         layout = lay_out(panels, colour_bar=norm is not None, heading=title, legend=tuple(legend))
@@ -71,8 +85,8 @@ def draw_configurations(
             _draw_panel(axes, panel, layout, norm)
             axes.set_xlabel(f"x [{unit}]")
         layout.axes[0].set_ylabel(f"y [{unit}]")
-        if norm is not None:
-            _draw_colour_bar(layout, norm, np.concatenate(values), colour_label)
+        if values is not None:
+            _draw_colour_bar(layout, norm, values, colour_label)
         layout.page.write(title, {label: Line2D([], [], color=c, lw=1.4) for label, c in legend.items()})
         save_png(layout.page.figure, path)
 
@@ -81,31 +95,16 @@ def _filled(panel: Panel) -> MechanismShape:
     return panel.deformed[-1] if panel.deformed else panel.undeformed
 
 
-def _values(shape: FlexibleShape) -> Iterator[np.ndarray]:
-    if shape.values is not None:
-        yield shape.values
-    if shape.point_values is not None:
-        yield shape.point_values[np.unique(shape.triangles)]
+def _normalise(values: Reals) -> Normalize:
+    low, most = min(0.0, float(values.min())), float(np.percentile(values, 99.0))
+    return Normalize(low, next(high for high in (most, float(values.max()), low + 1.0) if high > low))
 
 
-def _normalise(values: Sequence[np.ndarray], limits: tuple[float, float] | None) -> Normalize:
-    if limits is None:
-        every = np.concatenate(values)
-        low, most = min(0.0, float(every.min())), float(np.percentile(every, 99.0))
-        high = next(h for h in (most, float(every.max()), low + 1.0) if h > low)
-    else:
-        low, high = limits
-        if not low < high:
-            raise DescriptionError("colour_limits", f"{low} is not below {high}", "Give the smaller value first")
-    return Normalize(low, high)
-
-
-def _draw_panel(axes: Axes, panel: Panel, layout: MechanismLayout, norm: Normalize | None) -> None:
+def _draw_panel(axes: Axes, panel: Panel, layout: Layout, norm: Normalize | None) -> None:
     axes.set_title(panel.title, loc="left")
     if panel.deformed:
         still = panel.undeformed
-        outlines = [*(path_of([rigid.outline]) for rigid in still.rigid), *map(_rim, still.flexible)]
-        for outline in outlines:
+        for outline in (*(path_of([rigid.outline]) for rigid in still.rigid), *map(_rim, still.flexible)):
             axes.add_patch(PathPatch(outline, fc="none", ec=_PALE, lw=1.0, zorder=2))
     for state in panel.deformed[:-1]:
         for rigid in state.rigid:
@@ -118,9 +117,8 @@ def _draw_panel(axes: Axes, panel: Panel, layout: MechanismLayout, norm: Normali
     for flexible in state.flexible:
         _draw_flexible(axes, flexible, norm)
     for pin in state.pins:
-        draw_pin(axes, pin.at, pin.radius or 0.014 * layout.size, welded=pin.welded)
-    for index, trace in enumerate(panel.traces):
-        colour = _trace_colour(index)
+        draw_pin(axes, pin.at, 0.014 * layout.size, welded=pin.welded)
+    for trace, colour in zip(panel.traces, _TRACES * len(panel.traces), strict=False):
         axes.plot(*trace.points.T, color=colour, lw=1.4, zorder=5)
         axes.plot(*trace.marks.T, "o", ms=4.5, mfc=colour, mec="white", mew=0.8, zorder=7)
     for arrow in panel.arrows:
@@ -137,50 +135,39 @@ def _rim(shape: FlexibleShape) -> Outline:
 
 
 def _draw_rigid(axes: Axes, shape: RigidShape) -> None:
-    face, edge = (_FIXED, _FIXED_RIM) if shape.fixed else (_RIGID, _RIGID_RIM)
+    face, edge = _RIGID, _RIGID_RIM
     if shape.fixed:
-        axes.add_patch(Polygon(shape.outline, closed=True, fc=face, ec=_FIXED_HATCH, hatch="////", lw=0.0, zorder=3))
-        face = "none"
+        axes.add_patch(Polygon(shape.outline, closed=True, fc=_FIXED, ec=_FIXED_HATCH, hatch="////", lw=0.0, zorder=3))
+        face, edge = "none", _FIXED_RIM
     axes.add_patch(Polygon(shape.outline, closed=True, fc=face, ec=edge, lw=1.0, zorder=3))
 
 
 def _draw_flexible(axes: Axes, shape: FlexibleShape, norm: Normalize | None) -> None:
     face = FLEXIBLE
     if shape.values is not None:
-        cells = PolyCollection(
-            shape.points[shape.triangles], array=shape.values, cmap=_STRESS, norm=norm, ec="face", lw=0.3, zorder=4
-        )
-        axes.add_collection(cells, autolim=False)
-        face = "none"
-    elif shape.point_values is not None:
-        mesh = Triangulation(*shape.points.T, shape.triangles)
-        axes.tripcolor(mesh, shape.point_values, shading="gouraud", cmap=_STRESS, norm=norm, zorder=4)
-        face = "none"
+        face, corners = "none", shape.points[shape.triangles]
+        look = {"cmap": _STRESS, "norm": norm, "ec": "face", "lw": 0.3, "zorder": 4}
+        axes.add_collection(PolyCollection(corners, array=shape.values, **look), autolim=False)
     axes.add_patch(PathPatch(_rim(shape), fc=face, ec=FLEXIBLE_RIM, lw=0.9, joinstyle="round", zorder=4))
 
 
 def _draw_arrow(axes: Axes, arrow: Arrow, scale: float) -> None:
-    length = float(np.hypot(*arrow.vector))
-    if length == 0.0:
+    if not arrow.vector.any():
         return
-    tail, head = arrow_ends(arrow, scale)
-    axes.add_patch(
-        FancyArrowPatch(
-            tail, head, arrowstyle="-|>,head_length=0.5,head_width=0.26", mutation_scale=15, lw=2.2, color=_FORCE,
-            shrinkA=0, shrinkB=0, joinstyle="miter", zorder=8,
-        )
-    )  # fmt: skip
+    tail, side = arrow.at - scale * arrow.vector, -normalised(arrow.vector)
+    look = {"lw": 2.2, "color": _FORCE, "shrinkA": 0, "shrinkB": 0, "joinstyle": "miter", "zorder": 8}
+    style = "-|>,head_length=0.5,head_width=0.26"
+    axes.add_patch(FancyArrowPatch(tail, arrow.at, arrowstyle=style, mutation_scale=15, **look))
     if arrow.label:
-        free, side = (tail, -arrow.vector / length) if arrow.pushes else (head, arrow.vector / length)
         axes.annotate(
-            arrow.label, free, xytext=5.0 * side, textcoords="offset points", color=_FORCE, fontweight="bold",
+            arrow.label, tail, xytext=5.0 * side, textcoords="offset points", color=_FORCE, fontweight="bold",
             ha="right" if side[0] < -0.5 else "left" if side[0] > 0.5 else "center",
             va="top" if side[1] < -0.5 else "bottom" if side[1] > 0.5 else "center",
             path_effects=HALO, zorder=9,
         )  # fmt: skip
 
 
-def _draw_colour_bar(layout: MechanismLayout, norm: Normalize, values: np.ndarray, label: str) -> None:
+def _draw_colour_bar(layout: Layout, norm: Normalize, values: np.ndarray, label: str) -> None:
     over, under = values.max() > norm.vmax, values.min() < norm.vmin
     extend = "both" if over and under else "max" if over else "min" if under else "neither"
     bar = layout.page.figure.colorbar(ScalarMappable(norm, _STRESS), cax=layout.bar, extend=extend, extendfrac=0.04)
@@ -191,10 +178,85 @@ def _draw_colour_bar(layout: MechanismLayout, norm: Normalize, values: np.ndarra
 
 def _legend(panels: Sequence[Panel]) -> dict[str, str]:
     """Colours of the labelled traces; a label of several panels appears once."""
-    return {
-        trace.label: _trace_colour(index) for panel in panels for index, trace in enumerate(panel.traces) if trace.label
-    }
+    drawn = [pair for panel in panels for pair in zip(panel.traces, _TRACES * len(panel.traces), strict=False)]
+    return {trace.label: colour for trace, colour in drawn if trace.label}
 
 
-def _trace_colour(index: int) -> str:
-    return _TRACES[index % len(_TRACES)]
+# -- layout ----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """An empty picture of mechanisms."""
+
+    page: Page
+    axes: tuple[Axes, ...]  # one per panel
+    size: float  # diagonal of the mechanism, in the user's unit
+    arrow_scale: float  # length drawn per unit of force
+    bar: Axes | None  # of the colour bar
+
+
+def lay_out(panels: Sequence[Panel], *, colour_bar: bool, heading: str, legend: Sequence[str]) -> Layout:
+    """A figure in which all ``panels`` fit, with a ``heading`` above them and the entries of a ``legend`` below."""
+    points = np.concatenate([p for panel in panels for p in _extent(panel)])
+    low, high = points.min(axis=0), points.max(axis=0)
+    if not (high > low).any():  # a single point
+        low, high = low - 0.5, high + 0.5
+    size = float(np.hypot(*(high - low)))
+    arrows = [arrow for panel in panels for arrow in panel.arrows]
+    strongest = max((float(np.hypot(*arrow.vector)) for arrow in arrows), default=0.0)
+    arrow_scale = LENGTHS.longest_arrow * size / (strongest or np.inf)
+
+    largest = np.array([min(LENGTHS.panel[0], LENGTHS.row / len(panels)), LENGTHS.panel[1]])
+    low, high = _limits(arrows, np.array([low, high]), arrow_scale, largest)
+    scale = float(min(largest / (high - low)))
+    # slender and small mechanisms keep their scale and get air on both sides
+    lines = text_size(heading, **HEADING)[0], legend_width(legend)
+    titles = (text_size(panel.title, **TITLE)[0] for panel in panels)
+    least = max(LENGTHS.smallest, max(lines) / len(panels), *titles)
+    lack = np.maximum(np.array([least, LENGTHS.smallest]) / scale - (high - low), 0.0)
+    low, high = low - 0.5 * lack, high + 0.5 * lack
+    wide, tall = scale * (high - low)
+
+    widths, gaps = [wide] * len(panels), [LENGTHS.gap] * (len(panels) - 1)
+    if colour_bar:
+        widths, gaps = [*widths, LENGTHS.bar], [*gaps, LENGTHS.bar]
+    above = bool(heading) + any(panel.title for panel in panels)
+    right = LENGTHS.bar_room - 2.0 * LENGTHS.bar if colour_bar else LENGTHS.right
+    page = Page.of(widths, gaps, tall, above=above, below=bool(legend), right=right)
+    axes = page.row[: len(panels)]
+    for one in axes:
+        one.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        one.tick_params(labelleft=one is axes[0], length=3.0)
+    return Layout(page, axes, size, arrow_scale, page.row[-1] if colour_bar else None)
+
+
+def _limits(arrows: Sequence[Arrow], corners: Reals, arrow_scale: float, largest: Reals) -> tuple[Reals, Reals]:
+    """Limits around ``corners`` and ``arrows``; the room for labels depends on the scale, and the scale on the room."""
+    low, high = corners
+    for _ in range(3):
+        scale = float(min(largest / np.maximum(high - low, 1e-6 * (high - low).max())))
+        around = np.array([*corners, *(end for arrow in arrows for end in _arrow_extent(arrow, arrow_scale, scale))])
+        padding = LENGTHS.padding / scale
+        low, high = around.min(axis=0) - padding, around.max(axis=0) + padding
+    return low, high
+
+
+def _extent(panel: Panel) -> Iterator[Reals]:
+    for state in (panel.undeformed, *panel.deformed):
+        yield from (shape.points[np.unique(shape.triangles)] for shape in state.flexible)
+        yield from (shape.outline for shape in state.rigid)
+        yield from (pin.at[None] for pin in state.pins)
+    for trace in panel.traces:
+        yield from (trace.points, trace.marks)
+    yield from (arrow.at[None] for arrow in panel.arrows)
+
+
+def _arrow_extent(arrow: Arrow, arrow_scale: float, scale: float) -> Iterator[Reals]:
+    """Corners of ``arrow`` and of the label at its tail."""
+    tail = arrow.at - arrow_scale * arrow.vector
+    yield from (tail, arrow.at)
+    if arrow.label:
+        room = np.array(text_size(arrow.label, **NAME)) / scale
+        centre = tail - normalised(arrow.vector) * (0.5 * room + 0.1 / scale)
+        yield from (centre - 0.5 * room, centre + 0.5 * room)

@@ -1,4 +1,8 @@
-"""The content of pictures: planar shapes of mechanisms and designs, in the user's unit of length."""
+"""The content of pictures: planar shapes of mechanisms and designs, in the user's unit of length.
+
+A rigid link gets its outline from its joints, a solid link is seen from above. Values that are not finite and arrays
+that do not fit each other are refused with a ``DescriptionError``.
+"""
 
 from __future__ import annotations
 
@@ -6,16 +10,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import ConvexHull
 
-from fenicsmech.checks import index_array, real_array
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, index_array, positive, real_array, set_fields
 
 Reals = NDArray[np.float64]
 
 
 def _no_points() -> Reals:
     return np.empty((0, 2))
+
+
+def _polygon(part: str, points: ArrayLike) -> Reals:
+    polygon = real_array(part, points, None, 2)
+    if len(polygon) < 3:
+        raise DescriptionError(part, f"{len(polygon)} point(s) given", "Give at least 3")
+    return polygon
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,17 +37,12 @@ class FlexibleShape:
         points: (n, 2) vertices, deformed or not; vertices of no triangle are allowed.
         triangles: (m, 3) indices of vertices.
         values: (m,) one per triangle, or None.
-        point_values: (n,) one per vertex, or None; smoothly interpolated. At most one of the two.
         name: of the link, for messages.
-
-    Raises:
-        DescriptionError: the arrays do not fit each other or are not finite.
     """
 
     points: Reals
     triangles: NDArray[np.int64]
     values: Reals | None = None
-    point_values: Reals | None = None
     name: str = ""
 
     def __post_init__(self) -> None:
@@ -45,16 +51,9 @@ class FlexibleShape:
         triangles = index_array(f"triangles of {part}", self.triangles, None, 3, below=len(points))
         if not len(triangles):
             raise DescriptionError(part, "it has no triangle", "Give the triangles of its mesh or of its plan view")
-        if self.values is not None and self.point_values is not None:
-            raise DescriptionError(part, "both values and point_values are given", "Give one of them")
-        object.__setattr__(self, "points", points)
-        object.__setattr__(self, "triangles", triangles)
+        set_fields(self, points=points, triangles=triangles)
         if self.values is not None:
-            values = real_array(f"values of {part}, one per triangle,", self.values, len(triangles))
-            object.__setattr__(self, "values", values)
-        if self.point_values is not None:
-            values = real_array(f"point_values of {part}, one per vertex,", self.point_values, len(points))
-            object.__setattr__(self, "point_values", values)
+            set_fields(self, values=real_array(f"values of {part}, one per triangle,", self.values, len(triangles)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,44 +65,31 @@ class RigidShape:
     fixed: bool = False
 
     def __post_init__(self) -> None:
-        outline = real_array(f"outline of rigid shape '{self.name}'", self.outline, None, 2)
-        if len(outline) < 3:
-            raise DescriptionError(f"rigid shape '{self.name}'", f"{len(outline)} point(s) given", "Give at least 3")
-        object.__setattr__(self, "outline", outline)
+        set_fields(self, outline=_polygon(f"outline of rigid shape '{self.name}'", self.outline))
 
 
 @dataclass(frozen=True, eq=False)
 class Pin:
-    """A joint at ``at`` (2,): a ring with a dot, a square where it is ``welded``.
-
-    ``radius`` None draws it in a size that suits the picture.
-    """
+    """A joint at ``at`` (2,): a ring with a dot, a square where it is ``welded``."""
 
     at: Reals
-    radius: float | None = None
     welded: bool = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "at", real_array("position of a pin", self.at, 2))
-        if self.radius is not None and not self.radius > 0.0:
-            raise DescriptionError("radius of a pin", f"{self.radius} is not positive", "Give a positive one or None")
+        set_fields(self, at=real_array("position of a pin", self.at, 2))
 
 
 @dataclass(frozen=True, eq=False)
 class Arrow:
-    """A force on the point ``at`` (2,); the longest ``vector`` (2,) of a picture gets a fixed length.
-
-    ``pushes`` puts the head on the point, as where something presses; otherwise the tail sits there.
-    """
+    """A force on the point ``at`` (2,), its tip; the longest ``vector`` (2,) of a picture has a fixed length."""
 
     at: Reals
     vector: Reals
     label: str = ""
-    pushes: bool = True
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "at", real_array(f"position of arrow '{self.label}'", self.at, 2))
-        object.__setattr__(self, "vector", real_array(f"vector of arrow '{self.label}'", self.vector, 2))
+        for name, part in (("at", "position"), ("vector", "vector")):
+            set_fields(self, **{name: real_array(f"{part} of arrow '{self.label}'", getattr(self, name), 2)})
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,8 +101,8 @@ class Trace:
     marks: Reals = field(default_factory=_no_points)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", real_array(f"points of trace '{self.label}'", self.points, None, 2))
-        object.__setattr__(self, "marks", real_array(f"marks of trace '{self.label}'", self.marks, None, 2))
+        for name in ("points", "marks"):
+            set_fields(self, **{name: real_array(f"{name} of trace '{self.label}'", getattr(self, name), None, 2)})
 
 
 @dataclass(frozen=True)
@@ -156,9 +142,6 @@ class LinkOutline:
         centreline: (n, 2) points along the link.
         thickness: (n,) thickness in the plane at the points of the centreline, or None.
         controls: (k, 2) control points of the centreline.
-
-    Raises:
-        DescriptionError: no outline, the arrays do not fit each other, or a value that is not finite.
     """
 
     loops: Sequence[Reals]
@@ -167,24 +150,18 @@ class LinkOutline:
     controls: Reals = field(default_factory=_no_points)
 
     def __post_init__(self) -> None:
-        loops = tuple(real_array("loop of a link's outline", loop, None, 2) for loop in self.loops)
+        loops = tuple(_polygon("loop of a link's outline", loop) for loop in self.loops)
         if not loops:
             raise DescriptionError("outline of a link", "there are no loops", "Give its outer rim, then its holes")
-        for loop in loops:
-            if len(loop) < 3:
-                raise DescriptionError("loop of a link's outline", f"{len(loop)} point(s) given", "Give at least 3")
-        object.__setattr__(self, "loops", loops)
-        for name, part in (("centreline", "centreline of a link"), ("controls", "control points of a link")):
-            object.__setattr__(self, name, real_array(part, getattr(self, name), None, 2))
+        centreline = real_array("centreline of a link", self.centreline, None, 2)
+        controls = real_array("control points of a link", self.controls, None, 2)
+        set_fields(self, loops=loops, centreline=centreline, controls=controls)
         if self.thickness is not None:
-            thickness = real_array("thickness along a link's centreline", self.thickness, len(self.centreline))
-            if not (len(thickness) > 1 and thickness.min() > 0.0):
-                raise DescriptionError(
-                    "thickness along a link's centreline",
-                    "it is not positive at two points or more",
-                    "Give the thickness at every point of the centreline",
-                )
-            object.__setattr__(self, "thickness", thickness)
+            part, problem = "thickness along a link's centreline", "it is not positive at two points or more"
+            thickness = real_array(part, self.thickness, len(centreline))
+            if len(thickness) < 2 or thickness.min() <= 0.0:
+                raise DescriptionError(part, problem, "Give the thickness at every point of the centreline")
+            set_fields(self, thickness=thickness)
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,4 +174,57 @@ class DesignShape:
     joints: Reals = field(default_factory=_no_points)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "joints", real_array(f"joints of link '{self.name}'", self.joints, None, 2))
+        set_fields(self, joints=real_array(f"joints of link '{self.name}'", self.joints, None, 2))
+
+
+def rigid_outline(points: ArrayLike, width: float) -> Reals:
+    """The outline of all points within ``width``/2 of the convex hull of the joints: the hull of discs around them.
+
+    One point gives a disc, two a bar with round ends, three and more a rounded plate.
+
+    Args:
+        points: (k, 2) joint positions; coincident and collinear ones are allowed.
+        width: of the bar, in the unit of the points.
+
+    Returns:
+        (m, 2) polygon, counter-clockwise, not closed.
+    """
+    joints = real_array("joints of a rigid link", points, None, 2)
+    if not len(joints):
+        raise DescriptionError("outline of a rigid link", "there are no joints", "Give at least one point")
+    radius = 0.5 * positive("width of a rigid link's outline", width)
+    angles = np.linspace(0.0, 2.0 * np.pi, 384, endpoint=False)  # of the polygon that stands for a disc
+    circle = radius * np.column_stack((np.cos(angles), np.sin(angles)))
+    discs = (joints[:, None] + circle).reshape(-1, 2)
+    return discs[ConvexHull(discs).vertices]
+
+
+def plan_view(points: ArrayLike, tets: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The boundary faces whose outer unit normal has z > 0.5.
+
+    Take it from the undeformed mesh and use it with deformed points, so that all pictures show the same triangles.
+
+    Args:
+        points: (n, 3) vertices.
+        tets: (m, 4) indices of vertices, in any orientation.
+
+    Returns:
+        (k, 3) vertices of the triangles, counter-clockwise seen from +z; (k,) the tetrahedron each belongs to.
+    """
+    vertices = real_array("points of a solid mesh", points, None, 3)
+    cells = index_array("tetrahedra of a solid mesh", tets, None, 4, below=len(vertices))
+    faces = cells[:, ((1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2))].reshape(-1, 3)  # face i is opposite to vertex i
+    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+    boundary = first[count == 1]
+    faces, opposite, owner = faces[boundary], cells.reshape(-1)[boundary], boundary // 4
+
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    inward = np.einsum("ij,ij->i", normal, a - vertices[opposite]) < 0.0
+    normal[inward] *= -1.0
+    faces = np.where(inward[:, None], faces[:, [0, 2, 1]], faces)
+    top = normal[:, 2] > 0.5 * np.linalg.norm(normal, axis=1)
+    if not top.any():
+        part, problem = "plan view of a solid mesh", "no face has a normal towards +z"
+        raise DescriptionError(part, problem, "Extrude planar links along z")
+    return faces[top], owner[top]

@@ -2,25 +2,20 @@
 
 - ``simulation``: the entry point, which computes curves
 - ``discretisation``: the meshed and compiled parts that simulations of several designs share
-- ``request``: the prescribed part of a curve, and its samples or ends
-- ``tracing``, ``following``: curves computed sample by sample, or along the path with its events
+- ``tracing``: curves at prescribed values
+- ``following``: curves along a path until an end, with its events
 - ``frame``, ``curve``: results and their evaluation
-- ``buckling``: buckling loads, buckling positions and soft modes of an equilibrium
-- ``friction``: bounds of a curve's load by friction in hinges
-- ``explanation``: assumptions of a simulation as text
-- ``fields``, ``picture``: gathering, files and pictures of states
+- ``fields``: gathering, pictures and files of states
+- ``omitted_effects``: assumptions as text, hints where they matter, and friction in hinges
 """
 
-from fenicsmech.simulation.buckling import BucklingLoad, BucklingPosition, ModeShape, SoftMode
-from fenicsmech.simulation.curve import Curve
-from fenicsmech.simulation.explanation import Explanation, Hint, weight_influence
-from fenicsmech.simulation.fields import gather, rest_vertices
-from fenicsmech.simulation.following import FollowedCurve, PathEvent
-from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.friction import PinFriction
-from fenicsmech.simulation.picture import MechanismPlotter
-from fenicsmech.simulation.request import Axis, CurveRequest, Until, read_request
+from fenicsmech.simulation.curve import Axis, Curve
+from fenicsmech.simulation.fields import MechanismPlotter, gather, rest_geometry, rest_vertices
+from fenicsmech.simulation.following import FollowedCurve, PathEvent, Until
+from fenicsmech.simulation.frame import BucklingLoad, BucklingPosition, Frame, ModeShape, SoftMode
+from fenicsmech.simulation.omitted_effects import Explanation, Hint, PinFriction, weight_influence
 from fenicsmech.simulation.simulation import RestShape, Simulation
+from fenicsmech.simulation.tracing import CurveRequest, read_request
 
 __all__ = [
     "Axis",
@@ -42,6 +37,7 @@ __all__ = [
     "Until",
     "gather",
     "read_request",
+    "rest_geometry",
     "rest_vertices",
     "weight_influence",
 ]

@@ -12,21 +12,46 @@ import numpy as np
 from fenicsmech.collective import on_one
 from fenicsmech.continuation import Mode, critical_changes, softest_modes
 from fenicsmech.elasticity import PLANE_STRESS
-from fenicsmech.equilibrium import Iteration, LoadControl, MotorControl, NotConverged, Quantity
+from fenicsmech.equilibrium import EquilibriumSolver, LoadControl, MotorControl, NotConverged, State, Unknown
 from fenicsmech.errors import DescriptionError, EquilibriumError
-from fenicsmech.estimates import AccuracyOptions, Equilibrium, ErrorKind
+from fenicsmech.estimates import AccuracyOptions, Equilibrium, ErrorKind, cause_of_growth, growth_by_halving
 from fenicsmech.files import write_csv
-from fenicsmech.mechanism import Configuration, Force, Joint, Output, PrescribedPart, Units
+from fenicsmech.log import logger
+from fenicsmech.mechanism import Configuration, Force, ForceGroup, Joint, Output, PrescribedPart, Units
 from fenicsmech.multibody import Freedom
 from fenicsmech.plot import CurveSeries, Panel, Trace, draw_configurations, plot_curve
-from fenicsmech.simulation.buckling import BucklingLoad, BucklingPosition, ModeShape, SoftMode, mode_shape
 from fenicsmech.simulation.discretisation import Discretisation
-from fenicsmech.simulation.explanation import Explanation, ExplanationOptions, explain
-from fenicsmech.simulation.fields import gather, write_xdmf
-from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.friction import PinFriction, friction_band
-from fenicsmech.simulation.picture import MechanismPlotter
-from fenicsmech.simulation.request import Axis, axes, followed_control
+from fenicsmech.simulation.fields import MechanismPlotter, gather, write_xdmf
+from fenicsmech.simulation.frame import BucklingLoad, BucklingPosition, Frame, ModeShape, SoftMode, mode_shape
+from fenicsmech.simulation.omitted_effects import Explanation, ExplanationOptions, PinFriction, explain, friction_band
+
+_log = logger(__name__)
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A quantity and its unit."""
+
+    quantity: str
+    unit: str
+
+    @property
+    def label(self) -> str:
+        """The label of plots and columns."""
+        return f"{self.quantity} [{self.unit}]"
+
+    def __call__(self, value: float, digits: int = 3) -> str:
+        """A value with its unit."""
+        return f"{value:.{digits}g} {self.unit}"
+
+
+def axes(part: PrescribedPart, units: Units) -> tuple[Axis, Axis]:
+    """Quantities and units on the axes of the curve of a part."""
+    if isinstance(part, Force | ForceGroup):
+        return Axis("displacement", units.length), Axis("force", units.force)
+    if part.sliding:
+        return Axis("position", units.length), Axis("force", units.force)
+    return Axis("angle", "rad"), Axis("torque", f"{units.force} {units.length}")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -37,10 +62,11 @@ class Curve:
         part: the force that changes, or the motor or drive that moves.
         configuration: motor positions.
         freedom: mobility and redundancy of the assembled configuration.
-        frames: one per sample, in the order of the samples.
+        frames: one per prescribed value, in their order.
         discretisation: of the scene, with which they were computed.
+        unloaded: the configuration without any load or effect, from which displacements count.
         others: constant magnitudes of other forces.
-        quantity: the unknown of the curve: displacements, or forces where displacements were prescribed or the curve
+        unknown: of the curve: displacements, or forces where displacements were prescribed or the curve
             was followed.
     """
 
@@ -49,8 +75,9 @@ class Curve:
     freedom: Freedom
     frames: tuple[Frame, ...]
     discretisation: Discretisation
+    unloaded: State
     others: tuple[tuple[Force, float], ...] = ()
-    quantity: Quantity = Quantity.DISPLACEMENT
+    unknown: Unknown = Unknown.DISPLACEMENT
     _errors: dict[tuple[ErrorKind, Output | None], np.ndarray] = field(default_factory=dict, init=False)
 
     def __repr__(self) -> str:
@@ -86,8 +113,8 @@ class Curve:
 
     @property
     def values(self) -> np.ndarray:
-        """``displacements`` or ``forces``, whichever is the unknown ``quantity``, (frames,)."""
-        return self.forces if self.quantity is Quantity.FORCE else self.displacements
+        """``displacements`` or ``forces``, whichever is ``unknown``, (frames,)."""
+        return self.forces if self.unknown is Unknown.FORCE else self.displacements
 
     @property
     def stable(self) -> np.ndarray:
@@ -119,6 +146,9 @@ class Curve:
 
     def error_estimates(self, *, output: Output | None = None) -> np.ndarray:
         """Estimated discretisation errors of ``values``, (frames,), to be added to them; computed once.
+
+        A warning is logged where ``growth_by_halving`` is more than a hundredth of the largest value: then there is no
+        limit that they could lead to.
 
         Args:
             output: whose displacement is estimated instead, under the same control.
@@ -159,6 +189,19 @@ class Curve:
         """``values`` with their ``corrections``, (frames,). Raises as ``error_estimates``."""
         return self.values + self.corrections
 
+    @property
+    def growth_by_halving(self) -> np.ndarray:
+        """What each halving of the elements adds to ``values``, at most in the plane, about in space, (frames,).
+
+        Without end, as its force acts at a point of a flexible link; 0 if it does not, and where motors move.
+        """
+        found = self.discretisation
+        growth = growth_by_halving(self.part, found.model, found.fidelity.sizes) * self.forces
+        if self.unknown is Unknown.DISPLACEMENT:
+            return growth
+        # at a given displacement the force is smaller by as much as its displacement would be larger
+        return -growth * np.divide(self.forces, self.displacements, out=0.0 * growth, where=self.displacements != 0.0)
+
     # -- stability, friction, assumptions ------------------------------------------------------------------------
 
     def buckling_loads(self, *, frame: Frame | None = None, count: int = 3) -> tuple[BucklingLoad, ...]:
@@ -175,8 +218,7 @@ class Curve:
             EquilibriumError: the force moves nothing, or the tangent is singular.
         """
         self._need_force()
-        at = self._chosen(frame)
-        found = self._modes(LoadControl(), critical_changes, at, count)
+        at, found = self._modes(LoadControl(), critical_changes, frame, count)
         return tuple(BucklingLoad(at.force + value, mode) for value, mode in found)
 
     def buckling_positions(self, *, frame: Frame | None = None, count: int = 3) -> tuple[BucklingPosition, ...]:
@@ -188,12 +230,12 @@ class Curve:
             DescriptionError: a force changes along the curve, or the frame is of another curve.
             EquilibriumError: the motors move nothing, or the tangent is singular.
         """
-        if isinstance(self.part, Force):
+        if isinstance(self.part, Force | ForceGroup):
             raise DescriptionError(
-                f"curve of {self.part.name!r}", "no motor moves along it", "Ask this of a curve that follows a motor"
+                f"curve of {self.part.name!r}", "no motor moves along it", "Call this on a curve that follows a motor"
             )
-        at, held = self._chosen(frame), followed_control(self.part, self.discretisation.linkage.joints)
-        found = self._modes(held, critical_changes, at, count)
+        control = self.discretisation.followed_control(self.part)
+        at, found = self._modes(control, critical_changes, frame, count)
         return tuple(BucklingPosition(at.displacement + value, mode) for value, mode in found)
 
     def soft_modes(self, *, frame: Frame | None = None, count: int = 3) -> tuple[SoftMode, ...]:
@@ -201,7 +243,7 @@ class Curve:
 
         Arguments and errors as those of ``buckling_loads``.
         """
-        found = self._modes(LoadControl(), softest_modes, self._chosen(frame), count)
+        _, found = self._modes(LoadControl(), softest_modes, frame, count)
         return tuple(SoftMode(value, mode) for value, mode in found)
 
     def friction_band(self, pins: Mapping[Joint, PinFriction]) -> tuple[np.ndarray, np.ndarray]:
@@ -235,11 +277,10 @@ class Curve:
         """
         if weight is None and (self.units.length, self.units.force) == ("mm", "N"):
             weight = 1.2e-9 * 9810.0  # N/mm³
-        options, frame = ExplanationOptions(tolerance=tolerance, weight=weight), self.frames[-1]
+        options, frame = ExplanationOptions(tolerance, weight), self.frames[-1]
         self._need_force()
-        return explain(
-            self.discretisation.model, self._solver, self.equilibrium(frame), frame, self.units, options=options
-        )
+        at = self.equilibrium(frame)
+        return explain(self.discretisation, self.part, self._solver, at, frame, self.units, options)
 
     # -- pictures and files --------------------------------------------------------------------------------------
 
@@ -257,15 +298,8 @@ class Curve:
 
     def series(self, label: str = "", *, colour: str | None = None, faint: bool = False) -> CurveSeries:
         """The curve as a plot draws it, arguments as those of ``CurveSeries``."""
-        return CurveSeries(
-            self.displacements,
-            self.forces,
-            label=label,
-            stable=self.stable,
-            colour=colour,
-            faint=faint,
-            snapped_through=self.snapped_through,
-        )
+        x, y, snapped = self.displacements, self.forces, self.snapped_through
+        return CurveSeries(x, y, label, self.stable, colour=colour, faint=faint, snapped_through=snapped)
 
     def plot(self, path: str | Path) -> None:
         """Draws force over displacement as a PNG."""
@@ -288,10 +322,8 @@ class Curve:
         drawn = [panel for panel in panels if panel is not None]
         label = f"von Mises stress [{self.units.stress}]" if stress else ""
         title = self.discretisation.scene.mechanism.name
-        on_one(
-            self.discretisation.comm,
-            lambda: draw_configurations(path, drawn, title=title, colour_label=label, unit=self.units.length),
-        )
+        options = {"title": title, "colour_label": label, "unit": self.units.length}
+        on_one(self.discretisation.comm, lambda: draw_configurations(path, drawn, **options))
 
     def panel(self, *, stress: bool = True, traces: Sequence[Trace] = ()) -> Panel | None:
         """The picture of the first and the last frame, on rank 0; None elsewhere."""
@@ -301,8 +333,9 @@ class Curve:
             return None
         plotter = MechanismPlotter(model)
         (across, up), end, arrows = self.axes, self.frames[-1], []
-        if isinstance(self.part, Force):
-            arrows.append(plotter.arrow(self.part, end.force, last, label=f"{end.force:g} {up.unit}"))
+        if isinstance(self.part, Force | ForceGroup):
+            for force, ratio in self.part.ratios:
+                arrows.append(plotter.arrow(force, ratio * end.force, last, label=f"{ratio * end.force:g} {up.unit}"))
         return Panel(
             plotter.shape(first, stress=False),
             (plotter.shape(last, stress=stress),),
@@ -337,7 +370,7 @@ class Curve:
             f"max von Mises [{stress}]": np.array([frame.max_stress for frame in self.frames]),
         }
         if errors:
-            name, unit = self.quantity.value, force if self.quantity is Quantity.FORCE else length
+            name, unit = self.unknown.value, force if self.unknown is Unknown.FORCE else length
             columns[f"finer elements add to the {name} [{unit}]"] = self.error_estimates()
             columns[f"corrected {name} [{unit}]"] = self.corrected
         on_one(self.discretisation.comm, lambda: write_csv(path, columns))
@@ -345,20 +378,17 @@ class Curve:
     # -- what the above need -------------------------------------------------------------------------------------
 
     def equilibrium(self, frame: Frame) -> Equilibrium:
-        """The equilibrium of one of the frames, with its prescribed quantity. Local."""
-        return Equilibrium(frame.state, frame.design, self.quantity)
+        """The equilibrium of one of the frames, with the unknown of the curve. Local."""
+        return Equilibrium(frame.state, frame.design, self.unknown)
 
     @property
-    def _solver(self) -> Iteration:
-        return self.discretisation.newton(self.part, self.others)
+    def _solver(self) -> EquilibriumSolver:
+        return self.discretisation.solver(self.part, self.others)
 
     def _need_force(self) -> None:
-        if not isinstance(self.part, Force):
-            raise DescriptionError(
-                f"curve of {self.part.name!r}",
-                "no force changes along it",
-                "Ask this of a curve under a changing force",
-            )
+        if not isinstance(self.part, Force | ForceGroup):
+            where, remedy = f"curve of {self.part.name!r}", "Call this on a curve under a changing force"
+            raise DescriptionError(where, "no force changes along it", remedy)
 
     def _chosen(self, frame: Frame | None) -> Frame:
         if frame is not None and frame not in self.frames:
@@ -368,21 +398,21 @@ class Curve:
         return frame or self.frames[-1]
 
     def _modes(
-        self, held: LoadControl | MotorControl, modes: Callable[..., list[Mode]], frame: Frame, count: int
-    ) -> list[tuple[float, ModeShape]]:
-        """Eigenvalues and shapes of modes at a frame while ``held`` changes."""
-        model = self.discretisation.model
-        with model.shaped(frame.design):
+        self, control: LoadControl | MotorControl, modes: Callable[..., list[Mode]], frame: Frame | None, count: int
+    ) -> tuple[Frame, list[tuple[float, ModeShape]]]:
+        """The chosen frame, and eigenvalues and shapes of its modes while the value of ``control`` changes."""
+        model, at = self.discretisation.model, self._chosen(frame)
+        with model.shaped(at.design):
             try:
-                found = modes(self._solver, held, frame.state, count=count)
-                return [(mode.value, mode_shape(model, mode.step)) for mode in found]
+                found = modes(self._solver, control, at.state, count=count)
+                return at, [(mode.value, mode_shape(model, mode.step)) for mode in found]
             except NotConverged as failure:
                 where = f"{self.part.name!r} in configuration {self.configuration.name!r}"
                 raise EquilibriumError(
-                    f"modes of {where} at {self.axes[1](frame.force)}",
+                    f"modes of {where} at {self.axes[1](at.force)}",
                     f"they are not defined there ({failure.reason})",
                     "Choose another frame, or prescribe another part",
-                    last=frame,
+                    last=at,
                 ) from failure
 
     def _estimated(self, kinds: Sequence[ErrorKind], output: Output | None) -> list[np.ndarray]:
@@ -395,4 +425,7 @@ class Curve:
             rows = [estimates.at(self._solver, self.equilibrium(frame), missing, point) for frame in self.frames]
             for kind, column in zip(missing, np.array(rows).T, strict=True):
                 self._errors[kind, output] = column
+            growth, largest = np.abs(self.growth_by_halving).max(), np.abs(self.values).max()
+            if output is None and growth > ExplanationOptions().tolerance * largest:
+                _log.warning("%s (each halving adds %.2g of it)", cause_of_growth(self.part), growth / largest)
         return [self._errors[kind, output] for kind in kinds]

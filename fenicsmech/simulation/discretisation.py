@@ -2,38 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from copy import copy
 from functools import cached_property
 
 from mpi4py import MPI
 
-from fenicsmech.clock import Clock
 from fenicsmech.collective import on_one
 from fenicsmech.continuation import Predictor
-from fenicsmech.equilibrium import EquilibriumSolver, Iteration
+from fenicsmech.equilibrium import EquilibriumMethod, EquilibriumSolver, LoadControl, MotorControl, PointLoad
 from fenicsmech.errors import DescriptionError
 from fenicsmech.estimates import Estimates
-from fenicsmech.mechanism import Force, Material, PrescribedPart, Scene
+from fenicsmech.log import Clock
+from fenicsmech.mechanism import FlexibleLink, Force, ForceGroup, Material, PrescribedPart, Scene, Shape
 from fenicsmech.meshing import MechanismMesh
 from fenicsmech.model import Fidelity, MechanismModel, check_links, mesh_mechanism
 from fenicsmech.multibody import build_linkage
-from fenicsmech.simulation.request import controlled_load
 
 
 class Discretisation:
     """The meshed and compiled parts of simulations, which simulations of several designs share, and curves refer to.
 
-    Args:
-        scene: the mechanism and its effects.
-        fidelity: elements and formulation.
-        solver: of equilibria.
-        predictor: of the next equilibrium on a curve.
-        clock: of the phases.
-        comm: processes that share the work.
-
     Attributes:
         linkage: the bodies.
         materials: of the flexible links.
+        shapes: of the flexible links.
 
     Raises:
         DescriptionError: links, joints or points cannot be right.
@@ -43,30 +36,36 @@ class Discretisation:
         self,
         scene: Scene,
         fidelity: Fidelity,
-        solver: EquilibriumSolver,
+        method: EquilibriumMethod,
         predictor: Predictor,
         clock: Clock,
         comm: MPI.Comm,
+        shapes: Mapping[FlexibleLink, Shape] | None = None,
     ) -> None:
         self.scene, self.fidelity, self.clock, self.comm = scene, fidelity, clock, comm
-        self.solver, self.predictor = solver, predictor
+        self.method, self.predictor = method, predictor
         self.linkage = build_linkage(scene.mechanism, fidelity.model.mechanism_dim)
-        self.materials = tuple(link.material for link in scene.mechanism.flexible_links)
-        self._iterations: dict[tuple, Iteration] = {}
-        on_one(comm, lambda: check_links(scene.mechanism, self.linkage, fidelity))
+        links = scene.mechanism.flexible_links
+        self.materials = tuple(link.material for link in links)
+        self.shapes = {link: link.shape for link in links} | dict(shapes or {})
+        self._solvers: dict[tuple, EquilibriumSolver] = {}
+        on_one(comm, lambda: check_links(scene.mechanism, tuple(self.shapes.values()), self.linkage, fidelity))
 
-    def at(self, fidelity: Fidelity, clock: Clock, comm: MPI.Comm) -> Discretisation:
-        """The same scene at another fidelity or on other processes, with nothing meshed yet."""
-        other = Discretisation(self.scene, fidelity, self.solver, self.predictor, clock, comm)
+    def at(
+        self,
+        fidelity: Fidelity,
+        clock: Clock,
+        comm: MPI.Comm,
+        shapes: Mapping[FlexibleLink, Shape] | None = None,
+    ) -> Discretisation:
+        """The same scene at another fidelity, on other processes or with links of other shapes, nothing meshed yet."""
+        shapes = self.shapes | dict(shapes or {})
+        other = Discretisation(self.scene, fidelity, self.method, self.predictor, clock, comm, shapes)
         other.materials = self.materials
         return other
 
     def with_material(self, drawn: Material, other: Material) -> Discretisation:
-        """The same scene on the same mesh, with links of another material instead of ``drawn``.
-
-        Raises:
-            DescriptionError: no link is made of it.
-        """
+        """The same scene on the same mesh, with links of another material instead of ``drawn``."""
         if drawn not in self.materials:
             raise DescriptionError(
                 f"material {drawn.name!r}",
@@ -75,7 +74,7 @@ class Discretisation:
             )
         changed = copy(self)
         changed.materials = tuple(other if material == drawn else material for material in self.materials)
-        changed.mesh, changed._iterations = self.mesh, {}
+        changed.mesh, changed._solvers = self.mesh, {}
         for name in ("model", "estimates"):
             changed.__dict__.pop(name, None)
         return changed
@@ -84,7 +83,8 @@ class Discretisation:
     def mesh(self) -> MechanismMesh:
         """The reference mesh of all flexible links."""
         with self.clock.phase("mesh"):
-            return mesh_mechanism(self.comm, self.scene.mechanism, self.linkage, self.fidelity)
+            shapes = tuple(self.shapes.values())
+            return mesh_mechanism(self.comm, self.scene.mechanism, shapes, self.linkage, self.fidelity)
 
     @cached_property
     def model(self) -> MechanismModel:
@@ -100,10 +100,23 @@ class Discretisation:
         """Error estimates at equilibria."""
         return Estimates(self.model)
 
-    def newton(self, part: PrescribedPart, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
+    def solver(self, part: PrescribedPart, others: tuple[tuple[Force, float], ...] = ()) -> EquilibriumSolver:
         """The solver for what changes and some constant forces, kept for all configurations."""
         key = part, others
-        if key not in self._iterations:
+        if key not in self._solvers:
             loads = tuple((self.model.point_load(other), float(magnitude)) for other, magnitude in others)
-            self._iterations[key] = self.solver.on(self.model.system(controlled_load(part, self.model), loads))
-        return self._iterations[key]
+            self._solvers[key] = self.method.solver(self.model.system(self._controlled_load(part), loads))
+        return self._solvers[key]
+
+    def followed_control(self, part: PrescribedPart) -> LoadControl | MotorControl:
+        """The control whose value changes along the path of a part."""
+        if isinstance(part, Force | ForceGroup):
+            return LoadControl()
+        ratios = dict(part.ratios)
+        return MotorControl(0.0, self.linkage.joints.motor_values(lambda motor: ratios.get(motor, 0.0)))
+
+    def _controlled_load(self, part: PrescribedPart) -> PointLoad:
+        """The load whose magnitude is unknown; for motors one that acts nowhere."""
+        acting = part.ratios if isinstance(part, Force | ForceGroup) else ()
+        loads = [(self.model.point_load(force), ratio) for force, ratio in acting]
+        return PointLoad(part.name, tuple((point, ratio * way) for load, ratio in loads for point, way in load.acting))

@@ -1,16 +1,16 @@
-"""Fields of frames: gathered on one process for pictures, or written as an XDMF time series for ParaView."""
+"""Fields of frames: gathered on one process and drawn in plan view, or written as an XDMF time series for ParaView."""
 
 from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from dolfinx import fem
+from mpi4py import MPI
 
 from fenicsmech.collective import from_one, on_one
 from fenicsmech.compat import (
@@ -24,7 +24,10 @@ from fenicsmech.compat import (
     write_series,
 )
 from fenicsmech.errors import DescriptionError
+from fenicsmech.mechanism import Force, Link, in_dimension
+from fenicsmech.meshing import CurvedEdges, node_ends
 from fenicsmech.model import MechanismModel
+from fenicsmech.plot import Arrow, FlexibleShape, MechanismShape, Pin, RigidShape, plan_view, rigid_outline
 from fenicsmech.simulation.frame import Frame
 
 
@@ -55,51 +58,116 @@ def at_vertices(model: MechanismModel, field: fem.Function) -> np.ndarray:
     return vertices
 
 
-def rest_vertices(model: MechanismModel) -> np.ndarray | None:
-    """Vertices of the present rest shape on rank 0, (vertices, dim); None elsewhere."""
-    mesh = model.mesh
-    parts = mesh.mesh.comm.gather((original_nodes(mesh.mesh), at_vertices(model, model.elastic.d)), root=0)
+def _gathered(comm: MPI.Comm, numbers: np.ndarray, values: np.ndarray, count: int) -> np.ndarray | None:
+    """The values of all ``count`` vertices or cells on rank 0, from those of this rank with their numbers."""
+    parts = comm.gather((numbers, values), root=0)
     if parts is None:
         return None
-    rest = mesh.vertices.copy()
-    for nodes, design in parts:
-        rest[nodes] = mesh.vertices[nodes] + design
-    return rest
+    whole = np.zeros((count, *values.shape[1:]))
+    for places, part in parts:
+        whole[places] = part
+    return whole
+
+
+def rest_vertices(model: MechanismModel) -> np.ndarray | None:
+    """Vertices of the present rest shape on rank 0, (vertices, dim); None elsewhere."""
+    mesh, drawn = model.mesh.mesh, model.mesh.vertices
+    design = _gathered(mesh.comm, original_nodes(mesh), at_vertices(model, model.elastic.d), len(drawn))
+    return None if design is None else drawn + design
+
+
+def rest_geometry(model: MechanismModel) -> tuple[np.ndarray, CurvedEdges] | None:
+    """Vertices (vertices, dim) and curved edges of the present rest shape on rank 0; None elsewhere."""
+    elastic, vertices = model.elastic, rest_vertices(model)
+    ends, nodes = node_ends(elastic.d.function_space), elastic.d.x.array.reshape(-1, elastic.model.dim)
+    if elastic.bulge is not None:
+        nodes = nodes + elastic.bulge.x.array.reshape(nodes.shape)
+    between = ends[:, 0] != ends[:, 1]
+    parts = model.mesh.comm.gather((ends[between], nodes[between]), root=0)
+    if parts is None or vertices is None:
+        return None
+    ends, nodes = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return vertices, CurvedEdges.through(vertices, ends, model.mesh.vertices[ends].mean(axis=1) + nodes)
 
 
 def gather(model: MechanismModel, frame: Frame) -> Snapshot | None:
     """The snapshot of ``frame``, on rank 0; None elsewhere."""
-    mesh = model.mesh
-    own = mesh.mesh.topology.index_map(mesh.mesh.topology.dim).size_local
+    mesh, elastic = model.mesh.mesh, model.elastic
+    own = mesh.topology.index_map(mesh.topology.dim).size_local
     with model.shaped(frame.design):
         model.load(frame.state)
+        u, stress = at_vertices(model, elastic.u), elastic.von_mises()[:own]
         rest = rest_vertices(model)
-        parts = mesh.mesh.comm.gather(
-            (
-                original_nodes(mesh.mesh),
-                at_vertices(model, model.elastic.u),
-                original_cells(mesh.mesh)[:own],
-                model.elastic.von_mises()[:own],
-            ),
-            root=0,
-        )
-    if parts is None or rest is None:
+    displacement = _gathered(mesh.comm, original_nodes(mesh), u, len(model.mesh.vertices))
+    von_mises = _gathered(mesh.comm, original_cells(mesh)[:own], stress, len(model.mesh.cells))
+    if rest is None or displacement is None or von_mises is None:
         return None
-    displacement, stress = np.zeros_like(mesh.vertices), np.zeros(len(mesh.cells))
-    for nodes, u, cells, values in parts:
-        displacement[nodes] = u
-        stress[cells] = values
-    return Snapshot(rest, displacement, stress, frame.state.poses)
+    return Snapshot(rest, displacement, von_mises, frame.state.poses)
+
+
+class MechanismPlotter:
+    """Draws states of one mechanism in plan view; the triangles are those of the undeformed mesh."""
+
+    def __init__(self, model: MechanismModel) -> None:
+        self._mechanism, self._linkage, self._mesh = model.mechanism, model.linkage, model.mesh
+        self._width = 0.03 * model.linkage.length
+        self._faces = [self._visible(index) for index in range(len(model.mechanism.flexible_links))]
+
+    def shape(self, snapshot: Snapshot, *, stress: bool) -> MechanismShape:
+        """The mechanism in the state of ``snapshot``, links optionally coloured by von Mises stress."""
+        positions = (snapshot.rest + snapshot.displacement)[:, :2]
+        flexible = tuple(
+            FlexibleShape(positions, triangles, snapshot.von_mises[cells] if stress else None, name=link.name)
+            for (triangles, cells), link in zip(self._faces, self._mechanism.flexible_links, strict=True)
+        )
+        return MechanismShape(flexible, self.rigid(snapshot.poses), self._pins(snapshot.poses))
+
+    def rigid(self, poses: np.ndarray) -> tuple[RigidShape, ...]:
+        """The rigid links at ``poses`` (bodies, pose_size)."""
+        return tuple(
+            RigidShape(rigid_outline(self._places(link, poses), self._width), link.name, link.fixed)
+            for link in self._mechanism.rigid_links
+        )
+
+    def arrow(self, force: Force, magnitude: float, snapshot: Snapshot, *, label: str) -> Arrow:
+        """The arrow of a force on a rigid link in the state of ``snapshot``."""
+        at = self.position(force.on, force.at, snapshot.poses)
+        return Arrow(at, magnitude * np.array(force.direction[:2]), label=label)
+
+    def position(self, link: Link, at: Sequence[float], poses: np.ndarray) -> np.ndarray:
+        """Position of the point drawn at ``at`` of ``link``, (2,); a flexible link moves with its first interface."""
+        return self._moved(self._linkage.body_of(link), in_dimension(tuple(at), self._linkage.dim), poses)
+
+    def _places(self, link: Link, poses: np.ndarray) -> np.ndarray:
+        """Current positions of the joints, forces and outputs of a rigid link, (k, 2)."""
+        joints = [joint.at for joint in self._mechanism.joints if link in (joint.a, joint.b)]
+        points = [part.at for part in (*self._mechanism.forces, *self._mechanism.outputs) if part.on == link]
+        return np.array([self.position(link, at, poses) for at in (*joints, *points)])
+
+    def _pins(self, poses: np.ndarray) -> tuple[Pin, ...]:
+        return tuple(
+            Pin(self._moved(each.a, each.at, poses), welded=each.kind.clamps)
+            for each in self._linkage.joints.connections
+        )
+
+    def _moved(self, body: int, at: Sequence[float], poses: np.ndarray) -> np.ndarray:
+        """Position of the point drawn at ``at`` of a body, (2,)."""
+        offset = np.array(at) - np.array(self._linkage.bodies[body].centre)
+        return (np.array(at) + self._linkage.joints.space.displace(poses[body], offset[None])[0])[:2]
+
+    def _visible(self, index: int) -> tuple[np.ndarray, np.ndarray]:
+        """Triangles of a link seen from above, and the cell each belongs to."""
+        cells = np.flatnonzero(self._mesh.link_of_cell == index)
+        if self._mesh.vertices.shape[1] == 2:
+            return self._mesh.cells[cells], cells
+        triangles, owners = plan_view(self._mesh.vertices, self._mesh.cells[cells])
+        return triangles, cells[owners]
 
 
 def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame]) -> None:
     """Writes vertex displacements, von Mises stress and pressure of ``frames`` of one design; time is the force.
 
     There are pressures where elements are mixed, zero in all other links. The files appear when they are complete.
-
-    Raises:
-        DescriptionError: the path does not end in .xdmf.
-        OSError: nothing can be written there.
     """
     target = Path(path)
     if target.suffix != ".xdmf":
@@ -119,37 +187,25 @@ def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame])
             von_mises = elastic.von_mises()
             stress.x.array[: len(von_mises)] = von_mises
 
+    def new_folder() -> Path:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        return Path(tempfile.mkdtemp(dir=target.parent, prefix=f".{target.stem}-"))
+
     def move_up() -> None:
         """Moves the heavy data first, so that the light file never refers to a missing file."""
         for suffix in (".h5", ".xdmf"):
             os.replace(folder / target.with_suffix(suffix).name, target.with_suffix(suffix))
         folder.rmdir()
 
-    folder = from_one(comm, lambda: _folder_beside(target))
-    forces = np.array([frame.force for frame in frames])
-    with _at_rest(model, frames[0].design):
-        write_series(folder / target.name, mesh, {**nodal, "von Mises stress": stress}, forces, update, comm)
-    comm.barrier()  # all have closed the file
-    on_one(comm, move_up)
-
-
-def _folder_beside(path: Path) -> Path:
-    """A new folder next to ``path``."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    return Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.stem}-"))
-
-
-@contextmanager
-def _at_rest(model: MechanismModel, design: np.ndarray) -> Iterator[None]:
-    """A context in which the mesh has the rest shape of ``design``, as in files.
-
-    The only place where the coordinates of a ``MechanismMesh`` change: dolfinx writes functions with their own mesh.
-    """
-    x = model.mesh.mesh.geometry.x
-    drawn = x.copy()
-    with model.shaped(design):
-        x[:, : model.elastic.model.dim] += at_vertices(model, model.elastic.d)
+    folder, forces = from_one(comm, new_folder), np.array([frame.force for frame in frames])
+    x, drawn = mesh.geometry.x, mesh.geometry.x.copy()
+    with model.shaped(frames[0].design):
+        rest = at_vertices(model, elastic.d)
+    # only here the coordinates of a mesh change: dolfinx writes functions with their own mesh
     try:
-        yield
+        x[:, : elastic.model.dim] += rest
+        write_series(folder / target.name, mesh, {**nodal, "von Mises stress": stress}, forces, update, comm)
     finally:
         x[:] = drawn
+    comm.barrier()  # all have closed the file
+    on_one(comm, move_up)

@@ -1,8 +1,8 @@
-"""Followed curves: past limit points and folds, with their limit points and bifurcations recorded as events."""
+"""Followed curves: past limit points and folds until an end, with limit points and bifurcations recorded as events."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from time import perf_counter
 
@@ -17,15 +17,88 @@ from fenicsmech.continuation import (
     locate,
     null_space,
 )
-from fenicsmech.equilibrium import EquilibriumPoint, LoadControl, NotConverged, Quantity, State
-from fenicsmech.errors import DescriptionError, EquilibriumError
+from fenicsmech.equilibrium import EquilibriumPoint, LoadControl, NotConverged, State, Unknown
+from fenicsmech.errors import DescriptionError, EquilibriumError, finite, set_fields
+from fenicsmech.mechanism import Configuration, Drive, Force, ForceGroup, Mechanism, Motor, PrescribedPart
 from fenicsmech.plot import CurveMark, CurveSeries
-from fenicsmech.simulation.buckling import ModeShape, mode_shape
-from fenicsmech.simulation.curve import Curve
+from fenicsmech.simulation.curve import Curve, axes
 from fenicsmech.simulation.discretisation import Discretisation
-from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.request import CurveRequest, Until, quantities
-from fenicsmech.simulation.tracing import CurveTracer
+from fenicsmech.simulation.frame import Frame, ModeShape, mode_shape
+from fenicsmech.simulation.tracing import CurveRequest, CurveTracer, check_force, check_motors, read_others
+
+
+@dataclass(frozen=True)
+class Until:
+    """A path ends as soon as it passes one of these values, exactly there, or after so many frames.
+
+    Args:
+        displacement: of the point of the prescribed force, along it, counted as on curves; one value or several.
+        position: of the prescribed motors, rad or length, counted from the drawing; one value or several.
+        force: magnitude of the prescribed force, or torque or force of the motors; one value or several.
+        frames: most frames, critical points aside; the path ends there without error.
+
+    Raises:
+        DescriptionError: nothing to end at, displacement and position at once, or numbers that make no sense.
+    """
+
+    displacement: float | tuple[float, ...] = ()
+    force: float | tuple[float, ...] = ()
+    position: float | tuple[float, ...] = ()
+    frames: int = 500
+
+    def __post_init__(self) -> None:
+        for name in ("displacement", "force", "position"):
+            values = _several(getattr(self, name))
+            set_fields(self, **{name: tuple(finite(f"{name} where a path ends", value) for value in values)})
+        if not (self.displacement or self.force or self.position):
+            raise DescriptionError("end of a path", "no displacement, position or force is given", "Give one of them")
+        if self.displacement and self.position:
+            remedy = "Give displacement for a force, position for a motor"
+            raise DescriptionError("end of a path", "a displacement and a position are given", remedy)
+        if isinstance(self.frames, bool) or not isinstance(self.frames, int) or self.frames < 2:
+            raise DescriptionError("end of a path", f"{self.frames!r} frames", "Give a whole number of at least 2")
+
+    @property
+    def displacements(self) -> tuple[float, ...]:
+        """Displacements or positions, whichever are given."""
+        return _several(self.displacement or self.position)
+
+    @property
+    def forces(self) -> tuple[float, ...]:
+        """Magnitudes of the force."""
+        return _several(self.force)
+
+
+def _several(given: float | Iterable[float]) -> tuple[float, ...]:
+    return tuple(given) if isinstance(given, Iterable) and not isinstance(given, str) else (given,)
+
+
+def read_path(
+    mechanism: Mechanism,
+    part: PrescribedPart,
+    until: object,
+    configuration: Configuration,
+    others: Mapping[Force, float] | None,
+) -> CurveRequest:
+    """The request for a curve that is followed, if it makes sense for ``mechanism``."""
+    if isinstance(part, Motor | Drive):
+        check_motors(mechanism, f"{part.name!r}", part.ratios, "Add it with motor()")
+    else:
+        check_force(mechanism, part)
+    constant = read_others(mechanism, part, configuration, others)
+    check_until(until, part)
+    return CurveRequest(part, (), configuration, constant)
+
+
+def check_until(until: object, part: PrescribedPart) -> None:
+    """Refuses an end that the path of ``part`` does not have."""
+    has, lacks = ("displacement", "position") if isinstance(part, Force | ForceGroup) else ("position", "displacement")
+    if not isinstance(until, Until):
+        raise DescriptionError("end of a path", f"{until!r} does not say where it ends", f"Give until=Until({has}=…)")
+    if getattr(until, lacks):
+        raise DescriptionError(
+            "end of a path", f"{part.name!r} is prescribed, which has no {lacks}", f"Give its {has}=…"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,45 +173,11 @@ class FollowedCurve(Curve):
         return tuple(event for event in self.events if event.kind is kind)
 
 
-def follow(
-    discretisation: Discretisation,
-    request: CurveRequest,
-    until: Until,
-    steps: ArcSteps,
-    watch: Callable[[int], None],
-) -> FollowedCurve:
-    """The curve of a request from its configuration without the controlled force.
-
-    Args:
-        discretisation: of the scene, at its present rest shape.
-        request: of the curve.
-        until: where the curve ends.
-        steps: options of the continuation.
-        watch: called with the number of frames so far.
-
-    Raises:
-        AssemblyError: the configuration does not assemble.
-        EquilibriumError: the curve ends early; carries the frames before that.
-    """
-    follower = CurveFollower(CurveTracer(discretisation, request), until, steps)
-    follower.from_rest(watch)
-    return follower.curve()
-
-
 def branches(
     curve: FollowedCurve, event: PathEvent, until: Until, steps: ArcSteps, mode: ModeShape | None
 ) -> tuple[FollowedCurve, FollowedCurve]:
-    """The curve that crosses another one, in both senses.
-
-    Args:
-        curve, event: a followed curve and one of its bifurcations.
-        until, steps: as in ``follow``.
-        mode: one of the event's ``null_space``, if several modes become unstable at once.
-
-    Raises:
-        DescriptionError: the event is not a bifurcation of the curve, the mode is missing or none of its.
-        EquilibriumError: the curve is not found, or ends early; carries the frames before that.
-    """
+    """The curve that crosses another one, in both senses, as ``Simulation.branches``."""
+    check_until(until, curve.part)
     if event not in curve.bifurcations:
         raise DescriptionError(
             "branches", "the event is not a bifurcation of the curve", "Choose from its bifurcations"
@@ -147,100 +186,82 @@ def branches(
         raise DescriptionError(
             "branches",
             f"{event.modes} modes become unstable at once: {', '.join(shape.link for shape in event.null_space)}",
-            "Say which with mode=event.null_space[…], or break the symmetry a little",
+            "Choose one with mode=event.null_space[…], or break the symmetry slightly",
         )
     if mode is not None and mode not in event.null_space:
-        raise DescriptionError("branches", "the mode is none of the event's", "Choose from its null_space")
-    request, found = CurveRequest(curve.part, (), curve.configuration, curve.others), []
+        raise DescriptionError("branches", "the mode does not belong to the event", "Choose from its null_space")
+    request = CurveRequest(curve.part, (), curve.configuration, curve.others)
+
+    def branch(sense: Sense) -> FollowedCurve:
+        follower = CurveFollower(curve.discretisation, request, until, steps)
+        return follower.from_bifurcation(event, mode or event.mode, sense)
+
     with curve.discretisation.model.shaped(event.frame.design):
-        for sense in Sense:
-            follower = CurveFollower(CurveTracer(curve.discretisation, request), until, steps)
-            follower.from_bifurcation(event, mode or event.mode, sense)
-            found.append(follower.curve())
-    return found[0], found[1]
+        return branch(Sense.ALONG), branch(Sense.AGAINST)
 
 
 class CurveFollower:
-    """The path of one request.
+    """The path of one request, until an end."""
 
-    Args:
-        tracer: of the request.
-        until: where the path ends.
-        steps: how finely it is followed.
-    """
+    def __init__(self, discretisation: Discretisation, request: CurveRequest, until: Until, steps: ArcSteps) -> None:
+        self._tracer, self._until, self._steps = CurveTracer(discretisation, request), until, steps
+        self._followed, self._system = self._tracer.followed, self._tracer.solver.system
+        self._frames, self._events = self._tracer.frames, list[PathEvent]()
 
-    def __init__(self, tracer: CurveTracer, until: Until, steps: ArcSteps) -> None:
-        self._tracer, self._until, self._steps = tracer, until, steps
-        self._followed, self._system = tracer.followed, tracer.solver.system
-        self._frames: list[Frame] = []
-        self._events: list[PathEvent] = []
-
-    def curve(self) -> FollowedCurve:
-        """The frames and events found."""
-        tracer, request = self._tracer, self._tracer.request
-        return FollowedCurve(
-            request.part,
-            request.configuration,
-            tracer.freedom,
-            tuple(self._frames),
-            tracer.discretisation,
-            others=request.others,
-            # loads have limit points, where no displacement belongs to a slightly larger one
-            quantity=Quantity.FORCE,
-            events=tuple(self._events),
-        )
-
-    def from_rest(self, watch: Callable[[int], None]) -> None:
-        """Follows the path from the configuration without the controlled force.
-
-        Raises:
-            EquilibriumError: the path ends early; carries the frames before that.
-        """
-        first = self._tracer.frame(LoadControl(0.0), ())
-        self._frames.append(first)
+    def from_rest(self, watch: Callable[[int], None]) -> FollowedCurve:
+        """The curve from the configuration without the controlled force; ``watch`` gets the number of frames so far."""
+        self._frames.append(self._tracer.frame(LoadControl(0.0)))
         try:
-            path = self._path(first.state)
+            path = self._path(self._frames[0].state)
         except NotConverged as failure:
             raise self._ended(failure) from failure
         start, finishes = path.start, self._finishes(path)
         # towards the first displacement or position that is wanted, or else the first force
-        wanted = [*(finish for finish in finishes if finish.target != finish.value(start))][:1]
-        if wanted and (wanted[0].target - wanted[0].value(start)) * wanted[0].rate(start) < 0.0:
+        wanted = next((finish for finish in finishes if finish.target != finish.value(start)), None)
+        if wanted and (wanted.target - wanted.value(start)) * wanted.rate(start) < 0.0:
             start = start.scaled(-1.0)
-        self._walk(path, start, watch)
+        return self._follow(path, start, watch)
 
-    def from_bifurcation(self, event: PathEvent, mode: ModeShape, sense: Sense) -> None:
-        """Follows the path that crosses another one at ``event`` along ``mode``.
-
-        Raises:
-            EquilibriumError: the path is not found, or ends early; carries the frames before that.
-        """
+    def from_bifurcation(self, event: PathEvent, mode: ModeShape, sense: Sense) -> FollowedCurve:
+        """The curve that crosses another one at ``event`` along ``mode``."""
+        rest = self._tracer.frame(LoadControl(0.0))  # the tangent at the bifurcation has no scale
         self._frames.append(event.frame)
-        rest = self._tracer.frame(LoadControl(0.0), ())  # the tangent at the bifurcation has no scale
         try:
             path = self._path(rest.state)
             first = crossing(path, event.critical, mode.step, sense)
         except NotConverged as failure:
             raise self._ended(failure) from failure
         self._frames.append(self._tracer.record(first))
-        self._walk(path, first, lambda done: None)
+        return self._follow(path, first, lambda done: None)
 
-    def _walk(self, path: ArcLengthTracer, start: EquilibriumPoint, watch: Callable[[int], None]) -> None:
-        clock = self._tracer.discretisation.clock
-        stretches = path.follow(start, self._finishes(path), most=self._until.frames - len(self._frames))
+    def _follow(self, path: ArcLengthTracer, start: EquilibriumPoint, watch: Callable[[int], None]) -> FollowedCurve:
+        tracer, request = self._tracer, self._tracer.request
+        clock = tracer.discretisation.clock
+        steps = path.follow(start, self._finishes(path), most=self._until.frames - len(self._frames))
         while True:
             began, seconds = perf_counter(), dict(clock.seconds)
             try:
-                ends = next(stretches, None)
-                if ends is None:
-                    return
+                if (ends := next(steps, None)) is None:
+                    break
                 for critical in locate(path, *ends):
                     self._record_event(path, critical)
             except NotConverged as failure:
                 raise self._ended(failure) from failure
-            frame = self._tracer.record(ends[1])
+            frame = tracer.record(ends[1])
             self._frames.append(replace(frame, seconds=perf_counter() - began, phases=clock.since(seconds)))
             watch(min(len(self._frames), self._until.frames))  # critical points come on top
+        return FollowedCurve(
+            request.part,
+            request.configuration,
+            tracer.freedom,
+            tuple(self._frames),
+            tracer.discretisation,
+            tracer.unloaded,
+            others=request.others,
+            # loads have limit points, where no displacement belongs to a slightly larger one
+            unknown=Unknown.FORCE,
+            events=tuple(self._events),
+        )
 
     def _record_event(self, path: ArcLengthTracer, critical: CriticalPoint) -> None:
         if critical.kind is Critical.BIFURCATION:
@@ -256,7 +277,7 @@ class CurveFollower:
     def _path(self, state: State) -> ArcLengthTracer:
         """The path through ``state``, in units of its ends."""
         until, value, conjugate = self._until, self._followed.value(self._system, state), self._conjugate(state)
-        values, conjugates = until.travels, until.forces
+        values, conjugates = until.displacements, until.forces
         if not self._followed.displaces:
             values, conjugates = conjugates, values
         return ArcLengthTracer(
@@ -272,10 +293,10 @@ class CurveFollower:
         """Displacements or positions first, then forces."""
         followed = path.value, path.value_rate
         conjugate = (lambda point: self._conjugate(point.state)), (lambda point: point.conjugate_rate)
-        travel, force = (followed, conjugate) if self._followed.displaces else (conjugate, followed)
+        displacement, force = (followed, conjugate) if self._followed.displaces else (conjugate, followed)
         return [
             Finish(value, rate, target, max(map(abs, targets)) or 1.0)
-            for (value, rate), targets in ((travel, self._until.travels), (force, self._until.forces))
+            for (value, rate), targets in ((displacement, self._until.displacements), (force, self._until.forces))
             for target in targets
         ]
 
@@ -286,11 +307,13 @@ class CurveFollower:
         return self._followed.conjugate(self._system, state) - origin
 
     def _ended(self, failure: NotConverged) -> EquilibriumError:
-        last, (across, up) = self._frames[-1], quantities(self._tracer.request.part)
+        tracer, last = self._tracer, self._frames[-1]
+        across, up = axes(tracer.request.part, tracer.discretisation.scene.units)
         return EquilibriumError(
-            f"path of {self._tracer.request.where}",
-            f"it cannot be followed beyond {across} {last.displacement:g} at {up} {last.force:g} ({failure})",
-            "End it before, allow smaller steps with ArcSteps(smallest=…), or use a finer mesh",
+            f"path of {tracer.request.where}",
+            f"it cannot be followed beyond {across.quantity} {across(last.displacement, 6)} at {up.quantity} "
+            f"{up(last.force, 6)} ({failure})",
+            "End it earlier, allow smaller steps with ArcSteps(smallest=…), or use a finer mesh",
             last=last,
             frames=self._frames,
         )

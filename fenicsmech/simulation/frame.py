@@ -1,4 +1,4 @@
-"""The record of one equilibrium of a mechanism."""
+"""Equilibria of a curve with their measured quantities, and modes of their tangents."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenicsmech.equilibrium import Reaction, State
+from fenicsmech.equilibrium import Reaction, State, Step
 from fenicsmech.mechanism import Motor, Output
+from fenicsmech.model import MechanismModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,7 +20,6 @@ class Frame:
         force: magnitude of the prescribed force, or torque or force of the prescribed motors.
         displacement: of the force's point along it, from the assembled configuration, or the motors' position, from
             the drawing.
-        stable: whether small disturbances die out under dead loads.
         snapped_through: whether the mechanism snapped on the way from the frame before: the path turns back there, and
             this equilibrium lies on another one, perhaps not the one that dynamics would lead to.
         unstable_modes: directions in which the energy has a maximum, under dead loads.
@@ -39,7 +39,6 @@ class Frame:
 
     force: float
     displacement: float
-    stable: bool
     snapped_through: bool
     unstable_modes: int
     stable_under_control: bool
@@ -55,6 +54,11 @@ class Frame:
     state: State
     design: np.ndarray
 
+    @property
+    def stable(self) -> bool:
+        """Whether small disturbances die out under dead loads."""
+        return self.unstable_modes == 0
+
     def __repr__(self) -> str:
         figures = [f"force {self.force:.6g}", f"displacement {self.displacement:.6g}"]
         named: list[tuple[Output | Motor, float]] = [*self.outputs.items(), *self.motors.items()]
@@ -63,3 +67,58 @@ class Frame:
         figures.append("stable" if self.stable else f"{self.unstable_modes} unstable modes")
         figures += ["snapped through"] * self.snapped_through
         return f"<Frame: {', '.join(figures)}>"
+
+
+@dataclass(frozen=True, eq=False)
+class ModeShape:
+    """A direction in which a mechanism moves.
+
+    Attributes:
+        link: name of the flexible link that moves most.
+        out_of_plane: fraction of its squared displacements that is across the plane of the mechanism, 0 … 1.
+        step: the direction itself, its largest displacement the mechanism's length (or one rad).
+    """
+
+    link: str
+    out_of_plane: float
+    step: Step
+
+    def __repr__(self) -> str:
+        return f"<ModeShape: {self.link!r} moves most, {self.out_of_plane:.0%} out of the plane>"
+
+
+@dataclass(frozen=True)
+class BucklingLoad:
+    """A magnitude of the force that changes at which the tangent is singular, and the mode."""
+
+    force: float
+    mode: ModeShape
+
+
+@dataclass(frozen=True)
+class BucklingPosition:
+    """A position of the motors that move at which the tangent is singular while they are held there, and the mode."""
+
+    position: float
+    mode: ModeShape
+
+
+@dataclass(frozen=True)
+class SoftMode:
+    """A mode of the tangent; its stiffness is in units of the mean stiffness of the links, negative if unstable."""
+
+    stiffness: float
+    mode: ModeShape
+
+
+def mode_shape(model: MechanismModel, step: Step) -> ModeShape:
+    """The direction ``step`` and its characteristics."""
+    comm, links = model.mesh.mesh.comm, model.mechanism.flexible_links
+    # where half is meshed, nodes move in space and bodies in the plane; pressures come behind
+    dim = model.interfaces.block
+    squares = model.elastic.split(step.u)[0].reshape(-1, dim) ** 2
+    owners = model.node_link[: len(squares)]
+    sums = comm.allreduce(np.array([squares[owners == index].sum(axis=0) for index in range(len(links))]))
+    whole = float(sums.sum())
+    across = float(sums[:, 2].sum()) / whole if dim == 3 and whole > 0.0 else 0.0
+    return ModeShape(links[int(np.argmax(sums.sum(axis=1)))].name, across, step)

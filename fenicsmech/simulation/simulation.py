@@ -5,41 +5,41 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import copy
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from mpi4py import MPI
 
-from fenicsmech.clock import Clock
 from fenicsmech.collective import from_one
 from fenicsmech.continuation import ArcSteps, Hermite, Predictor
-from fenicsmech.effects import spring_potentials
 from fenicsmech.elasticity import Formulation, MixedFormulation, Quadrature
-from fenicsmech.equilibrium import EquilibriumSolver, Iteration, PrimalDualNewton
-from fenicsmech.errors import DescriptionError
-from fenicsmech.estimates import AccuracyControl, Choice, Estimates, FidelityLevel, LevelErrors
-from fenicsmech.log import Progress, Silent
+from fenicsmech.equilibrium import EquilibriumMethod, EquilibriumSolver, PrimalDualNewton
+from fenicsmech.errors import AssemblyError, DescriptionError
+from fenicsmech.estimates import AccuracyControl, Choice, Estimates, FidelityLevel, LevelErrors, cause_of_growth
+from fenicsmech.log import Clock, Progress
 from fenicsmech.mechanism import (
     DRAWN,
     Configuration,
     FlexibleLink,
     Force,
+    ForceGroup,
     Material,
     Mechanism,
     Output,
     PrescribedPart,
     Scene,
+    Shape,
+    in_dimension,
 )
 from fenicsmech.meshing import radius_ratios
 from fenicsmech.model import Fidelity, MechanismModel, read_fidelity
-from fenicsmech.multibody import Linkage
-from fenicsmech.simulation.buckling import ModeShape
+from fenicsmech.multibody import Linkage, assemble, spring_potentials
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.fields import rest_vertices
-from fenicsmech.simulation.following import FollowedCurve, PathEvent, branches, follow
-from fenicsmech.simulation.request import CurveRequest, Until, check_until, read_path, read_request
-from fenicsmech.simulation.tracing import CurveTracer, unloaded_positions
+from fenicsmech.simulation.following import CurveFollower, FollowedCurve, PathEvent, Until, branches, read_path
+from fenicsmech.simulation.frame import ModeShape
+from fenicsmech.simulation.tracing import CurveRequest, CurveTracer, read_request
 
 
 class RestShape(Protocol):
@@ -70,7 +70,7 @@ class Simulation:
         quadrature: quadrature degree; the measured optimum by default.
         formulation: ``MixedFormulation()``: pressures are unknowns in nearly incompressible links;
             ``DisplacementFormulation()``: in none.
-        solver: of equilibria.
+        solver: method for equilibria.
         predictor: of the next equilibrium on a curve.
         comm: processes that share the work.
 
@@ -93,7 +93,7 @@ class Simulation:
         segments: int | None = None,
         quadrature: Quadrature | None = None,
         formulation: Formulation | None = None,
-        solver: EquilibriumSolver | None = None,
+        solver: EquilibriumMethod | None = None,
         predictor: Predictor | None = None,
         comm: MPI.Comm = MPI.COMM_WORLD,
     ) -> None:
@@ -106,19 +106,17 @@ class Simulation:
         self.choice: Choice | None = None
         self._control: AccuracyControl | None = None
         self._design: np.ndarray | None = None
+        given = dict[str, Any](space=space, order=order, layers=layers, segments=segments, quadrature=quadrature)
         if accuracy is None:
-            fidelity = read_fidelity(
-                scene,
-                space=space,
-                order=order,
-                size=size,
-                quadrature=quadrature,
-                formulation=formulation,
-                layers=layers,
-                segments=segments,
-            )
+            fidelity = read_fidelity(scene, size=size, formulation=formulation, **given)
         else:
-            _refuse_beside_accuracy(space=space, order=order, layers=layers, segments=segments, quadrature=quadrature)
+            name = next((name for name, value in given.items() if value is not None), None)
+            if name:
+                raise DescriptionError(
+                    f"accuracy and {name}",
+                    f"both are given, and {name}={given[name]!r} would decide what accuracy is to choose",
+                    f"Leave out {name}, or give {name} and size=… instead of an accuracy",
+                )
             self._control = AccuracyControl(scene, accuracy, size, formulation)
             fidelity = self._control.fidelity(self._control.level)
         solver, predictor = solver or PrimalDualNewton(), predictor or Hermite()
@@ -137,7 +135,7 @@ class Simulation:
 
     def load_displacement(
         self,
-        part: Force,
+        part: Force | ForceGroup,
         *,
         forces: Sequence[float] | None = None,
         displacements: Sequence[float] | None = None,
@@ -147,16 +145,16 @@ class Simulation:
         """The equilibria under a changing force.
 
         Args:
-            part: the force that changes.
+            part: the force that changes, or a ``ForceGroup`` of several.
             forces: its magnitudes (load control), or
-            displacements: displacements of its point along it (displacement control).
+            displacements: of its point along it, for a group Σ ratio · displacement (displacement control).
             configuration: motor positions.
             others: constant magnitudes of other forces.
 
         Raises:
             DescriptionError: the request makes no sense.
             AssemblyError: the configuration does not assemble.
-            EquilibriumError: a sample was not reached; carries the frames before it.
+            EquilibriumError: a prescribed value was not reached; carries the frames before it.
         """
         self._check_description()
         request = read_request(
@@ -167,19 +165,20 @@ class Simulation:
             configuration=configuration,
             others=others,
         )
-        with self._progress(len(request.controls), configuration) as progress:
+        with Progress(len(request.controls), configuration.name, shown=self.comm.rank == 0) as progress:
             control = self._control
             if control is None:
                 return self.trace(request, watch=progress.update)
-
             curves: list[Curve] = []
 
             def run(level: FidelityLevel) -> LevelErrors:
-                self._use(control.fidelity(level))
+                fidelity = control.fidelity(level)
+                if fidelity != self.fidelity:  # curves keep theirs
+                    self._discretisation, self.choice = self._discretisation.at(fidelity, self.clock, self.comm), None
                 curves[:] = [self.trace(request, watch=progress.update)]
                 return _errors(curves[0])
 
-            self.choice = control.choose(run)
+            self.choice = control.choose(run, cause_of_growth(part))
             return curves[0]
 
     def follow(
@@ -210,10 +209,15 @@ class Simulation:
             EquilibriumError: the curve ends early; carries the frames before that.
         """
         self._check_description()
-        self._check_chosen(part)
-        request = read_path(self.scene.mechanism, part, until=until, configuration=configuration, others=others)
-        with self._progress(until.frames, configuration) as progress, self._shaped():
-            return follow(self._discretisation, request, until, steps or ArcSteps(), progress.update)
+        if self._control is not None and self.choice is None:
+            raise DescriptionError(
+                f"curve of {part.name!r}",
+                "no fidelity has been chosen for the required accuracy yet",
+                "Call load_displacement() first, up to such forces, or give space, order and size instead of accuracy",
+            )
+        request = read_path(self.scene.mechanism, part, until, configuration, others)
+        with Progress(until.frames, configuration.name, shown=self.comm.rank == 0) as progress, self._shaped():
+            return CurveFollower(self._discretisation, request, until, steps or ArcSteps()).from_rest(progress.update)
 
     def branches(
         self,
@@ -240,12 +244,11 @@ class Simulation:
             EquilibriumError: the curve is not found, or ends early; carries the frames before that.
         """
         self._check_description()
-        check_until(until, curve.part)
         if curve.discretisation is not self._discretisation:
             raise DescriptionError(
                 f"curve of {curve.part.name!r}",
-                "it was computed at another fidelity than this simulation has now",
-                "Ask the simulation that computed it, before an accuracy makes it go on to a finer mesh",
+                "it was computed at another fidelity than the present one of this simulation",
+                "Call branches() on the simulation that computed it, before it changes to a finer mesh",
             )
         return branches(curve, event, until, steps or ArcSteps(), mode)
 
@@ -255,9 +258,19 @@ class Simulation:
         Raises:
             AssemblyError: one of the configurations does not assemble, or its motors strain the links.
         """
-        return unloaded_positions(
-            self.linkage, part, configurations, spring_potentials(self.scene.effects, self.linkage)
-        )
+        linkage, springs = self.linkage, spring_potentials(self.scene.effects, self.linkage)
+        point, drawn = linkage.point(part.on, part.at), np.array(in_dimension(part.at, linkage.dim))
+        positions = []
+        for configuration in configurations:
+            assembly = assemble(linkage, configuration, springs)
+            if assembly.fraction < 1.0:
+                raise AssemblyError(
+                    f"configuration {configuration.name!r}",
+                    f"its motors strain the links beyond {assembly.fraction:.1%} of their way",
+                    "Use load_displacement with an output at the point",
+                )
+            positions.append(drawn + point.displacement(None, assembly.poses))
+        return np.array(positions)
 
     # -- others like this one ------------------------------------------------------------------------------------
 
@@ -276,7 +289,7 @@ class Simulation:
         if self.comm.allreduce(int(values.shape != (size,))):
             raise DescriptionError(
                 f"design of {self.scene.mechanism.name!r}",
-                f"values of shape {values.shape} for a mesh with {size}",
+                f"it has values of shape {values.shape}, and the mesh has {size}",
                 "Give the design field of this simulation",
             )
         other = copy(self)
@@ -288,7 +301,7 @@ class Simulation:
 
         Args:
             drawn: the material of some links.
-            other: their new material; effects, as the densities of ``Gravity``, keep the drawn one.
+            other: their new material; effects, as ``Gravity`` by its density, keep the drawn one.
 
         Raises:
             DescriptionError: no link is made of ``drawn``.
@@ -296,6 +309,32 @@ class Simulation:
         simulation = copy(self)
         simulation._discretisation, simulation._control = self._discretisation.with_material(drawn, other), None
         return simulation
+
+    def with_shapes(self, shapes: Mapping[FlexibleLink, Shape], *, fidelity: Fidelity | None = None) -> Simulation:
+        """The same scene with links of other shapes, meshed anew; joints keep their places and interfaces.
+
+        Quantities, samples, targets and effects that name these links mean those of other shapes. Links keep the depth
+        and the centreline they were described with.
+
+        Args:
+            shapes: of some flexible links, as ``step_file`` of a designed part.
+            fidelity: by default that of this simulation.
+
+        Raises:
+            DescriptionError: these are not shapes of links of the mechanism, or it does not fit the fidelity.
+            MeshingError: a file cannot be read, or a joint is not on its link.
+        """
+        for link, shape in shapes.items():
+            if link not in self.scene.mechanism.flexible_links or not isinstance(shape, Shape):
+                raise DescriptionError(
+                    f"shapes of links of {self.scene.mechanism.name!r}",
+                    f"{shape!r} is given as the shape of {link!r}",
+                    "Give {link: shape, …} of flexible links of the mechanism",
+                )
+        other = copy(self)
+        other.clock, other.choice, other._control, other._design = Clock(), None, None, None
+        other._discretisation = self._discretisation.at(fidelity or self.fidelity, other.clock, self.comm, shapes)
+        return other
 
     def on(self, comm: MPI.Comm) -> Simulation:
         """The same scene at the same fidelity for other processes, as drawn."""
@@ -338,9 +377,9 @@ class Simulation:
             rest, cells, dim = rest_vertices(self.model), self.model.mesh.cells, self.fidelity.model.dim
         return from_one(self.comm, lambda: 1.0 if rest is None else dim / float(radius_ratios(rest, cells).min()))
 
-    def newton(self, part: PrescribedPart, others: tuple[tuple[Force, float], ...] = ()) -> Iteration:
+    def solver(self, part: PrescribedPart, others: tuple[tuple[Force, float], ...] = ()) -> EquilibriumSolver:
         """The solver for what changes and some constant forces, kept for all configurations."""
-        return self._discretisation.newton(part, others)
+        return self._discretisation.solver(part, others)
 
     def trace(self, request: CurveRequest, *, watch: Callable[[int], None] = lambda done: None) -> Curve:
         """The curve of a checked request, as ``load_displacement`` without showing progress.
@@ -361,14 +400,6 @@ class Simulation:
             with self.model.shaped(self._design):
                 yield
 
-    def _progress(self, frames: int, configuration: Configuration) -> Progress | Silent:
-        return Progress(frames, configuration.name) if self.comm.rank == 0 else Silent()
-
-    def _use(self, fidelity: Fidelity) -> None:
-        """Switches to another fidelity; curves keep theirs."""
-        if fidelity != self.fidelity:
-            self._discretisation, self.choice = self._discretisation.at(fidelity, self.clock, self.comm), None
-
     def _check_description(self) -> None:
         """Refuses a mechanism that is not the one this simulation was made for."""
         if _description(self.scene.mechanism) != self._described:
@@ -378,37 +409,13 @@ class Simulation:
                 "Make a new Simulation",
             )
 
-    def _check_chosen(self, part: PrescribedPart) -> None:
-        """Refuses to follow a path before a fidelity is chosen for the accuracy."""
-        if self._control is not None and self.choice is None:
-            raise DescriptionError(
-                f"curve of {part.name!r}",
-                "the accuracy asked for is settled by load_displacement, which was not called yet",
-                "Call it first, with forces of the size in question, or give space, order and size instead of accuracy",
-            )
-
 
 def _errors(curve: Curve) -> LevelErrors:
     """The largest value of a curve and the estimates of its errors."""
-    elements, plane_stress = curve.errors_by_kind()
     largest, model = int(np.argmax(np.abs(curve.values))), curve.discretisation.model
-    return LevelErrors(
-        value=float(curve.values[largest]),
-        elements=float(elements[largest]),
-        plane_stress=float(plane_stress[largest]),
-        unknowns=model.rigid_dofs + model.flexible_dofs + model.pressure_dofs,
-    )
-
-
-def _refuse_beside_accuracy(**given: object) -> None:
-    """Refuses a fidelity beside an accuracy that is to choose it."""
-    for name, value in given.items():
-        if value is not None:
-            raise DescriptionError(
-                f"accuracy and {name}",
-                f"both are given, and {name}={value!r} would decide what accuracy is to choose",
-                f"Leave out {name}, or give {name} and size=… instead of an accuracy",
-            )
+    value, elements, plane_stress = (float(v[largest]) for v in (curve.values, *curve.errors_by_kind()))
+    unknowns = model.rigid_dofs + model.flexible_dofs + model.pressure_dofs
+    return LevelErrors(value, elements, plane_stress, unknowns, float(curve.growth_by_halving[largest]))
 
 
 def _description(mechanism: Mechanism) -> tuple[tuple, ...]:

@@ -1,15 +1,18 @@
-"""Sampled curves: from the assembled configuration, under constant loads, through all samples, recording frames.
+"""Curves at prescribed values: what is asked, checked before anything is meshed, and the load steps through all values.
+
+A curve starts in the assembled configuration, under constant loads. The prescribed part is a force or motors; both give
+a curve of force (or torque) over displacement (or position).
 
 Rounding of the nodal forces of stiff links may exceed small loads, so that a residual of the size of rounding does not
 fix the rest position of a zero-energy mode. The forces inside an element cancel along motions that deform no
-link, and so do their errors: the work along these is precise, and samples whose loads do not balance along them are
-refused.
+link, and so do their errors: the work along these is precise, and equilibria whose loads do not balance along them
+are refused.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
@@ -23,21 +26,18 @@ from fenicsmech.equilibrium import (
     LoadControl,
     LoadFactorControl,
     MotorControl,
-    Quantity,
     Residual,
     State,
+    Unknown,
     joint_reactions,
     motor_torques,
 )
-from fenicsmech.errors import AssemblyError, EquilibriumError
-from fenicsmech.mechanism import Configuration, Force, Output, in_dimension
+from fenicsmech.errors import DescriptionError, EquilibriumError, finite
+from fenicsmech.mechanism import Configuration, Force, ForceGroup, Mechanism, Motor, PrescribedPart
 from fenicsmech.multibody import (
     Assembly,
     BodyPoint,
-    Linkage,
     Motion,
-    SpringPotential,
-    assemble,
     assemble_before_strain,
     count_freedom,
     free_motions,
@@ -47,40 +47,113 @@ from fenicsmech.multibody import (
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.request import CurveRequest, followed_control
+
+
+@dataclass(frozen=True)
+class CurveRequest:
+    """A load–displacement curve to be computed.
+
+    Attributes:
+        part: the force that changes, or the motors that move.
+        controls: prescribed values, as loads or as displacements counted from the unloaded configuration; none if
+            the curve is followed.
+        configuration: motor positions; the initial ones of motors that move.
+        others: constant magnitudes of other forces.
+    """
+
+    part: PrescribedPart
+    controls: tuple[Control, ...]
+    configuration: Configuration
+    others: tuple[tuple[Force, float], ...]
+
+    @property
+    def where(self) -> str:
+        """The part and the configuration, for messages."""
+        return f"{self.part.name!r} in configuration {self.configuration.name!r}"
+
+
+def read_request(
+    mechanism: Mechanism,
+    force: Force | ForceGroup,
+    *,
+    forces: Sequence[float] | None,
+    displacements: Sequence[float] | None,
+    configuration: Configuration,
+    others: Mapping[Force, float] | None,
+) -> CurveRequest:
+    """The request for a curve at prescribed values, if it makes sense for ``mechanism``."""
+    check_force(mechanism, force)
+    constant = read_others(mechanism, force, configuration, others)
+    if (forces is None) == (displacements is None):
+        given = "both forces and displacements are given" if forces is not None else "no values are given"
+        raise DescriptionError(f"{force.name!r}", given, "Give either forces or displacements")
+    kind, values = (DisplacementControl, displacements) if forces is None else (LoadControl, forces)
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise DescriptionError(f"{force.name!r}", f"its prescribed values are {values!r}", "Give a list of numbers")
+    controls = tuple(kind(finite(f"prescribed value of {force.name!r}", value)) for value in values)
+    if not controls:
+        raise DescriptionError(f"{force.name!r}", "no value is prescribed", "Give at least one force or displacement")
+    return CurveRequest(force, controls, configuration, constant)
+
+
+def read_others(
+    mechanism: Mechanism, part: PrescribedPart, configuration: Configuration, others: Mapping[Force, float] | None
+) -> tuple[tuple[Force, float], ...]:
+    """The constant forces beside ``part``, if they and the configuration are of ``mechanism``."""
+    others = dict(others or {})
+    for other in others:
+        check_force(mechanism, other)
+    if isinstance(part, Force | ForceGroup) and not others.keys().isdisjoint(dict(part.ratios)):
+        raise DescriptionError(f"{part.name!r}", "it changes and is held constant at once", "Leave it out of others")
+    if not isinstance(configuration, Configuration):
+        raise DescriptionError(
+            f"configuration {configuration!r}", "it is not a configuration", "Make one with scene.configuration()"
+        )
+    remedy = "Make the configuration with this mechanism's scene"
+    check_motors(mechanism, f"configuration {configuration.name!r}", configuration.positions, remedy)
+    return tuple((other, finite(f"magnitude of {other.name!r}", value)) for other, value in others.items())
+
+
+def check_force(mechanism: Mechanism, part: object) -> None:
+    """Refuses what is not a force of ``mechanism``, or a group of them."""
+    for force in dict(part.ratios) if isinstance(part, Force | ForceGroup) else (part,):
+        if force not in mechanism.forces:
+            name = force.name if isinstance(force, Force) else force
+            raise DescriptionError(f"{name!r}", f"it is not a force of {mechanism.name!r}", "Add it with force()")
+
+
+def check_motors(mechanism: Mechanism, where: str, motors: Iterable[tuple[Motor, float]], remedy: str) -> None:
+    """Refuses what is not a motor of ``mechanism``."""
+    for motor, _ in motors:
+        if motor not in mechanism.motors:
+            raise DescriptionError(where, f"{motor.name!r} is not a motor of {mechanism.name!r}", remedy)
 
 
 class CurveTracer:
-    """The unloaded equilibrium of a configuration, and load steps from there.
-
-    Args:
-        discretisation: of the scene, at its present rest shape.
-        request: of the curve.
+    """The unloaded equilibrium of a configuration at the present rest shape, and load steps from there.
 
     Attributes:
+        frames: those of the curve so far.
         solver: for the request's forces.
         freedom: mobility of the configuration.
         followed: the control whose value changes along the curve.
         origin: zero of displacements: that of the force's point in the unloaded configuration.
-
-    Raises:
-        AssemblyError: the configuration does not assemble.
-        EquilibriumError: motors that strain the links, or the constant forces, lead to no equilibrium.
     """
 
     def __init__(self, discretisation: Discretisation, request: CurveRequest) -> None:
         self.discretisation, self.request, self._model = discretisation, request, discretisation.model
+        self.frames: list[Frame] = []
         model, rigid = self._model, self._model.linkage.rigid
         assembly = assemble_before_strain(model.linkage, request.configuration, model.spring_potentials)
         motors = assembly.fraction * rigid.motor_values(request.configuration.position)
         self.freedom = count_freedom(rigid, assembly.poses, motors, model.spring_potentials)
-        self.solver = discretisation.newton(request.part, request.others)
+        self.solver = discretisation.solver(request.part, request.others)
         self._system, self._joints = self.solver.system, model.linkage.joints
-        self.followed = followed_control(request.part, self._joints)
+        self.followed = discretisation.followed_control(request.part)
         self.origin, self._origins = 0.0, dict.fromkeys(model.mechanism.outputs, 0.0)
-        self._snaps = 0  # of the path so far that no frame reports
+        self._snaps = 0  # so far, that no frame reports
         self._poses = assembly.poses
-        state = self._unloaded(assembly)
+        state = self.unloaded = self._unloaded(assembly)
         self._system.load(state)
         if not self.followed.displaces:  # motors count from where they were drawn
             self.origin = self.followed.conjugate(self._system, state)
@@ -90,56 +163,44 @@ class CurveTracer:
             self._system.load(state)
         self._state = state
         control = DisplacementControl() if any(c.constrained for c in request.controls) else LoadControl()
-        self._path = LoadStepper(self.solver, state, control, predictor=discretisation.predictor)
+        self._stepper = LoadStepper(self.solver, state, control, predictor=discretisation.predictor)
 
     def curve(self, watch: Callable[[int], None]) -> Curve:
-        """The frames of all samples; ``watch`` is called with the number of frames so far.
-
-        Raises:
-            EquilibriumError: a sample was not reached; carries the frames before it.
-        """
+        """The frames of all prescribed values; ``watch`` is called with the number of frames so far."""
         request = self.request
-        frames: list[Frame] = []
         for control in request.controls:
-            frames.append(self.frame(control, frames))
-            watch(len(frames))
+            self.frames.append(self.frame(control))
+            watch(len(self.frames))
         return Curve(
             request.part,
             request.configuration,
             self.freedom,
-            tuple(frames),
+            tuple(self.frames),
             self.discretisation,
+            self.unloaded,
             others=request.others,
-            quantity=Quantity.FORCE if request.controls[0].constrained else Quantity.DISPLACEMENT,
+            unknown=Unknown.FORCE if request.controls[0].constrained else Unknown.DISPLACEMENT,
         )
 
-    def frame(self, control: Control, before: Sequence[Frame]) -> Frame:
-        """The equilibrium under ``control``; ``before`` are the frames so far.
-
-        Raises:
-            EquilibriumError: it was not reached; carries the frames before it.
-        """
-        clock, path = self._model.clock, self._path
-        start, seconds, iterations, snaps = perf_counter(), dict(clock.seconds), path.iterations, path.snaps
+    def frame(self, control: Control) -> Frame:
+        """The equilibrium under ``control``."""
+        clock, stepper = self._model.clock, self._stepper
+        start, seconds, iterations, snaps = perf_counter(), dict(clock.seconds), stepper.iterations, stepper.snaps
         if control.constrained:
             control = control.at(control.target + self.origin)
         try:
-            point = path.advance(control)
+            point = stepper.advance(control)
         except LoadStepsFailed as failure:
-            raise self._unreached(control, failure, before) from failure
+            raise self._unreached(control, failure) from failure
         record = self.record(point)
         if self.freedom.mobility and not control.constrained and self._imbalance(point.state, control) > 1e-4:
             names = ", ".join(map(repr, self.freedom.mobile))
-            problem = f"at force {control.target:g} where {names} come to rest is lost in the rounding of stiff links"
-            raise self._error(self.request.where, problem, before[-1] if before else None, before)
-        snapped_through, self._snaps = self._snaps + path.snaps > snaps, 0
-        return replace(
-            record,
-            snapped_through=snapped_through,
-            iterations=path.iterations - iterations,
-            seconds=perf_counter() - start,
-            phases=clock.since(seconds),
-        )
+            problem = f"the rest position of {names} at force {control.target:g} is lost in the rounding of stiff links"
+            raise self._error(self.request.where, problem, self.frames[-1] if self.frames else None)
+        snapped_through, self._snaps = self._snaps + stepper.snaps > snaps, 0
+        spent, phases = perf_counter() - start, clock.since(seconds)
+        iterations = stepper.iterations - iterations
+        return replace(record, snapped_through=snapped_through, iterations=iterations, seconds=spent, phases=phases)
 
     def record(self, point: EquilibriumPoint) -> Frame:
         """The measured quantities of an equilibrium; the caller adds iterations and times."""
@@ -152,7 +213,6 @@ class CurveTracer:
             return Frame(
                 force=force,
                 displacement=displacement - self.origin,
-                stable=point.unstable_modes == 0,
                 snapped_through=False,
                 unstable_modes=point.unstable_modes,
                 stable_under_control=point.unstable_under_control == 0,
@@ -181,13 +241,13 @@ class CurveTracer:
         if fraction == 1.0:
             return state
         control = MotorControl(fraction, motors)
-        path = MotorStepper(self.solver, state, control, predictor=self.discretisation.predictor)
+        stepper = MotorStepper(self.solver, state, control, predictor=self.discretisation.predictor)
         # a quarter of a radian, or of the mechanism's length: in space a motor's equation is periodic
         steps = int(np.ceil((1.0 - fraction) * self._joints.travel(motors) / 0.25))
         try:
             for value in np.linspace(fraction, 1.0, steps + 1)[1:]:
-                state = path.advance(control.at(float(value))).state
-            self._snaps += path.snaps
+                state = stepper.advance(control.at(float(value))).state
+            self._snaps += stepper.snaps
         except LoadStepsFailed as failure:
             raise EquilibriumError(
                 f"configuration {configuration.name!r}",
@@ -201,10 +261,10 @@ class CurveTracer:
     def _under_constant_loads(self, state: State) -> State:
         """The configuration under the request's constant forces and the scene's effects, which grow together."""
         control = LoadFactorControl()
-        path = LoadStepper(self.solver, control.prepare(state), control, predictor=self.discretisation.predictor)
+        stepper = LoadStepper(self.solver, control.prepare(state), control, predictor=self.discretisation.predictor)
         try:
-            state = path.advance(control.at(1.0)).state
-            self._snaps += path.snaps
+            state = stepper.advance(control.at(1.0)).state
+            self._snaps += stepper.snaps
         except LoadStepsFailed as failure:
             forces = [repr(force.name) for force, _ in self.request.others]
             names = ", ".join([*forces, *(effect.explain() for effect in self._model.effects)])
@@ -218,7 +278,7 @@ class CurveTracer:
 
     # -- failures ----------------------------------------------------------------------------------------------
 
-    def _unreached(self, control: Control, failure: LoadStepsFailed, before: Sequence[Frame]) -> EquilibriumError:
+    def _unreached(self, control: Control, failure: LoadStepsFailed) -> EquilibriumError:
         last, where = self._last(failure), self.request.where
         if control.constrained and self._is_held():
             return EquilibriumError(
@@ -227,7 +287,7 @@ class CurveTracer:
                 "which cannot move along its direction",
                 "Choose another point or direction, or load control",
                 last=last,
-                frames=before,
+                frames=self.frames,
             )
         what, origin = ("displacement", self.origin) if control.constrained else ("force", 0.0)
         force = f" with a force of {last.force:g}" if control.constrained and last is not None else ""
@@ -235,19 +295,18 @@ class CurveTracer:
             f"no equilibrium at {what} {control.target - origin:g}; the last one is at {failure.reached - origin:g}"
             f"{force} ({failure.reason}; {len(failure.tried)} smaller steps were tried)"
         )
-        return self._error(where, problem, last, before)
+        return self._error(where, problem, last)
 
     def _error(
         self,
         where: str,
         problem: str,
         last: Frame | None,
-        before: Sequence[Frame] = (),
         *,
-        otherwise: str = "Try follow() or displacement control past a limit point, other samples, or a finer mesh",
+        otherwise: str = "Try follow() or displacement control past a limit point, other values, or a finer mesh",
     ) -> EquilibriumError:
         """The error with a remedy that fits the mechanism, or else the one given."""
-        if self._springs_are_lost():
+        if self._has_springs_below_rounding():
             otherwise = (
                 "The springs are softer than the rounding of the stiffest links: "
                 "make links rigid that hardly bend, or springs stiffer"
@@ -255,22 +314,23 @@ class CurveTracer:
         elif self.freedom.zero_energy:
             names = ", ".join(map(repr, self.freedom.zero_energy))
             otherwise = f"Nothing but the force holds {names}: add a joint or a motor, or check the force's direction"
-        return EquilibriumError(where, problem, otherwise, last=last, frames=before)
+        return EquilibriumError(where, problem, otherwise, last=last, frames=self.frames)
 
     def _last(self, failure: LoadStepsFailed) -> Frame | None:
-        """The last equilibrium reached, on the way to a sample too."""
+        """The last equilibrium reached, on the way to a prescribed value too."""
         return None if failure.last is None else self.record(failure.last)
 
     def _is_held(self) -> bool:
         """Whether no motion of the joints moves the force's point along its direction."""
-        load, joints, poses = self._system.controlled, self._joints, self._state.poses
-        if not isinstance(load.point, BodyPoint):
-            return False
+        joints, poses = self._joints, self._state.poses
         rate = np.zeros(joints.size)
-        rate[joints.columns[load.point.body]] = load.direction @ load.point.gradient(poses)
+        for point, direction in self._system.controlled.acting:
+            if not isinstance(point, BodyPoint):
+                return False
+            rate[joints.columns[point.body]] += direction @ point.gradient(poses)
         return is_held(joints, poses, self._state.motors, rate, self._system.rigid_rows)
 
-    def _springs_are_lost(self) -> bool:
+    def _has_springs_below_rounding(self) -> bool:
         """Whether some freedom is held by springs softer than rounding, 1e-15 of the links' stiffness."""
         rigid, motors = self._model.linkage.rigid, self._joints.motor_values(self.request.configuration.position)
         motors = np.concatenate([motors, np.zeros(len(rigid.connections) - len(motors))])  # welds of links
@@ -287,13 +347,13 @@ class CurveTracer:
         nothing moves.
         """
         model, joints, residual = self._model, self._joints, self._system.residual(state, control)
-        size = abs(state.force) + sum(abs(state.load_factor * magnitude) for _, magnitude in self.request.others)
-        size, worst = size + self._effects(state), 0.0
-        parts = np.abs(state.multipliers) @ np.abs(joints.gradient(state.poses, state.motors))
+        loads = abs(state.force) + sum(abs(state.load_factor * magnitude) for _, magnitude in self.request.others)
+        loads, worst = loads + self._effect_forces(state), 0.0
+        reactions = np.abs(state.multipliers) @ np.abs(joints.gradient(state.poses, state.motors))
         for motion in stiff_motions(model.linkage, state.poses, state.motors):
-            rounding = 1e-12 * float(parts @ np.abs(motion.z))
+            rounding = 1e-12 * float(reactions @ np.abs(motion.z))
             worst = max(worst, (self._work(residual, state, motion) - rounding) / motion.fastest(model.linkage.length))
-        return worst / size if size > 0.0 else 0.0
+        return worst / loads if loads > 0.0 else 0.0
 
     def _work(self, residual: Residual, state: State, motion: Motion) -> float:
         """|r · u̇ + ∂L/∂z · ż| of a motion."""
@@ -309,7 +369,7 @@ class CurveTracer:
         nodal = model.mesh.mesh.comm.allreduce(float(residual.nodal @ velocity.ravel()))
         return abs(nodal + float(residual.rigid @ motion.z))
 
-    def _effects(self, state: State) -> float:
+    def _effect_forces(self, state: State) -> float:
         """Sum of the sizes of all forces of effects that grow with the load factor."""
         model, total = self._model, 0.0
         if model.elastic.depends_on_load_factor:
@@ -321,27 +381,3 @@ class CurveTracer:
                 total += float(np.abs(slope[:, : model.linkage.dim]).sum())
                 total += float(np.abs(slope[:, model.linkage.dim :]).sum()) / model.linkage.length
         return total
-
-
-def unloaded_positions(
-    linkage: Linkage, part: Force | Output, configurations: Sequence[Configuration], springs: Sequence[SpringPotential]
-) -> np.ndarray:
-    """Positions of the point of a force or output in each unloaded configuration, (configurations, dim).
-
-    Raises:
-        AssemblyError: one of the configurations does not assemble, or its motors strain the links.
-    """
-    body = linkage.body_of(part.on)
-    space, centre = linkage.joints.space, np.array(linkage.bodies[body].centre)
-    drawn = np.array(in_dimension(part.at, linkage.dim))
-    positions = []
-    for configuration in configurations:
-        assembly = assemble(linkage, configuration, springs)
-        if assembly.fraction < 1.0:
-            raise AssemblyError(
-                f"configuration {configuration.name!r}",
-                f"its motors strain the links beyond {assembly.fraction:.1%} of their way",
-                "Use load_displacement with an output at the point",
-            )
-        positions.append(drawn + space.displace(assembly.poses[body], (drawn - centre)[None])[0])
-    return np.array(positions)

@@ -18,7 +18,7 @@ H = 1e-3
 def test_gradient_and_matrix_are_derivatives_of_the_value(space, kind):
     case = crowded(space)
     system, control = system_of(case, controlled=case.on_rigid), control_of(kind)
-    iteration = AugmentedLagrangian().on(system)
+    solver = AugmentedLagrangian().solver(system)
     state = control.prepare(random_state(case, system))
     states = system.blocks.multipliers.local.start
 
@@ -29,14 +29,14 @@ def test_gradient_and_matrix_are_derivatives_of_the_value(space, kind):
     step = system.unknowns.step(way)
 
     def value(length):
-        return iteration._value(iteration._moved(state, step, length), control, SOFTNESS)
+        return solver._value(solver._moved(state, step, length), control, SOFTNESS)
 
     values = [value(length) for length in (-2 * H, -H, 0.0, H, 2 * H)]
     slope = np.dot(values, [1.0, -8.0, 0.0, 8.0, -1.0]) / (12.0 * H)
     curvature = np.dot(values, [-1.0, 16.0, -30.0, 16.0, -1.0]) / (12.0 * H**2)
 
     system.load(state)
-    current = iteration._updated(state, control, SOFTNESS)
+    current = solver._updated(state, control, SOFTNESS)
     residual = system.residual(current, control)
     assert residual.vector.dot(way) == pytest.approx(slope, rel=1e-6)
 

@@ -52,6 +52,13 @@ def test_both_optimisers_reach_the_targets_of_the_truss():
         assert float(row[6]) < 1.0 and row[-1] == "yes"
 
 
+@pytest.mark.thorough
+def test_sqp_solves_every_formula_under_inequalities():
+    head, _, *rows = printed("constrained")
+    assert head[1] == "SQP" and len(rows) == 9
+    assert all(row[1].endswith(")") and "no" not in row[1] for row in rows)
+
+
 @pytest.mark.slow
 def test_accuracy_control_keeps_its_promise_on_the_truss():
     *_, row = printed("accuracy_control", "truss", "--accuracy", "0.05", "--repeats", "1")
@@ -89,3 +96,12 @@ def test_two_levels_the_factor_and_algebraic_multigrid_agree():
     for multigrid in ("GAMG", "BoomerAMG"):
         # the Schur complement is a difference of much larger terms
         assert float(systems[multigrid][-1]) <= 1e-5
+
+
+@pytest.mark.thorough
+def test_optimal_handles_stretch_cells_less_than_naive_ones():
+    naive, optimal = ([float(cell) for cell in row[1:]] for row in printed("handles")[2:])
+    cells, mean, most, inverted, sizes = zip(naive, optimal, strict=True)
+    assert cells[0] == cells[1] and inverted[1] == 0
+    assert mean[1] - 1.0 < 0.75 * (mean[0] - 1.0)  # half of ρ is 1 in an equilateral triangle
+    assert most[1] < most[0] and sizes[1] < sizes[0]

@@ -37,8 +37,8 @@ def test_names_say_what_sets_a_level_apart():
 
 def test_a_model_without_a_form_for_an_effect_is_left_out():
     scene = cantilever().scene
-    (beam,) = scene.mechanism.flexible_links
-    weight = fm.Gravity((0.0, 0.0, -1.0), {beam.material: 1e-9})
+    body = scene.mechanism.rigid_links[-1]
+    weight = fm.Gravity((0.0, 0.0, -1.0), masses={body: fm.Mass(1e-9, (0.0, 0.0))})
     levels = fidelity_levels(replace(scene, effects=[weight]))
     assert {level.model for level in levels} == {None, SPATIAL}
 

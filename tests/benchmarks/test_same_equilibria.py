@@ -11,7 +11,7 @@ from benchmarks.solvers import SNES, AugmentedLagrangian, Globalisation, KKTNewt
 from fenicsmech.equilibrium import (
     Direct,
     DisplacementControl,
-    EquilibriumSolver,
+    EquilibriumMethod,
     LoadControl,
     NotConverged,
     TwoLevel,
@@ -30,7 +30,7 @@ SOLVERS = {
 each_solver = pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
 
 
-def assert_alike(solver: EquilibriumSolver, space: str, samples: dict, **options) -> None:
+def assert_alike(solver: EquilibriumMethod, space: str, samples: dict, **options) -> None:
     """The curve is that of the default solver: displacements, forces, stability, states, forces of the joints."""
     (_, reference), (simulation, curve) = (
         (sim, sim.load_displacement(push, **samples))
@@ -87,7 +87,7 @@ def test_what_is_out_of_reach_is_refused_in_one_solve(solver, control):
     simulation, push = finger("plane-stress", solver=solver)
     rest = simulation.load_displacement(push, forces=[0.0]).frames[0].state
     with pytest.raises(NotConverged) as caught:
-        simulation.newton(push).solve(rest, control)
+        simulation.solver(push).solve(rest, control)
     assert caught.value.reason
 
 
@@ -98,7 +98,7 @@ def test_start_with_inverted_elements_is_refused(solver):
     rest = simulation.load_displacement(push, forces=[0.0]).frames[0].state
     torn = replace(rest, u=50.0 * np.random.default_rng(1).standard_normal(len(rest.u)))
     with pytest.raises(NotConverged, match="inverted"):
-        simulation.newton(push).solve(torn, LoadControl(1.0))
+        simulation.solver(push).solve(torn, LoadControl(1.0))
 
 
 @pytest.mark.thorough
@@ -131,3 +131,20 @@ def truss_of_soft_joints():
     made = truss_finger(fm.strip([(0, 0), (14, 36), (40, 60)], thickness=6.0, depth=20.0), RUBBER)
     push = made.push()
     return fm.Scene(made.mechanism, effects=[fm.JointCompliance(made.hinge, 0.5)]), push
+
+
+def test_kkt_newton_follows_the_path_of_the_default_solver():
+    curves = []
+    for solver in (fm.PrimalDualNewton(), KKTNewton()):
+        simulation, push = finger("plane-stress", solver=solver)
+        curves.append(simulation.follow(push, until=fm.Until(force=2.0)))
+    expected, found = curves
+    assert found.displacements[-1] == pytest.approx(expected.displacements[-1], rel=1e-8)
+    assert all(frame.stable for curve in curves for frame in curve.frames)
+
+
+@pytest.mark.parametrize("solver", [AugmentedLagrangian(), SNES()], ids=["augmented Lagrangian", "SNES"])
+def test_solvers_that_correct_no_arc_length_say_so(solver):
+    simulation, push = finger("plane-stress", solver=solver)
+    with pytest.raises(fm.DescriptionError, match="no arc-length steps.*PrimalDualNewton"):
+        simulation.follow(push, until=fm.Until(force=2.0))

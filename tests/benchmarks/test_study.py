@@ -43,6 +43,7 @@ def test_limits_are_those_of_beam_theory(study):
         assert limit.uncertainty < 0.02 * expected
 
 
+@pytest.mark.thorough
 def test_without_contraction_across_the_depth_models_agree_within_their_uncertainty(study):
     assert len(study.limits) == 4
     for limit in study.limits.values():

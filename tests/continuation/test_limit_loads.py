@@ -83,6 +83,7 @@ def pulled():
     return fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=8.0), push, other
 
 
+@pytest.mark.thorough
 def test_steps_of_a_led_force_and_of_constant_loads_do_not_depend_on_what_is_out_of_reach(pulled, caplog):
     simulation, push, other = pulled
     reached = []

@@ -136,7 +136,9 @@ def test_curve_of_a_motor_is_labelled_with_its_own_units(tmp_path):
     assert (tmp_path / "toggle.png").stat().st_size > 0
     case = four_bar(MPI.COMM_SELF)
     crank = case.simulation.scene.mechanism.motor(case.simulation.scene.mechanism.joints[0])
-    turned = fm.FollowedCurve(crank, curve.configuration, curve.freedom, curve.frames, curve.discretisation)
+    turned = fm.FollowedCurve(
+        crank, curve.configuration, curve.freedom, curve.frames, curve.discretisation, curve.unloaded
+    )
     assert [axis.label for axis in turned.axes] == ["angle [rad]", "torque [N mm]"]
 
 

@@ -16,6 +16,15 @@ from ..equilibrium.finger import finger
 from ..hard.buckling import LENGTH, euler
 from ..hard.buckling import column as hard_column
 
+# parts of the limit load
+SNAPPING_LOADS = [
+    [1.05],
+    pytest.param([3.0], marks=pytest.mark.thorough),
+    pytest.param([10.0], marks=pytest.mark.thorough),
+    pytest.param([0.5, 0.97, 1.02, 1.1], marks=pytest.mark.thorough),
+    [0.999, 1.01],
+]
+
 
 @pytest.fixture(scope="module")
 def snapping():
@@ -24,7 +33,7 @@ def snapping():
     return simulation, push, path.limit_points[0].frame
 
 
-@pytest.mark.parametrize("loads", [[1.05], [3.0], [10.0], [0.5, 0.97, 1.02, 1.1], [0.999, 1.01]])
+@pytest.mark.parametrize("loads", SNAPPING_LOADS)
 def test_arch_under_more_than_its_limit_load_snaps_through(snapping, loads):
     simulation, push, limit = snapping
     curve = simulation.load_displacement(push, forces=np.array(loads) * limit.force)

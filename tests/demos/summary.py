@@ -31,6 +31,10 @@ def span(value: object) -> bool:
     return len(value) == 2 and all(map(number, value)) and value[0] <= value[1]
 
 
+def value(found: object) -> bool:
+    return number(found) or (isinstance(found, list) and all(map(number, found)))
+
+
 def or_none(rule: Callable[[object], bool]) -> Callable[[object], bool]:
     return lambda value: value is None or rule(value)
 
@@ -43,7 +47,7 @@ SCHEMA: Schema = {
     "ranks": count,
     "dofs": {"rigid": count, "flexible": count},
     "parameters": or_none(count),
-    "targets": [{"configuration": word, "force": number, "wanted": number, "reached": or_none(number)}],
+    "targets": [{"configuration": word, "force": or_none(number), "wanted": or_none(value), "reached": value}],
     "frames": [{"force": number, "displacement": number, "seconds": duration, "iterations": count, "stable": flag}],
     "seconds": {"setup": duration, "frame_median": or_none(duration), "optimise": or_none(duration)},
     "iterations": or_none(count),

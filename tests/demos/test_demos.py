@@ -23,7 +23,7 @@ DEMOS = {"truss": (1.7555, 18), "claw": (11.907, 33), "klann": (11.562, 33)}
 def run(name: str, folder: Path, *options: str) -> str:
     """Runs a demo as a user does; returns what it printed."""
     command = [sys.executable, str(ROOT / "demos" / f"{name}.py"), *options, "--out", str(folder)]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=900, check=False)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -70,7 +70,7 @@ def test_truss_is_soft_first_and_stiff_once_its_diagonal_is_straight(tmp_path):
 def check_design(summary: dict, folder: Path, thickness: tuple[float, float]) -> None:
     """Every target within 1 %, inside the bounds of fabrication, every equilibrium stable, all files there."""
     for target in summary["targets"]:
-        assert target["reached"] == pytest.approx(target["wanted"], rel=0.01)
+        assert target["corrected"] == pytest.approx(target["wanted"], rel=0.01)
     least, most = summary["thickness"]
     assert thickness[0] <= least <= most <= thickness[1]
     assert summary["curvature_ratio_max"] <= 0.08
@@ -109,26 +109,17 @@ def check_quick(name: str, summary: dict, printed: str, folder: Path) -> None:
     assert "optimisation:" in printed
 
 
-@pytest.mark.thorough
 def test_quick_truss_reaches_its_targets_in_plane_stress(truss_alone):
     check_quick("truss", *truss_alone)
 
 
-@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["claw", pytest.param("klann", marks=pytest.mark.slow)])
 def test_quick_demo_reaches_its_targets_in_plane_stress(name, tmp_path):
     check_quick(name, *report(name, tmp_path, *QUICK), tmp_path)
     assert name != "klann" or (tmp_path / "foot-path.png").exists()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", DEMOS)
-def test_quick_demo_reaches_its_targets_in_space(name, tmp_path):
-    summary, _ = report(name, tmp_path, "--quick")
-    check_design(summary, tmp_path, THICKNESS[name])
-    assert len(summary["start"]["reached_here"]) == len(summary["targets"])
-
-
+@pytest.mark.thorough
 def test_two_ranks_give_the_same_curve_and_the_same_optimum(truss_alone, tmp_path, mpirun):
     alone, _, folder = truss_alone
     done = mpirun(2, ROOT / "demos" / "truss.py", *QUICK, "--out", str(tmp_path))
@@ -150,7 +141,6 @@ def test_an_interrupted_optimisation_goes_on(truss_alone):
     assert again["objective"]["final"] <= (1.0 + 1e-6) * alone["objective"]["final"]
 
 
-@pytest.mark.thorough
 def test_characterisation_finds_the_modulus_of_the_synthetic_data(tmp_path):
     printed = run("characterise", tmp_path, "--space", "plane-stress", "--size", "1.25")
     figures = json.loads((tmp_path / "summary.json").read_text())
@@ -165,6 +155,42 @@ def test_characterisation_in_space_holds_the_true_modulus_in_its_interval(tmp_pa
     figures = json.loads((tmp_path / "summary.json").read_text())
     assert figures["youngs_modulus"] == pytest.approx(figures["true"], rel=0.01)
     assert figures["interval"][0] < figures["true"] < figures["interval"][1]
+
+
+@pytest.mark.thorough
+def test_force_of_the_designed_spring_is_constant_in_the_exported_strut(tmp_path):
+    summary, printed = report("constant_force", tmp_path, "--quick")
+    assert "from 2 to 8 mm" in printed
+    there = [frame["force"] for frame in summary["frames"] if 1.99 <= frame["displacement"] <= 8.01]
+    before = [frame["force"] for frame in summary["initial_frames"] if 1.99 <= frame["displacement"] <= 8.01]
+    assert len(there) == len(before) == 13
+    assert max(map(abs, np.array(there) / 8.0 - 1.0)) < 0.01
+    assert max(before) / min(before) > 1.07
+    for target in summary["targets"]:
+        assert target["part"]["value"] == pytest.approx(8.0, rel=0.01)
+    assert {path.name for path in (tmp_path / "parts").iterdir()} == {"strut.step"}
+
+
+@pytest.mark.thorough
+def test_designed_switch_snaps_at_1_newton_and_rests_15_mm_away(tmp_path):
+    run("switch", tmp_path, "--quick")
+    figures = json.loads((tmp_path / "summary.json").read_text())
+    assert figures["snap_force"] == pytest.approx(1.0, abs=0.01)
+    assert figures["force_at_rest"] == pytest.approx(0.0, abs=0.01)
+    assert figures["stable"]
+    assert figures["part_error"] < 0.01
+    assert {"curve.png", "links.png", "design.json"} <= {path.name for path in tmp_path.iterdir()}
+
+
+@pytest.mark.thorough
+def test_contact_points_of_the_designed_gripper_move_by_the_wanted_vectors(tmp_path):
+    summary, _ = report("gripper", tmp_path, "--quick")
+    wanted = [target["wanted"] for target in summary["targets"]]
+    assert wanted == [[2.0, 0.0], [7.0, 0.9]]
+    for target in summary["targets"]:
+        size = np.linalg.norm(target["wanted"])
+        assert np.linalg.norm(np.subtract(target["corrected"], target["wanted"])) < 0.01 * size
+        assert np.linalg.norm(np.subtract(target["part"]["value"], target["wanted"])) < 0.02 * size
 
 
 @pytest.mark.thorough

@@ -10,10 +10,12 @@ from mpi4py import MPI
 
 import fenicsmech as fm
 from fenicsmech.design import (
+    Comparison,
     Objective,
     ParametricShape,
     Regulariser,
-    TargetEquilibria,
+    SampleEquilibria,
+    sample_numbers,
     shape_links,
     shape_request,
     split,
@@ -52,7 +54,7 @@ class Bench:
 
     simulation: fm.Simulation
     rest: ParametricShape
-    equilibria: TargetEquilibria = field(repr=False)
+    equilibria: SampleEquilibria = field(repr=False)
 
     def direction(self, seed: int) -> np.ndarray:
         """A change of p, of typical size 1 in units of ``rest.lengths``."""
@@ -71,18 +73,23 @@ def bench(case: Case, simulation: fm.Simulation) -> Bench:
     """The parts of ``case`` in ``simulation`` (collective)."""
     mechanism, linkage, model = case.scene.mechanism, simulation.linkage, simulation.model
     shapes = shape_links(model.mesh, [shape_request(design, mechanism, linkage) for design in case.designs])
-    return Bench(simulation, ParametricShape(model, shapes, case.designs), TargetEquilibria(simulation, case.targets))
+    return Bench(simulation, ParametricShape(model, shapes, case.designs), SampleEquilibria(simulation, case.targets))
 
 
 def objective(
     case: Case, regulariser: Regulariser, *, comm: MPI.Comm = MPI.COMM_SELF, **fidelity
 ) -> tuple[Objective, Bench]:
     """The objective of all processes of ``comm``, their targets shared out, and this group's parts (collective)."""
-    group = split(comm, len(case.targets))
+    group = split(comm, sample_numbers(case.targets))
     simulation = case.simulate(comm=group.comm, **fidelity)
     mine = bench(Case(case.scene, case.designs, [case.targets[k] for k in group.mine]), simulation)
     whole = Objective(
-        mine.rest, mine.equilibria, targets=case.targets, regulariser=regulariser, group=group, clock=simulation.clock
+        mine.rest,
+        mine.equilibria,
+        comparison=Comparison(case.targets, case.scene.units),
+        regulariser=regulariser,
+        group=group,
+        clock=simulation.clock,
     )
     return whole, mine
 
@@ -95,7 +102,7 @@ def truss(*wanted: tuple[float, float], **design) -> Case:
     return Case(
         scene,
         [fm.SplineDesign(diagonal, 3, **design)],
-        [fm.Target(push, force, displacement) for force, displacement in wanted],
+        [fm.Target(push, force=force, displacement=displacement) for force, displacement in wanted],
     )
 
 
@@ -126,7 +133,9 @@ def bow(*forces: float) -> Case:
         mechanism.revolute(base, arch, at=at, interface_radius=3.0)
     push = mechanism.force(on=arch, at=(25, 13), direction=(0.6, -0.8))
     return Case(
-        fm.Scene(mechanism), [fm.SplineDesign(arch, 2)], [fm.Target(push, force, force / 40.0) for force in forces]
+        fm.Scene(mechanism),
+        [fm.SplineDesign(arch, 2)],
+        [fm.Target(push, force=force, displacement=force / 40.0) for force in forces],
     )
 
 
@@ -150,7 +159,7 @@ def strained(*forces: float, angle: float = 0.1) -> Case:
     return Case(
         scene,
         [fm.SplineDesign(coupler, 2), fm.SplineDesign(brace, 2)],
-        [fm.Target(push, force, force / 20.0, turned) for force in forces],
+        [fm.Target(push, force=force, displacement=force / 20.0, configuration=turned) for force in forces],
     )
 
 
@@ -165,9 +174,13 @@ def turned_beam(*forces: float, angle: float = 0.75 * np.pi) -> Case:
     push = mechanism.force(on=hand, at=(52, 10), direction=(0, 1))
     scene = fm.Scene(mechanism)
     turned = scene.configuration("turned", {motor: angle})
-    return Case(scene, [fm.SplineDesign(beam, 2)], [fm.Target(push, force, force, turned) for force in forces])
+    return Case(
+        scene,
+        [fm.SplineDesign(beam, 2)],
+        [fm.Target(push, force=force, displacement=force, configuration=turned) for force in forces],
+    )
 
 
 def strains(simulation: fm.Simulation, target: fm.Target) -> bool:
     """Whether the motors strain the links in the target's configuration."""
-    return assemble(simulation.linkage, target.configuration).fraction < 1.0
+    return assemble(simulation.linkage, target.sample.configuration).fraction < 1.0

@@ -1,4 +1,4 @@
-"""What a refusal must say."""
+"""Parts of a refusal: part, problem, remedy."""
 
 from __future__ import annotations
 

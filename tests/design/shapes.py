@@ -20,7 +20,6 @@ ARCH = ((0.0, 0.0), (20.0, 9.0), (40.0, 0.0))
 ROD = ((0.0, 50.0), (18.0, 52.0), (45.0, 46.0))
 CENTRELINES = (ARCH, ROD)
 JOINTS = ((ARCH[2], ARCH[0]), (ROD[1], ROD[0], ROD[2]))  # not in order along the links
-INTERIOR = ((2,), (0, 1))
 
 
 def strip_mesh(link: int, dim: int, *, unit: float = 1.0, axis: tuple[float, float, float] = (0, 0, 1)) -> LinkMesh:
@@ -44,7 +43,8 @@ def request(link: int, *, unit: float = 1.0, turns: bool = True, spacing: float 
         centreline=Centreline(np.array(CENTRELINES[link]) / unit),
         joints=joints,
         turns=(turns,) * len(joints),
-        interior=INTERIOR[link],
+        reach=(RADIUS / unit,) * len(joints),
+        segments=3,
         spacing=spacing,
     )
 

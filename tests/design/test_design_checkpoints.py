@@ -51,7 +51,11 @@ def soft_truss() -> Case:
     mechanism.revolute(base, diagonal, at=(0, 0), interface_radius=3.0)
     mechanism.revolute(diagonal, tip, at=(40, 60), interface_radius=3.0)
     push = mechanism.force(on=tip, at=(20, 70), direction=(1, 0), name="push on tip")
-    return Case(fm.Scene(mechanism), [fm.SplineDesign(diagonal, 3, thickness=(1.5, 6.0))], [fm.Target(push, 0.4, 1.8)])
+    return Case(
+        fm.Scene(mechanism),
+        [fm.SplineDesign(diagonal, 3, thickness=(1.5, 6.0))],
+        [fm.Target(push, force=0.4, displacement=1.8)],
+    )
 
 
 @pytest.mark.thorough
@@ -82,7 +86,7 @@ def test_checkpoints_of_another_problem_are_refused(differs, case, options, tmp_
 def test_checkpoints_of_other_motor_positions_are_refused(tmp_path):
     file = tmp_path / "checkpoint.json"
     strained(1.0).problem().optimise(optimiser=fm.LevenbergMarquardt(iterations=1), checkpoint=file)
-    with pytest.raises(fm.DescriptionError, match="another problem: configurations differ"):
+    with pytest.raises(fm.DescriptionError, match="another problem: targets differ"):
         strained(1.0, angle=0.09).problem().optimise(checkpoint=file, resume=True)
 
 

@@ -7,7 +7,7 @@ import math
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.model import model
+from fenicsmech import model
 
 from .mechanisms import Case, bow, pinned_links, strained, truss
 from .refusal import refused
@@ -71,12 +71,14 @@ def test_a_link_that_looks_the_same_but_is_another():
 
 def test_a_rigid_link():
     tip = truss().scene.mechanism.rigid_links[-1]
-    refused(lambda: fm.SplineDesign(tip, 3), part="spline design", problem="not a flexible link", remedy="Name one")
+    refused(
+        lambda: fm.SplineDesign(tip, 3), part="spline design", problem="not a flexible link", remedy="of the mechanism"
+    )
 
 
 def test_nothing_is_wanted():
     case = truss()
-    refused(lambda: case.problem(), part="design problem", problem="nothing is wanted", remedy="targets=")
+    refused(lambda: case.problem(), part="design problem", problem="there are no targets", remedy="targets=")
 
 
 def test_objects_that_are_not_targets_or_designs():
@@ -99,7 +101,7 @@ def test_a_force_of_another_mechanism():
     case, other = truss(*REACHABLE), bow(10.0)
     refused(
         lambda: Case(case.scene, case.designs, other.targets).problem(),
-        part=other.targets[0].part.name,
+        part=other.targets[0].quantity.part.name,
         problem="not a force of 'truss finger'",
         remedy="force",
     )
@@ -107,7 +109,9 @@ def test_a_force_of_another_mechanism():
 
 def test_motors_of_another_mechanism():
     case, other = truss(*REACHABLE), strained(1.0)
-    target = fm.Target(case.targets[0].part, 0.1, 2.0, other.targets[0].configuration)
+    target = fm.Target(
+        case.targets[0].quantity.part, force=0.1, displacement=2.0, configuration=other.targets[0].sample.configuration
+    )
     refused(
         lambda: Case(case.scene, case.designs, [target]).problem(),
         part="'turned'",
@@ -119,11 +123,11 @@ def test_motors_of_another_mechanism():
 @pytest.mark.parametrize("number", [math.nan, math.inf, "two", None])
 @pytest.mark.parametrize("name", ["force", "displacement", "weight"])
 def test_targets_that_are_no_numbers(name, number):
-    push = truss(*REACHABLE).targets[0].part
+    push = truss(*REACHABLE).targets[0].quantity.part
     numbers = {"force": 0.1, "displacement": 2.0, "weight": 1.0, name: number}
     refused(
         lambda: fm.Target(push, **numbers),
-        part=f"{name} of a target for 'push on tip'",
+        part=f"{name} of a target for",
         problem="",
         remedy="finite",
     )
@@ -131,12 +135,22 @@ def test_targets_that_are_no_numbers(name, number):
 
 @pytest.mark.parametrize("weight", [0.0, -1.0])
 def test_targets_that_count_for_nothing(weight):
-    push = truss(*REACHABLE).targets[0].part
-    refused(lambda: fm.Target(push, 0.1, 2.0, weight=weight), part="weight", problem="not positive", remedy="greater")
+    push = truss(*REACHABLE).targets[0].quantity.part
+    refused(
+        lambda: fm.Target(push, force=0.1, displacement=2.0, weight=weight),
+        part="weight",
+        problem="not positive",
+        remedy="greater",
+    )
 
 
 def test_a_target_without_a_force():
-    refused(lambda: fm.Target("push", 0.1, 2.0), part="target", problem="not a force", remedy="mechanism")
+    refused(
+        lambda: fm.Target("push", force=0.1, displacement=2.0),
+        part="target",
+        problem="neither a quantity nor a force",
+        remedy="mechanism",
+    )
 
 
 def test_fewer_segments_than_gaps_between_joints():
@@ -144,7 +158,7 @@ def test_fewer_segments_than_gaps_between_joints():
     push = case.scene.mechanism.force(on=case.designs[0].link, at=(20, 9), direction=(0, -1))
     few = fm.SplineDesign(case.designs[1].link, 1)
     refused(
-        lambda: Case(case.scene, [few], [fm.Target(push, 1.0, 0.1)]).problem(),
+        lambda: Case(case.scene, [few], [fm.Target(push, force=1.0, displacement=0.1)]).problem(),
         part="'rod'",
         problem="1 segment.* for 2 gaps",
         remedy="at least 2",
@@ -185,7 +199,7 @@ def test_a_configuration_that_does_not_assemble():
     mechanism.revolute(crank, stop, at=(0, 30))
     mechanism.revolute(stop, base, at=(5, 30))
     far = case.scene.configuration("far", {motor: 2.0})
-    target = fm.Target(case.targets[0].part, 1.0, 0.1, far)
+    target = fm.Target(case.targets[0].quantity.part, force=1.0, displacement=0.1, configuration=far)
     with pytest.raises(fm.AssemblyError, match="does not close") as caught:
         Case(case.scene, case.designs, [target]).problem()
     assert "'far'" in caught.value.part
@@ -198,5 +212,5 @@ def test_a_link_without_a_centreline():
     for x in (0, 40):
         mechanism.revolute(base, plate, at=(x, 0), interface_radius=2.0)
     push = mechanism.force(on=plate, at=(20, 0), direction=(0, 1))
-    case = Case(fm.Scene(mechanism), [fm.SplineDesign(plate, 2)], [fm.Target(push, 1.0, 0.1)])
+    case = Case(fm.Scene(mechanism), [fm.SplineDesign(plate, 2)], [fm.Target(push, force=1.0, displacement=0.1)])
     refused(lambda: case.problem(), part="'plate'", problem="no centreline", remedy="centreline=")

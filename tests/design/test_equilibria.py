@@ -7,8 +7,8 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.design import Infeasible, Known, TargetEquilibria
-from fenicsmech.equilibrium import Newton, NotConverged
+from fenicsmech.design import Infeasible, Known, SampleEquilibria
+from fenicsmech.equilibrium import NewtonSolver, NotConverged
 
 from .mechanisms import Bench, Case, bench, bow, strained, strains, truss, turned_beam
 
@@ -28,16 +28,21 @@ def made(name: str, **fidelity) -> Bench:
 
 
 def displacements(known: Known) -> np.ndarray:
-    return np.array([sample.displacement for sample in known.samples])
+    return np.concatenate(known.raw)
+
+
+def fields(both: Bench, known: Known) -> np.ndarray:
+    """Derivatives of the displacements by the design field, (targets, owned values)."""
+    return np.array([gradient.design for gradient in both.equilibria.gradients(known)])
 
 
 def assert_alike(followed: Known, traced: Known, *, digits: float = 1e-8) -> None:
     """The same states and displacements."""
     assert displacements(followed) == pytest.approx(displacements(traced), rel=digits)
-    for a, b in zip(followed.samples, traced.samples, strict=True):
-        assert (a.origin is None) == (b.origin is None)
-        pairs = [(a.state, b.state)] + ([] if a.origin is None else [(a.origin, b.origin)])
-        for one, other in pairs:
+    for sample, a in followed.samples.items():
+        b = traced.samples[sample]
+        assert a.unloaded.poses == pytest.approx(b.unloaded.poses, abs=digits * np.abs(b.state.poses).max())
+        for one, other in [(a.state, b.state)]:
             assert one.u == pytest.approx(other.u, abs=digits * np.abs(other.u).max())
             assert one.poses == pytest.approx(other.poses, abs=digits * np.abs(other.poses).max())
             assert one.force == other.force
@@ -71,7 +76,9 @@ def test_displacements_are_those_of_the_curve_that_a_user_computes():
         known = both.equilibria.trace()
         for target, reached in zip(both.equilibria.targets, displacements(known), strict=True):
             curve = both.simulation.load_displacement(
-                target.part, forces=[target.force / 2, target.force], configuration=target.configuration
+                target.quantity.part,
+                forces=[target.sample.magnitude / 2, target.sample.magnitude],
+                configuration=target.sample.configuration,
             )
             assert curve.displacements[-1] == pytest.approx(reached, rel=1e-8), name
 
@@ -82,9 +89,11 @@ def test_cases_are_what_they_claim_to_be():
         simulation = case.simulate()
         assert strains(simulation, case.targets[0]) == (name == "strained by motors")
         both = bench(case, simulation)
-        both.rest.place(both.rest.initial, None)
-        for sample in both.equilibria.trace().samples:
-            assert (sample.origin is not None) == (name in MOVING)
+        first = both.rest.place(both.rest.initial, None)
+        known = both.equilibria.trace()
+        both.rest.place(both.design(0.05), first)
+        for sample, at in both.equilibria.follow(known).samples.items():
+            assert (at.unloaded is not known.samples[sample].unloaded) == (name in MOVING)
 
 
 def bulged(both: Bench) -> np.ndarray:
@@ -100,8 +109,8 @@ def test_a_large_change_of_design_is_halved_on_the_way(monkeypatch):
     start = both.rest.place(both.rest.initial, None)
     known = both.equilibria.trace()
     both.rest.place(bulged(both), start)
-    newton = both.simulation.newton(both.equilibria.targets[0].part)
-    solve, failures = Newton.solve, []
+    solver = both.simulation.solver(both.equilibria.targets[0].quantity.part)
+    solve, failures = NewtonSolver.solve, []
 
     def counted(self, *arguments, **options):
         try:
@@ -110,11 +119,11 @@ def test_a_large_change_of_design_is_halved_on_the_way(monkeypatch):
             failures.append(failure)
             raise
 
-    monkeypatch.setattr(Newton, "solve", counted)
-    newton.options = fm.PrimalDualNewton(iterations=6, mixed_stress=False)
+    monkeypatch.setattr(NewtonSolver, "solve", counted)
+    solver.options = fm.PrimalDualNewton(iterations=6, mixed_stress=False)
     followed = both.equilibria.follow(known)
     assert len(failures) >= 1
-    newton.options = fm.PrimalDualNewton()
+    solver.options = fm.PrimalDualNewton()
     assert_alike(followed, both.equilibria.trace())
 
 
@@ -124,8 +133,8 @@ def test_a_change_that_is_too_large_is_infeasible_and_leaves_the_design_in_place
     known = both.equilibria.trace()
     both.rest.place(bulged(both), start)
     design = both.field()
-    both.simulation.newton(both.equilibria.targets[0].part).options = fm.PrimalDualNewton(iterations=2)
-    with pytest.raises(Infeasible, match="no equilibrium at 0.1"):
+    both.simulation.solver(both.equilibria.targets[0].quantity.part).options = fm.PrimalDualNewton(iterations=2)
+    with pytest.raises(Infeasible, match="no equilibrium under 'push on tip' of 0.1"):
         both.equilibria.follow(known)
     assert np.array_equal(both.field(), design)
 
@@ -140,7 +149,7 @@ def column(force: float) -> Case:
     mechanism.revolute(bar, cap, at=(0, 40), interface_radius=1.5)
     mechanism.prismatic(base, cap, at=(0, 40), axis=(0, 1))
     push = mechanism.force(on=cap, at=(0, 40), direction=(0, -1))
-    return Case(fm.Scene(mechanism), [fm.SplineDesign(bar, 2)], [fm.Target(push, force, 0.1)])
+    return Case(fm.Scene(mechanism), [fm.SplineDesign(bar, 2)], [fm.Target(push, force=force, displacement=0.1)])
 
 
 def test_unstable_equilibria_are_infeasible():
@@ -151,7 +160,7 @@ def test_unstable_equilibria_are_infeasible():
     stable.equilibria.trace()
     case = column(1.5 * euler)
     with pytest.raises(Infeasible, match="unstable"):
-        TargetEquilibria(case.simulate(size=2.0), case.targets).trace()
+        SampleEquilibria(case.simulate(size=2.0), case.targets).trace()
 
 
 def test_load_that_no_equilibrium_carries_is_infeasible():
@@ -167,7 +176,7 @@ def test_gradients_agree_with_central_differences_of_followed_equilibria(name):
     both = made(name)
     placed = both.rest.place(both.design(0.05), None)
     known = both.equilibria.trace()
-    gradient = both.rest.gradient(placed, both.equilibria.gradients(known))
+    gradient = both.rest.gradient(placed, fields(both, known))
     direction, step = both.direction(7), 1e-3
 
     def moved(h: float) -> np.ndarray:
@@ -184,9 +193,9 @@ def test_gradients_do_not_disturb_the_design(name):
     both.rest.place(both.design(0.05), None)
     known = both.equilibria.trace()
     before = both.field()
-    first = both.equilibria.gradients(known)
+    first = fields(both, known)
     assert np.array_equal(both.field(), before)
-    assert both.equilibria.gradients(known) == pytest.approx(first, rel=1e-12)
+    assert fields(both, known) == pytest.approx(first, rel=1e-12)
 
 
 def test_targets_of_several_forces_directions_and_sizes_are_told_apart():
@@ -197,19 +206,19 @@ def test_targets_of_several_forces_directions_and_sizes_are_told_apart():
     lift = mechanism.force(on=tip, at=(20, 70), direction=(0.6, -0.8), name="lift")
     (diagonal,) = mechanism.flexible_links
     targets = [
-        fm.Target(pushing, 0.4, 1.0),
-        fm.Target(lift, 0.2, 1.0),
-        fm.Target(pushing, 0.1, 1.0),
-        fm.Target(pushing, -0.02, 1.0),
-        fm.Target(pushing, 0.1, 2.0),
-        fm.Target(pushing, 0.0, 1.0),
+        fm.Target(pushing, force=0.4, displacement=1.0),
+        fm.Target(lift, force=0.2, displacement=1.0),
+        fm.Target(pushing, force=0.1, displacement=1.0),
+        fm.Target(pushing, force=-0.02, displacement=1.0),
+        fm.Target(pushing, force=0.1, displacement=2.0),
+        fm.Target(pushing, force=0.0, displacement=1.0),
     ]
     case = Case(scene, [fm.SplineDesign(diagonal, 3)], targets)
     both = bench(case, case.simulate())
     both.rest.place(both.rest.initial, None)
     together = displacements(both.equilibria.trace())
     for target, reached in zip(targets, together, strict=True):
-        alone = displacements(TargetEquilibria(both.simulation, [target]).trace())
+        alone = displacements(SampleEquilibria(both.simulation, [target]).trace())
         assert alone == pytest.approx([reached], rel=1e-8, abs=1e-12)
     assert together[2] == together[4]
     assert together[3] < 0.0 < together[2] < together[0]

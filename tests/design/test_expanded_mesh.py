@@ -1,4 +1,4 @@
-"""What weights are computed on: plans of extruded links, handles as vertices, linear elements."""
+"""Domains of the weights: plans of extruded links, handles as vertices, linear elements."""
 
 import numpy as np
 import pytest

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.design import Infeasible, Sensitivity, TargetEquilibria
+from fenicsmech.design import Infeasible, SampleEquilibria
+from fenicsmech.equilibrium import LoadControl
+from fenicsmech.quantities import Sensitivity
 
 from ..equilibrium.arch import RISE, SPAN, arch
 from ..oracles.dense import taylor_rates
@@ -30,15 +32,17 @@ def test_displacement_sensitivities_hold_close_to_a_limit_point(gap):
         return frame.displacement
 
     curve = simulation.load_displacement(push, forces=[0.0, 0.9 * force, force])
-    adjoint, outputs = Sensitivity(model, simulation.newton(push)), [model.point_load(push)]
-    (loaded,) = adjoint.gradients(curve.frames[-1].state, outputs)
-    (unloaded,) = adjoint.gradients(curve.frames[0].state, outputs)
+    adjoint, travels = Sensitivity(model), [fm.Displacement(push).on(model)]
+    loaded, unloaded = (
+        adjoint.gradients(simulation.solver(push), frame.state, LoadControl(frame.force), travels)[0]
+        for frame in (curve.frames[-1], curve.frames[0])
+    )
     slope = float((loaded.design - unloaded.design) @ rise.ravel())
     steps = 0.04 * gap * RISE * np.array([1.0, 0.5, 0.25])
     rates = taylor_rates(lambda t: travel(t, force), [0.0], [1.0], [slope], steps)
     assert np.all(rates.without > 0.9) and np.all(rates.with_gradient > 1.9)
     steps *= force / RISE
-    rates = taylor_rates(lambda t: travel(np.zeros(1), force - t[0]), [0.0], [1.0], [-loaded.force], steps)
+    rates = taylor_rates(lambda t: travel(np.zeros(1), force - t[0]), [0.0], [1.0], [-loaded.control], steps)
     assert np.all(rates.without > 0.9) and np.all(rates.with_gradient > 1.9)
 
 
@@ -56,8 +60,8 @@ def nearly_snapping():
     simulation, push = arch()
     path = simulation.follow(push, until=fm.Until(displacement=0.7 * RISE))
     limit = path.limit_points[0].frame
-    target = fm.Target(push, 0.97 * limit.force, limit.displacement)
-    return simulation, TargetEquilibria(simulation, [target])
+    target = fm.Target(push, force=0.97 * limit.force, displacement=limit.displacement)
+    return simulation, SampleEquilibria(simulation, [target])
 
 
 @pytest.mark.thorough
@@ -75,8 +79,8 @@ def test_design_path_across_a_fold_is_reported(nearly_snapping, fall):
         with pytest.raises(Infeasible, match="snaps"):
             equilibria.trace()
     else:
-        (followed,), (traced,) = equilibria.follow(known).samples, equilibria.trace().samples
-        assert followed.displacement == pytest.approx(traced.displacement, rel=1e-7)
+        followed, traced = equilibria.values(equilibria.follow(known)), equilibria.values(equilibria.trace())
+        assert followed == pytest.approx(traced, rel=1e-7)
 
 
 def test_large_change_of_design_away_from_the_fold_is_followed(nearly_snapping):
@@ -84,6 +88,6 @@ def test_large_change_of_design_away_from_the_fold_is_followed(nearly_snapping):
     lowered(simulation.model, 0.0)
     known = equilibria.trace()
     lowered(simulation.model, -0.3)
-    (followed,), (traced,) = equilibria.follow(known).samples, equilibria.trace().samples
-    assert followed.displacement == pytest.approx(traced.displacement, rel=1e-7)
-    assert followed.displacement < 0.5 * known.samples[0].displacement
+    followed, traced = equilibria.values(equilibria.follow(known)), equilibria.values(equilibria.trace())
+    assert followed == pytest.approx(traced, rel=1e-7)
+    assert followed < 0.5 * equilibria.values(known)

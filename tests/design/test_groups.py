@@ -36,7 +36,7 @@ class Part:
 
 
 def groups_of(processes: int, targets: int):
-    return [split(World(rank, processes), targets) for rank in range(processes)]
+    return [split(World(rank, processes), range(targets)) for rank in range(processes)]
 
 
 @pytest.mark.parametrize(
@@ -95,9 +95,15 @@ def test_every_target_is_in_exactly_one_group_and_every_group_has_targets_and_ne
 @pytest.mark.parametrize("targets", range(1, 5))
 def test_communicators_are_those_of_the_groups(targets):
     world = MPI.COMM_WORLD
-    group = split(world, targets)
+    group = split(world, range(targets))
     assert group.everyone is world
     assert group.comm.allgather(group.mine) == [group.mine] * group.comm.size
     assert world.allreduce(len(group.mine) if group.leads else 0) == targets
     # a communicator is a scarce resource, and what a dead one's matrices were is destroyed on it
-    assert split(world, targets).comm is group.comm
+    assert split(world, range(targets)).comm is group.comm
+
+
+def test_targets_of_one_sample_share_a_group_and_links_at_rest_are_the_first_ones():
+    groups = [split(World(rank, 2), [0, 1, 0, -1, 1, 2]) for rank in range(2)]
+    assert [group.mine for group in groups] == [(0, 2, 3, 5), (1, 4)]
+    assert split(World(0, 2), [-1, -1]).mine == (0, 1)

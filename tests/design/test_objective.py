@@ -8,16 +8,17 @@ from mpi4py import MPI
 
 import fenicsmech as fm
 from fenicsmech.design import (
+    Comparison,
     Infeasible,
     LevenbergMarquardt,
     MeshQuality,
     Quadratic,
     Regulariser,
     ShapeBounds,
+    ShapeError,
     Start,
     StayClose,
     TooHigh,
-    target_scales,
 )
 
 from .mechanisms import Case, objective, strained, truss
@@ -34,22 +35,28 @@ def away(bench, change: float = 0.05) -> tuple[np.ndarray, np.ndarray]:
 def test_value_is_half_the_weighted_sum_of_squared_relative_errors():
     case = truss(*TARGETS)
     light, heavy = (
-        fm.Target(t.part, t.force, t.displacement, weight=w) for t, w in zip(case.targets, (0.5, 3.0), strict=True)
+        fm.Target(t.quantity, t.sample, equals=t.wanted, weight=w)
+        for t, w in zip(case.targets, (0.5, 3.0), strict=True)
     )
     whole, bench = objective(Case(case.scene, case.designs, [light, heavy]), StayClose())
     here = whole.evaluate(bench.rest.initial)
     errors = (whole.reached - [2.0, 3.2]) / [2.0, 3.2]
     assert here.value == pytest.approx(0.5 * (0.5 * errors[0] ** 2 + 3.0 * errors[1] ** 2), rel=1e-10)
-    curve = bench.simulation.load_displacement(light.part, forces=[0.1, 0.4])
+    curve = bench.simulation.load_displacement(light.quantity.part, forces=[0.1, 0.4])
     assert whole.reached == pytest.approx(curve.displacements, rel=1e-8)
-    assert whole.traced(bench.rest.initial) == pytest.approx(here.value, rel=1e-8)
+    whole.correction = np.array([0.2, -0.1])
+    errors = (whole.reached + [0.2, -0.1] - [2.0, 3.2]) / [2.0, 3.2]
+    assert whole.evaluate(bench.rest.initial).value == pytest.approx(
+        0.5 * (0.5 * errors[0] ** 2 + 3.0 * errors[1] ** 2), rel=1e-10
+    )
 
 
 def test_targets_that_are_next_to_nothing_are_measured_by_the_largest_one():
     (push,) = truss().scene.mechanism.forces
-    wanted = [fm.Target(push, 1.0, displacement) for displacement in (0.0, 5.0, -0.1, -2.0)]
-    assert target_scales(wanted) == pytest.approx([0.5, 5.0, 0.5, 2.0])
-    assert target_scales(wanted[:1]) == pytest.approx([1.0])
+    wanted = [fm.Target(push, force=1.0, displacement=displacement) for displacement in (0.0, 5.0, -0.1, -2.0)]
+    assert Comparison(wanted, fm.Units()).scales == pytest.approx([0.5, 5.0, 0.5, 2.0])
+    with pytest.raises(fm.DescriptionError, match="zero is wanted.*scale="):
+        Comparison(wanted[:1], fm.Units())
 
 
 @pytest.mark.parametrize(
@@ -91,7 +98,7 @@ def test_values_that_are_of_no_use_are_refused_without_derivatives(monkeypatch):
         raise AssertionError("derivatives were computed")
 
     monkeypatch.setattr(bench.equilibria, "gradients", never)
-    with pytest.raises(TooHigh, match="objective is"):
+    with pytest.raises(TooHigh, match="merit is"):
         whole.evaluate(p, below=0.999 * value)
 
 
@@ -110,9 +117,26 @@ def test_designs_that_turn_cells_inside_out_are_infeasible():
     p = np.where(bench.rest.lengths == 1.0, -3.0, bench.rest.initial)
     with pytest.raises(Infeasible, match="inverted"):
         whole.evaluate(p)
+    whole.begin(None)
     with pytest.raises(Infeasible, match="inverted"):
-        whole.traced(p)
+        whole.evaluate(p)
     assert np.isfinite(whole.evaluate(bench.rest.initial).value)  # it recovers
+
+
+def test_designs_without_derivatives_are_infeasible(monkeypatch):
+    whole, bench = objective(truss(*TARGETS), StayClose())
+    before = whole.evaluate(bench.rest.initial)
+
+    def open_handles(placement, by_field):
+        raise ShapeError(
+            "shape of link 'diagonal'", "its mesh leaves positions of handles open", "Use smaller elements"
+        )
+
+    with monkeypatch.context() as patched:
+        patched.setattr(bench.rest, "gradient", open_handles)
+        with pytest.raises(Infeasible, match="leaves positions of handles open"):
+            whole.evaluate(bench.design(0.05))
+    assert whole.evaluate(bench.rest.initial).value == pytest.approx(before.value, rel=1e-8)
 
 
 def test_loads_that_no_equilibrium_carries_are_infeasible():

@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.design import TargetEquilibria, objective_error, target_errors
+from fenicsmech.design import Comparison, SampleEquilibria
 
 from ..simulation.five_problems import case
 from ..simulation.refined import cantilever, refine
@@ -16,7 +16,7 @@ from .mechanisms import truss
 
 def value(targets, reached) -> float:
     """Σ ½ w r²."""
-    return float(np.array([0.5 * target.weight for target in targets]) @ target_errors(targets, reached) ** 2)
+    return 0.5 * float(np.sum(Comparison(targets, fm.Units()).residuals(reached) ** 2))
 
 
 @pytest.mark.thorough
@@ -25,22 +25,29 @@ def test_effectivity_is_between_a_half_and_two(name, monkeypatch):
     scene, push, load = case(name)
     simulation = fm.Simulation(scene, space="plane-stress", size=2.0, comm=MPI.COMM_SELF)
     rough = simulation.load_displacement(push, forces=[load]).displacements[0]
-    targets = [fm.Target(push, load, 0.8 * rough, weight=2.0), fm.Target(push, 0.5 * load, 0.3 * rough)]
-    equilibria = TargetEquilibria(simulation, targets)
+    targets = [
+        fm.Target(push, force=load, displacement=0.8 * rough, weight=2.0),
+        fm.Target(push, force=0.5 * load, displacement=0.3 * rough),
+    ]
+    equilibria = SampleEquilibria(simulation, targets)
     known = equilibria.trace()
-    reached = np.array([sample.displacement for sample in known.samples])
-    estimate = objective_error(targets, reached, equilibria.errors(known))
+    reached = equilibria.values(known)
+    estimate = Comparison(targets, fm.Units()).objective_error(reached, equilibria.errors(known))
     refine(monkeypatch, 1)
     finer = fm.Simulation(scene, space="plane-stress", order=3, size=2.0, comm=MPI.COMM_SELF)
-    there = np.array([sample.displacement for sample in TargetEquilibria(finer, targets).trace().samples])
+    there = SampleEquilibria(finer, targets)
+    there = there.values(there.trace())
     assert 0.5 < estimate / (value(targets, there) - value(targets, reached)) < 2.0
 
 
 def test_it_is_exact_in_exact_errors():
     _, push, load = cantilever()
-    targets = [fm.Target(push, load, 4.0, weight=3.0), fm.Target(push, -load, 0.0)]
+    targets = [
+        fm.Target(push, force=load, displacement=4.0, weight=3.0),
+        fm.Target(push, force=-load, displacement=0.0),
+    ]
     reached, errors = np.array([4.3, 0.1]), np.array([-0.2, 0.05])
-    assert objective_error(targets, reached, errors) == pytest.approx(
+    assert Comparison(targets, fm.Units()).objective_error(reached, errors) == pytest.approx(
         value(targets, reached + errors) - value(targets, reached), rel=1e-12
     )
 
@@ -50,8 +57,10 @@ def test_designs_carry_the_errors_of_displacements_and_objective():
     problem = case.problem(size=4.0)
     result = problem.optimise(optimiser=fm.LevenbergMarquardt(iterations=2))
     forces = [target.force for target in result.targets]
-    curve = problem.simulation.with_design(result).load_displacement(case.targets[0].part, forces=forces)
+    curve = problem.simulation.with_design(result).load_displacement(case.targets[0].quantity.part, forces=forces)
     errors = [target.finer_elements_add for target in result.targets]
     assert errors == pytest.approx(curve.error_estimates(), rel=1e-5)
     reached = np.array([target.reached for target in result.targets])
-    assert result.objective_error == pytest.approx(objective_error(case.targets, reached, np.array(errors)))
+    assert result.objective_error == pytest.approx(
+        Comparison(case.targets, fm.Units()).objective_error(reached, np.array(errors))
+    )

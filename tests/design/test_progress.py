@@ -13,7 +13,7 @@ ERRORS = np.array([0.02, -0.25])
 class Display:
     """Keeps what is shown."""
 
-    def __init__(self, *arguments) -> None:
+    def __init__(self) -> None:
         self.notes: list[str] = []
 
     def update(self, number: int, note: str) -> None:
@@ -32,7 +32,7 @@ def shown(monkeypatch):
     ticks = iter(range(0, 10000, 10))
     display = Display()
     monkeypatch.setattr(run, "perf_counter", lambda: float(next(ticks)))
-    monkeypatch.setattr(run, "Progress", lambda *arguments: display)
+    monkeypatch.setattr(run, "Progress", lambda *arguments, **options: display)
 
     def show(optimiser: LevenbergMarquardt, promises: list[float], last: Reason | None = None) -> list[str]:
         with DesignProgress(optimiser, leads=True) as design:

@@ -206,7 +206,7 @@ def test_regularisers_do_not_depend_on_the_unit_of_length():
         case = pinned_links(unit)
         both = bench(case, case.simulate(size=2.0 / unit))
         direction = both.direction(8)
-        p = both.design(0.8)
+        p = both.design(0.6)
         placed = both.rest.place(p, None)
         here = {name: regulariser.around(both.rest, placed)(p) for name, regulariser in regularisers.items()}
         seen.append({name: [r.value, r.gradient @ direction] for name, r in here.items()})

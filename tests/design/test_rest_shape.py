@@ -56,26 +56,26 @@ def test_penalty_sums_its_barrier_over_the_cells():
 @pytest.mark.parallel
 @pytest.mark.parametrize("comm", [MPI.COMM_SELF, MPI.COMM_WORLD], ids=["alone", "together"])
 @pytest.mark.parametrize(
-    ("name", "space", "size"),
+    ("name", "space", "size", "order"),
     [
-        *((name, "plane-stress", 3.0) for name in CASES),
-        ("truss", "3d", 4.0),
-        ("force on a link", "plane-strain", 3.0),
-        ("force on a link", "3d-symmetric", 4.0),
+        *((name, "plane-stress", 3.0, 2) for name in CASES),
+        ("truss", "3d", 4.0, 1),
+        ("force on a link", "plane-strain", 3.0, 2),
+        ("force on a link", "plane-stress", 4.0, 3),
+        ("force on a link", "3d-symmetric", 4.0, 2),
     ],
 )
-def test_displacements_pass_the_taylor_test_by_the_parameters(name, space, size, comm):
+def test_displacements_pass_the_taylor_test_by_the_parameters(name, space, size, order, comm):
     case = CASES[name]()
-    order = 1 if space.startswith("3d") else 2
     both = bench(case, case.simulate(space, size=size, order=order, comm=comm))
     placed = both.rest.place(both.design(0.06), None)
     known = both.equilibria.trace()
-    gradient = both.rest.gradient(placed, both.equilibria.gradients(known))
+    gradient = both.rest.gradient(placed, np.array([own.design for own in both.equilibria.gradients(known)]))
     direction = both.direction(7)
 
     def reached(h: np.ndarray) -> np.ndarray:
         both.rest.place(placed.p + h[0] * direction, placed)
-        return np.array([sample.displacement for sample in both.equilibria.follow(known).samples])
+        return both.equilibria.values(both.equilibria.follow(known))
 
     rates = taylor_rates(reached, [0.0], [1.0], (gradient @ direction)[:, None], [0.02, 0.01, 0.005])
     assert rates.with_gradient.min() >= 1.95

@@ -30,11 +30,14 @@ RESULT = DesignResult(
     links=(link("coupler", (1.0 / 3.0, 2.0)), link("rocker", (0.7, 4.1))),
     targets=(
         TargetResult(
-            "push", "as drawn", 0.1, wanted=2.0, started=0.3, reached=1.99, error=-0.005, finer_elements_add=1e-3 / 3.0
+            *("displacement of 'push' under 'push' of 0.1, as drawn", "as drawn", 0.1, "mm", "equals"),
+            *(2.0, 0.3, 1.99, 1e-3 / 3.0, 1.99 + 1e-3 / 3.0, -0.005),
         ),
         TargetResult(
-            "push", "geöffnet", 0.4, wanted=0.0, started=0.3, reached=0.02, error=0.1, finer_elements_add=None
+            *("displacement of 'tip' at (1, 2) under 'push' of 0.4, geöffnet", "geöffnet", 0.4, "mm", "equals"),
+            *((0.0, 0.2), (0.3, 0.1), (0.02, 0.2), (0.005, 0.0), (0.025, 0.2), 0.1),
         ),
+        TargetResult("mass of all links", "", None, "N s²/mm", "least", None, 0.3, 0.2, 0.0, 0.2, 0.0),
     ),
     reason="a minimum was found",
     converged=True,
@@ -42,6 +45,8 @@ RESULT = DesignResult(
     active=("least thickness 0.7 of 'rocker'",),
     objective=(0.4 / 7.0, 1e-17 / 3.0),
     objective_error=1e-5 / 3.0,
+    surrogate="plane-stress",
+    corrections=(0.1 / 3.0, 1e-4),
     iterations=7,
     evaluations=9,
     mesh_ratio_max=4.0 / 3.0,
@@ -75,7 +80,7 @@ def test_the_file_is_plain_data_that_people_can_read(tmp_path):
     assert "Zange “ß”" in text
     data = json.loads(text)
     assert data["links"][0]["controls"][0][0] == list(RESULT.links[0].controls[0][0])
-    assert data["targets"][1]["wanted"] == 0.0
+    assert data["targets"][1]["wanted"] == [0.0, 0.2]
 
 
 def test_an_interrupted_save_leaves_the_result_before_it(tmp_path, monkeypatch):
@@ -140,4 +145,9 @@ def test_files_whose_parts_lack_something_are_refused(tmp_path, part):
 def test_a_result_prints_how_far_each_target_is_reached():
     first, *rows = str(RESULT).splitlines()
     assert "'Zange “ß”' after 7 iterations: a minimum was found" in first
-    assert rows == ["  'push' of 0.1, as drawn: 1.99 of 2 (-0.50%)", "  'push' of 0.4, geöffnet: 0.02 of 0 (+10.00%)"]
+    assert rows == [
+        "  displacement of 'push' under 'push' of 0.1, as drawn: 1.99 mm of 2 mm, met (-0.50%)",
+        "  displacement of 'tip' at (1, 2) under 'push' of 0.4, geöffnet: (0.025, 0.2) mm of (0, 0.2) mm, "
+        "missed (+10.00%)",
+        "  mass of all links: 0.2 N s²/mm, from 0.3 N s²/mm",
+    ]

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.design import Sensitivity
+from fenicsmech.equilibrium import LoadControl
 from fenicsmech.mechanism import Force
+from fenicsmech.quantities import Sensitivity
 
 from ..design.in_plane import design_field
 
@@ -24,5 +25,6 @@ def assert_design_gradient(simulation: fm.Simulation, push: Force, load: float) 
 
     slope = (solve_at(1e-3)[1] - solve_at(-1e-3)[1]) / 2e-3
     frame, _ = solve_at(0.0)
-    (gradient,) = Sensitivity(model, simulation.newton(push)).gradients(frame.state, [model.point_load(push)])
+    travel, solver = fm.Displacement(push).on(model), simulation.solver(push)
+    (gradient,) = Sensitivity(model).gradients(solver, frame.state, LoadControl(load), [travel])
     assert gradient.design @ direction[: len(gradient.design)] == pytest.approx(slope, rel=1e-5)

@@ -51,7 +51,7 @@ def lever(
     dim = 3 if space == "3d" else 2
     mechanism = fm.Mechanism("lever")
     base, arm = mechanism.rigid("base", fixed=True), mechanism.rigid("lever")
-    _idle_leaf(mechanism, base)
+    _unloaded_leaf(mechanism, base)
     ends = (arm, base) if swapped else (base, arm)
     axis = {"axis": frame.apply([0.0, 0.0, 1.0])} if dim == 3 else {}
     hinge = mechanism.revolute(*ends, at=(0, 0), **axis)
@@ -64,13 +64,13 @@ def sled(effects: MakeEffects, *, space: str = "plane-stress", angle: float = 0.
     """A sled on a slider at ``angle`` to x, pushed along x."""
     mechanism = fm.Mechanism("sled")
     base, body = mechanism.rigid("base", fixed=True), mechanism.rigid("sled")
-    _idle_leaf(mechanism, base)
+    _unloaded_leaf(mechanism, base)
     slider = mechanism.prismatic(base, body, at=(0, 0), axis=(np.cos(angle), np.sin(angle)))
     push = mechanism.force(on=body, at=(5, 5), direction=(1, 0))
     return _simulate(mechanism, effects(slider), slider, push, space, MPI.COMM_SELF)
 
 
-def _idle_leaf(mechanism: fm.Mechanism, base) -> None:
+def _unloaded_leaf(mechanism: fm.Mechanism, base) -> None:
     """A flexible link without load: a simulation needs one."""
     leaf = mechanism.flexible("leaf", fm.strip([(0, -30), (20, -30)], thickness=6.0, depth=6.0), PLASTIC)
     mechanism.weld(base, leaf, at=(3, -30), interface_radius=2.0)

@@ -7,8 +7,9 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.design import Sensitivity
 from fenicsmech.effects import Contact, Cylinder, HalfPlane
+from fenicsmech.equilibrium import LoadControl
+from fenicsmech.quantities import Sensitivity
 
 from ..design.in_plane import design_field
 from ..design.refusal import refused
@@ -103,8 +104,8 @@ def test_displacements_in_contact_are_differentiated_by_the_design_field(space, 
     slope = (_travel(case, solve(h)) - _travel(case, solve(-h))) / (2.0 * h)
     frame = solve(0.0)
     assert abs(case.measure(frame)[0][0]) > 0.3
-    adjoint = Sensitivity(model, case.simulation.newton(case.force))
-    (gradient,) = adjoint.gradients(frame.state, [model.point_load(case.force)])
+    travel, solver = fm.Displacement(case.force).on(model), case.simulation.solver(case.force)
+    (gradient,) = Sensitivity(model).gradients(solver, frame.state, LoadControl(frame.force), [travel])
     found = comm.allreduce(gradient.design @ direction[: len(gradient.design)])
     assert found == pytest.approx(slope, rel=1e-4)
 
@@ -143,12 +144,12 @@ def test_descriptions_without_sense_are_refused():
     floor = HalfPlane((0, -5), (0, 1))
     refused(lambda: Contact(base, floor), part="'base'", problem="points only", remedy="points=")
     refused(lambda: Contact(base, floor, points=[(0, 0)]), part="'base'", problem="points only", remedy="stiffness=")
-    refused(lambda: Contact(link, floor, points=[(0, 0)]), part="'link'", problem="anywhere", remedy="out")
+    refused(lambda: Contact(link, floor, points=[(0, 0)]), part="'link'", problem="whole surface", remedy="out")
     refused(lambda: Contact(link, floor, -1.0), part="stiffness", problem="not positive", remedy="greater")
     refused(lambda: Contact("link", floor), part="contact", problem="is not a link", remedy="rigid")
     refused(lambda: Contact(link, "floor"), part="'link'", problem="not an obstacle", remedy="HalfPlane")
     refused(lambda: HalfPlane((0, 0), (0, 0)), part="normal", problem="zero length", remedy="somewhere")
-    refused(lambda: Cylinder((0, 0, 0), 1.0), part="centre", problem="has not 2 coordinates", remedy="2 numbers")
+    refused(lambda: Cylinder((0, 0, 0), 1.0), part="centre", problem="does not have 2 coordinates", remedy="2 numbers")
     refused(lambda: Cylinder((0, 0), 0.0), part="radius", problem="not positive", remedy="greater")
     for contact, space, problem in (
         (Contact(stranger, floor, 1.0, [(0, 0)]), "3d", "is not a link of"),

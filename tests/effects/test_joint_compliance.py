@@ -102,20 +102,20 @@ def test_two_soft_pins_let_a_rigid_column_buckle(space):
 @every_space
 def test_newton_converges_quadratically_on_a_soft_pin(space):
     case = lever(lambda hinge: [JointSpring(hinge, STIFFNESS), JointCompliance(hinge, COMPLIANCE)], space=space)
-    newton = case.simulation.newton(case.force)
+    solver = case.simulation.solver(case.force)
     near, far = case.simulation.load_displacement(case.force, forces=[1.0, 1.2]).frames
-    solution = newton.solve(near.state, LoadControl(1.2))
+    solution = solver.solve(near.state, LoadControl(1.2))
     assert solution.iterations <= 6
     assert solution.state.poses == pytest.approx(far.state.poses, abs=1e-8)
 
 
 def test_tangent_is_the_rate_of_the_equilibria():
     case = lever(lambda hinge: [JointSpring(hinge, STIFFNESS), JointCompliance(hinge, COMPLIANCE)])
-    newton = case.simulation.newton(case.force)
+    solver = case.simulation.solver(case.force)
     step = 1e-3
     frames = case.simulation.load_displacement(case.force, forces=[1.0 - step, 1.0, 1.0 + step]).frames
-    tangent = newton.solve(frames[1].state, LoadControl(1.0)).tangent
-    rate = newton.system.difference(frames[2].state, frames[0].state).scaled(0.5 / step)
+    tangent = solver.solve(frames[1].state, LoadControl(1.0)).tangent
+    rate = solver.system.difference(frames[2].state, frames[0].state).scaled(0.5 / step)
     assert tangent.z == pytest.approx(rate.z, rel=1e-5, abs=1e-6)
     assert tangent.multipliers == pytest.approx(rate.multipliers, rel=1e-5, abs=1e-6)
 
@@ -143,7 +143,7 @@ def test_ranks_agree_on_a_mechanism_with_soft_pins():
     curves = []
     for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
         case = soft_truss(0.1)
-        curves.append(case.simulate(comm=comm).load_displacement(case.targets[0].part, forces=[0.1, 0.4]))
+        curves.append(case.simulate(comm=comm).load_displacement(case.targets[0].quantity.part, forces=[0.1, 0.4]))
     assert curves[1].displacements == pytest.approx(curves[0].displacements, rel=1e-8)
 
 

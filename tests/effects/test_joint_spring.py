@@ -14,7 +14,7 @@ from fenicsmech.effects import Gravity, JointSpring, Mass
 from fenicsmech.multibody import JointCoordinate, build_linkage
 
 from ..design.mechanisms import objective, truss
-from ..joints.poses import pose, random_pose, turn
+from ..joints.poses import carry, pose, random_pose, turn
 from ..joints.taylor import assert_derivative
 from ..oracles import dense
 from .levers import ARM, PLASTIC, TILTED, UPRIGHT, lever, sled
@@ -100,7 +100,7 @@ def test_energy_is_the_same_from_every_frame(dim, kind):
     space, poses = linkage.joints.space, anywhere(linkage, rng)
     centres = np.array([body.centre for body in linkage.bodies])
     frame = random_pose(space, rng)
-    moved = np.array([space.compose(frame, z, c - centres[0]) for z, c in zip(poses, centres, strict=True)])
+    moved = np.array([carry(space, frame, z, c - centres[0]) for z, c in zip(poses, centres, strict=True)])
     assert potential.value(moved) == pytest.approx(potential.value(poses), rel=1e-11)
 
 
@@ -116,9 +116,8 @@ def test_angle_is_that_of_the_turn_even_beyond_half_a_turn(dim, full):
     axis = np.array(joint.axis) if dim == 3 else np.ones(1)
     # small turns one after the other, as on a path: scipy's quaternions know no more than half a turn
     for _ in range(20):
-        poses[1] = space.compose(
-            poses[1], pose(space, np.zeros(dim), turn(space, full * np.pi / 20 * axis)), np.zeros(dim)
-        )
+        step = pose(space, np.zeros(dim), turn(space, full * np.pi / 20 * axis))
+        poses[1] = carry(space, poses[1], step, np.zeros(dim))
     assert coordinate.value(poses) == pytest.approx(full * np.pi, rel=1e-12)
 
 
@@ -246,7 +245,7 @@ def test_ranks_agree_on_a_mechanism_with_a_spring():
     curves = []
     for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
         case = sprung_truss(lambda hinge: JointSpring(hinge, 200.0, rest=0.02))
-        push = case.targets[0].part
+        push = case.targets[0].quantity.part
         curves.append(case.simulate(comm=comm).load_displacement(push, forces=[0.1, 0.4]))
     assert curves[1].displacements == pytest.approx(curves[0].displacements, rel=1e-8)
     assert curves[1].stable.tolist() == curves[0].stable.tolist()

@@ -5,11 +5,40 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import ufl
+from dolfinx import fem
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.effects import Contact, ContactGauge, Cylinder, HalfPlane
+from fenicsmech.compat import assemble_vector, compile_form
+from fenicsmech.effects import Contact, Cylinder, HalfPlane, LinkFields
 from fenicsmech.mechanism import Force
+
+
+class ContactGauge:
+    """Measures the contact of a flexible link in the state that the fields of a simulation hold."""
+
+    def __init__(self, contact: Contact, fields: LinkFields) -> None:
+        self._obstacle, self._fields = contact.obstacle, fields
+        self._form = compile_form(-ufl.derivative(contact.link_energy(fields), fields.u))
+        (faces,) = contact.faces
+        V = fields.u.function_space
+        self._design, self._forces = fem.Function(V), fem.Function(V)
+        self._nodes = fem.locate_dofs_topological(V, fields.dim - 1, fields.boundaries[faces].facets)
+
+    def force(self) -> np.ndarray:
+        """The force of the obstacle on the link, (dim,)."""
+        # shape functions sum up to one: so do nodal forces to the resultant
+        force = assemble_vector(self._form, self._forces).reshape(-1, self._fields.dim).sum(axis=0)
+        return self._fields.mesh.comm.allreduce(force, op=MPI.SUM)
+
+    def gap(self) -> float:
+        """The smallest gap at nodes of the link's boundary; where negative, the largest penetration."""
+        fields = self._fields
+        self._design.interpolate(fields.body.d)
+        moved = fields.body.drawn_nodes + (self._design.x.array + fields.u.x.array).reshape(-1, fields.dim)
+        gaps = self._obstacle.gap(moved[self._nodes].T, self._obstacle.numbers, np.sqrt)
+        return fields.mesh.comm.allreduce(float(gaps.min(initial=np.inf)), op=MPI.MIN)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""What the integral over the mesh is made of: material, depth and cells of each link, and units."""
+"""Integral over the mesh: material, depth and cells of each link, and units."""
 
 import numpy as np
 import pytest

@@ -9,6 +9,8 @@ import fenicsmech as fm
 from fenicsmech.equilibrium import Control, DisplacementControl, EquilibriumSystem, LoadControl, State
 from fenicsmech.mechanism import Force
 
+from ..joints.poses import carry
+
 SIZE = 3.0
 RUBBER = fm.Material("rubber", 2.0, 0.4)
 
@@ -87,7 +89,7 @@ def random_state(case: Crowded, system: EquilibriumSystem, *, seed: int = 5) -> 
     for group in linkage.interfaces.values():
         for body in group[1:]:
             lever = centres[body] - centres[group[0]]
-            poses[body] = space.compose(poses[group[0]], pose(0.1 * SIZE, 0.05), lever)
+            poses[body] = carry(space, poses[group[0]], pose(0.1 * SIZE, 0.05), lever)
     motors = np.where([c.motor is not None for c in joints.connections], 0.7, 0.0)
     carried = model.assembled_state(poses, motors)
     # the same field on any number of ranks: a function of position

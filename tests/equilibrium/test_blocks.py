@@ -79,8 +79,8 @@ def test_blocks_of_the_kkt_matrix_are_those_of_a_dense_oracle(space):
     stiffness = entries(stiffness)
     constraints = joints.gradient(state.poses, state.motors)
     lever = np.zeros((system.numbering.rows.nodes.count // system.numbering.per_node, system.numbering.per_node))
-    point = system.controlled.point
-    np.add.at(lever, point.global_nodes, np.outer(point.weights, system.controlled.direction))
+    ((point, direction),) = system.controlled.acting
+    np.add.at(lever, point.global_nodes, np.outer(point.weights, direction))
     lever = lever.ravel()
     expected = {
         ("nodes", "nodes"): units[:, None] * stiffness[np.ix_(free, free)] * units,
@@ -108,7 +108,7 @@ def test_blocks_of_the_kkt_matrix_are_those_of_a_dense_oracle(space):
 def test_fieldsplit_solves_with_the_blocks(control):
     """The Schur complement of the border, links solved exactly, gives what LDLᵀ of the whole matrix gives."""
     simulation, push = finger("plane-strain", comm=MPI.COMM_WORLD)
-    system = simulation.newton(push).system
+    system = simulation.solver(push).system
     state = simulation.load_displacement(push, forces=[0.5]).frames[0].state
     system.load(state)
     system.linearise(state, control, system.residual(state, control))

@@ -5,6 +5,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
+from fenicsmech.equilibrium import ArcLengthControl, ArcMetric, DisplacementControl, LoadControl
 
 from ..simulation.demo_scenes import describe
 from .arch import DISPLACEMENTS, RISE, arch, beam_forces
@@ -84,3 +85,20 @@ def test_constant_force_is_reached_as_surely_as_one_that_is_led():
     led = simulation.load_displacement(lift, forces=[10.0])
     both = simulation.load_displacement(lift, forces=[0.0], others={constant: 10.0})
     assert both.displacements == pytest.approx(led.displacements, rel=1e-9)
+
+
+@pytest.mark.parametrize("held", [LoadControl(), DisplacementControl()], ids=["force", "displacement"])
+def test_arc_length_is_corrected_like_other_controls_whatever_is_held(held):
+    simulation, push = finger("plane-stress")
+    solver = simulation.solver(push)
+    system, state = solver.system, simulation.load_displacement(push, forces=[1.0]).frames[0].state
+    tangent = solver.linearise(state, LoadControl(1.0)).tangent()
+    metric = ArcMetric(system, LoadControl(), system.size(tangent), 1.0, 1.0)
+    control = ArcLengthControl(0.5, metric, state, metric.unit(tangent), held)
+    point = solver.solve(state, control)
+    assert control.value(system, point.state) == pytest.approx(0.5, rel=1e-9)
+    assert metric.norm(point.tangent) == pytest.approx(1.0) and metric.dot(point.tangent, control.normal) > 0.0
+    loaded = solver.solve(state, LoadControl(point.state.force))
+    assert system.size(system.difference(point.state, loaded.state)) < 1e-9
+    assert point.conjugate_rate == pytest.approx(loaded.conjugate_rate * point.tangent.force, rel=1e-6)
+    assert point.stability == loaded.stability

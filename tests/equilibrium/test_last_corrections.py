@@ -1,4 +1,4 @@
-"""Last corrections are solved with the factor at hand: fewer factors, the same equilibria, the same verdicts."""
+"""Last corrections are solved with the factor at hand: fewer factors, the same equilibria, the same stability."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ def test_fewer_factors_lead_to_the_same_curve(space):
 @pytest.mark.parametrize("space", LOADS)
 def test_rates_at_the_equilibria_are_as_good_as_those_of_a_new_factor(space):
     simulation, push = finger(space)
-    newton = simulation.newton(push)
+    newton = simulation.solver(push)
     system, state = newton.system, simulation.load_displacement(push, forces=[1.0]).frames[0].state
     corrected = 0
     for load in (1.1, 1.2, 1.3, 1.4):
@@ -53,7 +53,7 @@ def test_rates_at_the_equilibria_are_as_good_as_those_of_a_new_factor(space):
 
 def test_rates_without_reused_factors_are_those_of_a_new_one():
     simulation, push = finger("plane-stress", solver=ALWAYS_ANEW)
-    newton = simulation.newton(push)
+    newton = simulation.solver(push)
     start = simulation.load_displacement(push, forces=[1.0]).frames[0].state
     for load in (1.01, 1.1, 1.3):
         solution = newton.solve(start, LoadControl(load))

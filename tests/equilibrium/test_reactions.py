@@ -91,9 +91,7 @@ def test_motor_torque_is_the_derivative_of_the_potential_by_the_motor_angle(spac
     def potential(angle):
         frame = frame_at(angle)
         model.load(frame.state)
-        point_load = model.point_load(load)
-        travel = point_load.direction @ point_load.point.displacement(model.elastic.u, frame.state.poses)
-        return frame.strain_energy - force * travel
+        return frame.strain_energy - force * model.travel(load, frame.state)
 
     energy = [potential(middle + k * step) for k in (-2, -1, 1, 2)]
     slope = (energy[0] - 8.0 * energy[1] + 8.0 * energy[2] - energy[3]) / (12.0 * step)
@@ -113,13 +111,13 @@ def test_torque_or_force_of_a_motor_that_strains_a_link_is_the_derivative_of_the
     else:
         joint = mechanism.prismatic(base, hand, at=(45, 0), axis=(0.6, 0.8))
     motor = mechanism.motor(joint)
-    idle = mechanism.force(on=hand, at=(40, 0), direction=(0, 1))
+    unloaded = mechanism.force(on=hand, at=(40, 0), direction=(0, 1))
     order = 1 if space == "3d" else 2
     simulation = fm.Simulation(fm.Scene(mechanism), space=space, order=order, size=5.0, comm=MPI.COMM_SELF)
 
     def frame_at(value):
         configuration = simulation.scene.configuration("driven", {motor: value})
-        return simulation.load_displacement(idle, forces=[0.0], configuration=configuration).frames[0]
+        return simulation.load_displacement(unloaded, forces=[0.0], configuration=configuration).frames[0]
 
     middle, step = {"revolute": (0.4, 0.02), "prismatic": (6.0, 0.3)}[kind]
     energy = [frame_at(middle + k * step).strain_energy for k in (-2, -1, 1, 2)]

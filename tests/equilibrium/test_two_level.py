@@ -81,7 +81,7 @@ def test_so_are_those_of_a_force_on_a_link(asked):
 @pytest.mark.parallel
 def test_inertia_and_solutions_are_those_of_the_factor_on_both_sides_of_buckling_loads():
     simulation, push = column()
-    newton = simulation.newton(push)
+    newton = simulation.solver(push)
     system, seen, solver = newton.system, [], None
     first = simulation.load_displacement(push, forces=[0.5 * EULER]).frames[0].state
     compression = newton.solve(first, LoadControl(0.5 * EULER)).tangent
@@ -109,7 +109,7 @@ def test_inertia_and_solutions_are_those_of_the_factor_on_both_sides_of_buckling
 @pytest.mark.parallel
 def test_stiffness_by_nodes_is_that_block_of_the_matrix():
     simulation, push = column()
-    system = simulation.newton(push).system
+    system = simulation.solver(push).system
     state = simulation.load_displacement(push, forces=[0.5 * EULER]).frames[0].state
     control = LoadControl(0.5 * EULER)
     system.load(state)
@@ -128,7 +128,7 @@ def test_stiffness_by_nodes_is_that_block_of_the_matrix():
 @pytest.mark.parallel
 def test_columns_and_restrictions_are_those_of_the_matrix_shifted_and_softened():
     simulation, push = finger("3d", size=6.0, comm=MPI.COMM_WORLD)
-    system = simulation.newton(push).system
+    system = simulation.solver(push).system
     state = simulation.load_displacement(push, forces=[0.5]).frames[0].state
     control = DisplacementControl(0.2)
     system.load(state)
@@ -191,7 +191,7 @@ def test_iterations_do_not_grow_with_the_mesh():
     counts = []
     for size in (3.0, 1.5):
         simulation, push = column(size)
-        newton = simulation.newton(push)
+        newton = simulation.solver(push)
         system = newton.system
         state = simulation.load_displacement(push, forces=[0.5 * EULER]).frames[0].state
         control = LoadControl(0.5 * EULER)
@@ -207,7 +207,7 @@ def test_iterations_do_not_grow_with_the_mesh():
 
 def test_size_decides_unless_said_otherwise():
     simulation, push = finger("3d")
-    system = simulation.newton(push).system
+    system = simulation.solver(push).system
     state = simulation.load_displacement(push, forces=[0.0]).frames[0].state
     control = LoadControl(0.0)
     system.linearise(state, control, system.residual(state, control))

@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.equilibrium import Iteration
+from fenicsmech.equilibrium import EquilibriumSolver
 from fenicsmech.files import read_csv
 
 from ..simulation.demo_scenes import describe
@@ -132,8 +132,8 @@ def test_estimate_falls_with_the_mesh_and_vanishes_without_load():
 
 def test_estimate_takes_half_of_the_factors_of_its_frame_at_most(monkeypatch):
     simulation, push, forces = grasping()
-    factored, refactor = [], Iteration.factor
-    monkeypatch.setattr(Iteration, "factor", lambda *args: factored.append(1) or refactor(*args))
+    factored, refactor = [], EquilibriumSolver.factor
+    monkeypatch.setattr(EquilibriumSolver, "factor", lambda *args: factored.append(1) or refactor(*args))
     curve = simulation.load_displacement(push, forces=forces)
     frames = len(factored)
     curve.error_estimates()

@@ -89,7 +89,7 @@ def test_error_of_a_quadratic_pressure_is_recovered():
 
 
 @pytest.mark.parallel
-@pytest.mark.parametrize("space", ["plane-strain", "3d-symmetric"])
+@pytest.mark.parametrize("space", ["plane-strain", pytest.param("3d-symmetric", marks=pytest.mark.thorough)])
 def test_estimate_is_the_same_on_any_number_of_processes(space):
     found = []
     for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):

@@ -43,7 +43,7 @@ def test_blocking_all_contraction_is_plane_strain():
         values.append(curve.displacements[-1])
         if space == "plane-stress":
             estimates, at = Estimates(simulation.model, Calibration(decay=1e6)), curve.equilibrium(curve.frames[-1])
-            (estimate,) = estimates.at(simulation.newton(push), at, [ErrorKind.PLANE_STRESS])
+            (estimate,) = estimates.at(simulation.solver(push), at, [ErrorKind.PLANE_STRESS])
     # first order of a change of 13 %
     assert estimate == pytest.approx(values[1] - values[0], rel=0.2)
 
@@ -72,7 +72,7 @@ def test_both_kinds_of_error_need_one_factor_per_frame_once(monkeypatch):
     loads = [0.5 * load, load]
     apart, together = (simulation.load_displacement(push, forces=loads) for _ in range(2))
     one, other = apart.error_estimates(), apart.modelling_errors()
-    newton, factored = type(simulation.newton(push)), []
+    newton, factored = type(simulation.solver(push)), []
     plain = newton.linearise
     monkeypatch.setattr(newton, "linearise", lambda *arguments: factored.append(arguments) or plain(*arguments))
     assert together.corrections == pytest.approx(one + other, rel=1e-10)

@@ -1,4 +1,4 @@
-"""What a hard case is, and what it finds out."""
+"""Hard cases and their findings."""
 
 from __future__ import annotations
 

@@ -208,7 +208,7 @@ def _bricard(space: str, comm: MPI.Comm) -> Iterator[Check]:
 
 
 def _hand(space: str, comm: MPI.Comm, kind: str) -> fm.Curve:
-    """A clamped link with a rigid hand: one body, several that are held more than they need, or with idle ones."""
+    """A clamped link with a rigid hand: one body, several that are held more than they need, or with loose ones."""
     mechanism = fm.Mechanism("hand")
     base, palm = mechanism.rigid("base", fixed=True), mechanism.rigid("palm")
     link = mechanism.flexible("link", fm.strip([(0, 0), (20, 4), (40, 0)], thickness=3.0, depth=5.0), SOFT)
@@ -225,7 +225,7 @@ def _hand(space: str, comm: MPI.Comm, kind: str) -> fm.Curve:
             for other in others:
                 mechanism.revolute(first, other, at=corner, name=f"{first.name} {other.name}")
         loaded = bars[2, 3]
-    if kind == "idle":
+    if kind == "loose":
         bob = mechanism.rigid("bob")
         mechanism.revolute(palm, bob, at=(45, 0))
         if space == SPACE:
@@ -245,11 +245,11 @@ def _over_constrained(space: str, comm: MPI.Comm) -> Iterator[Check]:
     yield deviation("as with one rigid body", braced.displacements, single.displacements, 1e-8)
 
 
-def _idle(space: str, comm: MPI.Comm) -> Iterator[Check]:
-    single, idle = (_hand(space, comm, kind) for kind in ("single", "idle"))
-    yield Fact("1 idle freedom in the plane, 4 in space", idle.freedom.mobility == (1 if space == PLANE else 4))
-    yield deviation("as without them", idle.displacements, single.displacements, 1e-8)
-    yield Fact("stable", all(idle.stable))
+def _loose(space: str, comm: MPI.Comm) -> Iterator[Check]:
+    single, loose = (_hand(space, comm, kind) for kind in ("single", "loose"))
+    yield Fact("1 free motion in the plane, 4 in space", loose.freedom.mobility == (1 if space == PLANE else 4))
+    yield deviation("as without them", loose.displacements, single.displacements, 1e-8)
+    yield Fact("stable", all(loose.stable))
 
 
 def _closing(space: str, comm: MPI.Comm) -> Iterator[Check]:
@@ -308,7 +308,7 @@ CASES = (
     HardCase("Bennett loop", "moves though its joints say it cannot; one bar flexible", _bennett, (SPACE,)),
     HardCase("Bricard loop", "six hinges, one equation redundant; one bar flexible", _bricard, (SPACE,)),
     HardCase("over-constrained hand", "rigid sub-chain braced twice", _over_constrained),
-    HardCase("idle parts", "a bob that nothing holds swings, and one that spins", _idle),
+    HardCase("loose parts", "a bob that nothing holds swings, and one that spins", _loose),
     HardCase(
         "loop that closes only just", "1e-12 rad within its reach, loaded 1e-6 rad within it, and beyond", _closing
     ),

@@ -24,8 +24,7 @@ def _effects(part) -> dict[str, Callable[[float], object]]:
     return {
         "mass of a rigid link": lambda x: fm.Mass(x, (0, 0)),
         "centre of mass": lambda x: fm.Mass(1.0, (0, x)),
-        "gravity": lambda x: fm.Gravity((0, x), densities={fm.ONYX: 1e-9}),
-        "density": lambda x: fm.Gravity((0, -1), densities={fm.ONYX: x}),
+        "gravity": lambda x: fm.Gravity((0, x)),
         "cylinder's centre": lambda x: fm.Cylinder((x, 0), 1.0),
         "cylinder's radius": lambda x: fm.Cylinder((0, 0), x),
         "half-plane's point": lambda x: fm.HalfPlane((0, x), (0, 1)),
@@ -58,6 +57,7 @@ def _fidelity(scene: fm.Scene, space: str, comm: MPI.Comm) -> dict[str, Callable
         "Newton's round-off": lambda x: simulated(solver=PrimalDualNewton(roundoff=x)),
         "Newton's neighbourhood": lambda x: simulated(solver=PrimalDualNewton(near=x)),
         "Newton's largest turn": lambda x: simulated(solver=PrimalDualNewton(largest_turn=x)),
+        "Newton's divergence": lambda x: simulated(solver=PrimalDualNewton(divergence=x)),
         "Levenberg–Marquardt's tolerance": lambda x: fm.LevenbergMarquardt(tolerance=x),
         "Levenberg–Marquardt's damping": lambda x: fm.LevenbergMarquardt(damping=x),
         "BFGS's tolerance": lambda x: fm.BFGS(tolerance=x),

@@ -21,7 +21,7 @@ from fenicsmech.joints import (
     constraint,
 )
 
-from .poses import matrix, pose, random_rotation, turn
+from .poses import carry, matrix, pose, random_rotation, turn
 
 # Motions of b relative to a: "t1" slides along the joint's first unit vector, "r3" turns about its third. In the
 # plane the vectors are axis, normal; "r3" turns in it.
@@ -91,7 +91,7 @@ class Drawn:
             rotation = rotation * turn(self.space, motions.get(name, 0.0) * axis)
         # b turns about the joint: its centre, at −anchor from there, follows
         lever = matrix(self.space, rotation) @ -self.anchors[1] + self.anchors[1]
-        return np.concatenate([a, self.space.compose(a, pose(self.space, slide + lever, rotation), self._apart)])
+        return np.concatenate([a, carry(self.space, a, pose(self.space, slide + lever, rotation), self._apart)])
 
     @property
     def _apart(self) -> np.ndarray:

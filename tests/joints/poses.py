@@ -40,3 +40,16 @@ def random_pose(space: RigidSpace, rng: np.random.Generator) -> np.ndarray:
 def rotation_of(space: RigidSpace, pose: np.ndarray) -> Rotation:
     """scipy's rotation for the rotation parameters of ``pose``."""
     return turn(space, pose[2:]) if space.dim == 2 else Rotation.from_quat(np.roll(pose[3:], -1))
+
+
+def carry(space: RigidSpace, outer: np.ndarray, inner: np.ndarray, lever: np.ndarray) -> np.ndarray:
+    """The pose of a body that first moves by ``inner`` and is then carried along by a body with the pose ``outer``.
+
+    ``lever`` is the reference centre of the carried body minus that of the carrying one, (dim,).
+    """
+    dim = space.dim
+    centre = space.displace(outer, (lever + inner[:dim])[None])[0] + inner[:dim]
+    if dim == 2:
+        return np.append(centre, outer[2] + inner[2])
+    (a, b), (v, w) = (outer[3], inner[3]), (outer[4:], inner[4:])
+    return space.retract(np.concatenate([centre, [a * b - v @ w], a * w + b * v + np.cross(v, w)]))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from .cases import CASES, DRIVEN, compiled, draw
-from .poses import random_pose
+from .poses import carry, random_pose
 from .taylor import assert_derivative
 
 EVERY_JOINT = pytest.mark.parametrize(
@@ -89,7 +89,7 @@ def test_equations_look_the_same_from_every_frame(case, driven, seed):
     c, (z, drawn, value), half = compiled(case, driven=driven), anywhere(case, rng), case.space.pose_size
     frame = random_pose(case.space, rng)
     lever = drawn.anchors[0] - drawn.anchors[1]
-    both = [case.space.compose(frame, z[:half], np.zeros(case.dim)), case.space.compose(frame, z[half:], lever)]
+    both = [carry(case.space, frame, z[:half], np.zeros(case.dim)), carry(case.space, frame, z[half:], lever)]
     here = c.value(z, drawn.anchors, drawn.triad, value)
     there = c.value(np.concatenate(both), drawn.anchors, drawn.triad, value)
     points = case.dim if case.kind.shares_point else 0

@@ -54,7 +54,7 @@ def test_an_invalid_clamp_is_refused(arguments, message):
 
 def test_a_strip_that_bends_back_over_its_clamp_is_refused():
     half_turn = [(5.0 * math.sin(0.1 * k), 5.0 * (1.0 - math.cos(0.1 * k))) for k in range(36)]
-    with pytest.raises(DescriptionError, match="the strip bends too much for a clamp of the length 16. Make the clamp"):
+    with pytest.raises(DescriptionError, match="the strip bends too much for a clamp of length 16. Make the clamp"):
         clamped(half_turn, end="start", length=16.0)
 
 

@@ -139,8 +139,8 @@ def test_interface_that_is_not_a_region_is_refused():
     assert_refused(
         lambda: p.mechanism.weld(p.crank, p.rod, at=(40.0, 0.0), region=2.0, name="clamp"),
         "'clamp'",
-        "2.0 is not an interface region",
-        "Give region=Disc(…) or region=Rectangle(…)",
+        "2.0 is not its interface",
+        "Give Disc(…) or Rectangle(…)",
     )
 
 

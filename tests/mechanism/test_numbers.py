@@ -52,7 +52,7 @@ COORDINATES = {
     "outline segment end": lambda p, x: outline((0.0, 0.0), [Line((1.0, x))], depth=1.0),
     "outline arc": lambda p, x: outline((0.0, 0.0), [Arc((x, 1.0), (1.0, 1.0))], depth=1.0),
     "STEP section": lambda p, x: step_file("part.step", depth=1.0, section=x),
-    "Poisson's ratio of material 'clay'": lambda p, x: Material("clay", 1.0, x),
+    "Poisson's ratio of law NeoHookean of material 'clay'": lambda p, x: Material("clay", 1.0, x),
 }
 SIZES = {
     "radius of 'far pin'": lambda p, x: pin(p, interface_radius=x),
@@ -65,9 +65,11 @@ SIZES = {
     "outline depth": lambda p, x: outline((0.0, 0.0), [Line((1.0, 1.0))], depth=x),
     "STEP depth": lambda p, x: step_file("part.step", depth=x),
     "mesh depth": lambda p, x: gmsh_mesh("part.msh", depth=x),
-    "Young's modulus of material 'clay'": lambda p, x: Material("clay", x, 0.3),
+    "Young's modulus of law NeoHookean of material 'clay'": lambda p, x: Material("clay", x, 0.3),
+    "density of material 'clay'": lambda p, x: Material("clay", 1.0, 0.3, density=x),
 }
 NUMBERS = COORDINATES | SIZES
+OPTIONAL = ("radius of 'far pin'", "density of material 'clay'")  # None is not given
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")], ids=["nan", "inf", "-inf"])
@@ -77,7 +79,7 @@ def test_number_that_is_not_finite_is_refused(part, value):
 
 
 @pytest.mark.parametrize("value", ["wide", None, (1.0,), 1j], ids=repr)
-@pytest.mark.parametrize("part", [part for part in NUMBERS if part != "radius of 'far pin'"])
+@pytest.mark.parametrize("part", [part for part in NUMBERS if part not in OPTIONAL])
 def test_value_that_is_not_a_number_is_refused(part, value):
     assert_refused(lambda: NUMBERS[part](parts(), value), part, f"{value!r} is not a number", "Give a finite number")
 
@@ -107,7 +109,7 @@ def test_sound_number_is_accepted(part):
 def test_poissons_ratio_outside_its_range_is_refused(nu):
     assert_refused(
         lambda: Material("clay", 1.0, nu),
-        "material 'clay'",
+        "law NeoHookean of material 'clay'",
         f"Poisson's ratio is {nu:g}",
         "Give a value between −1 and 0.5, both excluded",
     )
@@ -152,7 +154,7 @@ def test_wrong_number_of_coordinates_is_refused(part, values, wanted, action):
     assert_refused(
         lambda: action(parts(), values),
         part,
-        f"{values!r} has not {wanted} coordinates",
+        f"{values!r} does not have {wanted} coordinates",
         f"Give {wanted} numbers",
     )
 

@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from fenicsmech.mechanism import Arc, Disc, Line, outline, strip
-from fenicsmech.meshing import CurvedEdges, InterfaceSite, LinkMesh, cell_measures, extrude, extrude_half, mesh_link
+from fenicsmech.meshing import CurvedEdges, InterfaceSite, LinkMesh, cell_measures, extrude, mesh_link
 
 from ..plot.grids import box, rectangle
 from .curved_measure import least_jacobian, measure
@@ -57,10 +57,10 @@ def test_a_straight_outline_has_no_curved_edge():
 
 
 @pytest.mark.parametrize("layers", [1, 2])
-@pytest.mark.parametrize("part, extruded", [(1.0, extrude), (0.5, extrude_half)])
-def test_walls_of_an_extruded_link_bulge_like_its_plan(part, extruded, layers):
+@pytest.mark.parametrize("part, half", [(1.0, False), (0.5, True)])
+def test_walls_of_an_extruded_link_bulge_like_its_plan(part, half, layers):
     plan = half_ring(2.0)
-    solid = extruded(plan, DEPTH, layers)
+    solid = extrude(plan, DEPTH, layers, half=half)
     assert measure(solid) == pytest.approx(part * DEPTH * measure(plan), rel=1e-12)
     assert not solid.curved.bulges[:, 2].any()
     assert set(map(tuple, solid.curved.bulges[:, :2])) == set(map(tuple, plan.curved.bulges))

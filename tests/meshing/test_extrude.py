@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fenicsmech.mechanism import Disc, strip
-from fenicsmech.meshing import InterfaceSite, cell_measures, extrude, extrude_half, layer_count, mesh_link
+from fenicsmech.meshing import InterfaceSite, cell_measures, extrude, mesh_link
 
 BOW = strip([(0.0, 0.0), (10.0, 4.0), (22.0, 3.0)], thickness=2.0, depth=7.0)
 SITES = [InterfaceSite((0.0, 0.0), Disc(2.0), name="pin")]
@@ -56,7 +56,7 @@ def cells_at(mesh) -> set:
 
 @pytest.mark.parametrize("layers", [1, 2])
 def test_half_is_what_the_whole_of_twice_as_many_layers_has_above_its_middle_plane(plan, layers):
-    whole, half = extrude(plan, 7.0, 2 * layers), extrude_half(plan, 7.0, layers)
+    whole, half = extrude(plan, 7.0, 2 * layers), extrude(plan, 7.0, layers, half=True)
     assert cells_at(half) == {cell for cell in cells_at(whole) if all(z >= 0.0 for *_, z in cell)}
     assert 2 * len(half.cells) == len(whole.cells)
     assert np.all(cell_measures(half.points, half.cells) > 0.0)
@@ -86,4 +86,6 @@ def test_plane_and_spatial_models_share_the_plan_view(plan):
 
 @pytest.mark.parametrize("depth, size, layers", [(20.0, 1.5, 7), (10.0, 1.5, 3), (1.0, 1.5, 1)])
 def test_layers_are_about_two_sizes_high(depth, size, layers):
-    assert layer_count(depth, size) == layers
+    bar = strip([(0.0, 0.0), (10.0, 0.0)], thickness=2.0, depth=depth)
+    heights = np.unique(mesh_link("bar", bar, dim=3, size=size).points[:, 2])
+    assert heights == pytest.approx(np.linspace(-0.5 * depth, 0.5 * depth, layers + 1), abs=1e-12)

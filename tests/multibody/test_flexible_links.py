@@ -6,6 +6,7 @@ import pytest
 from fenicsmech.errors import AssemblyError
 from fenicsmech.mechanism import ONYX, Mechanism, Rectangle
 
+from ..joints.poses import carry
 from .flexible_machines import bent_strip, finger, flexible_four_bar, links_by_name
 from .machine import Machine, point_of
 from .planar_machines import CRANK_ROCKER, DRAWN_ANGLE
@@ -35,7 +36,7 @@ def test_both_ends_of_a_carried_link_move_as_one(dim):
     space = linkage.joints.space
     for first, second in linkage.interfaces.values():
         lever = np.subtract(linkage.bodies[second].centre, linkage.bodies[first].centre)
-        carried = space.compose(poses[first], space.identity, lever)
+        carried = carry(space, poses[first], space.identity, lever)
         assert poses[second] == pytest.approx(carried, abs=1e-12 * linkage.length)
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from fenicsmech.effects import JointSpring, spring_potentials
+from fenicsmech.effects import JointSpring
 from fenicsmech.mechanism import Joint, Mechanism, Scene
-from fenicsmech.multibody import assemble, build_linkage, count_freedom
+from fenicsmech.multibody import assemble, build_linkage, count_freedom, spring_potentials
 
 FIRST, SECOND, LENGTH, DRIVEN = 0.3, 0.02, 30.0, 0.7
 

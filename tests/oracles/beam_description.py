@@ -1,4 +1,4 @@
-"""What the beam oracle is told and what it answers: section, beam, end conditions, solution."""
+"""Questions to the beam oracle and its answers: section, beam, end conditions, solution."""
 
 from __future__ import annotations
 

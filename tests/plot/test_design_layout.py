@@ -26,22 +26,22 @@ def many(rows=4, columns=3):
 
 def test_a_millimetre_is_as_long_in_x_as_in_y_and_as_the_frame_says():
     layout = lay_out(four_bar())
-    for axes, scale in ((layout.place, layout.place_scale), (layout.details, layout.details_scale)):
-        (left, low), (right, high) = axes.transData.transform([(0.0, 0.0), (10.0, 10.0)])
+    for stage in (layout.place, layout.details):
+        (left, low), (right, high) = stage.axes.transData.transform([(0.0, 0.0), (10.0, 10.0)])
         assert right - left == pytest.approx(high - low, rel=1e-9)
-        assert right - left == pytest.approx(10.0 * scale * layout.page.figure.dpi, rel=1e-9)
+        assert right - left == pytest.approx(10.0 * stage.scale * layout.page.figure.dpi, rel=1e-9)
 
 
 def test_a_single_link_is_shown_in_place_only():
     layout = lay_out(four_bar()[:1])
-    assert layout.details is None and not layout.views
+    assert layout.details is None
 
 
 @pytest.mark.parametrize("links", [four_bar(), many()])
 def test_links_are_laid_down_without_touching_each_other_or_leaving_the_picture(links):
     layout = lay_out(links)
-    x, y = layout.details.get_xlim(), layout.details.get_ylim()
-    boxes = [corners(link, view) for link, view in zip(links, layout.views, strict=True)]
+    x, y = layout.details.axes.get_xlim(), layout.details.axes.get_ylim()
+    boxes = [corners(link, view) for link, view in zip(links, layout.details.views, strict=True)]
     for low, high in boxes:
         assert x[0] <= low[0] and high[0] <= x[1] and y[0] <= low[1] and high[1] <= y[1]
     for k, (low, high) in enumerate(boxes):
@@ -52,8 +52,8 @@ def test_links_are_laid_down_without_touching_each_other_or_leaving_the_picture(
 def test_links_laid_down_are_rigidly_moved_lie_along_x_and_are_not_smaller_than_in_place():
     links = [*four_bar(), design("hanger", (0, 0), (-4, 60)), design("mast", (40, 60), (41, -20))]
     layout = lay_out(links)
-    assert layout.details_scale >= layout.place_scale
-    for link, view in zip(links, layout.views, strict=True):
+    assert layout.details.scale >= layout.place.scale
+    for link, view in zip(links, layout.details.views, strict=True):
         assert view.turn.T @ view.turn == pytest.approx(np.eye(2), abs=1e-12)
         assert np.linalg.det(view.turn) == pytest.approx(1.0)
         (x0, y0), (x1, y1) = view(link.joints)
@@ -63,15 +63,15 @@ def test_links_laid_down_are_rigidly_moved_lie_along_x_and_are_not_smaller_than_
 def test_captions_stand_above_their_links():
     links = four_bar()
     layout = lay_out(links)
-    for link, view, at in zip(links, layout.views, layout.captions, strict=True):
+    for link, view, at in zip(links, layout.details.views, layout.captions, strict=True):
         low, high = corners(link, view)
-        assert at[0] < low[0] and at[1] > high[1] + 0.3 / layout.details_scale
+        assert at[0] < low[0] and at[1] > high[1] + 0.3 / layout.details.scale
 
 
 def test_the_mechanism_lies_inside_its_limits_with_room_around_it():
     links = four_bar()
     layout = lay_out(links)
-    (x0, x1), (y0, y1) = layout.place.get_xlim(), layout.place.get_ylim()
+    (x0, x1), (y0, y1) = layout.place.axes.get_xlim(), layout.place.axes.get_ylim()
     for low, high in map(corners, links):
         assert x0 < low[0] and high[0] < x1 and y0 < low[1] and high[1] < y1
 

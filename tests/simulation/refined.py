@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 import fenicsmech as fm
+from fenicsmech import model
 from fenicsmech.meshing import CurvedEdges, LinkMesh
-from fenicsmech.model import model
 
 
 def quartered(mesh: LinkMesh) -> LinkMesh:

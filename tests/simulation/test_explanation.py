@@ -23,10 +23,10 @@ def test_hint_on_weight_is_what_gravity_does(space):
     scene, push = describe("claw")
     simulation = fm.Simulation(scene, space=space, size=4.0)
     curve = simulation.load_displacement(push, forces=[2.0])
-    influence = weight_influence(simulation.model, simulation.newton(push), curve.equilibrium(curve.frames[-1]))
+    influence = weight_influence(simulation.model, simulation.solver(push), curve.equilibrium(curve.frames[-1]))
     direction = influence / np.linalg.norm(influence)
     density = 1e-2 * 1.2e-9 * 9810.0  # light enough to be linear
-    weighed = fm.Scene(scene.mechanism, effects=[fm.Gravity(tuple(direction), {fm.ONYX: density})])
+    weighed = fm.Scene(scene.mechanism, effects=[fm.Gravity(tuple(direction * density / fm.ONYX.density))])
     heavy = fm.Simulation(weighed, space=space, size=4.0).load_displacement(push, forces=[2.0])
     change = heavy.displacements[0] - curve.displacements[0]
     assert change == pytest.approx(density * np.linalg.norm(influence), rel=1e-3)
@@ -43,7 +43,9 @@ def test_weight_matters_to_the_soft_finger_and_not_to_the_stiff_claw():
 def test_hint_on_weight_knows_all_forces_that_act():
     rig = fm.Mechanism("arm")
     wall, hand = rig.rigid("wall", fixed=True), rig.rigid("hand")
-    link = rig.flexible("link", fm.strip([(-3, 0), (63, 0)], thickness=2.0, depth=6.0), fm.Material("soft", 100.0, 0.3))
+    link = rig.flexible(
+        "link", fm.strip([(-3, 0), (63, 0)], thickness=2.0, depth=6.0), fm.Material("soft", 100.0, 0.3, density=1.2e-9)
+    )
     for a, b, x in ((wall, link, -1.5), (link, hand, 61.5)):
         rig.weld(a, b, at=(x, 0), region=fm.Rectangle(3, 4))
     push = rig.force(on=hand, at=(60, 0), direction=(0, 1))
@@ -51,7 +53,7 @@ def test_hint_on_weight_knows_all_forces_that_act():
     pull = rig.force(on=hand, at=(110, 0), direction=(-1, 0), name="pull")
     simulation = fm.Simulation(fm.Scene(rig), space="plane-stress", size=2.0)
     curve = simulation.load_displacement(push, forces=[0.01], others={pull: 0.3})
-    weighed = fm.Scene(rig, effects=[fm.Gravity((0, -1e-3 * 9810.0), {link.material: 1.2e-9})])
+    weighed = fm.Scene(rig, effects=[fm.Gravity((0, -1e-3 * 9810.0))])
     heavy = fm.Simulation(weighed, space="plane-stress", size=2.0)
     sunk = heavy.load_displacement(push, forces=[0.01], others={pull: 0.3}).displacements[0] - curve.displacements[0]
     printed = float(hint(curve.explain(), "weight").text.split("at most ")[1].split()[0])
@@ -60,11 +62,11 @@ def test_hint_on_weight_knows_all_forces_that_act():
 
 def test_effects_that_are_listed_are_named_and_not_hinted_at():
     scene, push = describe("truss")
-    gravity = fm.Gravity((0, -9810), {fm.SMOOTH_SIL_950: 1.2e-9})
+    gravity = fm.Gravity((0, -9810))
     simulation = fm.Simulation(fm.Scene(scene.mechanism, effects=[gravity]), space="plane-stress", size=4.0)
     curve = simulation.load_displacement(push, forces=[0.1])
     explanation = curve.explain()
-    assert "weight of Smooth-Sil 950" in explanation.simulated
+    assert "weight of flexible links by their density" in explanation.simulated
     assert hint(explanation, "weight") is None
     assert "Simulated:" in str(explanation)
     assert "Left out:" in str(explanation)

@@ -16,7 +16,7 @@ STIFF = 200.0
         ({}, "no displacement, position or force"),
         ({"displacement": float("nan")}, "nan"),
         ({"force": (1.0, "much")}, "not a number"),
-        ({"displacement": 1.0, "position": 2.0}, "displacement and position"),
+        ({"displacement": 1.0, "position": 2.0}, "a displacement and a position"),
         ({"force": 1.0, "frames": 1}, "1 frames"),
         ({"force": 1.0, "frames": 2.5}, "2.5 frames"),
     ],

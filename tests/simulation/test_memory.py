@@ -78,7 +78,7 @@ def test_nothing_but_its_owner_and_its_curves_keeps_a_simulation():
     try:
         simulation, curve = simulate(space="plane-stress", size=3.0)
         curve.error_estimates()
-        model, system = simulation.model, simulation.newton(curve.part).system
+        model, system = simulation.model, simulation.solver(curve.part).system
         gone = [weakref.ref(thing) for thing in (simulation, model, model.elastic, system)]
         del simulation, curve, model, system
         assert [thing() for thing in gone] == [None] * len(gone)

@@ -48,7 +48,7 @@ def test_nothing_is_added_where_no_link_is_bulky(space):
     found = []
     for formulation in (None, fm.DisplacementFormulation()):
         simulation, push = arm(materials, space=space, formulation=formulation)
-        system = simulation.newton(push).system
+        system = simulation.solver(push).system
         elastic = simulation.model.elastic
         extended = system.kkt.extended
         found.append(

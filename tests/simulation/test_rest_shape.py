@@ -161,7 +161,7 @@ def test_the_same_scene_on_other_processes_has_its_drawn_shape_and_the_same_fide
 
 
 @pytest.mark.parallel
-@each_space
+@pytest.mark.parametrize("space", ["plane-stress", pytest.param("3d", marks=pytest.mark.thorough)])
 def test_simulation_of_another_design_leaves_the_first_one_as_it_is(space):
     simulation, push, turned = crane(space)
     request = {"forces": [2.0], "configuration": turned}

@@ -1,1 +1,1 @@
-"""Optimisers of a regularised least-squares objective: Levenberg–Marquardt, the default, and BFGS, as in the paper."""
+"""Optimisers: Levenberg–Marquardt for least squares, SQP for inequalities and other objectives, the paper's BFGS."""

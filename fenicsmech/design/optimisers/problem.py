@@ -1,20 +1,23 @@
-"""The least-squares problem that optimisers solve, and the history of a run.
+"""The problem that optimisers solve, and the history of a run.
 
-    O(p) = ½ |r(p)|² + R(p)
+    min O(p)   subject to   c(p) ≤ 0,     O(p) = ½ |r(p)|² + f(p) + R(p)
 
-with the residuals r and the regularisation R.
+with the residuals r, a plain objective f, the regularisation R and the inequalities c. A problem of least squares has
+neither f nor c.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
 from typing import Protocol
 
 import numpy as np
+
+from fenicsmech.errors import DescriptionError
 
 
 class Infeasible(Exception):
@@ -22,7 +25,18 @@ class Infeasible(Exception):
 
 
 class TooHigh(Infeasible):
-    """The objective exceeds the optimiser's limit."""
+    """The merit exceeds the optimiser's limit.
+
+    Attributes:
+        merit: O + Σ ν_k (x_k + ½ x_k²), x = max(c, 0).
+    """
+
+    def __init__(self, merit: float) -> None:
+        super().__init__(merit)
+        self.merit = merit
+
+    def __str__(self) -> str:
+        return f"the merit is {self.merit:.3g}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +59,40 @@ class Quadratic:
         return Quadratic(0.0, np.zeros(size), np.zeros((size, size)))
 
 
+@dataclass(frozen=True, eq=False)
+class Plain:
+    """An objective f that is not a sum of squares.
+
+    Attributes:
+        value: f.
+        gradient: ∂f/∂p, (n,).
+    """
+
+    value: float = 0.0
+    gradient: np.ndarray = field(default_factory=lambda: np.zeros(()))
+
+
+@dataclass(frozen=True, eq=False)
+class Inequalities:
+    """The inequalities c ≤ 0, best scaled so that 0.01 is little and 1 is much.
+
+    Attributes:
+        names: of each, for messages, (k,).
+        values: c, (k,).
+        jacobian: ∂c/∂p, (k, n).
+    """
+
+    names: tuple[str, ...] = ()
+    values: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    jacobian: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+
+
+def merit(value: float, inequalities: np.ndarray, penalties: np.ndarray | float) -> float:
+    """O + Σ ν_k (x_k + ½ x_k²) of an objective O, inequalities c, x = max(c, 0), and penalties ν."""
+    violated = np.maximum(inequalities, 0.0)
+    return value + float(np.sum(penalties * violated * (1.0 + 0.5 * violated)))
+
+
 def exact() -> np.ndarray:
     """The errors of residuals that have none."""
     return np.zeros(())
@@ -52,7 +100,7 @@ def exact() -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """O(p) and its derivatives at one point.
+    """O(p), c(p) and their derivatives at one point.
 
     Attributes:
         parameters: p, (n,).
@@ -60,6 +108,8 @@ class Evaluation:
         jacobian: ∂r/∂p, (m, n).
         regulariser: R near p, which costs little to evaluate.
         errors: estimates the errors |e| of the residuals, (m,); valid at the best point so far only.
+        plain: f, zero by default.
+        inequalities: c, none by default.
     """
 
     parameters: np.ndarray
@@ -67,6 +117,8 @@ class Evaluation:
     jacobian: np.ndarray
     regulariser: Callable[[np.ndarray], Quadratic]
     errors: Callable[[], np.ndarray] = exact
+    plain: Plain = Plain()
+    inequalities: Inequalities = Inequalities()
 
     @cached_property
     def penalty(self) -> Quadratic:
@@ -76,26 +128,40 @@ class Evaluation:
     @property
     def value(self) -> float:
         """O."""
-        return 0.5 * float(self.residuals @ self.residuals) + self.penalty.value
+        return 0.5 * float(self.residuals @ self.residuals) + self.plain.value + self.penalty.value
+
+    def merit(self, penalties: np.ndarray | float) -> float:
+        """O + Σ ν_k (x_k + ½ x_k²), x = max(c, 0), of penalties ν, (k,)."""
+        return merit(self.value, self.inequalities.values, penalties)
 
     @property
     def gradient(self) -> np.ndarray:
-        """∂O/∂p = Jᵀ r + ∂R/∂p, (n,)."""
-        return self.jacobian.T @ self.residuals + self.penalty.gradient
+        """∂O/∂p = Jᵀ r + ∂f/∂p + ∂R/∂p, (n,)."""
+        return self.jacobian.T @ self.residuals + self.plain.gradient + self.penalty.gradient
 
     def model(self, parameters: np.ndarray) -> Quadratic:
-        """½ |r + J s|² + R(p + s), the objective with displacements made linear, at ``parameters`` p + s."""
-        r = self.residuals + self.jacobian @ (parameters - self.parameters)
-        penalty = self.regulariser(parameters)
+        """½ |r + J s|² + f + ∂f/∂p s + R(p + s), the objective with r and f made linear, at ``parameters`` p + s."""
+        step, penalty = parameters - self.parameters, self.regulariser(parameters)
+        r = self.residuals + self.jacobian @ step
         return Quadratic(
-            0.5 * float(r @ r) + penalty.value,
-            self.jacobian.T @ r + penalty.gradient,
+            0.5 * float(r @ r) + self.plain.value + float(np.sum(self.plain.gradient * step)) + penalty.value,
+            self.jacobian.T @ r + self.plain.gradient + penalty.gradient,
             self.jacobian.T @ self.jacobian + penalty.curvature,
         )
 
 
-class LeastSquaresProblem(Protocol):
-    """An objective that can be evaluated with its derivatives.
+def refuse_inequalities(optimiser: str, here: Evaluation) -> None:
+    """Raises DescriptionError if there are inequalities."""
+    if here.inequalities.names:
+        raise DescriptionError(
+            optimiser,
+            f"it does not take inequalities: {', '.join(here.inequalities.names)}",
+            "Minimise under inequalities by optimiser=fm.SQP()",
+        )
+
+
+class Problem(Protocol):
+    """A problem that can be evaluated with its derivatives.
 
     Attributes:
         lengths: typical change ℓ of each parameter, (n,).
@@ -103,12 +169,19 @@ class LeastSquaresProblem(Protocol):
 
     lengths: np.ndarray
 
-    def evaluate(self, parameters: np.ndarray, below: float = np.inf) -> Evaluation:
-        """O and its derivatives.
+    def evaluate(
+        self, parameters: np.ndarray, below: float = np.inf, penalties: np.ndarray | float = 0.0
+    ) -> Evaluation:
+        """O and c with their derivatives; the point becomes the best so far.
+
+        Args:
+            parameters: p, (n,).
+            below: largest merit of use to the optimiser.
+            penalties: ν of the merit, (k,).
 
         Raises:
             Infeasible: O has no value there.
-            TooHigh: it is larger than ``below``; its derivatives were not computed.
+            TooHigh: the merit is larger than ``below``; derivatives were not computed.
         """
 
 
@@ -117,6 +190,7 @@ class Reason(Enum):
 
     CONVERGED = "the gradient vanishes or the objective no longer falls: a minimum was found"
     RESOLVED = "what is left to gain is small beside the error of the elements: refine them, or give a tolerance"
+    VIOLATED = "inequalities stay violated, and no small change of the design mends it: relax one, or start elsewhere"
     ITERATIONS = "the number of iterations ran out: allow more to get closer to the minimum"
     NO_DESCENT = "no step lowers the objective although the gradient does not vanish: check bounds and mesh quality"
 
@@ -151,7 +225,7 @@ class Iterate:
         evaluations: objective evaluations so far, infeasible ones included.
         evaluation: the best point.
         memory: state of the optimiser, for resuming.
-        promise: the reduction that is still expected, over the objective; inf if that is not known.
+        promise: the predicted reduction, over the objective; inf if that is not known.
         reason: None while it runs.
     """
 
@@ -163,8 +237,9 @@ class Iterate:
     reason: Reason | None
 
 
+@dataclass(frozen=True)
 class Optimiser(ABC):
-    """A method that minimises a least-squares problem from a start.
+    """A method that minimises from a start, a frozen dataclass.
 
     Attributes:
         iterations: most iterations.
@@ -178,7 +253,7 @@ class Optimiser(ABC):
     def least_promise(self) -> float: ...
 
     @abstractmethod
-    def minimise(self, problem: LeastSquaresProblem, start: Start, *, watch: Callable[[Iterate], None]) -> Iterate:
+    def minimise(self, problem: Problem, start: Start, *, watch: Callable[[Iterate], None]) -> Iterate:
         """The last iterate; ``watch`` is called with every one, the start included.
 
         Raises:

@@ -122,7 +122,9 @@ class HandleOptimum:
                 followed.append(cho_solve(link.factor, slope[..., link.free].T).T @ link.mixed)
             except np.linalg.LinAlgError:
                 raise ShapeError(
-                    f"shape of link {shape.name!r}", "its mesh leaves positions of handles open", "Use smaller elements"
+                    f"shape of link {shape.name!r}",
+                    "its mesh does not determine the positions of all handles",
+                    "Use smaller elements",
                 ) from None
         return by_p - np.concatenate(followed, axis=-1)
 
@@ -324,16 +326,16 @@ def by_positions(handles: LinkHandles, p: np.ndarray, theta: np.ndarray, by_T: M
 
 
 def follow_spline(handles: LinkHandles, p: np.ndarray) -> np.ndarray:
-    """θ with joints turned like the tangent of the spline there, and all other handles at their initial t."""
+    """θ with joints turned like the tangent of the spline there, and all other handles as they were."""
     tangents = (handles.spline.derivative(q, handles.t)[:, :2] for q in (handles.spline.initial, p))
     before, now = (np.arctan2(tangent[:, 1], tangent[:, 0]) for tangent in tangents)
     turn = np.remainder(now - before + np.pi, 2.0 * np.pi) - np.pi
-    return np.where(handles.slides, handles.t, np.where(handles.turns, turn, 0.0))
+    return np.where(handles.turns, turn, handles.initial)
 
 
 def _along(handles: LinkHandles, theta: np.ndarray) -> np.ndarray:
     """Spline parameters of all handles, joints too."""
-    return np.where(handles.slides, theta, handles.t)
+    return np.where(handles.rides, theta, handles.t)
 
 
 class _MomentHessian:

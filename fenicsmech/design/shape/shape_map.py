@@ -9,19 +9,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
 from fenicsmech.collective import from_one
-from fenicsmech.compat import cell_dofs, cell_nodes, original_cells, original_nodes
+from fenicsmech.compat import original_cells
+from fenicsmech.design.shape.edges import EdgeWeights, edge_weights
 from fenicsmech.design.shape.handles import BETWEEN, LinkHandles
-from fenicsmech.design.shape.spline import SplineFit, fit_spline
+from fenicsmech.design.shape.spline import SplineFit, fit_spline, lay_out
 from fenicsmech.design.shape.weights import handle_weights, pierced
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import Centreline
-from fenicsmech.meshing import FREE, LinkMesh, MechanismMesh, cell_measures, plan_of
+from fenicsmech.meshing import FREE, CurvedEdges, LinkMesh, MechanismMesh, cell_measures, node_ends, plan_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,20 +33,24 @@ class ShapeRequest:
     Attributes:
         link: index of the flexible link.
         name: its name, for messages.
-        centreline: approximated by its spline.
         joints: positions of its interfaces, in the order of the mesh, (sites, 2).
-        turns: whether each interface may turn about its joint; a clamp may not, (sites,).
-        interior: control points between each joint and the next along the centreline, (sites − 1,).
+        turns: whether the joints of each interface let it turn about z, (sites,).
+        reach: how far each interface extends from its joint in the plane, (sites,).
+        segments: number of cubic segments.
+        centreline: approximated by the spline.
+        ends_move: whether free ends may move.
         thickness: in the plane, where δ = 1; None: the mean width of the link.
         spacing: arc length between handles; None: the mean width of the link.
     """
 
     link: int
     name: str
-    centreline: Centreline
     joints: tuple[tuple[float, float], ...]
     turns: tuple[bool, ...]
-    interior: tuple[int, ...]
+    reach: tuple[float, ...]
+    segments: int
+    centreline: Centreline
+    ends_move: bool = False
     thickness: float | None = None
     spacing: float | None = None
 
@@ -58,6 +64,7 @@ class LinkShape:
         name: its name, for messages.
         handles: its handles.
         weights: of each handle at each vertex of the link, (n, handles).
+        edges: weights at the midpoints of edges that follow the design.
         thickness: in the plane, where δ = 1.
     """
 
@@ -65,6 +72,7 @@ class LinkShape:
     name: str
     handles: LinkHandles
     weights: np.ndarray
+    edges: EdgeWeights
     thickness: float
 
 
@@ -74,8 +82,9 @@ def shape_link(mesh: LinkMesh, request: ShapeRequest) -> LinkShape:
     Raises:
         DescriptionError: the spline does not fit the link, or elements are too large for its handles.
     """
-    part = f"link {request.name!r}"
-    fit = fit_spline(request.centreline, request.joints, request.interior, part=f"spline of {part}")
+    part, joints = f"link {request.name!r}", request.joints
+    layout = lay_out(request.centreline, joints, request.reach, request.segments, part=f"design of {part}")
+    fit = fit_spline(request.centreline, joints, layout, ends_move=request.ends_move, part=f"spline of {part}")
     width = _mean_width(mesh, request.centreline.length)
     handles = _place_handles(mesh, fit, spacing=request.spacing or width, turns=request.turns, part=part)
     weights = handle_weights(mesh, handles, part=part)
@@ -86,7 +95,8 @@ def shape_link(mesh: LinkMesh, request: ShapeRequest) -> LinkShape:
             f"{hidden} of its {len(handles)} handles move no vertex: its elements are too large",
             "Use smaller elements",
         )
-    return LinkShape(request.link, request.name, handles, weights, request.thickness or width)
+    edges = edge_weights(mesh, weights)
+    return LinkShape(request.link, request.name, handles, weights, edges, request.thickness or width)
 
 
 def shape_links(mesh: MechanismMesh, requests: Sequence[ShapeRequest]) -> list[LinkShape]:
@@ -95,14 +105,14 @@ def shape_links(mesh: MechanismMesh, requests: Sequence[ShapeRequest]) -> list[L
     return from_one(mesh.mesh.comm, lambda: [shape_link(links[request.link], request) for request in requests])
 
 
-def gather_links(mesh: MechanismMesh, vertices: np.ndarray | None = None) -> list[LinkMesh]:
+def gather_links(mesh: MechanismMesh, rest: tuple[np.ndarray, CurvedEdges] | None = None) -> list[LinkMesh]:
     """The mesh of every flexible link with its own numbering of interfaces, on every rank.
 
     Args:
         mesh: the mechanism's mesh.
-        vertices: positions of its vertices, (vertices, dim); as drawn by default.
+        rest: positions of its vertices (vertices, dim) and its curved edges; as drawn by default.
     """
-    points = mesh.vertices if vertices is None else vertices
+    points, curved = rest or (mesh.vertices, mesh.curved)
     interface = np.full(len(mesh.cells), FREE)
     topology = mesh.mesh.topology
     owned = topology.index_map(topology.dim).size_local
@@ -113,19 +123,19 @@ def gather_links(mesh: MechanismMesh, vertices: np.ndarray | None = None) -> lis
         mine = mesh.link_of_cell == link
         numbers = interface[mine]
         numbers[numbers != FREE] -= numbers[numbers != FREE].min(initial=np.iinfo(int).max)
-        links.append(LinkMesh.from_cells(points, mesh.cells[mine].copy(), numbers))
+        links.append(LinkMesh.from_cells(points, mesh.cells[mine].copy(), numbers, curved))
     return links
 
 
 def _place_handles(mesh: LinkMesh, fit: SplineFit, *, spacing: float, turns: Sequence[bool], part: str) -> LinkHandles:
-    """The handles of one link: at its joints, and at regular arc lengths of the spline between them.
+    """The handles of one link: at its joints and free ends, and at regular arc lengths of the spline between them.
 
-    Intermediary handles in or next to an interface are left out.
+    Those between that are in or next to an interface are left out.
 
     Args:
         mesh: the link's mesh.
         fit: its spline; sites are the interfaces of ``mesh``.
-        spacing: arc length between handles, adjusted so that it divides each span between joints evenly.
+        spacing: arc length between handles, adjusted so that it divides each span evenly.
         turns: whether each site may turn, (sites,).
         part: the link, for messages.
 
@@ -138,9 +148,14 @@ def _place_handles(mesh: LinkMesh, fit: SplineFit, *, spacing: float, turns: Seq
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
     held = plan.points[np.unique(plan.cells[plan.interface != FREE])][:, :2]
 
-    joints = np.flatnonzero(spline.is_joint).astype(float)
-    t, sites = [joints[0]], [fit.sites[0]]
-    for start, end, end_site in zip(joints, joints[1:], fit.sites[1:], strict=False):
+    stops = [(float(at), site) for at, site in zip(np.flatnonzero(spline.is_joint), fit.sites, strict=True)]
+    inside = np.interp([1e-6 * spacing, arc[-1] - 1e-6 * spacing], arc, samples)  # of the mesh, whatever the rounding
+    if not spline.is_joint[0]:
+        stops.insert(0, (float(inside[0]), BETWEEN))
+    if not spline.is_joint[-1]:
+        stops.append((float(inside[1]), BETWEEN))
+    t, sites = [stops[0][0]], [stops[0][1]]
+    for (start, _), (end, end_site) in pairwise(stops):
         a, b = np.interp([start, end], samples, arc)
         parts = max(2, round((b - a) / spacing))
         between = np.interp(np.linspace(a, b, parts + 1)[1:-1], arc, samples)
@@ -177,12 +192,12 @@ class ShapeMap:
 
     Args:
         mesh: the mechanism's mesh.
-        design: the design field d, vector P1.
+        design: the design field d, vector P1, or P2 to bend edges too.
         shapes: the links that change, the same on all ranks.
 
     Attributes:
         owned: number of owned nodes.
-        original: vertex of the whole mesh of every local node, (nodes,).
+        original: vertex of the whole mesh of every local node, of an edge's midpoint its lower end, (nodes,).
         vertices: per link, its vertices in the whole mesh, (n,).
         reach: per link, r_ij at ``vertices``, (n, handles, 3).
         initial, initial_theta: p (parameters,) and θ (handles,) of the initial design.
@@ -190,15 +205,18 @@ class ShapeMap:
 
     def __init__(self, mesh: MechanismMesh, design: fem.Function, shapes: Sequence[LinkShape]) -> None:
         self.mesh, self.design, self.shapes = mesh, design, tuple(shapes)
-        self.original = _original_vertices(design)
+        ends = node_ends(design.function_space)
+        self.original = ends[:, 0]
         self.owned = design.function_space.dofmap.index_map.size_local
         self.vertices = [np.unique(mesh.cells[mesh.link_of_cell == shape.link]) for shape in shapes]
-        self.reach = [_reach(mesh.vertices[v], shape) for v, shape in zip(self.vertices, shapes, strict=True)]
+        self.reach = [
+            _reach(mesh.vertices[v], shape.weights, shape) for v, shape in zip(self.vertices, shapes, strict=True)
+        ]
         self._nodes, self._local_reach = [], []
-        for vertices, reach in zip(self.vertices, self.reach, strict=True):
+        for shape, vertices, reach in zip(shapes, self.vertices, self.reach, strict=True):
             nodes = np.flatnonzero(np.isin(self.original, vertices))
             self._nodes.append(nodes)
-            self._local_reach.append(reach[np.searchsorted(vertices, self.original[nodes])])
+            self._local_reach.append(_at_nodes(np.searchsorted(vertices, ends[nodes]), reach, shape))
         handles = [shape.handles for shape in shapes]
         self.initial = np.concatenate([h.spline.initial for h in handles])
         self.initial_theta = np.concatenate([h.initial for h in handles])
@@ -259,15 +277,20 @@ class ShapeMap:
         return zip(self.shapes, self.parameters(p), self.positions(theta), strict=True)
 
 
-def _reach(points: np.ndarray, shape: LinkShape) -> np.ndarray:
+def _reach(points: np.ndarray, weights: np.ndarray, shape: LinkShape) -> np.ndarray:
     """r_ij = w_ij (X_i − X_j, 1), (n, handles, 3)."""
     arms = points[:, None, :2] - shape.handles.centre
-    return shape.weights[..., None] * np.concatenate([arms, np.ones((*arms.shape[:2], 1))], axis=2)
+    return weights[..., None] * np.concatenate([arms, np.ones((*arms.shape[:2], 1))], axis=2)
 
 
-def _original_vertices(design: fem.Function) -> np.ndarray:
-    """The vertex of the whole mesh of every local node of a P1 field, (nodes,)."""
-    V = design.function_space
-    original = np.empty(len(design.x.array) // V.dofmap.index_map_bs, dtype=np.int64)
-    original[cell_dofs(V)] = cell_nodes(V.mesh)
-    return original_nodes(V.mesh)[original]
+def _at_nodes(ends: np.ndarray, reach: np.ndarray, shape: LinkShape) -> np.ndarray:
+    """r_ij at nodes between the vertices ``ends`` (n, 2) of a link, from that at its vertices, (n, handles, 3)."""
+    if np.array_equal(ends[:, 0], ends[:, 1]):
+        return reach[ends[:, 0]]
+    found, edges, count = 0.5 * (reach[ends[:, 0]] + reach[ends[:, 1]]), shape.edges, len(reach)
+    if len(edges.ends):
+        keys, wanted = edges.ends @ (count, 1), ends @ (count, 1)
+        place = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+        hit = np.flatnonzero(keys[place] == wanted)
+        found[hit] = _reach(edges.middles, edges.weights, shape)[place[hit]]
+    return found

@@ -5,7 +5,8 @@ With control points C_k (position P_k and tangent M_k, three components each) an
     (x, y, δ)(p, t) = h₀₀(τ) P_k + h₁₀(τ) M_k + h₀₁(τ) P_{k+1} + h₁₁(τ) M_{k+1}.
 
 The parameters p are the tangents at joints, and position and tangent at all other control points: a joint stays where
-it is and keeps its thickness. The curve is linear in p.
+it is and keeps its thickness. Free ends change their thickness; they stay where they are drawn unless they may move.
+The curve is linear in p.
 """
 
 from __future__ import annotations
@@ -34,10 +35,12 @@ class LinkSpline:
     Attributes:
         controls: initial control points, (n, 2, 3): position and tangent, each (x, y, δ).
         is_joint: which control points are joints, (n,).
+        ends_move: whether the places of free ends are parameters.
     """
 
     controls: np.ndarray
     is_joint: np.ndarray
+    ends_move: bool = False
 
     @property
     def segments(self) -> int:
@@ -54,6 +57,8 @@ class LinkSpline:
         """Indices of the parameters in ``controls.ravel()``, (size,)."""
         free = np.ones(self.controls.shape, dtype=bool)
         free[self.is_joint, 0] = False
+        if not self.ends_move:
+            free[[0, -1], 0, :2] = False
         return np.flatnonzero(free)
 
     @property
@@ -170,10 +175,71 @@ class SplineFit:
     deviation: float
 
 
+@dataclass(frozen=True)
+class ControlLayout:
+    """The places of control points along a centreline.
+
+    Attributes:
+        start, end: whether its first and its last point are free ends.
+        interior: control points inside of each span between joints and free ends, in order.
+    """
+
+    start: bool
+    end: bool
+    interior: tuple[int, ...]
+
+
+def lay_out(
+    centreline: Centreline,
+    joints: Sequence[Sequence[float]],
+    reach: Sequence[float],
+    segments: int,
+    *,
+    part: str = "spline",
+) -> ControlLayout:
+    """Control points for a number of ``segments``, where joints and free ends are farthest apart.
+
+    An end of the centreline is free where it is more than twice as far from the next joint as its interface reaches.
+
+    Args:
+        centreline: the curve to follow.
+        joints: positions of the link's joints, (n, 2), in any order.
+        reach: how far the interface of each joint extends from it, (n,).
+        segments: number of cubic segments.
+        part: what the spline belongs to, for messages.
+
+    Raises:
+        DescriptionError: there are fewer segments than spans, or one joint and no free end.
+    """
+    stations = np.array([centreline.closest(joint) for joint in joints])
+    first, last = int(np.argmin(stations)), int(np.argmax(stations))
+    start = bool(stations[first] > 2.0 * reach[first])
+    end = bool(centreline.end - stations[last] > 2.0 * reach[last])
+    gaps = np.diff([*[0.0] * start, *np.sort(stations), *[centreline.end] * end])
+    if not len(gaps):
+        raise DescriptionError(
+            part, "the link has 1 joint and no free end", "Lead its centreline on to a free end, or give it two joints"
+        )
+    if segments < len(gaps):
+        between = "joints and free ends" if start or end else "joints"
+        raise DescriptionError(
+            part, f"{segments} segment(s) for {len(gaps)} gaps between {between}", f"Give at least {len(gaps)}"
+        )
+    interior = np.zeros(len(gaps), dtype=int)
+    for _ in range(segments - len(gaps)):
+        interior[int(np.argmax(gaps / (interior + 1)))] += 1
+    return ControlLayout(start, end, tuple(interior.tolist()))
+
+
 def fit_spline(
-    centreline: Centreline, joints: Sequence[Sequence[float]], interior: Sequence[int], *, part: str = "spline"
+    centreline: Centreline,
+    joints: Sequence[Sequence[float]],
+    layout: ControlLayout,
+    *,
+    ends_move: bool = False,
+    part: str = "spline",
 ) -> SplineFit:
-    """The spline along ``centreline`` with control points at ``joints`` and evenly spaced ones between them.
+    """The spline along ``centreline`` with control points at ``joints``, free ends, and evenly spaced between them.
 
     The tangents minimise the distance across the curve,
 
@@ -185,38 +251,33 @@ def fit_spline(
     Args:
         centreline: the curve to follow.
         joints: positions of the link's joints, (n, 2), in any order.
-        interior: number of control points between each joint and the next along the curve, (n − 1,).
+        layout: of the control points.
+        ends_move: whether the places of free ends are parameters.
         part: what the spline belongs to, for messages.
 
     Raises:
-        DescriptionError: fewer than two joints, two joints at one place of the curve, or ``interior`` does not match.
+        DescriptionError: two joints lie at one place of the curve.
     """
-    if len(joints) < 2:
-        raise DescriptionError(part, f"the link has {len(joints)} joint", "Only links with two joints or more have one")
-    if len(interior) != len(joints) - 1 or any(count < 0 for count in interior):
-        raise DescriptionError(
-            part,
-            f"interior control points {tuple(interior)} do not match {len(joints)} joints",
-            f"Give {len(joints) - 1} numbers from 0 up, one per span between joints",
-        )
     curve = _ArcLength(centreline)
     arcs = np.array([curve.arc(joint) for joint in joints])
     order = np.argsort(arcs)
     arcs = arcs[order]
     if np.any(np.diff(arcs) <= 1e-9 * curve.length):
-        raise DescriptionError(part, "two joints are at one place of the centreline", "Move one of them")
+        raise DescriptionError(part, "two joints lie at the same place of the centreline", "Move one of them")
 
-    knots, joint_flags = [arcs[0]], [True]
-    for start, end, count in zip(arcs, arcs[1:], interior, strict=False):
+    stops = [*[0.0] * layout.start, *arcs, *[curve.length] * layout.end]
+    at_joints = [*[False] * layout.start, *[True] * len(arcs), *[False] * layout.end]
+    knots, joint_flags = stops[:1], at_joints[:1]
+    for start, end, count, at_joint in zip(stops, stops[1:], layout.interior, at_joints[1:], strict=False):
         knots += np.linspace(start, end, count + 2)[1:].tolist()
-        joint_flags += [False] * count + [True]
+        joint_flags += [False] * count + [at_joint]
     is_joint = np.array(joint_flags)
     positions = curve.point(np.array(knots))
     positions[is_joint] = np.asarray(joints, dtype=float)[order]
 
     controls = np.zeros((len(knots), 2, 3))
     controls[:, 0, :2], controls[:, 0, 2] = positions, 1.0
-    spline, each = LinkSpline(controls, is_joint), 32  # samples per segment
+    spline, each = LinkSpline(controls, is_joint, ends_move), 32  # samples per segment
     t = np.arange(0.5, spline.segments * each) / each
     feet = np.interp(t, np.arange(len(knots)), knots)
     for _ in range(40):  # the deviation has settled after a few

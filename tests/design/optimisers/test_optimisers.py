@@ -37,13 +37,15 @@ class Problem:
     asked: list[np.ndarray] = field(default_factory=list, init=False)
     refused: int = field(default=0, init=False)
 
-    def evaluate(self, parameters: np.ndarray, below: float = np.inf) -> Evaluation:
+    def evaluate(
+        self, parameters: np.ndarray, below: float = np.inf, penalties: np.ndarray | float = 0.0
+    ) -> Evaluation:
         self.asked.append(parameters)
         self.check(parameters)
         evaluation = Evaluation(parameters, *self.residuals(parameters), self.regulariser)
-        if evaluation.value > below:
+        if (height := evaluation.merit(penalties)) > below:
             self.refused += 1
-            raise TooHigh(f"{evaluation.value} is above {below}")
+            raise TooHigh(height)
         return evaluation
 
     def check(self, parameters: np.ndarray) -> None:
@@ -92,8 +94,8 @@ class Wall(Problem):
         super().__init__(np.zeros(1), np.ones(1))
         self.quadratic = quadratic
 
-    def evaluate(self, parameters, below=np.inf):
-        evaluation = super().evaluate(parameters, below)
+    def evaluate(self, parameters, below=np.inf, penalties=0.0):
+        evaluation = super().evaluate(parameters, below, penalties)
         if not self.quadratic:
             return evaluation
         here = evaluation.penalty
@@ -213,6 +215,15 @@ def test_barriers_are_not_run_through_where_the_residual_would():
     assert max(p[0] for p in parabola.asked) > 9.0
     assert len(exact.asked) <= 4
     assert len(parabola.asked) >= 2 * len(exact.asked)
+
+
+def test_bfgs_takes_walls_of_the_regulariser_exactly():
+    problem = Wall()
+    last, _ = watched(BFGS(tolerance=1e-9), problem)
+    optimum = brentq(lambda x: problem.BARRIER.slope(x) + x - 10.0, 1.0, 2.0)
+    assert last.reason is Reason.CONVERGED
+    assert last.evaluation.parameters == pytest.approx([optimum], rel=1e-4)
+    assert len(problem.asked) <= 10
 
 
 @each_optimiser

@@ -26,13 +26,15 @@ class Doubtful:
     estimates: int = field(default=0, init=False)
     start: np.ndarray = field(default_factory=lambda: np.array([-1.2, 1.0]), init=False)
 
-    def evaluate(self, parameters: np.ndarray, below: float = np.inf) -> Evaluation:
+    def evaluate(
+        self, parameters: np.ndarray, below: float = np.inf, penalties: np.ndarray | float = 0.0
+    ) -> Evaluation:
         self.evaluations += 1
         x, y = parameters
         residuals, jacobian = np.array([10.0 * (y - x * x), 1.0 - x]), np.array([[-20.0 * x, 10.0], [-1.0, 0.0]])
         evaluation = Evaluation(parameters, residuals, jacobian, self.regulariser, self.errors)
-        if evaluation.value > below:
-            raise TooHigh("no use")
+        if (height := evaluation.merit(penalties)) > below:
+            raise TooHigh(height)
         return evaluation
 
     def regulariser(self, parameters: np.ndarray) -> Quadratic:

@@ -188,17 +188,15 @@ def build(blueprint: Blueprint) -> Built:
     """
     mechanism = fm.Mechanism(blueprint.topology)
     built = Built(mechanism)
-    materials = {}
+    density = next((plan.density for plan in blueprint.effects if isinstance(plan, GravityPlan)), None)
     for link in blueprint.links:
         if not link.centreline:
             built.links[link.name] = mechanism.rigid(link.name, fixed=link.fixed)
             continue
-        name = f"material of {link.name}"
-        fm.Material(name, link.young, link.poisson)  # names the material where the law below could name itself only
         law = getattr(fm, link.law)(link.young, link.poisson)
-        materials[link.name] = fm.Material(name, law=law)
+        material = fm.Material(f"material of {link.name}", law=law, density=density)
         shape = fm.strip(link.centreline, thickness=link.thickness, depth=link.depth)
-        built.links[link.name] = mechanism.flexible(link.name, shape, materials[link.name])
+        built.links[link.name] = mechanism.flexible(link.name, shape, material)
     for joint in blueprint.joints:
         built.joints[joint.name] = _join(mechanism, joint, built.links)
     for motor in blueprint.motors:
@@ -207,7 +205,7 @@ def build(blueprint: Blueprint) -> Built:
         built.forces[force.name] = mechanism.force(
             on=built.links[force.on], at=force.at, direction=force.direction, name=force.name
         )
-    scene = fm.Scene(mechanism, effects=[_effect(plan, built, materials) for plan in blueprint.effects])
+    scene = fm.Scene(mechanism, effects=[_effect(plan, built) for plan in blueprint.effects])
     built.simulation = fm.Simulation(
         scene,
         space=blueprint.space,
@@ -231,11 +229,11 @@ def _join(mechanism: fm.Mechanism, joint: JointPlan, links: Mapping[str, object]
     return getattr(mechanism, joint.kind)(links[joint.a], links[joint.b], at=joint.at, name=joint.name, **options)
 
 
-def _effect(plan: EffectPlan, built: Built, materials: Mapping[str, fm.Material]):
+def _effect(plan: EffectPlan, built: Built):
     match plan:
         case SpringPlan(joint=joint, stiffness=stiffness, rest=rest):
             return fm.JointSpring(built.joints[joint], stiffness, rest=rest)
         case CompliancePlan(joint=joint, compliance=compliance):
             return fm.JointCompliance(built.joints[joint], compliance)
-        case GravityPlan(acceleration=acceleration, density=density):
-            return fm.Gravity(acceleration, densities=dict.fromkeys(materials.values(), density))
+        case GravityPlan(acceleration=acceleration):
+            return fm.Gravity(acceleration)

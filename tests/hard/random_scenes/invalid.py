@@ -69,14 +69,15 @@ def _not_finite(rng: Random) -> float:
 def bad_link_number(rng: Random, scene: Blueprint) -> Spoiled:
     """Thickness, depth, modulus or element size is zero, negative or no number."""
     link, what = rng.choice(scene.flexible), rng.choice(("thickness", "depth", "young", "size"))
-    return _refused(f"{what} of a link", _with_link(scene, link, **{what: _bad(rng)}), link.name, f"strip {what}")
+    names = (link.name, f"strip {what}", f"law {link.law}")
+    return _refused(f"{what} of a link", _with_link(scene, link, **{what: _bad(rng)}), *names)
 
 
 def bad_poisson(rng: Random, scene: Blueprint) -> Spoiled:
     """ν is 0.5 or more, −1 or less, or no number."""
     link = rng.choice(scene.flexible)
     poisson = rng.choice((0.5, 0.7, 12.0, -1.0, -3.0, math.nan, math.inf))
-    return _refused("Poisson's ratio", _with_link(scene, link, poisson=poisson), link.name)
+    return _refused("Poisson's ratio", _with_link(scene, link, poisson=poisson), f"law {link.law}")
 
 
 def bad_centreline(rng: Random, scene: Blueprint) -> Spoiled:

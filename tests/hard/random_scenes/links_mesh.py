@@ -130,7 +130,7 @@ def gather(simulation: fm.Simulation) -> LinksMesh:
 
 
 def _ordered(nodes: np.ndarray, dofs: np.ndarray, dim: int, order: int) -> np.ndarray:
-    """Nodes of each cell in this module's order, told by where they are: midpoints lie between two corners."""
+    """Nodes of each cell in this module's order, known by where they are: midpoints lie between two corners."""
     if order == 1:
         return dofs
     at, count = nodes[dofs], dofs.shape[1]

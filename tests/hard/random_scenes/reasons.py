@@ -1,4 +1,4 @@
-"""Whether an error about a scene that makes sense is true, told without the solver."""
+"""Whether an error about a scene that makes sense is true, judged without the solver."""
 
 from __future__ import annotations
 

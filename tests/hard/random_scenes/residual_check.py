@@ -14,10 +14,10 @@ import numpy as np
 import fenicsmech as fm
 
 from .closure import Place
-from .idle_check import idle_work
 from .motions import body_modes, moved
 from .potential import Potential
 from .strain_energy import REAL
+from .unstrained_check import unstrained_work
 
 _STEP = 1e-30
 _RANDOM = 8
@@ -34,7 +34,7 @@ class Residual:
         floor: residual force from rounding of displacements alone.
         travel_error: how far the controlled displacement is off, relative to the length.
         energy_error: strain energy against the frame's, relative to it.
-        idle_work: work along motions that deform no link, over the sum of its parts' sizes; 0 if there are none.
+        unstrained_work: work along motions that deform no link, over the sum of its parts' sizes; 0 if there are none.
     """
 
     gap: float
@@ -43,7 +43,7 @@ class Residual:
     floor: float
     travel_error: float
     energy_error: float
-    idle_work: float
+    unstrained_work: float
 
     @property
     def relative(self) -> float:
@@ -88,7 +88,7 @@ def check(potential: Potential, frame: fm.Frame, origin: float, seed: int = 0) -
         floor=floor,
         travel_error=abs(travel - frame.displacement) / length,
         energy_error=abs(energy - frame.strain_energy) / max(abs(frame.strain_energy), _energy_digits(potential)),
-        idle_work=idle_work(potential, frame.force, followed, places, floor=floor, reaction=scale),
+        unstrained_work=unstrained_work(potential, frame.force, followed, places, floor=floor, reaction=scale),
     )
 
 

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from .blueprint import SpringPlan, build
 from .generator import random_scene
-from .idle_check import idle_motions
 from .motions import STEP
 from .potential import Potential
 from .residual_check import check
 from .stability_check import unstable_directions
+from .unstrained_check import unstrained_motions
 from .verdict import BALANCED, TOLERANCE, judge
 
 SOUND = st.integers(0, 10**6).map(lambda n: 10 * n + 5)
@@ -109,7 +109,7 @@ def test_motions_that_deform_no_link_leave_the_strain_energy_as_it_is(sprung):
     potential, frame = sprung
     places = potential.places(frame.state.poses)
     u = potential.nodal(np.array(frame.state.u).reshape(potential.mesh.nodes.shape), places)
-    motions = list(idle_motions(potential, u, places))
+    motions = list(unstrained_motions(potential, u, places))
     assert len(motions) == 1
     for du, _, _ in motions:
         slope = potential.strain_energy(u + du).imag / STEP
@@ -119,8 +119,8 @@ def test_motions_that_deform_no_link_leave_the_strain_energy_as_it_is(sprung):
 
 def test_loads_and_springs_balance_however_stiff_the_links(sprung):
     potential, frame = sprung
-    assert check(potential, frame, 0.0).idle_work < 1e-6
-    assert check(potential, replace(frame, force=1.01 * frame.force), 0.0).idle_work > 10.0 * BALANCED
+    assert check(potential, frame, 0.0).unstrained_work < 1e-6
+    assert check(potential, replace(frame, force=1.01 * frame.force), 0.0).unstrained_work > 10.0 * BALANCED
 
 
 @pytest.mark.thorough

@@ -1,4 +1,4 @@
-"""What became of a scene, and whether that is right.
+"""The outcome of a scene, and whether it is right.
 
 A scene that makes sense must end in equilibria that pass the residual check, or in an error that is true: no assembly
 where the loop cannot close, no equilibrium where none can be expected. One that makes no sense must be refused by name.
@@ -141,8 +141,8 @@ def _error(blueprint: Blueprint, frame: fm.Frame, sample: float, found: Residual
         return "joints apart"
     if found.force > max(TOLERANCE * found.scale, ROUNDING * found.floor):
         return "no equilibrium"
-    if found.idle_work > BALANCED:
-        return "idle freedoms out of balance"
+    if found.unstrained_work > BALANCED:
+        return "motions that deform no link are out of balance"
     if not math.isnan(found.travel_error) and found.travel_error > 1e-9:
         return "displacement"
     if found.energy_error > 1e-6:

@@ -1,0 +1,329 @@
+"""Optimisation on corrected values: a simulation is minimised that differs from the truth by what is held fixed.
+
+    p_k = argmin O(Q(p) + c_k),     c_{k+1} = Q̂(p_k) + e(p_k) − Q(p_k),     c_0 = 0
+
+Q are the values of the simulation that is minimised, Q̂ those of the simulation that counts, and e the goal-oriented
+estimates of what infinitely fine elements add to Q̂. Only Q is differentiated. It is
+
+- that of the same simulation (deferred correction): c = e,
+- or that of a surrogate, plane stress for space (space mapping): a few equilibria in space, and no gradient there.
+
+c changes from round to round by the part by which the derivatives of Q and Q̂ + e differ, 2 to 8 % between plane stress
+and space. At the end the corrected values are the true ones to within the last change. Where a surrogate does not
+contract, the simulation that counts is minimised itself.
+
+Sources: J. W. Bandler et al., Space mapping: the state of the art (doi:10.1109/TMTT.2003.820904); for deferred
+correction V. Pereyra, Iterated deferred corrections for nonlinear operator equations (doi:10.1007/BF02165406).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fenicsmech.design.designed import DesignedSimulation
+from fenicsmech.design.equilibria import SampleEquilibria
+from fenicsmech.design.objective import Objective
+from fenicsmech.design.optimisers.problem import Infeasible, Iterate, Optimiser, Reason, Start
+from fenicsmech.design.result import DesignResult, Reached
+from fenicsmech.design.run import Checkpoint, DesignProgress, Optimum, Round, Saved, minimise_together
+from fenicsmech.design.shape.handle_optimum import HandlePlacement, ShapeError
+from fenicsmech.design.target import Comparison, check_sensitivities
+from fenicsmech.errors import EquilibriumError, positive
+from fenicsmech.log import logger
+
+_log = logger(__name__)
+
+
+@dataclass(frozen=True)
+class Correction:
+    """What values are corrected by before they are compared with targets, and when corrections have settled.
+
+    Attributes:
+        estimates: whether error estimates are added; without, targets are met on the mesh of the simulation alone.
+        change: largest change of a correction in the last round, over the target's scale: a tenth of the per cent
+            within which targets count as met.
+        resolved: the same over the component's error estimate, which is not more certain than that.
+        contraction: change of corrections over that of the round before, above which a surrogate is given up if that
+            happens in two rounds in a row, for the gradient of the simulation itself leads there faster: one round may
+            end at another design, where corrections differ. Where changes grow it is given up at once.
+        rounds: most of them.
+
+    Raises:
+        DescriptionError: a number is not positive.
+    """
+
+    estimates: bool = True
+    change: float = 1e-3
+    resolved: float = 0.1
+    contraction: float = 0.5
+    rounds: int = 8
+
+    def __post_init__(self) -> None:
+        for name in ("change", "resolved", "contraction", "rounds"):
+            positive(f"{name} of the correction", getattr(self, name))
+
+
+@dataclass(frozen=True, eq=False)
+class Corrected:
+    """The outcome of some rounds.
+
+    Attributes:
+        optimum: of the last one.
+        round: the last one, with the correction found there.
+        reached: at the optimum.
+        settled: whether there is nothing that other rounds would change.
+    """
+
+    optimum: Optimum
+    round: Round
+    reached: Reached
+    settled: bool
+
+
+# -- values of the simulation that counts ---
+
+
+def loaded(equilibria: SampleEquilibria, estimates: bool) -> Reached:
+    """Values and their estimates at the design that the model holds, loaded from zero as a user will do.
+
+    Raises:
+        Infeasible: loading leads elsewhere.
+    """
+    known = equilibria.trace()
+    values, errors = equilibria.values(known), equilibria.errors(known)
+    return Reached(values, errors, values + errors if estimates else values)
+
+
+def verified(
+    equilibria: SampleEquilibria, comparison: Comparison, followed: Reached, estimates: bool
+) -> tuple[Reached, bool]:
+    """What loading from zero leads to at the design that the model holds, and whether it is what was followed.
+
+    Where loading fails, what was followed from design to design stands; the log says where not.
+    """
+    try:
+        known = equilibria.trace()
+    except Infeasible as failure:
+        _log.warning("loaded from zero, the optimum does not reach all its targets: %s", failure)
+        return followed, False
+    values = equilibria.values(known)
+    # values of one equilibrium differ by less
+    different = np.flatnonzero(np.abs(values - followed.values) > 1e-6 * comparison.scale_of)
+    for k in different:
+        _log.warning(
+            "%s of the optimum: %.6g when loaded from zero, %.6g when followed from the drawn design",
+            *(comparison.names[k], values[k], followed.values[k]),
+        )
+    errors = equilibria.errors(known) if len(different) else followed.errors
+    return Reached(values, errors, values + errors if estimates else values), len(different) == 0
+
+
+# -- rounds ---
+
+
+def correct(
+    objective: Objective,
+    begin: Start,
+    first: Round,
+    options: Correction,
+    *,
+    minimise: Callable[[Start, Round], tuple[Optimum, Round]],
+    truth: Callable[[Optimum], Reached],
+) -> Corrected:
+    """Rounds of minimisation and correction, until corrections have settled, do not contract, or iterations run out.
+
+    Args:
+        objective: that is minimised.
+        begin: where the first round starts.
+        first: the first round.
+        options: of the correction.
+        minimise: the optimum of one round, and that round with what was learnt at its start.
+        truth: values of the simulation that counts.
+
+    Raises:
+        Infeasible: there is no value at the start, or the simulation that counts has none at an optimum.
+    """
+    round = first
+    while True:
+        optimum, round = minimise(begin, round)
+        reached = truth(optimum)
+        needed, scales = reached.compared - objective.reached, objective.comparison.scale_of
+        off = np.abs(needed - round.correction)
+        change = float(np.max(off / np.maximum(options.change * scales, options.resolved * np.abs(reached.errors))))
+        round = replace(
+            round,
+            correction=tuple(needed.tolist()),
+            changes=(*round.changes, change),
+            largest=(*round.largest, float(np.max(off / scales))),
+        )
+        settled = change <= 1.0 or optimum.reason is Reason.ITERATIONS
+        if settled or len(round.changes) >= options.rounds or (round.surrogate and _stalls(round.changes, options)):
+            return Corrected(optimum, round, reached, settled)
+        begin = Start(optimum.parameters, optimum.number, optimum.evaluations)
+
+
+def _stalls(changes: Sequence[float], options: Correction) -> bool:
+    """Whether the last change grew, or did not contract like the one before."""
+    slow = [late > options.contraction * early for early, late in zip(changes, changes[1:], strict=False)]
+    return len(slow) > 0 and (changes[-1] > changes[-2] or (len(slow) >= 2 and all(slow[-2:])))
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """The end of a run.
+
+    Attributes:
+        of: the simulation that was minimised.
+        optimum, round, reached: as of ``Corrected``.
+        placement: of the handles in the simulation that counts.
+        verified: whether loading from zero leads there.
+    """
+
+    of: DesignedSimulation
+    optimum: Optimum
+    round: Round
+    reached: Reached
+    placement: HandlePlacement
+    verified: bool
+
+
+class CorrectedRun:
+    """One optimisation of a problem.
+
+    Args:
+        problem: the simulation that counts.
+        optimiser: by which.
+        correction: of the values.
+        start: initial design.
+        saved: the checkpoint, if one is written.
+        found: what was saved in it by a run that this one continues.
+    """
+
+    def __init__(
+        self,
+        problem: DesignedSimulation,
+        optimiser: Optimiser,
+        correction: Correction,
+        start: DesignResult | np.ndarray | None,
+        saved: Checkpoint | None,
+        found: Saved | None,
+    ) -> None:
+        self._problem, self._optimiser, self._options = problem, optimiser, correction
+        self._start, self._saved, self._found = start, saved, found
+        self._comm = problem.simulation.comm
+        self._nothing = Round(False, (0.0,) * Comparison(problem.targets, problem.simulation.scene.units).size)
+        self._next: tuple[Start, HandlePlacement | None, Round] | None = None  # where a surrogate was given up
+
+    def from_surrogate(self, cheaper: DesignedSimulation | None) -> Outcome | None:
+        """The optimum by a surrogate; None if there is none or its corrections do not settle."""
+        problem, found = self._problem, self._found
+        if cheaper is None or (found is not None and not found.round.surrogate):
+            return None
+        placement: HandlePlacement | None = None
+
+        def truth(optimum: Optimum) -> Reached:
+            nonlocal placement
+            theta = self._comm.bcast(cheaper.team[1].placement.theta, root=0)
+            with problem.clock.phase("verification"):
+                try:
+                    near = problem.rest.known(optimum.parameters, theta) or placement
+                    placement = problem.rest.place(optimum.parameters, near)
+                except ShapeError as failure:
+                    raise Infeasible(str(failure)) from failure
+                return loaded(problem.loaded, self._options.estimates)
+
+        try:
+            end = self._rounds(cheaper, *self._beginning(cheaper, replace(self._nothing, surrogate=True)), truth)
+        except Infeasible as failure:
+            _log.info("the surrogate does not lead to a design: %s", failure)
+            return None
+        assert placement is not None, "the optimum was verified"
+        if end.settled:
+            return Outcome(cheaper, end.optimum, end.round, end.reached, placement, True)
+        _log.info("corrections of the surrogate change by %s of the scale: it is given up", end.round.largest)
+        optimum, reached = end.optimum, end.reached
+        first = replace(end.round, surrogate=False, correction=tuple(reached.compared - reached.values), changes=())
+        self._next = Start(optimum.parameters, optimum.number, optimum.evaluations), placement, first
+        return None
+
+    def directly(self) -> Outcome:
+        """The optimum of the simulation itself."""
+        problem, estimates = self._problem, self._options.estimates
+        _, objective = problem.team
+
+        def truth(optimum: Optimum) -> Reached:
+            values, errors = objective.reached, objective.estimates()
+            return Reached(values, errors, values + errors if estimates else values)
+
+        try:
+            end = self._rounds(problem, *(self._next or self._beginning(problem, self._nothing)), truth)
+        except Infeasible as failure:
+            raise EquilibriumError(
+                f"design of {problem.simulation.scene.mechanism.name!r}",
+                f"the design to start from has no value: {failure}",
+                "Draw links that carry the targets' loads, or start with smaller loads",
+            ) from failure
+        placement = self._comm.bcast(objective.placement, root=0)
+        with problem.clock.phase("verification"):
+            problem.rest.place(end.optimum.parameters, placement)
+            reached, same = verified(problem.loaded, objective.comparison, end.reached, estimates)
+        return Outcome(problem, end.optimum, end.round, reached, placement, same)
+
+    def _beginning(self, low: DesignedSimulation, first: Round) -> tuple[Start, HandlePlacement | None, Round]:
+        """Start, its handles if known, and the first round: where the saved run was if there is one."""
+        if self._found is not None:
+            start = self._found.start
+            return start, low.rest.known(start.parameters, self._found.handles), self._found.round
+        parameters, near = (low.rest.initial, None) if self._start is None else low.given(self._start)
+        return Start(parameters), near, first
+
+    def _rounds(
+        self,
+        low: DesignedSimulation,
+        begin: Start,
+        near: HandlePlacement | None,
+        first: Round,
+        truth: Callable[[Optimum], Reached],
+    ) -> Corrected:
+        _, objective = low.team
+        if objective.comparison.relative and not first.drawn and self._start is not None:
+            first = replace(first, drawn=tuple(objective.loaded(low.rest.initial).tolist()))
+        objective.begin(near, np.array(first.drawn) if first.drawn else None)
+        return correct(
+            objective,
+            begin,
+            first,
+            self._options,
+            minimise=lambda begin, round: self._minimise(low, begin, round),
+            truth=lambda optimum: self._comm.bcast(truth(optimum), root=0),
+        )
+
+    def _minimise(self, low: DesignedSimulation, begin: Start, round: Round) -> tuple[Optimum, Round]:
+        """The optimum of a round, and the round with values and objective at the start of the optimisation."""
+        _, objective = low.team
+        objective.correction, found, self._found = np.array(round.correction), self._found, None
+        if found is not None and found.ended is not None and found.ended[1] == repr(self._optimiser):
+            here = objective.evaluate(begin.parameters)
+            reason = Reason[found.ended[0]]
+            return Optimum(begin.number, begin.evaluations, here.parameters, reason, here.penalty.value), round
+        space, number = low.simulation.fidelity.model.name, len(round.changes) + 1
+
+        def watch(iterate: Iterate) -> None:
+            nonlocal round
+            errors = objective.comparison.errors(objective.compared)
+            if round.initial is None:
+                check_sensitivities(low.targets, low.designs, sensitivities=objective.sensitivities(), errors=errors)
+                started = tuple(objective.reached.tolist())
+                drawn = round.drawn or started
+                round = replace(round, started=started, drawn=drawn, initial=iterate.evaluation.value)
+            if self._saved is not None:
+                self._saved.save(iterate, objective.placement.theta, round, self._optimiser)
+            progress.update(iterate, errors)
+
+        name = f"design, {space}" if number == 1 else f"design, {space}, round {number}"
+        with DesignProgress(self._optimiser, leads=self._comm.rank == 0, name=name) as progress:
+            optimum = minimise_together(self._comm, objective, self._optimiser, begin, watch=watch)
+        return optimum, self._comm.bcast(round, root=0)

@@ -1,0 +1,134 @@
+"""What a design problem computes with in one simulation: rest shape, objective, and equilibria loaded from zero."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from fenicsmech.design.description import SplineDesign, shape_request
+from fenicsmech.design.equilibria import SampleEquilibria
+from fenicsmech.design.objective import Group, Objective, sample_numbers, split
+from fenicsmech.design.regularisers import Regulariser
+from fenicsmech.design.rest_shape import ParametricShape
+from fenicsmech.design.result import DesignResult
+from fenicsmech.design.shape.handle_optimum import HandlePlacement
+from fenicsmech.design.shape.shape_map import LinkShape, shape_links
+from fenicsmech.design.target import Comparison, Target, check_targets
+from fenicsmech.elasticity import PLANE_STRESS, Quadrature
+from fenicsmech.errors import DescriptionError
+from fenicsmech.log import Clock
+from fenicsmech.model import fits
+from fenicsmech.simulation import Simulation
+
+
+class DesignedSimulation:
+    """The links of one simulation that may change, and the objective of all targets there, built on first use.
+
+    Args:
+        simulation: of the equilibria.
+        designs: the links that may change.
+        targets: what is wanted.
+        regulariser: R.
+        clock: of the phases.
+
+    Attributes:
+        simulation, designs, targets, clock: likewise.
+
+    Raises:
+        DescriptionError: the simulation does not have what designs or targets name.
+        AssemblyError: a target's configuration does not assemble.
+    """
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        designs: Sequence[SplineDesign],
+        targets: Sequence[Target],
+        regulariser: Regulariser,
+        clock: Clock,
+    ) -> None:
+        check_targets(simulation, targets)
+        self.simulation, self.designs, self.targets = simulation, tuple(designs), tuple(targets)
+        self._regulariser, self.clock = regulariser, clock
+        mechanism, linkage = simulation.scene.mechanism, simulation.linkage
+        self._requests = [shape_request(design, mechanism, linkage) for design in self.designs]
+
+    def on(self, simulation: Simulation) -> DesignedSimulation:
+        """The same in another simulation."""
+        return DesignedSimulation(simulation, self.designs, self.targets, self._regulariser, self.clock)
+
+    @cached_property
+    def in_plane_stress(self) -> DesignedSimulation | None:
+        """The same problem in plane stress; None if the scene or a target does not fit that."""
+        own = self.simulation.fidelity
+        if not fits(self.simulation.scene, PLANE_STRESS):
+            return None
+        quadrature = Quadrature.for_order(own.order, PLANE_STRESS.dim)
+        flat = replace(own, model=PLANE_STRESS, quadrature=quadrature, layers=None)
+        try:
+            return self.on(self.simulation.with_shapes({}, fidelity=flat))
+        except DescriptionError:
+            return None
+
+    @cached_property
+    def _shapes(self) -> list[LinkShape]:
+        """Handles and weights of the links that change, the same on all processes."""
+        with self.clock.phase("setup"):
+            mesh = self.simulation.model.mesh
+        with self.clock.phase("weights"):
+            return shape_links(mesh, self._requests)
+
+    @cached_property
+    def rest(self) -> ParametricShape:
+        """The rest shape of the links that change."""
+        return ParametricShape(self.simulation.model, self._shapes, self.designs)
+
+    @cached_property
+    def loaded(self) -> SampleEquilibria:
+        """The equilibria of all targets, of all processes together."""
+        return SampleEquilibria(self.simulation, self.targets)
+
+    @cached_property
+    def team(self) -> tuple[Group, Objective]:
+        """This process's group, and the objective on its simulation."""
+        rest = self.rest
+        with self.clock.phase("setup"):
+            group, simulation = split(self.simulation.comm, sample_numbers(self.targets)), self.simulation
+            if group.comm is not simulation.comm:
+                simulation = simulation.on(group.comm)
+                rest = ParametricShape(simulation.model, self._shapes, self.designs)
+            equilibria = SampleEquilibria(simulation, [self.targets[k] for k in group.mine])
+            comparison = Comparison(self.targets, simulation.scene.units)
+            objective = Objective(
+                rest, equilibria, comparison=comparison, regulariser=self._regulariser, group=group, clock=self.clock
+            )
+        return group, objective
+
+    def given(self, design: DesignResult | np.ndarray) -> tuple[np.ndarray, HandlePlacement | None]:
+        """Parameters of a design, and its handle positions if it is a result.
+
+        Raises:
+            DescriptionError: the result is one of other links, or the parameters are not as many finite numbers.
+        """
+        if not isinstance(design, DesignResult):
+            parameters = np.array(design, dtype=float)
+            if parameters.shape != self.rest.initial.shape or not np.all(np.isfinite(parameters)):
+                raise DescriptionError(
+                    "design", f"parameters of shape {parameters.shape}", f"Give {len(self.rest.initial)} finite numbers"
+                )
+            return parameters, None
+        given = {link.name: link for link in design.links}
+        for link in self.rest.links:
+            size, found = link.spline.size, len(given[link.name].parameters) if link.name in given else 0
+            if found != size:
+                raise DescriptionError(
+                    f"design of {design.mechanism!r}",
+                    f"it has {found} parameters of link {link.name!r} instead of {size}",
+                    "Use a result of the same links and numbers of segments",
+                )
+        own = [given[link.name] for link in self.rest.links]
+        parameters, theta = (np.concatenate(parts) for parts in ([o.parameters for o in own], [o.handles for o in own]))
+        return parameters, self.rest.known(parameters, theta)

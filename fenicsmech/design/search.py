@@ -1,0 +1,415 @@
+"""Search from scattered starts: distinct optima, best first, and evidence where targets are out of reach.
+
+The starts are the drawn design and designs scattered evenly around it, by Latin hypercubes in units of typical lengths
+(McKay, Beckman & Conover 1979, doi:10.2307/1268522). Each is optimised for a few iterations; then the better half goes
+on and those that meet their targets, and the rest is given up unless it has ended before. A start depends on its number
+alone, so that results are the same however many processes share the starts.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from mpi4py import MPI
+from scipy.stats import qmc
+
+from fenicsmech.collective import on_all
+from fenicsmech.design.correction import Correction
+from fenicsmech.design.optimisers.problem import Optimiser, Reason
+from fenicsmech.design.regularisers import ShapeBounds
+from fenicsmech.design.rest_shape import DesignedLink, ParametricShape
+from fenicsmech.design.result import DesignResult, read_result
+from fenicsmech.design.run import Checkpoint
+from fenicsmech.design.shape.handle_optimum import HandlePlacement, ShapeError
+from fenicsmech.design.target import Target, check_targets
+from fenicsmech.elasticity import PLANE_STRESS, ElasticModel
+from fenicsmech.errors import DescriptionError, EquilibriumError, positive
+from fenicsmech.log import Progress
+from fenicsmech.mechanism import Strip
+from fenicsmech.model import fits
+from fenicsmech.polygons import first_crossing
+from fenicsmech.simulation import Simulation
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Numbers of a search from scattered starts.
+
+    Attributes:
+        starts: their number, the drawn design included.
+        spread: largest change of a parameter, in typical lengths: a link's thickness. Thicknesses change by half of
+            the way to the nearer bound at most.
+        seed: other seeds give other starts.
+        draws: most shapes drawn for a start until one is feasible.
+        trial: iterations after which the worse half is given up, but for designs that meet their targets.
+        distinct: designs are one if no parameter differs by more typical lengths.
+
+    Raises:
+        DescriptionError: a number makes no sense.
+    """
+
+    starts: int = 16
+    spread: float = 2.0
+    seed: int = 0
+    draws: int = 20
+    trial: int = 6
+    distinct: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name, least in (("starts", 1), ("seed", 0), ("draws", 1), ("trial", 1)):
+            value = getattr(self, name)
+            if not isinstance(value, int) or value < least:
+                raise DescriptionError("search", f"{name} is {value!r}", f"Give a whole number of at least {least}")
+        for name in ("spread", "distinct"):
+            positive(f"{name} of a search", getattr(self, name))
+
+
+@dataclass(frozen=True)
+class StartResult:
+    """The end of one start.
+
+    Attributes:
+        number: 0 is the drawn design.
+        rejected: shapes drawn before it that were not feasible.
+        failure: the reason why it has no value; None if it has.
+        given_up: whether it was ended early, for others were better.
+        result: the design it led to; None if it has no value.
+    """
+
+    number: int
+    rejected: int
+    failure: str | None
+    given_up: bool
+    result: DesignResult | None
+
+    def __str__(self) -> str:
+        drawn = f", {self.rejected} shape(s) rejected before" if self.rejected else ""
+        if self.result is None:
+            return f"start {self.number}: {self.failure}{drawn}"
+        worst = max(self.result.targets, key=lambda target: abs(target.error))
+        bounds = f", at {', '.join(self.result.active)}" if self.result.active else ""
+        return (
+            f"start {self.number}: objective {self.result.objective[1]:.3g}, {worst.name} off by {worst.error:+.2%}"
+            f"{bounds}{', given up' if self.given_up else ''}{drawn}"
+        )
+
+
+@dataclass(frozen=True)
+class SearchResult:
+    """The outcome of a search.
+
+    Attributes:
+        mechanism: its name.
+        optima: distinct designs, best first; at least one.
+        sources: the starts that led to each of them.
+        starts: the ends of all starts, by number.
+        evidence: for targets that no design meets, a sentence each.
+    """
+
+    mechanism: str
+    optima: tuple[DesignResult, ...]
+    sources: tuple[tuple[int, ...], ...]
+    starts: tuple[StartResult, ...]
+    evidence: tuple[str, ...]
+
+    @property
+    def best(self) -> DesignResult:
+        """The best design."""
+        return self.optima[0]
+
+    def __str__(self) -> str:
+        failed = sum(start.result is None for start in self.starts)
+        given_up = sum(start.given_up for start in self.starts)
+        lines = [
+            f"search for {self.mechanism!r}: {len(self.optima)} distinct design(s) from {len(self.starts)} starts, "
+            f"{failed} infeasible, {given_up} given up"
+        ]
+        for number, (design, sources) in enumerate(zip(self.optima, self.sources, strict=True), 1):
+            lines.append(
+                f"  {number}. objective {design.objective[1]:.3g}, worst target error {design.worst_error:.2%}, "
+                f"from start {', '.join(map(str, sources))}"
+            )
+        return "\n".join([*lines, *(f"  {sentence}" for sentence in self.evidence)])
+
+
+def cheapest(simulation: Simulation, targets: Sequence[Target]) -> Simulation:
+    """The scene as drawn, in a plane model if it and the targets fit, with elements as large as strips are thick."""
+    fidelity = simulation.fidelity
+    sizes = {
+        link: max(size, link.shape.thickness) if isinstance(link.shape, Strip) else size
+        for link, size in fidelity.sizes.items()
+    }
+
+    def at(model: ElasticModel) -> Simulation:
+        order, formulation = min(fidelity.order, 2), fidelity.formulation
+        return Simulation(
+            simulation.scene, space=model.name, order=order, size=sizes, formulation=formulation, comm=simulation.comm
+        )
+
+    if fidelity.model.dim == 3 and fits(simulation.scene, PLANE_STRESS):
+        try:
+            check_targets(flat := at(PLANE_STRESS), targets)
+            return flat
+        except DescriptionError:
+            pass  # a target asks for what a plane model does not have
+    return at(fidelity.model)
+
+
+class Searchable(Protocol):
+    """A design problem on one process."""
+
+    targets: tuple[Target, ...]
+
+    def rest_shape(self, design: np.ndarray) -> np.ndarray:
+        """The design field, or a ShapeError."""
+
+    def optimise(
+        self, *, optimiser: Optimiser, start: DesignResult | np.ndarray, correction: Correction
+    ) -> DesignResult:
+        """The optimum from a start, or an EquilibriumError where that has no value."""
+
+
+class Search:
+    """A search from scattered starts, shared out to the processes of ``comm``.
+
+    Args:
+        comm: the processes.
+        problem: the problem on this process alone.
+        rest: its rest shape.
+        scatter: numbers of the search.
+        optimiser: of each start.
+        checkpoint: of a stage of a start, by name; none are written by default.
+        resume: whether checkpoints that exist are used.
+    """
+
+    def __init__(
+        self,
+        comm: MPI.Comm,
+        problem: Searchable,
+        rest: ParametricShape,
+        scatter: Scatter,
+        optimiser: Optimiser,
+        *,
+        checkpoint: Callable[[str], Checkpoint] | None = None,
+        resume: bool = False,
+    ) -> None:
+        self._comm, self._problem, self._rest, self._scatter = comm, problem, rest, scatter
+        self._optimiser, self._checkpoint, self._resume = optimiser, checkpoint, resume
+
+    def run(self) -> SearchResult:
+        """The outcome, on all processes.
+
+        Raises:
+            DescriptionError: a checkpoint belongs to another search.
+            EquilibriumError: no start carries its loads.
+        """
+        with Progress(2.0 * self._scatter.starts, "search", shown=self._comm.rank == 0) as progress:
+            tried = self._shared("trial", self._tried, progress)
+            hopeful = promising(tried, self._problem.targets)
+            ends = self._shared("end", lambda k: self._ended(tried[k], hopeful), progress)
+        return outcome(ends, self._problem.targets, self._rest.lengths, self._scatter.distinct)
+
+    def _shared(self, stage: str, work: Callable[[int], StartResult], progress: Progress) -> list[StartResult]:
+        """``work`` of all starts, each on one process, by number."""
+        comm, count = self._comm, self._scatter.starts
+
+        def mine() -> list[StartResult]:
+            found = []
+            for k in range(comm.rank, count, comm.size):
+                found.append(self._once(f"{stage}-{k}", lambda: work(k)))  # noqa: B023, called at once
+                done = min(len(found) * comm.size, count) + (0 if stage == "trial" else count)
+                progress.update(done, str(found[-1]))
+            return found
+
+        return sorted(sum(comm.allgather(on_all(comm, mine)), []), key=lambda start: start.number)
+
+    def _once(self, name: str, work: Callable[[], StartResult]) -> StartResult:
+        """What a checkpoint holds if it is to be used, else ``work``, which is written to it."""
+        if self._checkpoint is None:
+            return work()
+        checkpoint = self._checkpoint(name)
+        if self._resume and checkpoint.path.exists():
+            saved = checkpoint.read()["start"]
+            return StartResult(**{**saved, "result": saved["result"] and read_result(saved["result"])})
+        found = work()
+        checkpoint.write({"start": asdict(found)})
+        return found
+
+    def _tried(self, k: int) -> StartResult:
+        """A start after its trial."""
+        p, rejected = self._drawn(k)
+        if p is None:
+            return StartResult(k, rejected, "no feasible shape was drawn", False, None)
+        return self._optimised(k, rejected, replace(self._optimiser, iterations=self._scatter.trial), p)
+
+    def _ended(self, tried: StartResult, hopeful: set[int]) -> StartResult:
+        """The end of a start that was tried."""
+        if tried.result is None or not _unfinished(tried.result):
+            return tried
+        if tried.number not in hopeful:
+            return replace(tried, given_up=True)
+        return self._optimised(tried.number, tried.rejected, self._optimiser, tried.result)
+
+    def _optimised(self, k: int, rejected: int, optimiser: Optimiser, start: DesignResult | np.ndarray) -> StartResult:
+        plain = Correction(estimates=False)  # which optimum is near does not depend on the last per cent
+        try:
+            result = self._problem.optimise(optimiser=optimiser, start=start, correction=plain)
+            return StartResult(k, rejected, None, False, result)
+        except EquilibriumError as failure:
+            return StartResult(k, rejected, str(failure), False, None)
+
+    def _drawn(self, k: int) -> tuple[np.ndarray | None, int]:
+        """Parameters of a start, None if no shape was feasible, and the number of shapes rejected before."""
+        rest, scatter = self._rest, self._scatter
+        if k == 0:
+            return rest.initial, 0
+        reach = np.concatenate([_reach(link, scatter.spread) for link in rest.links]) * rest.lengths
+        for draw in range(scatter.draws):
+            scattered = qmc.LatinHypercube(len(reach), seed=np.random.default_rng([scatter.seed, draw]))
+            p = rest.initial + (2.0 * scattered.random(scatter.starts)[k] - 1.0) * reach
+            if self._feasible(p):
+                return p, draw
+        return None, scatter.draws
+
+    def _feasible(self, p: np.ndarray) -> bool:
+        """Whether links are within their bounds, do not cross themselves, and have no inverted cells."""
+        if ShapeBounds().active(self._rest, HandlePlacement(p, np.empty(0))):
+            return False
+        for link in self._rest.links:
+            if first_crossing(_outline(link, p[link.place])) is not None:
+                return False
+        try:
+            self._problem.rest_shape(p)
+        except ShapeError:
+            return False
+        return True
+
+
+def _reach(link: DesignedLink, spread: float) -> np.ndarray:
+    """Largest changes of a link's parameters, in typical lengths."""
+    least, most = (bound / link.thickness for bound in link.bounds.thickness)
+    return np.where(link.spline.is_thickness, min(spread, 0.5 * min(1.0 - least, most - 1.0)), spread)
+
+
+def _outline(link: DesignedLink, p: np.ndarray) -> np.ndarray:
+    """Both edges of a link as a polygon, p its own parameters, (n, 2)."""
+    t = np.linspace(0.0, link.spline.segments, 20 * link.spline.segments + 1)
+    points, (dx, dy, _) = link.spline.evaluate(p, t), link.spline.derivative(p, t).T
+    across = np.stack([-dy, dx], axis=1) / np.hypot(dx, dy)[:, None] * (0.5 * link.thickness * points[:, 2:])
+    return np.concatenate([points[:, :2] + across, (points[:, :2] - across)[::-1]])
+
+
+def _unfinished(result: DesignResult) -> bool:
+    return result.reason == Reason.ITERATIONS.value
+
+
+def _meets_all(result: DesignResult) -> bool:
+    return all(target.met for target in result.targets)
+
+
+def _ranks(results: Sequence[DesignResult], targets: Sequence[Target]) -> list[tuple[float, float]]:
+    """Sort keys: designs that violate no bound come first, then those of lower objective.
+
+    Least quantities, which an objective takes relative to its own start, are made relative to the first design's.
+    """
+    ranks = []
+    for result in results:
+        bounded = [abs(own.error) for own in result.targets if own.relation.startswith("at ") and not own.met]
+        value = result.objective[1]
+        for target, own, first in zip(targets, result.targets, results[0].targets, strict=True):
+            if target.relation == "least" and target.scale is None:
+                scale, common = (abs(float(np.sum(each.started))) or 1.0 for each in (own, first))
+                value += target.weight * float(np.sum(own.reached)) * (1.0 / common - 1.0 / scale)
+        ranks.append((max(bounded, default=0.0), value))
+    return ranks
+
+
+def _ordered(starts: Sequence[StartResult], targets: Sequence[Target]) -> list[tuple[DesignResult, int]]:
+    """The results of starts that have a value and are not given up, best first, with their numbers."""
+    ended = [(start.result, start.number) for start in starts if start.result is not None and not start.given_up]
+    ranks = _ranks([result for result, _ in ended], targets)
+    order = sorted(range(len(ended)), key=lambda k: (ranks[k], ended[k][1]))
+    return [ended[k] for k in order]
+
+
+def promising(tried: Sequence[StartResult], targets: Sequence[Target]) -> set[int]:
+    """Numbers of the better half of the starts that have a value, and of those that meet their targets."""
+    ordered = _ordered(tried, targets)
+    half = (len(ordered) + 1) // 2
+    return {number for place, (result, number) in enumerate(ordered) if place < half or _meets_all(result)}
+
+
+def outcome(
+    starts: Sequence[StartResult], targets: Sequence[Target], lengths: np.ndarray, distinct: float
+) -> SearchResult:
+    """Distinct designs among the ends of starts, and evidence for targets out of reach.
+
+    Raises:
+        EquilibriumError: no start carries its loads.
+    """
+    ended = _ordered(starts, targets)
+    if not ended:
+        raise EquilibriumError(
+            "search",
+            f"none of {len(starts)} starts has a value: {starts[0]}",
+            "Draw links that carry the targets' loads",
+        )
+    optima: list[tuple[DesignResult, list[int]]] = []
+    for result, number in ended:
+        same = (numbers for other, numbers in optima if _distance(result, other, lengths) <= distinct)
+        if (numbers := next(same, None)) is not None:
+            numbers.append(number)
+        else:
+            optima.append((result, [number]))
+    return SearchResult(
+        optima[0][0].mechanism,
+        tuple(result for result, _ in optima),
+        tuple(tuple(numbers) for _, numbers in optima),
+        tuple(starts),
+        evidence([result for result, _ in ended], len(starts)),
+    )
+
+
+def _distance(one: DesignResult, other: DesignResult, lengths: np.ndarray) -> float:
+    """Largest difference of a parameter, in typical lengths."""
+    p, q = (np.concatenate([link.parameters for link in result.links]) for result in (one, other))
+    return float(np.max(np.abs(p - q) / lengths))
+
+
+def evidence(ended: Sequence[DesignResult], starts: int) -> tuple[str, ...]:
+    """A sentence for each target that no design meets, or one if none meets all at once; none if one does.
+
+    Bounds are named at which all designs end that miss the target by at most twice the least miss.
+    """
+    if any(map(_meets_all, ended)):
+        return ()
+    sentences = []
+    for k, target in enumerate(ended[0].targets):
+        if any(result.targets[k].met for result in ended):
+            continue
+        nearest = min(ended, key=lambda result: abs(result.targets[k].error))
+        least = abs(nearest.targets[k].error)
+        near = [result for result in ended if abs(result.targets[k].error) <= 2.0 * least]
+        held = Counter(bound for result in near for bound in result.active)
+        common = [bound for bound, number in held.items() if number == len(near)]
+        missed = (
+            f"{target.name} is missed by all {len(ended)} designs from {starts} starts, by at least {least:.2%} "
+            f"({nearest.targets[k]})"
+        )
+        if common:
+            best = "all" if len(near) == len(ended) else f"the {len(near)} nearest"
+            sentences.append(f"{missed}; {best} end at {', '.join(common)}: widen that, or want less")
+        else:
+            most = "".join(f", {number} of {len(near)} end at {bound}" for bound, number in held.most_common(1))
+            sentences.append(f"{missed}; no bound is common to them{most}: scatter more starts, or farther")
+    if not sentences:
+        worst = max(ended[0].targets, key=lambda target: abs(target.error))
+        sentences.append(
+            f"each target is met by some design, but none meets all at once: the best misses {worst.name} by "
+            f"{worst.error:+.2%}"
+        )
+    return tuple(sentences)

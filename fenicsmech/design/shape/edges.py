@@ -1,0 +1,119 @@
+"""Weights of the handles at the midpoints of edges, so that a design bends edges too.
+
+The outline of a designed link is that of the drawn link under a smooth map. Vertices alone would leave it chords, in
+error by the square of the element size whatever the order of the elements; the midpoint m of an edge of the outline
+therefore moves like a vertex,
+
+    d(m) = Σ_j w_j(m) T_j (m − X_j, 1),
+
+w_j(m) interpolated along the outline: the cubic in the arc length through the two vertices on either side. It reaches
+across no corner and not into interfaces, whose vertices are held; there it is the quadratic through three. Edges around
+interfaces move with them. All other edges stay as straight as the map of their ends makes them. An extruded link has
+the weights of its plan.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from fenicsmech.meshing import LinkMesh, boundary_loops, plan_of
+
+_CORNER = 0.3  # rad between the tangents of two edges: less is the error of edges on a curve
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeWeights:
+    """The edges of a link that follow a design at their midpoints; the midpoints of others stay between their ends.
+
+    Attributes:
+        ends: vertices of each, the lower one first, in lexical order, (k, 2).
+        middles: drawn midpoints in the plane, on the curve, (k, 2).
+        weights: of each handle there, (k, handles).
+    """
+
+    ends: np.ndarray
+    middles: np.ndarray
+    weights: np.ndarray
+
+
+def edge_weights(mesh: LinkMesh, weights: np.ndarray) -> EdgeWeights:
+    """The weights at midpoints from those at the vertices of ``mesh``, (n, handles)."""
+    pairs = list(combinations(range(mesh.dim + 1), 2))
+    ends = np.unique(np.sort(mesh.cells[:, pairs].reshape(-1, 2), axis=1), axis=0)
+    bulges = mesh.curved.of_cells(ends)[:, 0]
+    middles, found = (mesh.points[ends].mean(axis=1) + bulges)[:, :2], weights[ends].mean(axis=1)
+    follows = np.any(bulges != 0.0, axis=1)
+    plan = plan_of(mesh)
+    if plan.mesh.dim == 2:
+        held = np.zeros(len(plan.mesh.points), dtype=bool)
+        held[plan.mesh.cells[plan.mesh.interface >= 0]] = True
+        # vertex of the link at the foot of each column, and the edges of the plan with one edge above each
+        vertex = np.unique(plan.column, return_index=True)[1]
+        columns = np.sort(plan.column[ends], axis=1)
+        above = {tuple(pair): k for k, pair in reversed(list(enumerate(columns.tolist())))}
+        count = len(vertex)
+        keys = columns @ (count, 1)
+        for loop in boundary_loops("link", plan.mesh):
+            edges = np.sort(np.column_stack([loop, np.roll(loop, -1)]), axis=1)
+            rows = [above[tuple(edge)] for edge in edges.tolist()]
+            outline = _Outline(plan.mesh.points[loop], middles[rows], held[loop])
+            smooth = outline.at_middles(weights[vertex[loop]])
+            # every edge above one of the outline
+            wanted = edges @ (count, 1)
+            order = np.argsort(wanted)
+            place = order[np.minimum(np.searchsorted(wanted, keys, sorter=order), len(order) - 1)]
+            on = wanted[place] == keys
+            found[on] = smooth[place[on]]
+            follows |= on
+    return EdgeWeights(ends[follows], middles[follows], found[follows])
+
+
+class _Outline:
+    """A closed line of edges, each from one of ``points`` over its middle to the next."""
+
+    def __init__(self, points: np.ndarray, middles: np.ndarray, held: np.ndarray) -> None:
+        after = np.roll(points, -1, axis=0)
+        chords, bulges = after - points, middles - 0.5 * (points + after)
+        first, second = (np.linalg.norm(half, axis=1) for half in (middles - points, after - middles))
+        lengths = first + second
+        self._share, self._lengths, self._count = first / lengths, lengths, len(points)
+        into, out = np.roll(chords - 4.0 * bulges, 1, axis=0), chords + 4.0 * bulges
+        turn = np.arctan2(into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0], np.sum(into * out, axis=1))
+        self._breaks = held | (np.abs(turn) > _CORNER)
+        self._rigid = held & np.roll(held, -1)
+
+    def at_middles(self, values: np.ndarray) -> np.ndarray:
+        """Values (n, …) of a smooth function at the points, interpolated at the middle of each edge, (n, …)."""
+        found = 0.5 * (values + np.roll(values, -1, axis=0))
+        for edge in np.flatnonzero(~self._rigid):
+            indices, places = self._stencil(int(edge))
+            found[edge] = _shares(places) @ values[indices]
+        return found
+
+    def _stencil(self, edge: int) -> tuple[np.ndarray, np.ndarray]:
+        """Up to two vertices on either side of the middle of an edge, and their arc lengths from there."""
+        found = [near for step in (-1, 1) for near in self._walk(edge, step)]
+        indices, places = (np.array(part) for part in zip(*found, strict=True))
+        return indices, places
+
+    def _walk(self, edge: int, step: int) -> Iterator[tuple[int, float]]:
+        """Vertices from the middle of an edge on, up to a corner or interface, and their arc lengths from there."""
+        n, share = self._count, self._share[edge]
+        vertex = (edge + (step > 0)) % n
+        place = step * self._lengths[edge] * (1.0 - share if step > 0 else share)
+        for _ in range(2):
+            yield vertex, place
+            if self._breaks[vertex]:
+                return
+            place += step * self._lengths[vertex if step > 0 else vertex - 1]
+            vertex = (vertex + step) % n
+
+
+def _shares(places: np.ndarray) -> np.ndarray:
+    """Shares of values at ``places`` (n,) in that at 0 (Lagrange's polynomials), (n,)."""
+    others = [np.delete(places, k) for k in range(len(places))]
+    return np.array([np.prod(rest / (rest - place)) for rest, place in zip(others, places, strict=True)])

@@ -1,0 +1,344 @@
+"""Targets: what is wanted of quantities at samples, their checks, and the comparison of values with them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenicsmech.design.description import SplineDesign
+from fenicsmech.errors import DescriptionError, finite, positive
+from fenicsmech.mechanism import DRAWN, Configuration, Force, Units
+from fenicsmech.multibody import assemble
+from fenicsmech.quantities import Displacement, ForceMagnitude, Quantity, Sample
+from fenicsmech.simulation import CurveRequest, Simulation, read_request
+
+Numbers = float | Sequence[float]
+
+
+@dataclass(frozen=True, init=False)
+class Target:
+    """What is wanted of a quantity at a sample.
+
+        Target(Displacement(tip, at=(40, 60)), grasp, equals=(5.0, -1.0))
+        Target(ForceMagnitude(push), Sample({push: at(5.0)}), equals=2.0)
+        Target(MotorTorque(shaft), grasp, at_most=30.0)
+        Target(LinkMass(crank, density=1e-9), least=True)
+        Target(push, force=4.0, displacement=5.0)
+
+    The last one is short for ``Target(Displacement(push), Sample({push: 4.0}), equals=5.0)``.
+
+    Args:
+        quantity: the quantity, or a force.
+        sample: the equilibrium it is asked of; none for quantities of links at rest.
+        equals: wanted value; of a vector as many components as are wanted of it, counted from the first.
+        at_most, at_least: bounds instead.
+        least: the quantity is made as small as possible instead.
+        weight: of its squared relative error, or of the least quantity, in the objective.
+        scale: to which errors are relative, in the unit of the quantity. By default the wanted value's size |ū|, or a
+            tenth of the largest one wanted of quantities in the same unit where that is more; of the least quantity its
+            value as drawn.
+        force, displacement, configuration: of the short form.
+
+    Attributes:
+        quantity, sample, weight: likewise.
+        relation: "equals", "at most", "at least" or "least".
+        wanted: components of the wanted value or bound; empty for the least quantity.
+        scale: if it was given.
+
+    Raises:
+        DescriptionError: a number makes no sense, or the target does not say what is wanted.
+    """
+
+    quantity: Quantity
+    sample: Sample | None
+    relation: str
+    wanted: tuple[float, ...]
+    weight: float
+    scale: float | None
+
+    def __init__(
+        self,
+        quantity: Quantity | Force,
+        sample: Sample | None = None,
+        *,
+        equals: Numbers | None = None,
+        at_most: Numbers | None = None,
+        at_least: Numbers | None = None,
+        least: bool = False,
+        weight: float = 1.0,
+        scale: float | None = None,
+        force: float | None = None,
+        displacement: float | None = None,
+        configuration: Configuration = DRAWN,
+    ) -> None:
+        if isinstance(quantity, Force):
+            if sample is not None or equals is not None:
+                raise DescriptionError(
+                    f"target of {quantity.name!r}", "a force alone is not a quantity", "Give Displacement(force)"
+                )
+            equals = finite(f"displacement of a target for {quantity.name!r}", displacement)
+            sample = Sample({quantity: finite(f"force of a target for {quantity.name!r}", force)}, configuration)
+            quantity = Displacement(quantity)
+        elif not isinstance(quantity, Quantity):
+            raise DescriptionError(
+                "target", f"{quantity!r} is neither a quantity nor a force", "Give one of the mechanism's forces"
+            )
+        elif force is not None or displacement is not None or configuration != DRAWN:
+            raise DescriptionError(
+                f"target of the {quantity}",
+                "force, displacement and configuration stand in its sample",
+                "Give Sample(…)",
+            )
+        part, relations = f"target of the {quantity}", {"equals": equals, "at most": at_most, "at least": at_least}
+        given = {relation: value for relation, value in relations.items() if value is not None}
+        if len(given) + bool(least) != 1:
+            raise DescriptionError(
+                part, f"it says {len(given) + bool(least)} things", "Give one of equals, at_most, at_least and least"
+            )
+        relation, wanted = next(iter(given.items()), ("least", ()))
+        numbers = tuple(wanted) if isinstance(wanted, Sequence) and not isinstance(wanted, str) else (wanted,)
+        if quantity.of_state != isinstance(sample, Sample):
+            raise DescriptionError(
+                part,
+                f"its sample is {sample!r}",
+                "Give Sample(…)" if quantity.of_state else "Leave it out: links at rest have one shape",
+            )
+        for name, value in (
+            ("quantity", quantity),
+            ("sample", sample),
+            ("relation", relation),
+            ("wanted", tuple(finite(f"wanted value of the {part}", value) for value in numbers)),
+            ("weight", positive(f"weight of a target for the {quantity}", weight)),
+            ("scale", None if scale is None else positive(f"scale of the {part}", scale)),
+        ):
+            object.__setattr__(self, name, value)
+
+    @property
+    def size(self) -> int:
+        """Number of components that are wanted."""
+        return max(len(self.wanted), 1)
+
+    @property
+    def name(self) -> str:
+        """The target in words."""
+        return f"{self.quantity}{'' if self.sample is None else f' under {self.sample}'}"
+
+    @property
+    def on_curve(self) -> tuple[float, float, Configuration] | None:
+        """Force, displacement and configuration of a point of a load–displacement curve, if it is one."""
+        if self.sample is None or self.sample.moved or self.relation != "equals" or len(self.sample.forces) != 1:
+            return None
+        (force, magnitude), *_ = self.sample.forces
+        if self.quantity != Displacement(force) or not isinstance(magnitude, float):
+            return None
+        return magnitude, self.wanted[0], self.sample.configuration
+
+
+class Comparison:
+    """Values of all components against what is wanted of them.
+
+    With the scale s and the weight w of a target, and the value v of a component,
+
+        equals     residual        √w (v − v̄) / s
+        at most    inequality      (v − v̄) / s ≤ 0,     at least with the other sign
+        least      plain objective w v / s
+
+    Args:
+        targets: all of them.
+        units: of the scene.
+        drawn: values of all components as drawn, to which the least quantities are relative; 1 where not known.
+
+    Attributes:
+        places: the components of each target.
+        scales, scale_of: of the targets, (targets,), and of their components, (components,).
+        least_squares: whether there are neither bounds nor least quantities.
+        relative: whether a least quantity is relative to its drawn value.
+
+    Raises:
+        DescriptionError: nothing tells the scale of a wanted zero.
+    """
+
+    def __init__(self, targets: Sequence[Target], units: Units, drawn: np.ndarray | None = None) -> None:
+        self.targets, self._units = tuple(targets), units
+        sizes = [target.size for target in targets]
+        self.places = [slice(end - size, end) for size, end in zip(sizes, np.cumsum(sizes), strict=True)]
+        relations = np.repeat([target.relation for target in targets], sizes)
+        self._equal, self._bounded = relations == "equals", np.isin(relations, ("at most", "at least"))
+        self._summed = relations == "least"
+        self.least_squares = bool(self._equal.all())
+        self.relative = any(target.relation == "least" and target.scale is None for target in targets)
+        self._wanted = np.concatenate([target.wanted or (0.0,) for target in targets])
+        self.scales = np.array(
+            [self._scale(k, None if drawn is None else float(drawn[self.places[k]][0])) for k in range(len(targets))]
+        )
+        weights = np.array([target.weight for target in targets])
+        self.scale_of = np.repeat(self.scales, sizes)
+        self._root = np.sqrt(np.repeat(weights, sizes))
+        self._sign = np.where(relations == "at least", -1.0, 1.0)
+        self.names = tuple(target.name for target in targets for _ in range(target.size))
+
+    @property
+    def size(self) -> int:
+        """Number of components."""
+        return len(self._wanted)
+
+    def relative_to(self, values: np.ndarray) -> Comparison:
+        """The same with the least quantities relative to those in ``values`` (components,)."""
+        return Comparison(self.targets, self._units, values)
+
+    def residuals(self, values: np.ndarray) -> np.ndarray:
+        """Of the components that are to equal something."""
+        return (self._relative(values) * self._root)[self._equal]
+
+    def plain(self, values: np.ndarray) -> float:
+        """Σ w v / s of the least quantities."""
+        return float(np.sum((self._relative(values) * self._root**2)[self._summed]))
+
+    def inequalities(self, values: np.ndarray) -> np.ndarray:
+        """Of the components that are bounded."""
+        return (self._relative(values) * self._sign)[self._bounded]
+
+    def bounded(self) -> tuple[str, ...]:
+        """Names of the inequalities."""
+        return tuple(name for name, own in zip(self.names, self._bounded, strict=True) if own)
+
+    def slopes(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Derivatives of residuals, plain objective and inequalities from those of components (components, n)."""
+        relative = rows / self.scale_of[:, None]
+        root = self._root[:, None]
+        plain = np.sum((relative * root**2)[self._summed], axis=0)
+        return (relative * root)[self._equal], plain, (relative * self._sign[:, None])[self._bounded]
+
+    def residual_errors(self, errors: np.ndarray) -> np.ndarray:
+        """|e| of the residuals from errors of components, (components,)."""
+        return (np.abs(errors) / self.scale_of * self._root)[self._equal]
+
+    def relative_slopes(self, rows: np.ndarray) -> np.ndarray:
+        """Derivatives of components relative to their scales, (components, n)."""
+        return rows / self.scale_of[:, None]
+
+    def errors(self, values: np.ndarray) -> np.ndarray:
+        """Relative errors of the targets, (targets,): signed for numbers, else lengths; 0 where a bound is kept."""
+        off, found = self._relative(values), []
+        for target, place in zip(self.targets, self.places, strict=True):
+            if target.relation == "least":
+                found.append(0.0)
+            elif target.relation == "equals":
+                found.append(float(off[place][0]) if target.size == 1 else float(np.linalg.norm(off[place])))
+            else:
+                found.append(float(np.max((off * self._sign)[place], initial=0.0)))
+        return np.array(found)
+
+    def objective_error(self, values: np.ndarray, errors: np.ndarray) -> float:
+        """Discretisation error of the objective, O(v + d) − O(v), from the errors d of the components.
+
+            O(v + d) − O(v) = Σ w (r d / s + ½ (d / s)²) over equals,     Σ w d / s over the least quantities.
+
+        Far from the targets the first term counts, and the estimate is as good as those of the components; where
+        targets are met the second one is left, whose factor is the square of theirs. R depends on the design alone.
+        """
+        d, r, weights = errors / self.scale_of, self._relative(values), self._root**2
+        squares = weights * (r * d + 0.5 * d**2)
+        return float(np.sum(squares[self._equal]) + np.sum((weights * d)[self._summed]))
+
+    def _relative(self, values: np.ndarray) -> np.ndarray:
+        return (values - self._wanted) / self.scale_of
+
+    def _scale(self, k: int, drawn: float | None) -> float:
+        target = self.targets[k]
+        if target.scale is not None:
+            return target.scale
+        if target.relation == "least":
+            return abs(drawn) if drawn else 1.0
+        unit = target.quantity.unit(self._units)
+        alike = [other for other in self.targets if other.quantity.unit(self._units) == unit]
+        largest = max(float(np.linalg.norm(other.wanted)) for other in alike)
+        scale = max(float(np.linalg.norm(target.wanted)), 0.1 * largest)
+        if scale == 0.0:
+            raise DescriptionError(
+                f"target of the {target.name}", "zero is wanted, to which no error is relative", "Give scale=…"
+            )
+        return scale
+
+
+def check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
+    """Refuses targets whose parts ``simulation`` does not have, and those that cannot be compared with anything.
+
+    Raises:
+        DescriptionError: a target is missing, or one of another mechanism; its size is not that of its quantity.
+        AssemblyError: a configuration does not assemble.
+    """
+    if not targets:
+        raise DescriptionError("design problem", "there are no targets", "Give targets=[Target(…), …]")
+    dim = simulation.linkage.dim
+    for target in targets:
+        if not isinstance(target, Target):
+            raise DescriptionError("design problem", f"{target!r} is not a target", "Give Target(…)")
+        part, size = f"target of the {target.quantity}", target.quantity.size(dim)
+        if target.sample is not None:
+            sample_request(simulation, target.sample)
+            assemble(simulation.linkage, target.sample.configuration)
+        target.quantity.check(simulation.scene, dim)
+        if len(target.wanted) > size or target.size == 1 < size:
+            raise DescriptionError(
+                part, f"it has {size} component(s) and {target.size} is or are wanted", "Give as many numbers as it has"
+            )
+        if target.sample is not None and isinstance(target.quantity, ForceMagnitude):
+            moved = target.sample.moved
+            if moved is None or moved[0] != target.quantity.force:
+                raise DescriptionError(
+                    part,
+                    f"nothing prescribes the displacement of {target.quantity.force.name!r}",
+                    "Give Sample({force: at(…)})",
+                )
+    Comparison(targets, simulation.scene.units)
+
+
+def sample_request(simulation: Simulation, *samples: Sample) -> CurveRequest:
+    """The request for samples on one path, in the order of their loads, if they make sense for ``simulation``.
+
+    Raises:
+        DescriptionError: a force or motor is one of another mechanism.
+    """
+    first = samples[0]
+    values = [sample.magnitude if sample.moved is None else sample.moved[1] for sample in samples]
+    return read_request(
+        simulation.scene.mechanism,
+        first.part,
+        forces=values if first.moved is None else None,
+        displacements=None if first.moved is None else values,
+        configuration=first.configuration,
+        others=dict(first.others),
+    )
+
+
+def check_sensitivities(
+    targets: Sequence[Target], designs: Sequence[SplineDesign], *, sensitivities: np.ndarray, errors: np.ndarray
+) -> None:
+    """Refuses targets that are missed and that no parameter moves.
+
+    Args:
+        targets: the targets.
+        designs: the links that may change.
+        sensitivities: relative change of each component when a parameter changes by its length ℓ, (components,
+            parameters).
+        errors: relative errors of the targets, (targets,).
+
+    Raises:
+        DescriptionError: naming the first such target.
+    """
+    names, rounding, first = ", ".join(repr(design.link.name) for design in designs), 1e-9, 0
+    for target, error in zip(targets, errors, strict=True):
+        rows, first = sensitivities[first : first + target.size], first + target.size
+        if np.abs(rows).max(initial=0.0) > rounding or (abs(error) <= rounding and target.relation != "least"):
+            continue
+        if target.sample is not None and not target.sample.moved and target.sample.magnitude == 0.0:
+            reason, remedy = "no force acts", "Give a force that is not zero"
+        else:
+            reason = f"{names} do not carry the force, or something rigid holds its point"
+            remedy = "Let links change that carry it, or give targets of another force"
+        raise DescriptionError(
+            f"target of the {target.name}", f"it does not depend on the shapes that may change: {reason}", remedy
+        )

@@ -1,0 +1,101 @@
+"""Verification of designs in the parts to be made: their STEP files are meshed anew and finer, and loaded from zero.
+
+What an optimiser reaches on its own mesh differs from what the part will do by the elements, by the outline between the
+vertices of the mesh, and by what the design makes of the mesh. All three are in the difference of both values: the part
+has the outline of the exported file, its mesh has nothing in common with the optimiser's, and goal-oriented estimates
+say what still finer elements would add.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from fenicsmech.collective import on_one
+from fenicsmech.design.equilibria import SampleEquilibria
+from fenicsmech.design.optimisers.problem import Infeasible
+from fenicsmech.design.result import DesignResult, PartValue, component_values, solid_path
+from fenicsmech.design.target import Comparison, Target
+from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, SPATIAL
+from fenicsmech.errors import DescriptionError, positive
+from fenicsmech.export import write_step
+from fenicsmech.log import logger
+from fenicsmech.mechanism import FlexibleLink, step_file
+from fenicsmech.meshing import LinkMesh
+from fenicsmech.model import Fidelity, fits
+from fenicsmech.simulation import Simulation
+
+_log = logger(__name__)
+
+
+def part_simulation(
+    simulation: Simulation, links: Sequence[FlexibleLink], meshes: Sequence[LinkMesh], folder: Path, finer: float
+) -> Simulation:
+    """The scene with ``links`` read from the STEP files of their ``meshes``, which this writes to ``folder``.
+
+    In space half the depth is meshed where the scene allows it: exported links are symmetric.
+
+    Raises:
+        DescriptionError: a point of a force or an output is on one of the links, so that its place in the part is not
+            known; or ``finer`` is not positive.
+        MeshingError: a part cannot be written or meshed.
+    """
+    scene, finer = simulation.scene, positive("refinement of the part's mesh", finer)
+    for point in (*scene.mechanism.forces, *scene.mechanism.outputs):
+        if point.on in links:
+            raise DescriptionError(
+                f"verification of {scene.mechanism.name!r}",
+                f"{point.name!r} is at a point of {point.on.name!r}, whose place in the part is not known",
+                "Join a rigid link there, and let it act on that",
+            )
+    on_one(simulation.comm, lambda: _write(folder, links, meshes))
+    shapes = {link: step_file(solid_path(folder, link, ".step"), depth=link.shape.depth) for link in links}
+    return simulation.with_shapes(shapes, fidelity=_finer(simulation, finer))
+
+
+def _write(folder: Path, links: Sequence[FlexibleLink], meshes: Sequence[LinkMesh]) -> None:
+    for link, mesh in zip(links, meshes, strict=True):
+        write_step(solid_path(folder, link, ".step"), mesh, depth=link.shape.depth, name=link.name)
+
+
+def _finer(simulation: Simulation, factor: float) -> Fidelity:
+    """The fidelity of a simulation with smaller elements, of half the depth where that is possible."""
+    fidelity = simulation.fidelity
+    layers = None if fidelity.layers is None else math.ceil(factor * fidelity.layers)
+    sizes = {link: size / factor for link, size in fidelity.sizes.items()}
+    if fidelity.model is SPATIAL and fits(simulation.scene, MID_PLANE_SYMMETRIC):
+        half = None if layers is None else math.ceil(0.5 * layers)
+        return replace(fidelity, model=MID_PLANE_SYMMETRIC, sizes=sizes, layers=half)
+    return replace(fidelity, sizes=sizes, layers=layers)
+
+
+def verified_parts(result: DesignResult, part: Simulation, targets: Sequence[Target]) -> DesignResult:
+    """The result with the values of its targets in the parts; without them, and a warning, where loads are not carried.
+
+    Args:
+        result: of ``targets``, in their order.
+        part: the scene with the links from the exported files.
+        targets: of the design problem.
+    """
+    comparison, measured = Comparison(targets, part.scene.units), [t for t in targets if t.quantity.of_part]
+    equilibria = SampleEquilibria(part, measured)
+    try:
+        known = equilibria.trace()
+    except Infeasible as failure:
+        _log.warning("the exported parts do not reach all targets: %s", failure)
+        return result
+    of_part = np.repeat([target.quantity.of_part for target in targets], [target.size for target in targets])
+    values, adds = (np.full(comparison.size, np.nan) for _ in range(2))
+    values[of_part], adds[of_part] = equilibria.values(known), equilibria.errors(known)
+    errors, found = comparison.errors(values + adds), []
+    for own, target, place, error in zip(result.targets, targets, comparison.places, errors, strict=True):
+        pair = component_values(values[place]), component_values(adds[place])
+        found.append(replace(own, part=PartValue(*pair, float(error)) if target.quantity.of_part else None))
+    sizes = sorted({part.fidelity.sizes[link] for link in part.fidelity.sizes})
+    span = f"{sizes[0]:.3g}" if len(sizes) == 1 else f"{sizes[0]:.3g} to {sizes[-1]:.3g}"
+    fidelity = f"{part.fidelity.model.name}, elements of {span} {part.scene.units.length}"
+    return replace(result, targets=tuple(found), part_fidelity=fidelity)

@@ -1,0 +1,349 @@
+"""The KKT matrix at an equilibrium and its factor LDLᵀ: rates along paths, stability, adjoints.
+
+The equilibrium y solves F(y, p) = Gᵀ ∇L = 0. With the KKT matrix K = ∂F/∂y, the rate y′ with the target of a control
+and the adjoint x of a quantity Q solve
+
+    K y′ = r,      K x = ∂Q/∂y,     dQ/dp = −xᵀ ∂F/∂p
+
+for any parameter p. Q is the travel a · u_P of a material point, or the controlled force f, which is one of the
+unknowns y; the control stays as it is. Stability follows from the inertia of K: by Sylvester's law the signs of its
+pivots are those of its eigenvalues.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+from petsc4py import PETSc
+
+from fenicsmech.compat import destroy_garbage
+from fenicsmech.equilibrium.border import PointLoad
+from fenicsmech.equilibrium.control import Control, Stability
+from fenicsmech.equilibrium.kkt import KktMatrix
+from fenicsmech.equilibrium.state import State, Step
+from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
+
+_EXACT = 1e-10  # relative error that iterative solvers may leave
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """Numbers of negative and zero pivots: Sylvester's law makes them those of the eigenvalues."""
+
+    negative: int
+    zero: int
+
+
+class LinearSolver(ABC):
+    """Solves with a matrix whose values change and whose pattern does not."""
+
+    @abstractmethod
+    def refactor(self) -> bool:
+        """Factors the matrix's current values; whether this succeeded."""
+
+    @abstractmethod
+    def solve(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float) -> bool:
+        """Solves with the matrix last refactored, to a relative error of ``tolerance``; whether this succeeded."""
+
+    @abstractmethod
+    def inertia(self) -> Inertia:
+        """Inertia of the matrix last refactored."""
+
+    def known_inertia(self) -> Inertia:
+        """Lower bound of the inertia, known from the last ``solve``; exact where a factor gives it."""
+        return self.inertia()
+
+    def solve_and_count(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float) -> Inertia | None:
+        """``solve`` and ``inertia``, in less than the time of both where that can be; None if the solve failed."""
+        return self.inertia() if self.solve(right, solution, tolerance) else None
+
+
+class LinearMethod(ABC):
+    """A method for linear systems."""
+
+    @abstractmethod
+    def solver(self, system: EquilibriumSystem) -> LinearSolver:
+        """The solver for the KKT matrix of ``system``, linearised once at least, shifted and softened."""
+
+
+@dataclass(frozen=True)
+class Direct(LinearMethod):
+    """The factor LDLᵀ of the whole matrix: fastest up to some 80,000 unknowns on slender links."""
+
+    def solver(self, system):
+        return _KktFactor(system.kkt)
+
+
+_MUMPS = {
+    7: 2,  # ordering AMF: fewest operations on slender links (Debian's MUMPS has neither METIS nor SCOTCH)
+    12: 2,  # order the graph compressed by likely 2 × 2 pivots
+    13: 1,  # root front factored by one process: exact inertia in parallel
+    14: 60,  # per cent of workspace beyond the estimate, for delayed pivots
+    24: 1,  # detect null pivots instead of failing on them
+}
+"""Controls ICNTL of MUMPS that differ from its own defaults."""
+
+
+class Factor(LinearSolver):
+    """MUMPS LDLᵀ of a matrix whose pattern does not change: the symbolic analysis is reused."""
+
+    def __init__(self, matrix: PETSc.Mat) -> None:
+        self._matrix, self._fresh = matrix, True
+        self._analyse()
+
+    def refactor(self) -> bool:
+        done = self._numeric()
+        if not self._fresh and not (done and self.inertia().zero == 0):
+            # the analysis pairs unknowns by their present values: in later ones a pair may be zero, the matrix regular
+            self._solver.destroy()
+            self._analyse()
+            done = self._numeric()
+        self._fresh = False
+        return done
+
+    def _analyse(self) -> None:
+        """A new solver, which orders and pairs the unknowns by the first values it factors."""
+        # the only way that reaches all of MUMPS's controls, the ordering among them
+        prefix = "fenicsmech_kkt_"
+        options = PETSc.Options(prefix)
+        for number, value in _MUMPS.items():
+            options[f"mat_mumps_icntl_{number}"] = value
+        self._solver = PETSc.KSP().create(self._matrix.comm)
+        self._solver.setOptionsPrefix(prefix)
+        self._solver.setType(PETSc.KSP.Type.PREONLY)
+        self._solver.setOperators(self._matrix)
+        pc = self._solver.getPC()
+        pc.setType(PETSc.PC.Type.CHOLESKY)
+        pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
+        self._solver.setFromOptions()
+        self._fresh = True
+
+    def _numeric(self) -> bool:
+        self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        for _ in range(4):
+            self._solver.setOperators(self._matrix)
+            self._solver.getPC().setUp()
+            mumps = self._solver.getPC().getFactorMatrix()
+            status = mumps.getMumpsInfog(1)
+            if status >= 0:
+                return True
+            if status not in (-8, -9):  # the integer or real workspace is too small
+                return False
+            mumps.setMumpsIcntl(14, 2 * mumps.getMumpsIcntl(14))
+            self._matrix.stateIncrease()  # marks the values as new
+        return False
+
+    def inertia(self) -> Inertia:
+        mumps = self._solver.getPC().getFactorMatrix()
+        return Inertia(mumps.getMumpsInfog(12), mumps.getMumpsInfog(28))
+
+    @property
+    def memory(self) -> float:
+        """Bytes the factorisation took, on all ranks."""
+        return 1e6 * self._solver.getPC().getFactorMatrix().getMumpsInfog(22)
+
+    def solve(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float = 0.0) -> bool:
+        """Solves with the last factor, always to roundoff."""
+        self._solver.solve(right, solution)
+        return True
+
+
+class _KktFactor(Factor):
+    """The factor of the whole KKT matrix, formed on demand."""
+
+    def __init__(self, kkt: KktMatrix) -> None:
+        self._kkt = kkt
+        super().__init__(kkt.matrix())
+
+    def refactor(self):
+        self._kkt.matrix()
+        return super().refactor()
+
+
+class NotConverged(Exception):
+    """The iteration ended without an equilibrium; ``reason`` says why."""
+
+    def __init__(self, reason: str, iterations: int = 0) -> None:
+        super().__init__(reason)
+        self.reason, self.iterations = reason, iterations
+
+
+@dataclass(frozen=True, eq=False)
+class EquilibriumPoint:
+    """A converged equilibrium.
+
+    Attributes:
+        state: the equilibrium.
+        control: under which it was found.
+        tangent: rate of the state with the control's target; with an arc length, the path's direction of norm one.
+        conjugate_rate: that of the control's conjugate along it, or of the conjugate of the value that is followed.
+        stability: from the inertia of K.
+        iterations: KKT systems factored and solved on the way.
+        residuals: relative residual before each iteration and at the end.
+        linearisation: K, last factored on the way, of which stability and tangent are.
+    """
+
+    state: State
+    control: Control
+    tangent: Step
+    conjugate_rate: float
+    stability: Stability
+    iterations: int
+    residuals: tuple[float, ...]
+    linearisation: Linearisation
+
+    @property
+    def unstable_modes(self) -> int:
+        """Number of directions in which the energy has a maximum, under dead loads."""
+        return self.stability.under_load
+
+    @property
+    def unstable_under_control(self) -> int:
+        """The same number with the controlled quantity held; along a path, the displacement of the force's point."""
+        held = self.control.constrained or self.control.along_path
+        return self.stability.under_displacement if held else self.stability.under_load
+
+    def scaled(self, factor: float) -> EquilibriumPoint:
+        """The same equilibrium with ``factor`` times its tangent."""
+        return replace(self, tangent=self.tangent.scaled(factor), conjugate_rate=factor * self.conjugate_rate)
+
+
+class Linearisation:
+    """The KKT matrix K at one state under one control, factored by ``linear`` just before.
+
+    Valid until another matrix is assembled or factored; methods raise RuntimeError afterwards.
+    """
+
+    def __init__(
+        self, system: EquilibriumSystem, linear: LinearSolver, state: State, control: Control, residual: Residual
+    ) -> None:
+        self.state, self.control, self.residual = state, control, residual
+        self._system, self._linear, self._version = system, linear, system.kkt.version
+
+    def solve(self, right: PETSc.Vec) -> PETSc.Vec:
+        """x with K x = ``right``; raises ``NotConverged`` if an iterative solver stalled."""
+        self._check()
+        x = right.duplicate()
+        with self._system.clock.phase("solve"):
+            if not self._linear.solve(right, x, _EXACT):
+                raise NotConverged("the linear solver stalled")
+        return x
+
+    def rate(self) -> PETSc.Vec:
+        """x′ of the scaled unknowns x with the control's target."""
+        return self.solve(self.control_rate())
+
+    def control_rate(self) -> PETSc.Vec:
+        """r, the right-hand side of the rate."""
+        self._turn()
+        return self.control.rate(self._system, self.state)
+
+    def tangent(self) -> Step:
+        """The rate of the state with the control's target."""
+        return self.control.tangent(self.step(self.rate()))
+
+    def point(self, residuals: Sequence[float], iterations: int, *, tolerance: float = _EXACT) -> EquilibriumPoint:
+        """The equilibrium at this state, with its tangent and stability, from one solve; raises as ``solve``."""
+        self._check()
+        self._turn()
+        system, control = self._system, self.control
+        destroy_garbage(system.comm)
+        right = control.rate(system, self.state)
+        x = right.duplicate()
+        with system.clock.phase("solve"):
+            inertia = self._linear.solve_and_count(right, x, tolerance)
+        if inertia is None:
+            raise NotConverged("the linear solver stalled", iterations)
+        tangent, rate = control.rates(system, right, x)
+        stability = control.stability(inertia.negative - system.negative_where_stable, tangent, rate)
+        return EquilibriumPoint(self.state, control, tangent, rate, stability, iterations, tuple(residuals), self)
+
+    def travel_gradient(self, load: PointLoad) -> PETSc.Vec:
+        """∂(a · u_P)/∂x of a load's travel."""
+        self._turn()
+        return self._system.travel_gradient(load, self.state)
+
+    def controlled_slopes(self) -> np.ndarray:
+        """The gradient of the controlled load's travel by this rank's (u, p), (owned dofs,)."""
+        return self._system.travel_slopes(self._system.controlled, self.state)[0]
+
+    def transpose(self, links: np.ndarray, border: np.ndarray) -> PETSc.Vec:
+        """Gᵀ of a gradient by this rank's (u, p), (owned dofs,), and by (z, λ, f), (border,)."""
+        self._turn()
+        return self._system.unknowns.apply_transpose(links, border)
+
+    def displacements(self, x: PETSc.Vec) -> np.ndarray:
+        """∂u/∂x · x of all nodes, as in ``State.u``, (owned dofs,)."""
+        self._turn()
+        return self._system.unknowns.apply(x)
+
+    def step(self, x: PETSc.Vec) -> Step:
+        """The change of state that x stands for."""
+        return self._system.unknowns.step(x)
+
+    def _check(self) -> None:
+        if self._version != self._system.kkt.version:
+            raise RuntimeError("this linearisation is out of date: another matrix was made or factored since")
+
+    def _turn(self) -> None:
+        """Brings the map from x to displacements back to this state."""
+        if self._system.unknowns.poses is not self.state.poses:
+            self._system.unknowns.turn(self.state.poses)
+
+
+class Unknown(Enum):
+    """The unknown of a load–displacement curve: a displacement under a prescribed force, or the other way round."""
+
+    DISPLACEMENT = "displacement"
+    FORCE = "force"
+
+
+@dataclass(frozen=True, eq=False)
+class Adjoint:
+    """The adjoint of one quantity.
+
+    Attributes:
+        at: the linearisation it was solved with.
+        x: in the scaled unknowns of the system.
+        nodal: ∂u/∂y x, so that forces δF on the links change Q by nodal · δF: this rank's owned values at the nodes of
+            u, and of pressures behind them, flat.
+        poses: ∂z/∂y x of the bodies' poses z, (size,).
+        load: the part of the controlled force.
+    """
+
+    at: Linearisation
+    x: PETSc.Vec
+    nodal: np.ndarray
+    poses: np.ndarray
+    load: float
+
+    @staticmethod
+    def of(at: Linearisation, right: PETSc.Vec) -> Adjoint:
+        """The adjoint of a quantity whose derivative is ``right``, as ``Linearisation.transpose`` gives it."""
+        return Adjoint._of(at, at.solve(right))
+
+    def by_control(self) -> float:
+        """dQ/dv by the value v of the control."""
+        return self.x.dot(self.at.control_rate())
+
+    @staticmethod
+    def of_travel(at: Linearisation, load: PointLoad) -> Adjoint:
+        """The adjoint of the travel of a load's point."""
+        return Adjoint.of(at, at.travel_gradient(load))
+
+    @staticmethod
+    def of_force(at: Linearisation) -> Adjoint:
+        """The adjoint of the controlled force under displacement control."""
+        # ∂f/∂y is the right-hand side of the rate with the prescribed displacement, but for its sign
+        x = at.rate()
+        x.scale(-1.0)
+        return Adjoint._of(at, x)
+
+    @staticmethod
+    def _of(at: Linearisation, x: PETSc.Vec) -> Adjoint:
+        step = at.step(x)
+        return Adjoint(at, x, at.displacements(x), step.z, step.force)

@@ -1,0 +1,377 @@
+"""The discretised scene: its fidelity, and the mechanism with mesh, elastic links, bodies, constraints and loads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+from scipy.sparse import csr_matrix
+
+from fenicsmech.collective import on_one
+from fenicsmech.compat import cell_dofs, cell_nodes, original_nodes
+from fenicsmech.effects import LinkFields, find_boundaries, region_average
+from fenicsmech.elasticity import (
+    MID_PLANE_SYMMETRIC,
+    PLANE_STRAIN,
+    PLANE_STRESS,
+    SPATIAL,
+    ElasticBody,
+    ElasticModel,
+    Formulation,
+    Quadrature,
+    Stretch,
+)
+from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State, load_fields
+from fenicsmech.errors import DescriptionError, positive
+from fenicsmech.log import Clock
+from fenicsmech.mechanism import (
+    Effect,
+    FlexibleLink,
+    Force,
+    Material,
+    Mechanism,
+    Output,
+    Scene,
+    Shape,
+    in_dimension,
+    validate,
+)
+from fenicsmech.meshing import (
+    LEAST_SEGMENTS,
+    InterfaceSite,
+    LinkMesh,
+    MechanismMesh,
+    bulge_field,
+    check_link,
+    distribute,
+    mesh_link,
+)
+from fenicsmech.multibody import BodyPoint, DesignAtNodes, InterfaceMap, Linkage, LinkPoint, link_point
+
+SPACES = {model.name: model for model in (SPATIAL, MID_PLANE_SYMMETRIC, PLANE_STRESS, PLANE_STRAIN)}
+"""Names of the elastic models, as users type them."""
+
+
+@dataclass(frozen=True)
+class Fidelity:
+    """Elastic model, elements and formulation of a simulation.
+
+    Attributes:
+        model: 3D, whole or half, plane strain or plane stress.
+        order: degree of the displacement field.
+        sizes: element size per flexible link.
+        quadrature: quadrature degree.
+        formulation: the criterion for links in the u–p (mixed) formulation.
+        layers: through the depth, or through half of it where half is meshed; None: chosen from depth and size.
+        segments: around a pin, at least.
+    """
+
+    model: ElasticModel
+    order: int
+    sizes: Mapping[FlexibleLink, float]
+    quadrature: Quadrature
+    formulation: Formulation
+    layers: int | None = None
+    segments: int = LEAST_SEGMENTS
+
+
+def read_fidelity(
+    scene: Scene,
+    *,
+    space: str | None,
+    order: int | None,
+    size: float | Mapping[FlexibleLink, float] | None,
+    quadrature: Quadrature | None,
+    formulation: Formulation,
+    layers: int | None,
+    segments: int | None,
+) -> Fidelity:
+    """The fidelity, if ``scene`` can be simulated at it; arguments as those of ``Simulation``.
+
+    Raises:
+        DescriptionError: it cannot.
+    """
+    space, order = "3d" if space is None else space, 2 if order is None else order
+    if space not in SPACES:
+        raise DescriptionError("space", f"{space!r} is not known", f"Choose one of {', '.join(SPACES)}")
+    if order not in (1, 2, 3):
+        raise DescriptionError("order", f"{order!r} is not 1, 2 or 3", "Choose 1 for speed, 2 for accuracy")
+    if size is None:
+        raise DescriptionError("size", "it is missing", "Give an element size, or accuracy=… to have one chosen")
+    model, links = SPACES[space], scene.mechanism.flexible_links
+    per_link = size if isinstance(size, Mapping) else dict.fromkeys(links, size)
+    sizes = {link: positive(f"element size of {link.name!r}", per_link.get(link)) for link in links}
+    rule = quadrature or Quadrature.for_order(order, model.dim)
+    check_scene(scene, model)
+    return Fidelity(model, order, sizes, rule, formulation, layers, LEAST_SEGMENTS if segments is None else segments)
+
+
+def check_scene(scene: Scene, model: ElasticModel) -> None:
+    """Raises a DescriptionError if a scene cannot be simulated in ``model``."""
+    mechanism = scene.mechanism
+    validate(mechanism, model.mechanism_dim)
+    if not mechanism.flexible_links:
+        raise DescriptionError(
+            f"mechanism {mechanism.name!r}", "no link is flexible: nothing would bend", "Add one with flexible()"
+        )
+    for effect in scene.effects:
+        effect.check(mechanism, model.mechanism_dim)
+
+
+def fits(scene: Scene, model: ElasticModel) -> bool:
+    """Whether a scene can be simulated in ``model``."""
+    try:
+        check_scene(scene, model)
+    except DescriptionError:
+        return False
+    return True
+
+
+def check_links(mechanism: Mechanism, shapes: Sequence[Shape], linkage: Linkage, fidelity: Fidelity) -> None:
+    """Checks links of some shapes, joints and points before anything is meshed."""
+    for link, shape in zip(mechanism.flexible_links, shapes, strict=True):
+        points = {part.name: part.at for part in (*mechanism.forces, *mechanism.outputs) if part.on == link}
+        check_link(link.name, shape, points=points, **_mesh_options(link, linkage, fidelity))
+
+
+def mesh_links(mechanism: Mechanism, shapes: Sequence[Shape], linkage: Linkage, fidelity: Fidelity) -> list[LinkMesh]:
+    """The mesh of every flexible link, of which each has one of ``shapes``. Local."""
+    pairs = zip(mechanism.flexible_links, shapes, strict=True)
+    return [mesh_link(link.name, shape, **_mesh_options(link, linkage, fidelity)) for link, shape in pairs]
+
+
+def mesh_mechanism(
+    comm: MPI.Comm, mechanism: Mechanism, shapes: Sequence[Shape], linkage: Linkage, fidelity: Fidelity
+) -> MechanismMesh:
+    """Meshes on rank 0 and distributes; an error there is raised on all ranks."""
+    return distribute(comm, on_one(comm, lambda: mesh_links(mechanism, shapes, linkage, fidelity)))
+
+
+def _mesh_options(link: FlexibleLink, linkage: Linkage, fidelity: Fidelity) -> dict[str, Any]:
+    """Arguments of ``mesh_link`` and ``check_link`` for ``link``."""
+    bodies = [linkage.bodies[index] for index in linkage.interfaces[link]]
+    sites = [
+        # a pin along z holds its link at whatever height the link is
+        InterfaceSite(body.centre[:2] if body.axis[2] == 1.0 else body.centre, body.region, body.axis, body.name)
+        for body in bodies
+        if body.region is not None  # interfaces have regions, rigid links none
+    ]
+    model, size, layers = fidelity.model, fidelity.sizes[link], fidelity.layers
+    return dict(sites=sites, dim=model.dim, size=size, half=model.half, layers=layers, segments=fidelity.segments)
+
+
+class MechanismModel:
+    """A mechanism at one fidelity, ready for equilibria.
+
+    Attributes:
+        materials: of the flexible links.
+        mesh: the reference mesh of all flexible links.
+        elastic: their elastic energy.
+        fields: what energies of effects are written in.
+        interfaces: interface nodes as functions of body poses.
+        design_nodes: the design field at the nodes of the displacement.
+        node_link: index of the flexible link of every local node.
+        clock: of the phases.
+        mixed: whether each flexible link is in the u–p formulation.
+        effects: of the scene.
+        potentials: potentials of body poses.
+        spring_potentials: those of springs, which act from the start.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        linkage: Linkage,
+        mesh: MechanismMesh,
+        fidelity: Fidelity,
+        clock: Clock,
+        effects: Sequence[Effect] = (),
+        materials: Sequence[Material] | None = None,
+    ) -> None:
+        self.mechanism, self.linkage, self.mesh, self.clock = mechanism, linkage, mesh, clock
+        self.effects, links = tuple(effects), mechanism.flexible_links
+        self.materials = tuple(link.material for link in links) if materials is None else tuple(materials)
+        self.mixed = fidelity.formulation.mixed(list(self.materials), fidelity.model, fidelity.order)
+        faces = [part for effect in effects for part in effect.faces]
+        boundaries = find_boundaries(mesh.mesh, links, mesh.link, faces, half=fidelity.model.half)
+
+        def energy(effect: Effect, body: ElasticBody) -> ufl.Form | None:
+            return effect.link_energy(LinkFields(tuple(links), body, boundaries))
+
+        self.elastic = ElasticBody(
+            mesh.mesh,
+            link=mesh.link,
+            free=mesh.interface < 0,
+            materials=self.materials,
+            depths=[link.shape.depth for link in links],
+            model=fidelity.model,
+            order=fidelity.order,
+            quadrature=fidelity.quadrature,
+            effects=[partial(energy, effect) for effect in effects],
+            stretches=_stretches(links, fidelity.model, effects),
+            # only fields of the bulge's degree can move curved cells rigidly
+            bulge=bulge_field(mesh) if fidelity.order > 1 else None,
+            mixed=self.mixed,
+        )
+        self.fields = LinkFields(tuple(links), self.elastic, boundaries)
+        self.potentials = [potential for effect in effects for potential in effect.pose_potentials(linkage)]
+        self.spring_potentials = tuple(potential for potential in self.potentials if potential.holds)
+        self._compliances: dict[int, float] = {}
+        for effect in effects:
+            for row, compliance in effect.soften(linkage).items():
+                self._compliances[row] = self._compliances.get(row, 0.0) + compliance
+        cell_body = np.where(mesh.interface >= 0, mesh.interface + len(mechanism.rigid_links), -1)
+        centres = np.array([body.centre for body in linkage.bodies])
+        self.interfaces = InterfaceMap(
+            self.elastic.u, self.elastic.drawn_nodes, cell_body, centres, linkage.joints.space
+        )
+        self.design_nodes = DesignAtNodes(self.elastic.d, self.elastic.u)
+        self.node_link = np.full(len(self.interfaces.body), -1)
+        self.node_link[cell_dofs(self.elastic.u.function_space)] = mesh.link[:, None]
+        self._point_loads: dict[Force | Output, PointLoad] = {}
+
+    @property
+    def flexible_dofs(self) -> int:
+        """Displacements of the flexible links that are unknown, interfaces and mid-planes excluded."""
+        return self.mesh.mesh.comm.allreduce(int(np.sum(self.interfaces.unknown)))
+
+    @property
+    def pressure_dofs(self) -> int:
+        """Pressures that are unknown."""
+        return 0 if self.elastic.pressure is None else self.elastic.pressure.count
+
+    @property
+    def rigid_dofs(self) -> int:
+        """Coordinates of all rigid and interface bodies, fixed ones included."""
+        return len(self.linkage.bodies) * self.linkage.joints.space.pose_size
+
+    # -- shape and material -------------------------------------------------------------------------------------
+
+    def reshape(self, design: np.ndarray) -> None:
+        """Gives the links the rest shape X₀ + c + d, d this rank's values with ghosts, flat."""
+        self.elastic.d.x.array[:] = design
+        self.interfaces.reshape(self.design_nodes.values())
+
+    @contextmanager
+    def shaped(self, design: np.ndarray) -> Iterator[None]:
+        """A context in which the links have another rest shape."""
+        before = self.elastic.d.x.array.copy()
+        self.reshape(design)
+        try:
+            yield
+        finally:
+            self.reshape(before)
+
+    def set_parameter(self, links: np.ndarray, name: str, value: float) -> None:
+        """Gives the links in a mask (links,) another value of a parameter of their law, as "E". Local."""
+        self.elastic.parameters[name].x.array[np.flatnonzero(links[self.mesh.link])] = value
+
+    # -- states -------------------------------------------------------------------------------------------------
+
+    def load(self, state: State) -> None:
+        """Makes the finite-element fields hold ``state``."""
+        load_fields(self.elastic, self.interfaces, state)
+
+    def carry(self, state: State, design: np.ndarray) -> State:
+        """Reshapes the links and guesses the equilibrium there from the one at the present shape."""
+        self.load(state)
+        carried = self.elastic.carried(design - self.elastic.d.x.array)
+        self.reshape(design)
+        displacements, *pressures = self.elastic.split(state.u)
+        return replace(state, u=np.concatenate([carried[: len(displacements)], *pressures]))
+
+    def assembled_state(self, poses: np.ndarray, motors: np.ndarray) -> State:
+        """The state of a rigid assembly: every flexible link carried along by its first interface."""
+        dim, owned = self.linkage.dim, self.interfaces.owned
+        positions = self.elastic.drawn_nodes[:owned, :dim] + self.design_nodes.values()[:owned, :dim]
+        u = np.zeros((owned, self.interfaces.block))
+        for index, (body, *_) in enumerate(self.linkage.interfaces.values()):
+            nodes = np.flatnonzero(self.node_link[:owned] == index)
+            offsets = positions[nodes] - np.array(self.linkage.bodies[body].centre)
+            u[nodes, :dim] = self.linkage.joints.space.displace(poses[body], offsets)
+        pressures = np.zeros(0 if self.elastic.pressure is None else len(self.elastic.pressure.unknown))
+        return State(np.concatenate([u.ravel(), pressures]), poses, np.zeros(self.linkage.joints.rows), 0.0, motors)
+
+    # -- points and loads ---------------------------------------------------------------------------------------
+
+    def point(self, part: Force | Output) -> BodyPoint | LinkPoint:
+        """The material point, or region, of a force or output."""
+        if not isinstance(part.on, FlexibleLink):
+            return self.linkage.point(part.on, part.at)
+        if part.region is not None:
+            links = self.mechanism.flexible_links
+            return region_average(part, self._drawn(part.at), self.mesh, self.elastic, links)
+        (point,) = self._link_points(f"{part.name!r}", part.on, [part.at], self.elastic.u)
+        return point
+
+    def design_weights(self, part: str, link: FlexibleLink, positions: np.ndarray) -> csr_matrix:
+        """Weights of this rank's owned nodes of the design field in it at drawn points of a link, (points, nodes)."""
+        d = self.elastic.d
+        index = d.function_space.dofmap.index_map
+        weights = np.zeros((len(positions), index.size_local))
+        for row, point in zip(weights, self._link_points(part, link, positions, d), strict=True):
+            own = point.global_nodes - index.local_range[0]
+            mine = (own >= 0) & (own < index.size_local)
+            np.add.at(row, own[mine], point.weights[mine])
+        return csr_matrix(weights)
+
+    def _link_points(
+        self, part: str, link: FlexibleLink, positions: Iterable[Sequence[float]], field: fem.Function
+    ) -> list[LinkPoint]:
+        """The points drawn at ``positions`` on a link, with the weights of a field there."""
+        mesh, elastic = self.mesh.mesh, self.elastic
+        owned = mesh.topology.index_map(mesh.topology.dim).size_local
+        cells = np.flatnonzero(self.mesh.link[:owned] == self.mechanism.flexible_links.index(link))
+        bulges = self.mesh.curved.of_cells(original_nodes(mesh)[cell_nodes(mesh)[cells]])
+        if elastic.bulge is None:
+            bulges = np.zeros_like(bulges)
+        corners = self.mesh.corners(cells)
+        return [link_point(part, self._drawn(at), field, cells, corners, bulges) for at in positions]
+
+    def _drawn(self, at: Sequence[float]) -> np.ndarray:
+        """A drawn point on the mesh; where the mechanism moves in the plane, at any height it is on the mid-plane."""
+        return np.array(in_dimension(in_dimension(at, self.linkage.dim), self.elastic.model.dim))
+
+    def point_load(self, force: Force | Output) -> PointLoad:
+        """The point load of a force, or of a unit force along an output."""
+        if force not in self._point_loads:
+            dim = self.elastic.model.dim if isinstance(force.on, FlexibleLink) else self.linkage.dim
+            direction = np.array(in_dimension(force.direction, dim))
+            self._point_loads[force] = PointLoad(force.name, ((self.point(force), direction),))
+        return self._point_loads[force]
+
+    def travel(self, part: Force | Output, state: State) -> float:
+        """Travel of the point of a force or output in the loaded ``state``."""
+        return self.point_load(part).travel(self.elastic.u, state.poses)
+
+    def system(self, controlled: PointLoad, loads: tuple[tuple[PointLoad, float], ...]) -> EquilibriumSystem:
+        """The equilibrium equations with one controlled and several fixed loads."""
+        return EquilibriumSystem(
+            self.elastic,
+            self.interfaces,
+            self.linkage.joints,
+            controlled=controlled,
+            loads=loads,
+            potentials=self.potentials,
+            compliances=self._compliances,
+            clock=self.clock,
+            comm=self.mesh.comm,
+        )
+
+
+def _stretches(links: Sequence[FlexibleLink], model: ElasticModel, effects: Sequence[Effect]) -> list[Stretch | None]:
+    """The stretch of the strain-free state of each link, of which it has one at most."""
+    found: dict[FlexibleLink, Stretch] = {}
+    for effect in effects:
+        for link, stretch in effect.growth(model).items():
+            if link in found:
+                raise DescriptionError(f"link {link.name!r}", "it is prestrained twice", "Leave one out")
+            found[link] = stretch
+    return [found.get(link) for link in links]

@@ -1,0 +1,233 @@
+"""Quantities Q(y, p) of an equilibrium: numbers or vectors with their derivatives.
+
+    y = (u, p, z, λ, f) the unknowns of the equilibrium,      p the design field d and the numbers of the links' laws
+
+A ``Quantity`` is described as plain data. ``on`` a model it is an ``Observable``, which gives the values of a state
+and the partial derivatives of each component; the adjoint in ``sensitivity`` makes total ones of them. A new quantity
+is one subclass of each.
+
+Quantities of quantities follow by the chain rule: ``Component`` of a vector along a direction, and its ``Magnitude``.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from types import MappingProxyType
+from typing import ClassVar
+
+import numpy as np
+
+from fenicsmech.equilibrium import EquilibriumSystem, State
+from fenicsmech.errors import DescriptionError, direction, point_text
+from fenicsmech.mechanism import FlexibleLink, Force, Joint, Motor, Output, RigidLink, Scene, Units, in_dimension
+from fenicsmech.model import MechanismModel
+
+
+@dataclass(frozen=True, eq=False)
+class Partial:
+    """Partial derivatives of one component, everything else held; 0 where there are none.
+
+    Attributes:
+        links: by this rank's displacements and pressures of all nodes, (owned dofs,).
+        border: by poses, multipliers and the controlled force, the same on all ranks, (border,).
+        design: by this rank's owned values of the design field, flat.
+        parameters: by the numbers of the links' laws, by name, (links,).
+    """
+
+    links: np.ndarray | float = 0.0
+    border: np.ndarray | float = 0.0
+    design: np.ndarray | float = 0.0
+    parameters: Mapping[str, np.ndarray] = field(default_factory=lambda: MappingProxyType({}))
+
+    @property
+    def of_state(self) -> bool:
+        """Whether the component depends on the state."""
+        return isinstance(self.links, np.ndarray) or isinstance(self.border, np.ndarray)
+
+    def __mul__(self, factor: float) -> Partial:
+        parameters = {name: np.multiply(factor, values) for name, values in self.parameters.items()}
+        return Partial(factor * self.links, factor * self.border, factor * self.design, parameters)
+
+    __rmul__ = __mul__
+
+    def __add__(self, other: Partial) -> Partial:
+        names = dict.fromkeys((*self.parameters, *other.parameters))
+        parameters = {name: np.add(self.parameters.get(name, 0.0), other.parameters.get(name, 0.0)) for name in names}
+        return Partial(self.links + other.links, self.border + other.border, self.design + other.design, parameters)
+
+
+class Observable(ABC):
+    """A quantity on one model; the model holds the state in question.
+
+    Attributes:
+        size: number of its components.
+        on_link: whether its value in the unloaded configuration changes with the design.
+    """
+
+    size: int = 1
+    on_link: bool = False
+
+    @abstractmethod
+    def values(self, state: State) -> np.ndarray:
+        """Q, the same on all ranks, (size,)."""
+
+    @abstractmethod
+    def partials(self, system: EquilibriumSystem, state: State) -> list[Partial]:
+        """The derivatives of each component at a state of ``system``."""
+
+
+class RestObservable(Observable):
+    """A quantity of the links at rest on one model; it has one component."""
+
+    @abstractmethod
+    def value(self) -> float:
+        """Q at the design that the model holds."""
+
+    @abstractmethod
+    def slope(self) -> np.ndarray:
+        """∂Q/∂d, this rank's owned values, flat."""
+
+    def values(self, state):
+        return np.array([self.value()])
+
+    def partials(self, system, state):
+        return [Partial(design=self.slope())]
+
+
+@dataclass(frozen=True)
+class Quantity(ABC):
+    """A number or a vector that belongs to an equilibrium, or to the links at rest; a frozen dataclass.
+
+    Attributes:
+        of_state: whether it depends on an equilibrium; those that do not need no sample.
+        from_unloaded: whether it counts from the unloaded configuration.
+        of_part: whether links known by their outline alone have it; a line drawn in them is no part of it.
+    """
+
+    of_state: ClassVar[bool] = True
+    of_part: ClassVar[bool] = True
+    from_unloaded: ClassVar[bool] = False
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """The quantity in words, for messages and tables."""
+
+    @abstractmethod
+    def unit(self, units: Units) -> str:
+        """Its unit."""
+
+    @abstractmethod
+    def on(self, model: MechanismModel) -> Observable:
+        """The quantity of one model."""
+
+    def size(self, dim: int) -> int:
+        """Number of its components in ``dim`` dimensions; 1 by default."""
+        return 1
+
+    def reduce(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Values (m,) made of those of the observable, (n,), and their derivatives, (m, n); the same by default."""
+        return values, np.eye(len(values))
+
+    def check(self, scene: Scene, dim: int) -> None:
+        """Checks that the quantity exists in ``scene`` in ``dim`` dimensions; by default, that its parts do.
+
+        Raises:
+            DescriptionError: it does not.
+        """
+        mechanism = scene.mechanism
+        parts = (*mechanism.links, *mechanism.joints, *mechanism.motors, *mechanism.forces, *mechanism.outputs)
+        for own in fields(self):
+            given = getattr(self, own.name)
+            for part in given if isinstance(given, tuple) else (given,):
+                if isinstance(part, RigidLink | FlexibleLink | Joint | Motor | Force | Output) and part not in parts:
+                    raise DescriptionError(
+                        self.name, f"{part.name!r} is not a part of {mechanism.name!r}", "Name one of its parts"
+                    )
+                if isinstance(part, Quantity):
+                    part.check(scene, dim)
+
+    def __str__(self) -> str:
+        return self.name
+
+
+class _OfVector(Quantity):
+    """A number made of a vector."""
+
+    vector: Quantity
+
+    @property
+    def of_state(self):  # type: ignore[override]
+        return self.vector.of_state
+
+    @property
+    def from_unloaded(self):  # type: ignore[override]
+        return self.vector.from_unloaded
+
+    def unit(self, units):
+        return self.vector.unit(units)
+
+    def check(self, scene, dim):
+        super().check(scene, dim)
+        if self.vector.size(dim) == 1:
+            raise DescriptionError(self.name, f"the {self.vector} is a number in {dim} dimensions", "Use it as it is")
+
+    def on(self, model):
+        return self.vector.on(model)
+
+
+@dataclass(frozen=True)
+class Component(_OfVector):
+    """The component of a vector along a direction.
+
+    Attributes:
+        vector: the quantity.
+        direction: any length; 2 or 3 coordinates.
+
+    Raises:
+        DescriptionError: the direction has no length.
+    """
+
+    vector: Quantity
+    direction: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "direction", direction(f"direction of the {self.vector}", self.direction))
+
+    @property
+    def name(self):
+        return f"{self.vector} along {point_text(self.direction)}"
+
+    def reduce(self, values):
+        along = np.array(in_dimension(self.direction, len(values)))
+        return np.array([along @ values]), along[None]
+
+
+@dataclass(frozen=True)
+class Magnitude(_OfVector):
+    """The length of a vector.
+
+    Attributes:
+        vector: the quantity.
+    """
+
+    vector: Quantity
+
+    @property
+    def name(self):
+        return f"magnitude of the {self.vector}"
+
+    def reduce(self, values):
+        length = float(np.linalg.norm(values))
+        return np.array([length]), (values / length if length > 0.0 else np.zeros(len(values)))[None]
+
+
+def border_of(system: EquilibriumSystem, **blocks: tuple[Sequence[int] | np.ndarray, np.ndarray | float]) -> np.ndarray:
+    """∂Q/∂(z, λ, f) from places and values of its blocks ``poses``, ``multipliers`` and ``load``, (border,)."""
+    border = np.zeros(system.blocks.border.size)
+    parts = system.blocks.restrict_border(border)
+    for name, (places, values) in blocks.items():
+        getattr(parts, name)[places] += values
+    return border

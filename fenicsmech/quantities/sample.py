@@ -1,0 +1,131 @@
+"""Samples: the equilibria that quantities are asked of, by forces that act at once and motor positions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from fenicsmech.errors import DescriptionError, finite
+from fenicsmech.mechanism import DRAWN, Configuration, Force, ForceGroup, Motor
+
+
+@dataclass(frozen=True)
+class PrescribedDisplacement:
+    """A prescribed displacement of a force's point in place of the force's magnitude; ``at`` makes it.
+
+    Attributes:
+        value: the displacement along the force, from the unloaded configuration, length.
+    """
+
+    value: float
+
+
+def at(displacement: float) -> PrescribedDisplacement:
+    """A prescribed displacement as a value of a ``Sample``; the force follows.
+
+    Args:
+        displacement: of the force's point along it, from the unloaded configuration, length.
+
+    Raises:
+        DescriptionError: it is not a finite number.
+    """
+    return PrescribedDisplacement(finite("displacement of a sample", displacement))
+
+
+@dataclass(frozen=True, init=False)
+class Sample:
+    """An equilibrium: ``Sample({thumb: 4.0, finger: 6.0}, configuration=closed)``, ``Sample({push: at(5.0)})``.
+
+    It is reached from the unloaded configuration: the forces grow together. Where a displacement is prescribed, the
+    other forces act first.
+
+    Args:
+        loads: magnitudes of forces; ``at(…)`` for one of them prescribes the displacement of its point instead; for
+            motors their positions, angle (rad) or length.
+        configuration: positions of the other motors.
+
+    Attributes:
+        forces: (force, magnitude or prescribed displacement) pairs.
+        configuration: positions of all motors.
+
+    Raises:
+        DescriptionError: a part is neither a force nor a motor, a number is not finite, a motor is given twice, or two
+            displacements are prescribed.
+    """
+
+    forces: tuple[tuple[Force, float | PrescribedDisplacement], ...]
+    configuration: Configuration
+
+    def __init__(
+        self,
+        loads: Mapping[Force | Motor, float | PrescribedDisplacement] | None = None,
+        configuration: Configuration = DRAWN,
+    ) -> None:
+        forces: list[tuple[Force, float | PrescribedDisplacement]] = []
+        positions: list[tuple[Motor, float]] = []
+        if not isinstance(configuration, Configuration):
+            raise DescriptionError(
+                "sample", f"{configuration!r} is not a configuration", "Make one with scene.configuration()"
+            )
+        for part, value in dict(loads or {}).items():
+            if isinstance(part, Motor):
+                positions.append((part, finite(f"position of {part.name!r} in a sample", value)))
+            elif not isinstance(part, Force):
+                raise DescriptionError("sample", f"{part!r} is neither a force nor a motor", "Give the mechanism's")
+            elif isinstance(value, PrescribedDisplacement):
+                forces.append((part, value))
+            else:
+                forces.append((part, finite(f"force of a sample for {part.name!r}", value)))
+        given = dict(configuration.positions)
+        for motor, _ in positions:
+            if motor in given:
+                raise DescriptionError("sample", f"{motor.name!r} has two positions", "Give one of them")
+        if positions:
+            names = [] if configuration == DRAWN else [configuration.name]
+            names += [f"{motor.name} at {value:g}" for motor, value in positions]
+            configuration = Configuration(", ".join(names), (*configuration.positions, *positions))
+        if sum(isinstance(value, PrescribedDisplacement) for _, value in forces) > 1:
+            raise DescriptionError("sample", "two displacements are prescribed", "Prescribe one, with at(…)")
+        object.__setattr__(self, "forces", tuple(forces))
+        object.__setattr__(self, "configuration", configuration)
+
+    def __str__(self) -> str:
+        shown = [
+            f"{force.name!r} moved by {value.value:g}"
+            if isinstance(value, PrescribedDisplacement)
+            else f"{force.name!r} of {value:g}"
+            for force, value in self.forces
+        ]
+        return f"{' and '.join(shown) or 'no force'}, {self.configuration.name}"
+
+    @property
+    def moved(self) -> tuple[Force, float] | None:
+        """The force whose displacement is prescribed, and that; None if there is none."""
+        found = [(force, value.value) for force, value in self.forces if isinstance(value, PrescribedDisplacement)]
+        return found[0] if found else None
+
+    @property
+    def part(self) -> Force | ForceGroup:
+        """What changes on the way from the unloaded configuration."""
+        if self.moved:
+            return self.moved[0]
+        acting = self._acting or self.forces[:1]
+        if len(acting) == 1:
+            return acting[0][0]
+        name = " and ".join(force.name for force, _ in acting) or "no force"
+        return ForceGroup(name, tuple((force, magnitude / self.magnitude) for force, magnitude in self._acting))
+
+    @property
+    def magnitude(self) -> float:
+        """The magnitude of ``part``: of the first force of several."""
+        return self._acting[0][1] if self._acting and not self.moved else 0.0
+
+    @property
+    def others(self) -> tuple[tuple[Force, float], ...]:
+        """Forces that act before the displacement is prescribed."""
+        return self._acting if self.moved else ()
+
+    @property
+    def _acting(self) -> tuple[tuple[Force, float], ...]:
+        """Forces of given magnitude, without those of none."""
+        return tuple((force, value) for force, value in self.forces if isinstance(value, float) and value)

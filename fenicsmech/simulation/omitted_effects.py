@@ -1,0 +1,303 @@
+"""Omitted effects: the assumptions of a simulation as text, hints where they may matter, and friction in hinges.
+
+Friction gives bounds on the load of a curve computed without it. Dry friction of a pin of radius r turns the force R on
+it into a moment of at most μ r |R| against its turning. While the mechanism creeps along its curve, the power
+dissipated in the pins is that of the additional force:
+
+    |Δf| |du| = Σ_j μ_j r_j |R_j| |dφ_j|,      f ∈ [f − Δf, f + Δf].
+
+Within this band the mechanism sticks; loaded it moves along the upper bound, unloaded along the lower one.
+Reactions are those without friction: bounds are of first order in μ. Source: Coulomb's law.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+from math import hypot, pi
+from typing import Literal
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from scipy.spatial import cKDTree
+
+from fenicsmech.collective import from_one
+from fenicsmech.compat import compile_form
+from fenicsmech.effects import Gravity
+from fenicsmech.equilibrium import EquilibriumSolver, Unknown
+from fenicsmech.errors import DescriptionError, positive, set_fields
+from fenicsmech.estimates import Equilibrium, adjoint_at, cause_of_growth, growth_by_halving
+from fenicsmech.mechanism import Joint, PrescribedPart, Strip, Units
+from fenicsmech.model import MechanismModel
+from fenicsmech.multibody import JointCoordinate, Linkage
+from fenicsmech.simulation.discretisation import Discretisation
+from fenicsmech.simulation.fields import gather
+from fenicsmech.simulation.frame import Frame
+
+
+@dataclass(frozen=True)
+class ExplanationOptions:
+    """Thresholds from which an omitted effect matters.
+
+    Attributes:
+        tolerance: relative change of the displacement.
+        weight: per volume, of the flexible links, in the units of the scene; None is unknown.
+        locking: Poisson's ratio from which displacement elements of an order lose accuracy.
+        slender: fraction of the out-of-plane buckling load from which a link needs a simulation in space.
+    """
+
+    tolerance: float = 0.01
+    weight: float | None = None
+    locking: Mapping[int, float] = field(default_factory=lambda: {1: 0.40, 2: 0.48, 3: 0.49})
+    slender: float = 0.2
+
+    def __post_init__(self) -> None:
+        positive("tolerance of an explanation", self.tolerance)
+        if self.weight is not None:
+            positive("weight per volume of an explanation", self.weight)
+
+
+@dataclass(frozen=True)
+class Hint:
+    """A hint on an omitted effect.
+
+    Attributes:
+        what: its name.
+        text: the consequence of omitting it.
+        matters: whether it changes the displacement by more than the tolerance, or may change it altogether.
+    """
+
+    what: str
+    text: str
+    matters: bool
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Assumptions of a simulation, and hints on omitted effects; prints as plain text."""
+
+    simulated: tuple[str, ...]
+    left_out: tuple[Hint, ...]
+
+    def __str__(self) -> str:
+        lines = ["Simulated:", *(f"  - {item}" for item in self.simulated), "Left out:"]
+        return "\n".join([*lines, *(f"  {'!' if h.matters else '-'} {h.what}: {h.text}" for h in self.left_out)])
+
+
+def explain(
+    discretisation: Discretisation,
+    part: PrescribedPart,
+    solver: EquilibriumSolver,
+    at: Equilibrium,
+    frame: Frame,
+    units: Units,
+    options: ExplanationOptions,
+) -> Explanation:
+    """The assumptions of a simulation, and hints on omitted effects, from one ``frame`` of the curve of a part.
+
+    ``at`` is the equilibrium of the frame.
+    """
+    model = discretisation.model
+    growth = growth_by_halving(part, model, discretisation.fidelity.sizes) * frame.force
+    hints = [_point_force_hint(part, growth, frame.displacement, units, options)]
+    if not any(isinstance(effect, Gravity) for effect in model.effects):
+        weight = options.weight
+        change = None if weight is None else weight * float(np.linalg.norm(weight_influence(model, solver, at)))
+        hints.append(_weight_hint(change, frame.displacement, units, options))
+    hints += [_compressibility_hint(model, options.locking[model.elastic.order]), _touching_hint(model, frame)]
+    if model.linkage.dim == 2:
+        hints.append(_buckling_hint(model, frame, options.slender))
+    return Explanation(_simulated(model), tuple(hint for hint in hints if hint is not None))
+
+
+def _simulated(model: MechanismModel) -> tuple[str, ...]:
+    mechanism, elastic = model.mechanism, model.elastic
+    kinds = sorted({joint.kind.name for joint in mechanism.joints})
+    links = ", ".join(
+        f"{link.name} ({material.name}, {type(material.law).__name__})"
+        for link, material in zip(mechanism.flexible_links, model.materials, strict=True)
+    )
+    mixed = [link.name for link, is_mixed in zip(mechanism.flexible_links, model.mixed, strict=True) if is_mixed]
+    items = [
+        f"flexible links in large deformation ({elastic.model.name}, order {elastic.order}): {links}",
+        f"rigid links: {', '.join(link.name for link in mechanism.rigid_links)}",
+        f"ideal joints, without play, friction or compliance: {', '.join(kinds)}",
+        "forces that keep their direction, applied without inertia",
+    ]
+    if mixed:
+        items.insert(1, f"pressure as an unknown (u–p elements) in {', '.join(mixed)}")
+    return (*items, *(effect.explain() for effect in model.effects))
+
+
+def _weight_hint(change: float | None, displacement: float, units: Units, options: ExplanationOptions) -> Hint:
+    """Influence of the weight, whose ``change`` of the displacement is None where the weight is unknown."""
+    per_volume = f"{units.force}/{units.length}³"
+    if change is None:
+        return Hint("weight", f"its influence needs explain(weight=…), the weight per volume in {per_volume}", False)
+    part = change / max(abs(displacement), 1e-300)
+    return Hint(
+        "weight",
+        f"flexible links of {options.weight:.3g} {per_volume} would move the point by at most {change:.2g} "
+        f"{units.length}, {part:.2%} of its displacement; "
+        "list Gravity(…) to include it (one form to compile, a few per cent of a frame)",
+        part > options.tolerance,
+    )
+
+
+def _point_force_hint(
+    part: PrescribedPart, growth: float, displacement: float, units: Units, options: ExplanationOptions
+) -> Hint | None:
+    """What each halving of the elements adds to the displacement, its ``growth``; None if nothing."""
+    if not growth:
+        return None
+    fraction = abs(growth) / max(abs(displacement), sys.float_info.min)
+    added = f"each halving adds about {abs(growth):.2g} {units.length}, {fraction:.2%} of it"
+    return Hint("extent of the force", f"{cause_of_growth(part)} ({added})", fraction > options.tolerance)
+
+
+def weight_influence(model: MechanismModel, solver: EquilibriumSolver, at: Equilibrium) -> np.ndarray:
+    """Derivative of the displacement by a weight per volume along each axis the mechanism moves in.
+
+    dQ/dw_k = û · ∫ e_k dV, û the nodal adjoint of the displacement
+    """
+    elastic = model.elastic
+    with model.shaped(at.design):
+        adjoint = adjoint_at(solver, replace(at, unknown=Unknown.DISPLACEMENT))
+        displacements = elastic.split(adjoint.nodal)[0]
+        depths = [elastic.model.multiplier(link.shape.depth) for link in model.mechanism.flexible_links]
+        v = ufl.TestFunction(elastic.u.function_space)
+        depth = elastic.cellwise(depths) * ufl.det(elastic.rest_gradient)
+        direction = fem.Constant(elastic.mesh, np.zeros(elastic.model.dim))
+        form = compile_form(ufl.dot(direction, v) * depth * elastic.dx(metadata={"quadrature_degree": elastic.order}))
+        slopes = []
+        for axis in np.eye(elastic.model.dim)[: model.linkage.dim]:
+            direction.value = axis
+            slopes.append(model.mesh.mesh.comm.allreduce(float(elastic.assembled(form) @ displacements)))
+    return np.array(slopes)
+
+
+def _compressibility_hint(model: MechanismModel, limit: float) -> Hint | None:
+    elastic, links = model.elastic, model.mechanism.flexible_links
+    stiff = [
+        link.name
+        for link, material, is_mixed in zip(links, model.materials, model.mixed, strict=True)
+        if material.law.nu > limit and elastic.model.confined and not is_mixed
+    ]
+    if not stiff:
+        return None
+    remedy = "use order 2 or 3 with" if elastic.order == 1 else "use"
+    return Hint(
+        "pressure as an unknown",
+        f"Poisson's ratio of {', '.join(stiff)} is above {limit:g}: elements of order {elastic.order} are too stiff "
+        f"there; {remedy} formulation=MixedFormulation(above={limit:g}), or compare two sizes",
+        True,
+    )
+
+
+def _touching_hint(model: MechanismModel, frame: Frame) -> Hint:
+    """Links that come closer than half an element, those that share a joint apart."""
+    mesh, links = model.mesh, model.mechanism.flexible_links
+    snapshot, joined = gather(model, frame), [{joint.a, joint.b} for joint in model.mechanism.joints]
+
+    def search() -> str:
+        if snapshot is None:
+            return ""
+        places = (snapshot.rest + snapshot.displacement)[:, :2]
+        trees = [cKDTree(places[np.unique(mesh.cells[mesh.link_of_cell == k])]) for k in range(len(links))]
+        reach = 0.5 * np.linalg.norm(np.diff(places[mesh.cells[:, :2]], axis=1)[:, 0], axis=1).mean()
+        return "; ".join(
+            f"{a.name} and {b.name}"
+            for (a, one), (b, other) in combinations(zip(links, trees, strict=True), 2)
+            if {a, b} not in joined and one.count_neighbors(other, reach)
+        )
+
+    names, text = from_one(mesh.comm, search), "no links come close to each other"
+    if names:
+        text = f"in one plane these links would touch: {names}; stack them, or list Contact(…) with obstacles"
+    return Hint("contact between links", text, bool(names))
+
+
+def _buckling_hint(model: MechanismModel, frame: Frame, slender: float) -> Hint | None:
+    """The largest compression of a strip between two joints over its Euler load out of the plane.
+
+    N_cr = π² E I / L²,     I = h b³ / 12,     h in the plane, b the depth
+    """
+    fraction, name = 0.0, ""
+    for link, material in zip(model.mechanism.flexible_links, model.materials, strict=True):
+        joints = [joint for joint in model.mechanism.joints if link in (joint.a, joint.b)]
+        if isinstance(link.shape, Strip) and len(joints) > 1:
+            length = hypot(*np.subtract(joints[-1].at[:2], joints[0].at[:2]))
+            forces = [frame.reactions[joint.name].force[:2] for joint in joints if joint.name in frame.reactions]
+            load = max((float(np.linalg.norm(force)) for force in forces), default=0.0)
+            critical = pi**2 * material.law.E * link.shape.thickness * link.shape.depth**3 / 12.0 / length**2
+            fraction, name = max((fraction, name), (load / critical, link.name))
+    if not name:
+        return None
+    text = f"the compression of {name} is about {fraction:.2g} of what buckles it out of the plane"
+    remedy = "; use space='3d'" if fraction > slender else ""
+    return Hint("bending out of the plane", text + remedy, fraction > slender)
+
+
+@dataclass(frozen=True)
+class PinFriction:
+    """Dry friction in a hinge.
+
+    Attributes:
+        coefficient: Coulomb's μ.
+        radius: of the pin.
+
+    Raises:
+        DescriptionError: one of them is not positive.
+    """
+
+    coefficient: float
+    radius: float
+
+    def __post_init__(self) -> None:
+        set_fields(self, coefficient=positive("coefficient of friction", self.coefficient))
+        set_fields(self, radius=positive("radius of a pin with friction", self.radius))
+
+
+def friction_band(
+    frames: Sequence[Frame], pins: Mapping[Joint, PinFriction], linkage: Linkage
+) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds of the force between which friction holds the mechanism, as ``Curve.friction_band``."""
+    poses = [frame.state.poses for frame in frames]
+    if len(poses) < 2:
+        raise DescriptionError("friction band", "the curve has one frame only", "Give two values or more")
+    turning = []  # moment of friction and angle of each pin, (frames,) each
+    for joint, pin in pins.items():
+        is_hinge = joint.kind.motorised and not joint.kind.sliding
+        if not is_hinge or joint.name not in frames[0].reactions:
+            raise DescriptionError(
+                "friction band", f"{joint.name!r} is not a hinge of this curve that turns", "Name its revolute joints"
+            )
+        coordinate = JointCoordinate(linkage, joint)
+        turned = np.array([coordinate.value(z) for z in poses])
+        forces = np.array([frame.reactions[joint.name].force for frame in frames])
+        if linkage.dim == 3:
+            turned = np.unwrap(turned, period=4.0 * np.pi)
+            first, axis = coordinate.bodies[0], np.array(joint.axis)
+            axes = np.array([linkage.joints.space.rotate(z[first], axis) for z in poses])
+            forces = forces - np.sum(forces * axes, axis=1, keepdims=True) * axes
+        turning.append((pin.coefficient * pin.radius * np.linalg.norm(forces, axis=1), turned))
+    # length of the path of all bodies and the force's point, in lengths of the mechanism and rad
+    space = linkage.joints.space
+    scale = np.concatenate([np.full(space.dim, linkage.length), np.ones(space.rotation_size)])
+    motion = [np.append(frame.state.poses / scale, frame.displacement / linkage.length) for frame in frames]
+    steps = np.linalg.norm(np.diff(motion, axis=0), axis=1)
+    # frames closer than that, in lengths of the mechanism or rad, differ by the tolerance of their equilibria
+    if not np.all(steps > 1e-8):
+        raise DescriptionError("friction band", "two frames of the curve are the same", "Give different values")
+    arc = np.concatenate([[0.0], np.cumsum(steps)])
+    order: Literal[1, 2] = 1 if len(poses) == 2 else 2
+    loss = np.zeros_like(arc)
+    for moment, turned in turning:
+        loss += moment * np.abs(np.gradient(turned, arc, edge_order=order))
+    speed = np.abs(np.gradient([frame.displacement for frame in frames], arc, edge_order=order))
+    surplus = np.divide(loss, speed, out=np.where(loss > 0.0, np.inf, 0.0), where=speed > 0.0)
+    forces = np.array([frame.force for frame in frames])
+    return forces - surplus, forces + surplus

@@ -1,0 +1,132 @@
+"""Designs on corrected values: nearer to finer meshes, and in 3D as good as by the gradient there, for less."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import fenicsmech as fm
+from fenicsmech.design import SampleEquilibria
+
+from .mechanisms import Case, truss
+
+WANTED = ((0.1, 2.0), (0.4, 3.2))
+COARSE = {"space": "3d", "size": 4.0, "order": 1}
+
+
+class Counted(SampleEquilibria):
+    """Counts the samples traced from zero load, per space."""
+
+    traced: dict[str, int] = {}
+
+    def trace(self):
+        space = self._simulation.fidelity.model.name
+        Counted.traced[space] = Counted.traced.get(space, 0) + 1
+        return super().trace()
+
+
+@pytest.fixture
+def traced(monkeypatch) -> dict[str, int]:
+    """How often equilibria were loaded from zero, per space."""
+    monkeypatch.setattr("fenicsmech.design.designed.SampleEquilibria", Counted)
+    Counted.traced = {}
+    return Counted.traced
+
+
+def corrected(result: fm.DesignResult) -> list[float]:
+    return [target.corrected for target in result.targets]
+
+
+def test_corrected_designs_are_nearer_to_their_targets_on_a_finer_mesh():
+    case, wanted = truss(*WANTED), np.array([displacement for _, displacement in WANTED])
+    problem, missed = case.problem(size=2.5, order=1), []
+    finer = case.simulate(size=1.0)
+    for estimates in (True, False):
+        result = problem.optimise(
+            optimiser=fm.LevenbergMarquardt(tolerance=1e-3),
+            correction=fm.Correction(estimates=estimates, resolved=1e-3),
+        )
+        assert result.worst_error < 3e-3
+        assert corrected(result) == pytest.approx(
+            [t.reached + (t.finer_elements_add if estimates else 0.0) for t in result.targets], rel=1e-12
+        )
+        curve = finer.with_design(result).load_displacement(case.targets[0].quantity.part, forces=[0.1, 0.4])
+        missed.append(np.abs(curve.displacements / wanted - 1.0).max())
+    assert missed[0] < 0.5 * missed[1]
+
+
+def test_plane_stress_with_corrections_ends_at_the_targets_in_space(traced):
+    problem = truss(*WANTED).problem(**COARSE)
+    result = problem.optimise()
+    assert result.surrogate == "plane-stress" and result.verified
+    assert result.worst_error < 5e-3
+    assert traced["3d"] == len(result.corrections) <= 4
+    # far from the truth at first, and nearer by at least the factor at which a surrogate is given up
+    changes = np.array(result.corrections)
+    assert changes[0] > 0.05
+    assert np.all(changes[1:] < 0.5 * changes[:-1])
+    curve = problem.simulation.with_design(result).load_displacement(
+        problem.targets[0].quantity.part, forces=[0.1, 0.4]
+    )
+    assert [target.reached for target in result.targets] == pytest.approx(curve.displacements, rel=1e-8)
+    assert [t.finer_elements_add for t in result.targets] == pytest.approx(curve.error_estimates(), rel=1e-5)
+    direct = problem.optimise(surrogate=None)
+    assert direct.surrogate is None
+    assert corrected(result) == pytest.approx(corrected(direct), rel=5e-3)
+
+
+def misleading(case: Case) -> fm.Simulation:
+    """The same scene in plane stress with links five times as stiff."""
+    sim = case.simulate(size=4.0)
+    (link,) = case.scene.mechanism.flexible_links
+    return sim.with_material(link.material, fm.Material("stiff rubber", 5.0 * 1.9, 0.475))
+
+
+def test_a_surrogate_that_misleads_is_given_up(traced, caplog):
+    case = truss(*WANTED)
+    problem = case.problem(**COARSE)
+    with caplog.at_level("INFO", logger="fenicsmech"):
+        result = problem.optimise(surrogate=misleading(case), correction=fm.Correction(resolved=0.01))
+    assert result.surrogate is None
+    assert "surrogate" in caplog.text
+    assert result.worst_error < 5e-3 and result.verified
+
+
+def test_a_run_killed_between_two_rounds_ends_as_if_nothing_had_happened(tmp_path, monkeypatch):
+    whole = truss(*WANTED).problem(**COARSE).optimise(checkpoint=tmp_path / "whole.json")
+    assert len(whole.corrections) > 1
+    from fenicsmech.design import correction
+
+    file, loaded, calls = tmp_path / "checkpoint.json", correction.loaded, []
+
+    def killed(*arguments):
+        calls.append(None)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return loaded(*arguments)
+
+    with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
+        patched.setattr(correction, "loaded", killed)
+        truss(*WANTED).problem(**COARSE).optimise(checkpoint=file)
+    again = truss(*WANTED).problem(**COARSE).optimise(checkpoint=file, resume=True)
+    assert (again.iterations, again.reason, again.evaluations) == (whole.iterations, whole.reason, whole.evaluations)
+    assert again.corrections == pytest.approx(whole.corrections, rel=1e-5, abs=1e-8)
+    assert again.links[0].parameters == pytest.approx(whole.links[0].parameters, rel=1e-7, abs=1e-7)
+    assert again.objective == pytest.approx(whole.objective, rel=1e-6)
+
+
+@pytest.mark.parallel
+def test_two_ranks_correct_as_one_does():
+    alone, together = (
+        truss(*WANTED).problem(comm=comm, **COARSE).optimise() for comm in (MPI.COMM_SELF, MPI.COMM_WORLD)
+    )
+    assert together.links[0].parameters == pytest.approx(alone.links[0].parameters, rel=1e-6, abs=1e-6)
+    assert together.corrections == pytest.approx(alone.corrections, rel=1e-4, abs=1e-7)
+    assert (together.iterations, together.reason) == (alone.iterations, alone.reason)
+
+
+def test_corrections_that_make_no_sense_are_refused():
+    for name in ("change", "resolved", "contraction", "rounds"):
+        with pytest.raises(fm.DescriptionError, match=name):
+            fm.Correction(**{name: 0.0})

@@ -1,0 +1,106 @@
+"""Designs in their exported parts: the same numbers as of a scene drawn with the files, and of finer meshes."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import fenicsmech as fm
+
+from .mechanisms import bow, truss
+from .refusal import refused
+
+WANTED = ((0.1, 2.0), (0.4, 3.2))
+
+
+@pytest.fixture(scope="module")
+def verified(tmp_path_factory) -> tuple[fm.DesignProblem, fm.DesignResult, fm.DesignResult]:
+    """A design of the truss finger on coarse elements, before and after its verification in files."""
+    folder = tmp_path_factory.mktemp("parts")
+    problem = truss(*WANTED).problem()
+    result = problem.optimise(optimiser=fm.LevenbergMarquardt(iterations=3))
+    return problem, result, problem.verify(result, folder)
+
+
+def parts(result: fm.DesignResult) -> np.ndarray:
+    """Value, estimate and error of each target in the part, (targets, 3)."""
+    found = [target.part for target in result.targets]
+    assert all(found)
+    return np.array([[own.value, own.finer_elements_add, own.error] for own in found])
+
+
+def test_parts_have_the_values_of_a_scene_drawn_with_the_files(tmp_path):
+    problem = truss(*WANTED).problem()
+    result = problem.verify(problem.optimise(optimiser=fm.LevenbergMarquardt(iterations=1)), tmp_path, finer=1.5)
+    assert [path.name for path in tmp_path.iterdir()] == ["diagonal.step"]
+    finger = fm.Mechanism("truss finger")
+    base = finger.rigid("base", fixed=True)
+    left, right, tip = (finger.rigid(name) for name in ("left", "right", "tip"))
+    diagonal = finger.flexible("part", fm.step_file(tmp_path / "diagonal.step", depth=20.0), fm.SMOOTH_SIL_950)
+    for a, b, at in ((base, left, (0, 0)), (base, right, (40, 0)), (left, tip, (0, 60)), (right, tip, (40, 60))):
+        finger.revolute(a, b, at=at)
+    finger.revolute(base, diagonal, at=(0, 0), interface_radius=3.0)
+    finger.revolute(diagonal, tip, at=(40, 60), interface_radius=3.0)
+    push = finger.force(on=tip, at=(20, 70), direction=(1, 0))
+    again = fm.Simulation(fm.Scene(finger), space="plane-stress", size=2.0)
+    curve = again.load_displacement(push, forces=[0.1, 0.4])
+    assert parts(result)[:, 0] == pytest.approx(curve.displacements, rel=1e-8)
+    assert parts(result)[:, 1] == pytest.approx(curve.error_estimates(), rel=1e-6)
+
+
+def test_errors_in_the_part_are_those_of_still_finer_elements(verified):
+    problem, result, half = verified
+    assert [target.part for target in result.targets] == [None, None]
+    quarter = problem.verify(result, finer=4.0)
+    assert np.sum(parts(half)[:, :2], axis=1) == pytest.approx(np.sum(parts(quarter)[:, :2], axis=1), rel=1e-3)
+    wanted = np.array([displacement for _, displacement in WANTED])
+    assert parts(half)[:, 2] == pytest.approx(np.sum(parts(half)[:, :2], axis=1) / wanted - 1.0)
+    assert half.worst_part_error == pytest.approx(np.abs(parts(half)[:, 2]).max())
+    assert result.worst_part_error is None
+
+
+def test_results_tell_both_numbers_and_keep_them_in_files(verified, tmp_path):
+    _, result, half = verified
+    assert "in the part" in str(half) and "in the part" not in str(result)
+    assert half.part_fidelity == "plane-stress, elements of 1.5 mm"
+    half.save(tmp_path / "design.json")
+    assert fm.DesignResult.load(tmp_path / "design.json") == half
+    data = json.loads((tmp_path / "design.json").read_text())
+    assert data["targets"][0]["part"]["value"] == half.targets[0].part.value
+
+
+def test_other_shapes_bend_as_if_drawn_so():
+    def link(thickness: float):
+        rig = fm.Mechanism("cantilever")
+        wall, hand = rig.rigid("wall", fixed=True), rig.rigid("hand")
+        strip = rig.flexible("strip", fm.strip([(0, 0), (60, 0)], thickness=thickness, depth=5.0), fm.ONYX)
+        rig.weld(wall, strip, at=(0, 0), region=fm.Rectangle(6, 9))
+        rig.weld(strip, hand, at=(60, 0), region=fm.Rectangle(6, 9))
+        push = rig.force(on=hand, at=(60, 0), direction=(0, 1))
+        return fm.Simulation(fm.Scene(rig), space="plane-stress", size=1.5), strip, push
+
+    def moved(sim, push) -> float:
+        return float(sim.load_displacement(push, forces=[1.0]).displacements[0])
+
+    sim, strip, push = link(3.0)
+    thicker, same, drawn_push = link(4.0)
+    other = sim.with_shapes({strip: same.shape})
+    assert moved(other, push) == pytest.approx(moved(thicker, drawn_push), rel=1e-12)
+    assert moved(sim, push) / moved(other, push) == pytest.approx((4.0 / 3.0) ** 3, rel=0.02)
+
+
+def test_other_shapes_are_refused(verified):
+    problem, result, _ = verified
+    sim, (diagonal,) = problem.simulation, problem.simulation.scene.mechanism.flexible_links
+    refused(lambda: sim.with_shapes({diagonal: 3.0}), part="truss finger", problem="3.0", remedy="{link: shape")
+    refused(lambda: problem.verify(result, finer=0.0), part="refinement", problem="0", remedy="greater than zero")
+    other = truss((0.1, 1.0)).problem()
+    refused(lambda: other.verify(result), part="truss finger", problem="other targets", remedy="this problem")
+
+
+def test_points_on_links_that_change_are_refused():
+    problem = bow(10.0).problem()
+    result = problem.optimise(optimiser=fm.LevenbergMarquardt(iterations=1))
+    refused(lambda: problem.verify(result), part="bow", problem="place in the part", remedy="rigid link")
