@@ -118,20 +118,23 @@ from fenicsmech.mechanism import (
     step_file,
     strip,
 )
-from fenicsmech.model import SPACES, Fidelity
+from fenicsmech.model import SPACES, Design, Fidelity
 from fenicsmech.multibody import BodyPoint, Freedom, Linkage, PosePotential
 from fenicsmech.plot import CurveMark, CurveSeries, CurveTarget, Trace, plot_curve
 from fenicsmech.quantities import (
     CentrelineLength,
     Component,
+    Depth,
     Displacement,
     ForceMagnitude,
     JointForce,
     JointMoment,
+    LawParameter,
     LinkMass,
     LinkVolume,
     Magnitude,
     MotorTorque,
+    NumberKind,
     PrescribedDisplacement,
     Quantity,
     Rotation,
@@ -194,7 +197,9 @@ __all__ = [
     "DesignProblem", "SplineDesign", "ShapeBounds", "Target", "StayClose", "MeshQuality", "Regulariser",
     "LevenbergMarquardt", "BFGS", "SQP", "Optimiser", "Correction", "DesignResult", "LinkDesign", "TargetResult",
     "PartValue", "Scatter", "SearchResult", "StartResult", "Optimisation", "design_study", "Experiment", "ModulusFit",
-    "fit_modulus",
+    "fit_modulus", "Design",
+    # numbers that designs change beside shapes; NumberKind for kinds of your own
+    "Depth", "LawParameter", "NumberKind",
     # errors
     "FenicsmechError", "DescriptionError", "MeshingError", "AssemblyError", "EquilibriumError",
 ]

@@ -1,17 +1,21 @@
-"""Quantities of equilibria and of links at rest, with their derivatives by the design and by the laws' numbers.
+"""Quantities of equilibria and of links at rest, with their derivatives by the design field and by numbers of parts.
 
 - ``quantity``: what a quantity is; components and magnitudes of vectors
 - ``motion``: displacements and rotations
 - ``forces``: forces that prescribe displacements, torques of motors, reactions of joints
 - ``links``: strain energy, mass, volume and length of flexible links
 - ``sample``: the equilibria they are asked of
+- ``number``: what a number of a part is, and its derivative from an adjoint
+- ``link_numbers``: numbers of laws, depth
 - ``sensitivity``: total derivatives by adjoints
 - ``forms``: values of forms and their derivatives
 """
 
 from fenicsmech.quantities.forces import ForceMagnitude, JointForce, JointMoment, MotorTorque
+from fenicsmech.quantities.link_numbers import Depth, LawParameter
 from fenicsmech.quantities.links import CentrelineLength, LinkMass, LinkVolume, StrainEnergy
 from fenicsmech.quantities.motion import Displacement, Rotation
+from fenicsmech.quantities.number import ModelNumber, NumberKind, NumberTerms
 from fenicsmech.quantities.quantity import (
     Component,
     Magnitude,

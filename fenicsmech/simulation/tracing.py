@@ -226,7 +226,7 @@ class CurveTracer:
                 seconds=0.0,
                 phases={},
                 state=state,
-                design=model.elastic.d.x.array.copy(),
+                design=model.design,
             )
 
     def _unloaded(self, assembly: Assembly) -> State:
