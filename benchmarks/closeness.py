@@ -1,4 +1,4 @@
-"""Closeness to the drawn shape and what it costs; designs given by parameters without handle positions.
+"""Closeness to the drawn shape and its cost; designs given by parameters without handle positions.
 
     python3 -m benchmarks.closeness [MECHANISM …] [--size MM]
 

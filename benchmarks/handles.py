@@ -30,7 +30,7 @@ PICTURE = ROOT / "demos" / "pictures" / "handles.png"
 
 
 class Link:
-    """The link with its handles, and what the cells of its shapes look like."""
+    """The link with its handles, and the cells of its shapes."""
 
     def __init__(self, size: float) -> None:
         rig = fm.Mechanism("one link")
