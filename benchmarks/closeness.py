@@ -3,7 +3,7 @@
     python3 -m benchmarks.closeness [MECHANISM …] [--size MM]
 
 Plane stress, Levenberg–Marquardt from the drawn design. The worst target error with R_init weighted as by default and
-with the article's weight 1, and the largest change of a target's displacement when the optimum of the default weight is
+with the paper's weight 1, and the largest change of a target's displacement when the optimum of the default weight is
 given by its parameters alone, so that handle positions are found anew.
 """
 
