@@ -193,7 +193,7 @@ class MechanismModel:
         depths: of the flexible links.
         mesh: the reference mesh of all flexible links.
         elastic: their elastic energy.
-        fields: what energies of effects are written in.
+        fields: the fields of effects' energies.
         interfaces: interface nodes as functions of body poses.
         design_nodes: the design field at the nodes of the displacement.
         node_link: index of the flexible link of every local node.
@@ -283,7 +283,7 @@ class MechanismModel:
         return Design(self._shape.copy(), {kind: own.value for kind, own in self._numbers.items()})
 
     def number(self, kind):
-        """The ``ModelNumber`` of a ``NumberKind`` on this model; its value belongs to the model's designs from now on."""
+        """The ``ModelNumber`` of a ``NumberKind`` on this model; designs of the model tell it from now on."""
         if kind not in self._numbers:
             self._numbers[kind] = kind.on(self)
         return self._numbers[kind]

@@ -1,11 +1,11 @@
 """Quantities of equilibria and of links at rest, with their derivatives by the design field and by numbers of parts.
 
-- ``quantity``: what a quantity is; components and magnitudes of vectors
+- ``quantity``: the interface of quantities; components and magnitudes of vectors
 - ``motion``: displacements and rotations
 - ``forces``: forces that prescribe displacements, torques of motors, reactions of joints
 - ``links``: strain energy, mass, volume and length of flexible links
-- ``sample``: the equilibria they are asked of
-- ``number``: what a number of a part is, and its derivative from an adjoint
+- ``sample``: the equilibria at which they are evaluated
+- ``number``: numbers of parts, and their derivatives from adjoints
 - ``link_numbers``: numbers of laws, depth
 - ``sensitivity``: total derivatives by adjoints
 - ``forms``: values of forms and their derivatives
