@@ -17,6 +17,9 @@ from fenicsmech.design import (
     LinkDesign,
     MeshQuality,
     ModulusFit,
+    Number,
+    NumberBounds,
+    NumberDesign,
     Optimiser,
     PartValue,
     Regulariser,
@@ -199,7 +202,7 @@ __all__ = [
     "PartValue", "Scatter", "SearchResult", "StartResult", "Optimisation", "design_study", "Experiment", "ModulusFit",
     "fit_modulus", "Design",
     # numbers that designs change beside shapes; NumberKind for kinds of your own
-    "Depth", "LawParameter", "NumberKind",
+    "Number", "Depth", "LawParameter", "NumberBounds", "NumberDesign", "NumberKind",
     # errors
     "FenicsmechError", "DescriptionError", "MeshingError", "AssemblyError", "EquilibriumError",
 ]

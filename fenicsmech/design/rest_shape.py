@@ -1,29 +1,32 @@
-"""The rest shape of a simulation's links as a function of the design p, with optimal handles.
+"""The design of a simulation as a function of parameters p: the links' rest shapes, with optimal handles, and numbers.
 
-    p → θ*(p) → d(p, θ*(p)) → X = X₀ + c + d
+    p = (p_shapes, q),     p_shapes → θ* → d(p_shapes, θ*) → X = X₀ + c + d
 
 with the handle positions θ, the design field d and the bulge c of the drawn edges. Handle positions are best for the
-straight cells between the vertices. Edges of the outline follow the design between them too; a design whose curved
-cells are squeezed too much has no rest shape.
+straight cells of drawn depth between the vertices. Edges of the outline follow the design between them too; a design
+whose curved cells are squeezed too much has no rest shape.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
-from fenicsmech.compat import cell_dofs, vector_space
+from fenicsmech.compat import cell_dofs, owned_values, vector_space
 from fenicsmech.design.description import Bounds, SplineDesign, shape_request
+from fenicsmech.design.numbers import TYPICAL, Number, ScaledNumbers
 from fenicsmech.design.shape.handle_optimum import HandleOptimum, HandlePlacement, ShapeError
 from fenicsmech.design.shape.quality import Barrier, QualitySum
 from fenicsmech.design.shape.shape_map import LinkShape, ShapeMap, shape_links
 from fenicsmech.design.shape.spline import LinkSpline, SplineSamples
 from fenicsmech.meshing import edge_corners, least_stretches
-from fenicsmech.model import MechanismModel
+from fenicsmech.model import Design, MechanismModel
+from fenicsmech.quantities import Gradient
 from fenicsmech.simulation import Simulation
 
 
@@ -52,23 +55,32 @@ _LEAST_STRETCH = 0.1  # least det ∂X/∂X₁ in a cell, X₁ the straight cell
 
 
 class ParametricShape:
-    """The rest shape of one model.
+    """The design of one model.
 
     Args:
         model: whose links change.
         shapes: handles and weights of these links.
         designs: how they may change.
+        numbers: that may change beside shapes.
 
     Attributes:
-        links: the links that change.
+        links: the links whose shape changes.
+        numbers: those that change.
         initial: p of the drawn design, (parameters,).
-        lengths: typical change ℓ of each parameter, (parameters,): a link's thickness; 1 for δ.
+        lengths: typical change ℓ of each parameter, (parameters,): a link's thickness; 1 for δ; 0.1 for q.
+        of_numbers: the entries q of p.
 
     Raises:
-        DescriptionError: the drawn thickness of a link is not within its bounds.
+        DescriptionError: the drawn thickness of a link, or a number, is not within its bounds.
     """
 
-    def __init__(self, model: MechanismModel, shapes: Sequence[LinkShape], designs: Sequence[SplineDesign]) -> None:
+    def __init__(
+        self,
+        model: MechanismModel,
+        shapes: Sequence[LinkShape],
+        designs: Sequence[SplineDesign],
+        numbers: Sequence[Number] = (),
+    ) -> None:
         self._model, design = model, model.elastic.d
         self._map = ShapeMap(model.mesh, design, shapes)
         self._cells = np.flatnonzero(np.isin(model.mesh.link, [shape.link for shape in shapes]))
@@ -78,20 +90,23 @@ class ParametricShape:
         self._ratio = QualitySum(self._straight, comm=model.mesh.comm)
         self._optimum = HandleOptimum(self._vertex_map, self._ratio)
         self._penalties: dict[Barrier, QualitySum] = {}
-        self.initial = self._map.initial
+        self.numbers = ScaledNumbers(model, numbers)
+        self.initial = np.concatenate([self._map.initial, self.numbers.initial])
+        self.of_numbers = slice(len(self._map.initial), len(self.initial))
         links, first = [], 0
         for shape, wanted in zip(shapes, designs, strict=True):
             spline, h = shape.handles.spline, shape.thickness
             place = slice(first, first := first + spline.size)
             links.append(DesignedLink(wanted.link.name, place, spline, SplineSamples(spline), h, wanted.bounds(h)))
         self.links = tuple(links)
-        self.lengths = np.concatenate([np.where(s.spline.is_thickness, 1.0, s.thickness) for s in self.links])
+        lengths = [np.where(s.spline.is_thickness, 1.0, s.thickness) for s in self.links]
+        self.lengths = np.concatenate([*lengths, np.full(len(self.numbers.initial), TYPICAL)])
 
     @staticmethod
-    def of(simulation: Simulation, designs: Sequence[SplineDesign]) -> ParametricShape:
-        """The rest shape of a simulation's links, handles and weights computed on its mesh."""
+    def of(simulation: Simulation, designs: Sequence[SplineDesign], numbers: Sequence[Number] = ()) -> ParametricShape:
+        """The design of a simulation, handles and weights of its links computed on its mesh."""
         requests = [shape_request(design, simulation.scene.mechanism, simulation.linkage) for design in designs]
-        return ParametricShape(simulation.model, shape_links(simulation.model.mesh, requests), designs)
+        return ParametricShape(simulation.model, shape_links(simulation.model.mesh, requests), designs, numbers)
 
     def known(self, p: np.ndarray, theta: np.ndarray) -> HandlePlacement | None:
         """A placement to start from, for handle positions found before; None if their number has changed."""
@@ -104,25 +119,34 @@ class ParametricShape:
         return self._map.positions(placement.theta)
 
     def place(self, p: np.ndarray, near: HandlePlacement | None) -> HandlePlacement:
-        """Gives the links the shape of design ``p`` with optimal handles.
+        """Gives the model the design ``p`` with optimal handles.
 
         Args:
             p: the design, (parameters,).
             near: placement of a design near by.
 
         Raises:
-            ShapeError: cells stay inverted however the handles are placed, or curved ones are squeezed.
+            ShapeError: cells stay inverted however the handles are placed, or curved ones are squeezed, or a number is
+                out of its bounds.
         """
-        placement = self._optimum.solve(p, near)
+        placement = self._optimum.solve(p, near or self._drawn)
         self._model.reshape(self._placed(placement))
         return placement
 
-    def field(self, p: np.ndarray, near: HandlePlacement | None) -> np.ndarray:
-        """This rank's values of the design field for ``p``, ghosts last, flat; the links keep the shape they have."""
-        return self._placed(self._optimum.solve(p, near))
+    def design(self, p: np.ndarray, near: HandlePlacement | None) -> Design:
+        """The design ``p``; the model keeps the one it has."""
+        return self._placed(self._optimum.solve(p, near or self._drawn))
 
-    def _placed(self, placement: HandlePlacement) -> np.ndarray:
-        """The design field of a placement, this rank's values, ghosts last, flat."""
+    @property
+    def _drawn(self) -> HandlePlacement:
+        return HandlePlacement(self.initial, self._map.initial_theta)
+
+    def _placed(self, placement: HandlePlacement) -> Design:
+        """The design of a placement."""
+        q = placement.p[self.of_numbers]
+        for own, scaled in zip(self.numbers.numbers, q, strict=True):
+            if not 0.0 < scaled < 1.0:
+                raise ShapeError(str(own), "it is out of its bounds", "Change it by less")
         field, elastic, mesh = self._map.field(placement.p, placement.theta), self._model.elastic, self._model.mesh
         if elastic.order > 1:
             bent = field if elastic.bulge is None else field + elastic.bulge.x.array.reshape(field.shape)
@@ -133,10 +157,15 @@ class ParametricShape:
             least = mesh.mesh.comm.allreduce(float(squeezed.min(initial=1.0)), op=MPI.MIN)
             if least < _LEAST_STRETCH:
                 raise ShapeError("rest shape", "its curved edges squeeze cells", "Change it by less, or mesh it finer")
-        return field.ravel()
+        return Design(field.ravel(), self.numbers.values(q))
+
+    def slopes(self, placement: HandlePlacement, gradients: Sequence[Gradient]) -> np.ndarray:
+        """dQ/dp of some components at the design placed as in ``placement``, (components, parameters)."""
+        fields = np.array([own.design for own in gradients])
+        return np.hstack([self.gradient(placement, fields), self.numbers.slopes(gradients)])
 
     def gradient(self, placement: HandlePlacement, nodal: np.ndarray) -> np.ndarray:
-        """dO/dp (…, parameters) from ∂O/∂d (…, owned values) of the design placed as in ``placement``."""
+        """dO/dp of shapes (…, parameters) from ∂O/∂d (…, owned values) of the design placed as in ``placement``."""
         fields = nodal.reshape(*nodal.shape[:-1], self._map.owned, -1)
         by_p, by_theta = self._map.apply_transpose(placement.p, placement.theta, fields)
         return self._optimum.total_gradient(placement, by_p, by_theta)
@@ -153,5 +182,18 @@ class ParametricShape:
             self._penalties[barrier] = QualitySum(self._straight, barrier.symbolic)
         total = self._penalties[barrier]
         self._straight.interpolate(self._model.elastic.d)
-        by_p, by_theta = self._vertex_map.apply_transpose(placement.p, placement.theta, total.gradient())
-        return total.value(), self._optimum.total_gradient(placement, by_p, by_theta)
+        slope = total.gradient()
+        by_p, by_theta = self._vertex_map.apply_transpose(placement.p, placement.theta, slope)
+        by_q = self._model.mesh.mesh.comm.allreduce(self._vertex_rates @ slope.ravel(), op=MPI.SUM) * self.numbers.width
+        return total.value(), np.concatenate([self._optimum.total_gradient(placement, by_p, by_theta), by_q])
+
+    @cached_property
+    def _vertex_rates(self) -> np.ndarray:
+        """∂d/∂v of each number's value v at this rank's owned vertices, flat, (numbers, owned values)."""
+        field, vertices = (fem.Function(own.function_space) for own in (self._model.elastic.d, self._straight))
+        rates = np.zeros((len(self.numbers.on_model), len(owned_values(vertices))))
+        for row, own in zip(rates, self.numbers.on_model, strict=True):
+            field.x.array[:] = own.rate
+            vertices.interpolate(field)
+            row[:] = owned_values(vertices)
+        return rates

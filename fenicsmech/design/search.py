@@ -41,8 +41,9 @@ class Scatter:
 
     Attributes:
         starts: their number, the drawn design included.
-        spread: largest change of a parameter, in typical lengths: a link's thickness. Thicknesses change by half of
-            the way to the nearer bound at most.
+        spread: largest change of a parameter, in typical lengths: a link's thickness, and for numbers a tenth of the
+            interval between their bounds. Thicknesses and numbers change by half of the way to the nearer bound at
+            most.
         seed: other seeds give other starts.
         draws: most shapes drawn for a start until one is feasible.
         trial: iterations after which the worse half is given up, but for designs that meet their targets.
@@ -267,7 +268,9 @@ class Search:
         rest, scatter = self._rest, self._scatter
         if k == 0:
             return rest.initial, 0
-        reach = np.concatenate([_reach(link, scatter.spread) for link in rest.links]) * rest.lengths
+        nearest = 0.5 * np.minimum(rest.numbers.initial, 1.0 - rest.numbers.initial)
+        numbers = np.minimum(scatter.spread, nearest / rest.lengths[rest.of_numbers])
+        reach = np.concatenate([*(_reach(link, scatter.spread) for link in rest.links), numbers]) * rest.lengths
         for draw in range(scatter.draws):
             scattered = qmc.LatinHypercube(len(reach), seed=np.random.default_rng([scatter.seed, draw]))
             p = rest.initial + (2.0 * scattered.random(scatter.starts)[k] - 1.0) * reach
@@ -376,7 +379,10 @@ def outcome(
 
 def _distance(one: DesignResult, other: DesignResult, lengths: np.ndarray) -> float:
     """Largest difference of a parameter, in typical lengths."""
-    p, q = (np.concatenate([link.parameters for link in result.links]) for result in (one, other))
+    p, q = (
+        np.concatenate([*(link.parameters for link in result.links), [own.scaled for own in result.numbers]])
+        for result in (one, other)
+    )
     return float(np.max(np.abs(p - q) / lengths))
 
 

@@ -15,7 +15,7 @@ from fenicsmech.quantities.forces import ForceMagnitude, JointForce, JointMoment
 from fenicsmech.quantities.link_numbers import Depth, LawParameter
 from fenicsmech.quantities.links import CentrelineLength, LinkMass, LinkVolume, StrainEnergy
 from fenicsmech.quantities.motion import Displacement, Rotation
-from fenicsmech.quantities.number import ModelNumber, NumberKind, NumberTerms
+from fenicsmech.quantities.number import ModelNumber, NumberKind, NumberTerms, read_kind
 from fenicsmech.quantities.quantity import (
     Component,
     Magnitude,

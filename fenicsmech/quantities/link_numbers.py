@@ -49,6 +49,7 @@ class Depth(_OfLinks):
     """
 
     what = "depth"
+    changes_solids = True
 
     def described(self, part):
         return part.shape.depth
@@ -86,6 +87,10 @@ class LawParameter(_OfLinks):
     @property
     def name(self):
         return f"{self.parameter} of {' and '.join(repr(link.name) for link in self.parts)}"
+
+    @property
+    def slots(self):
+        return tuple((*slot, self.parameter) for slot in super().slots)
 
     @property
     def words(self):

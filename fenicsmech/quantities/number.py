@@ -13,7 +13,7 @@ each.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -82,6 +82,7 @@ class NumberKind(ABC):
     Attributes:
         parts: likewise.
         moves_unloaded: whether the unloaded configuration, from which displacements count, moves with it.
+        changes_solids: whether the solids of its parts change.
 
     Raises:
         DescriptionError: there are no parts, or one is given twice.
@@ -89,6 +90,7 @@ class NumberKind(ABC):
 
     what: ClassVar[str]
     moves_unloaded: ClassVar[bool] = False
+    changes_solids: ClassVar[bool] = False
     parts: tuple[Any, ...]
 
     def __init__(self, *parts: Any) -> None:
@@ -124,6 +126,11 @@ class NumberKind(ABC):
     def name(self) -> str:
         """The number in words."""
         return f"{self.what} of {' and '.join(repr(self.label(part)) for part in self.parts)}"
+
+    @property
+    def slots(self) -> tuple[Hashable, ...]:
+        """What it changes; two kinds that change the same contradict each other."""
+        return tuple((type(self), part) for part in self.parts)
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -177,3 +184,20 @@ class NumberKind(ABC):
 
     def __str__(self) -> str:
         return self.name
+
+
+def read_kind(scene: Scene, kind: str, words: Sequence[str]) -> NumberKind:
+    """The kind of number whose class is named ``kind``, with its ``words``.
+
+    Raises:
+        DescriptionError: there is no such class, or the scene has no such part.
+    """
+    for known in _derived(NumberKind):
+        if known.__name__ == kind:
+            return known.read(scene, words)
+    raise DescriptionError(f"number {kind!r}", "there is no such kind", "Import the module that defines it")
+
+
+def _derived(base: type) -> list[type]:
+    own = base.__subclasses__()
+    return own + [found for cls in own for found in _derived(cls)]

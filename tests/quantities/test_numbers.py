@@ -23,8 +23,8 @@ NUMBERS = {
     "modulus": (lambda bench: fm.LawParameter("E", links(bench)[1]), (16.0, 8.0, 4.0)),
     "Poisson's ratio": (lambda bench: fm.LawParameter("nu", links(bench)[1]), (0.016, 0.008, 0.004, 0.002)),
     "modulus of both": (lambda bench: fm.LawParameter("E", *links(bench)), (16.0, 8.0, 4.0)),
-    "depth": (lambda bench: fm.Depth(links(bench)[1]), (0.2, 0.1, 0.05, 0.025)),
-    "depth of both": (lambda bench: fm.Depth(*links(bench)), (0.2, 0.1, 0.05, 0.025)),
+    "depth": (lambda bench: fm.Depth(links(bench)[1]), (0.1, 0.05, 0.025, 0.0125)),
+    "depth of both": (lambda bench: fm.Depth(*links(bench)), (0.1, 0.05, 0.025, 0.0125)),
 }
 CASES = ("plane-stress", "plane-stress moved", "plane-strain pressure", "3d-symmetric", "3d moved", "3d pressure")
 
