@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -177,7 +178,7 @@ class Design:
     """
 
     field: np.ndarray
-    numbers: Mapping[Any, float] = field(default_factory=dict)
+    numbers: Mapping[Any, float] = dataclasses.field(default_factory=dict)
 
     def halfway(self, other: Design) -> Design:
         """The mean of both."""

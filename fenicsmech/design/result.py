@@ -300,8 +300,8 @@ def read_result(data: dict) -> DesignResult:
         part = own.pop("part", None)
         part = part and PartValue(**{key: frozen(value) for key, value in part.items()})
         targets.append(TargetResult(**{key: frozen(value) for key, value in own.items()}, part=part))
-    found = {"links": links, "numbers": tuple(numbers), "targets": tuple(targets)}
-    return DesignResult(**found, **{key: frozen(value) for key, value in data.items()})
+    rest = {key: frozen(value) for key, value in data.items()}
+    return DesignResult(links=links, numbers=tuple(numbers), targets=tuple(targets), **rest)
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,7 +30,7 @@ from fenicsmech.elasticity import PLANE_STRESS, ElasticModel
 from fenicsmech.errors import DescriptionError, EquilibriumError, positive
 from fenicsmech.log import Progress
 from fenicsmech.mechanism import Strip
-from fenicsmech.model import fits
+from fenicsmech.model import Design, fits
 from fenicsmech.polygons import first_crossing
 from fenicsmech.simulation import Simulation
 
@@ -165,8 +165,8 @@ class Searchable(Protocol):
 
     targets: tuple[Target, ...]
 
-    def rest_shape(self, design: np.ndarray) -> np.ndarray:
-        """The design field, or a ShapeError."""
+    def rest_shape(self, design: np.ndarray) -> Design:
+        """The design of parameters, or a ShapeError."""
 
     def optimise(
         self, *, optimiser: Optimiser, start: DesignResult | np.ndarray, correction: Correction

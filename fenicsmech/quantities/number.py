@@ -198,6 +198,6 @@ def read_kind(scene: Scene, kind: str, words: Sequence[str]) -> NumberKind:
     raise DescriptionError(f"number {kind!r}", "there is no such kind", "Import the module that defines it")
 
 
-def _derived(base: type) -> list[type]:
+def _derived(base: type[NumberKind]) -> list[type[NumberKind]]:
     own = base.__subclasses__()
     return own + [found for cls in own for found in _derived(cls)]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.design import DesignResult, LinkDesign, TargetResult
+from fenicsmech.design import DesignResult, LinkDesign, NumberDesign, TargetResult
 
 
 def link(name: str, thickness: tuple[float, float]) -> LinkDesign:
@@ -28,6 +28,7 @@ def link(name: str, thickness: tuple[float, float]) -> LinkDesign:
 RESULT = DesignResult(
     mechanism="Zange “ß”",
     links=(link("coupler", (1.0 / 3.0, 2.0)), link("rocker", (0.7, 4.1))),
+    numbers=(NumberDesign("depth of 'rocker'", "Depth", ("rocker",), 10.0 / 3.0, 4.0, (1.0, 7.1), "mm"),),
     targets=(
         TargetResult(
             *("displacement of 'push' under 'push' of 0.1, as drawn", "as drawn", 0.1, "mm", "equals"),
