@@ -18,7 +18,7 @@ COARSE = {"space": "3d", "size": 4.0, "order": 1}
 
 
 class Traced(Counter):
-    """How often equilibria were loaded from zero, per space.
+    """Number of times that equilibria were loaded from zero, per space.
 
     Attributes:
         most: in 3D, after which the run is killed.

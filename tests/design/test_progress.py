@@ -12,7 +12,7 @@ ERRORS = np.array([0.02, -0.25])
 
 @pytest.fixture
 def shown(capfd):
-    """The lines shown of predicted reductions, one per iteration of ten seconds."""
+    """Output for predicted reductions, one per iteration of ten seconds."""
 
     def show(optimiser: LevenbergMarquardt, reductions: list[float], last: Reason | None = None) -> list[str]:
         now = 0.0
