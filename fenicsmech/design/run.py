@@ -216,7 +216,7 @@ class Checkpoint:
             other = [key for key in mine if data["problem"].get(key) != mine[key]]
             raise DescriptionError(
                 part,
-                f"it belongs to another problem: {', '.join(other)} differ(s)",
+                f"it belongs to another problem, with other {', '.join(other)}",
                 "Resume with the options of the first run, or start anew",
             )
         return data
