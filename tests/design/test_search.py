@@ -229,7 +229,7 @@ def test_a_search_that_was_killed_goes_on_and_gives_the_same_list(tmp_path, afte
 
 def test_checkpoints_of_another_search_are_refused(tmp_path):
     searched(TwoValleys(), checkpoint=checkpoints(tmp_path))
-    with pytest.raises(fm.DescriptionError, match="another problem: wanted differ"):
+    with pytest.raises(fm.DescriptionError, match="another problem, with other wanted"):
         searched(TwoValleys(wanted=2.0), checkpoint=checkpoints(tmp_path, wanted=2.0), resume=True)
 
 
