@@ -30,7 +30,7 @@ from mpi4py import MPI
 from fenicsmech.collective import on_one
 from fenicsmech.design import DesignProblem, DesignResult
 from fenicsmech.equilibrium import Unknown
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, counted
 from fenicsmech.files import write_json
 from fenicsmech.log import print_once
 from fenicsmech.mechanism import Force
@@ -45,7 +45,7 @@ class Report:
     Attributes:
         folder: of its files.
         summary: all figures, as in ``summary.json``.
-        curves: what it reports on, those of the optimum after an optimisation.
+        curves: those reported on, of the optimum after an optimisation.
     """
 
     folder: Path
@@ -132,7 +132,7 @@ def design_study(
 
     Args:
         folder: of the files; created if it does not exist.
-        problem: what is optimised.
+        problem: the design problem.
         curves: of the drawn design, by ``load_displacement``; at least one.
         resume: whether to continue an optimisation that was interrupted.
         pin_diameter: of the holes for pins in the exported links; there are none by default.
@@ -306,7 +306,8 @@ def _text(summary: dict, folder: Path) -> str:
     dofs, seconds = summary["dofs"], summary["seconds"]
     phases = ", ".join(f"{name} {value:.2f}" for name, value in seconds["phases"].items())
     lines += [
-        f"{dofs['rigid']} rigid + {dofs['flexible']} flexible unknowns, {summary['ranks']} process(es)",
+        f"{dofs['rigid']} rigid + {dofs['flexible']} flexible unknowns, "
+        f"{counted(summary['ranks'], 'process', 'processes')}",
         f"seconds: {phases}",
         f"seconds per loaded equilibrium (median): {seconds['frame_median']:.3f}; "
         f"peak memory {summary['peak_memory_mb']:.0f} MB",

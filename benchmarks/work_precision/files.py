@@ -6,6 +6,7 @@ import csv
 from collections.abc import Sequence
 from pathlib import Path
 
+from fenicsmech.errors import counted
 from fenicsmech.files import atomic_write
 from fenicsmech.report import format_table
 
@@ -21,7 +22,7 @@ def save_study(study: Study, folder: str | Path) -> None:
     """Writes table.csv, table.md and, if there is a reference, work-precision.png (call on one rank).
 
     Args:
-        study: what was measured.
+        study: the measurements.
         folder: made if missing.
 
     Raises:
@@ -40,7 +41,7 @@ def save_study(study: Study, folder: str | Path) -> None:
 
 
 def study_rows(study: Study) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
-    """Headers and rows of the full table: one row per level, None for what is not known."""
+    """Headers and rows of the full table: one row per level, None for unknown values."""
     unit = study.scene.units.length
     headers = (
         "level",
@@ -126,7 +127,7 @@ def study_text(study: Study) -> str:
     what = f"{study.scene.mechanism.name}: {study.quantity.name}, {study.quantity.load:g} {study.scene.units.force}"
     return "\n".join(
         [
-            f"{what}, {study.quantity.configuration.name}; {study.ranks} process(es)",
+            f"{what}, {study.quantity.configuration.name}; {counted(study.ranks, 'process', 'processes')}",
             "",
             format_table(headers, rows, digits=_DIGITS),
             "",

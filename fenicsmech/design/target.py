@@ -1,4 +1,4 @@
-"""Targets: what is wanted of quantities at samples, their checks, and the comparison of values with them."""
+"""Targets: requirements on quantities at samples, their checks, and the comparison of values with them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenicsmech.design.description import SplineDesign
-from fenicsmech.errors import DescriptionError, finite, positive
+from fenicsmech.errors import DescriptionError, counted, finite, positive
 from fenicsmech.mechanism import DRAWN, Configuration, Force, Units
 from fenicsmech.multibody import assemble
 from fenicsmech.quantities import Displacement, ForceMagnitude, Quantity, Sample
@@ -19,7 +19,7 @@ Numbers = float | Sequence[float]
 
 @dataclass(frozen=True, init=False)
 class Target:
-    """What is wanted of a quantity at a sample.
+    """A requirement on a quantity at a sample.
 
         Target(Displacement(tip, at=(40, 60)), grasp, equals=(5.0, -1.0))
         Target(ForceMagnitude(push), Sample({push: at(5.0)}), equals=2.0)
@@ -48,7 +48,7 @@ class Target:
         scale: if it was given.
 
     Raises:
-        DescriptionError: a number makes no sense, or the target does not say what is wanted.
+        DescriptionError: a number makes no sense, or no relation is given.
     """
 
     quantity: Quantity
@@ -137,7 +137,7 @@ class Target:
 
 
 class Comparison:
-    """Values of all components against what is wanted of them.
+    """Values of all components beside the wanted ones.
 
     With the scale s and the weight w of a target, and the value v of a component,
 
@@ -157,7 +157,7 @@ class Comparison:
         relative: whether a least quantity is relative to its drawn value.
 
     Raises:
-        DescriptionError: nothing tells the scale of a wanted zero.
+        DescriptionError: zero is wanted, and no scale is given.
     """
 
     def __init__(self, targets: Sequence[Target], units: Units, drawn: np.ndarray | None = None) -> None:
@@ -283,7 +283,9 @@ def check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
         target.quantity.check(simulation.scene, dim)
         if len(target.wanted) > size or target.size == 1 < size:
             raise DescriptionError(
-                part, f"it has {size} component(s) and {target.size} is or are wanted", "Give as many numbers as it has"
+                part,
+                f"it has {counted(size, 'component')} and {counted(target.size, 'wanted value')}",
+                "Give as many numbers as it has",
             )
         if target.sample is not None and isinstance(target.quantity, ForceMagnitude):
             moved = target.sample.moved

@@ -1,12 +1,11 @@
 """Quantities of equilibria and of links at rest, with their derivatives by the design and by the laws' numbers.
 
-- ``quantity``: what a quantity is; components and magnitudes of vectors
+- ``quantity``: the interface of quantities; components and magnitudes of vectors
 - ``motion``: displacements and rotations
 - ``forces``: forces that prescribe displacements, torques of motors, reactions of joints
 - ``links``: strain energy, mass, volume and length of flexible links
-- ``sample``: the equilibria they are asked of
+- ``sample``: the equilibria at which they are evaluated
 - ``sensitivity``: total derivatives by adjoints
-- ``forms``: values of forms and their derivatives
 """
 
 from fenicsmech.quantities.forces import ForceMagnitude, JointForce, JointMoment, MotorTorque
@@ -14,6 +13,7 @@ from fenicsmech.quantities.links import CentrelineLength, LinkMass, LinkVolume, 
 from fenicsmech.quantities.motion import Displacement, Rotation
 from fenicsmech.quantities.quantity import (
     Component,
+    FormValue,
     Magnitude,
     Observable,
     Partial,
@@ -23,28 +23,3 @@ from fenicsmech.quantities.quantity import (
 )
 from fenicsmech.quantities.sample import PrescribedDisplacement, Sample, at
 from fenicsmech.quantities.sensitivity import Gradient, Sensitivity
-
-__all__ = [
-    "CentrelineLength",
-    "Component",
-    "Displacement",
-    "ForceMagnitude",
-    "Gradient",
-    "JointForce",
-    "JointMoment",
-    "LinkMass",
-    "LinkVolume",
-    "Magnitude",
-    "MotorTorque",
-    "Observable",
-    "Partial",
-    "PrescribedDisplacement",
-    "Quantity",
-    "RestObservable",
-    "Rotation",
-    "Sample",
-    "Sensitivity",
-    "StrainEnergy",
-    "at",
-    "border_of",
-]

@@ -29,7 +29,7 @@ class Discretisation:
         shapes: of the flexible links.
 
     Raises:
-        DescriptionError: links, joints or points cannot be right.
+        DescriptionError: links, joints or points contradict each other.
     """
 
     def __init__(
@@ -52,11 +52,7 @@ class Discretisation:
         on_one(comm, lambda: check_links(scene.mechanism, tuple(self.shapes.values()), self.linkage, fidelity))
 
     def at(
-        self,
-        fidelity: Fidelity,
-        clock: Clock,
-        comm: MPI.Comm,
-        shapes: Mapping[FlexibleLink, Shape] | None = None,
+        self, fidelity: Fidelity, clock: Clock, comm: MPI.Comm, shapes: Mapping[FlexibleLink, Shape] | None = None
     ) -> Discretisation:
         """The same scene at another fidelity, on other processes or with links of other shapes, nothing meshed yet."""
         shapes = self.shapes | dict(shapes or {})
@@ -101,7 +97,7 @@ class Discretisation:
         return Estimates(self.model)
 
     def solver(self, part: PrescribedPart, others: tuple[tuple[Force, float], ...] = ()) -> EquilibriumSolver:
-        """The solver for what changes and some constant forces, kept for all configurations."""
+        """The solver for a force or motors that change and some constant forces, kept for all configurations."""
         key = part, others
         if key not in self._solvers:
             loads = tuple((self.model.point_load(other), float(magnitude)) for other, magnitude in others)

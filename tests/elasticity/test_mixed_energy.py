@@ -1,17 +1,11 @@
-"""Strain energies with a pressure of their own: the same energy at the pressure that makes them stationary."""
+"""Energies of the u–p (mixed) formulation: the law's energy at the pressure that makes them stationary."""
 
 import numpy as np
 import pytest
 import ufl
 
 from fenicsmech.elasticity import PLANE_STRAIN, SPATIAL
-from fenicsmech.laws import (
-    IsochoricNeoHookean,
-    IsochoricSimoNeoHookean,
-    Law,
-    LogarithmicNeoHookean,
-    NeoHookean,
-)
+from fenicsmech.laws import IsochoricNeoHookean, IsochoricSimoNeoHookean, Law, LogarithmicNeoHookean, NeoHookean
 
 from . import textbook
 from .cases import LAWS, each_law, name

@@ -18,7 +18,7 @@ LIMIT, TURNING = fm.Critical.LIMIT, fm.Critical.TURNING
 
 
 def _highest(function, low: float, high: float) -> float:
-    """Where a smooth function of one number is largest."""
+    """The maximum of a smooth function of one number."""
     return minimize_scalar(lambda x: -function(x), bounds=(low, high), method="bounded", options={"xatol": 1e-10}).x
 
 
@@ -78,10 +78,5 @@ CASES = (
         "toggle", "snaps through, and back where a soft link stands in series; against the closed form", _toggle, BOTH
     ),
     HardCase("shallow arch", "load falls between two limit points, against the beam", _arch, BOTH),
-    HardCase(
-        "bistable four-bar",
-        "one flexible link, pushed through to its mirror image",
-        _four_bar,
-        BOTH,
-    ),
+    HardCase("bistable four-bar", "one flexible link, pushed through to its mirror image", _four_bar, BOTH),
 )

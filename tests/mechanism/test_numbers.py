@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, counted
 from fenicsmech.mechanism import (
     Arc,
     Configuration,
@@ -33,7 +33,7 @@ def pin(p, **options):
     )
 
 
-# What is named in the message, and the entry: a function of the parts and the number that is wrong.
+# The name in the message, and the entry: a function of the parts and the number that is wrong.
 COORDINATES = {
     "position of 'far pin'": lambda p, x: pin(p, at=(x, 0.0)),
     "axis of 'far pin'": lambda p, x: pin(p, axis=(0.0, x, 1.0)),
@@ -168,7 +168,9 @@ def test_wrong_number_of_coordinates_is_refused(part, values, wanted, action):
 )
 def test_too_few_points_are_refused(part, least, action):
     given = least - 1
-    assert_refused(lambda: action(TRIANGLE[:given]), part, f"{given} point(s) given", f"Give at least {least} points")
+    assert_refused(
+        lambda: action(TRIANGLE[:given]), part, f"{counted(given, 'point')} given", f"Give at least {least} points"
+    )
 
 
 def test_outline_of_anything_but_lines_and_arcs_is_refused():

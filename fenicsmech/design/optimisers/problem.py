@@ -189,7 +189,7 @@ class Reason(Enum):
     """Reasons for the end of a minimisation; the value is text."""
 
     CONVERGED = "the gradient vanishes or the objective no longer falls: a minimum was found"
-    RESOLVED = "what is left to gain is small beside the error of the elements: refine them, or give a tolerance"
+    RESOLVED = "the remaining gain is small beside the error of the elements: refine them, or give a tolerance"
     VIOLATED = "inequalities stay violated, and no small change of the design mends it: relax one, or start elsewhere"
     ITERATIONS = "the number of iterations ran out: allow more to get closer to the minimum"
     NO_DESCENT = "no step lowers the objective although the gradient does not vanish: check bounds and mesh quality"
@@ -225,7 +225,7 @@ class Iterate:
         evaluations: objective evaluations so far, infeasible ones included.
         evaluation: the best point.
         memory: state of the optimiser, for resuming.
-        promise: the predicted reduction, over the objective; inf if that is not known.
+        reduction: the predicted one, over the objective; inf if that is not known.
         reason: None while it runs.
     """
 
@@ -233,7 +233,7 @@ class Iterate:
     evaluations: int
     evaluation: Evaluation
     memory: np.ndarray
-    promise: float
+    reduction: float
     reason: Reason | None
 
 
@@ -243,14 +243,14 @@ class Optimiser(ABC):
 
     Attributes:
         iterations: most iterations.
-        least_promise: predicted reduction over the objective at which it ends at the latest.
+        least_reduction: predicted reduction over the objective at which it ends at the latest.
     """
 
     iterations: int
 
     @property
     @abstractmethod
-    def least_promise(self) -> float: ...
+    def least_reduction(self) -> float: ...
 
     @abstractmethod
     def minimise(self, problem: Problem, start: Start, *, watch: Callable[[Iterate], None]) -> Iterate:
