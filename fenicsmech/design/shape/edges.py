@@ -174,7 +174,7 @@ class MidEdgeNodes:
             (self._a[mine], 0.5 * along * e - by_chord),
             (self._b[mine], 0.5 * along * e + by_chord),
         ):
-            np.add.at(found, (..., nodes, slice(2)), part)
+            np.add.at(np.moveaxis(found, -2, 0)[..., :2], nodes, np.moveaxis(part, -2, 0))
         return found
 
     def _places(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
