@@ -3,8 +3,8 @@
     p = (p_shapes, q),     p_shapes → θ* → d(p_shapes, θ*) → X = X₀ + c + d
 
 with the handle positions θ, the design field d and the bulge c of the drawn edges. Handle positions are best for the
-straight cells of drawn depth between the vertices. Edges of the outline follow the design between them too; a design
-whose curved cells are squeezed too much has no rest shape.
+straight cells of drawn depth between the vertices. Edges of the outline follow the design between them too, their
+middles without the part along the chord; a design whose curved cells are squeezed too much has no rest shape.
 """
 
 from __future__ import annotations
@@ -20,11 +20,12 @@ from mpi4py import MPI
 from fenicsmech.compat import cell_dofs, owned_values, vector_space
 from fenicsmech.design.description import Bounds, SplineDesign, shape_request
 from fenicsmech.design.numbers import TYPICAL, Number, ScaledNumbers
+from fenicsmech.design.shape.edges import MidEdgeNodes
 from fenicsmech.design.shape.handle_optimum import HandleOptimum, HandlePlacement, ShapeError
 from fenicsmech.design.shape.quality import Barrier, QualitySum
 from fenicsmech.design.shape.shape_map import LinkShape, ShapeMap, shape_links
 from fenicsmech.design.shape.spline import LinkSpline, SplineSamples
-from fenicsmech.meshing import edge_corners, least_stretches
+from fenicsmech.meshing import edge_corners, least_stretches, node_ends
 from fenicsmech.model import Design, MechanismModel
 from fenicsmech.quantities import Gradient
 from fenicsmech.simulation import Simulation
@@ -89,6 +90,11 @@ class ParametricShape:
         self._vertex_map = ShapeMap(model.mesh, self._straight, shapes)
         self._ratio = QualitySum(self._straight, comm=model.mesh.comm)
         self._optimum = HandleOptimum(self._vertex_map, self._ratio)
+        ends, dim = node_ends(design.function_space), model.mesh.vertices.shape[1]
+        drawn = model.mesh.vertices[ends].mean(axis=1)
+        if model.elastic.bulge is not None:
+            drawn += model.elastic.bulge.x.array.reshape(-1, dim)
+        self._middles = MidEdgeNodes(ends, drawn) if model.elastic.order > 1 else None
         self._penalties: dict[Barrier, QualitySum] = {}
         self.numbers = ScaledNumbers(model, numbers)
         self.initial = np.concatenate([self._map.initial, self.numbers.initial])
@@ -148,7 +154,8 @@ class ParametricShape:
             if not 0.0 < scaled < 1.0:
                 raise ShapeError(str(own), "it is out of its bounds", "Change it by less")
         field, elastic, mesh = self._map.field(placement.p, placement.theta), self._model.elastic, self._model.mesh
-        if elastic.order > 1:
+        if self._middles is not None:
+            field = self._middles.placed(field)
             bent = field if elastic.bulge is None else field + elastic.bulge.x.array.reshape(field.shape)
             corners, pairs = field.shape[1] + 1, edge_corners(field.shape[1] + 1)
             values = bent[cell_dofs(elastic.d.function_space)[self._cells]]
@@ -167,6 +174,8 @@ class ParametricShape:
     def gradient(self, placement: HandlePlacement, nodal: np.ndarray) -> np.ndarray:
         """dO/dp of shapes (…, parameters) from ∂O/∂d (…, owned values) of the design placed as in ``placement``."""
         fields = nodal.reshape(*nodal.shape[:-1], self._map.owned, -1)
+        if self._middles is not None:
+            fields = self._middles.apply_transpose(self._map.field(placement.p, placement.theta), fields)
         by_p, by_theta = self._map.apply_transpose(placement.p, placement.theta, fields)
         return self._optimum.total_gradient(placement, by_p, by_theta)
 

@@ -8,7 +8,6 @@
 - ``number``: numbers of parts, and their derivatives from adjoints
 - ``link_numbers``: numbers of laws, depth
 - ``sensitivity``: total derivatives by adjoints
-- ``forms``: values of forms and their derivatives
 """
 
 from fenicsmech.quantities.forces import ForceMagnitude, JointForce, JointMoment, MotorTorque
@@ -18,6 +17,7 @@ from fenicsmech.quantities.motion import Displacement, Rotation
 from fenicsmech.quantities.number import ModelNumber, NumberKind, NumberTerms, read_kind
 from fenicsmech.quantities.quantity import (
     Component,
+    FormValue,
     Magnitude,
     Observable,
     Partial,

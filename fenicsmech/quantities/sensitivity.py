@@ -34,9 +34,8 @@ from mpi4py import MPI
 from fenicsmech.compat import destroy_garbage, owned_values
 from fenicsmech.equilibrium import Adjoint, Control, EquilibriumSolver, State
 from fenicsmech.model import MechanismModel
-from fenicsmech.quantities.forms import FormValue
 from fenicsmech.quantities.number import NumberKind, NumberTerms
-from fenicsmech.quantities.quantity import Observable, Partial, RestObservable
+from fenicsmech.quantities.quantity import FormValue, Observable, Partial, RestObservable
 
 
 @dataclass(frozen=True, eq=False)
