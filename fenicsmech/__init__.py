@@ -137,8 +137,10 @@ from fenicsmech.quantities import (
     LinkMass,
     LinkVolume,
     Magnitude,
+    ModelNumber,
     MotorTorque,
     NumberKind,
+    NumberTerms,
     Observable,
     Partial,
     PrescribedDisplacement,
@@ -208,7 +210,8 @@ __all__ = [
     "PartValue", "Scatter", "SearchResult", "StartResult", "Optimisation", "design_study", "Experiment", "ModulusFit",
     "fit_modulus", "Design",
     # numbers that designs change beside shapes; NumberKind for kinds of your own
-    "Number", "Depth", "LawParameter", "NumberBounds", "NumberDesign", "NumberKind",
+    "Number", "Depth", "LawParameter", "NumberBounds", "NumberDesign", "NumberKind", "ModelNumber",
+    "NumberTerms",
     # errors
     "FenicsmechError", "DescriptionError", "MeshingError", "AssemblyError", "EquilibriumError",
 ]

@@ -201,7 +201,8 @@ class MechanismModel:
         clock: of the phases.
         mixed: whether each flexible link is in the u–p formulation.
         effects: of the scene.
-        potentials: potentials of body poses.
+        effect_potentials: potentials of body poses of each effect.
+        potentials: all of these.
         spring_potentials: those of springs, which act from the start.
     """
 
@@ -243,7 +244,8 @@ class MechanismModel:
             mixed=self.mixed,
         )
         self.fields = LinkFields(tuple(links), self.elastic, boundaries)
-        self.potentials = [potential for effect in effects for potential in effect.pose_potentials(linkage)]
+        self.effect_potentials = [(effect, tuple(effect.pose_potentials(linkage))) for effect in effects]
+        self.potentials = [potential for _, found in self.effect_potentials for potential in found]
         self.spring_potentials = tuple(potential for potential in self.potentials if potential.holds)
         self._compliances: dict[int, float] = {}
         for effect in effects:

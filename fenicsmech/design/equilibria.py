@@ -114,8 +114,8 @@ class _Path:
         self.moved = None if sample.moved is None else Displacement(sample.moved[0]).on(simulation.model)
         strained = assemble(simulation.linkage, sample.configuration).fraction < 1.0
         own = observables if self.moved is None else (*observables, self.moved)
-        moved = any(observable.on_link for observable in own) or any(kind.moves_unloaded for kind in numbers)
-        self.moves = strained or moved
+        moved = any(observable.on_link for observable in own)
+        self.moves = strained or moved or any(kind.moves_unloaded(sample.configuration) for kind in numbers)
 
     def control(self, unloaded: State) -> Control:
         """The sample's control at the design that the model holds."""

@@ -21,7 +21,7 @@ import numpy as np
 
 from fenicsmech.equilibrium import Adjoint, State
 from fenicsmech.errors import DescriptionError, positive
-from fenicsmech.mechanism import Scene, Units
+from fenicsmech.mechanism import Configuration, Scene, Units
 from fenicsmech.model import MechanismModel
 from fenicsmech.quantities.quantity import Partial
 
@@ -81,7 +81,6 @@ class NumberKind(ABC):
 
     Attributes:
         parts: likewise.
-        moves_unloaded: whether the unloaded configuration, from which displacements count, moves with it.
         changes_solids: whether the solids of its parts change.
 
     Raises:
@@ -89,7 +88,6 @@ class NumberKind(ABC):
     """
 
     what: ClassVar[str]
-    moves_unloaded: ClassVar[bool] = False
     changes_solids: ClassVar[bool] = False
     parts: tuple[Any, ...]
 
@@ -145,6 +143,10 @@ class NumberKind(ABC):
             DescriptionError: the scene has no such part.
         """
         return cls(*(cls._part(scene, word) for word in words))
+
+    def moves_unloaded(self, configuration: Configuration) -> bool:
+        """Whether the unloaded state of a configuration, from which displacements count, moves with it; not by default."""
+        return False
 
     def check_value(self, value: float) -> None:
         """Refuses a value that makes no sense with a DescriptionError; by default one that is not positive."""
