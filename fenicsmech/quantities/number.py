@@ -145,7 +145,7 @@ class NumberKind(ABC):
         return cls(*(cls._part(scene, word) for word in words))
 
     def moves_unloaded(self, configuration: Configuration) -> bool:
-        """Whether the unloaded state of a configuration, from which displacements count, moves with it; not by default."""
+        """Whether the unloaded configuration, from which displacements count, moves with it; not by default."""
         return False
 
     def check_value(self, value: float) -> None:
