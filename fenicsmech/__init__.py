@@ -148,6 +148,8 @@ from fenicsmech.quantities import (
     RestObservable,
     Rotation,
     Sample,
+    SpringRest,
+    SpringStiffness,
     StrainEnergy,
     at,
     border_of,
@@ -210,7 +212,7 @@ __all__ = [
     "PartValue", "Scatter", "SearchResult", "StartResult", "Optimisation", "design_study", "Experiment", "ModulusFit",
     "fit_modulus", "Design",
     # numbers that designs change beside shapes; NumberKind for kinds of your own
-    "Number", "Depth", "LawParameter", "NumberBounds", "NumberDesign", "NumberKind", "ModelNumber",
+    "Number", "Depth", "LawParameter", "SpringStiffness", "SpringRest", "NumberBounds", "NumberDesign", "NumberKind", "ModelNumber",
     "NumberTerms",
     # errors
     "FenicsmechError", "DescriptionError", "MeshingError", "AssemblyError", "EquilibriumError",

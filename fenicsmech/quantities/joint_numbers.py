@@ -1,8 +1,8 @@
-"""Numbers of joints: stiffness and rest position of their springs, and offsets of their motors.
+"""Numbers of springs in joints: their stiffness and rest position.
 
-A spring is a potential V(z; k, φ₀) of poses z, which counts with a factor σ; a motor at φ enters constraints C(z, φ):
+A spring is a potential V(z; k, φ₀) of poses z, which counts with a factor σ. With ẑ the poses' part of the adjoint,
 
-    xᵀ ∂F/∂p = ẑ · σ ∂²V/∂z∂p,     xᵀ ∂F/∂φ = −x · r,     r the right-hand side of the rate with the motor's position
+    xᵀ ∂F/∂p = ẑ · σ ∂²V/∂z∂p.
 """
 
 from __future__ import annotations

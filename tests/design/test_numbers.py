@@ -11,6 +11,7 @@ from mpi4py import MPI
 import fenicsmech as fm
 from fenicsmech.design import Correction, MeshQuality, NumberBounds, ShapeBounds, StayClose
 
+from ..effects.levers import ARM, lever
 from .mechanisms import Case, objective, truss
 from .refusal import refused
 
@@ -140,11 +141,19 @@ def test_gradients_of_the_objective_by_shapes_and_numbers_agree_with_central_dif
     whole, bench = objective(both(truss((0.1, 2.0), (0.4, 3.2))), regulariser, space=space, size=size, order=order)
     p, direction = bench.design(0.05, seed=5), bench.direction(6)
     assert len(p) == 20
-    here, step = whole.evaluate(p), 1e-3
-    ahead, back = (whole.evaluate(p + h * direction) for h in (step, -step))
-    assert here.gradient @ direction == pytest.approx((ahead.value - back.value) / (2 * step), rel=1e-5)
-    slope = (ahead.residuals - back.residuals) / (2 * step)
-    assert here.jacobian @ direction == pytest.approx(slope, rel=1e-5, abs=1e-5 * np.abs(slope).max())
+    here = whole.evaluate(p)
+
+    def slope(of) -> np.ndarray:
+        """Central differences, extrapolated: numbers bend the objective more than shapes do."""
+        found = []
+        for step in (1e-3, 2e-3):
+            ahead, back = (of(whole.evaluate(p + h * direction)) for h in (step, -step))
+            found.append((ahead - back) / (2 * step))
+        return (4.0 * found[0] - found[1]) / 3.0
+
+    assert here.gradient @ direction == pytest.approx(slope(lambda own: own.value), rel=1e-5)
+    residuals = slope(lambda own: own.residuals)
+    assert here.jacobian @ direction == pytest.approx(residuals, rel=1e-5, abs=1e-5 * np.abs(residuals).max())
 
 
 @pytest.mark.parallel
@@ -191,3 +200,19 @@ def test_numbers_that_make_no_sense_are_refused():
         problem="5 is drawn",
         remedy="Widen",
     )
+
+
+def test_springs_are_as_stiff_as_the_moment_of_the_force_asks_for():
+    rest, angle, force = -0.2, 0.5, 1.5
+    case = lever(lambda hinge: [fm.JointSpring(hinge, 60.0, rest=rest)])
+    (spring,) = case.simulation.scene.effects
+    targets = [fm.Target(case.force, force=force, displacement=ARM * np.sin(angle))]
+    for kind, bounds, wanted in (
+        (fm.SpringStiffness(spring), (20.0, 200.0), force * ARM * np.cos(angle) / (angle - rest)),
+        (fm.SpringRest(spring), (-1.5, 0.5), angle - force * ARM * np.cos(angle) / 60.0),
+    ):
+        problem = fm.DesignProblem(case.simulation, [fm.Number(kind, *bounds)], targets=targets)
+        result = problem.optimise(**EXACT)
+        assert result.numbers[0].value == pytest.approx(wanted, rel=1e-6)
+        found = curve(case.simulation.with_design(result), case.force, [force])
+        assert found == pytest.approx([ARM * np.sin(angle)], rel=1e-6)

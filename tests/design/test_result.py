@@ -101,7 +101,7 @@ def test_an_interrupted_save_leaves_the_result_before_it(tmp_path, monkeypatch):
 def test_summaries_look_at_all_links_and_targets():
     assert RESULT.worst_error == 0.1
     assert RESULT.thickness == (1.0 / 3.0, 4.1)
-    assert RESULT.parameters == 8
+    assert RESULT.parameters == 9
 
 
 @pytest.mark.parametrize(
@@ -151,4 +151,5 @@ def test_a_result_prints_how_far_each_target_is_reached():
         "  displacement of 'tip' at (1, 2) under 'push' of 0.4, geöffnet: (0.025, 0.2) mm of (0, 0.2) mm, "
         "missed (+10.00%)",
         "  mass of all links: 0.2 N s²/mm, from 0.3 N s²/mm",
+        "  depth of 'rocker': 3.33333 mm, drawn with 4 mm",
     ]

@@ -25,6 +25,8 @@ NUMBERS = {
     "modulus of both": (lambda bench: fm.LawParameter("E", *links(bench)), (16.0, 8.0, 4.0)),
     "depth": (lambda bench: fm.Depth(links(bench)[1]), (0.1, 0.05, 0.025, 0.0125)),
     "depth of both": (lambda bench: fm.Depth(*links(bench)), (0.1, 0.05, 0.025, 0.0125)),
+    "stiffness": (lambda bench: fm.SpringStiffness(*bench.simulation.scene.effects), (20.0, 10.0, 5.0)),
+    "rest": (lambda bench: fm.SpringRest(*bench.simulation.scene.effects), (0.1, 0.05, 0.025)),
 }
 CASES = ("plane-stress", "plane-stress moved", "plane-strain pressure", "3d-symmetric", "3d moved", "3d pressure")
 
@@ -41,7 +43,7 @@ CASES = ("plane-stress", "plane-stress moved", "plane-strain pressure", "3d-symm
 def bench(request) -> Bench:
     (space, *more), comm = request.param[0].split(), request.param[1]
     formulation = fm.MixedFormulation(above=0.3) if "pressure" in more else None
-    return Bench(space, COMMS[comm], formulation, moved="moved" in more)
+    return Bench(space, COMMS[comm], formulation, moved="moved" in more, springs=True)
 
 
 @pytest.mark.parametrize("name", NUMBERS)

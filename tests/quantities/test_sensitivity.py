@@ -30,7 +30,13 @@ class Bench:
     """
 
     def __init__(
-        self, space: str, comm: MPI.Comm, formulation: fm.MixedFormulation | None = None, *, moved: bool = False
+        self,
+        space: str,
+        comm: MPI.Comm,
+        formulation: fm.MixedFormulation | None = None,
+        *,
+        moved: bool = False,
+        springs: bool = False,
     ) -> None:
         mechanism = fm.Mechanism("four-bar")
         ground, coupler = mechanism.rigid("ground", fixed=True), mechanism.rigid("coupler")
@@ -43,7 +49,7 @@ class Bench:
         motor = mechanism.motor(shaft)
         self.force = mechanism.force(on=coupler, at=(20, 35), direction=(1, 0.3))
         lift = mechanism.output(on=coupler, at=(0, 40), direction=(0, 1), name="lift")
-        scene = fm.Scene(mechanism)
+        scene = fm.Scene(mechanism, [fm.JointSpring(end, 300.0, rest=0.4)] if springs else [])
         self.turned = scene.configuration("turned", {motor: 0.3})
         self.simulation = fm.Simulation(scene, space=space, size=4.0, formulation=formulation, comm=comm)
         self.model, self.moved = self.simulation.model, moved
