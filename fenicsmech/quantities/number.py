@@ -136,6 +136,12 @@ class NumberKind(ABC):
         return tuple(self.label(part) for part in self.parts)
 
     @classmethod
+    def kinds(cls) -> list[type[NumberKind]]:
+        """All kinds derived from this one, of the package and of others that are imported."""
+        own = cls.__subclasses__()
+        return own + [found for kind in own for found in kind.kinds()]
+
+    @classmethod
     def read(cls, scene: Scene, words: Sequence[str]) -> NumberKind:
         """The kind with the ``words``, of parts of a scene.
 
@@ -194,12 +200,7 @@ def read_kind(scene: Scene, kind: str, words: Sequence[str]) -> NumberKind:
     Raises:
         DescriptionError: there is no such class, or the scene has no such part.
     """
-    for known in _derived(NumberKind):
+    for known in NumberKind.kinds():
         if known.__name__ == kind:
             return known.read(scene, words)
     raise DescriptionError(f"number {kind!r}", "there is no such kind", "Import the module that defines it")
-
-
-def _derived(base: type[NumberKind]) -> list[type[NumberKind]]:
-    own = base.__subclasses__()
-    return own + [found for cls in own for found in _derived(cls)]

@@ -43,7 +43,10 @@ def rest_of(link: LinkSpline, bounds: Bounds, *, count: int = 500, thickness: fl
     samples = SplineSamples(link, count=count)
     whole = slice(0, link.size)
     return SimpleNamespace(
-        links=(DesignedLink("arch", whole, link, samples, thickness, bounds),), initial=link.initial, lengths=lengths
+        links=(DesignedLink("arch", whole, link, samples, thickness, bounds),),
+        initial=link.initial,
+        lengths=lengths,
+        of_numbers=slice(len(lengths), len(lengths)),
     )
 
 
