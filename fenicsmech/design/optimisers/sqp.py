@@ -77,8 +77,8 @@ class Memory:
 class SQP(Optimiser):
     """Ends at a stationary point, or when three steps in a row gained less than ``tolerance`` times the merit.
 
-    A point is stationary if the predicted reduction is below ``tolerance`` times the merit, and the Lagrangian's gradient
-    changes O by less than √tolerance of its scale when parameters change by their lengths ℓ:
+    A point is stationary if the predicted reduction is below ``tolerance`` times the merit, and along the gradient of
+    the Lagrangian O changes by less than √tolerance of its scale when parameters change by their lengths ℓ:
 
         |ℓ (∂O/∂p + Σ λ_k ∂c_k/∂p)| ≤ √tolerance max(|O|, |ℓ ∂O/∂p|) at the start.
 
@@ -118,7 +118,7 @@ class SQP(Optimiser):
     def least_reduction(self) -> float:
         return self.tolerance
 
-    def continued(self, memory: np.ndarray) -> np.ndarray:
+    def continued(self, memory: np.ndarray) -> np.ndarray | None:
         """B and ν as they are, for shifts leave derivatives alone; no stalls, and μ not above that of a start."""
         return np.concatenate([[min(memory[0], self.damping), 0.0], memory[2:]])
 
