@@ -153,7 +153,6 @@ class Comparison:
     Attributes:
         places: the components of each target.
         scales, scale_of: of the targets, (targets,), and of their components, (components,).
-        least_squares: whether there are neither bounds nor least quantities.
         relative: whether a least quantity is relative to its drawn value.
 
     Raises:
@@ -167,7 +166,6 @@ class Comparison:
         relations = np.repeat([target.relation for target in targets], sizes)
         self._equal, self._bounded = relations == "equals", np.isin(relations, ("at most", "at least"))
         self._summed = relations == "least"
-        self.least_squares = bool(self._equal.all())
         self.relative = any(target.relation == "least" and target.scale is None for target in targets)
         self._wanted = np.concatenate([target.wanted or (0.0,) for target in targets])
         self.scales = np.array(
