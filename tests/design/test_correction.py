@@ -61,7 +61,7 @@ def test_plane_stress_with_corrections_ends_at_the_targets_in_space(traced):
     result = problem.optimise()
     assert result.surrogate == "plane-stress" and result.verified
     assert result.worst_error < 5e-3
-    assert traced["3d"] == len(result.corrections) <= 4
+    assert traced["3d"] == 1 < len(result.corrections) <= 4
     # far from the truth at first, and nearer by at least the factor at which a surrogate is given up
     changes = np.array(result.corrections)
     assert changes[0] > 0.05
@@ -98,16 +98,16 @@ def test_a_run_killed_between_two_rounds_ends_as_if_nothing_had_happened(tmp_pat
     assert len(whole.corrections) > 1
     from fenicsmech.design import correction
 
-    file, loaded, calls = tmp_path / "checkpoint.json", correction.loaded, []
+    file, carried, calls = tmp_path / "checkpoint.json", correction.carried, []
 
     def killed(*arguments):
         calls.append(None)
         if len(calls) == 2:
             raise KeyboardInterrupt
-        return loaded(*arguments)
+        return carried(*arguments)
 
     with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
-        patched.setattr(correction, "loaded", killed)
+        patched.setattr(correction, "carried", killed)
         truss(*WANTED).problem(**COARSE).optimise(checkpoint=file)
     again = truss(*WANTED).problem(**COARSE).optimise(checkpoint=file, resume=True)
     assert (again.iterations, again.reason, again.evaluations) == (whole.iterations, whole.reason, whole.evaluations)
