@@ -167,7 +167,7 @@ class Library(fm.Optimiser):
     tolerance: float
 
     @property
-    def least_promise(self) -> float:
+    def least_reduction(self) -> float:
         return self.tolerance
 
     def minimise(self, problem: Problem, start: Start, *, watch: Callable[[Iterate], None]) -> Iterate:

@@ -28,7 +28,6 @@ from fenicsmech.design.optimisers.problem import (
     Reason,
     Start,
     TooHigh,
-    merit,
 )
 from fenicsmech.design.optimisers.sqp import SQP
 from fenicsmech.design.regularisers import MeshQuality, Model, Regulariser, ShapeBounds, StayClose
