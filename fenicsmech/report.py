@@ -227,7 +227,7 @@ def _summarise_design(optimisation: Optimisation) -> dict[str, object]:
         "targets": [
             {
                 "target": target.name,
-                "configuration": target.configuration,
+                "configuration": target.configuration or None,  # links at rest have none
                 "force": target.force,
                 "unit": target.unit,
                 "relation": target.relation,
