@@ -276,7 +276,7 @@ def check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
             raise DescriptionError("design problem", f"{target!r} is not a target", "Give Target(…)")
         part, size = f"target of the {target.quantity}", target.quantity.size(dim)
         if target.sample is not None:
-            sample_request(simulation, target.sample)
+            sample_request(simulation, target.sample, [target.sample.value])
             assemble(simulation.linkage, target.sample.configuration)
         target.quantity.check(simulation.scene, dim)
         if len(target.wanted) > size or target.size == 1 < size:
@@ -296,21 +296,19 @@ def check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
     Comparison(targets, simulation.scene.units)
 
 
-def sample_request(simulation: Simulation, *samples: Sample) -> CurveRequest:
-    """The request for samples on one path, in the order of their loads, if they make sense for ``simulation``.
+def sample_request(simulation: Simulation, sample: Sample, values: Sequence[float]) -> CurveRequest:
+    """The request for the path of a sample through ``values`` of its part, if it makes sense for ``simulation``.
 
     Raises:
         DescriptionError: a force or motor is one of another mechanism.
     """
-    first = samples[0]
-    values = [sample.magnitude if sample.moved is None else sample.moved[1] for sample in samples]
     return read_request(
         simulation.scene.mechanism,
-        first.part,
-        forces=values if first.moved is None else None,
-        displacements=None if first.moved is None else values,
-        configuration=first.configuration,
-        others=dict(first.others),
+        sample.part,
+        forces=values if sample.moved is None else None,
+        displacements=None if sample.moved is None else values,
+        configuration=sample.configuration,
+        others=dict(sample.others),
     )
 
 
