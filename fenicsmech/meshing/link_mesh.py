@@ -289,7 +289,7 @@ def boundary_polygons(part: str, mesh: LinkMesh) -> list[np.ndarray]:
 def _turned_over(part: str, mesh: LinkMesh, cell: int, count: int) -> MeshingError:
     return MeshingError(
         part,
-        f"{count} of its {len(mesh.cells)} triangles are turned over or lie on others, one of them near "
+        f"triangles are turned over or lie on others: {count} of {len(mesh.cells)}, for example near "
         f"{point_text(mesh.points[mesh.cells[cell]].mean(axis=0))}",
         "Choose a design that deforms the mesh less",
     )

@@ -98,7 +98,7 @@ def test_results_tell_their_numbers_and_keep_them_in_files(tmp_path):
     assert again == pytest.approx(once, rel=1e-12)
     assert problem.optimise(checkpoint=tmp_path / "checkpoint.json", resume=True).numbers == result.numbers
     wider = fm.DesignProblem(sim, [fm.Number(fm.Depth(strip), 3.0, 9.5), numbers[1]], targets=problem.targets)
-    with pytest.raises(fm.DescriptionError, match="another problem: numbers differ"):
+    with pytest.raises(fm.DescriptionError, match="another problem, with other numbers"):
         wider.optimise(checkpoint=tmp_path / "checkpoint.json", resume=True)
     other, _, _ = cantilever()
     other.mechanism.name = "other"

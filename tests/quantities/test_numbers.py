@@ -25,7 +25,7 @@ NUMBERS = {
     "modulus of both": (lambda bench: fm.LawParameter("E", *links(bench)), (16.0, 8.0, 4.0)),
     "depth": (lambda bench: fm.Depth(links(bench)[1]), (0.1, 0.05, 0.025, 0.0125)),
     "depth of both": (lambda bench: fm.Depth(*links(bench)), (0.1, 0.05, 0.025, 0.0125)),
-    "stiffness": (lambda bench: fm.SpringStiffness(*bench.simulation.scene.effects), (20.0, 10.0, 5.0)),
+    "stiffness": (lambda bench: fm.SpringStiffness(*bench.simulation.scene.effects), (8.0, 4.0, 2.0, 1.0)),
     "rest": (lambda bench: fm.SpringRest(*bench.simulation.scene.effects), (0.1, 0.05, 0.025)),
 }
 CASES = ("plane-stress", "plane-stress moved", "plane-strain pressure", "3d-symmetric", "3d moved", "3d pressure")
