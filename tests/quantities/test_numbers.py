@@ -52,11 +52,10 @@ def test_derivatives_by_a_number(bench, name):
     kind, base = describe(bench), bench.field(1)
     kind.check(bench.simulation.scene)
     bench.adjoint, number = Sensitivity(bench.model, [kind]), bench.model.number(kind)
-    gradients = bench.gradients(base)
+    gradients = bench.gradients(fm.Design(base))
     assert MPI.COMM_WORLD.size > 1 or np.any([gradient.numbers for gradient in gradients])
 
     def changed(step: float) -> np.ndarray:
         return bench.values(fm.Design(base, {kind: number.drawn + step}))
 
     assert_slopes(bench, changed, [gradient.numbers[0] for gradient in gradients], steps)
-    bench.model.reshape(fm.Design(base))
