@@ -16,15 +16,7 @@ from .table import command, publish
 
 WRIST, HIP = (28, 92), (56, 88)  # joints of the claw
 
-HEADERS = (
-    "effect",
-    "energy terms",
-    "unknowns",
-    "iterations",
-    "s/iteration",
-    "relative",
-    "moves the finger by [mm]",
-)
+HEADERS = ("effect", "energy terms", "unknowns", "iterations", "s/iteration", "relative", "moves the finger by [mm]")
 
 
 def scenes():

@@ -124,13 +124,7 @@ def measure(options, size: float) -> tuple[tuple, list[tuple]]:
     gc.collect()
     factor = Run.of(size, Direct()) if unknowns <= options.factor_up_to else None
     difference = None if factor is None else float(np.max(np.abs(found / factor.curve.displacements - 1.0)))
-    return (
-        *known[:4],
-        factor and factor.seconds,
-        known[4],
-        factor and factor.memory,
-        difference,
-    ), compared
+    return (*known[:4], factor and factor.seconds, known[4], factor and factor.memory, difference), compared
 
 
 def compare(run: Run) -> list[tuple]:

@@ -75,10 +75,7 @@ def test_numpy_becomes_plain_and_the_order_of_keys_is_kept(tmp_path):
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        (
-            {"frames": [{"force": 1.0}, {"force": float("nan")}]},
-            r"'frames\[1\].force' of a file: the value is nan",
-        ),
+        ({"frames": [{"force": 1.0}, {"force": float("nan")}]}, r"'frames\[1\].force' of a file: the value is nan"),
         ({"field": np.array([1.0, np.inf])}, r"'field\[1\]'.*inf"),
         ({"x": np.float32("nan")}, "'x'.*nan"),
         ({"x": 1j}, "'x'.*complex has no JSON form"),

@@ -8,5 +8,3 @@
 from .augmented_lagrangian import AugmentedLagrangian
 from .kkt_newton import KKTNewton
 from .snes import SNES, Globalisation
-
-__all__ = ["SNES", "AugmentedLagrangian", "Globalisation", "KKTNewton"]

@@ -13,25 +13,3 @@ from .levels import RIGID, TOLERANCE, FidelityLevel, fidelity_levels
 from .measurement import Measurement, Quantity
 from .plot import ModellingError, WorkSeries, pareto_front, plot_work_precision
 from .study import ErrorSplit, Study, run_study, split_error
-
-__all__ = [
-    "ErrorSplit",
-    "FidelityLevel",
-    "Limit",
-    "Measurement",
-    "ModellingError",
-    "Quantity",
-    "RIGID",
-    "Study",
-    "TOLERANCE",
-    "WorkSeries",
-    "extrapolate",
-    "fidelity_levels",
-    "front_of",
-    "pareto_front",
-    "plot_work_precision",
-    "run_study",
-    "save_study",
-    "split_error",
-    "study_text",
-]

@@ -12,26 +12,3 @@ from fenicsmech.continuation.critical import Critical, CriticalPoint, Sense, cro
 from fenicsmech.continuation.eigen import Mode, critical_changes, softest_modes
 from fenicsmech.continuation.load_steps import LoadStepper, LoadSteps, LoadStepsFailed, MotorStepper
 from fenicsmech.continuation.stepper import Constant, Hermite, Predictor, Tangent
-
-__all__ = [
-    "ArcLengthTracer",
-    "ArcSteps",
-    "Constant",
-    "Critical",
-    "CriticalPoint",
-    "Finish",
-    "Hermite",
-    "LoadStepper",
-    "LoadSteps",
-    "LoadStepsFailed",
-    "Mode",
-    "MotorStepper",
-    "Predictor",
-    "Sense",
-    "Tangent",
-    "critical_changes",
-    "crossing",
-    "locate",
-    "null_space",
-    "softest_modes",
-]

@@ -133,12 +133,7 @@ class _Operator:
         y.array_w[:] = self._apply(x.array_r)
 
 
-def _largest(
-    system: EquilibriumSystem,
-    size: int,
-    apply: Callable[[np.ndarray], np.ndarray],
-    count: int,
-) -> list[Mode]:
+def _largest(system: EquilibriumSystem, size: int, apply: Callable[[np.ndarray], np.ndarray], count: int) -> list[Mode]:
     """Modes with the values 1 / θ, θ the ``count`` real eigenvalues of a map that are largest in size.
 
     The map, ``apply``, has ``size`` values on this rank; the unknowns of a mode are the last ones of an eigenvector.

@@ -20,18 +20,8 @@ from fenicsmech.design.optimisers.levenberg_marquardt import LevenbergMarquardt
 from fenicsmech.design.optimisers.problem import Optimiser
 from fenicsmech.design.optimisers.sqp import SQP
 from fenicsmech.design.regularisers import MeshQuality, Regulariser, ShapeBounds, StayClose
-from fenicsmech.design.result import (
-    DesignResult,
-    draw_links,
-    link_designs,
-    rest_meshes,
-    target_results,
-    write_solids,
-)
-from fenicsmech.design.run import (
-    Checkpoint,
-    fingerprint,
-)
+from fenicsmech.design.result import DesignResult, draw_links, link_designs, rest_meshes, target_results, write_solids
+from fenicsmech.design.run import Checkpoint, fingerprint
 from fenicsmech.design.search import Scatter, Search, SearchResult, cheapest
 from fenicsmech.design.shape.handle_optimum import HandlePlacement
 from fenicsmech.design.target import Target
@@ -219,8 +209,7 @@ class DesignProblem:
         before, after = ((given[0], self._meshes(given)) for given in ((self.initial, None), self._own.given(design)))
         links = [design.link for design in self.designs]
         on_one(
-            self.simulation.comm,
-            lambda: draw_links(path, self.simulation, links, self._own.rest.links, before, after),
+            self.simulation.comm, lambda: draw_links(path, self.simulation, links, self._own.rest.links, before, after)
         )
 
     def export(

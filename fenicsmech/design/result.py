@@ -395,11 +395,7 @@ def draw_links(
 
 
 def write_solids(
-    folder: str | Path,
-    linkage: Linkage,
-    links: Sequence[FlexibleLink],
-    meshes: Sequence[LinkMesh],
-    hole: float | None,
+    folder: str | Path, linkage: Linkage, links: Sequence[FlexibleLink], meshes: Sequence[LinkMesh], hole: float | None
 ) -> None:
     """Local. Writes ``NAME.step`` and ``NAME.stl`` of every link, with holes of this diameter for pins if given."""
     for link, mesh in zip(links, meshes, strict=True):

@@ -21,11 +21,3 @@ from fenicsmech.effects.joint_spring import JointSpring
 from fenicsmech.effects.link_fields import Boundary, Faces, LinkFields, find_boundaries
 from fenicsmech.effects.pressure import Pressure
 from fenicsmech.effects.prestrain import Prestrain
-
-# fmt: off
-__all__ = [
-    "Gravity", "Mass", "JointSpring", "JointCompliance", "Pressure", "Prestrain",
-    "Contact", "Cylinder", "HalfPlane", "Obstacle",
-    "Boundary", "Faces", "LinkFields", "find_boundaries", "region_average",
-]
-# fmt: on

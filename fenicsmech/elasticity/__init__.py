@@ -21,11 +21,3 @@ from fenicsmech.elasticity.models import (
     Quadrature,
     cauchy_stress,
 )
-
-# fmt: off
-__all__ = [
-    "ElasticBody", "MixedStress", "PressureField", "Stretch",
-    "MID_PLANE_SYMMETRIC", "PLANE_STRAIN", "PLANE_STRESS", "SPATIAL", "ElasticModel", "Quadrature", "cauchy_stress",
-    "LOCKING", "DisplacementFormulation", "Formulation", "MixedFormulation",
-]
-# fmt: on

@@ -23,22 +23,3 @@ from fenicsmech.estimates.estimates import (
     adjoint_at,
 )
 from fenicsmech.estimates.point_forces import cause_of_growth, growth_by_halving
-
-__all__ = [
-    "AccuracyControl",
-    "AccuracyOptions",
-    "Calibration",
-    "Choice",
-    "Equilibrium",
-    "ErrorKind",
-    "Estimates",
-    "FidelityLevel",
-    "LevelErrors",
-    "PressureError",
-    "Recovery",
-    "Trial",
-    "adjoint_at",
-    "cause_of_growth",
-    "fidelity_levels",
-    "growth_by_halving",
-]

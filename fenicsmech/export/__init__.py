@@ -9,5 +9,3 @@
 
 from fenicsmech.export.outlines import corners_of, smooth_outline
 from fenicsmech.export.solid import PinHole, write_step, write_stl
-
-__all__ = ["PinHole", "corners_of", "smooth_outline", "write_step", "write_stl"]

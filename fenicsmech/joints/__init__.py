@@ -20,20 +20,3 @@ from fenicsmech.joints.joint import (
     free_coordinate,
 )
 from fenicsmech.joints.rotations import RIGID_SPACES, RigidSpace
-
-__all__ = [
-    "CYLINDRICAL",
-    "JointKind",
-    "PLANAR_JOINT",
-    "PRISMATIC",
-    "PlanarMarker",
-    "REVOLUTE",
-    "RIGID_SPACES",
-    "RigidSpace",
-    "SPHERICAL",
-    "SpatialMarker",
-    "UNIVERSAL",
-    "WELD",
-    "constraint",
-    "free_coordinate",
-]

@@ -9,16 +9,7 @@ from typing import TypeVar
 
 from fenicsmech.errors import DescriptionError, finite, point, positive
 from fenicsmech.errors import direction as unit
-from fenicsmech.joints import (
-    CYLINDRICAL,
-    PLANAR_JOINT,
-    PRISMATIC,
-    REVOLUTE,
-    SPHERICAL,
-    UNIVERSAL,
-    WELD,
-    JointKind,
-)
+from fenicsmech.joints import CYLINDRICAL, PLANAR_JOINT, PRISMATIC, REVOLUTE, SPHERICAL, UNIVERSAL, WELD, JointKind
 from fenicsmech.mechanism.parts import (
     FlexibleLink,
     Force,

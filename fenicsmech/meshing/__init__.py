@@ -19,7 +19,7 @@ their interfaces (``cutting``) and extruded. Only ``session`` starts gmsh; ``lin
 and makes dolfinx meshes of them, over parallel ranks.
 """
 
-from fenicsmech.meshing import outline, part_files, strip  # noqa: F401  (each registers its shapes)
+from fenicsmech.meshing import outline, part_files, strip  # each registers its shapes
 from fenicsmech.meshing.cutting import circle_segments
 from fenicsmech.meshing.link_mesh import (
     FREE,
@@ -43,38 +43,3 @@ from fenicsmech.meshing.link_mesh import (
 from fenicsmech.meshing.link_mesher import LEAST_SEGMENTS, InterfaceSite, check_link, mesh_link, typical_thickness
 from fenicsmech.meshing.outline import CircleArc, Curve, draw_loop, sampled, start_of, straight_line
 from fenicsmech.meshing.session import gmsh, gmsh_session, muted_output
-
-__all__ = [
-    "CircleArc",
-    "Curve",
-    "CurvedEdges",
-    "FREE",
-    "InterfaceSite",
-    "LEAST_SEGMENTS",
-    "LinkMesh",
-    "MechanismMesh",
-    "boundary_loops",
-    "boundary_polygons",
-    "bulge_field",
-    "cell_measures",
-    "check_link",
-    "circle_segments",
-    "count_pieces",
-    "distribute",
-    "draw_loop",
-    "edge_corners",
-    "extrude",
-    "gmsh",
-    "gmsh_session",
-    "least_stretches",
-    "mesh_link",
-    "muted_output",
-    "node_ends",
-    "on_mid_plane",
-    "plan_of",
-    "radius_ratios",
-    "sampled",
-    "start_of",
-    "straight_line",
-    "typical_thickness",
-]

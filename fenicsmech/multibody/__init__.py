@@ -27,13 +27,3 @@ from fenicsmech.multibody.linkage import (
     spring_potentials,
 )
 from fenicsmech.multibody.points import BodyPoint, DesignAtNodes, InterfaceMap, LinkPoint, link_point
-
-# fmt: off
-__all__ = [
-    "Assembly", "assemble", "assemble_before_strain",
-    "Freedom", "Motion", "count_freedom", "free_motions", "is_held", "stiff_motions",
-    "Body", "Connection", "JointCoordinate", "JointSystem", "Linkage", "build_linkage",
-    "PosePotential", "spring_potentials",
-    "BodyPoint", "DesignAtNodes", "InterfaceMap", "LinkPoint", "link_point",
-]
-# fmt: on

@@ -14,17 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenicsmech.joints import RIGID_SPACES, WELD, JointKind, constraint, free_coordinate
-from fenicsmech.mechanism import (
-    Effect,
-    FlexibleLink,
-    Joint,
-    Link,
-    Mechanism,
-    Motor,
-    Region,
-    in_dimension,
-    same_place,
-)
+from fenicsmech.mechanism import Effect, FlexibleLink, Joint, Link, Mechanism, Motor, Region, in_dimension, same_place
 from fenicsmech.multibody.points import BodyPoint
 
 

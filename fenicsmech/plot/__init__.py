@@ -35,13 +35,3 @@ from fenicsmech.plot.shapes import (
     plan_view,
     rigid_outline,
 )
-
-# fmt: off
-__all__ = [
-    "CurveMark", "CurveSeries", "CurveTarget", "plot_curve",
-    "draw_configurations", "lay_out", "IN_PLACE", "draw_designs", "lay_out_designs",
-    "Arrow", "DesignShape", "FlexibleShape", "LinkOutline", "MechanismShape", "Panel", "Pin", "RigidShape", "Trace",
-    "plan_view", "rigid_outline",
-    "FLEXIBLE", "INK", "PALETTE", "Labels", "Spot", "house_style", "new_figure", "open_frame", "save_png", "text_size",
-]
-# fmt: on

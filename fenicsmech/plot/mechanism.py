@@ -51,12 +51,7 @@ _STRESS = LinearSegmentedColormap.from_list("stress", _HEAT)
 
 
 def draw_configurations(
-    path: str | Path,
-    panels: Sequence[Panel],
-    *,
-    title: str = "",
-    colour_label: str = "",
-    unit: str = "mm",
+    path: str | Path, panels: Sequence[Panel], *, title: str = "", colour_label: str = "", unit: str = "mm"
 ) -> None:
     """Draws mechanisms side by side, with the same limits, scale of forces and colours.
 

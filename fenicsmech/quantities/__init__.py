@@ -23,28 +23,3 @@ from fenicsmech.quantities.quantity import (
 )
 from fenicsmech.quantities.sample import PrescribedDisplacement, Sample, at
 from fenicsmech.quantities.sensitivity import Gradient, Sensitivity
-
-__all__ = [
-    "CentrelineLength",
-    "Component",
-    "Displacement",
-    "ForceMagnitude",
-    "Gradient",
-    "JointForce",
-    "JointMoment",
-    "LinkMass",
-    "LinkVolume",
-    "Magnitude",
-    "MotorTorque",
-    "Observable",
-    "Partial",
-    "PrescribedDisplacement",
-    "Quantity",
-    "RestObservable",
-    "Rotation",
-    "Sample",
-    "Sensitivity",
-    "StrainEnergy",
-    "at",
-    "border_of",
-]

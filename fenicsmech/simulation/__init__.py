@@ -16,28 +16,3 @@ from fenicsmech.simulation.frame import BucklingLoad, BucklingPosition, Frame, M
 from fenicsmech.simulation.omitted_effects import Explanation, Hint, PinFriction, weight_influence
 from fenicsmech.simulation.simulation import RestShape, Simulation
 from fenicsmech.simulation.tracing import CurveRequest, read_request
-
-__all__ = [
-    "Axis",
-    "BucklingLoad",
-    "BucklingPosition",
-    "Curve",
-    "CurveRequest",
-    "Explanation",
-    "FollowedCurve",
-    "Frame",
-    "Hint",
-    "MechanismPlotter",
-    "ModeShape",
-    "PathEvent",
-    "PinFriction",
-    "RestShape",
-    "Simulation",
-    "SoftMode",
-    "Until",
-    "gather",
-    "read_request",
-    "rest_geometry",
-    "rest_vertices",
-    "weight_influence",
-]

@@ -52,11 +52,7 @@ class Discretisation:
         on_one(comm, lambda: check_links(scene.mechanism, tuple(self.shapes.values()), self.linkage, fidelity))
 
     def at(
-        self,
-        fidelity: Fidelity,
-        clock: Clock,
-        comm: MPI.Comm,
-        shapes: Mapping[FlexibleLink, Shape] | None = None,
+        self, fidelity: Fidelity, clock: Clock, comm: MPI.Comm, shapes: Mapping[FlexibleLink, Shape] | None = None
     ) -> Discretisation:
         """The same scene at another fidelity, on other processes or with links of other shapes, nothing meshed yet."""
         shapes = self.shapes | dict(shapes or {})

@@ -8,14 +8,7 @@ from mpi4py import MPI
 
 import fenicsmech as fm
 from benchmarks.solvers import SNES, AugmentedLagrangian, Globalisation, KKTNewton
-from fenicsmech.equilibrium import (
-    Direct,
-    DisplacementControl,
-    EquilibriumMethod,
-    LoadControl,
-    NotConverged,
-    TwoLevel,
-)
+from fenicsmech.equilibrium import Direct, DisplacementControl, EquilibriumMethod, LoadControl, NotConverged, TwoLevel
 
 from ..equilibrium.finger import RUBBER, finger
 from ..mechanism.truss_finger import truss_finger

@@ -125,12 +125,7 @@ def test_motors_of_another_mechanism():
 def test_targets_that_are_no_numbers(name, number):
     push = truss(*REACHABLE).targets[0].quantity.part
     numbers = {"force": 0.1, "displacement": 2.0, "weight": 1.0, name: number}
-    refused(
-        lambda: fm.Target(push, **numbers),
-        part=f"{name} of a target for",
-        problem="",
-        remedy="finite",
-    )
+    refused(lambda: fm.Target(push, **numbers), part=f"{name} of a target for", problem="", remedy="finite")
 
 
 @pytest.mark.parametrize("weight", [0.0, -1.0])

@@ -62,8 +62,7 @@ def test_sites_of_handles_at_joints_and_ends():
 
 
 @pytest.mark.parametrize(
-    ("space", "size", "order"),
-    [("plane-stress", 3.0, 2), pytest.param("3d-symmetric", 5.0, 2, marks=pytest.mark.slow)],
+    ("space", "size", "order"), [("plane-stress", 3.0, 2), pytest.param("3d-symmetric", 5.0, 2, marks=pytest.mark.slow)]
 )
 def test_gradient_passes_the_taylor_test(space, size, order):
     case = leaf((5.0, 2.0), (20.0, 6.0), ends_move=True)

@@ -6,15 +6,7 @@ import pytest
 
 import fenicsmech as fm
 from fenicsmech.design import shape_request
-from fenicsmech.joints import (
-    CYLINDRICAL,
-    PLANAR_JOINT,
-    PRISMATIC,
-    REVOLUTE,
-    SPHERICAL,
-    UNIVERSAL,
-    WELD,
-)
+from fenicsmech.joints import CYLINDRICAL, PLANAR_JOINT, PRISMATIC, REVOLUTE, SPHERICAL, UNIVERSAL, WELD
 from fenicsmech.multibody import build_linkage
 
 X, Y, Z, TILTED = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.6, 0.0, 0.8)

@@ -27,10 +27,7 @@ class Squashed:
         corner, side = vertices[cell[0]], vertices[cell[1:]]
         way = side.mean(axis=0) - corner
         positions = self.bench.space.tabulate_dof_coordinates()[:, : len(corner)]
-        (node,) = np.flatnonzero(np.linalg.norm(positions - mesh.vertices[cell[0]], axis=1) < 1e-9)
-        self.inwards = np.zeros((len(positions), len(way)))
-        self.inwards[node] = way
-        self.inwards = self.inwards.ravel()
+        self.inwards = np.outer(self._hat(positions, mesh.cells, mesh.vertices, cell[0]), way).ravel()
         low, high = 0.0, 1.0
         for _ in range(60):
             fraction = 0.5 * (low + high)
@@ -38,6 +35,14 @@ class Squashed:
             low, high = (fraction, high) if self.bench.simulation.mesh_ratio_max < ratio else (low, fraction)
         self.design, self.left = smooth + low * self.inwards, 1.0 - low
         model.reshape(self.design)
+
+    @staticmethod
+    def _hat(positions: np.ndarray, cells: np.ndarray, vertices: np.ndarray, vertex: int) -> np.ndarray:
+        """Values at ``positions`` of the linear function that is 1 at a vertex and 0 at the others."""
+        around = np.setdiff1d(cells[(cells == vertex).any(axis=1)], [vertex])
+        places = np.vstack([vertices[vertex], 0.5 * (vertices[vertex] + vertices[around])])
+        near = np.linalg.norm(positions[:, None] - places, axis=2) < 1e-9
+        return near @ np.array([1.0, *[0.5] * len(around)])
 
 
 @pytest.mark.thorough

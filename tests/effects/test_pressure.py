@@ -61,12 +61,7 @@ def test_a_thick_walled_cylinder_widens_under_inner_pressure_as_lame_says():
     radius, angle = inner + grid[:, 0], grid[:, 1]
     points = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
     pressed = PressedBody(
-        points,
-        cells,
-        PLANE_STRAIN,
-        pressure,
-        where=lambda x: np.hypot(*x.T) < inner + 1e-9,
-        about=(0.0, 0.0),
+        points, cells, PLANE_STRAIN, pressure, where=lambda x: np.hypot(*x.T) < inner + 1e-9, about=(0.0, 0.0)
     )
     body = pressed.body
     fixed = np.concatenate([components(body, lambda X, k=k: np.abs(X[:, 1 - k]) < 1e-9)[1 - k :: 2] for k in (0, 1)])

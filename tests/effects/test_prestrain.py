@@ -25,13 +25,7 @@ RUBBER = fm.Material("rubber", 2000.0, 0.4999)  # in the u–p formulation
 
 
 def bar(
-    space: str,
-    stretch: float,
-    *,
-    along=(1.0, 0.0),
-    held: bool = False,
-    bow: float = 0.0,
-    material: fm.Material = NYLON,
+    space: str, stretch: float, *, along=(1.0, 0.0), held: bool = False, bow: float = 0.0, material: fm.Material = NYLON
 ):
     """A bar between a wall at x = 0 and a block, which is free to move or ``held`` by a slider in y; the force."""
     mechanism = fm.Mechanism("bar")

@@ -3,12 +3,7 @@
 import pytest
 
 from fenicsmech.elasticity import PLANE_STRAIN, PLANE_STRESS, SPATIAL
-from fenicsmech.laws import (
-    IsochoricNeoHookean,
-    IsochoricSimoNeoHookean,
-    LogarithmicNeoHookean,
-    NeoHookean,
-)
+from fenicsmech.laws import IsochoricNeoHookean, IsochoricSimoNeoHookean, LogarithmicNeoHookean, NeoHookean
 
 LAWS = (NeoHookean, LogarithmicNeoHookean, IsochoricNeoHookean, IsochoricSimoNeoHookean)
 # the plane stress of the others is found by a local solve, see test_new_law.py

@@ -5,12 +5,7 @@ import pytest
 from numpy import log
 
 from fenicsmech.elasticity import PLANE_STRAIN, PLANE_STRESS, SPATIAL, cauchy_stress
-from fenicsmech.laws import (
-    IsochoricNeoHookean,
-    IsochoricSimoNeoHookean,
-    LogarithmicNeoHookean,
-    NeoHookean,
-)
+from fenicsmech.laws import IsochoricNeoHookean, IsochoricSimoNeoHookean, LogarithmicNeoHookean, NeoHookean
 
 from . import textbook
 from .cases import each_case, each_law

@@ -5,13 +5,7 @@ import pytest
 import ufl
 
 from fenicsmech.elasticity import PLANE_STRAIN, SPATIAL
-from fenicsmech.laws import (
-    IsochoricNeoHookean,
-    IsochoricSimoNeoHookean,
-    Law,
-    LogarithmicNeoHookean,
-    NeoHookean,
-)
+from fenicsmech.laws import IsochoricNeoHookean, IsochoricSimoNeoHookean, Law, LogarithmicNeoHookean, NeoHookean
 
 from . import textbook
 from .cases import LAWS, each_law, name

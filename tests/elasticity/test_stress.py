@@ -5,12 +5,7 @@ import pytest
 from scipy.optimize import brentq
 
 from fenicsmech.elasticity import PLANE_STRAIN, PLANE_STRESS, SPATIAL
-from fenicsmech.laws import (
-    IsochoricNeoHookean,
-    IsochoricSimoNeoHookean,
-    LogarithmicNeoHookean,
-    NeoHookean,
-)
+from fenicsmech.laws import IsochoricNeoHookean, IsochoricSimoNeoHookean, LogarithmicNeoHookean, NeoHookean
 
 from .cases import each_case
 from .single_link import distorted, interpolate, single_link

@@ -6,13 +6,7 @@ import mpmath
 from mpmath import mpf
 
 from fenicsmech.elasticity import PLANE_STRAIN, PLANE_STRESS, SPATIAL, ElasticModel
-from fenicsmech.laws import (
-    IsochoricNeoHookean,
-    IsochoricSimoNeoHookean,
-    Law,
-    LogarithmicNeoHookean,
-    NeoHookean,
-)
+from fenicsmech.laws import IsochoricNeoHookean, IsochoricSimoNeoHookean, Law, LogarithmicNeoHookean, NeoHookean
 
 DIGITS = 50
 

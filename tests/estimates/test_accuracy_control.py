@@ -7,14 +7,7 @@ import pytest
 
 import fenicsmech as fm
 from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRESS, SPATIAL, MixedFormulation
-from fenicsmech.estimates import (
-    AccuracyControl,
-    AccuracyOptions,
-    FidelityLevel,
-    LevelErrors,
-    Trial,
-    fidelity_levels,
-)
+from fenicsmech.estimates import AccuracyControl, AccuracyOptions, FidelityLevel, LevelErrors, Trial, fidelity_levels
 from fenicsmech.files import read_csv
 
 from ..simulation.demo_scenes import describe

@@ -101,11 +101,7 @@ def _deep_cantilever(space: str, comm: MPI.Comm) -> Iterator[Check]:
 
 
 CASES = (
-    HardCase(
-        "straight column",
-        "beyond its bifurcation the straight state is an equilibrium still",
-        _straight_column,
-    ),
+    HardCase("straight column", "beyond its bifurcation the straight state is an equilibrium still", _straight_column),
     HardCase(
         "column with a sag of L/500", "load all but constant, displacement grows a thousandfold", _imperfect_column
     ),

@@ -78,10 +78,5 @@ CASES = (
         "toggle", "snaps through, and back where a soft link stands in series; against the closed form", _toggle, BOTH
     ),
     HardCase("shallow arch", "load falls between two limit points, against the beam", _arch, BOTH),
-    HardCase(
-        "bistable four-bar",
-        "one flexible link, pushed through to its mirror image",
-        _four_bar,
-        BOTH,
-    ),
+    HardCase("bistable four-bar", "one flexible link, pushed through to its mirror image", _four_bar, BOTH),
 )

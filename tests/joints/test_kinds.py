@@ -2,16 +2,7 @@
 
 import pytest
 
-from fenicsmech.joints import (
-    CYLINDRICAL,
-    PLANAR_JOINT,
-    PRISMATIC,
-    REVOLUTE,
-    SPHERICAL,
-    UNIVERSAL,
-    WELD,
-    constraint,
-)
+from fenicsmech.joints import CYLINDRICAL, PLANAR_JOINT, PRISMATIC, REVOLUTE, SPHERICAL, UNIVERSAL, WELD, constraint
 
 KINDS = (REVOLUTE, PRISMATIC, CYLINDRICAL, SPHERICAL, UNIVERSAL, PLANAR_JOINT, WELD)
 

@@ -5,17 +5,7 @@ import pytest
 from fenicsmech.errors import DescriptionError
 from fenicsmech.joints import SPHERICAL
 from fenicsmech.laws import NeoHookean
-from fenicsmech.mechanism import (
-    ONYX,
-    Configuration,
-    Disc,
-    Material,
-    Mechanism,
-    Rectangle,
-    RigidLink,
-    Scene,
-    strip,
-)
+from fenicsmech.mechanism import ONYX, Configuration, Disc, Material, Mechanism, Rectangle, RigidLink, Scene, strip
 
 from .parts import assert_refused, parts
 

@@ -82,10 +82,7 @@ def test_force_on_a_fixed_link_is_refused(dim):
     p = parts()
     p.mechanism.force(on=p.base, at=(0.0, 0.0), direction=(1.0, 0.0), name="push")
     assert_refused(
-        lambda: validate(p.mechanism, dim),
-        "force 'push'",
-        "it acts on the fixed link 'base'",
-        "Give a link that moves",
+        lambda: validate(p.mechanism, dim), "force 'push'", "it acts on the fixed link 'base'", "Give a link that moves"
     )
 
 

@@ -9,7 +9,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicSpline
 
 from fenicsmech.mechanism import Disc, strip
-from fenicsmech.meshing import InterfaceSite, LinkMesh, mesh_link
+from fenicsmech.meshing import CurvedEdges, InterfaceSite, LinkMesh, mesh_link
 
 LENGTH, THICKNESS, DEPTH, RADIUS, ANGLE = 40.0, 3.0, 5.0, 2.5, 1.1
 STRAIGHT = ((0.0, 0.0), (20.0, 0.0), (LENGTH, 0.0))
@@ -24,9 +24,15 @@ def link(size: float, *, points=CURVED, dim: int = 2, radius: float = RADIUS, pi
 
 def bent(mesh: LinkMesh, *, thicker: float = 0.6) -> LinkMesh:
     """A link along ``STRAIGHT``, its centreline bent by ``ANGLE`` in between and up to 1 + ``thicker`` as thick."""
-    x, y = mesh.points[:, :2].T
-    points = _centreline()(x) + ((1.0 + thicker * _bump(x)) * y * _normal(x)).T
-    return replace(mesh, points=np.column_stack([points, mesh.points[:, 2:]]))
+
+    def moved(positions: np.ndarray) -> np.ndarray:
+        x, y = positions[:, :2].T
+        points = _centreline()(x) + ((1.0 + thicker * _bump(x)) * y * _normal(x)).T
+        return np.column_stack([points, positions[:, 2:]])
+
+    points, ends = moved(mesh.points), mesh.curved.ends
+    middles = moved(mesh.points[ends].mean(axis=1) + mesh.curved.bulges)
+    return replace(mesh, points=points, curved=CurvedEdges.through(points, ends, middles))
 
 
 def bent_point(x: float) -> tuple[float, float]:

@@ -200,9 +200,7 @@ def test_a_general_solver_of_boundary_value_problems_agrees():
     guess = np.vstack([line.position(s).T, line.angle(s), np.zeros((3, s.size))])
     reference = solve_bvp(rates, ends, s, guess, tol=1e-9, max_nodes=20000)
     solution = beam.solve(
-        beam.Beam(line, beam.Section(ea, ga, ei)),
-        beam.CLAMPED,
-        beam.End(force_x=load[0], force_y=load[1], moment=0.3),
+        beam.Beam(line, beam.Section(ea, ga, ei)), beam.CLAMPED, beam.End(force_x=load[0], force_y=load[1], moment=0.3)
     )
     assert reference.success
     assert solution.position[-1] == pytest.approx(reference.y[:2, -1], abs=1e-8)

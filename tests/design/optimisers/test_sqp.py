@@ -8,16 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.constrained import KNOWN, FormulaProblem, Formulas
-from fenicsmech.design import (
-    BFGS,
-    SQP,
-    Barrier,
-    Iterate,
-    LevenbergMarquardt,
-    Quadratic,
-    Reason,
-    Start,
-)
+from fenicsmech.design import BFGS, SQP, Barrier, Iterate, LevenbergMarquardt, Quadratic, Reason, Start
 from fenicsmech.errors import DescriptionError
 
 
