@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import singledispatch
 from itertools import pairwise
 from typing import TypeAlias
 
@@ -15,7 +16,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from fenicsmech.errors import MeshingError, point_text
-from fenicsmech.mechanism import Arc, Line, Outline
+from fenicsmech.mechanism import Arc, Line, Outline, Shape
 from fenicsmech.meshing.cutting import PlaneDrawing, in_units_of, mesh_planar
 from fenicsmech.meshing.link_mesh import LinkMesh
 from fenicsmech.meshing.link_mesher import (
@@ -25,10 +26,10 @@ from fenicsmech.meshing.link_mesher import (
     check_shape,
     holds,
     mesh_shape,
-    outer_loop,
+    typical_thickness,
 )
 from fenicsmech.meshing.session import gmsh
-from fenicsmech.polygons import distance_to, first_crossing, is_inside
+from fenicsmech.polygons import distance_to, first_crossing, is_inside, signed_area
 
 _SAMPLED = 0.02  # of the element size: how far the polygons that checks look at deviate from the outline
 
@@ -115,25 +116,30 @@ def chained(curves: Sequence[Curve], tolerance: float) -> list[list[Curve]]:
     return loops
 
 
+def outermost(loops: Sequence[list[Curve]], tolerance: float) -> list[Curve]:
+    """The loop that encloses the largest area."""
+    return max(loops, key=lambda loop: abs(signed_area(sampled(loop, tolerance))))
+
+
 def sampled(loop: Sequence[Curve], tolerance: float) -> np.ndarray:
     """The closed polygon (m, 2) with vertices on ``loop``, from which it deviates by at most ``tolerance``."""
-    return np.concatenate([points_on(curve, sample_parameters(curve, tolerance)) for curve in loop])
+    return np.concatenate([points_on(curve, sample_parameters(curve, tolerance)[:-1]) for curve in loop])
 
 
 def sample_parameters(curve: Curve, tolerance: float) -> np.ndarray:
-    """Parameters (k,) of a curve, from its start to before its end, whose polygon deviates by ``tolerance``."""
+    """Parameters (k,) from the start of a curve to its end; lines through their points deviate by ``tolerance``."""
     if isinstance(curve, CircleArc):
         # a chord over the angle 2 φ misses the arc by r (1 − cos φ)
         widest = max(math.cos(math.pi / LEAST_SEGMENTS), 1.0 - tolerance / curve.radius)
         parts = math.ceil(abs(curve.sweep) / (2.0 * math.acos(widest)))
-        return np.arange(parts) / parts
+        return np.linspace(0.0, 1.0, parts + 1)
     knots = np.unique(curve.t)
     # the chord over a piece of length h in the parameter misses the curve by at most h² max|C''| / 8
     second = np.linalg.norm(curve(knots, 2), axis=1) if curve.k > 1 else np.zeros(len(knots))
     most = np.maximum(second[:-1], second[1:])
     counts = np.maximum(1, np.ceil(np.diff(knots) * np.sqrt(most / (8.0 * tolerance)))).astype(int)
     pieces = zip(knots[:-1], knots[1:], counts, strict=True)
-    return np.concatenate([np.linspace(a, b, n, endpoint=False) for a, b, n in pieces])
+    return np.concatenate([*(np.linspace(a, b, n, endpoint=False) for a, b, n in pieces), knots[-1:]])
 
 
 def draw_loop(loop: Sequence[Curve], height: float = 0.0) -> int:
@@ -168,6 +174,32 @@ def _draw(curve: Curve, ends: tuple[int, int], height: float) -> list[int]:
     # points that no edge begins or ends in would go into files
     occ.remove([(0, at) for at in helpers])
     return edges
+
+
+@singledispatch
+def outer_loop(shape: object, request: MeshRequest) -> list[Curve]:
+    """The closed curve around ``shape`` in the plane, its holes filled; each kind of shape registers its own."""
+    raise TypeError(f"{type(shape).__name__} has no outline of curves")
+
+
+def link_outline(name: str, shape: Shape, *, dim: int) -> list[Curve]:
+    """The curves around a link in the plane, as they were drawn: those of its section where it is a solid.
+
+    Holes are filled. Curves of a STEP file that are neither lines nor circles are interpolated to 1e-8 of the link's
+    extent; a mesh file has the polygon of its boundary.
+
+    Args:
+        name: the link's name, for messages.
+        shape: an outline, or a link from a file.
+        dim: 2 or 3, of the mesh in a mesh file.
+
+    Raises:
+        MeshingError: a file cannot be read, or has no such section.
+    """
+    size = typical_thickness(shape, name) if isinstance(shape, Outline) else 1.0
+    request = MeshRequest(name, (), dim, size)
+    check_shape(shape, request)
+    return outer_loop(shape, request)
 
 
 @mesh_shape.register
