@@ -38,7 +38,7 @@ demo: install ## install what is missing and run the truss finger; pictures and 
 
 test: lint test-serial test-parallel ## style, types, layers; fast tests, quick demos among them, on one process; on two ranks
 
-# What moves by itself, as Debian's newest, is no part of it.
+# Debian's newest moves by itself, so it is not part of this.
 check: test-thorough test-slow hard-cases random-scenes-check docs test-debian13 ## everything that `make test` leaves out
 
 # Where the packages come from elsewhere (the Debian 13 root), INSTALL= switches the installation off.

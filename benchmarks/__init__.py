@@ -19,5 +19,5 @@
 ====================  ==========================================================================================
 
 ``--write`` leaves the table in docs/tables/NAME.md. ``mechanisms`` holds the scenes, those of the demos, and ``table``
-what all benchmarks share.
+the options and the output of all benchmarks.
 """

@@ -58,7 +58,7 @@ def timed(make, case, choice):
 def race(case, accuracy, level, repeats):
     """The simulation and curve by accuracy control, and the least seconds of these and of a level.
 
-    They take turns, so that what else the machine does slows both.
+    They take turns, so that other work of the machine slows both.
     """
     seconds = []
     for _ in range(repeats + 1):  # the first one compiles

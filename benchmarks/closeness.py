@@ -1,9 +1,9 @@
-"""Closeness to the drawn shape and what it costs; designs given by parameters without handle positions.
+"""Closeness to the drawn shape and its cost; designs given by parameters without handle positions.
 
     python3 -m benchmarks.closeness [MECHANISM …] [--size MM]
 
 Plane stress, Levenberg–Marquardt from the drawn design. The worst target error with R_init weighted as by default and
-with the article's weight 1, and the largest change of a target's displacement when the optimum of the default weight is
+with the paper's weight 1, and the largest change of a target's displacement when the optimum of the default weight is
 given by its parameters alone, so that handle positions are found anew.
 """
 

@@ -2,7 +2,7 @@
 
     python3 -m benchmarks.handles [--size MM] [--write]
 
-The comparison of the article's Fig. 4. A straight link between pins is carried to a bent spline whose middle control
+The comparison of the paper's Fig. 4. A straight link between pins is carried to a bent spline whose middle control
 point has moved along the link, so that one half is stretched and the other compressed. Naive handles stay at their
 parameters t of the spline, and joints turn with its tangents; optimal ones slide and turn so that the sum of the aspect
 ratios ρ of all cells is smallest. With --write the picture of both goes to demos/pictures/ too.
@@ -30,7 +30,7 @@ PICTURE = ROOT / "demos" / "pictures" / "handles.png"
 
 
 class Link:
-    """The link with its handles, and what the cells of its shapes look like."""
+    """The link with its handles, and the cells of its shapes."""
 
     def __init__(self, size: float) -> None:
         rig = fm.Mechanism("one link")

@@ -1,4 +1,4 @@
-"""The mechanisms of the demos as drawn, with what the demos simulate and ask for."""
+"""The mechanisms of the demos as drawn, with the demos' curves and targets."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Case:
         loads: its magnitudes.
         configurations: of the curves.
         designs: links that may change.
-        targets: what is wanted of the curves.
+        targets: requirements on the curves.
         size: element size of the demo, mm.
     """
 

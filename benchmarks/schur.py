@@ -4,7 +4,7 @@ complement on bodies, joints and forces.
     KKT = [[K, Bᵀ], [B, C]],     S = C − B K⁻¹ Bᵀ,     S y = b_y − B K⁻¹ b_x,     K x = b_x − Bᵀ y
 
 K is solved with by conjugate gradients, preconditioned by one cycle that knows the rigid motions as near-null space.
-S is formed column by column: it holds what is left of stiff links when they are free to move with their pins, a small
+S is formed column by column: it is the stiffness of links that are free to move with their pins, a small
 difference of two large terms.
 """
 
@@ -79,7 +79,7 @@ class SchurSolver:
         self._ksp.setUp()
 
     def column(self, number: int, tolerance: float = EXACT) -> np.ndarray:
-        """B K⁻¹ Bᵀ e: what one column of S takes, (border,) on all ranks."""
+        """B K⁻¹ Bᵀ e, the costly part of a column of S, (border,) on all ranks."""
         unit = self._c.createVecRight()
         first, end = unit.getOwnershipRange()
         if first <= number < end:

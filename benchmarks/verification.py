@@ -24,7 +24,7 @@ class Case:
     """A line of the table.
 
     Attributes:
-        what: is compared with what.
+        what: the values compared.
         within: the bound that the test asserts.
         test: file, or file::function, below ``tests/``.
     """
@@ -91,7 +91,7 @@ CASES = (
         "estimates/test_element_error.py::test_effectivity",
     ),
     Case(
-        "estimate of what space adds to plane stress against space",
+        "estimate of the error of plane stress against space",
         "factor 2",
         "estimates/test_plane_stress_error.py::test_estimate_is_near_what_space_adds",
     ),

@@ -2,7 +2,8 @@
 
 The finger pushes on the object at its tip; the object pushes back across the finger. The motor holds the closed
 configuration while the force grows to 10 N. The links are shaped until the finger gives way by 5 mm at 4 N and by
-20 mm at 10 N; or they become as light as these bounds allow. Geometry and targets are this project's own.
+20 mm at 10 N; or they become as light as these bounds allow. The targets are the paper's, the geometry is this
+project's own.
 
     python3 demos/claw.py [--space SPACE] [--quick] [--simulate-only] [--least-mass] [--out DIR]
     mpirun -n 2 python3 demos/claw.py

@@ -1,8 +1,8 @@
 """Klann leg: a walking leg whose four Onyx links are shaped to spring when the foot meets an obstacle.
 
 The linkage is that of US patent 6,260,862. Its foot runs along a nearly straight ground stroke while the crank turns;
-the links are shaped until 5 N lift the foot by 10 mm in three configurations of the stroke. Shapes of the links and
-targets are this project's own.
+the links are shaped until 5 N lift the foot by 10 mm in three configurations of the stroke. The targets are the
+paper's, the shapes of the links are this project's own.
 
     python3 demos/klann.py [--space SPACE] [--quick] [--simulate-only] [--resume] [--out DIR]
 """

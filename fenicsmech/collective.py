@@ -14,7 +14,7 @@ T = TypeVar("T")
 
 
 def on_one(comm: MPI.Comm, work: Callable[[], T], *, root: int = 0) -> T | None:
-    """What ``work`` returns on ``root``, None elsewhere; all processes raise what it raises.
+    """The result of ``work`` on ``root``, None elsewhere; all processes raise its error.
 
     ``work`` calls nothing collective; the others wait for it.
     """
@@ -22,14 +22,14 @@ def on_one(comm: MPI.Comm, work: Callable[[], T], *, root: int = 0) -> T | None:
 
 
 def from_one(comm: MPI.Comm, work: Callable[[], T], *, root: int = 0) -> T:
-    """As ``on_one``; all processes get what ``work`` returned."""
+    """As ``on_one``; all processes get the result."""
     return pickle.loads(comm.bcast(on_one(comm, lambda: pickle.dumps(work()), root=root), root=root))
 
 
 def on_all(comm: MPI.Comm, work: Callable[[], T]) -> T:
-    """What ``work`` returns on each process; if it fails on one, all raise the error of the lowest rank.
+    """The result of ``work`` on each process; if it fails on one, all raise the error of the lowest rank.
 
-    What in ``work`` is collective on ``comm`` must fail on all processes or on none; all else may fail on some.
+    Calls in ``work`` that are collective on ``comm`` must fail on all processes or on none; others may fail on some.
     """
     result, failure = None, None
     try:

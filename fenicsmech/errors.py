@@ -160,6 +160,6 @@ def _check_shape(part: str, array: NDArray, shape: tuple[int | None, ...]) -> No
 
 
 def set_fields(frozen: object, **values: Any) -> None:
-    """Sets fields of a frozen dataclass to what its checks returned, for its ``__post_init__``."""
+    """Sets fields of a frozen dataclass to their checked values, for its ``__post_init__``."""
     for name, value in values.items():
         object.__setattr__(frozen, name, value)

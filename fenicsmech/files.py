@@ -93,7 +93,7 @@ def write_csv(path: str | Path, columns: Mapping[str, ArrayLike]) -> None:
 
 
 def read_csv(path: str | Path) -> dict[str, NDArray[np.float64]]:
-    """Reads what :func:`write_csv` writes, or a spreadsheet's export of the same form.
+    """Reads a file of :func:`write_csv`, or a spreadsheet's export of the same form.
 
     Blank lines and lines that start with # are skipped.
 

@@ -174,7 +174,7 @@ class MechanismModel:
         materials: of the flexible links.
         mesh: the reference mesh of all flexible links.
         elastic: their elastic energy.
-        fields: what energies of effects are written in.
+        fields: the fields of effects' energies.
         interfaces: interface nodes as functions of body poses.
         design_nodes: the design field at the nodes of the displacement.
         node_link: index of the flexible link of every local node.

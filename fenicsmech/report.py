@@ -45,7 +45,7 @@ class Report:
     Attributes:
         folder: of its files.
         summary: all figures, as in ``summary.json``.
-        curves: what it reports on, those of the optimum after an optimisation.
+        curves: those reported on, of the optimum after an optimisation.
     """
 
     folder: Path
@@ -132,7 +132,7 @@ def design_study(
 
     Args:
         folder: of the files; created if it does not exist.
-        problem: what is optimised.
+        problem: the design problem.
         curves: of the drawn design, by ``load_displacement``; at least one.
         resume: whether to continue an optimisation that was interrupted.
         pin_diameter: of the holes for pins in the exported links; there are none by default.

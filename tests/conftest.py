@@ -78,7 +78,7 @@ def pytest_runtest_makereport(item: pytest.Item):
 
 
 def _meet(report: pytest.TestReport, stderr: int) -> None:
-    """Wait for the other ranks; if this one failed and they do not come, tell why and end the run."""
+    """Wait for the other ranks; if this one failed and they do not come, print the reason and end the run."""
     arrival = COMM.Ibarrier()
     deadline = time.monotonic() + AFTER_FAILURE
     while not arrival.Test():

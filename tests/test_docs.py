@@ -123,6 +123,37 @@ def test_every_path_of_the_makefile_exists():
         assert (ROOT / path).exists(), path
 
 
+PAGES_OF_TEXT = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")]
+SOURCES = [file for folder in ("fenicsmech", "benchmarks", "demos") for file in (ROOT / folder).rglob("*.py")]
+
+
+def test_every_path_command_and_target_named_exists():
+    makefile, missing = (ROOT / "Makefile").read_text(), []
+    tables = re.findall(r"^BENCHMARKS := (.*)", makefile, flags=re.M)[0].split()
+    targets = {*re.findall(r"^([\w-]+):", makefile, flags=re.M), *(f"table-{name}" for name in tables)}
+    for file in [*PAGES_OF_TEXT, *SOURCES]:
+        text = file.read_text()
+        paths = re.findall(r"(?<![\w/])((?:fenicsmech|tests|benchmarks|demos|tools|docs)/[\w./-]*\w)", text)
+        modules = [name.replace(".", "/") for name in re.findall(r"-m ((?:benchmarks|tests)(?:\.\w+)+)", text)]
+        found = [path for path in paths if (ROOT / path).exists()]
+        found += [path for path in modules if (ROOT / path).exists() or (ROOT / f"{path}.py").exists()]
+        named = [name for name in re.findall(r"`make ([\w-]+)", text) if name not in targets]
+        missing += [f"{file.name}: {name}" for name in {*paths, *modules} - {*found} if "NAME" not in name]
+        missing += [f"{file.name}: make {name}" for name in named]
+    assert not missing
+
+
+def test_every_name_on_the_way_through_the_code_exists():
+    page = (ROOT / "docs" / "contributing.md").read_text()
+    rows = re.findall(r"^\| [^|`]+ \| (`.*?) \| (.*) \|$", page, flags=re.M)
+    assert len(rows) > 20
+    for files, names in rows:
+        code = "\n".join((ROOT / "fenicsmech" / file).read_text() for file in re.findall(r"`([\w/]+\.py)`", files))
+        for name in re.findall(r"`([\w.]+)`", names):
+            for each in name.split("."):
+                assert re.search(rf"(?:class|def) {each}\b", code), f"{name} is not in {files}"
+
+
 def test_generated_tables_are_measured():
     for table in (ROOT / "docs" / "tables").glob("*.md"):
         assert re.search(r"^Commit [0-9a-f]{7}", table.read_text(), flags=re.M), f"{table.name}: run its command"

@@ -83,7 +83,7 @@ def imports(module: str, source: str, *, is_package: bool) -> Iterator[tuple[str
 
 
 def upward_imports(module: str, source: str, *, is_package: bool = False) -> list[str]:
-    """What a module imports against the order of the layers, as readable complaints."""
+    """Imports of a module against the order of the layers, as readable complaints."""
     own = layer(module)
     complaints = []
     for target, line in imports(module, source, is_package=is_package):

@@ -13,7 +13,7 @@ import fenicsmech as fm
 
 PUBLIC = [getattr(fm, name) for name in fm.__all__]
 
-# What methods return for the package's own layers, or hand to solvers, optimisers and regularisers from outside, which
+# Classes that methods return for the package's own layers, or hand to solvers, optimisers and regularisers, which
 # read attributes of it and never make one.
 INNER = {
     "Body",
@@ -72,7 +72,7 @@ def classes(hint: object) -> Iterator[type]:
         yield from classes(each)
 
 
-def test_what_signatures_name_is_public():
+def test_classes_in_signatures_are_public():
     named = {found for public in PUBLIC for hint in hints(public) for found in classes(hint)}
     assert {found.__name__ for found in named if found not in PUBLIC} == INNER
 

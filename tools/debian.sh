@@ -143,7 +143,7 @@ fi
 
 case $suite in
     trixie | sid) ;;
-    *) fail "'$suite' is no suite that fenicsmech is tested on: give trixie or sid" ;;
+    *) fail "fenicsmech is not tested on '$suite': give trixie or sid" ;;
 esac
 [ $# -gt 0 ] || fail "no command given, for example: tools/debian.sh trixie python3 -c 'import fenicsmech'"
 command -v debootstrap >/dev/null || fail "debootstrap is missing; run: make install-test"

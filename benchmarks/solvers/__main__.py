@@ -45,7 +45,7 @@ class Stopped(Exception):
 
 @dataclass
 class Count:
-    """What a run took: linear systems, and solves that failed; and when it has to end."""
+    """The cost of a run, in linear systems and failed solves, and the time at which it has to end."""
 
     iterations: int = 0
     failures: int = 0

@@ -34,7 +34,7 @@ _REASONS = {
 
 
 class Globalisation(Enum):
-    """What keeps SNES's steps in bounds."""
+    """The globalisations of SNES, which bound its steps."""
 
     BACKTRACKING = "bt"
     SECANT = "l2"
@@ -107,7 +107,7 @@ class SNESSolver(EquilibriumSolver):
 
 
 class _Equations:
-    """What SNES calls: residual, matrix, factor and convergence test at x, an increment from ``base``.
+    """The callbacks of SNES: residual, matrix, factor and convergence test at x, an increment from ``base``.
 
     Attributes:
         state, residual: where they were evaluated last.

@@ -34,7 +34,7 @@ _APART = 1.2  # least ratio of sizes between meshes that are compared
 
 @dataclass(frozen=True)
 class Limit:
-    """Where a sequence of meshes leads.
+    """The limit of a sequence of meshes.
 
     Attributes:
         value: f₀.

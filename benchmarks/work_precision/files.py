@@ -21,7 +21,7 @@ def save_study(study: Study, folder: str | Path) -> None:
     """Writes table.csv, table.md and, if there is a reference, work-precision.png (call on one rank).
 
     Args:
-        study: what was measured.
+        study: the measurements.
         folder: made if missing.
 
     Raises:
@@ -40,7 +40,7 @@ def save_study(study: Study, folder: str | Path) -> None:
 
 
 def study_rows(study: Study) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
-    """Headers and rows of the full table: one row per level, None for what is not known."""
+    """Headers and rows of the full table: one row per level, None for unknown values."""
     unit = study.scene.units.length
     headers = (
         "level",

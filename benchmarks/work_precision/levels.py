@@ -54,7 +54,7 @@ class FidelityLevel:
 
     @property
     def name(self) -> str:
-        """What sets the level apart, as "3D P2 h×0.5, degree 5"."""
+        """The level in words, as "3D P2 h×0.5, degree 5"."""
         if self.model is None:
             return "rigid"
         words = [f"{self.model_name} P{self.order} h×{self.factor:g}"]
@@ -88,7 +88,7 @@ def fidelity_levels(
     order 2 at the base size, in plane stress and in whole 3D.
 
     Args:
-        scene: what is to be computed.
+        scene: the mechanism and its effects.
         planar: size factors of every order in the plane.
         spatial: the same in space.
         quadratures: degrees beside the default one.

@@ -53,7 +53,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Measurement:
-    """What a level gives and costs.
+    """The value and the cost of a level.
 
     Attributes:
         level: the fidelity.
@@ -92,8 +92,8 @@ def measure(
     """The measurement of a level; a failure is recorded in it.
 
     Args:
-        scene: what is computed.
-        quantity: what is read.
+        scene: the mechanism and its effects.
+        quantity: of which the value is measured.
         level: the fidelity.
         size: element size at factor 1, or one per flexible link.
         repeats: most curves to time; fewer once they took five seconds.

@@ -1,4 +1,4 @@
-"""Work–precision plots: what accuracy costs in time, and which choices nothing else beats."""
+"""Work–precision plots: accuracy against time, and the Pareto front."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ class WorkSeries:
     """Points of one sequence of meshes.
 
     Args:
-        model: what decides the colour.
-        variant: what decides the marker, among the sequences of a model.
+        model: by which it is coloured.
+        variant: by which it is marked, among the sequences of a model.
         seconds: (n,) positive.
         errors: (n,) relative to the reference, not negative.
         names: (n,) of the points, for labels on the front.
         joined: draw a thin line through the points, in their order; else they are small and hollow.
 
     Raises:
-        DescriptionError: the arrays differ in length, or hold what has no logarithm.
+        DescriptionError: the arrays differ in length, or a number has no logarithm.
     """
 
     model: str
@@ -199,7 +199,7 @@ def _draw_front(axes: Axes, series: Sequence[WorkSeries], uncertainty: float) ->
 def _obstacles(
     axes: Axes, series: Sequence[WorkSeries], uncertainty: float, front: Sequence[tuple[float, float, str, str]]
 ) -> list[NDArray[np.float64]]:
-    """What labels should not hide: squares around the points, the sequences' lines and the staircase."""
+    """Shapes that labels should not hide: squares around the points, the sequences' lines and the staircase."""
     scale, corners = np.array([1.04, 1.06]), np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
     lines = [np.column_stack([one.seconds, _shown(one.errors, uncertainty)]) for one in series]
     # nested, so that hiding a point costs more than crossing a line

@@ -48,7 +48,7 @@ class ErrorSplit:
 
     @property
     def magnitude(self) -> float:
-        """The parts added by magnitude: what is left if none of them happens to cancel another."""
+        """The parts added by magnitude: the error if none of them happens to cancel another."""
         return abs(self.modelling) + abs(self.discretisation) + abs(self.algebraic)
 
 
@@ -83,8 +83,8 @@ class Study:
     """A set of fidelity levels, measured.
 
     Attributes:
-        scene: what was computed.
-        quantity: what was read.
+        scene: the mechanism and its effects.
+        quantity: of which the values were measured.
         measurements: one per level, in the order of the study.
         limits: of each elastic model as meshes are refined; models with less than two meshes are missing.
         ranks: processes that shared the work.
@@ -142,8 +142,8 @@ def run_study(
     the limit in space.
 
     Args:
-        scene: what is computed.
-        quantity: what is read.
+        scene: the mechanism and its effects.
+        quantity: of which the values are measured.
         levels: the levels, sequences from coarse to fine.
         size: element size at factor 1, or one per flexible link. Where depths are even multiples of it, layers
             through the depth double as it halves, and sequences are even.

@@ -141,7 +141,7 @@ class ArcLengthTracer(Stepper):
     def correct(self, guess: State, normal: Step, near: EquilibriumPoint) -> EquilibriumPoint:
         """The equilibrium in the plane through ``guess`` across ``normal``, its tangent oriented along that.
 
-        Solves hold what changes more along the path at ``near``, an equilibrium nearby.
+        Solves hold the value or its conjugate, whichever changes more along the path at ``near``, a nearby equilibrium.
         """
         return self.solver.solve(guess, ArcLengthControl(0.0, self.metric, guess, normal, self.held(near)))
 

@@ -144,7 +144,9 @@ class LoadStepper(Stepper):
                     continue
                 self.snaps += 1
                 self._rate = None
-                _log.warning("between %g and %g the path turns back; what follows is another one", self._value, value)
+                _log.warning(
+                    "between %g and %g the path turns back; the next equilibria are on another one", self._value, value
+                )
             self._accept_at(point)
             if arrives:
                 return point
@@ -231,7 +233,7 @@ class LoadStepper(Stepper):
         return False
 
     def _beyond(self, rate: Step, span: tuple[Step, ...]) -> float:
-        """How far ``rate`` lies outside the ``span`` of others, without nodes that bodies move."""
+        """Distance of ``rate`` from the ``span`` of others, without nodes that bodies move."""
         return self.system.size(self.system.independent(rate.beyond(span)))
 
     def _accept_at(self, point: EquilibriumPoint) -> None:

@@ -1,9 +1,9 @@
-"""Optimisation on corrected values: a simulation is minimised that differs from the truth by what is held fixed.
+"""Optimisation on corrected values: those of a simulation, plus corrections that are held fixed meanwhile.
 
     p_k = argmin O(Q(p) + c_k),     c_{k+1} = Q̂(p_k) + e(p_k) − Q(p_k),     c_0 = 0
 
 Q are the values of the simulation that is minimised, Q̂ those of the simulation that counts, and e the goal-oriented
-estimates of what infinitely fine elements add to Q̂. Only Q is differentiated. It is
+estimates of the discretisation error of Q̂. Only Q is differentiated. It is
 
 - that of the same simulation (deferred correction): c = e,
 - or that of a surrogate, plane stress for space (space mapping): a few equilibria in space, and no gradient there.
@@ -39,7 +39,7 @@ _log = logger(__name__)
 
 @dataclass(frozen=True)
 class Correction:
-    """What values are corrected by before they are compared with targets, and when corrections have settled.
+    """Options of the corrections of values before these are compared with targets.
 
     Attributes:
         estimates: whether error estimates are added; without, targets are met on the mesh of the simulation alone.
@@ -100,9 +100,9 @@ def loaded(equilibria: SampleEquilibria, estimates: bool) -> Reached:
 def verified(
     equilibria: SampleEquilibria, comparison: Comparison, followed: Reached, estimates: bool
 ) -> tuple[Reached, bool]:
-    """What loading from zero leads to at the design that the model holds, and whether it is what was followed.
+    """Values loaded from zero at the design that the model holds, and whether they are those that were followed.
 
-    Where loading fails, what was followed from design to design stands; the log says where not.
+    Where loading fails, the values followed from design to design stand; the log names the targets.
     """
     try:
         known = equilibria.trace()
@@ -140,7 +140,7 @@ def correct(
         begin: where the first round starts.
         first: the first round.
         options: of the correction.
-        minimise: the optimum of one round, and that round with what was learnt at its start.
+        minimise: the optimum of one round, and that round with the values at its start.
         truth: values of the simulation that counts.
 
     Raises:
@@ -199,7 +199,7 @@ class CorrectedRun:
         correction: of the values.
         start: initial design.
         saved: the checkpoint, if one is written.
-        found: what was saved in it by a run that this one continues.
+        found: its content, saved by the run that this one continues.
     """
 
     def __init__(

@@ -120,7 +120,7 @@ def shape_request(design: SplineDesign, mechanism: Mechanism, linkage: Linkage) 
 
 
 def _reach(interface: Body) -> float:
-    """How far an interface extends from its joint."""
+    """Radius of the smallest circle about a joint that contains its interface."""
     match interface.region:
         case Disc(radius=radius):
             return radius

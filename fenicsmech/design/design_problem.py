@@ -49,7 +49,7 @@ class DesignProblem:
     Args:
         simulation: of the equilibria; it keeps its shapes. ``simulation.with_design`` gives one of a result.
         designs: the links that may change.
-        targets: what is wanted.
+        targets: requirements on the mechanism.
         regulariser: R; by default mesh quality, bounds of fabrication, and closeness to the drawing with weight 1e-4,
             where the paper has 1: with 1 the demos miss their targets (benchmarks/closeness.py).
 
@@ -171,7 +171,7 @@ class DesignProblem:
 
         That is plane stress where the scene can be simulated so, with elements not smaller than the links are thick.
         ``optimise(start=found.best)`` takes an optimum to this problem's fidelity. Each process works on a start of
-        its own; starts without an equilibrium are told in the result.
+        its own; starts without an equilibrium stand in the result.
 
         Args:
             scatter: how many starts, how far apart, and other numbers; 16 by default.
@@ -238,8 +238,7 @@ class DesignProblem:
         Args:
             result: of this problem's targets.
             folder: where the files stay; nowhere by default.
-            finer: how many times smaller its elements are. At half the size, estimates of the demos are below 0.3 %,
-                and values with them within 0.03 % of those at a quarter.
+            finer: ratio of the simulation's element size to that of the parts.
 
         Raises:
             DescriptionError: the result is one of other links or targets, or a force or an output is at a point of a

@@ -1,4 +1,4 @@
-"""What a design problem computes with in one simulation: rest shape, objective, and equilibria loaded from zero."""
+"""A design problem in one simulation: rest shape, objective, and equilibria loaded from zero."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class DesignedSimulation:
     Args:
         simulation: of the equilibria.
         designs: the links that may change.
-        targets: what is wanted.
+        targets: requirements on the mechanism.
         regulariser: R.
         clock: of the phases.
 
@@ -38,7 +38,7 @@ class DesignedSimulation:
         simulation, designs, targets, clock: likewise.
 
     Raises:
-        DescriptionError: the simulation does not have what designs or targets name.
+        DescriptionError: designs or targets name parts that the simulation does not have.
         AssemblyError: a target's configuration does not assemble.
     """
 

@@ -63,7 +63,7 @@ class SampleState:
 
     Attributes:
         state: the equilibrium.
-        control: what is prescribed.
+        control: under which it was found.
         unloaded: without loads, from which displacements count.
     """
 
@@ -105,7 +105,7 @@ class _Path:
         self.moves = strained or any(observable.on_link for observable in own)
 
     def control(self, unloaded: State) -> Control:
-        """What is prescribed, at the design that the model holds."""
+        """The sample's control at the design that the model holds."""
         if self.moved is None or self.sample.moved is None:
             return LoadControl(self.sample.magnitude)
         self._model.load(unloaded)
@@ -339,7 +339,7 @@ class SampleEquilibria:
 
 @dataclass(frozen=True, eq=False)
 class _Design:
-    """A design field, this rank's values with ghosts, flat; and what is prescribed there."""
+    """A design field, this rank's values with ghosts, flat, and the control there."""
 
     field: np.ndarray
     control: Control

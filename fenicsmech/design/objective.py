@@ -76,7 +76,7 @@ class Objective:
 
     @property
     def compared(self) -> np.ndarray:
-        """What targets are compared with at the last evaluation, (components,)."""
+        """Corrected values, which targets are compared with, at the last evaluation, (components,)."""
         return self.reached + self.correction
 
     @property
@@ -153,7 +153,7 @@ class Objective:
         return self.comparison.residual_errors(self.estimates())
 
     def estimates(self) -> np.ndarray:
-        """What infinitely fine elements would add to the components of the best design so far, (components,)."""
+        """Estimated discretisation errors of the best design so far, to be added to its values, (components,)."""
         with self._clock.phase("estimates"):
             estimates = on_all(self._group.everyone, lambda: self._equilibria.errors(self._best.known))
         return self._gathered(estimates[:, None])[:, 0]

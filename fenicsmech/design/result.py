@@ -61,7 +61,7 @@ class PartValue:
 
     Attributes:
         value: of the quantity.
-        finer_elements_add: estimate of what infinitely fine elements would add.
+        finer_elements_add: estimated discretisation error, to be added.
         error: of the value with this estimate, relative as that of the target.
     """
 
@@ -77,7 +77,7 @@ class PartValue:
 
 @dataclass(frozen=True)
 class TargetResult:
-    """A target and what was reached of it; vectors are tuples.
+    """A target and the value reached; vectors are tuples.
 
     Attributes:
         name: the quantity and its sample, in words.
@@ -88,7 +88,8 @@ class TargetResult:
         wanted: value or bound; None of a quantity that is to be as small as possible.
         started: value of the design the optimisation started from, as the optimiser saw it: that of a surrogate.
         reached: value of the best design on the simulation's mesh.
-        finer_elements_add: estimate of what infinitely fine elements would add to the reached value.
+        finer_elements_add: estimated discretisation error of the reached value, to be added: the change by infinitely
+            fine elements.
         corrected: their sum, with which the target is compared; the reached value alone of an optimisation without
             estimates.
         error: of the corrected value, relative to the target's scale; of a bound how far it is missed, of a vector the
@@ -150,7 +151,7 @@ class DesignResult:
             design; the log says where not.
         active: the bounds that hold the design back, in words.
         objective: of the design at the start as the optimiser saw it, and of the best one with corrected values.
-        objective_error: what the corrections add to the latter.
+        objective_error: part of the latter that is due to corrections.
         surrogate: the space of the surrogate that led there; None if the simulation itself was minimised.
         corrections: largest change of the corrections after each round, over the targets' scales; of a surrogate that
             was given up first.
@@ -269,7 +270,7 @@ class DesignResult:
 
 
 def read_result(data: dict) -> DesignResult:
-    """A result from what ``dataclasses.asdict`` and JSON made of it; ``data`` is used up."""
+    """The inverse of ``dataclasses.asdict`` and JSON; ``data`` is used up."""
 
     def frozen(value):
         return tuple(map(frozen, value)) if isinstance(value, list) else value
@@ -289,8 +290,8 @@ class Reached:
 
     Attributes:
         values: of the components, (components,).
-        errors: what infinitely fine elements add, estimated, (components,).
-        compared: what targets are compared with, (components,).
+        errors: estimated discretisation errors, to be added, (components,).
+        compared: the values that targets are compared with, (components,).
     """
 
     values: np.ndarray

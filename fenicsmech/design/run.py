@@ -113,7 +113,7 @@ class Round:
     Attributes:
         surrogate: whether the simulation is a surrogate.
         correction: of its values, (components,).
-        changes: of the corrections so far, over what is allowed.
+        changes: of the corrections so far, over the allowed ones.
         largest: the same over the scales of the targets.
         started, initial: components at the start of the optimisation, (components,), and the objective there; empty
             and None before.
@@ -257,7 +257,7 @@ class DesignProgress:
     Args:
         optimiser: gives the criteria of its end.
         leads: whether this process shows anything.
-        name: of what is shown.
+        name: of the task shown.
     """
 
     def __init__(self, optimiser: Optimiser, *, leads: bool, name: str = "design") -> None:

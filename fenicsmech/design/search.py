@@ -155,7 +155,7 @@ def cheapest(simulation: Simulation, targets: Sequence[Target]) -> Simulation:
             check_targets(flat := at(PLANE_STRESS), targets)
             return flat
         except DescriptionError:
-            pass  # a target asks for what a plane model does not have
+            pass  # a target names a part that a plane model does not have
     return at(fidelity.model)
 
 
@@ -228,7 +228,7 @@ class Search:
         return sorted(sum(comm.allgather(on_all(comm, mine)), []), key=lambda start: start.number)
 
     def _once(self, name: str, work: Callable[[], StartResult]) -> StartResult:
-        """What a checkpoint holds if it is to be used, else ``work``, which is written to it."""
+        """The content of a checkpoint if that is to be used, else the result of ``work``, which is written to it."""
         if self._checkpoint is None:
             return work()
         checkpoint = self._checkpoint(name)

@@ -1,4 +1,4 @@
-"""Targets: what is wanted of quantities at samples, their checks, and the comparison of values with them."""
+"""Targets: requirements on quantities at samples, their checks, and the comparison of values with them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Numbers = float | Sequence[float]
 
 @dataclass(frozen=True, init=False)
 class Target:
-    """What is wanted of a quantity at a sample.
+    """A requirement on a quantity at a sample.
 
         Target(Displacement(tip, at=(40, 60)), grasp, equals=(5.0, -1.0))
         Target(ForceMagnitude(push), Sample({push: at(5.0)}), equals=2.0)
@@ -48,7 +48,7 @@ class Target:
         scale: if it was given.
 
     Raises:
-        DescriptionError: a number makes no sense, or the target does not say what is wanted.
+        DescriptionError: a number makes no sense, or no relation is given.
     """
 
     quantity: Quantity
@@ -137,7 +137,7 @@ class Target:
 
 
 class Comparison:
-    """Values of all components against what is wanted of them.
+    """Values of all components beside the wanted ones.
 
     With the scale s and the weight w of a target, and the value v of a component,
 
@@ -157,7 +157,7 @@ class Comparison:
         relative: whether a least quantity is relative to its drawn value.
 
     Raises:
-        DescriptionError: nothing tells the scale of a wanted zero.
+        DescriptionError: zero is wanted, and no scale is given.
     """
 
     def __init__(self, targets: Sequence[Target], units: Units, drawn: np.ndarray | None = None) -> None:

@@ -1,9 +1,9 @@
 """Verification of designs in the parts to be made: their STEP files are meshed anew and finer, and loaded from zero.
 
-What an optimiser reaches on its own mesh differs from what the part will do by the elements, by the outline between the
-vertices of the mesh, and by what the design makes of the mesh. All three are in the difference of both values: the part
+Values on the optimiser's mesh differ from those of the part by the elements, by the outline between the vertices of the
+mesh, and by the deformation of the mesh with the design. All three are in the difference of both values: the part
 has the outline of the exported file, its mesh has nothing in common with the optimiser's, and goal-oriented estimates
-say what still finer elements would add.
+give the error of the part's own mesh.
 """
 
 from __future__ import annotations

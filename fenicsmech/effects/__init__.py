@@ -1,6 +1,6 @@
 """Effects on a mechanism beside its links, joints and forces, one per file.
 
-- ``link_fields``: what energies of links are written in, and parts of links' boundaries
+- ``link_fields``: the fields of links' energies, and parts of links' boundaries
 - ``force_region``: averages over regions of links, which forces act on
 - ``gravity``: weight
 - ``joint_spring``: springs in revolute and prismatic joints

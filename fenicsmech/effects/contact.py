@@ -32,7 +32,7 @@ class Obstacle(ABC):
     @property
     @abstractmethod
     def numbers(self) -> tuple[float, ...]:
-        """What ``gap`` depends on; constants in forms, so that obstacles of one kind share their compiled code."""
+        """Numbers that ``gap`` depends on; constants in forms, so that obstacles of one kind share compiled code."""
 
     @abstractmethod
     def gap(self, x, numbers, sqrt):
@@ -119,7 +119,7 @@ class Cylinder(Obstacle):
 
     @property
     def core(self):
-        return 0.25 * self.radius  # what gets deeper might leave on the other side
+        return 0.25 * self.radius  # deeper points might leave on the other side
 
     def __str__(self) -> str:
         return f"a cylinder of radius {self.radius:g} at {self.centre}"
@@ -144,7 +144,7 @@ class Contact(Effect):
     the order of penetration over depth.
 
     Raises:
-        DescriptionError: a number makes no sense, or what a link of this kind needs is missing.
+        DescriptionError: a number makes no sense, or a field that a link of this kind needs is missing.
     """
 
     link: Link

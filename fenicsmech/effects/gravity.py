@@ -48,7 +48,7 @@ class Gravity(Effect):
 
     Raises:
         DescriptionError: the acceleration is not a vector; when it is simulated: nothing has weight, or the mass of a
-            link is given that is no rigid link of the mechanism.
+            link is given that is not a rigid link of the mechanism.
     """
 
     acceleration: tuple[float, ...]

@@ -198,7 +198,7 @@ class ElasticBody(BodyFields):
     def pressure_unit(self) -> float:
         """√(n / ∫ dV/μ) over the n unknowns of p, in whose units p is as large as u in an energy.
 
-        Volumes resist with p² / μ per volume once shear has done what it can.
+        Volumes resist with p² / μ per volume once shear has given way.
         """
         assert self.pressure is not None, "no link is in the u–p formulation"
         mixed = [term for term in self.terms if term.mixed]

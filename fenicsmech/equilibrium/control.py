@@ -18,7 +18,7 @@ A path may turn back in v and in q. Its arc length s is a control as well, with 
 
 in place of the equation that prescribes v. It needs no row of the matrix: solves hold v, or q where that changes more
 (Rheinboldt & Burkardt, doi:10.1145/357456.357460), which leaves K regular at limit points of the other, and the Newton
-step is led into the plane by bordering, with r the rate of what is held,
+step is moved into the plane by bordering, with r the right-hand side of the control that is held,
 
     K x₀ = −R,    K x₁ = r,    x = x₀ + τ x₁,    τ such that y + x lies in the plane.
 
@@ -80,7 +80,7 @@ class Control(ABC):
         """v of a state that the ``EquilibriumSystem`` has loaded."""
 
     def prepare(self, state: State) -> State:
-        """``state`` with what the control prescribes directly."""
+        """``state`` with the prescribed force, motors or load factor."""
         return state
 
     def gap(self, system, state: State) -> float:
@@ -283,7 +283,8 @@ class ArcLengthControl(Control):
         metric: ⟨·, ·⟩.
         origin: y₀.
         normal: n; the path's tangent, of norm one, is oriented along it.
-        held: what solves hold, that the equation of the plane replaces: the followed value, or its conjugate.
+        held: the control that solves hold, which the equation of the plane replaces: of the followed value, or of its
+            conjugate.
     """
 
     target: float

@@ -46,13 +46,13 @@ class KktMatrix:
         self._elastic, self._numbering, self._unknowns = elastic, numbering, unknowns
         self._rows, self._blocks = numbering.rows, numbering.unknowns
         self.extended, self._clock, self.version = extended, clock, 0
-        # what shift and soften add to the diagonal, and whether that is nothing
+        # the summand of shift and soften on the diagonal, and whether that is zero
         self._added, self._shift, self._plain = unknowns.zeros(), 0.0, True
-        # K̂ by entries: its copy, whether it is up to date, its diagonal, and whether that is without what is added
+        # K̂ by entries: its copy, whether it is up to date, its diagonal, and whether that is without the summand
         self._entries: EntryCopy | None = None
         self._converted, self._entries_plain = False, False
         self._entries_diagonal = PETSc.Vec()
-        # the whole matrix, whether it is up to date, and its diagonal without what is added
+        # the whole matrix, whether it is up to date, and its diagonal without the summand
         self._matrix, self._formed, self._diagonal = PETSc.Mat(), False, PETSc.Vec()
         # G of the border, K̂ G of it, Gᵀ K̂ G of it
         self._border_map, self._images, self._border_columns = PETSc.Mat(), PETSc.Mat(), PETSc.Mat()

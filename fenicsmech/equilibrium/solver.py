@@ -76,7 +76,7 @@ class EquilibriumSolver(ABC):
 
         Args:
             start: first guess; its least shift is that of all tangents.
-            control: what is prescribed.
+            control: the prescribed value.
 
         Raises:
             NotConverged: too many iterations, no descent, or elements inverted all along.
@@ -89,7 +89,7 @@ class EquilibriumSolver(ABC):
 
     @abstractmethod
     def iterate(self, start: State, control: Control) -> EquilibriumPoint:
-        """``solve`` from a ``start`` that is loaded and has what ``control`` prescribes directly."""
+        """``solve`` from a ``start`` that is loaded and has the force, motors or load factor of ``control``."""
 
     def linearise(
         self, state: State, control: Control, residual: Residual | None = None, *, iterations: int = 0
@@ -98,7 +98,7 @@ class EquilibriumSolver(ABC):
 
         Args:
             state: the equilibrium.
-            control: what is prescribed.
+            control: the prescribed value.
             residual: at the state, if that is loaded.
             iterations: so far, for the failure.
 

@@ -14,7 +14,7 @@ elements are too stiff to show. Conjugate gradients stay in W if the smoother S 
 
     x ← P K₁⁻¹ Pᵀ b,     then with the preconditioner  (I − P K₁⁻¹ Pᵀ K) S.
 
-S is a polynomial of the stiffness A of free nodes that damps what varies from node to node, PETSc's Chebyshev
+S is a polynomial of the stiffness A of free nodes that damps short waves, PETSc's Chebyshev
 iteration: with D the 3 × 3 (2 × 2 in the plane) diagonal blocks of A and λ the largest eigenvalue of D⁻¹A,
 
     S = q(D⁻¹A) D⁻¹,     1 − t q(t) = T_m((θ − t)/δ) / T_m(θ/δ),     θ, δ = (b ± a)/2,  a = ratio · b,  b ≥ λ:
@@ -125,7 +125,7 @@ class TwoLevelSolver(LinearSolver):
         self._smoother = _chebyshev(system.comm, options)
         self._sets = system.blocks.nodes.index_set(), system.blocks.border.index_set()
         self._stiffness, self._border, self._corner, self._matrix = (PETSc.Mat() for _ in range(4))
-        # petsc4py destroys what it creates late: nothing is created per iteration
+        # petsc4py destroys its objects late: none is created per iteration
         self._work, self._residual, self._z, self._image, self._p, self._q = (system.unknowns.zeros() for _ in range(6))
         self._rough, self._smoothed = PETSc.Vec(), PETSc.Vec()
         self._met = 0
@@ -237,7 +237,7 @@ class TwoLevelSolver(LinearSolver):
         p.set(0.0)
         q.set(0.0)
         before, least = math.inf, least**2
-        # rᵀ S r is the same but for what rounding leaves in Pᵀ r: if that ends here, no projection is needed
+        # rᵀ S r is the same but for rounding in Pᵀ r: if that ends here, no projection is needed
         while not abs(self._smooth(r)) <= least:
             self._project(found)
             energy = r.dot(z)

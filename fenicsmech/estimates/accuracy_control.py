@@ -11,7 +11,7 @@ is the one they may leave,
     |error| ≤ r |elements| + r_s |plane stress|,
 
 with r by level (``FidelityLevel.remainder``) and r_s = ``AccuracyOptions.plane_stress_remainder``: measured on
-cantilever, arch, truss, claw and Klann leg, as what finer elements and space add beside their estimates. Source
+cantilever, arch, truss, claw and Klann leg, by finer elements and by space. Source
 for corrections by adjoints: Pierce & Giles (doi:10.1137/S0036144598349423).
 """
 
@@ -40,7 +40,7 @@ class AccuracyOptions:
 
     Attributes:
         plane_stress_remainder: error that remains once the plane-stress estimate is added, over the estimate.
-        remainder_in_space: of the plane-stress error, what the coarsest level in space leaves.
+        remainder_in_space: the part of the plane-stress error that the coarsest level in space leaves.
         safety: factor on the expected error of a level.
         first_order: largest valid estimate over the largest displacement: larger ones, as near limit points, are
             meaningless.
@@ -118,7 +118,7 @@ class LevelErrors:
         elements: estimated discretisation error.
         plane_stress: estimated error of plane stress; 0 in space.
         unknowns: of the level.
-        growth: what each halving of the elements adds without end, under forces at points of flexible links.
+        growth: by each halving of the elements, without limit, under forces at points of flexible links.
     """
 
     value: float

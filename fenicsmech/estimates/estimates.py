@@ -103,7 +103,8 @@ class Calibration:
         displacement: c² of recovered gradients by the order of displacement elements, so that effectivities lie around
             1 (tests/estimates/test_element_error.py).
         mixed: the same of elements with a pressure (tests/estimates/test_mixed_error.py).
-        decay: c of the contraction that pins block, so that estimates are near what space adds to plane stress
+        decay: c of the contraction that pins block, so that estimates are near the difference between space and plane
+            stress
             (tests/estimates/test_plane_stress_error.py).
     """
 

@@ -25,7 +25,7 @@ from fenicsmech.model import MechanismModel
 
 
 def growth_by_halving(part: PrescribedPart, model: MechanismModel, sizes: Mapping[FlexibleLink, float]) -> float:
-    """What halving all elements of some ``sizes`` adds at most to the displacement of ``part`` per force.
+    """Largest growth of the displacement of ``part`` per force when all elements of some ``sizes`` are halved.
 
     0 if no force acts at a point of a flexible link.
     """
@@ -42,7 +42,7 @@ def growth_by_halving(part: PrescribedPart, model: MechanismModel, sizes: Mappin
 
 
 def cause_of_growth(part: PrescribedPart) -> str:
-    """Which forces of ``part`` act at points of flexible links, and the remedy, in one sentence; empty if none does."""
+    """The forces of ``part`` at points of flexible links, and the remedy, in one sentence; empty if there are none."""
     found = [f"{force.name!r} acts at a point of flexible link {link.name!r}" for force, link, _ in _at_points(part)]
     if not found:
         return ""

@@ -22,7 +22,7 @@ from fenicsmech.mechanism.shapes import Region
 
 @dataclass(frozen=True)
 class Effect(ABC):
-    """An influence on a mechanism; a frozen dataclass derived from this one, in a file of its own.
+    """An effect on a mechanism: a frozen dataclass derived from this one, in a file of its own.
 
     It overrides the hooks that it needs. Each is nothing by default and then adds no form, no unknown and no entry of a
     matrix. The arguments of hooks are objects of the layers above.

@@ -33,7 +33,7 @@ class Grading:
     Attributes:
         growth: of the element size per unit of distance from a small feature.
         gap_aspect: length over height of the elements in a narrow gap.
-        least_gap_size: least element size in a gap over that next to it; bounds what a vanishing gap may cost.
+        least_gap_size: least element size in a gap over that next to it; bounds the number of elements there.
     """
 
     growth: float = 1.0

@@ -310,7 +310,7 @@ def extrude(plan: LinkMesh, depth: float, layers: int, *, half: bool = False) ->
         plan: the triangulation; its ``interface`` numbers pass on to the cells above.
         depth: extent along z.
         layers: number of layers, at least 1.
-        half: only the upper half, z ≥ 0, of what twice as many layers would be.
+        half: only the upper half, z ≥ 0, of the mesh with twice as many layers.
     """
     heights = np.linspace(0.0 if half else -0.5 * depth, 0.5 * depth, layers + 1)
     count, middle = len(plan.points), 0 if half else (layers + 1) // 2

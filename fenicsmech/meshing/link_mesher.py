@@ -1,4 +1,4 @@
-"""The mesh of a link from its shape: the request, what each kind of shape implements, the checks of every mesh."""
+"""The mesh of a link from its shape: the request, the functions of each kind of shape, the checks of every mesh."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ def gmsh_session(part: str) -> Iterator[None]:
     gmsh has one global state: sessions do not nest, and one started elsewhere must have been finalised.
 
     Args:
-        part: what is being meshed, for messages.
+        part: the link that is meshed, for messages.
 
     Raises:
         MeshingError: gmsh reports an error; carries the last error line of its log.
@@ -87,9 +87,9 @@ def gmsh_session(part: str) -> Iterator[None]:
 
 @contextmanager
 def muted_output() -> Iterator[None]:
-    """Discards what libraries write to the standard output of this process inside the block; not Python's output."""
+    """Discards the output of libraries to this process's standard output inside the block; not Python's output."""
     flush = ctypes.CDLL(None).fflush
-    flush(None)  # what C libraries have buffered was written before the block
+    flush(None)  # C libraries' buffers were filled before the block
     kept = os.dup(1)
     try:
         with open(os.devnull, "wb") as nowhere:

@@ -338,7 +338,7 @@ def _null_space(matrix: np.ndarray) -> np.ndarray:
 
 
 def _takes_part(vectors: np.ndarray) -> np.ndarray:
-    """Which entries of any of some unit vectors, (n, size), are beyond rounding."""
+    """Mask of the entries that exceed rounding in any of some unit vectors, (n, size)."""
     return (np.abs(vectors) > 1e-6).any(axis=0)
 
 

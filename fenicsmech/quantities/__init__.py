@@ -1,10 +1,10 @@
 """Quantities of equilibria and of links at rest, with their derivatives by the design and by the laws' numbers.
 
-- ``quantity``: what a quantity is; components and magnitudes of vectors
+- ``quantity``: the interface of quantities; components and magnitudes of vectors
 - ``motion``: displacements and rotations
 - ``forces``: forces that prescribe displacements, torques of motors, reactions of joints
 - ``links``: strain energy, mass, volume and length of flexible links
-- ``sample``: the equilibria they are asked of
+- ``sample``: the equilibria at which they are evaluated
 - ``sensitivity``: total derivatives by adjoints
 - ``forms``: values of forms and their derivatives
 """

@@ -86,7 +86,7 @@ class _Travels(Observable):
 
 @dataclass(frozen=True)
 class Rotation(Quantity):
-    """The rotation of a rigid link, or of what a joint holds of a flexible one, from the unloaded configuration, rad.
+    """The rotation of a rigid link, or of a flexible one at a joint, from the unloaded configuration, rad.
 
     Attributes:
         link: the link.

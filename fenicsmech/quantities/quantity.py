@@ -103,7 +103,7 @@ class Quantity(ABC):
     Attributes:
         of_state: whether it depends on an equilibrium; those that do not need no sample.
         from_unloaded: whether it counts from the unloaded configuration.
-        of_part: whether links known by their outline alone have it; a line drawn in them is no part of it.
+        of_part: whether exported parts, known by their outline alone, have it; they have no centreline.
     """
 
     of_state: ClassVar[bool] = True

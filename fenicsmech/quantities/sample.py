@@ -1,4 +1,4 @@
-"""Samples: the equilibria that quantities are asked of, by forces that act at once and motor positions."""
+"""Samples: the equilibria at which quantities are evaluated, by simultaneous forces and motor positions."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ class Sample:
 
     @property
     def part(self) -> Force | ForceGroup:
-        """What changes on the way from the unloaded configuration."""
+        """The force or forces that are prescribed along the way from the unloaded configuration."""
         if self.moved:
             return self.moved[0]
         acting = self._acting or self.forces[:1]

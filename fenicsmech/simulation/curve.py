@@ -191,7 +191,7 @@ class Curve:
 
     @property
     def growth_by_halving(self) -> np.ndarray:
-        """What each halving of the elements adds to ``values``, at most in the plane, about in space, (frames,).
+        """Growth of ``values`` by each halving of the elements: a bound in the plane, about so in space, (frames,).
 
         Without end, as its force acts at a point of a flexible link; 0 if it does not, and where motors move.
         """
@@ -250,7 +250,7 @@ class Curve:
         """Bounds of the force between which friction holds the mechanism, at every frame.
 
         Turning angles are differences along the curve, of second order in the distance of its frames; ends of the curve
-        are less accurate than the rest. Only what a pin bears across its axis counts.
+        are less accurate than the rest. Only forces across the axes of pins count.
 
         Args:
             pins: friction of revolute joints.
@@ -375,7 +375,7 @@ class Curve:
             columns[f"corrected {name} [{unit}]"] = self.corrected
         on_one(self.discretisation.comm, lambda: write_csv(path, columns))
 
-    # -- what the above need -------------------------------------------------------------------------------------
+    # -- helpers --------------------------------------------------------------------------------------------------
 
     def equilibrium(self, frame: Frame) -> Equilibrium:
         """The equilibrium of one of the frames, with the unknown of the curve. Local."""

@@ -29,7 +29,7 @@ class Discretisation:
         shapes: of the flexible links.
 
     Raises:
-        DescriptionError: links, joints or points cannot be right.
+        DescriptionError: links, joints or points contradict each other.
     """
 
     def __init__(
@@ -97,7 +97,7 @@ class Discretisation:
         return Estimates(self.model)
 
     def solver(self, part: PrescribedPart, others: tuple[tuple[Force, float], ...] = ()) -> EquilibriumSolver:
-        """The solver for what changes and some constant forces, kept for all configurations."""
+        """The solver for a force or motors that change and some constant forces, kept for all configurations."""
         key = part, others
         if key not in self._solvers:
             loads = tuple((self.model.point_load(other), float(magnitude)) for other, magnitude in others)

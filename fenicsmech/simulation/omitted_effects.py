@@ -133,7 +133,7 @@ def _simulated(model: MechanismModel) -> tuple[str, ...]:
 
 
 def _weight_hint(change: float | None, displacement: float, units: Units, options: ExplanationOptions) -> Hint:
-    """Influence of the weight, whose ``change`` of the displacement is None where the weight is unknown."""
+    """The hint on weight, whose ``change`` of the displacement is None where the weight is unknown."""
     per_volume = f"{units.force}/{units.length}³"
     if change is None:
         return Hint("weight", f"its influence needs explain(weight=…), the weight per volume in {per_volume}", False)
@@ -150,7 +150,7 @@ def _weight_hint(change: float | None, displacement: float, units: Units, option
 def _point_force_hint(
     part: PrescribedPart, growth: float, displacement: float, units: Units, options: ExplanationOptions
 ) -> Hint | None:
-    """What each halving of the elements adds to the displacement, its ``growth``; None if nothing."""
+    """Growth of the displacement by each halving of the elements; None if there is none."""
     if not growth:
         return None
     fraction = abs(growth) / max(abs(displacement), sys.float_info.min)
@@ -236,7 +236,7 @@ def _buckling_hint(model: MechanismModel, frame: Frame, slender: float) -> Hint 
             fraction, name = max((fraction, name), (load / critical, link.name))
     if not name:
         return None
-    text = f"the compression of {name} is about {fraction:.2g} of what buckles it out of the plane"
+    text = f"the compression of {name} is about {fraction:.2g} of its buckling load out of the plane"
     remedy = "; use space='3d'" if fraction > slender else ""
     return Hint("bending out of the plane", text + remedy, fraction > slender)
 

@@ -272,7 +272,7 @@ class Simulation:
             positions.append(drawn + point.displacement(None, assembly.poses))
         return np.array(positions)
 
-    # -- others like this one ------------------------------------------------------------------------------------
+    # -- simulations derived from this one ------------------------------------------------------------------------
 
     def with_design(self, design: RestShape | np.ndarray) -> Simulation:
         """The same scene at the same fidelity with links of another rest shape; mesh and compiled forms are shared.
@@ -343,7 +343,7 @@ class Simulation:
         other._discretisation = self._discretisation.at(self.fidelity, other.clock, comm)
         return other
 
-    # -- what it computes with -----------------------------------------------------------------------------------
+    # -- parts ------------------------------------------------------------------------------------------------------
 
     @property
     def fidelity(self) -> Fidelity:
@@ -357,7 +357,7 @@ class Simulation:
 
     @property
     def model(self) -> MechanismModel:
-        """The meshed mechanism, which simulations of several designs share; as drawn unless it is being worked with."""
+        """The meshed mechanism, which simulations of several designs share; as drawn between their methods' calls."""
         return self._discretisation.model
 
     @property
@@ -378,7 +378,7 @@ class Simulation:
         return from_one(self.comm, lambda: 1.0 if rest is None else dim / float(radius_ratios(rest, cells).min()))
 
     def solver(self, part: PrescribedPart, others: tuple[tuple[Force, float], ...] = ()) -> EquilibriumSolver:
-        """The solver for what changes and some constant forces, kept for all configurations."""
+        """The solver for a force or motors that change and some constant forces, kept for all configurations."""
         return self._discretisation.solver(part, others)
 
     def trace(self, request: CurveRequest, *, watch: Callable[[int], None] = lambda done: None) -> Curve:

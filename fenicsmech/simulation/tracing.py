@@ -1,4 +1,4 @@
-"""Curves at prescribed values: what is asked, checked before anything is meshed, and the load steps through all values.
+"""Curves at prescribed values: the request, checked before anything is meshed, and the load steps through all values.
 
 A curve starts in the assembled configuration, under constant loads. The prescribed part is a force or motors; both give
 a curve of force (or torque) over displacement (or position).
@@ -115,7 +115,7 @@ def read_others(
 
 
 def check_force(mechanism: Mechanism, part: object) -> None:
-    """Refuses what is not a force of ``mechanism``, or a group of them."""
+    """Raises a DescriptionError unless ``part`` is a force of ``mechanism``, or a group of them."""
     for force in dict(part.ratios) if isinstance(part, Force | ForceGroup) else (part,):
         if force not in mechanism.forces:
             name = force.name if isinstance(force, Force) else force
@@ -123,7 +123,7 @@ def check_force(mechanism: Mechanism, part: object) -> None:
 
 
 def check_motors(mechanism: Mechanism, where: str, motors: Iterable[tuple[Motor, float]], remedy: str) -> None:
-    """Refuses what is not a motor of ``mechanism``."""
+    """Raises a DescriptionError unless ``motors`` are motors of ``mechanism``."""
     for motor, _ in motors:
         if motor not in mechanism.motors:
             raise DescriptionError(where, f"{motor.name!r} is not a motor of {mechanism.name!r}", remedy)

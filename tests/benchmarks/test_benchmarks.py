@@ -82,7 +82,7 @@ def test_predictors_and_quadratures_give_the_same_displacement():
 
 
 @pytest.mark.thorough
-def test_what_takes_too_long_is_stopped_and_said_so():
+def test_a_run_that_takes_too_long_is_stopped_and_marked():
     *_, row = printed("solvers", "truss, whole load at once", "--limit", "0")
     assert row[1:] and set(row[1:]) == {"stopped after 0 s"}
 

@@ -76,7 +76,7 @@ def test_joints_with_compliance(solver):
     [DisplacementControl(200.0), DisplacementControl(-200.0), LoadControl(1e100), LoadControl(np.nan)],
     ids=["forth", "back", "1e100", "nan"],
 )
-def test_what_is_out_of_reach_is_refused_in_one_solve(solver, control):
+def test_values_out_of_reach_are_refused_in_one_solve(solver, control):
     simulation, push = finger("plane-stress", solver=solver)
     rest = simulation.load_displacement(push, forces=[0.0]).frames[0].state
     with pytest.raises(NotConverged) as caught:

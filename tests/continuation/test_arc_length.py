@@ -16,7 +16,7 @@ SUNK = 12.0  # mm at the end
 
 
 def extremum(function, low: float, high: float) -> float:
-    """Where a smooth function of how far the toggle has sunk has its maximum, to rounding."""
+    """The maximum, to rounding, of a smooth function of the toggle's displacement."""
     return minimize_scalar(
         lambda sunk: -function(sunk), bounds=(low, high), method="bounded", options={"xatol": 1e-10}
     ).x

@@ -90,7 +90,7 @@ def test_bifurcation_is_located_by_few_equilibria_to_the_accuracy_of_the_eigenva
     assert event.frame.force == pytest.approx(loads[0], rel=1e-3)
 
 
-def test_what_is_no_bifurcation_of_the_curve_is_refused():
+def test_an_event_that_is_not_a_bifurcation_of_the_curve_is_refused():
     case = column()
     curve = straight(case)
     event = curve.bifurcations[0]

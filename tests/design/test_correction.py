@@ -28,7 +28,7 @@ class Counted(SampleEquilibria):
 
 @pytest.fixture
 def traced(monkeypatch) -> dict[str, int]:
-    """How often equilibria were loaded from zero, per space."""
+    """Number of times that equilibria were loaded from zero, per space."""
     monkeypatch.setattr("fenicsmech.design.designed.SampleEquilibria", Counted)
     Counted.traced = {}
     return Counted.traced

@@ -28,7 +28,7 @@ class Display:
 
 @pytest.fixture
 def shown(monkeypatch):
-    """What is shown of promised reductions, one per iteration of ten seconds."""
+    """Output for promised reductions, one per iteration of ten seconds."""
     ticks = iter(range(0, 10000, 10))
     display = Display()
     monkeypatch.setattr(run, "perf_counter", lambda: float(next(ticks)))

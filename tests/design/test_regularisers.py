@@ -38,7 +38,7 @@ def spline() -> LinkSpline:
 
 
 def rest_of(link: LinkSpline, bounds: Bounds, *, count: int = 500, thickness: float = THICKNESS) -> SimpleNamespace:
-    """What regularisers that are functions of the spline alone look at."""
+    """The part of a rest shape that regularisers of the spline alone read."""
     lengths = np.where(link.is_thickness, 1.0, thickness)
     samples = SplineSamples(link, count=count)
     whole = slice(0, link.size)

@@ -1,4 +1,4 @@
-"""An optimisation ends where elements cannot tell what is left to gain; results move by less than their errors."""
+"""An optimisation ends where the gain left is below the elements' error; results move by less than their errors."""
 
 import numpy as np
 import pytest

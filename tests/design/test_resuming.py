@@ -51,7 +51,7 @@ def run(folder: Path, ranks: int, *options: str) -> tuple[fm.DesignResult, list[
 
 
 def saved_iteration(folder: Path) -> int:
-    """What the checkpoint says, which is complete whenever it is looked at; −1 if there is none yet."""
+    """The iteration in the checkpoint, which is complete whenever it is read; −1 if there is none yet."""
     file = folder / "checkpoint.json"
     return json.loads(file.read_text())["number"] if file.exists() else -1
 
@@ -72,7 +72,7 @@ def run_and_kill(folder: Path, ranks: int, *, victim: int) -> list[int]:
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory) -> tuple[fm.DesignResult, list[int]]:
-    """What comes out if nobody kills anything."""
+    """The result of an uninterrupted run."""
     return run(tmp_path_factory.mktemp("undisturbed"), 1)
 
 

@@ -78,7 +78,7 @@ def test_two_joints_at_one_place_are_refused():
         ([(40, 0)], 2, ControlLayout(True, False, (1,))),
         ([(24, 8.64)], 3, ControlLayout(True, True, (1, 0))),
         ([(30, 6.75), (0, 0)], 3, ControlLayout(False, True, (1, 0))),
-        ([(36, 3.24), (0, 0)], 3, ControlLayout(False, False, (2,))),  # a stub beyond a joint is no free end
+        ([(36, 3.24), (0, 0)], 3, ControlLayout(False, False, (2,))),  # a stub beyond a joint is not a free end
     ],
 )
 def test_control_points_go_to_joints_and_free_ends_and_where_these_are_farthest_apart(joints, segments, expected):

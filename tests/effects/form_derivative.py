@@ -17,7 +17,7 @@ STEPS = 10.0 ** -np.arange(1.5, 3.6, 0.5)
 
 @dataclass(frozen=True)
 class FormDerivative:
-    """How well a form is differentiated, its value, and its slope along the direction."""
+    """Error of a form's derivative, its value, and its slope along the direction."""
 
     rates: TaylorRates
     value: float

@@ -1,4 +1,4 @@
-"""Displacements alone lock as ν approaches 0.5; with a pressure of their own links do not (Cook's membrane).
+"""Displacements alone lock as ν approaches 0.5; links in the u–p (mixed) formulation do not (Cook's membrane).
 
 Errors against the same elements on 32 × 32 squares, of the displacement in the middle of the loaded edge.
 """

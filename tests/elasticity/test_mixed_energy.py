@@ -1,4 +1,4 @@
-"""Strain energies with a pressure of their own: the same energy at the pressure that makes them stationary."""
+"""Energies of the u–p (mixed) formulation: the law's energy at the pressure that makes them stationary."""
 
 import numpy as np
 import pytest

@@ -33,7 +33,7 @@ def shifted(system: EquilibriumSystem, state: State, x: np.ndarray) -> State:
 
 
 def largest_steps(system: EquilibriumSystem) -> np.ndarray:
-    """How far each scaled unknown may go in finite differences: a small part of a cell, some degrees."""
+    """Largest change of each scaled unknown in finite differences: a small part of a cell, some degrees."""
     blocks, joints = system.blocks, system.joints
     border = np.ones(blocks.border.size)
     units = blocks.restrict_border(system.unknowns.scale).poses
@@ -57,7 +57,7 @@ def scattered(system: EquilibriumSystem, columns: np.ndarray, values: np.ndarray
 
 
 def parts_of(system: EquilibriumSystem) -> dict[str, np.ndarray]:
-    """Which unknowns are displacements, poses, multipliers, the force."""
+    """Masks of the unknowns that are displacements, poses, multipliers, the force."""
     parts = system.blocks.restrict(np.arange(system.blocks.local))
     return {"u": parts.nodes, "z": parts.poses, "λ": parts.multipliers, "f": parts.load}
 

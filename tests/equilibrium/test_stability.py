@@ -1,4 +1,4 @@
-"""The inertia of the KKT matrix tells how many modes are unstable, whatever the constraints."""
+"""The inertia of the KKT matrix counts the unstable modes, whatever the constraints."""
 
 import pytest
 from mpi4py import MPI

@@ -72,6 +72,6 @@ def force(sunk: np.ndarray) -> np.ndarray:
 
 
 def displacement(sunk: np.ndarray, stilt_modulus: float) -> np.ndarray:
-    """How far the force's point has moved then: the stilt's λ solves 1/λ − λ = 2 F / A E."""
+    """Displacement of the force's point: the stilt's λ solves 1/λ − λ = 2 F / A E."""
     half = force(sunk) / (STILT_WIDTH * DEPTH * stilt_modulus)
     return sunk + STILT * (1.0 - (np.sqrt(half**2 + 1.0) - half))

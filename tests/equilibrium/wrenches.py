@@ -29,7 +29,7 @@ class Wrench:
 
 
 def of_joints(simulation: fm.Simulation, frame: fm.Frame) -> dict[Link, Wrench]:
-    """What the joints exert on each link, from the reported reactions."""
+    """Forces and moments of the joints on each link, from the reported reactions."""
     mechanism, linkage = simulation.scene.mechanism, simulation.linkage
     dim, space = linkage.dim, linkage.joints.space
     totals = {link: Wrench(np.zeros(dim), np.zeros({2: 1, 3: 3}[dim])) for link in mechanism.links}

@@ -49,7 +49,7 @@ def test_elements_are_refined_in_the_plane_as_long_as_they_are_what_is_wrong():
 
 
 @pytest.mark.parametrize("accuracy", [0.02, 0.01, 0.003, 0.001])
-def test_what_plane_stress_leaves_out_leads_to_space_without_detours(accuracy):
+def test_errors_of_plane_stress_lead_to_space_without_detours(accuracy):
     run = Recorder(0.005, 0.03)
     assert control(accuracy).choose(run).reached
     assert run.levels[0].model is PLANE_STRESS
@@ -142,7 +142,7 @@ def test_estimates_beyond_first_order_are_no_corrections():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["cantilever", "arch", "truss", "claw", "klann"])
-def test_what_corrections_leave_is_what_they_may_leave(name):
+def test_errors_after_correction_are_within_their_bound(name):
     scene, push, load = {"cantilever": cantilever, "arch": arch}.get(name, lambda: (*describe(name)[:2], LOADS[name]))()
     forces = [0.5 * load, load]
     *levels, finest = [*fidelity_levels(PLANE_STRESS), *fidelity_levels(MID_PLANE_SYMMETRIC)[:4]]

@@ -1,4 +1,4 @@
-"""Error estimates of links that have a pressure of their own: within a factor of two, the pressure's error included."""
+"""Error estimates of links in the u–p (mixed) formulation: within a factor of two, the pressure's error included."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Displacements under forces at points of flexible links grow without limit, as told; those of regions converge."""
+"""Displacements under forces at points of flexible links grow without limit, as predicted; on regions they converge."""
 
 from __future__ import annotations
 
@@ -35,17 +35,17 @@ class Block:
 def test_each_halving_adds_as_much_as_flamant_says(space, at, along):
     block = Block(at=at, along=along)
     added = np.diff(block.displacements([2.5, 1.25, 0.625], space=space))
-    told = block.curve(size=2.5, space=space).growth_by_halving[0]
-    assert told > 4e-5
-    assert added == pytest.approx([told, told], rel=0.05)
+    predicted = block.curve(size=2.5, space=space).growth_by_halving[0]
+    assert predicted > 4e-5
+    assert added == pytest.approx([predicted, predicted], rel=0.05)
 
 
 def test_less_is_added_inside_a_link():
     block = Block(at=(30.0, 0.0))
     added = np.diff(block.displacements([2.5, 1.25], space="plane-stress"))[0]
     # Kelvin's problem: (3 − ν) (1 + ν) / 8 of it
-    told = block.curve(size=2.5, space="plane-stress").growth_by_halving[0]
-    assert added == pytest.approx(told * 2.7 * 1.3 / 8, rel=0.15)
+    predicted = block.curve(size=2.5, space="plane-stress").growth_by_halving[0]
+    assert added == pytest.approx(predicted * 2.7 * 1.3 / 8, rel=0.15)
 
 
 def test_forces_at_given_displacements_shrink_as_much():
@@ -63,9 +63,9 @@ def test_displacements_in_space_grow_with_one_over_the_size():
     layers = {5.0: 1, 2.5: 2, 1.25: 4}
     curves = [block.curve(size=size, order=1, layers=n, space="3d-symmetric") for size, n in layers.items()]
     added = np.diff([curve.displacements[0] for curve in curves])
-    told = [curve.growth_by_halving[0] for curve in curves[:2]]
+    predicted = [curve.growth_by_halving[0] for curve in curves[:2]]
     assert added[1] == pytest.approx(2.0 * added[0], rel=0.1)
-    assert np.all((0.3 * added < told) & (told < 3.0 * added))
+    assert np.all((0.3 * added < predicted) & (predicted < 3.0 * added))
 
 
 @pytest.mark.parametrize(

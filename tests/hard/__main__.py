@@ -42,7 +42,7 @@ def main() -> int:
 
 
 def _run(case: HardCase, space: str) -> list[Check]:
-    """What is found; an error that the case does not expect is a finding of its own."""
+    """The findings; an error that the case does not expect is one too."""
     try:
         return list(case.run(space, COMM))
     except Exception as failure:
@@ -50,7 +50,7 @@ def _run(case: HardCase, space: str) -> list[Check]:
 
 
 def _found(checks: list[Check]) -> str:
-    """What happened: of the same thing in several spaces the worst."""
+    """The findings as text: of the same finding in several spaces the worst."""
     worst: dict[str, Check] = {}
     for check in checks:
         known = worst.get(check.what)

@@ -17,7 +17,7 @@ BOTH = (PLANE, SPACE)
 
 @dataclass(frozen=True)
 class Deviation:
-    """How far ``what`` is from its known value, relative to its size; NaN does not hold."""
+    """Deviation of ``what`` from its known value, relative to its size; NaN does not hold."""
 
     what: str
     value: float
@@ -59,7 +59,7 @@ def deviation(what: str, found, wanted, bound: float, *, scale: float | None = N
 
 
 def travel(simulation: fm.Simulation, part: Force | Output, frame: fm.Frame) -> float:
-    """How far the point of a force or output has moved along its direction from where it was drawn (collective)."""
+    """Displacement of the point of a force or output along its direction from the drawn place (collective)."""
     simulation.model.load(frame.state)
     return simulation.model.travel(part, frame.state)
 

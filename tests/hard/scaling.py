@@ -30,7 +30,7 @@ JOINTS = {
 
 @dataclass(frozen=True)
 class Described:
-    """How the four-bar is described.
+    """Variations in the description of the four-bar.
 
     Attributes:
         length: what a millimetre is.

@@ -18,7 +18,7 @@ LIMIT, TURNING = fm.Critical.LIMIT, fm.Critical.TURNING
 
 
 def _highest(function, low: float, high: float) -> float:
-    """Where a smooth function of one number is largest."""
+    """The maximum of a smooth function of one number."""
     return minimize_scalar(lambda x: -function(x), bounds=(low, high), method="bounded", options={"xatol": 1e-10}).x
 
 

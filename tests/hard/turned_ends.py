@@ -35,7 +35,7 @@ def turned(line: beam.Beam, left: float, right: float, initial: beam.BeamSolutio
 
 
 def largest_turn(line: beam.Beam, below: float) -> float:
-    """How far the ends can be turned: the angle as a function of the moment at either end, on from ``below``."""
+    """Largest angle of the ends: the angle as a function of the moment at either end, on from ``below``."""
     solution, angles = turned(line, below, below), []
     for moment in solution.end.moment - np.linspace(0.0, 2.0, 81):
         ends = (beam.End(x=0.0, y=0.0, moment=sign * moment) for sign in (-1.0, 1.0))

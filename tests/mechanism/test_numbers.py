@@ -33,7 +33,7 @@ def pin(p, **options):
     )
 
 
-# What is named in the message, and the entry: a function of the parts and the number that is wrong.
+# The name in the message, and the entry: a function of the parts and the number that is wrong.
 COORDINATES = {
     "position of 'far pin'": lambda p, x: pin(p, at=(x, 0.0)),
     "axis of 'far pin'": lambda p, x: pin(p, axis=(0.0, x, 1.0)),

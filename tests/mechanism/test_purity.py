@@ -83,7 +83,7 @@ def test_equal_descriptions_are_equal_data(k):
 
 
 def imported_by(module: Path) -> set[str]:
-    """What a module imports anywhere in it, dotted."""
+    """Dotted names of a module's imports, wherever they stand in it."""
     found = set()
     for node in ast.walk(ast.parse(module.read_text())):
         if isinstance(node, ast.Import):

@@ -36,7 +36,7 @@ def bent(mesh: LinkMesh, *, thicker: float = 0.6) -> LinkMesh:
 
 
 def bent_point(x: float) -> tuple[float, float]:
-    """Where ``bent`` puts the point x of the centreline."""
+    """Place of the point x of the centreline after ``bent``."""
     return tuple(_centreline()(x).tolist())
 
 

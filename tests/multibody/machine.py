@@ -29,12 +29,12 @@ class Machine:
         return assemble(linkage, Configuration("driven", ((self.motor, position),)))
 
     def positions(self, linkage: Linkage, poses: np.ndarray) -> dict[str, np.ndarray]:
-        """Where all pivots (dim,) are."""
+        """Places (dim,) of all pivots."""
         return {name: point_of(linkage, poses, link, at) for name, (link, at) in self.pivots.items()}
 
 
 def point_of(linkage: Linkage, poses: np.ndarray, link: Link, at: Sequence[float]) -> np.ndarray:
-    """Where the point of ``link`` drawn at ``at`` is, (dim,)."""
+    """Place of the point of ``link`` drawn at ``at``, (dim,)."""
     body = linkage.body_of(link)
     drawn = np.array([*at, 0.0])[: linkage.dim]
     offset = drawn - linkage.bodies[body].centre

@@ -17,7 +17,7 @@ TURN = 2.5
 
 
 def displacements(machine: Machine, dim: int, turn: float = TURN) -> dict[str, np.ndarray]:
-    """How far each pivot goes when the motor turns."""
+    """Displacement of each pivot when the motor turns."""
     linkage = machine.linkage(dim)
     found = machine.positions(linkage, machine.drive(linkage, turn).poses)
     return {name: found[name] - np.array([*at, 0.0])[:dim] for name, (_, at) in machine.pivots.items()}

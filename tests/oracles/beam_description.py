@@ -63,7 +63,7 @@ def between_pins(centreline: Centreline, section: Section, *, rigid: tuple[float
 
 @dataclass(frozen=True)
 class End:
-    """What is prescribed at a pin: per direction a displacement, or (where that is None) a force.
+    """Boundary conditions at a pin: per direction a displacement, or (where that is None) a force.
 
     x, y, rotation: displacement of the pin along the end's axes and rotation (rad) or None;
     force_x, force_y, moment: load on the pin where the displacement is None;

@@ -80,7 +80,7 @@ class Bench:
         return design_field(self.model, 0.3 * np.sin(positions @ waves + phases))
 
     def control(self, change: float = 0.0) -> Control:
-        """What is prescribed."""
+        """The control."""
         return DisplacementControl(PLACE + self.origin + change) if self.moved else LoadControl(FORCE + change)
 
     def state(self, design: np.ndarray, change: float = 0.0) -> State:

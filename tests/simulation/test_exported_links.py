@@ -16,7 +16,7 @@ FORCES = [-0.5, 1.0, 4.0]
 
 
 def curve(shape, pins, *, size, space="plane-stress") -> np.ndarray:
-    """How far the second pin of a link moves along the line through both, for each of ``FORCES``."""
+    """Displacement of the second pin of a link along the line through both, for each of ``FORCES``."""
     mechanism = fm.Mechanism("bench")
     along = tuple(np.subtract(pins[1], pins[0]) / np.linalg.norm(np.subtract(pins[1], pins[0])))
     ground, slide = mechanism.rigid("ground", fixed=True), mechanism.rigid("slide")

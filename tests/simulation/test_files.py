@@ -32,7 +32,7 @@ def claw(space: str):
 
 
 def names(folder: Path) -> set[str]:
-    """What is in ``folder``, once all ranks are done with it."""
+    """Content of ``folder``, once all ranks are done with it."""
     COMM.Barrier()
     found = {path.name for path in folder.iterdir()}
     COMM.Barrier()
@@ -69,7 +69,7 @@ def test_fields_are_written_as_a_time_series_over_the_force(space, shared_tmp_pa
         assert np.nanmin(distance) <= 1e-12 * abs(largest)
 
 
-def test_where_nothing_can_be_written_all_ranks_say_so(shared_tmp_path):
+def test_folders_that_cannot_be_written_are_refused_on_all_ranks(shared_tmp_path):
     _, curve = claw("plane-stress")
     if COMM.rank == 0:
         (shared_tmp_path / "no folder").touch()

@@ -34,7 +34,7 @@ def test_steps_that_make_no_sense_are_refused(given):
         fm.ArcSteps(**given)
 
 
-def test_what_does_not_say_where_to_end_is_refused():
+def test_an_until_without_an_end_is_refused():
     case = toggle.toggle(stilt_modulus=STIFF)
     with pytest.raises(fm.DescriptionError, match="does not say where"):
         case.simulation.follow(case.push, until=12.0)

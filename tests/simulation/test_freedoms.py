@@ -41,7 +41,7 @@ def bow_between(foot: str, head: str, slide: str):
 
 @pytest.fixture(scope="module")
 def hinged_bow() -> fm.Curve:
-    """What every other set of joints must give as well."""
+    """The curve that every other set of joints must give as well."""
     simulation, pull = bow_between("revolute", "revolute", "prismatic")
     return simulation.load_displacement(pull, forces=[200.0, -200.0])
 

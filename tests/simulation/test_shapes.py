@@ -15,7 +15,7 @@ PLASTIC = fm.Material("plastic", 2000.0, 0.35)
 
 
 def pulled(shape, *, radius: float, space: str, size: float, force: float = 5.0) -> float:
-    """How far the far pin of a link from (0, 0) to (60, 0) moves along x under ``force``."""
+    """Displacement along x of the far pin of a link from (0, 0) to (60, 0) under ``force``."""
     mechanism = fm.Mechanism("bench")
     ground, slide = mechanism.rigid("ground", fixed=True), mechanism.rigid("slide")
     link = mechanism.flexible("link", shape, PLASTIC)
@@ -81,7 +81,7 @@ def test_outline_of_lines_and_arcs_equals_the_strip_of_the_same_shape():
 
 
 def _on_eye(pin, radius) -> tuple[float, float]:
-    """Where the circle of ``radius`` about (30, −40) crosses the eye of radius 3 about ``pin``, inwards."""
+    """Point at which the circle of ``radius`` about (30, −40) crosses the eye of radius 3 about ``pin``, inwards."""
     centre, pin = np.array([30.0, -40.0]), np.array(pin)
     apart = np.linalg.norm(pin - centre)
     along = (apart**2 + radius**2 - 9.0) / (2.0 * apart)

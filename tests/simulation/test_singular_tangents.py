@@ -20,7 +20,7 @@ ASKED = {
 
 
 def failing(*arguments, **options):
-    """What a singular tangent does to all that needs it."""
+    """Singular tangents: every computation that needs one says so."""
     raise NotConverged("the tangent cannot be factored", 0)
 
 

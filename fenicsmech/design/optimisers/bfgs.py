@@ -2,7 +2,7 @@
 
     B_{k+1} = B_k + y yᵀ / yᵀ s − B_k s sᵀ B_k / sᵀ B_k s,     y = change of ∂(½ |r|² + f)/∂p along the step s
 
-from B_0 = diag(ℓ⁻²), scaled, with the lengths ℓ of the parameters. B stands for what is expensive alone: the
+from B_0 = diag(ℓ⁻²), scaled, with the lengths ℓ of the parameters. B approximates the expensive part alone: the
 regulariser R, whose barriers are too steep to be learnt from gradients, enters directions exactly,
 
     d = argmin ½ dᵀ B d + (Jᵀ r + ∂f/∂p)ᵀ d + R(p + d).
@@ -90,7 +90,7 @@ class BFGS(Optimiser):
         if last.promise <= self.tolerance:
             return _iterate(number, evaluations, here, curvature, Reason.CONVERGED)
         there, tried = self._search(problem, here, _step(here, curvature))
-        if there is None:  # what B has learnt elsewhere may not hold here
+        if there is None:  # B was learnt elsewhere and may not hold here
             curvature = _fresh(here, problem.lengths)
             there, more = self._search(problem, here, _step(here, curvature))
             tried += more
@@ -120,7 +120,7 @@ class BFGS(Optimiser):
 
         if slope < 0.0:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # a search that ends early has found what it has
+                warnings.simplefilter("ignore")  # a search that ends early keeps its best point
                 line_search(
                     value, lambda p: found.gradient, here.parameters, step, here.gradient, here.value,
                     c1=self.armijo, c2=self.wolfe, maxiter=20,

@@ -189,7 +189,7 @@ class Reason(Enum):
     """Reasons for the end of a minimisation; the value is text."""
 
     CONVERGED = "the gradient vanishes or the objective no longer falls: a minimum was found"
-    RESOLVED = "what is left to gain is small beside the error of the elements: refine them, or give a tolerance"
+    RESOLVED = "the remaining gain is small beside the error of the elements: refine them, or give a tolerance"
     VIOLATED = "inequalities stay violated, and no small change of the design mends it: relax one, or start elsewhere"
     ITERATIONS = "the number of iterations ran out: allow more to get closer to the minimum"
     NO_DESCENT = "no step lowers the objective although the gradient does not vanish: check bounds and mesh quality"

@@ -178,7 +178,7 @@ class SQP(Optimiser):
         lengths: np.ndarray,
         reason: Reason | None = None,
     ) -> Iterate:
-        """The iterate with what the undamped step promises: of the merit, or as removal of violations."""
+        """The iterate with the reduction predicted for the undamped step: of the merit, or of violations."""
         step, eased = self._undamped(here, memory, lengths)
         promise = here.merit(eased.penalties) - _predicted(here, eased, step)
         promise /= _height(here, eased.penalties)

@@ -159,7 +159,7 @@ class Blueprint:
 
 @dataclass
 class Built:
-    """What the package made of a blueprint; ``parts`` by name."""
+    """The package's objects for a blueprint; ``parts`` by name."""
 
     mechanism: fm.Mechanism
     links: dict[str, object] = field(default_factory=dict)

@@ -20,7 +20,7 @@ from .strain_energy import REAL
 
 @dataclass(frozen=True)
 class Place:
-    """Where a body is: x = X + shift + (turn − 1) (X − centre); ``angle`` counts full turns (in the plane)."""
+    """Place of a body: x = X + shift + (turn − 1) (X − centre); ``angle`` counts full turns (in the plane)."""
 
     centre: np.ndarray
     shift: np.ndarray
@@ -94,7 +94,7 @@ class Closure:
         return {plan.joint: plan.compliance for plan in self.blueprint.effects if isinstance(plan, CompliancePlan)}
 
     def gap(self, joint: JointPlan, places: Sequence[Place]) -> np.ndarray:
-        """How far b's point is from a's, (dim,)."""
+        """Vector from a's point to b's, (dim,)."""
         a, b = (places[i] for i in self.ends[joint.name])
         at = np.array((*joint.at, 0.0)[: self.blueprint.dim])
         return b.displacement(at) - a.displacement(at)
@@ -115,7 +115,7 @@ class Closure:
         return angle + 1j * (cosine.real * sine.imag - sine.real * cosine.imag) / size
 
     def residual(self, places: Sequence[Place]) -> np.ndarray:
-        """What must vanish: gaps over the mechanism's length, and angles; compliant gaps left out, (rows,)."""
+        """Residuals: gaps over the mechanism's length, and angles; compliant gaps left out, (rows,)."""
         length, dim = self.blueprint.length, self.blueprint.dim
         motors = {motor.joint: motor.position for motor in self.blueprint.motors}
         rows = []

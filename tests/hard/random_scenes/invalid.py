@@ -81,7 +81,7 @@ def bad_poisson(rng: Random, scene: Blueprint) -> Spoiled:
 
 
 def bad_centreline(rng: Random, scene: Blueprint) -> Spoiled:
-    """A point of a centreline is no number, doubled, or the strip is too short to be one."""
+    """A point of a centreline is not a number, or doubled, or the strip is too short."""
     link = rng.choice(scene.flexible)
     way = rng.choice(("not finite", "doubled", "single"))
     line = {
@@ -150,7 +150,7 @@ def force_on_ground(rng: Random, scene: Blueprint) -> Spoiled:
 
 
 def bad_samples(rng: Random, scene: Blueprint) -> Spoiled:
-    """A sample is no number, or there is none."""
+    """A sample is not a number, or there is none."""
     samples = rng.choice(((), (0.0, _not_finite(rng)), (_not_finite(rng),)))
     return _refused("samples", replace(scene, samples=samples), scene.forces[0].name)
 
@@ -222,7 +222,7 @@ def _pin(scene: Blueprint, joint: JointPlan) -> float | None:
 
 
 def motor_nowhere(rng: Random, scene: Blueprint) -> Spoiled:
-    """A motor's position is no number."""
+    """A motor's position is not a number."""
     joint = scene.joints[0]
     pinned = _with_joint(scene, joint, kind="revolute", interface=_pin(scene, joint))
     motors = (MotorPlan(joint.name, _not_finite(rng)),)

@@ -64,7 +64,7 @@ class Potential:
         return held
 
     def places(self, poses: np.ndarray) -> list[Place]:
-        """Where all bodies are."""
+        """Places of all bodies."""
         return [place(centre, pose) for centre, pose in zip(self.centres, poses, strict=True)]
 
     def nodal(self, free: np.ndarray, places: Sequence[Place]) -> np.ndarray:

@@ -23,7 +23,7 @@ _ROUNDED = 1e-14
 
 
 def true_reason(blueprint: Blueprint, built: Built | None, failure: fm.FenicsmechError) -> str:
-    """Why the error is right, empty if it is not."""
+    """The reason why the error is right, empty if it is not."""
     if not isinstance(failure, fm.EquilibriumError):
         return ""
     if blueprint.control == "displacements" and failure.last is not None and immobile(blueprint, built, failure.last):

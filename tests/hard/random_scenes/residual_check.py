@@ -25,7 +25,7 @@ _RANDOM = 8
 
 @dataclass(frozen=True)
 class Residual:
-    """What was found.
+    """Findings of the check.
 
     Attributes:
         gap: largest closure error of joints, motors and interfaces, relative to the mechanism's length.
@@ -133,7 +133,7 @@ def _floor(potential: Potential, u: np.ndarray) -> float:
 
 
 def _energy_digits(potential: Potential) -> float:
-    """What textbook energies lose by cancellation: 1e-16 of the modulus, times the volume; kept below a millionth."""
+    """Cancellation error of textbook energies: 1e-16 of the modulus, times the volume; kept below a millionth."""
     volume = sum(link.young / (1 - 2 * link.poisson) for link in potential.blueprint.flexible)
     thickest = max(link.depth for link in potential.blueprint.flexible) if potential.mesh.dim == 2 else 1.0
     return 1e-16 * volume * thickest * potential.volume * 1e6

@@ -1,4 +1,4 @@
-"""How many directions an equilibrium is unstable in, from second differences of the potential alone.
+"""Number of unstable directions of an equilibrium, from second differences of the potential alone.
 
     L(u, z) = Π − λᵀ C,    Aᵀ λ = ∂Π/∂z,    A = ∂C/∂z,
 
@@ -106,7 +106,7 @@ def _body_curvature(
         forces[node, axis] = potential.value(u + step, places, magnitude).imag / _IMAGINARY
 
     def work(there: list[Place]) -> complex:
-        """What of Π changes with bodies while nodal forces and what acts on links stay."""
+        """Part of Π that changes with bodies while nodal forces and effects on links stay."""
         value = np.sum(forces * potential.nodal(np.zeros(u.shape), there))
         value = value + potential.body_potential(np.zeros(u.shape), there)
         for force, size in potential.acting(magnitude):

@@ -42,7 +42,7 @@ def unstrained_motions(
         groups.append((np.unique(mesh.cells[cells]), [body for body in np.unique(mesh.body[cells]) if body >= 0]))
 
     def stiff(there: list[Place]) -> np.ndarray:
-        """What must stay: joints, and the interfaces of a link as its first one sees them."""
+        """Invariants of unstrained motions: joints, and the interfaces of a link as seen from its first one."""
         rows = [potential.closure.residual(there)]
         for _, (first, *others) in groups:
             back, at = there[first].turn.T, there[first].centre + there[first].shift

@@ -34,7 +34,7 @@ class Verdict:
 
     Attributes:
         seed: of the scene.
-        scene: its topology, or what is wrong with it.
+        scene: its topology, or its fault.
         outcome: "equilibrium", "equilibrium to rounding", "refused", "true: …" or "wrong: …".
         detail: the error, or the figures.
         seconds: wall-clock time.
@@ -132,7 +132,7 @@ def unloaded_travel(potential: Potential, built: Built) -> float:
 
 
 def _error(blueprint: Blueprint, frame: fm.Frame, sample: float, found: Residual) -> str:
-    """What is wrong with a frame, empty if nothing is."""
+    """The fault of a frame, empty if there is none."""
     controlled = frame.force if blueprint.control == "forces" else frame.displacement
     size = abs(sample) if blueprint.control == "forces" else blueprint.length
     if abs(controlled - sample) > 1e-9 * size:
@@ -158,6 +158,6 @@ def _finite(frame: fm.Frame) -> bool:
 
 
 def _unclear(error: fm.FenicsmechError) -> str:
-    """What an error leaves open: it must say which part, what is wrong, and what to do."""
+    """The omission of an error, which must give part, problem and remedy; empty if there is none."""
     missing = [name for name in ("part", "problem", "remedy") if not getattr(error, name).strip()]
     return f"no {missing[0]} in {type(error).__name__}" if missing else ""

@@ -23,7 +23,7 @@ class Worker:
         self._process, self._pipe = None, None
 
     def judge(self, seed: int) -> Verdict:
-        """The verdict on a scene; a hang or a crash is one too."""
+        """The outcome of a scene; a hang or a crash is one too."""
         if self._process is None:
             self._start()
         self._pipe.send(seed)

@@ -16,7 +16,7 @@ SPACES = ("plane-stress", "3d-symmetric")
 
 @dataclass(frozen=True)
 class Counts:
-    """What a simulation of two frames is made of."""
+    """The parts of a simulation of two frames."""
 
     forms: int
     terms: int
