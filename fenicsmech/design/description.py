@@ -93,9 +93,10 @@ class SplineDesign:
             DescriptionError: the drawn thickness is not within them.
         """
         least, most = self.thickness or (thickness / 3.0, 3.0 * thickness)
-        beyond = ~((least < thickness) & (thickness < most))
-        if np.any(beyond):
-            worst = float(np.asarray(thickness)[beyond].flat[0])
+        drawn = np.atleast_1d(thickness)
+        beyond = drawn[(drawn <= least) | (drawn >= most)]
+        if len(beyond):
+            worst = float(beyond[0])
             raise DescriptionError(
                 f"design of link {self.link.name!r}",
                 f"its drawn thickness {worst:.3g} is not between {least:g} and {most:g}",

@@ -184,8 +184,8 @@ def find_centreline(
 ) -> np.ndarray:
     """Points of the centreline of a link, in order, (n, 2); the interpolating spline is the centreline.
 
-    It runs from joint to joint. Where the link runs on beyond the last joint by more than twice the radius of its eye,
-    and twice as far as its interface reaches, the centreline runs on to a free end.
+    It runs from joint to joint. Where the link runs on beyond the last joint by more than twice its width there, and
+    twice as far as the joint's interface reaches, the centreline runs on to a free end.
 
     Args:
         outline: of the link.
@@ -274,7 +274,7 @@ def _medial_path(
         # what lies on from the joint, seen from the other end; the joint may be off the axis
         beyond = axis.central[other[axis.central] >= other[terminals[end]] + own[axis.central] - eye]
         tip = int(beyond[np.argmax(own[beyond])]) if len(beyond) else terminals[end]
-        if own[tip] + axis.radius[tip] > 2.0 * max(eye, reach[joint]):
+        if own[tip] + axis.radius[tip] > 2.0 * max(2.0 * eye, reach[joint]):
             terminals[end], free[end] = tip, True
     path = axis.path(*terminals)
     for end, joint in enumerate((a, b)):
