@@ -3,7 +3,9 @@
     p → θ*(p) → d(p, θ*(p)) → X = X₀ + c + d
 
 with the handle positions θ, the design field d and the bulge c of the drawn edges. Handle positions are best for the
-straight cells between the vertices. Edges of the outline follow the design between them too; a design whose curved
+straight cells between the vertices. Links drawn by an outline keep their drawn shape at the initial design p₀: their
+handles are at θ₀ + θ*(p) − θ*(p₀), where those of strips are at θ*(p), since handles that move along a link of varying
+thickness, or turn about an eye, change its outline. Edges of the outline follow the design between them too; a design whose curved
 cells are squeezed too much has no rest shape.
 """
 
@@ -11,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence, Set
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from dolfinx import fem
@@ -119,17 +122,32 @@ class ParametricShape:
         Raises:
             ShapeError: cells stay inverted however the handles are placed, or curved ones are squeezed.
         """
+        lag = self._lag
         placement = self._optimum.solve(p, near)
-        self._model.reshape(self._placed(placement))
+        self._model.reshape(self._placed(placement, lag))
         return placement
 
     def field(self, p: np.ndarray, near: HandlePlacement | None) -> np.ndarray:
         """This rank's values of the design field for ``p``, ghosts last, flat; the links keep the shape they have."""
-        return self._placed(self._optimum.solve(p, near))
+        lag = self._lag
+        return self._placed(self._optimum.solve(p, near), lag)
 
-    def _placed(self, placement: HandlePlacement) -> np.ndarray:
+    @cached_property
+    def _lag(self) -> np.ndarray:
+        """θ*(p₀) − θ₀ of links drawn by an outline, 0 of others, (handles,)."""
+        drawn = self._map.initial_theta
+        outlined = np.repeat(*np.transpose([(np.ndim(own.thickness), len(own.handles)) for own in self._map.shapes]))
+        if not np.any(outlined):
+            return np.zeros_like(drawn)
+        return np.where(outlined, self._optimum.solve(self.initial).theta - drawn, 0.0)
+
+    def _placed(self, placement: HandlePlacement, lag: np.ndarray) -> np.ndarray:
         """The design field of a placement, this rank's values, ghosts last, flat."""
-        field, elastic, mesh = self._map.field(placement.p, placement.theta), self._model.elastic, self._model.mesh
+        field, elastic, mesh = self._map.field(placement.p, placement.theta - lag), self._model.elastic, self._model.mesh
+        if np.any(lag):
+            self._straight.x.array[:] = self._vertex_map.field(placement.p, placement.theta - lag).ravel()
+            if self._ratio.value() == np.inf:
+                raise ShapeError("rest shape", "it inverts cells", "Change it by less, or mesh it finer")
         if elastic.order > 1:
             bent = field if elastic.bulge is None else field + elastic.bulge.x.array.reshape(field.shape)
             corners, pairs = field.shape[1] + 1, edge_corners(field.shape[1] + 1)
@@ -144,7 +162,7 @@ class ParametricShape:
     def gradient(self, placement: HandlePlacement, nodal: np.ndarray) -> np.ndarray:
         """dO/dp (…, parameters) from ∂O/∂d (…, owned values) of the design placed as in ``placement``."""
         fields = nodal.reshape(*nodal.shape[:-1], self._map.owned, -1)
-        by_p, by_theta = self._map.apply_transpose(placement.p, placement.theta, fields)
+        by_p, by_theta = self._map.apply_transpose(placement.p, placement.theta - self._lag, fields)
         return self._optimum.total_gradient(placement, by_p, by_theta)
 
     def worst_ratio(self) -> float:
@@ -159,7 +177,7 @@ class ParametricShape:
             self._penalties[barrier] = QualitySum(self._straight, barrier.symbolic, counts=self._deformable)
         total = self._penalties[barrier]
         self._straight.interpolate(self._model.elastic.d)
-        by_p, by_theta = self._vertex_map.apply_transpose(placement.p, placement.theta, total.gradient())
+        by_p, by_theta = self._vertex_map.apply_transpose(placement.p, placement.theta - self._lag, total.gradient())
         return total.value(), self._optimum.total_gradient(placement, by_p, by_theta)
 
 

@@ -11,6 +11,7 @@ from mpi4py import MPI
 
 import fenicsmech as fm
 from fenicsmech.design import LinkOutline, ParametricShape, find_centreline, rest_meshes, shape_request
+from fenicsmech.export import write_step
 from fenicsmech.mechanism import Centreline, Disc, Shape
 from fenicsmech.meshing import InterfaceSite, boundary_polygons, gmsh, gmsh_session, link_outline
 from fenicsmech.multibody import build_linkage
@@ -105,7 +106,7 @@ def test_thickness_of_a_step_part_does_not_depend_on_the_mesh_and_drawn_designs_
     for size in (3.0, 1.5):
         simulation = case.simulate(size=size, order=1)
         rest = ParametricShape.of(simulation, case.designs)
-        assert np.abs(rest.field(rest.initial, None)).max() < 1e-9
+        assert np.abs(rest.field(rest.initial, None)).max() < 1e-9  # as imported, whatever handles would be best
         found.append(rest.links[0])
     assert np.array_equal(found[0].thickness, found[1].thickness)
     assert found[0].spline.initial == pytest.approx(found[1].spline.initial, abs=1e-12)
@@ -164,11 +165,12 @@ def test_half_as_thick_designs_of_a_wedge_are_half_as_thick_everywhere():
 def test_a_strip_from_a_step_file_has_the_same_optimum_as_the_strip(tmp_path):
     case = truss((0.1, 6.0), (0.4, 9.0))
     simulation = case.simulate(size=1.5)
-    drawn = fm.DesignProblem(simulation, case.designs, targets=case.targets)
-    drawn.export(tmp_path, drawn.initial)
     (diagonal,) = case.scene.mechanism.flexible_links
+    (mesh,) = rest_meshes(simulation, [diagonal])
+    write_step(tmp_path / "diagonal.step", mesh, depth=diagonal.shape.depth, name="diagonal")
     part = fm.step_file(tmp_path / "diagonal.step", depth=diagonal.shape.depth)
     other = simulation.with_shapes({diagonal: part})
+    drawn = fm.DesignProblem(simulation, case.designs, targets=case.targets)
     imported = fm.DesignProblem(other, case.designs, targets=case.targets)
     assert imported.initial == pytest.approx(drawn.initial, abs=1e-3)
     push, forces = case.targets[0].quantity.part, [0.1, 0.2, 0.3, 0.4]
@@ -176,8 +178,8 @@ def test_a_strip_from_a_step_file_has_the_same_optimum_as_the_strip(tmp_path):
         own.with_design(problem.optimise()).load_displacement(push, forces=forces)
         for own, problem in ((simulation, drawn), (other, imported))
     ]
-    assert curves[0].corrected == pytest.approx([6.0, curves[0].corrected[1], curves[0].corrected[2], 9.0], rel=5e-3)
-    assert curves[1].corrected == pytest.approx(curves[0].corrected, rel=1e-3)
+    assert curves[0].displacements[[0, -1]] == pytest.approx([6.0, 9.0], rel=5e-3)
+    assert curves[1].displacements == pytest.approx(curves[0].displacements, rel=1e-3)
 
 
 def test_ends_of_strips_and_joints_on_branches_are_refused():
