@@ -30,7 +30,7 @@ from mpi4py import MPI
 from fenicsmech.collective import on_one
 from fenicsmech.design import DesignProblem, DesignResult
 from fenicsmech.equilibrium import Unknown
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, counted
 from fenicsmech.files import write_json
 from fenicsmech.log import print_once
 from fenicsmech.mechanism import Force
@@ -227,7 +227,7 @@ def _summarise_design(optimisation: Optimisation) -> dict[str, object]:
         "targets": [
             {
                 "target": target.name,
-                "configuration": target.configuration,
+                "configuration": target.configuration or None,  # links at rest have none
                 "force": target.force,
                 "unit": target.unit,
                 "relation": target.relation,
@@ -306,7 +306,8 @@ def _text(summary: dict, folder: Path) -> str:
     dofs, seconds = summary["dofs"], summary["seconds"]
     phases = ", ".join(f"{name} {value:.2f}" for name, value in seconds["phases"].items())
     lines += [
-        f"{dofs['rigid']} rigid + {dofs['flexible']} flexible unknowns, {summary['ranks']} process(es)",
+        f"{dofs['rigid']} rigid + {dofs['flexible']} flexible unknowns, "
+        f"{counted(summary['ranks'], 'process', 'processes')}",
         f"seconds: {phases}",
         f"seconds per loaded equilibrium (median): {seconds['frame_median']:.3f}; "
         f"peak memory {summary['peak_memory_mb']:.0f} MB",
@@ -338,8 +339,9 @@ def _design_text(summary: dict) -> list[str]:
     return [
         format_table(headers, rows),
         *([f"parts: {summary['part_fidelity']}"] if summary["part_fidelity"] else []),
-        f"{summary['parameters']} parameters, {summary['iterations']} iterations, {summary['evaluations']} "
-        f"evaluations: objective {objective['initial']:.3g} -> {objective['final']:.3g} "
+        f"{counted(summary['parameters'], 'parameter')}, {counted(summary['iterations'], 'iteration')}, "
+        f"{counted(summary['evaluations'], 'evaluation')}: "
+        f"objective {objective['initial']:.3g} -> {objective['final']:.3g} "
         f"(corrections make {error:.2g} of it; {summary['ended']})",
         f"corrections changed by {', '.join(f'{change:.2%}' for change in summary['corrections'])} in as many rounds"
         + (f" of a surrogate in {summary['surrogate']}" if summary["surrogate"] else ""),
@@ -358,7 +360,7 @@ def format_table(headers: Sequence[str], rows: Sequence[Sequence[object]], *, di
     """
     for index, row in enumerate(rows):
         if len(row) != len(headers):
-            problem = f"{len(row)} cells for {len(headers)} columns"
+            problem = f"{counted(len(row), 'cell')} for {counted(len(headers), 'column')}"
             raise DescriptionError(f"row {index} of the table", problem, "Give one cell per column")
     columns = []
     for k, header in enumerate(headers):

@@ -52,6 +52,8 @@ def design(names: Names, folder: Path) -> None:
     assert names["result"].worst_error < 0.01
     assert names["after"].displacements == pytest.approx([6.0, 9.0], rel=0.01)
     assert names["before"].displacements[0] < 5.0
+    again = names["again"]
+    assert again.worst_error < 0.01 and again.objective[0] < 1e-3  # the part is the design that met the targets
 
 
 def accuracy(names: Names, folder: Path) -> None:

@@ -5,8 +5,8 @@
 with the handle positions θ, the design field d and the bulge c of the drawn edges. Handle positions are best for the
 straight cells between the vertices. Links drawn by an outline keep their drawn shape at the initial design p₀: their
 handles are at θ₀ + θ*(p) − θ*(p₀), where those of strips are at θ*(p), since handles that move along a link of varying
-thickness, or turn about an eye, change its outline. Edges of the outline follow the design between them too; a design whose curved
-cells are squeezed too much has no rest shape.
+thickness, or turn about an eye, change its outline. Edges of the outline follow the design between them too, their
+middles without the part along the chord; a design whose curved cells are squeezed too much has no rest shape.
 """
 
 from __future__ import annotations
@@ -21,11 +21,12 @@ from mpi4py import MPI
 
 from fenicsmech.compat import cell_dofs, original_cells, vector_space
 from fenicsmech.design.description import Bounds, SplineDesign, shape_requests
+from fenicsmech.design.shape.edges import MidEdgeNodes
 from fenicsmech.design.shape.handle_optimum import HandleOptimum, HandlePlacement, ShapeError
 from fenicsmech.design.shape.quality import Barrier, QualitySum
 from fenicsmech.design.shape.shape_map import LinkShape, ShapeMap, shape_links
 from fenicsmech.design.shape.spline import LinkSpline, SplineSamples
-from fenicsmech.meshing import edge_corners, least_stretches
+from fenicsmech.meshing import edge_corners, least_stretches, node_ends
 from fenicsmech.model import MechanismModel
 from fenicsmech.simulation import Simulation
 
@@ -83,6 +84,11 @@ class ParametricShape:
         self._ratio = QualitySum(self._straight, comm=model.mesh.comm)
         self._deformable = _deformable(model, {shape.link for shape in shapes})
         self._optimum = HandleOptimum(self._vertex_map, self._ratio)
+        ends, dim = node_ends(design.function_space), model.mesh.vertices.shape[1]
+        drawn = model.mesh.vertices[ends].mean(axis=1)
+        if model.elastic.bulge is not None:
+            drawn += model.elastic.bulge.x.array.reshape(-1, dim)
+        self._middles = MidEdgeNodes(ends, drawn) if model.elastic.order > 1 else None
         self._penalties: dict[Barrier, QualitySum] = {}
         self.initial = self._map.initial
         links, first = [], 0
@@ -143,12 +149,14 @@ class ParametricShape:
 
     def _placed(self, placement: HandlePlacement, lag: np.ndarray) -> np.ndarray:
         """The design field of a placement, this rank's values, ghosts last, flat."""
-        field, elastic, mesh = self._map.field(placement.p, placement.theta - lag), self._model.elastic, self._model.mesh
+        theta, elastic, mesh = placement.theta - lag, self._model.elastic, self._model.mesh
+        field = self._map.field(placement.p, theta)
         if np.any(lag):
-            self._straight.x.array[:] = self._vertex_map.field(placement.p, placement.theta - lag).ravel()
+            self._straight.x.array[:] = self._vertex_map.field(placement.p, theta).ravel()
             if self._ratio.value() == np.inf:
                 raise ShapeError("rest shape", "it inverts cells", "Change it by less, or mesh it finer")
-        if elastic.order > 1:
+        if self._middles is not None:
+            field = self._middles.placed(field)
             bent = field if elastic.bulge is None else field + elastic.bulge.x.array.reshape(field.shape)
             corners, pairs = field.shape[1] + 1, edge_corners(field.shape[1] + 1)
             values = bent[cell_dofs(elastic.d.function_space)[self._cells]]
@@ -162,7 +170,10 @@ class ParametricShape:
     def gradient(self, placement: HandlePlacement, nodal: np.ndarray) -> np.ndarray:
         """dO/dp (…, parameters) from ∂O/∂d (…, owned values) of the design placed as in ``placement``."""
         fields = nodal.reshape(*nodal.shape[:-1], self._map.owned, -1)
-        by_p, by_theta = self._map.apply_transpose(placement.p, placement.theta - self._lag, fields)
+        theta = placement.theta - self._lag
+        if self._middles is not None:
+            fields = self._middles.apply_transpose(self._map.field(placement.p, theta), fields)
+        by_p, by_theta = self._map.apply_transpose(placement.p, theta, fields)
         return self._optimum.total_gradient(placement, by_p, by_theta)
 
     def worst_ratio(self) -> float:

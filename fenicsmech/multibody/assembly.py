@@ -76,16 +76,16 @@ def assemble(linkage: Linkage, configuration: Configuration, springs: Sequence[P
 
 
 def assemble_before_strain(
-    linkage: Linkage, configuration: Configuration, springs: Sequence[PosePotential] = (), *, part: float = 0.98
+    linkage: Linkage, configuration: Configuration, springs: Sequence[PosePotential] = ()
 ) -> Assembly:
-    """As ``assemble``, but ``part`` of the way to the last position free of strain where motors strain the links.
+    """As ``assemble``, but 98 % of the way to the last position free of strain where motors strain the links.
 
     That one is a dead centre as a rule, where the tangent is not unique and freedoms count twice.
     """
     assembly = assemble(linkage, configuration, springs)
     if assembly.fraction == 1.0:
         return assembly
-    fraction = part * assembly.fraction
+    fraction = 0.98 * assembly.fraction
     poses, _, _ = _Assembler(linkage.rigid, springs).follow(configuration, fraction)
     return Assembly(poses, fraction)
 

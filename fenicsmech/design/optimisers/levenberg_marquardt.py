@@ -51,8 +51,12 @@ class LevenbergMarquardt(SQP):
     again: float = 0.1
 
     @property
-    def least_promise(self) -> float:
+    def least_reduction(self) -> float:
         return 5e-3 if self.tolerance is None else self.tolerance
+
+    def continued(self, memory: np.ndarray) -> None:
+        """Without memory: it is μ alone, and a start's makes the first step of a round cautious."""
+        return None
 
     def _minimum(self, here: Evaluation, lengths: np.ndarray) -> np.ndarray:
         """The minimum of the undamped model, (n,)."""
@@ -70,7 +74,7 @@ class LevenbergMarquardt(SQP):
         resolution = Resolution(self, first)
 
         def resolved(last: Iterate) -> bool:
-            undecided = self.tolerance is None and last.promise > self.least_promise
+            undecided = self.tolerance is None and last.reduction > self.least_reduction
             return undecided and resolution.reached(last, lengths)
 
         return resolved
@@ -106,4 +110,4 @@ class Resolution:
 
 def _gain(last: Iterate) -> float:
     """O(p) − min O, as predicted."""
-    return last.promise * last.evaluation.value
+    return last.reduction * last.evaluation.value

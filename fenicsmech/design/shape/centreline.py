@@ -176,11 +176,7 @@ class LinkOutline:
 
 
 def find_centreline(
-    outline: LinkOutline,
-    reach: Sequence[float],
-    ends: Sequence[Sequence[float]] | None = None,
-    *,
-    part: str = "link",
+    outline: LinkOutline, reach: Sequence[float], ends: Sequence[Sequence[float]] | None = None, *, part: str = "link"
 ) -> np.ndarray:
     """Points of the centreline of a link, in order, (n, 2); the interpolating spline is the centreline.
 
@@ -363,5 +359,7 @@ def _seeds(polygon: np.ndarray, spacing: float) -> tuple[np.ndarray, np.ndarray,
     parts = [np.arange(count)[:, None] / count for count in counts]
     points = np.concatenate([a + part * (b - a) for a, b, part in zip(polygon, ends, parts, strict=True)])
     starts = np.concatenate([[0.0], np.cumsum(lengths)])
-    places = np.concatenate([start + part[:, 0] * own for start, own, part in zip(starts, lengths, parts, strict=False)])
+    places = np.concatenate(
+        [start + part[:, 0] * own for start, own, part in zip(starts, lengths, parts, strict=False)]
+    )
     return points, places, float(starts[-1])
