@@ -138,16 +138,16 @@ def shape_request(
         raise DescriptionError(part, f"it is not a flexible link of {mechanism.name!r}", "Name one of its links")
     shape, bodies = shape or link.shape, [linkage.bodies[i] for i in linkage.interfaces[link]]
     reach, line = tuple(_reach(body) for body in bodies), design.centreline
+    thickness: float | LinkOutline
     if isinstance(shape, Strip):
         if design.ends is not None:
             raise DescriptionError(part, "a strip has a centreline, and ends were given", "Leave them out")
-        thickness, line = shape.thickness, line or shape.centreline
+        thickness, centreline = shape.thickness, Centreline(shape.centreline if line is None else line, part=part)
     else:
         sites = [InterfaceSite(b.centre[:2], b.region, name=b.name) for b in bodies if b.region is not None]
-        thickness = LinkOutline(link_outline(link.name, shape, dim=linkage.dim), sites)
-        if line is None:
-            line = find_centreline(thickness, reach, design.ends, part=part)
-    centreline = Centreline(line, part=part)
+        thickness = outline = LinkOutline(link_outline(link.name, shape, dim=linkage.dim), sites)
+        found = find_centreline(outline, reach, design.ends, part=part) if line is None else line
+        centreline = Centreline(found, part=part)
     request = ShapeRequest(
         link=mechanism.flexible_links.index(link),
         name=link.name,

@@ -174,9 +174,9 @@ def _span(bound: float | np.ndarray) -> str:
 class MeshQuality(Regulariser):
     """R_mesh = Σ_e β(ρ_e), ρ a cell's circumradius over its inradius; infinite where cells are inverted.
 
-    The constants are the paper's (appendix). Cells that cannot deform do not count: those of other links, and those that
-    clamps or pins hold at all corners. A design with inverted cells has no placement at all and is refused
-    before R_mesh is evaluated.
+    The constants are the paper's (appendix). Cells that cannot deform do not count: those of other links, and those
+    that clamps or pins hold at all corners. A design with inverted cells has no placement at all and is refused before
+    R_mesh is evaluated.
 
     Attributes:
         limit: largest aspect ratio without penalty.

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.design import LinkOutline, ParametricShape, find_centreline, rest_meshes, shape_request
+from fenicsmech.design import (
+    LinkOutline,
+    MeshQuality,
+    ParametricShape,
+    ShapeBounds,
+    StayClose,
+    find_centreline,
+    rest_meshes,
+)
 from fenicsmech.export import write_step
 from fenicsmech.mechanism import Centreline, Disc, Shape
-from fenicsmech.meshing import InterfaceSite, boundary_polygons, gmsh, gmsh_session, link_outline
-from fenicsmech.multibody import build_linkage
+from fenicsmech.meshing import InterfaceSite, boundary_polygons, link_outline
 
-from .mechanisms import PLASTIC, Case, truss
+from .mechanisms import PLASTIC, Case, objective, truss
 from .refusal import refused
 
 CURVED = fm.step_file(Path(__file__).parents[2] / "meshes" / "curved_link.step", depth=10.0)
@@ -180,6 +185,17 @@ def test_a_strip_from_a_step_file_has_the_same_optimum_as_the_strip(tmp_path):
     ]
     assert curves[0].displacements[[0, -1]] == pytest.approx([6.0, 9.0], rel=5e-3)
     assert curves[1].displacements == pytest.approx(curves[0].displacements, rel=1e-3)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("comm", [MPI.COMM_SELF, MPI.COMM_WORLD], ids=["alone", "together"])
+def test_gradient_of_a_link_from_a_step_file_is_that_of_its_objective(comm):
+    regulariser = MeshQuality(limit=2.5, width=2.5) + ShapeBounds() + 1e-3 * StayClose()
+    whole, bench = objective(arm(CURVED), regulariser, comm=comm)
+    p, direction = bench.design(0.05, seed=5), bench.direction(6)
+    here = whole.evaluate(p)
+    ahead, back = (whole.evaluate(p + h * direction) for h in (1e-3, -1e-3))
+    assert here.gradient @ direction == pytest.approx((ahead.value - back.value) / 2e-3, rel=1e-5)
 
 
 def test_ends_of_strips_and_joints_on_branches_are_refused():

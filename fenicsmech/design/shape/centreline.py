@@ -195,17 +195,18 @@ def find_centreline(
     """
     path, open_ends = _medial_path(outline, reach, ends, part=part)
     for spacing in SEARCH.spacings:
-        path = _halve_chords(outline, path, open_ends, spacing, part=part)
-    return path
+        points = _halve_chords(outline, path, open_ends, spacing, part=part)
+        curve = Centreline(points)
+        path = curve.evaluate(curve.samples(64))
+    return points
 
 
 def _halve_chords(
     outline: LinkOutline, path: np.ndarray, open_ends: tuple[bool, bool], spacing: float, *, part: str
 ) -> np.ndarray:
     """Points of the line near ``path`` (n, 2) that halves its chords; ends that are not free stay."""
-    width = outline.width
-    points = _evenly(path, max(3, math.ceil(_length(path) / (spacing * width))), smooth=spacing != SEARCH.spacings[0])
-    far = np.inf
+    width, far = outline.width, np.inf
+    points = _evenly(path, spacing * width)
     for _ in range(SEARCH.moves):
         curve = Centreline(points, part=f"centreline of {part}")
         tangents = curve.tangent(curve.knots)
@@ -216,10 +217,11 @@ def _halve_chords(
         moved = points + np.where(chords.fixed, 0.0, 0.5 * (chords.left - chords.right))[:, None] * normals
         kept = ~chords.fixed
         kept[[0, -1]] = True
-        for end, inner, free, outward in ((0, 1, open_ends[0], -1.0), (-1, -2, open_ends[1], 1.0)):
-            if free:
-                last = end if not chords.fixed[end] else int(np.flatnonzero(~chords.fixed)[-1 if end else 0])
-                start = moved[last] - (outward * 1e-3 * width * tangents[last] if last == end else 0.0)
+        free = np.flatnonzero(~chords.fixed)
+        for end, outward in ((0, -1.0), (-1, 1.0)):
+            if open_ends[end] and len(free):
+                last = free[end]
+                start = moved[last] - outward * 1e-3 * width * tangents[last] * (not chords.fixed[end])
                 moved[end] = outline.end_along(start, outward * tangents[last])
         far = float(np.linalg.norm(moved - points, axis=1).max()) if kept.all() else np.inf
         points = moved[kept]
@@ -232,18 +234,11 @@ def _halve_chords(
     return points
 
 
-def _evenly(path: np.ndarray, spans: int, *, smooth: bool) -> np.ndarray:
-    """Points that divide a line through ``path`` (n, 2) evenly, (spans + 1, 2)."""
-    if smooth:
-        curve = Centreline(path)
-        path = curve.evaluate(curve.samples(64))
+def _evenly(path: np.ndarray, spacing: float) -> np.ndarray:
+    """Points that divide a line through ``path`` (n, 2) evenly, about ``spacing`` apart."""
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-    at = np.linspace(0.0, arc[-1], spans + 1)
+    at = np.linspace(0.0, arc[-1], max(3, math.ceil(arc[-1] / spacing)) + 1)
     return np.column_stack([np.interp(at, arc, coordinate) for coordinate in path.T])
-
-
-def _length(path: np.ndarray) -> float:
-    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
 
 
 def _medial_path(
@@ -257,30 +252,31 @@ def _medial_path(
         return np.vstack([given[:1], axis.path(first, last), given[1:]]), (False, False)
     at = axis.nearest(joints)
     distance = axis.distances(at)
-    a, b = np.unravel_index(np.argmax(np.triu(distance[:, at])), (len(at), len(at)))
-    if a == b:  # one joint: from there to the farthest end
-        tip = int(axis.central[np.argmax(distance[a, axis.central])])
-        stops, terminals, from_terminals = [tip], [int(at[a]), tip], axis.distances(np.array([at[a], tip]))
-    else:
-        stops, terminals, from_terminals = [], [int(at[a]), int(at[b])], distance[[a, b]]
-    free = [False, bool(stops)]
-    for end, joint in enumerate((a,) if stops else (a, b)):
-        eye = outline.eye(joints[joint])
-        own, other = from_terminals[[end, 1 - end]]
-        # what lies on from the joint, seen from the other end; the joint may be off the axis
+    outer = divmod(int(np.argmax(np.triu(distance[:, at]))), len(at))  # the joints farthest apart
+    if len(at) > 1:
+        terminals, free, seen = [int(at[joint]) for joint in outer], [False, False], distance[list(outer)]
+    else:  # from the joint to the farthest end
+        tip = int(axis.central[np.argmax(distance[0, axis.central])])
+        terminals, free = [int(at[0]), tip], [False, True]
+        seen = axis.distances(np.array(terminals))
+    for end in (0, 1):
+        if free[end]:
+            continue
+        eye, own, other = outline.eye(joints[outer[end]]), seen[end], seen[1 - end]
+        # beyond the joint, as seen from the other end; the joint may be off the axis
         beyond = axis.central[other[axis.central] >= other[terminals[end]] + own[axis.central] - eye]
         tip = int(beyond[np.argmax(own[beyond])]) if len(beyond) else terminals[end]
-        if own[tip] + axis.radius[tip] > 2.0 * max(2.0 * eye, reach[joint]):
+        if own[tip] + axis.radius[tip] > 2.0 * max(2.0 * eye, reach[outer[end]]):
             terminals[end], free[end] = tip, True
     path = axis.path(*terminals)
-    for end, joint in enumerate((a, b)):
-        if free[end]:
-            inward = path[min(3, len(path) - 1)] if end == 0 else path[-min(4, len(path))]
-            tip = path[-end]
-            out = (tip - inward) / np.linalg.norm(tip - inward)
-            path = np.insert(path, len(path) * end, outline.end_along(tip, out), axis=0)
-        else:
-            path[-end] = joints[joint]
+    for end in (0, 1):
+        if not free[end]:
+            path[-end] = joints[outer[end]]
+            continue
+        inner = min(3, len(path) - 1)
+        out = path[-end] - path[-1 - inner if end else inner]
+        tip_point = outline.end_along(path[-end], out / np.linalg.norm(out))
+        path = np.insert(path, len(path) * end, tip_point, axis=0)
     for site in outline.sites:
         away = np.linalg.norm(path - site.centre[:2], axis=1)
         if away.min() > outline.width + outline.eye(path[np.argmin(away)]):
