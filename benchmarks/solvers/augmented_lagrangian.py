@@ -182,7 +182,7 @@ class AugmentedLagrangianSolver(EquilibriumSolver):
                 break
             shift, following = following, 8.0 * following
         else:
-            raise NotConverged("no shift of the tangent gives a direction of descent", 0)
+            raise NotConverged("no shift of the KKT matrix gives a direction of descent", 0)
         x.scale(-1.0)
         return system.unknowns.step(x), x.dot(right), shift
 

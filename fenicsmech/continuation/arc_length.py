@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from fenicsmech.continuation.stepper import Parabola, Stepper, on_cubic
+from fenicsmech.continuation.stepper import ParabolaPredictor, Stepper, on_cubic
 from fenicsmech.equilibrium import (
     ArcLengthControl,
     ArcMetric,
@@ -101,7 +101,7 @@ class ArcLengthTracer(Stepper):
         length: of the next step.
 
     Raises:
-        NotConverged: the followed value moves nothing, or the tangent is singular.
+        NotConverged: the followed value moves nothing, or the KKT matrix is singular.
     """
 
     def __init__(
@@ -126,7 +126,7 @@ class ArcLengthTracer(Stepper):
             reach = 0.01 / motion  # of the mechanism's length, or rad: of interest if nothing else is said
         self.metric = ArcMetric(system, followed, reach * motion, reach, reach * speed or math.inf)
         self.start = point.scaled(1.0 / self.metric.norm(point.tangent))
-        super().__init__(solver, Parabola(self.metric, steps.turn))
+        super().__init__(solver, ParabolaPredictor(self.metric, steps.turn))
 
     # -- points ------------------------------------------------------------------------------------------------
 

@@ -86,7 +86,7 @@ def locate(path: ArcLengthTracer, before: EquilibriumPoint, after: EquilibriumPo
 
 
 def null_space(path: ArcLengthTracer, critical: CriticalPoint) -> list[Step]:
-    """A basis of the tangent's null space at a bifurcation, largest displacements the mechanism's length.
+    """A basis of the KKT matrix's null space at a bifurcation, largest displacements the mechanism's length.
 
     As many vectors as modes change their stability there.
     """
@@ -164,7 +164,7 @@ class _Piece:
         return _PiecePoint(distance, point, self._stiffness(point.linearisation))
 
     def _stiffness(self, at: Linearisation) -> float:
-        """μ of a tangent, to a relative change of 1e-3.
+        """μ of a KKT matrix, to a relative change of 1e-3.
 
         Twelve iterations at most: where two modes are equally soft, either suffices.
         """

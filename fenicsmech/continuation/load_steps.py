@@ -25,7 +25,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from fenicsmech.continuation.stepper import Predictor, Stepper, Tangent
+from fenicsmech.continuation.stepper import Predictor, Stepper, TangentPredictor
 from fenicsmech.equilibrium import Control, EquilibriumPoint, EquilibriumSolver, NotConverged, State, Step
 from fenicsmech.log import logger
 
@@ -48,7 +48,7 @@ class LoadSteps:
         branching_rate: largest rate of a step off a bifurcation, over the rate at its end.
         smallest_snap: smallest motion that counts as a snap; bifurcations stay below.
         smallest_snap_step: smallest step, as ``smallest``, that is halved because of a snap.
-        minimum_shift: least shift of the tangent, in units of the mean stiffness, where a mechanism has zero-energy
+        minimum_shift: least shift of the KKT matrix, in units of the mean stiffness, where a mechanism has zero-energy
             modes, which would leave it singular.
         shift_factors: of ``minimum_shift``, tried in order: a shift slows Newton's method down where soft springs or
             forces hold zero-energy modes with a smaller stiffness.
@@ -183,7 +183,7 @@ class LoadStepper(Stepper):
         if not self._points:
             return self._start
         system, last = self.system, self._points[-1].state
-        for predictor in (self.predictor, Tangent()):
+        for predictor in (self.predictor, TangentPredictor()):
             guess = predictor.predict(system, self._points, self._width, ahead)
             if system.size(system.difference(guess, last)) <= self._steps.largest_prediction:
                 return guess
@@ -287,7 +287,7 @@ class MotorStepper(LoadStepper):
         """Rate of the state with the target of ``control``, the dominant motion x held.
 
         Raises:
-            NotConverged: the tangent cannot be factored or solved with, or is not positive along the motion.
+            NotConverged: the KKT matrix cannot be factored or solved with, or is not positive along the motion.
         """
         at = self.solver.linearise(last.state, control)
         rate = at.rate()

@@ -109,7 +109,7 @@ class PathEvent:
         kind: limit point of the force, turning point of the displacement or of a motor, or bifurcation.
         frame: the equilibrium; also one of the curve's frames.
         index: of that frame.
-        null_space: at a bifurcation a basis of the tangent's null space, one direction for each of the modes that
+        null_space: at a bifurcation a basis of the KKT matrix's null space, one direction for each of the modes that
             change; else the direction of the path.
         critical: the point of the path that branches start from.
     """
@@ -130,7 +130,7 @@ class PathEvent:
 
     @property
     def value(self) -> float:
-        """Value of the prescribed part at the singular tangent; the frame is the nearest equilibrium found."""
+        """Value of the prescribed part where the KKT matrix is singular; the frame is the nearest equilibrium found."""
         return self.critical.value
 
     @property

@@ -11,7 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenicsmech.collective import from_one
-from fenicsmech.continuation import ArcSteps, Hermite, Predictor
+from fenicsmech.continuation import ArcSteps, HermitePredictor, Predictor
 from fenicsmech.elasticity import Formulation, MixedFormulation, Quadrature
 from fenicsmech.equilibrium import EquilibriumMethod, EquilibriumSolver, PrimalDualNewton
 from fenicsmech.errors import AssemblyError, DescriptionError
@@ -119,7 +119,7 @@ class Simulation:
                 )
             self._control = AccuracyControl(scene, accuracy, size, formulation)
             fidelity = self._control.fidelity(self._control.level)
-        solver, predictor = solver or PrimalDualNewton(), predictor or Hermite()
+        solver, predictor = solver or PrimalDualNewton(), predictor or HermitePredictor()
         self._discretisation = Discretisation(scene, fidelity, solver, predictor, self.clock, comm)
         self._described = _description(scene.mechanism)
 

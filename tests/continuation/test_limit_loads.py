@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.continuation import Hermite, LoadStepper, LoadStepsFailed
+from fenicsmech.continuation import HermitePredictor, LoadStepper, LoadStepsFailed
 from fenicsmech.equilibrium import EquilibriumPoint, LoadControl, NotConverged, Stability, State, Step
 
 from ..equilibrium import toggle
@@ -56,7 +56,7 @@ def start() -> State:
 @pytest.mark.parametrize("beyond", BEYOND)
 def test_last_equilibrium_is_next_to_the_limit_load_and_has_lost_its_stiffness(beyond):
     freedom = OneFreedom()
-    path = LoadStepper(freedom, start(), LoadControl(), predictor=Hermite())
+    path = LoadStepper(freedom, start(), LoadControl(), predictor=HermitePredictor())
     with pytest.raises(LoadStepsFailed) as failure:
         path.advance(LoadControl(beyond))
     assert 1.0 - RESOLUTION < failure.value.reached <= 1.0
@@ -66,7 +66,7 @@ def test_last_equilibrium_is_next_to_the_limit_load_and_has_lost_its_stiffness(b
 
 @pytest.mark.parametrize("beyond", BEYOND)
 def test_load_steps_after_the_first_locate_it_as_closely_and_a_load_on_the_way_back_is_reached(beyond):
-    path = LoadStepper(OneFreedom(), start(), LoadControl(), predictor=Hermite())
+    path = LoadStepper(OneFreedom(), start(), LoadControl(), predictor=HermitePredictor())
     path.advance(LoadControl(0.5))
     with pytest.raises(LoadStepsFailed) as failure:
         path.advance(LoadControl(beyond))

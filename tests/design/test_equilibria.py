@@ -120,7 +120,7 @@ def test_a_large_change_of_design_is_halved_on_the_way(monkeypatch):
             raise
 
     monkeypatch.setattr(NewtonSolver, "solve", counted)
-    solver.options = fm.PrimalDualNewton(iterations=6, mixed_stress=False)
+    solver.options = fm.PrimalDualNewton(iterations=6, predicted_stress=False)
     followed = both.equilibria.follow(known)
     assert len(failures) >= 1
     solver.options = fm.PrimalDualNewton()

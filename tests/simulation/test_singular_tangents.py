@@ -20,8 +20,8 @@ ASKED = {
 
 
 def failing(*arguments, **options):
-    """Singular tangents: every computation that needs one says so."""
-    raise NotConverged("the tangent cannot be factored", 0)
+    """Singular KKT matrices: every computation that needs one says so."""
+    raise NotConverged("the KKT matrix cannot be factored", 0)
 
 
 @pytest.mark.parametrize("ask", ASKED.values(), ids=ASKED)
