@@ -12,6 +12,7 @@ import dolfinx
 from mpi4py import MPI
 
 import fenicsmech as fm
+from fenicsmech.errors import counted
 from fenicsmech.files import atomic_write
 
 ROOT = Path(__file__).parents[1]
@@ -55,7 +56,7 @@ def provenance() -> str:
     changed = ", changed since" if git("status", "--porcelain", "--untracked-files=no") else ""
     return (
         f"Commit {git('rev-parse', '--short', 'HEAD') or 'unknown'}{changed}; dolfinx {dolfinx.__version__}; "
-        f"{_processor()}, {os.cpu_count()} cores; {MPI.COMM_WORLD.size} process(es)."
+        f"{_processor()}, {os.cpu_count()} cores; {counted(MPI.COMM_WORLD.size, 'process', 'processes')}."
     )
 
 

@@ -134,18 +134,23 @@ from fenicsmech.quantities import (
     Component,
     Displacement,
     ForceMagnitude,
+    FormValue,
     JointForce,
     JointMoment,
     LinkMass,
     LinkVolume,
     Magnitude,
     MotorTorque,
+    Observable,
+    Partial,
     PrescribedDisplacement,
     Quantity,
+    RestObservable,
     Rotation,
     Sample,
     StrainEnergy,
     at,
+    border_of,
 )
 from fenicsmech.report import Optimisation, Report, design_study, write_report
 from fenicsmech.simulation import (
@@ -189,9 +194,10 @@ __all__ = [
     "RestShape", "Curve", "Frame", "Axis", "Unknown", "Freedom", "Reaction", "Explanation", "Hint", "PinFriction",
     "write_report", "Report", "plot_curve", "CurveSeries", "CurveMark", "CurveTarget", "Trace", "read_csv",
     "print_once", "configure_logging", "mpi_abort_on_error",
-    # quantities of equilibria
+    # quantities of equilibria; those from Observable on for quantities of your own
     "Sample", "at", "PrescribedDisplacement", "Quantity", "Displacement", "Rotation", "ForceMagnitude", "MotorTorque",
     "JointForce", "JointMoment", "StrainEnergy", "LinkMass", "LinkVolume", "CentrelineLength", "Component", "Magnitude",
+    "Observable", "RestObservable", "Partial", "FormValue", "border_of",
     # path following, stability and buckling
     "FollowedCurve", "ArcSteps", "Critical", "Until", "PathEvent", "CriticalPoint", "BucklingLoad", "BucklingPosition",
     "SoftMode", "ModeShape",

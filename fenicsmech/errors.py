@@ -93,6 +93,11 @@ def point_text(point: Iterable[float]) -> str:
     return f"({', '.join(f'{c:g}' for c in point)})"
 
 
+def counted(number: int, noun: str, plural: str = "") -> str:
+    """A number of things as messages show it: ``1 point``, ``2 points``."""
+    return f"{number} {noun if number == 1 else plural or noun + 's'}"
+
+
 def points(
     part: str, values: Sequence[Sequence[float]], *, least: int, dimensions: tuple[int, ...]
 ) -> tuple[tuple[float, ...], ...]:
@@ -103,7 +108,7 @@ def points(
         raise DescriptionError(part, f"{values!r} is not a list of points", "Give a list of points") from None
     checked = tuple(point(part, p, dimensions=dimensions) for p in values)
     if len(checked) < least:
-        raise DescriptionError(part, f"{len(checked)} point(s) given", f"Give at least {least} points")
+        raise DescriptionError(part, f"{counted(len(checked), 'point')} given", f"Give at least {least} points")
     return checked
 
 

@@ -30,7 +30,7 @@ from mpi4py import MPI
 from fenicsmech.collective import on_one
 from fenicsmech.design import DesignProblem, DesignResult
 from fenicsmech.equilibrium import Unknown
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, counted
 from fenicsmech.files import write_json
 from fenicsmech.log import print_once
 from fenicsmech.mechanism import Force
@@ -227,7 +227,7 @@ def _summarise_design(optimisation: Optimisation) -> dict[str, object]:
         "targets": [
             {
                 "target": target.name,
-                "configuration": target.configuration,
+                "configuration": target.configuration or None,  # links at rest have none
                 "force": target.force,
                 "unit": target.unit,
                 "relation": target.relation,
@@ -306,7 +306,8 @@ def _text(summary: dict, folder: Path) -> str:
     dofs, seconds = summary["dofs"], summary["seconds"]
     phases = ", ".join(f"{name} {value:.2f}" for name, value in seconds["phases"].items())
     lines += [
-        f"{dofs['rigid']} rigid + {dofs['flexible']} flexible unknowns, {summary['ranks']} process(es)",
+        f"{dofs['rigid']} rigid + {dofs['flexible']} flexible unknowns, "
+        f"{counted(summary['ranks'], 'process', 'processes')}",
         f"seconds: {phases}",
         f"seconds per loaded equilibrium (median): {seconds['frame_median']:.3f}; "
         f"peak memory {summary['peak_memory_mb']:.0f} MB",

@@ -33,7 +33,6 @@ INNER = {
     "Linearisation",
     "MechanismModel",
     "NewtonSolver",
-    "Observable",
     "Panel",
     "ParametricShape",
     "PointLoad",

@@ -6,6 +6,7 @@ import csv
 from collections.abc import Sequence
 from pathlib import Path
 
+from fenicsmech.errors import counted
 from fenicsmech.files import atomic_write
 from fenicsmech.report import format_table
 
@@ -126,7 +127,7 @@ def study_text(study: Study) -> str:
     what = f"{study.scene.mechanism.name}: {study.quantity.name}, {study.quantity.load:g} {study.scene.units.force}"
     return "\n".join(
         [
-            f"{what}, {study.quantity.configuration.name}; {study.ranks} process(es)",
+            f"{what}, {study.quantity.configuration.name}; {counted(study.ranks, 'process', 'processes')}",
             "",
             format_table(headers, rows, digits=_DIGITS),
             "",

@@ -28,7 +28,6 @@ from fenicsmech.design.optimisers.problem import (
     Reason,
     Start,
     TooHigh,
-    merit,
 )
 from fenicsmech.design.optimisers.sqp import SQP
 from fenicsmech.design.regularisers import MeshQuality, Model, Regulariser, ShapeBounds, StayClose
@@ -36,7 +35,7 @@ from fenicsmech.design.rest_shape import DesignedLink, ParametricShape
 from fenicsmech.design.result import DesignResult, LinkDesign, PartValue, TargetResult, rest_meshes
 from fenicsmech.design.run import Checkpoint, DesignProgress, Round, minimise_together
 from fenicsmech.design.search import Scatter, Search, SearchResult, StartResult
-from fenicsmech.design.shape.edges import edge_weights
+from fenicsmech.design.shape.edges import MidEdgeNodes, edge_weights
 from fenicsmech.design.shape.handle_optimum import (
     HandleOptimum,
     MapDerivatives,

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from fenicsmech.equilibrium import LoadControl
-from fenicsmech.errors import DescriptionError, finite, set_fields
+from fenicsmech.errors import DescriptionError, counted, finite, set_fields
 from fenicsmech.mechanism import DRAWN, Configuration, Force, Material
 from fenicsmech.quantities import Displacement, Sensitivity
 from fenicsmech.simulation import Curve, CurveRequest, Simulation, read_request
@@ -116,7 +116,7 @@ def fit_modulus(experiments: Sequence[Experiment], material: Material) -> Modulu
     readings = sum(len(experiment.forces) for experiment in experiments)
     if readings < 2:
         raise DescriptionError(
-            f"modulus of {material.name!r}", f"{readings} reading(s)", "Give two or more: an interval needs them"
+            f"modulus of {material.name!r}", counted(readings, "reading"), "Give two or more: an interval needs them"
         )
     log_modulus, iterations, step = float(np.log(material.law.parameters["E"])), 0, np.inf
     while True:

@@ -3,8 +3,8 @@
     p → θ*(p) → d(p, θ*(p)) → X = X₀ + c + d
 
 with the handle positions θ, the design field d and the bulge c of the drawn edges. Handle positions are best for the
-straight cells between the vertices. Edges of the outline follow the design between them too; a design whose curved
-cells are squeezed too much has no rest shape.
+straight cells between the vertices. Edges of the outline follow the design between them too, their middles without the
+part along the chord; a design whose curved cells are squeezed too much has no rest shape.
 """
 
 from __future__ import annotations
@@ -18,11 +18,12 @@ from mpi4py import MPI
 
 from fenicsmech.compat import cell_dofs, vector_space
 from fenicsmech.design.description import Bounds, SplineDesign, shape_request
+from fenicsmech.design.shape.edges import MidEdgeNodes
 from fenicsmech.design.shape.handle_optimum import HandleOptimum, HandlePlacement, ShapeError
 from fenicsmech.design.shape.quality import Barrier, QualitySum
 from fenicsmech.design.shape.shape_map import LinkShape, ShapeMap, shape_links
 from fenicsmech.design.shape.spline import LinkSpline, SplineSamples
-from fenicsmech.meshing import edge_corners, least_stretches
+from fenicsmech.meshing import edge_corners, least_stretches, node_ends
 from fenicsmech.model import MechanismModel
 from fenicsmech.simulation import Simulation
 
@@ -77,6 +78,11 @@ class ParametricShape:
         self._vertex_map = ShapeMap(model.mesh, self._straight, shapes)
         self._ratio = QualitySum(self._straight, comm=model.mesh.comm)
         self._optimum = HandleOptimum(self._vertex_map, self._ratio)
+        ends, dim = node_ends(design.function_space), model.mesh.vertices.shape[1]
+        drawn = model.mesh.vertices[ends].mean(axis=1)
+        if model.elastic.bulge is not None:
+            drawn += model.elastic.bulge.x.array.reshape(-1, dim)
+        self._middles = MidEdgeNodes(ends, drawn) if model.elastic.order > 1 else None
         self._penalties: dict[Barrier, QualitySum] = {}
         self.initial = self._map.initial
         links, first = [], 0
@@ -124,7 +130,8 @@ class ParametricShape:
     def _placed(self, placement: HandlePlacement) -> np.ndarray:
         """The design field of a placement, this rank's values, ghosts last, flat."""
         field, elastic, mesh = self._map.field(placement.p, placement.theta), self._model.elastic, self._model.mesh
-        if elastic.order > 1:
+        if self._middles is not None:
+            field = self._middles.placed(field)
             bent = field if elastic.bulge is None else field + elastic.bulge.x.array.reshape(field.shape)
             corners, pairs = field.shape[1] + 1, edge_corners(field.shape[1] + 1)
             values = bent[cell_dofs(elastic.d.function_space)[self._cells]]
@@ -138,6 +145,8 @@ class ParametricShape:
     def gradient(self, placement: HandlePlacement, nodal: np.ndarray) -> np.ndarray:
         """dO/dp (…, parameters) from ∂O/∂d (…, owned values) of the design placed as in ``placement``."""
         fields = nodal.reshape(*nodal.shape[:-1], self._map.owned, -1)
+        if self._middles is not None:
+            fields = self._middles.apply_transpose(self._map.field(placement.p, placement.theta), fields)
         by_p, by_theta = self._map.apply_transpose(placement.p, placement.theta, fields)
         return self._optimum.total_gradient(placement, by_p, by_theta)
 

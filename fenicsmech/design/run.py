@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from math import inf, log
 from pathlib import Path
-from time import perf_counter
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -216,7 +216,7 @@ class Checkpoint:
             other = [key for key in mine if data["problem"].get(key) != mine[key]]
             raise DescriptionError(
                 part,
-                f"it belongs to another problem: {', '.join(other)} differ(s)",
+                f"it belongs to another problem, with other {', '.join(other)}",
                 "Resume with the options of the first run, or start anew",
             )
         return data
@@ -258,16 +258,19 @@ class DesignProgress:
         optimiser: gives the criteria of its end.
         leads: whether this process shows anything.
         name: of the task shown.
+        clock: seconds from an arbitrary start, increasing.
     """
 
-    def __init__(self, optimiser: Optimiser, *, leads: bool, name: str = "design") -> None:
-        self._minimiser = optimiser
-        self._progress = Progress(None, name, shown=leads)
+    def __init__(
+        self, optimiser: Optimiser, *, leads: bool, name: str = "design", clock: Callable[[], float] = monotonic
+    ) -> None:
+        self._optimiser, self._clock = optimiser, clock
+        self._progress = Progress(None, name, shown=leads, clock=clock)
         self._recent: deque[tuple[float, float]] = deque(maxlen=6)
 
     def update(self, iterate: Iterate, errors: np.ndarray) -> None:
         """Shows an iterate; ``errors`` (targets,) are relative."""
-        self._recent.append((perf_counter(), max(iterate.promise, 1e-300)))
+        self._recent.append((self._clock(), max(iterate.reduction, 1e-300)))
         note = f"objective {iterate.evaluation.value:.3g}, worst target error {np.abs(errors).max():.2%}"
         left = self._left(iterate)
         self._progress.update(iterate.number, note if left is None else f"{note}, about {left:.0f} s left")
@@ -285,5 +288,5 @@ class DesignProgress:
         (start, first), (now, last) = self._recent[0], self._recent[-1]
         each = (now - start) / (len(self._recent) - 1)
         falling = (log(first) - log(last)) / (len(self._recent) - 1)
-        wanted = log(last / self._minimiser.least_promise) / falling if falling > 0.0 else inf
-        return each * max(1.0, min(wanted, self._minimiser.iterations - iterate.number))
+        wanted = log(last / self._optimiser.least_reduction) / falling if falling > 0.0 else inf
+        return each * max(1.0, min(wanted, self._optimiser.iterations - iterate.number))

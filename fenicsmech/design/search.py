@@ -27,7 +27,7 @@ from fenicsmech.design.run import Checkpoint
 from fenicsmech.design.shape.handle_optimum import HandlePlacement, ShapeError
 from fenicsmech.design.target import Target, check_targets
 from fenicsmech.elasticity import PLANE_STRESS, ElasticModel
-from fenicsmech.errors import DescriptionError, EquilibriumError, positive
+from fenicsmech.errors import DescriptionError, EquilibriumError, counted, positive
 from fenicsmech.log import Progress
 from fenicsmech.mechanism import Strip
 from fenicsmech.model import fits
@@ -87,7 +87,7 @@ class StartResult:
     result: DesignResult | None
 
     def __str__(self) -> str:
-        drawn = f", {self.rejected} shape(s) rejected before" if self.rejected else ""
+        drawn = f", {counted(self.rejected, 'shape')} rejected before" if self.rejected else ""
         if self.result is None:
             return f"start {self.number}: {self.failure}{drawn}"
         worst = max(self.result.targets, key=lambda target: abs(target.error))
@@ -125,8 +125,8 @@ class SearchResult:
         failed = sum(start.result is None for start in self.starts)
         given_up = sum(start.given_up for start in self.starts)
         lines = [
-            f"search for {self.mechanism!r}: {len(self.optima)} distinct design(s) from {len(self.starts)} starts, "
-            f"{failed} infeasible, {given_up} given up"
+            f"search for {self.mechanism!r}: {counted(len(self.optima), 'distinct design')} from "
+            f"{counted(len(self.starts), 'start')}, {failed} infeasible, {given_up} given up"
         ]
         for number, (design, sources) in enumerate(zip(self.optima, self.sources, strict=True), 1):
             lines.append(

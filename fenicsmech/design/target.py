@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenicsmech.design.description import SplineDesign
-from fenicsmech.errors import DescriptionError, finite, positive
+from fenicsmech.errors import DescriptionError, counted, finite, positive
 from fenicsmech.mechanism import DRAWN, Configuration, Force, Units
 from fenicsmech.multibody import assemble
 from fenicsmech.quantities import Displacement, ForceMagnitude, Quantity, Sample
@@ -283,7 +283,9 @@ def check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
         target.quantity.check(simulation.scene, dim)
         if len(target.wanted) > size or target.size == 1 < size:
             raise DescriptionError(
-                part, f"it has {size} component(s) and {target.size} is or are wanted", "Give as many numbers as it has"
+                part,
+                f"it has {counted(size, 'component')} and {counted(target.size, 'wanted value')}",
+                "Give as many numbers as it has",
             )
         if target.sample is not None and isinstance(target.quantity, ForceMagnitude):
             moved = target.sample.moved

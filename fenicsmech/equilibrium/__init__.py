@@ -39,7 +39,6 @@ from fenicsmech.equilibrium.newton import NewtonSolver, PrimalDualNewton
 from fenicsmech.equilibrium.solver import EquilibriumMethod, EquilibriumSolver
 from fenicsmech.equilibrium.state import (
     Reaction,
-    ReactionSlopes,
     State,
     Step,
     joint_reaction,

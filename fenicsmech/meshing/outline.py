@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 from scipy.interpolate import BSpline
 
-from fenicsmech.errors import MeshingError, point_text
+from fenicsmech.errors import MeshingError, counted, point_text
 from fenicsmech.mechanism import Arc, Line, Outline
 from fenicsmech.meshing.cutting import PlaneDrawing, in_units_of, mesh_planar
 from fenicsmech.meshing.link_mesh import LinkMesh
@@ -177,6 +177,6 @@ def _loop(outline: Outline, request: MeshRequest) -> list[Curve]:
             loop.append(straight_line(start, segment.end))
         start = segment.end
     if len(loop) < 2:
-        problem = f"an outline of {len(loop)} segment(s) encloses nothing"
+        problem = f"an outline of {counted(len(loop), 'segment')} encloses nothing"
         raise MeshingError(request.part, problem, "Give at least two segments")
     return loop

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull
 
-from fenicsmech.errors import DescriptionError, index_array, positive, real_array, set_fields
+from fenicsmech.errors import DescriptionError, counted, index_array, positive, real_array, set_fields
 
 Reals = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ def _no_points() -> Reals:
 def _polygon(part: str, points: ArrayLike) -> Reals:
     polygon = real_array(part, points, None, 2)
     if len(polygon) < 3:
-        raise DescriptionError(part, f"{len(polygon)} point(s) given", "Give at least 3")
+        raise DescriptionError(part, f"{counted(len(polygon), 'point')} given", "Give at least 3")
     return polygon
 
 

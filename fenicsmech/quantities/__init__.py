@@ -6,7 +6,6 @@
 - ``links``: strain energy, mass, volume and length of flexible links
 - ``sample``: the equilibria at which they are evaluated
 - ``sensitivity``: total derivatives by adjoints
-- ``forms``: values of forms and their derivatives
 """
 
 from fenicsmech.quantities.forces import ForceMagnitude, JointForce, JointMoment, MotorTorque
@@ -14,6 +13,7 @@ from fenicsmech.quantities.links import CentrelineLength, LinkMass, LinkVolume, 
 from fenicsmech.quantities.motion import Displacement, Rotation
 from fenicsmech.quantities.quantity import (
     Component,
+    FormValue,
     Magnitude,
     Observable,
     Partial,

@@ -17,8 +17,7 @@ import ufl
 from fenicsmech.errors import DescriptionError, points, positive
 from fenicsmech.mechanism import Centreline, FlexibleLink, Strip
 from fenicsmech.model import MechanismModel
-from fenicsmech.quantities.forms import FormValue
-from fenicsmech.quantities.quantity import Observable, Partial, Quantity, RestObservable
+from fenicsmech.quantities.quantity import FormValue, Observable, Partial, Quantity, RestObservable
 
 _CHORDS = 48  # of a centreline: their length is in error by 1e-4 at most, and its change with the design by less
 

@@ -31,8 +31,7 @@ from dolfinx import fem
 from fenicsmech.compat import destroy_garbage, owned_values
 from fenicsmech.equilibrium import Adjoint, Control, EquilibriumSolver, State
 from fenicsmech.model import MechanismModel
-from fenicsmech.quantities.forms import FormValue
-from fenicsmech.quantities.quantity import Observable, Partial, RestObservable
+from fenicsmech.quantities.quantity import FormValue, Observable, Partial, RestObservable
 
 
 @dataclass(frozen=True, eq=False)

@@ -53,10 +53,13 @@ def test_both_optimisers_reach_the_targets_of_the_truss():
 
 
 @pytest.mark.thorough
-def test_sqp_solves_every_formula_under_inequalities():
-    head, _, *rows = printed("constrained")
-    assert head[1] == "SQP" and len(rows) == 9
-    assert all(row[1].endswith(")") and "no" not in row[1] for row in rows)
+def test_sqp_solves_every_formula_and_every_design_under_inequalities():
+    rows = printed("constrained", "--limit", "60")
+    split = next(k for k, row in enumerate(rows) if row[0] == "design")
+    formulas, designs = rows[2:split], rows[split + 2 :]
+    assert rows[0][1] == rows[split][1] == "SQP" and len(formulas) == 9 and len(designs) == 3
+    assert all(row[1].endswith(")") and "no" not in row[1] for row in formulas)
+    assert all(row[1].endswith(")") and "violated" not in row[1] for row in designs)
 
 
 @pytest.mark.slow

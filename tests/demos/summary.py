@@ -47,7 +47,7 @@ SCHEMA: Schema = {
     "ranks": count,
     "dofs": {"rigid": count, "flexible": count},
     "parameters": or_none(count),
-    "targets": [{"configuration": word, "force": or_none(number), "wanted": or_none(value), "reached": value}],
+    "targets": [{"configuration": or_none(word), "force": or_none(number), "wanted": or_none(value), "reached": value}],
     "frames": [{"force": number, "displacement": number, "seconds": duration, "iterations": count, "stable": flag}],
     "seconds": {"setup": duration, "frame_median": or_none(duration), "optimise": or_none(duration)},
     "iterations": or_none(count),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -15,23 +17,28 @@ WANTED = ((0.1, 2.0), (0.4, 3.2))
 COARSE = {"space": "3d", "size": 4.0, "order": 1}
 
 
-class Counted(SampleEquilibria):
-    """Counts the samples traced from zero load, per space."""
+class Traced(Counter):
+    """Number of times that equilibria were loaded from zero, per space.
 
-    traced: dict[str, int] = {}
+    Attributes:
+        most: in 3D, after which the run is killed.
+    """
 
-    def trace(self):
-        space = self._simulation.fidelity.model.name
-        Counted.traced[space] = Counted.traced.get(space, 0) + 1
-        return super().trace()
+    most = float("inf")
 
 
 @pytest.fixture
-def traced(monkeypatch) -> dict[str, int]:
-    """Number of times that equilibria were loaded from zero, per space."""
-    monkeypatch.setattr("fenicsmech.design.designed.SampleEquilibria", Counted)
-    Counted.traced = {}
-    return Counted.traced
+def traced(monkeypatch) -> Traced:
+    counts, trace = Traced(), SampleEquilibria.trace
+
+    def counted(equilibria: SampleEquilibria):
+        if counts["3d"] >= counts.most:
+            raise KeyboardInterrupt
+        counts[equilibria._simulation.fidelity.model.name] += 1
+        return trace(equilibria)
+
+    monkeypatch.setattr(SampleEquilibria, "trace", counted)
+    return counts
 
 
 def corrected(result: fm.DesignResult) -> list[float]:
@@ -93,22 +100,14 @@ def test_a_surrogate_that_misleads_is_given_up(traced, caplog):
     assert result.worst_error < 5e-3 and result.verified
 
 
-def test_a_run_killed_between_two_rounds_ends_as_if_nothing_had_happened(tmp_path, monkeypatch):
+def test_a_run_killed_between_two_rounds_ends_as_if_nothing_had_happened(tmp_path, traced):
     whole = truss(*WANTED).problem(**COARSE).optimise(checkpoint=tmp_path / "whole.json")
     assert len(whole.corrections) > 1
-    from fenicsmech.design import correction
-
-    file, loaded, calls = tmp_path / "checkpoint.json", correction.loaded, []
-
-    def killed(*arguments):
-        calls.append(None)
-        if len(calls) == 2:
-            raise KeyboardInterrupt
-        return loaded(*arguments)
-
-    with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
-        patched.setattr(correction, "loaded", killed)
+    file = tmp_path / "checkpoint.json"
+    traced.most = traced["3d"] + 1
+    with pytest.raises(KeyboardInterrupt):
         truss(*WANTED).problem(**COARSE).optimise(checkpoint=file)
+    traced.most = float("inf")
     again = truss(*WANTED).problem(**COARSE).optimise(checkpoint=file, resume=True)
     assert (again.iterations, again.reason, again.evaluations) == (whole.iterations, whole.reason, whole.evaluations)
     assert again.corrections == pytest.approx(whole.corrections, rel=1e-5, abs=1e-8)

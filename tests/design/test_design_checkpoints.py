@@ -86,7 +86,7 @@ def test_checkpoints_of_another_problem_are_refused(differs, case, options, tmp_
 def test_checkpoints_of_other_motor_positions_are_refused(tmp_path):
     file = tmp_path / "checkpoint.json"
     strained(1.0).problem().optimise(optimiser=fm.LevenbergMarquardt(iterations=1), checkpoint=file)
-    with pytest.raises(fm.DescriptionError, match="another problem: targets differ"):
+    with pytest.raises(fm.DescriptionError, match="another problem, with other targets"):
         strained(1.0, angle=0.09).problem().optimise(checkpoint=file, resume=True)
 
 

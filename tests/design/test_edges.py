@@ -8,7 +8,7 @@ from numpy.polynomial import polynomial
 
 import fenicsmech as fm
 from fenicsmech.compat import vector_space
-from fenicsmech.design import BETWEEN, ShapeError, ShapeMap, edge_weights, shape_links
+from fenicsmech.design import BETWEEN, MidEdgeNodes, ShapeError, ShapeMap, edge_weights, shape_links
 from fenicsmech.mechanism import Force
 from fenicsmech.meshing import InterfaceSite, LinkMesh, boundary_loops, distribute, mesh_link, node_ends
 
@@ -126,9 +126,57 @@ def test_edges_and_the_transpose_do_not_depend_on_the_number_of_ranks(dim):
         whole = whole or dict(zip(keys, field, strict=True))
         assert field == pytest.approx(np.array([whole[key] for key in keys]), abs=1e-12)
         g = np.sin(np.array(keys))[:, None] * np.arange(1, dim + 1)
-        pulled.append(shape.apply_transpose(p, shape.initial_theta, g))
+        pulled.append(shape.apply_transpose(p, shape.initial_theta, g[: shape.owned]))
     for one, other in zip(*pulled, strict=True):
         assert other == pytest.approx(one, rel=1e-10, abs=1e-10)
+
+
+def place_along_chord(x: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """The place of the middles of edges along their chords in the plane, 0 halfway, from the positions of all nodes."""
+    vertex = {int(a): k for k, (a, b) in enumerate(ends) if a == b}
+    middles = np.flatnonzero(ends[:, 0] != ends[:, 1])
+    a, b = (x[[vertex[int(end)] for end in ends[middles, side]], :2] for side in (0, 1))
+    chords, long = b - a, np.linalg.norm(b - a, axis=1) > 1e-9
+    bulges = x[middles, :2] - 0.5 * (a + b)
+    return np.sum((bulges * chords)[long], axis=1) / np.sum(chords[long] ** 2, axis=1)
+
+
+@each_dim
+def test_middles_of_edges_keep_their_place_along_the_chord_and_move_along_it_alone(dim):
+    shape = quadratic_map(dim)
+    ends, X = node_ends(shape.design.function_space), drawn(shape)
+    middles = MidEdgeNodes(ends, X)
+    slid = shape.initial_theta.copy()
+    for own, positions in zip(shape.shapes, np.split(slid, [len(shape.shapes[0].handles)]), strict=True):
+        t = own.handles.t[own.handles.slides]
+        positions[own.handles.slides] = t + 0.3 * np.sin(np.pi * t / own.handles.t[-1])  # bunched up at one end
+    raw = shape.field(shape.initial, slid)
+    placed = middles.placed(raw)
+    assert np.abs(place_along_chord(X + raw, ends) - place_along_chord(X, ends)).max() > 0.03
+    assert place_along_chord(X + placed, ends) == pytest.approx(place_along_chord(X, ends), abs=1e-12)
+    moved = np.flatnonzero(np.any(placed != raw, axis=1))
+    assert np.all(ends[moved, 0] != ends[moved, 1])
+    position = {int(a): (X + raw)[k] for k, (a, b) in enumerate(ends) if a == b}
+    chords = np.array([position[int(b)] - position[int(a)] for a, b in ends[moved]])[:, :2]
+    shifts = (placed - raw)[moved, :2]
+    across = shifts[:, 0] * chords[:, 1] - shifts[:, 1] * chords[:, 0]
+    assert across == pytest.approx(0.0, abs=1e-10)
+    assert np.array_equal(middles.placed(np.zeros_like(X)), np.zeros_like(X))
+
+
+@each_dim
+def test_the_transpose_of_placed_middles_is_that_of_their_derivative(dim):
+    shape = quadratic_map(dim)
+    middles = MidEdgeNodes(node_ends(shape.design.function_space), drawn(shape))
+    random = np.random.default_rng(2)
+    field, way, g = (scale * random.standard_normal(drawn(shape).shape) for scale in (0.05, 1.0, 1.0))
+    pulled = float(np.sum(middles.apply_transpose(field, g) * way))
+    errors = []
+    for step in (1e-2, 5e-3):
+        change = middles.placed(field + step * way) - middles.placed(field - step * way)
+        errors.append(abs(np.sum(g * change) / (2.0 * step) - pulled))
+    assert errors[1] < 1e-2 * abs(pulled)
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.1)  # of central differences
 
 
 def test_a_design_whose_edges_would_squeeze_cells_is_refused():
@@ -136,7 +184,7 @@ def test_a_design_whose_edges_would_squeeze_cells_is_refused():
     near = both.rest.place(both.rest.initial, None)
     before = both.field()
     with pytest.raises(ShapeError, match="squeeze"):
-        both.rest.place(both.design(1.2, 3), near)
+        both.rest.place(both.design(3.0, 3), near)
     assert np.array_equal(both.field(), before)
 
 

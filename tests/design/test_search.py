@@ -127,7 +127,7 @@ def test_both_optima_are_found_and_the_better_one_comes_first():
     given_up = {start.number for start in found.starts if start.given_up}
     assert sorted([*sum(found.sources, ()), *given_up]) == list(range(SCATTER.starts))
     assert found.evidence == ()
-    assert "2 distinct design(s) from 8 starts, 0 infeasible" in str(found)
+    assert "2 distinct designs from 8 starts, 0 infeasible" in str(found)
 
 
 def test_starts_are_the_drawn_design_and_feasible_shapes_spread_evenly():
@@ -160,7 +160,7 @@ def test_shapes_with_inverted_cells_are_drawn_anew():
 def test_starts_for_which_no_feasible_shape_is_drawn_are_told():
     found = searched(TwoValleys(inverted=-np.inf), fm.Scatter(starts=3, draws=5))
     assert [start.result is None for start in found.starts] == [False, True, True]
-    assert str(found.starts[1]) == "start 1: no feasible shape was drawn, 5 shape(s) rejected before"
+    assert str(found.starts[1]) == "start 1: no feasible shape was drawn, 5 shapes rejected before"
 
 
 def test_infeasible_starts_are_survived_and_told():
@@ -229,7 +229,7 @@ def test_a_search_that_was_killed_goes_on_and_gives_the_same_list(tmp_path, afte
 
 def test_checkpoints_of_another_search_are_refused(tmp_path):
     searched(TwoValleys(), checkpoint=checkpoints(tmp_path))
-    with pytest.raises(fm.DescriptionError, match="another problem: wanted differ"):
+    with pytest.raises(fm.DescriptionError, match="another problem, with other wanted"):
         searched(TwoValleys(wanted=2.0), checkpoint=checkpoints(tmp_path, wanted=2.0), resume=True)
 
 

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, counted
 from fenicsmech.mechanism import (
     Arc,
     Configuration,
@@ -168,7 +168,9 @@ def test_wrong_number_of_coordinates_is_refused(part, values, wanted, action):
 )
 def test_too_few_points_are_refused(part, least, action):
     given = least - 1
-    assert_refused(lambda: action(TRIANGLE[:given]), part, f"{given} point(s) given", f"Give at least {least} points")
+    assert_refused(
+        lambda: action(TRIANGLE[:given]), part, f"{counted(given, 'point')} given", f"Give at least {least} points"
+    )
 
 
 def test_outline_of_anything_but_lines_and_arcs_is_refused():

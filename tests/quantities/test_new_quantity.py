@@ -10,14 +10,13 @@ from mpi4py import MPI
 
 import fenicsmech as fm
 from fenicsmech.multibody import JointCoordinate
-from fenicsmech.quantities import Observable, Partial, Quantity, border_of
 
 from ..oracles.dense import taylor_rates
 from .test_sensitivity import Bench
 
 
 @dataclass(frozen=True)
-class JointAngle(Quantity):
+class JointAngle(fm.Quantity):
     """The angle of a hinge."""
 
     joint: fm.Joint
@@ -33,7 +32,7 @@ class JointAngle(Quantity):
         return _Angle(model, self.joint)
 
 
-class _Angle(Observable):
+class _Angle(fm.Observable):
     def __init__(self, model, joint: fm.Joint) -> None:
         self._joints, self._coordinate = model.linkage.joints, JointCoordinate(model.linkage, joint)
 
@@ -44,11 +43,11 @@ class _Angle(Observable):
         slopes = np.split(self._coordinate.gradient(state.poses), 2)
         ends = zip(self._coordinate.bodies, slopes, strict=True)
         parts = [
-            Partial(border=border_of(system, poses=(self._joints.columns[body], slope)))
+            fm.Partial(border=fm.border_of(system, poses=(self._joints.columns[body], slope)))
             for body, slope in ends
             if body in self._joints.columns
         ]
-        return [sum(parts, start=Partial())]
+        return [sum(parts, start=fm.Partial())]
 
 
 def test_new_quantity_has_total_derivatives():

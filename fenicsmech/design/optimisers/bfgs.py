@@ -67,7 +67,7 @@ class BFGS(Optimiser):
         positive("tolerance of BFGS", self.tolerance)
 
     @property
-    def least_promise(self) -> float:
+    def least_reduction(self) -> float:
         return self.tolerance
 
     def minimise(self, problem: Problem, start: Start, *, watch: Callable[[Iterate], None]) -> Iterate:
@@ -87,7 +87,7 @@ class BFGS(Optimiser):
     def _advance(self, problem: Problem, last: Iterate) -> Iterate:
         here, number, evaluations = last.evaluation, last.number, last.evaluations
         curvature = last.memory.reshape(len(here.parameters), -1)
-        if last.promise <= self.tolerance:
+        if last.reduction <= self.tolerance:
             return _iterate(number, evaluations, here, curvature, Reason.CONVERGED)
         there, tried = self._search(problem, here, _step(here, curvature))
         if there is None:  # B was learnt elsewhere and may not hold here

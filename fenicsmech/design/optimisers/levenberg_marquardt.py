@@ -51,7 +51,7 @@ class LevenbergMarquardt(SQP):
     again: float = 0.1
 
     @property
-    def least_promise(self) -> float:
+    def least_reduction(self) -> float:
         return 5e-3 if self.tolerance is None else self.tolerance
 
     def _minimum(self, here: Evaluation, lengths: np.ndarray) -> np.ndarray:
@@ -70,7 +70,7 @@ class LevenbergMarquardt(SQP):
         resolution = Resolution(self, first)
 
         def resolved(last: Iterate) -> bool:
-            undecided = self.tolerance is None and last.promise > self.least_promise
+            undecided = self.tolerance is None and last.reduction > self.least_reduction
             return undecided and resolution.reached(last, lengths)
 
         return resolved
@@ -106,4 +106,4 @@ class Resolution:
 
 def _gain(last: Iterate) -> float:
     """O(p) − min O, as predicted."""
-    return last.promise * last.evaluation.value
+    return last.reduction * last.evaluation.value

@@ -225,7 +225,7 @@ class Iterate:
         evaluations: objective evaluations so far, infeasible ones included.
         evaluation: the best point.
         memory: state of the optimiser, for resuming.
-        promise: the predicted reduction, over the objective; inf if that is not known.
+        reduction: the predicted one, over the objective; inf if that is not known.
         reason: None while it runs.
     """
 
@@ -233,7 +233,7 @@ class Iterate:
     evaluations: int
     evaluation: Evaluation
     memory: np.ndarray
-    promise: float
+    reduction: float
     reason: Reason | None
 
 
@@ -243,14 +243,14 @@ class Optimiser(ABC):
 
     Attributes:
         iterations: most iterations.
-        least_promise: predicted reduction over the objective at which it ends at the latest.
+        least_reduction: predicted reduction over the objective at which it ends at the latest.
     """
 
     iterations: int
 
     @property
     @abstractmethod
-    def least_promise(self) -> float: ...
+    def least_reduction(self) -> float: ...
 
     @abstractmethod
     def minimise(self, problem: Problem, start: Start, *, watch: Callable[[Iterate], None]) -> Iterate:

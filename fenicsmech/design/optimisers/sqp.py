@@ -103,14 +103,14 @@ class SQP(Optimiser):
 
     def __post_init__(self) -> None:
         for name, value in (
-            ("tolerance", self.least_promise),
+            ("tolerance", self.least_reduction),
             ("violation", self.violation),
             ("damping", self.damping),
         ):
             positive(f"{name} of {type(self).__name__}", value)
 
     @property
-    def least_promise(self) -> float:
+    def least_reduction(self) -> float:
         return self.tolerance
 
     def minimise(self, problem: Problem, start: Start, *, watch: Callable[[Iterate], None]) -> Iterate:
@@ -138,18 +138,18 @@ class SQP(Optimiser):
         here, evaluations = last.evaluation, last.evaluations
         memory = Memory.unpacked(last.memory, here)
         violated = np.any(here.inequalities.values > self.violation)
-        if last.promise <= self.least_promise or (memory.stalls >= self.stalls and not violated):
+        if last.reduction <= self.least_reduction or (memory.stalls >= self.stalls and not violated):
             return replace(last, reason=Reason.VIOLATED if violated else Reason.CONVERGED)
         memory = self._undamped(here, memory, lengths)[1]
         height, damping = here.merit(memory.penalties), memory.damping
         for _ in range(self.refusals):
             step = self._step(here, memory, damping, lengths)
-            promised = height - _predicted(here, memory, step)
-            if promised <= 0.0:
+            predicted = height - _predicted(here, memory, step)
+            if predicted <= 0.0:
                 break  # damped to a standstill
             evaluations += 1
             try:
-                new = problem.evaluate(step.parameters, height - self.poor * promised, memory.penalties)
+                new = problem.evaluate(step.parameters, height - self.poor * predicted, memory.penalties)
             except TooHigh:
                 damping *= 4.0
                 continue
@@ -157,9 +157,9 @@ class SQP(Optimiser):
                 damping *= 10.0
                 continue
             gain, number = height - new.merit(memory.penalties), last.number + 1
-            if gain > self.good * promised:
+            if gain > self.good * predicted:
                 damping = max(damping / 5.0, self.least_damping)
-            stalls = memory.stalls + 1 if gain < self.least_promise * _height(here, memory.penalties) else 0
+            stalls = memory.stalls + 1 if gain < self.least_reduction * _height(here, memory.penalties) else 0
             bent = new.inequalities.jacobian - here.inequalities.jacobian
             y = new.plain.gradient - here.plain.gradient + bent.reshape(-1, len(lengths)).T @ step.multipliers
             s = new.parameters - here.parameters
@@ -180,11 +180,11 @@ class SQP(Optimiser):
     ) -> Iterate:
         """The iterate with the reduction predicted for the undamped step: of the merit, or of violations."""
         step, eased = self._undamped(here, memory, lengths)
-        promise = here.merit(eased.penalties) - _predicted(here, eased, step)
-        promise /= _height(here, eased.penalties)
+        reduction = here.merit(eased.penalties) - _predicted(here, eased, step)
+        reduction /= _height(here, eased.penalties)
         removed = np.maximum(here.inequalities.values, 0.0) - np.maximum(_ahead(here, step), 0.0)
-        promise = max(promise, self.least_promise * float(np.max(removed, initial=0.0)) / self.violation)
-        return Iterate(number, evaluations, here, memory.packed(), promise, reason)
+        reduction = max(reduction, self.least_reduction * float(np.max(removed, initial=0.0)) / self.violation)
+        return Iterate(number, evaluations, here, memory.packed(), reduction, reason)
 
     def _undamped(self, here: Evaluation, memory: Memory, lengths: np.ndarray) -> tuple[Step, Memory]:
         """The undamped step, and the memory with penalties for which it satisfies the inequalities if any step does."""

@@ -10,6 +10,10 @@ w_j(m) interpolated along the outline: the cubic in the arc length through the t
 across no corner and not into interfaces, whose vertices are held; there it is the quadratic through three. Edges around
 interfaces move with them. All other edges stay as straight as the map of their ends makes them. An extruded link has
 the weights of its plan.
+
+Where handles slide, the map stretches one end of an edge more than the other and shifts its midpoint along the outline.
+A shift by a quarter of the edge turns cells inside out and says nothing of the outline's shape: ``MidEdgeNodes`` take
+it back.
 """
 
 from __future__ import annotations
@@ -111,6 +115,72 @@ class _Outline:
                 return
             place += step * self._lengths[vertex if step > 0 else vertex - 1]
             vertex = (vertex + step) % n
+
+
+class MidEdgeNodes:
+    """The nodes in the middles of edges, which keep their drawn place along the chord.
+
+    With the ends x_a and x_b of an edge, its middle x_m where the handles take it, and τ° of the drawn edge,
+
+        x_m − (τ − τ°) e,     e = x_b − x_a,     w = x_m − ½ (x_a + x_b),     τ = w · e / |e|²,
+
+    all in the plane: edges above each other stay so. Edges that move rigidly or have no bulge stay as they are.
+
+    Args:
+        ends: vertices at the ends of the edge of each local node, nodes at vertices have theirs twice, (nodes, 2).
+        points: drawn positions of the nodes, (nodes, dim).
+    """
+
+    def __init__(self, ends: np.ndarray, points: np.ndarray) -> None:
+        self._points = points[:, :2]
+        at_vertex = np.flatnonzero(ends[:, 0] == ends[:, 1])
+        node = np.zeros(ends.max(initial=-1) + 1, dtype=np.int64)
+        node[ends[at_vertex, 0]] = at_vertex
+        middles = np.flatnonzero(ends[:, 0] != ends[:, 1])
+        a, b = node[ends[middles]].T
+        level = np.any(points[a, :2] != points[b, :2], axis=1)  # not between two vertices of one column
+        self._a, self._b, self._middles = a[level], b[level], middles[level]
+        self._drawn = self._places(self._points)[2]
+
+    def placed(self, field: np.ndarray) -> np.ndarray:
+        """The design field (nodes, dim) with shifts along chords taken back."""
+        chords, _, places = self._places(self._points + field[:, :2])
+        found = field.copy()
+        found[self._middles, :2] -= (places - self._drawn)[:, None] * chords
+        return found
+
+    def apply_transpose(self, field: np.ndarray, g: np.ndarray) -> np.ndarray:
+        """The transpose of the derivative of ``placed`` at ``field``.
+
+        Args:
+            field: given to ``placed``, (nodes, dim).
+            g: of the first nodes, those that this rank owns, (…, owned nodes, dim).
+
+        Returns:
+            This rank's part of the sum over all ranks, at all its nodes, (…, nodes, dim).
+        """
+        chords, bulges, places = self._places(self._points + field[:, :2])
+        owned = g.shape[-2]
+        found = np.zeros((*g.shape[:-2], *field.shape))
+        found[..., :owned, :] = g
+        mine = self._middles < owned
+        e, w, tau = chords[mine], bulges[mine], places[mine, None]
+        own = g[..., self._middles[mine], :2]
+        # δ(x_m − (τ − τ°) e) · g,  with  |e|² δτ = e · δw + (w − 2 τ e) · δe
+        along = np.sum(own * e, axis=-1, keepdims=True) / np.sum(e**2, axis=1, keepdims=True)
+        by_chord = -along * (w - 2.0 * tau * e) - (tau - self._drawn[mine, None]) * own
+        for nodes, part in (
+            (self._middles[mine], -along * e),
+            (self._a[mine], 0.5 * along * e - by_chord),
+            (self._b[mine], 0.5 * along * e + by_chord),
+        ):
+            np.add.at(np.moveaxis(found, -2, 0)[..., :2], nodes, np.moveaxis(part, -2, 0))
+        return found
+
+    def _places(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """e and w (n, 2) and τ (n,) of the edges, from the positions of all nodes in the plane (nodes, 2)."""
+        chords, bulges = x[self._b] - x[self._a], x[self._middles] - 0.5 * (x[self._a] + x[self._b])
+        return chords, bulges, np.sum(bulges * chords, axis=1) / np.sum(chords**2, axis=1)
 
 
 def _shares(places: np.ndarray) -> np.ndarray:

@@ -242,7 +242,8 @@ class ShapeMap:
     def apply_transpose(self, p: np.ndarray, theta: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The transpose of the derivatives of the field: g · ∂d/∂p (…, parameters) and g · ∂d/∂θ (…, handles).
 
-        g: (…, nodes or owned nodes, dim), of which the owned nodes count; summed over all ranks.
+        g: (…, owned nodes, dim), or (…, nodes, dim) with this rank's parts at nodes that others own; summed over all
+        ranks.
         """
         by_p, by_theta = [], []
         for (shape, *point), moments in zip(self._links(p, theta), self.moments(g), strict=True):
@@ -262,7 +263,7 @@ class ShapeMap:
         """The transpose of ``spread``: Σ_i g_i ⊗ r_ij of each handle, per link (…, handles, 2, 3), over all ranks."""
         parts = []
         for nodes, reach in zip(self._nodes, self._local_reach, strict=True):
-            mine = nodes < self.owned
+            mine = nodes < g.shape[-2]
             parts.append(np.einsum("...ia,ijk->...jak", g[..., nodes[mine], :2], reach[mine]))
         return self.sum_over_ranks(parts)
 

@@ -19,7 +19,7 @@ import numpy as np
 import sympy
 from numpy.polynomial.polynomial import polyder
 
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, counted
 from fenicsmech.mechanism import Centreline
 from fenicsmech.symbolic import SmoothFunction, derive
 
@@ -223,7 +223,7 @@ def lay_out(
     if segments < len(gaps):
         between = "joints and free ends" if start or end else "joints"
         raise DescriptionError(
-            part, f"{segments} segment(s) for {len(gaps)} gaps between {between}", f"Give at least {len(gaps)}"
+            part, f"{counted(segments, 'segment')} for {len(gaps)} gaps between {between}", f"Give at least {len(gaps)}"
         )
     interior = np.zeros(len(gaps), dtype=int)
     for _ in range(segments - len(gaps)):

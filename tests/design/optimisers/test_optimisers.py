@@ -242,14 +242,14 @@ def test_going_on_from_any_iterate_repeats_what_would_have_come(optimiser):
             assert ours.evaluations == theirs.evaluations + 1  # the start was evaluated once more
             assert np.array_equal(ours.evaluation.parameters, theirs.evaluation.parameters)
             assert np.array_equal(ours.memory, theirs.memory)
-            assert (ours.promise, ours.reason) == (theirs.promise, theirs.reason)
+            assert (ours.reduction, ours.reason) == (theirs.reduction, theirs.reason)
 
 
 def test_three_steps_that_gain_next_to_nothing_are_enough():
-    # damping so strong that a step gains little although much is promised
+    # damping so strong that a step gains little although the predicted reduction is large
     crawling = LevenbergMarquardt(tolerance=1e-3, damping=1e9)
     last, history = watched(crawling, Rosenbrock())
     assert last.reason is Reason.CONVERGED
-    assert last.promise > crawling.tolerance
+    assert last.reduction > crawling.tolerance
     assert last.number == 3
     assert len(history) == 5

@@ -75,7 +75,7 @@ def test_larger_errors_end_it_earlier_and_the_reason_says_so():
 def test_a_tolerance_that_was_given_is_kept_to_and_no_error_asked_for():
     doubtful = Doubtful(1.0, 1e-4)
     last = minimised(EXACT, doubtful)
-    assert last.reason is Reason.CONVERGED and last.promise <= 1e-12
+    assert last.reason is Reason.CONVERGED and last.reduction <= 1e-12
     assert doubtful.estimates == 0
     assert last.evaluation.parameters == pytest.approx(minimised(EXACT, Doubtful(0.0, 1e-4)).evaluation.parameters)
 
