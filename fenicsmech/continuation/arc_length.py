@@ -82,7 +82,7 @@ class Finish:
         return a * b < 0.0 or (b == 0.0 and a != 0.0)
 
 
-class ArcLengthTracer(Stepper):
+class ArcLengthStepper(Stepper):
     """Steps along the path through one equilibrium.
 
     Distances are in units of the arc on which a linear mechanism reaches ``value`` or ``conjugate``.

@@ -162,7 +162,7 @@ class _Rig:
         assert isinstance(part, Force), "experiments prescribe forces"
         model, solver = simulation.model, simulation.solver(part)
         model.set_parameter(self._links, "E", modulus)
-        curve = simulation.trace(self._request)
+        curve = simulation.compute(self._request)
         adjoint, travel = Sensitivity(model), [Displacement(part).on(model)]
         slopes, travels = {}, {}
         for frame in curve.frames:

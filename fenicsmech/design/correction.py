@@ -92,8 +92,8 @@ def loaded(equilibria: SampleEquilibria, estimates: bool) -> Reached:
     Raises:
         Infeasible: loading leads elsewhere.
     """
-    known = equilibria.trace()
-    values, errors = equilibria.values(known), equilibria.errors(known)
+    solved = equilibria.from_zero()
+    values, errors = equilibria.values(solved), equilibria.errors(solved)
     return Reached(values, errors, values + errors if estimates else values)
 
 
@@ -105,11 +105,11 @@ def verified(
     Where loading fails, the values followed from design to design stand; the log names the targets.
     """
     try:
-        known = equilibria.trace()
+        solved = equilibria.from_zero()
     except Infeasible as failure:
         _log.warning("loaded from zero, the optimum does not reach all its targets: %s", failure)
         return followed, False
-    values = equilibria.values(known)
+    values = equilibria.values(solved)
     # values of one equilibrium differ by less
     different = np.flatnonzero(np.abs(values - followed.values) > 1e-6 * comparison.scale_of)
     for k in different:
@@ -117,7 +117,7 @@ def verified(
             "%s of the optimum: %.6g when loaded from zero, %.6g when followed from the drawn design",
             *(comparison.names[k], values[k], followed.values[k]),
         )
-    errors = equilibria.errors(known) if len(different) else followed.errors
+    errors = equilibria.errors(solved) if len(different) else followed.errors
     return Reached(values, errors, values + errors if estimates else values), len(different) == 0
 
 
@@ -229,7 +229,7 @@ class CorrectedRun:
             theta = self._comm.bcast(cheaper.team[1].placement.theta, root=0)
             with problem.clock.phase("verification"):
                 try:
-                    near = problem.rest.known(optimum.parameters, theta) or placement
+                    near = problem.rest.placement_from(optimum.parameters, theta) or placement
                     placement = problem.rest.place(optimum.parameters, near)
                 except ShapeError as failure:
                     raise Infeasible(str(failure)) from failure
@@ -276,7 +276,7 @@ class CorrectedRun:
         """Start, its handles if known, and the first round: where the saved run was if there is one."""
         if self._found is not None:
             start = self._found.start
-            return start, low.rest.known(start.parameters, self._found.handles), self._found.round
+            return start, low.rest.placement_from(start.parameters, self._found.handles), self._found.round
         parameters, near = (low.rest.initial, None) if self._start is None else low.given(self._start)
         return Start(parameters), near, first
 

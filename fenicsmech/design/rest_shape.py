@@ -99,7 +99,7 @@ class ParametricShape:
         requests = [shape_request(design, simulation.scene.mechanism, simulation.linkage) for design in designs]
         return ParametricShape(simulation.model, shape_links(simulation.model.mesh, requests), designs)
 
-    def known(self, p: np.ndarray, theta: np.ndarray) -> HandlePlacement | None:
+    def placement_from(self, p: np.ndarray, theta: np.ndarray) -> HandlePlacement | None:
         """A placement to start from, for handle positions found before; None if their number has changed."""
         if theta.shape != self._map.initial_theta.shape:
             return None

@@ -27,7 +27,7 @@ from fenicsmech.equilibrium.kkt import KktMatrix
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 
-_EXACT = 1e-10  # relative error that iterative solvers may leave
+_ACCURACY = 1e-10  # relative error that iterative solvers may leave
 
 
 @dataclass(frozen=True)
@@ -229,7 +229,7 @@ class Linearisation:
         self._check()
         x = right.duplicate()
         with self._system.clock.phase("solve"):
-            if not self._linear.solve(right, x, _EXACT):
+            if not self._linear.solve(right, x, _ACCURACY):
                 raise NotConverged("the linear solver stalled")
         return x
 
@@ -246,7 +246,7 @@ class Linearisation:
         """The rate of the state with the control's target."""
         return self.control.tangent(self.step(self.rate()))
 
-    def point(self, residuals: Sequence[float], iterations: int, *, tolerance: float = _EXACT) -> EquilibriumPoint:
+    def point(self, residuals: Sequence[float], iterations: int, *, tolerance: float = _ACCURACY) -> EquilibriumPoint:
         """The equilibrium at this state, with its tangent and stability, from one solve; raises as ``solve``."""
         self._check()
         self._turn()

@@ -25,7 +25,7 @@ class OutlineTolerances:
         sharp: turn (rad) of a corner, whatever its neighbours; more than that of a circle of eight vertices.
         unexpected: largest deviation (rad) of the turn of a smooth curve from the one expected.
         irregular: the same over the turns nearby: 1/4 where a curvature sets in, and up to 1/2 if the edges grow there.
-        exact: largest distance of vertices from their line or arc over the polygon's extent; some CAD rounding.
+        distance: largest distance of vertices from their line or arc over the polygon's extent; some CAD rounding.
         widest_arc: greatest radius of an arc over the polygon's extent.
         least_sweep: of an arc (rad) inside a smooth curve; over shorter ones any curve is close to a circle.
     """
@@ -33,7 +33,7 @@ class OutlineTolerances:
     sharp: float = math.radians(60.0)
     unexpected: float = math.radians(15.0)
     irregular: float = 0.5
-    exact: float = 5e-8
+    distance: float = 5e-8
     widest_arc: float = 1e3
     least_sweep: float = 0.25 * math.pi
 
@@ -49,7 +49,7 @@ def smooth_outline(polygon: np.ndarray) -> list[Curve]:
         with two coefficients. Arcs of circles run through three vertices between corners, and wherever more of them
         are on one circle. The others are B-splines of degree 3, or 2 if there are only three vertices.
     """
-    allowed, count = TOLERANCES.exact * _extent(polygon), len(polygon)
+    allowed, count = TOLERANCES.distance * _extent(polygon), len(polygon)
     corner, ends = corners_of(polygon), set[int]()
     for first, last in _exact_runs(polygon):
         corner[np.arange(first + 1, last) % count] = False
@@ -74,7 +74,7 @@ def _exact_runs(polygon: np.ndarray) -> Iterator[tuple[int, int]]:
 
     Four vertices are on one circle by chance: on a chamfer, or on both sides of the axis of a symmetric shape.
     """
-    count, allowed = len(polygon), TOLERANCES.exact * _extent(polygon)
+    count, allowed = len(polygon), TOLERANCES.distance * _extent(polygon)
     if count < 4:
         return
     sharp = _sharp_corners_of(polygon)

@@ -17,7 +17,7 @@ WANTED = ((0.1, 2.0), (0.4, 3.2))
 COARSE = {"space": "3d", "size": 4.0, "order": 1}
 
 
-class Traced(Counter):
+class Counts(Counter):
     """Number of times that equilibria were loaded from zero, per space.
 
     Attributes:
@@ -28,16 +28,16 @@ class Traced(Counter):
 
 
 @pytest.fixture
-def traced(monkeypatch) -> Traced:
-    counts, trace = Traced(), SampleEquilibria.trace
+def loads(monkeypatch) -> Counts:
+    counts, from_zero = Counts(), SampleEquilibria.from_zero
 
     def counted(equilibria: SampleEquilibria):
         if counts["3d"] >= counts.most:
             raise KeyboardInterrupt
         counts[equilibria._simulation.fidelity.model.name] += 1
-        return trace(equilibria)
+        return from_zero(equilibria)
 
-    monkeypatch.setattr(SampleEquilibria, "trace", counted)
+    monkeypatch.setattr(SampleEquilibria, "from_zero", counted)
     return counts
 
 
@@ -63,12 +63,12 @@ def test_corrected_designs_are_nearer_to_their_targets_on_a_finer_mesh():
     assert missed[0] < 0.5 * missed[1]
 
 
-def test_plane_stress_with_corrections_ends_at_the_targets_in_space(traced):
+def test_plane_stress_with_corrections_ends_at_the_targets_in_space(loads):
     problem = truss(*WANTED).problem(**COARSE)
     result = problem.optimise()
     assert result.surrogate == "plane-stress" and result.verified
     assert result.worst_error < 5e-3
-    assert traced["3d"] == len(result.corrections) <= 4
+    assert loads["3d"] == len(result.corrections) <= 4
     # far from the truth at first, and nearer by at least the factor at which a surrogate is given up
     changes = np.array(result.corrections)
     assert changes[0] > 0.05
@@ -90,7 +90,7 @@ def misleading(case: Case) -> fm.Simulation:
     return sim.with_material(link.material, fm.Material("stiff rubber", 5.0 * 1.9, 0.475))
 
 
-def test_a_surrogate_that_misleads_is_given_up(traced, caplog):
+def test_a_surrogate_that_misleads_is_given_up(loads, caplog):
     case = truss(*WANTED)
     problem = case.problem(**COARSE)
     with caplog.at_level("INFO", logger="fenicsmech"):
@@ -100,14 +100,14 @@ def test_a_surrogate_that_misleads_is_given_up(traced, caplog):
     assert result.worst_error < 5e-3 and result.verified
 
 
-def test_a_run_killed_between_two_rounds_ends_as_if_nothing_had_happened(tmp_path, traced):
+def test_a_run_killed_between_two_rounds_ends_as_if_nothing_had_happened(tmp_path, loads):
     whole = truss(*WANTED).problem(**COARSE).optimise(checkpoint=tmp_path / "whole.json")
     assert len(whole.corrections) > 1
     file = tmp_path / "checkpoint.json"
-    traced.most = traced["3d"] + 1
+    loads.most = loads["3d"] + 1
     with pytest.raises(KeyboardInterrupt):
         truss(*WANTED).problem(**COARSE).optimise(checkpoint=file)
-    traced.most = float("inf")
+    loads.most = float("inf")
     again = truss(*WANTED).problem(**COARSE).optimise(checkpoint=file, resume=True)
     assert (again.iterations, again.reason, again.evaluations) == (whole.iterations, whole.reason, whole.evaluations)
     assert again.corrections == pytest.approx(whole.corrections, rel=1e-5, abs=1e-8)

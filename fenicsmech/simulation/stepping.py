@@ -129,7 +129,7 @@ def check_motors(mechanism: Mechanism, where: str, motors: Iterable[tuple[Motor,
             raise DescriptionError(where, f"{motor.name!r} is not a motor of {mechanism.name!r}", remedy)
 
 
-class CurveTracer:
+class CurveStepper:
     """The unloaded equilibrium of a configuration at the present rest shape, and load steps from there.
 
     Attributes:
