@@ -72,7 +72,7 @@ class Experiment:
             configuration=self.configuration,
             others=None,
         )
-        loads = sorted({control.target for control in request.controls}, key=abs)
+        loads = sorted({control.prescribed for control in request.controls}, key=abs)
         return CurveRequest(request.part, tuple(map(LoadControl, loads)), request.configuration, request.others)
 
 

@@ -346,8 +346,8 @@ class _Design:
 
     def halfway(self, other: _Design) -> _Design:
         """Their mean."""
-        target = 0.5 * (self.control.target + other.control.target)
-        return _Design(0.5 * (self.field + other.field), self.control.at(target))
+        value = 0.5 * (self.control.prescribed + other.control.prescribed)
+        return _Design(0.5 * (self.field + other.field), self.control.at(value))
 
 
 class _Lost(Infeasible):

@@ -253,5 +253,5 @@ class NewtonSolver(EquilibriumSolver):
         value += 0.5 * stiffness * float(violation @ violation) + 5.0 * system.volume_violation() ** 2
         if control.constrained:
             gap = control.gap(system, state) / system.joints.length
-            value += force * control.target + 0.5 * stiffness * gap**2
+            value += force * control.prescribed + 0.5 * stiffness * gap**2
         return value

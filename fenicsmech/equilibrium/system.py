@@ -208,7 +208,7 @@ class EquilibriumSystem:
         links         ∂E/∂(u, p) − loads
         poses         ∂V/∂z − loads − Aᵀ λ
         multipliers   −(C + c λ)
-        load          −(a · u_P − target), or 0 where f is given
+        load          −(a · u_P − v), or 0 where f is given
         """
         with self.clock.phase("residual"):
             self.unknowns.turn(state.poses)

@@ -116,8 +116,8 @@ class _Assembler:
     curved: float = 1e-9
 
     def move(self, configuration: Configuration, limit: float = 1.0) -> tuple[np.ndarray, float, int]:
-        """Poses at the fraction ``limit`` of the way to ``configuration``, the part of that which was reached, and the row
-        with the largest residual where the motion ends early."""
+        """Poses at the fraction ``limit`` of the way to ``configuration``, the part of that reached, and the row with
+        the largest residual where the motion ends early."""
         system = self.system
         target = limit * system.motor_values(configuration.position)
         travel = system.travel(target)

@@ -217,8 +217,8 @@ class CurveFollower:
             raise self._ended(failure) from failure
         start, finishes = path.start, self._finishes(path)
         # towards the first displacement or position that is wanted, or else the first force
-        wanted = next((finish for finish in finishes if finish.target != finish.value(start)), None)
-        if wanted and (wanted.target - wanted.value(start)) * wanted.rate(start) < 0.0:
+        wanted = next((finish for finish in finishes if finish.end != finish.value(start)), None)
+        if wanted and (wanted.end - wanted.value(start)) * wanted.rate(start) < 0.0:
             start = start.scaled(-1.0)
         return self._follow(path, start, watch)
 
@@ -285,8 +285,8 @@ class CurveFollower:
             self._followed,
             state,
             steps=self._steps,
-            value=max((abs(target - value) for target in values), default=0.0),
-            conjugate=max((abs(target - conjugate) for target in conjugates), default=0.0),
+            value=max((abs(end - value) for end in values), default=0.0),
+            conjugate=max((abs(end - conjugate) for end in conjugates), default=0.0),
         )
 
     def _finishes(self, path: ArcLengthStepper) -> list[Finish]:
@@ -295,9 +295,9 @@ class CurveFollower:
         conjugate = (lambda point: self._conjugate(point.state)), (lambda point: point.conjugate_rate)
         displacement, force = (followed, conjugate) if self._followed.displaces else (conjugate, followed)
         return [
-            Finish(value, rate, target, max(map(abs, targets)) or 1.0)
-            for (value, rate), targets in ((displacement, self._until.displacements), (force, self._until.forces))
-            for target in targets
+            Finish(value, rate, end, max(map(abs, ends)) or 1.0)
+            for (value, rate), ends in ((displacement, self._until.displacements), (force, self._until.forces))
+            for end in ends
         ]
 
     def _conjugate(self, state: State) -> float:

@@ -27,13 +27,13 @@ class OneFreedom:
 
     def solve(self, start: State, control: LoadControl) -> EquilibriumPoint:
         self.solved += 1
-        if control.target > 1.0:
+        if control.prescribed > 1.0:
             raise NotConverged("no equilibrium", 25)
-        stiffness = math.sqrt(1.0 - control.target)
+        stiffness = math.sqrt(1.0 - control.prescribed)
         self.softest = min(self.softest, stiffness)
         rate = math.inf if stiffness == 0.0 else 0.5 / stiffness
         tangent = Step(np.array([rate]), np.zeros(0), np.zeros(0), 1.0)
-        state = State(np.array([1.0 - stiffness]), np.zeros((0, 1)), np.zeros(0), control.target, np.zeros(0))
+        state = State(np.array([1.0 - stiffness]), np.zeros((0, 1)), np.zeros(0), control.prescribed, np.zeros(0))
         return EquilibriumPoint(state, control, tangent, rate, Stability(0, 0), 4, (0.0,), None)
 
     def size(self, step: Step) -> float:
