@@ -5,7 +5,7 @@ configuration while the force grows to 10 N. The links are shaped until the fing
 20 mm at 10 N; or they become as light as these bounds allow. The targets are the paper's, the geometry is this
 project's own.
 
-    python3 demos/claw.py [--space SPACE] [--quick] [--simulate-only] [--least-mass] [--out DIR]
+    python3 demos/claw.py [--space SPACE] [--quick] [--simulate-only] [--least-mass] [--resume] [--out DIR]
     mpirun -n 2 python3 demos/claw.py
 """
 
@@ -35,14 +35,13 @@ def describe():
     coupler = claw.flexible("coupler", link(ELBOW, (50, 30), KNEE, (66, 64), HIP), fm.ONYX)
     rocker = claw.flexible("rocker", link(AXLE, (67, 23), KNEE), fm.ONYX)
     guide = claw.flexible("guide", link(ANCHOR, (15, 62), WRIST), fm.ONYX)
-    shaft = claw.revolute(base, crank, at=SHAFT, interface_radius=PIN)
+    claw.motor(claw.revolute(base, crank, at=SHAFT, interface_radius=PIN), name="servo")
     claw.revolute(crank, coupler, at=ELBOW, interface_radius=PIN)
     claw.revolute(base, rocker, at=AXLE, interface_radius=PIN)
     claw.revolute(rocker, coupler, at=KNEE, interface_radius=PIN)
     claw.revolute(coupler, finger, at=HIP, interface_radius=PIN)
     claw.revolute(base, guide, at=ANCHOR, interface_radius=PIN)
     claw.revolute(guide, finger, at=WRIST, interface_radius=PIN)
-    claw.motor(shaft, name="servo")
     grasp = claw.force(on=finger, at=FINGERTIP, direction=(1, 0), name="object on finger")
     return fm.Scene(claw), grasp, [fm.DRAWN]
 

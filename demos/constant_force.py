@@ -5,7 +5,7 @@ and more and more of it points across the guide. The shape of the strut is optim
 shuttle is pushed back by 8 N within 1 % from 2 mm to 8 mm, where the drawn strut's force changes by 8 %. Geometry and
 targets are this project's own.
 
-    python3 demos/constant_force.py [--quick] [--simulate-only] [--out DIR]
+    python3 demos/constant_force.py [--space SPACE] [--quick] [--simulate-only] [--out DIR]
 """
 
 import argparse

@@ -1,8 +1,7 @@
 """Klann leg: a walking leg whose four Onyx links are shaped to spring when the foot meets an obstacle.
 
-The linkage is that of US patent 6,260,862. Its foot runs along a nearly straight ground stroke while the crank turns;
-the links are shaped until 5 N lift the foot by 10 mm in three configurations of the stroke. The targets are the
-paper's, the shapes of the links are this project's own.
+The linkage is that of US patent 6,260,862: its foot runs nearly straight along the ground while the crank turns. The
+links, drawn for this project, are shaped until 5 N lift the foot by 10 mm in three configurations, as in the paper.
 
     python3 demos/klann.py [--space SPACE] [--quick] [--simulate-only] [--resume] [--out DIR]
 """
@@ -36,11 +35,10 @@ def describe():
     rod = leg.flexible("connecting rod", fm.strip([CRANK_PIN, ELBOW, KNEE], thickness=THICKNESS, depth=DEPTH), fm.ONYX)
     first = leg.flexible("first rocker", bowed(FIRST_AXLE, HIP, 10.0), fm.ONYX)
     second = leg.flexible("second rocker", bowed(SECOND_AXLE, ELBOW, 5.0), fm.ONYX)
-    shaft = leg.revolute(base, crank, at=SHAFT, interface_radius=PIN)
+    motor = leg.motor(leg.revolute(base, crank, at=SHAFT, interface_radius=PIN), name="crank motor")
     pins = ((crank, rod, CRANK_PIN), (base, second, SECOND_AXLE), (second, rod, ELBOW), (base, first, FIRST_AXLE))
     for a, b, at in (*pins, (first, foot, HIP), (rod, foot, KNEE)):
         leg.revolute(a, b, at=at, interface_radius=PIN)
-    motor = leg.motor(shaft, name="crank motor")
     lift = leg.force(on=foot, at=FOOT, direction=(0, 1), name="obstacle under foot")
     scene = fm.Scene(leg)
     return scene, lift, [scene.configuration(f"crank {a} deg", {motor: radians(a - 180)}) for a in (45, 95, 145)]
@@ -72,7 +70,6 @@ def main():
     problem = fm.DesignProblem(sim, **wanted(scene, lift, stroke))
     report = fm.design_study(options.out, problem, curves, resume=options.resume, pin_diameter=PIN)
     report.show()
-
     motor = scene.mechanism.motors[0]
     turn = [scene.configuration(f"turned by {a} deg", {motor: radians(a)}) for a in range(0, 361, 4)]
     path = fm.Trace(sim.path(lift, turn)[:, :2], "foot path", sim.path(lift, stroke)[:, :2])

@@ -1,6 +1,6 @@
 """A bistable switch snaps: a four-bar with a flexible follower, pushed directly, through a soft spring, and by a motor.
 
-    python3 demos/snap.py [--size MM] [--out DIR]
+    python3 demos/snap.py [--size MM] [--quick] [--out DIR]
 
 Both curves are followed past their limit points. Pushed directly the force falls and rises again; behind the spring the
 curve folds back over itself, so that even a held finger feels the switch snap: load_displacement holds it at one
@@ -13,8 +13,8 @@ from pathlib import Path
 
 import fenicsmech as fm
 
-PIVOT, KNEE, PIN, ROOT = (0, 0), (25, 8), (50, 0), (50, -40)
-HEAD, BOW = (25, 68), (45, 38)  # the finger's end of the spring, and the middle of its bow
+PIVOT, KNEE, PIN, ROOT = (0, 0), (25, 8), (50, 0), (50, -42)  # mm
+HEAD, BOW = (25, 68), (45, 38)  # mm: the finger's end of the spring, and the middle of its bow
 ONWARD = 2.0  # N: beyond the force at which the switch snaps
 HELD = (9.0, 11.0, 13.0, 15.0)  # mm: where the finger is held, before and after the snap
 OVER = -0.7  # rad: beyond the crank's second rest
@@ -29,7 +29,7 @@ def describe(sprung):
     hinge = switch.revolute(pivot, crank, at=PIVOT)
     switch.revolute(crank, coupler, at=KNEE)
     switch.revolute(coupler, follower, at=PIN, interface_radius=2.0)
-    switch.weld(wall, follower, at=(50, -42), region=fm.Rectangle(6.0, 4.0))
+    switch.weld(wall, follower, at=ROOT, region=fm.Rectangle(6.0, 4.0))
     if not sprung:
         return fm.Scene(switch), switch.force(on=crank, at=KNEE, direction=(0, -1), name="finger"), hinge
     finger, guide = switch.rigid("finger"), switch.rigid("guide", fixed=True)
@@ -43,8 +43,10 @@ def describe(sprung):
 def main():
     fm.mpi_abort_on_error()
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--size", type=float, default=1.0, metavar="MM", help="element size")
-    parser.add_argument("--out", type=Path, default=Path("results/snap"), metavar="DIR")
+    parser.add_argument("--size", type=float, default=1.0, metavar="MM", help="element size (default 1 mm)")
+    parser.add_argument("--quick", dest="size", action="store_const", const=2.0, help="elements of 2 mm")
+    parser.add_argument("--out", type=Path, default=Path("results/snap"), metavar="DIR", help="folder for files")
+
     options = parser.parse_args()
     series = []
     for sprung, label in ((False, "pushed directly"), (True, "through a spring")):

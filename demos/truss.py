@@ -5,8 +5,8 @@ matter. The diagonal resists: soft while it unbends, stiff once it is straight. 
 moves by 6 mm under 0.1 N, and by no more than 9 mm under four times as much. Geometry and targets are this project's
 own.
 
-    python3 demos/truss.py [--space SPACE] [--quick] [--simulate-only] [--out DIR]
-    mpirun -n 2 python3 demos/truss.py --resume
+    python3 demos/truss.py [--space SPACE] [--quick] [--simulate-only] [--resume] [--out DIR]
+    mpirun -n 2 python3 demos/truss.py
 """
 
 import argparse

@@ -13,17 +13,17 @@ from mpi4py import MPI
 T = TypeVar("T")
 
 
-def on_one(comm: MPI.Comm, work: Callable[[], T], *, root: int = 0) -> T | None:
-    """The result of ``work`` on ``root``, None elsewhere; all processes raise its error.
+def on_one(comm: MPI.Comm, work: Callable[[], T]) -> T | None:
+    """The result of ``work`` on the first process, None elsewhere; all processes raise its error.
 
     ``work`` calls nothing collective; the others wait for it.
     """
-    return on_all(comm, lambda: work() if comm.rank == root else None)
+    return on_all(comm, lambda: work() if comm.rank == 0 else None)
 
 
-def from_one(comm: MPI.Comm, work: Callable[[], T], *, root: int = 0) -> T:
+def from_one(comm: MPI.Comm, work: Callable[[], T]) -> T:
     """As ``on_one``; all processes get the result."""
-    return pickle.loads(comm.bcast(on_one(comm, lambda: pickle.dumps(work()), root=root), root=root))
+    return pickle.loads(comm.bcast(on_one(comm, lambda: pickle.dumps(work())), root=0))
 
 
 def on_all(comm: MPI.Comm, work: Callable[[], T]) -> T:

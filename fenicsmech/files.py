@@ -15,7 +15,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fenicsmech.errors import DescriptionError, finite, real_array
+from fenicsmech.errors import DescriptionError, counted, finite, real_array
 
 
 @contextmanager
@@ -117,6 +117,8 @@ def read_csv(path: str | Path) -> dict[str, NDArray[np.float64]]:
     for index, (line, row) in enumerate(rows[1:]):
         part = f"table '{path}', line {line}"
         if len(row) != len(headers):
-            raise DescriptionError(part, f"{len(row)} fields for {len(headers)} columns", "Complete the line")
+            raise DescriptionError(
+                part, f"{counted(len(row), 'field')} for {counted(len(headers), 'column')}", "Complete the line"
+            )
         values[index] = [finite(part, field) for field in row]
     return {header: values[:, k].copy() for k, header in enumerate(headers)}

@@ -81,6 +81,12 @@ class Fidelity:
     layers: int | None = None
     segments: int = LEAST_SEGMENTS
 
+    @property
+    def size_text(self) -> str:
+        """The element sizes as text: ``1.5``, ``1.5 to 3``."""
+        least, most = min(self.sizes.values()), max(self.sizes.values())
+        return f"{least:.3g}" if least == most else f"{least:.3g} to {most:.3g}"
+
 
 def read_fidelity(
     scene: Scene,

@@ -339,8 +339,9 @@ def _design_text(summary: dict) -> list[str]:
     return [
         format_table(headers, rows),
         *([f"parts: {summary['part_fidelity']}"] if summary["part_fidelity"] else []),
-        f"{summary['parameters']} parameters, {summary['iterations']} iterations, {summary['evaluations']} "
-        f"evaluations: objective {objective['initial']:.3g} -> {objective['final']:.3g} "
+        f"{counted(summary['parameters'], 'parameter')}, {counted(summary['iterations'], 'iteration')}, "
+        f"{counted(summary['evaluations'], 'evaluation')}: "
+        f"objective {objective['initial']:.3g} -> {objective['final']:.3g} "
         f"(corrections make {error:.2g} of it; {summary['ended']})",
         f"corrections changed by {', '.join(f'{change:.2%}' for change in summary['corrections'])} in as many rounds"
         + (f" of a surrogate in {summary['surrogate']}" if summary["surrogate"] else ""),
@@ -359,7 +360,7 @@ def format_table(headers: Sequence[str], rows: Sequence[Sequence[object]], *, di
     """
     for index, row in enumerate(rows):
         if len(row) != len(headers):
-            problem = f"{len(row)} cells for {len(headers)} columns"
+            problem = f"{counted(len(row), 'cell')} for {counted(len(headers), 'column')}"
             raise DescriptionError(f"row {index} of the table", problem, "Give one cell per column")
     columns = []
     for k, header in enumerate(headers):

@@ -25,5 +25,5 @@ def test_a_table_without_rows_has_its_headers():
 
 
 def test_a_row_of_another_length_is_named():
-    with pytest.raises(DescriptionError, match="row 1 of the table: 1 cells for 2 columns"):
+    with pytest.raises(DescriptionError, match="row 1 of the table: 1 cell for 2 columns"):
         format_table(["a", "b"], [[1, 2], [3]])

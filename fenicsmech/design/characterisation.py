@@ -55,7 +55,9 @@ class Experiment:
         displacements = np.array([finite(f"displacement among the {part}", value) for value in self.displacements])
         if len(forces) != len(displacements):
             raise DescriptionError(
-                part, f"{len(forces)} forces for {len(displacements)} displacements", "Give one of each per reading"
+                part,
+                f"{counted(len(forces), 'force')} for {counted(len(displacements), 'displacement')}",
+                "Give one of each per reading",
             )
         if not np.any(forces * displacements):
             raise DescriptionError(part, "no force moves anything", "Give readings under load")

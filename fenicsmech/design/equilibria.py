@@ -20,6 +20,7 @@ not under a prescribed force.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -47,11 +48,13 @@ class FollowOptions:
     """Criteria for an equilibrium at one design to continue the one at another.
 
     Attributes:
+        load_steps: least number to the largest load from zero; larger ones fail more often than they save a step.
         halvings: of a change of design whose equilibrium is not found, or lies elsewhere.
         largest_miss: of the prediction, over |δ|: up to 1.7 on one branch, 3.8 and more across folds.
         rounding: misses below this part of the mechanism's length, or rad, are rounding.
     """
 
+    load_steps: int = 8
     halvings: int = 2
     largest_miss: float = 2.0
     rounding: float = 1e-6
@@ -106,10 +109,10 @@ class _Path:
 
     def control(self, unloaded: State) -> Control:
         """The sample's control at the design that the model holds."""
-        if self.moved is None or self.sample.moved is None:
+        if self.moved is None:
             return LoadControl(self.sample.magnitude)
         self._model.load(unloaded)
-        return DisplacementControl(self.sample.moved[1] + float(self.moved.values(unloaded)[0]))
+        return DisplacementControl(self.sample.value + float(self.moved.values(unloaded)[0]))
 
 
 class SampleEquilibria:
@@ -136,8 +139,7 @@ class SampleEquilibria:
         """
         groups: dict[tuple, list[Sample]] = {}
         for sample in self._paths:
-            value = sample.magnitude if sample.moved is None else sample.moved[1]
-            key = sample.part, sample.others, sample.configuration, sample.moved is None, value < 0.0
+            key = sample.part, sample.others, sample.configuration, sample.moved is None, sample.value < 0.0
             groups.setdefault(key, []).append(sample)
         found: dict[Sample, SampleState] = {}
         for samples in groups.values():
@@ -275,14 +277,22 @@ class SampleEquilibria:
 
     def _traced(self, samples: Sequence[Sample]) -> dict[Sample, SampleState]:
         """The states of samples on one path, which differ in the size of their load alone."""
-        ordered = sorted(samples, key=lambda own: abs(own.magnitude if own.moved is None else own.moved[1]))
+        ordered = sorted(samples, key=lambda own: abs(own.value))
+        loads, before, last = list[float](), 0.0, ordered[-1].value
+        for sample in ordered:
+            count = math.ceil(self._options.load_steps * (sample.value - before) / last) if last else 1
+            loads += np.linspace(before, sample.value, max(count, 1) + 1)[1:].tolist()
+            before = sample.value
         try:
-            curve = self._simulation.compute(sample_request(self._simulation, *ordered))
+            curve = self._simulation.compute(sample_request(self._simulation, ordered[0], loads))
         except EquilibriumError as error:
             raise Infeasible(str(error)) from error
-        found, snapped = {}, False
-        for sample, frame in zip(ordered, curve.frames, strict=True):
+        found, snapped = dict[Sample, SampleState](), False
+        for load, frame in zip(loads, curve.frames, strict=True):
             snapped = snapped or frame.snapped_through
+            if load != ordered[len(found)].value:
+                continue
+            sample = ordered[len(found)]
             if not frame.stable_under_control:
                 raise Infeasible(_unstable(sample))
             if snapped:

@@ -16,7 +16,7 @@ from fenicsmech.design.rest_shape import DesignedLink, ParametricShape
 from fenicsmech.design.shape.handle_optimum import HandlePlacement
 from fenicsmech.design.shape.shape_map import gather_links
 from fenicsmech.design.target import Comparison
-from fenicsmech.errors import DescriptionError, point_text
+from fenicsmech.errors import DescriptionError, counted, point_text
 from fenicsmech.export import PinHole, write_step, write_stl
 from fenicsmech.files import atomic_write
 from fenicsmech.mechanism import DRAWN, Disc, FlexibleLink, Units
@@ -185,8 +185,8 @@ class DesignResult:
     part_fidelity: str = ""
 
     def __str__(self) -> str:
-        reached = (f"  {target}" for target in self.targets)
-        return "\n".join([f"design of {self.mechanism!r} after {self.iterations} iterations: {self.reason}", *reached])
+        reached, ended = (f"  {target}" for target in self.targets), counted(self.iterations, "iteration")
+        return "\n".join([f"design of {self.mechanism!r} after {ended}: {self.reason}", *reached])
 
     @property
     def worst_error(self) -> float:

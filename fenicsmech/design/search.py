@@ -397,8 +397,8 @@ def evidence(ended: Sequence[DesignResult], starts: int) -> tuple[str, ...]:
         held = Counter(bound for result in near for bound in result.active)
         common = [bound for bound, number in held.items() if number == len(near)]
         missed = (
-            f"{target.name} is missed by all {len(ended)} designs from {starts} starts, by at least {least:.2%} "
-            f"({nearest.targets[k]})"
+            f"{target.name} is missed by {counted(len(ended), 'design')} from {counted(starts, 'start')}, "
+            f"by at least {least:.2%} ({nearest.targets[k]})"
         )
         if common:
             best = "all" if len(near) == len(ended) else f"the {len(near)} nearest"

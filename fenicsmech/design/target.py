@@ -153,7 +153,6 @@ class Comparison:
     Attributes:
         places: the components of each target.
         scales, scale_of: of the targets, (targets,), and of their components, (components,).
-        least_squares: whether there are neither bounds nor least quantities.
         relative: whether a least quantity is relative to its drawn value.
 
     Raises:
@@ -167,7 +166,6 @@ class Comparison:
         relations = np.repeat([target.relation for target in targets], sizes)
         self._equal, self._bounded = relations == "equals", np.isin(relations, ("at most", "at least"))
         self._summed = relations == "least"
-        self.least_squares = bool(self._equal.all())
         self.relative = any(target.relation == "least" and target.scale is None for target in targets)
         self._wanted = np.concatenate([target.wanted or (0.0,) for target in targets])
         self.scales = np.array(
@@ -278,7 +276,7 @@ def check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
             raise DescriptionError("design problem", f"{target!r} is not a target", "Give Target(…)")
         part, size = f"target of the {target.quantity}", target.quantity.size(dim)
         if target.sample is not None:
-            sample_request(simulation, target.sample)
+            sample_request(simulation, target.sample, [target.sample.value])
             assemble(simulation.linkage, target.sample.configuration)
         target.quantity.check(simulation.scene, dim)
         if len(target.wanted) > size or target.size == 1 < size:
@@ -298,21 +296,19 @@ def check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
     Comparison(targets, simulation.scene.units)
 
 
-def sample_request(simulation: Simulation, *samples: Sample) -> CurveRequest:
-    """The request for samples on one path, in the order of their loads, if they make sense for ``simulation``.
+def sample_request(simulation: Simulation, sample: Sample, values: Sequence[float]) -> CurveRequest:
+    """The request for the path of a sample through ``values`` of its part, if it makes sense for ``simulation``.
 
     Raises:
         DescriptionError: a force or motor is one of another mechanism.
     """
-    first = samples[0]
-    values = [sample.magnitude if sample.moved is None else sample.moved[1] for sample in samples]
     return read_request(
         simulation.scene.mechanism,
-        first.part,
-        forces=values if first.moved is None else None,
-        displacements=None if first.moved is None else values,
-        configuration=first.configuration,
-        others=dict(first.others),
+        sample.part,
+        forces=values if sample.moved is None else None,
+        displacements=None if sample.moved is None else values,
+        configuration=sample.configuration,
+        others=dict(sample.others),
     )
 
 

@@ -95,7 +95,5 @@ def verified_parts(result: DesignResult, part: Simulation, targets: Sequence[Tar
     for own, target, place, error in zip(result.targets, targets, comparison.places, errors, strict=True):
         pair = component_values(values[place]), component_values(adds[place])
         found.append(replace(own, part=PartValue(*pair, float(error)) if target.quantity.of_part else None))
-    sizes = sorted({part.fidelity.sizes[link] for link in part.fidelity.sizes})
-    span = f"{sizes[0]:.3g}" if len(sizes) == 1 else f"{sizes[0]:.3g} to {sizes[-1]:.3g}"
-    fidelity = f"{part.fidelity.model.name}, elements of {span} {part.scene.units.length}"
+    fidelity = f"{part.fidelity.model.name}, elements of {part.fidelity.size_text} {part.scene.units.length}"
     return replace(result, targets=tuple(found), part_fidelity=fidelity)

@@ -21,7 +21,7 @@ from fenicsmech.equilibrium.linearisation import (
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 from fenicsmech.equilibrium.two_level import BySize
-from fenicsmech.errors import positive
+from fenicsmech.errors import counted, positive
 
 _STEP = 1e-6  # relative error that iterative solvers may leave in steps and tangents, as the next iteration mends it
 
@@ -192,7 +192,7 @@ class EquilibriumSolver(ABC):
     def exhausted(self, residuals: Sequence[float], iterations: int) -> NotConverged:
         """The failure after the last iteration."""
         return NotConverged(
-            f"the residual is {residuals[-1]:.1e} of the forces after {iterations} iterations", iterations
+            f"the residual is {residuals[-1]:.1e} of the forces after {counted(iterations, 'iteration')}", iterations
         )
 
     def _rounding(self, residual: Residual) -> float:

@@ -25,7 +25,7 @@ from time import perf_counter
 import numpy as np
 
 from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRESS, SPATIAL, ElasticModel, Formulation, Quadrature
-from fenicsmech.errors import positive
+from fenicsmech.errors import counted, positive
 from fenicsmech.log import logger
 from fenicsmech.mechanism import FlexibleLink, MeshPart, Scene, StepPart
 from fenicsmech.meshing import typical_thickness
@@ -86,8 +86,7 @@ class FidelityLevel:
     def name(self) -> str:
         """The level as text."""
         where = self.model.name.replace("-", " ").replace("3d", "3D")
-        layers = "1 layer" if self.layers == 1 else f"{self.layers} layers"
-        through = "" if self.model is PLANE_STRESS else f", {layers} through half the depth"
+        through = "" if self.model is PLANE_STRESS else f", {counted(self.layers, 'layer')} through half the depth"
         return f"{where} P{self.order}, elements of {self.size:g} thicknesses, {self.segments} around pins{through}"
 
 

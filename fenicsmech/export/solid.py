@@ -156,7 +156,7 @@ def _plan(link: str, mesh: LinkMesh, depth: float) -> LinkMesh:
     """The triangles of the section."""
     flat = np.count_nonzero(cell_measures(mesh.points, mesh.cells) <= 0.0)
     if flat:
-        problem = f"{flat} of its {len(mesh.cells)} cells are turned over"
+        problem = f"cells are turned over: {flat} of {len(mesh.cells)}"
         raise MeshingError(link, problem, "Choose a design that deforms the mesh less")
     if mesh.dim == 2:
         return mesh

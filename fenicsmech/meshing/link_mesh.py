@@ -289,7 +289,7 @@ def boundary_polygons(part: str, mesh: LinkMesh) -> list[np.ndarray]:
 def _turned_over(part: str, mesh: LinkMesh, cell: int, count: int) -> MeshingError:
     return MeshingError(
         part,
-        f"{count} of its {len(mesh.cells)} triangles are turned over or lie on others, one of them near "
+        f"triangles are turned over or lie on others: {count} of {len(mesh.cells)}, for example near "
         f"{point_text(mesh.points[mesh.cells[cell]].mean(axis=0))}",
         "Choose a design that deforms the mesh less",
     )
@@ -401,10 +401,10 @@ class MechanismMesh:
         return self.mesh.geometry.x[cell_nodes(self.mesh)[cells]][..., : self.vertices.shape[1]]
 
 
-def distribute(comm: MPI.Comm, link_meshes: Sequence[LinkMesh] | None, *, root: int = 0) -> MechanismMesh:
-    """Distributes ``link_meshes`` (given on ``root`` only) over ``comm``; interfaces are numbered link after link."""
-    vertices, cells, link, interface, curved = from_one(comm, lambda: _joined(link_meshes or ()), root=root)
-    here = slice(None) if comm.rank == root else slice(0)
+def distribute(comm: MPI.Comm, link_meshes: Sequence[LinkMesh] | None) -> MechanismMesh:
+    """Distributes ``link_meshes`` (given on rank 0 only) over ``comm``; interfaces are numbered link after link."""
+    vertices, cells, link, interface, curved = from_one(comm, lambda: _joined(link_meshes or ()))
+    here = slice(None) if comm.rank == 0 else slice(0)
     mesh = create_mesh(comm, cells[here], vertices[here])
     own = original_cells(mesh)
     return MechanismMesh(mesh, link[own], interface[own], vertices, cells, link, curved, comm)

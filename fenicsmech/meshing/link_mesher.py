@@ -241,7 +241,7 @@ def _check_cells(mesh: LinkMesh, request: MeshRequest) -> None:
     flat = np.flatnonzero(cell_measures(mesh.points, mesh.cells) <= 1e-12 * longest**mesh.dim)
     if len(flat):
         where = point_text(mesh.points[mesh.cells[flat[0]]].mean(axis=0))
-        problem = f"{len(flat)} of {len(mesh.cells)} cells have no volume, one of them at {where}"
+        problem = f"cells have no volume: {len(flat)} of {len(mesh.cells)}, for example at {where}"
         remedy = "Remove tiny features from the shape, or change the element size"
         raise MeshingError(request.part, problem, remedy)
     pieces = count_pieces(mesh.cells)

@@ -76,17 +76,16 @@ def assemble(linkage: Linkage, configuration: Configuration, springs: Sequence[P
 
 
 def assemble_before_strain(
-    linkage: Linkage, configuration: Configuration, springs: Sequence[PosePotential] = (), *, limit: float = 0.98
+    linkage: Linkage, configuration: Configuration, springs: Sequence[PosePotential] = ()
 ) -> Assembly:
-    """As ``assemble``; where motors strain the links, at the fraction ``limit`` of the way to the last position free of
-    strain.
+    """As ``assemble``, but 98 % of the way to the last position free of strain where motors strain the links.
 
     That one is a dead centre as a rule, where paths cross and freedoms count twice.
     """
     assembly = assemble(linkage, configuration, springs)
     if assembly.fraction == 1.0:
         return assembly
-    fraction = limit * assembly.fraction
+    fraction = 0.98 * assembly.fraction
     poses, _, _ = _Assembler(linkage.rigid, springs).move(configuration, fraction)
     return Assembly(poses, fraction)
 

@@ -14,7 +14,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fenicsmech.collective import on_one
-from fenicsmech.errors import DescriptionError, real_array, set_fields
+from fenicsmech.errors import DescriptionError, counted, real_array, set_fields
 from fenicsmech.plot.page import INK, MUTED, PALETTE, house_style, new_figure, open_frame, save_png
 
 _DASHES = (0, (3.0, 1.6))  # of unstable parts
@@ -73,7 +73,7 @@ class CurveSeries:
             given = np.array(getattr(self, name), dtype=bool)
             flags = given if given.size else np.full(len(force), absent)
             if flags.shape != force.shape:
-                problem = f"{flags.size} flags for {force.size} points"
+                problem = f"{counted(flags.size, 'flag')} for {counted(force.size, 'point')}"
                 raise DescriptionError(f"{what} of {part}", problem, "Give one flag per point")
             set_fields(self, **{name: flags})
 

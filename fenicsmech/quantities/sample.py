@@ -121,6 +121,11 @@ class Sample:
         return self._acting[0][1] if self._acting and not self.moved else 0.0
 
     @property
+    def value(self) -> float:
+        """What is prescribed of ``part``: its displacement, or its magnitude."""
+        return self.moved[1] if self.moved else self.magnitude
+
+    @property
     def others(self) -> tuple[tuple[Force, float], ...]:
         """Forces that act before the displacement is prescribed."""
         return self._acting if self.moved else ()

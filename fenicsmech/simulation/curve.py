@@ -13,7 +13,7 @@ from fenicsmech.collective import on_one
 from fenicsmech.continuation import Mode, critical_changes, softest_modes
 from fenicsmech.elasticity import PLANE_STRESS
 from fenicsmech.equilibrium import EquilibriumSolver, LoadControl, MotorControl, NotConverged, State, Unknown
-from fenicsmech.errors import DescriptionError, EquilibriumError
+from fenicsmech.errors import DescriptionError, EquilibriumError, counted
 from fenicsmech.estimates import AccuracyOptions, Equilibrium, ErrorKind, cause_of_growth, growth_by_halving
 from fenicsmech.files import write_csv
 from fenicsmech.log import logger
@@ -82,9 +82,9 @@ class Curve:
 
     def __repr__(self) -> str:
         (across, up), first, last = self.axes, self.frames[0], self.frames[-1]
-        unstable = int(np.sum(~self.stable))
+        unstable, frames = int(np.sum(~self.stable)), counted(len(self.frames), "frame")
         return (
-            f"<{type(self).__name__} of {self.part.name!r}, {self.configuration.name}: {len(self.frames)} frames, "
+            f"<{type(self).__name__} of {self.part.name!r}, {self.configuration.name}: {frames}, "
             f"{across.quantity} {across(first.displacement)} to {across(last.displacement)}, "
             f"{up.quantity} {up(first.force)} to {up(last.force)}{f', {unstable} unstable' if unstable else ''}>"
         )

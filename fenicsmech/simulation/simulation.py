@@ -124,11 +124,10 @@ class Simulation:
         self._described = _description(scene.mechanism)
 
     def __repr__(self) -> str:
-        sizes = sorted(set(self.fidelity.sizes.values()))
-        size = f"{sizes[0]:.3g}" if len(sizes) == 1 else f"{sizes[0]:.3g} to {sizes[-1]:.3g}"
+        own, design = self.fidelity, ", another design" if self._design is not None else ""
         return (
-            f"<Simulation of {self.scene.mechanism.name!r}: {self.fidelity.model.name}, order {self.fidelity.order}, "
-            f"elements of {size} {self.scene.units.length}{', another design' if self._design is not None else ''}>"
+            f"<Simulation of {self.scene.mechanism.name!r}: {own.model.name}, order {own.order}, "
+            f"elements of {own.size_text} {self.scene.units.length}{design}>"
         )
 
     # -- curves --------------------------------------------------------------------------------------------------

@@ -216,7 +216,7 @@ def test_contact_points_of_the_designed_gripper_move_by_the_wanted_vectors(tmp_p
 
 @pytest.mark.thorough
 def test_switch_snaps_behind_its_spring_only(tmp_path):
-    printed = run("snap", tmp_path, "--size", "2")
+    printed = run("snap", tmp_path, "--quick")
     direct, sprung = ([line for line in printed.splitlines() if line.startswith(f"{how}: limit point")]
                       for how in ("pushed directly", "through a spring"))  # fmt: skip
     forces = [float(line.split(", ")[-1].removesuffix(" N")) for line in direct]

@@ -100,7 +100,7 @@ def test_interval_shrinks_with_the_noise():
 @pytest.mark.parametrize(
     ("forces", "displacements", "message"),
     [
-        ((1.0, 2.0), (1.0,), "2 forces for 1 displacements"),
+        ((1.0, 2.0), (1.0,), "2 forces for 1 displacement"),
         ((1.0, float("nan")), (1.0, 2.0), "nan"),
         ((0.0, 0.0), (0.0, 1.0), "no force moves anything"),
     ],

@@ -258,6 +258,6 @@ def test_elements_too_large_for_the_handles_of_a_thin_strip_are_refused():
     refused(
         lambda: case.problem(size=3.0, order=1).initial,
         part="'strip'",
-        problem="2 of its 44 handles move no vertex",
+        problem="handles move no vertex, as its elements are too large: 2 of 44",
         remedy="smaller elements",
     )

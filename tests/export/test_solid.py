@@ -195,7 +195,7 @@ def crossing():
 @pytest.mark.parametrize(
     "mesh, pins, message",
     [
-        (turned_over, (), r"link 'crank': \d+ of its \d+ cells are turned over\. Choose a design"),
+        (turned_over, (), r"link 'crank': cells are turned over: \d+ of \d+\. Choose a design"),
         (crossing, (), r"link 'crank': its outline crosses itself near \(.*Choose a design"),
         (
             lambda: link(2.0),

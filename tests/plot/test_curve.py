@@ -63,7 +63,7 @@ def test_comments_blank_lines_and_a_byte_order_mark_are_understood(tmp_path):
         ("", "it is empty"),
         ("x,x\n1,2\n", "own name"),
         ("x,\n1,2\n", "own name"),
-        ("x,y\n1,2\n\n3\n", "line 4: 1 fields for 2 columns"),
+        ("x,y\n1,2\n\n3\n", "line 4: 1 field for 2 columns"),
         ("x,y\n1,2\n3,four\n", "line 3: 'four' is not a number"),
         ("x,y\n1,nan\n", "line 2: the value is nan"),
     ],
@@ -172,8 +172,8 @@ def test_any_number_of_samples_is_drawn(tmp_path, count):
     [
         ({"displacement": X, "force": X[1:]}, "forces of curve 'c'.*shape"),
         ({"displacement": X, "force": np.full(9, np.inf)}, "forces of curve 'c'.*entry"),
-        ({"displacement": X, "force": X, "stable": [True]}, "stability of curve 'c': 1 flags for 9 points"),
-        ({"displacement": X, "force": X, "snapped_through": [True]}, "snaps of curve 'c': 1 flags for 9 points"),
+        ({"displacement": X, "force": X, "stable": [True]}, "stability of curve 'c': 1 flag for 9 points"),
+        ({"displacement": X, "force": X, "snapped_through": [True]}, "snaps of curve 'c': 1 flag for 9 points"),
     ],
 )
 def test_a_contradictory_series_is_refused(arguments, message):

@@ -92,7 +92,7 @@ def shape_link(mesh: LinkMesh, request: ShapeRequest) -> LinkShape:
     if hidden:
         raise DescriptionError(
             f"design of {part}",
-            f"{hidden} of its {len(handles)} handles move no vertex: its elements are too large",
+            f"handles move no vertex, as its elements are too large: {hidden} of {len(handles)}",
             "Use smaller elements",
         )
     edges = edge_weights(mesh, weights)
