@@ -209,8 +209,8 @@ class Search:
         """
         with Progress(2.0 * self._scatter.starts, "search", shown=self._comm.rank == 0) as progress:
             tried = self._shared("trial", self._tried, progress)
-            hopeful = promising(tried, self._problem.targets)
-            ends = self._shared("end", lambda k: self._ended(tried[k], hopeful), progress)
+            continued = better_half(tried, self._problem.targets)
+            ends = self._shared("end", lambda k: self._ended(tried[k], continued), progress)
         return outcome(ends, self._problem.targets, self._rest.lengths, self._scatter.distinct)
 
     def _shared(self, stage: str, work: Callable[[int], StartResult], progress: Progress) -> list[StartResult]:
@@ -246,11 +246,11 @@ class Search:
             return StartResult(k, rejected, "no feasible shape was drawn", False, None)
         return self._optimised(k, rejected, replace(self._optimiser, iterations=self._scatter.trial), p)
 
-    def _ended(self, tried: StartResult, hopeful: set[int]) -> StartResult:
+    def _ended(self, tried: StartResult, continued: set[int]) -> StartResult:
         """The end of a start that was tried."""
         if tried.result is None or not _unfinished(tried.result):
             return tried
-        if tried.number not in hopeful:
+        if tried.number not in continued:
             return replace(tried, given_up=True)
         return self._optimised(tried.number, tried.rejected, self._optimiser, tried.result)
 
@@ -336,7 +336,7 @@ def _ordered(starts: Sequence[StartResult], targets: Sequence[Target]) -> list[t
     return [ended[k] for k in order]
 
 
-def promising(tried: Sequence[StartResult], targets: Sequence[Target]) -> set[int]:
+def better_half(tried: Sequence[StartResult], targets: Sequence[Target]) -> set[int]:
     """Numbers of the better half of the starts that have a value, and of those that meet their targets."""
     ordered = _ordered(tried, targets)
     half = (len(ordered) + 1) // 2
