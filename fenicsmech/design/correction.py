@@ -137,6 +137,7 @@ def correct(
     *,
     minimise: Callable[[Start, Round], tuple[Optimum, Round]],
     truth: Callable[[Optimum], Reached],
+    continued: Callable[[np.ndarray], np.ndarray | None],
 ) -> Corrected:
     """Rounds of minimisation and correction, until corrections have settled, do not contract, or iterations run out.
 
@@ -147,6 +148,7 @@ def correct(
         options: of the correction.
         minimise: the optimum of one round, and that round with the values at its start.
         truth: values of the simulation that counts.
+        continued: the optimiser's memory at the start of the next round, from that at the end of the last.
 
     Raises:
         Infeasible: there is no value at the start, or the simulation that counts has none at an optimum.
@@ -167,7 +169,7 @@ def correct(
         settled = change <= 1.0 or optimum.reason is Reason.ITERATIONS
         if settled or len(round.changes) >= options.rounds or (round.surrogate and _stalls(round.changes, options)):
             return Corrected(optimum, round, reached, settled)
-        begin = Start(optimum.parameters, optimum.number, optimum.evaluations)
+        begin = Start(optimum.parameters, optimum.number, optimum.evaluations, continued(optimum.memory))
 
 
 def _stalls(changes: Sequence[float], options: Correction) -> bool:
@@ -318,6 +320,7 @@ class CorrectedRun:
             self._options,
             minimise=lambda begin, round: self._minimise(low, begin, round),
             truth=lambda optimum: self._comm.bcast(truth(optimum), root=0),
+            continued=self._optimiser.continued,
         )
 
     def _minimise(self, low: DesignedSimulation, begin: Start, round: Round) -> tuple[Optimum, Round]:
@@ -327,7 +330,8 @@ class CorrectedRun:
         if found is not None and found.ended is not None and found.ended[1] == repr(self._optimiser):
             here = objective.evaluate(begin.parameters)
             reason = Reason[found.ended[0]]
-            return Optimum(begin.number, begin.evaluations, here.parameters, reason, here.penalty.value), round
+            memory = np.zeros(0) if begin.memory is None else begin.memory
+            return Optimum(begin.number, begin.evaluations, here.parameters, memory, reason, here.penalty.value), round
         space, number = low.simulation.fidelity.model.name, len(round.changes) + 1
 
         def watch(iterate: Iterate) -> None:

@@ -35,13 +35,14 @@ class Optimum:
     """The optimum found by a run.
 
     Attributes:
-        number, evaluations, parameters, reason: as in ``Iterate`` and its evaluation.
+        number, evaluations, parameters, memory, reason: as in ``Iterate`` and its evaluation.
         regulariser: R there.
     """
 
     number: int
     evaluations: int
     parameters: np.ndarray
+    memory: np.ndarray
     reason: Reason
     regulariser: float
 
@@ -63,7 +64,7 @@ def minimise_together(
             comm.bcast(None, root=0)
         assert last.reason is not None, "an optimiser ends for a reason"
         here = last.evaluation
-        return Optimum(last.number, last.evaluations, here.parameters, last.reason, here.penalty.value)
+        return Optimum(last.number, last.evaluations, here.parameters, last.memory, last.reason, here.penalty.value)
 
     return comm.bcast(on_all(comm, lambda: decide() if comm.rank == 0 else _follow(comm, objective)), root=0)
 

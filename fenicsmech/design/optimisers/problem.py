@@ -252,6 +252,10 @@ class Optimiser(ABC):
     @abstractmethod
     def least_reduction(self) -> float: ...
 
+    def continued(self, memory: np.ndarray) -> np.ndarray | None:
+        """The memory to start with where values are shifted, from that at the end before; None to start without."""
+        return None
+
     @abstractmethod
     def minimise(self, problem: Problem, start: Start, *, watch: Callable[[Iterate], None]) -> Iterate:
         """The last iterate; ``watch`` is called with every one, the start included.

@@ -75,7 +75,12 @@ class Memory:
 
 @dataclass(frozen=True)
 class SQP(Optimiser):
-    """Ends when the predicted reduction is below ``tolerance`` times the merit, or three steps in a row gained less.
+    """Ends at a stationary point, or when three steps in a row gained less than ``tolerance`` times the merit.
+
+    A point is stationary if the predicted reduction is below ``tolerance`` times the merit, and along the gradient of
+    the Lagrangian O changes by less than √tolerance of its scale when parameters change by their lengths ℓ:
+
+        |ℓ (∂O/∂p + Σ λ_k ∂c_k/∂p)| ≤ √tolerance max(|O|, |ℓ ∂O/∂p|) at the start.
 
     Attributes:
         iterations: largest number.
@@ -113,6 +118,10 @@ class SQP(Optimiser):
     def least_reduction(self) -> float:
         return self.tolerance
 
+    def continued(self, memory: np.ndarray) -> np.ndarray | None:
+        """B and ν as they are, for shifts leave derivatives alone; no stalls, and μ not above that of a start."""
+        return np.concatenate([[min(memory[0], self.damping), 0.0], memory[2:]])
+
     def minimise(self, problem: Problem, start: Start, *, watch: Callable[[Iterate], None]) -> Iterate:
         here, lengths = problem.evaluate(start.parameters), problem.lengths
         memory = self._begin(here, lengths) if start.memory is None else Memory.unpacked(start.memory, here)
@@ -138,9 +147,11 @@ class SQP(Optimiser):
         here, evaluations = last.evaluation, last.evaluations
         memory = Memory.unpacked(last.memory, here)
         violated = np.any(here.inequalities.values > self.violation)
-        if last.reduction <= self.least_reduction or (memory.stalls >= self.stalls and not violated):
+        step, eased = self._undamped(here, memory, lengths)
+        little, stalled = last.reduction <= self.least_reduction, memory.stalls >= self.stalls
+        if (little and (stalled or self._stationary(here, memory, step, lengths))) or (stalled and not violated):
             return replace(last, reason=Reason.VIOLATED if violated else Reason.CONVERGED)
-        memory = self._undamped(here, memory, lengths)[1]
+        memory = eased
         merit_here, damping = here.merit(memory.penalties), memory.damping
         for _ in range(self.refusals):
             step = self._step(here, memory, damping, lengths)
@@ -167,7 +178,7 @@ class SQP(Optimiser):
             memory = replace(memory, damping=damping, stalls=stalls, curvature=curvature)
             reason = Reason.ITERATIONS if number >= self.iterations else None
             return self._iterate(number, evaluations, new, memory, lengths, reason)
-        return replace(last, evaluations=evaluations, reason=Reason.NO_DESCENT)
+        return replace(last, evaluations=evaluations, reason=Reason.VIOLATED if violated else Reason.NO_DESCENT)
 
     def _iterate(
         self,
@@ -185,6 +196,13 @@ class SQP(Optimiser):
         removed = np.maximum(here.inequalities.values, 0.0) - np.maximum(_ahead(here, step), 0.0)
         reduction = max(reduction, self.least_reduction * float(np.max(removed, initial=0.0)) / self.violation)
         return Iterate(number, evaluations, here, memory.packed(), reduction, reason)
+
+    def _stationary(self, here: Evaluation, memory: Memory, step: Step, lengths: np.ndarray) -> bool:
+        """Whether the Lagrangian's gradient is small. Where B is too stiff, the predicted reduction is small before."""
+        if not memory.curvature.any():
+            return True  # the curvature is that of the residuals and of R
+        left = here.gradient + here.inequalities.jacobian.reshape(-1, len(lengths)).T @ step.multipliers
+        return float(np.linalg.norm(lengths * left)) <= self.least_reduction**0.5 * memory.scale
 
     def _undamped(self, here: Evaluation, memory: Memory, lengths: np.ndarray) -> tuple[Step, Memory]:
         """The undamped step, and the memory with penalties for which it satisfies the inequalities if any step does."""
