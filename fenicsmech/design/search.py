@@ -291,7 +291,8 @@ class Search:
 
 def _reach(link: DesignedLink, spread: float) -> np.ndarray:
     """Largest changes of a link's parameters, in typical lengths."""
-    least, most = (bound / link.thickness for bound in link.bounds.thickness)
+    relative = [bound / link.thickness for bound in link.bounds.thickness]
+    least, most = float(np.max(relative[0])), float(np.min(relative[1]))
     return np.where(link.spline.is_thickness, min(spread, 0.5 * min(1.0 - least, most - 1.0)), spread)
 
 
@@ -299,7 +300,9 @@ def _outline(link: DesignedLink, p: np.ndarray) -> np.ndarray:
     """Both edges of a link as a polygon, p its own parameters, (n, 2)."""
     t = np.linspace(0.0, link.spline.segments, 20 * link.spline.segments + 1)
     points, (dx, dy, _) = link.spline.evaluate(p, t), link.spline.derivative(p, t).T
-    across = np.stack([-dy, dx], axis=1) / np.hypot(dx, dy)[:, None] * (0.5 * link.thickness * points[:, 2:])
+    samples = link.samples.t
+    drawn = np.interp(t, samples, np.broadcast_to(link.thickness, samples.shape))[:, None]
+    across = np.stack([-dy, dx], axis=1) / np.hypot(dx, dy)[:, None] * (0.5 * drawn * points[:, 2:])
     return np.concatenate([points[:, :2] + across, (points[:, :2] - across)[::-1]])
 
 
