@@ -127,9 +127,9 @@ class Objective:
         residuals, inequalities = compared.residuals(values), compared.inequalities(values)
         value = 0.5 * float(residuals @ residuals) + compared.plain(values) + model(parameters).value
         # decisions may depend on its last bit
-        height = everyone.bcast(merit(value, inequalities, penalties), root=0)
-        if height > below:
-            raise TooHigh(height)
+        reached_merit = everyone.bcast(merit(value, inequalities, penalties), root=0)
+        if reached_merit > below:
+            raise TooHigh(reached_merit)
         with self._clock.phase("gradients"):
             try:
                 rows = self._gathered(on_all(everyone, lambda: self._rest.gradient(placement, self._fields(solved))))

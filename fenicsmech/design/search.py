@@ -209,8 +209,8 @@ class Search:
         """
         with Progress(2.0 * self._scatter.starts, "search", shown=self._comm.rank == 0) as progress:
             tried = self._shared("trial", self._tried, progress)
-            hopeful = promising(tried, self._problem.targets)
-            ends = self._shared("end", lambda k: self._ended(tried[k], hopeful), progress)
+            continued = better_half(tried, self._problem.targets)
+            ends = self._shared("end", lambda k: self._ended(tried[k], continued), progress)
         return outcome(ends, self._problem.targets, self._rest.lengths, self._scatter.distinct)
 
     def _shared(self, stage: str, work: Callable[[int], StartResult], progress: Progress) -> list[StartResult]:
@@ -246,11 +246,11 @@ class Search:
             return StartResult(k, rejected, "no feasible shape was found", False, None)
         return self._optimised(k, rejected, replace(self._optimiser, iterations=self._scatter.trial), p)
 
-    def _ended(self, tried: StartResult, hopeful: set[int]) -> StartResult:
+    def _ended(self, tried: StartResult, continued: set[int]) -> StartResult:
         """The end of a start that was tried."""
         if tried.result is None or not _unfinished(tried.result):
             return tried
-        if tried.number not in hopeful:
+        if tried.number not in continued:
             return replace(tried, given_up=True)
         return self._optimised(tried.number, tried.rejected, self._optimiser, tried.result)
 
@@ -291,7 +291,8 @@ class Search:
 
 def _reach(link: DesignedLink, spread: float) -> np.ndarray:
     """Largest changes of a link's parameters, in typical lengths."""
-    least, most = (bound / link.thickness for bound in link.bounds.thickness)
+    relative = [bound / link.thickness for bound in link.bounds.thickness]
+    least, most = float(np.max(relative[0])), float(np.min(relative[1]))
     return np.where(link.spline.is_thickness, min(spread, 0.5 * min(1.0 - least, most - 1.0)), spread)
 
 
@@ -299,7 +300,9 @@ def _outline(link: DesignedLink, p: np.ndarray) -> np.ndarray:
     """Both edges of a link as a polygon, p its own parameters, (n, 2)."""
     t = np.linspace(0.0, link.spline.segments, 20 * link.spline.segments + 1)
     points, (dx, dy, _) = link.spline.evaluate(p, t), link.spline.derivative(p, t).T
-    across = np.stack([-dy, dx], axis=1) / np.hypot(dx, dy)[:, None] * (0.5 * link.thickness * points[:, 2:])
+    samples = link.samples.t
+    drawn = np.interp(t, samples, np.broadcast_to(link.thickness, samples.shape))[:, None]
+    across = np.stack([-dy, dx], axis=1) / np.hypot(dx, dy)[:, None] * (0.5 * drawn * points[:, 2:])
     return np.concatenate([points[:, :2] + across, (points[:, :2] - across)[::-1]])
 
 
@@ -336,7 +339,7 @@ def _ordered(starts: Sequence[StartResult], targets: Sequence[Target]) -> list[t
     return [ended[k] for k in order]
 
 
-def promising(tried: Sequence[StartResult], targets: Sequence[Target]) -> set[int]:
+def better_half(tried: Sequence[StartResult], targets: Sequence[Target]) -> set[int]:
     """Numbers of the better half of the starts that have a value, and of those that meet their targets."""
     ordered = _ordered(tried, targets)
     half = (len(ordered) + 1) // 2

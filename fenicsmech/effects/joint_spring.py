@@ -89,5 +89,5 @@ class _Spring(PosePotential):
 
     def hessian(self, poses):
         slope, hessian = self._coordinate.gradient(poses), self._coordinate.hessian(poses)
-        pull = self._stiffness * self._coordinate.value(poses) - self._moment
-        return self._stiffness * np.outer(slope, slope) + pull * hessian
+        moment = self._stiffness * self._coordinate.value(poses) - self._moment
+        return self._stiffness * np.outer(slope, slope) + moment * hessian

@@ -174,7 +174,7 @@ class Centreline:
         knots: parameters s_k of the points, shape (n,).
     """
 
-    def __init__(self, points: Sequence[Sequence[float]], *, part: str = "centreline") -> None:
+    def __init__(self, points: ArrayLike, *, part: str = "centreline") -> None:
         through = np.asarray(points, dtype=float)
         chords = np.linalg.norm(np.diff(through, axis=0), axis=1)
         if not np.all(chords > 0.0):

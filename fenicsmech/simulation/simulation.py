@@ -350,6 +350,11 @@ class Simulation:
         return self._discretisation.fidelity
 
     @property
+    def shapes(self) -> Mapping[FlexibleLink, Shape]:
+        """The present shapes of the flexible links: as drawn, or others given to ``with_shapes``."""
+        return self._discretisation.shapes
+
+    @property
     def linkage(self) -> Linkage:
         """The mechanism's bodies and joints."""
         return self._discretisation.linkage

@@ -47,7 +47,9 @@ class TwoValleys:
         controls = np.zeros((3, 2, 3))
         controls[:, 0, 0], controls[:, 1, 0], controls[:, 0, 2] = (0.0, 30.0, 60.0), 30.0, 1.0
         spline = LinkSpline(controls, np.array([True, False, True]))
-        link = DesignedLink("bar", slice(0, spline.size), spline, SplineSamples(spline), H, Bounds((1.0, 6.0), 0.08))
+        link = DesignedLink(
+            "bar", slice(0, spline.size), spline, SplineSamples(spline), H, Bounds((1.0, 6.0), 0.08), controls[:, 0, :2]
+        )
         self.lengths = np.where(spline.is_thickness, 1.0, H)
         self.rest = SimpleNamespace(initial=spline.initial, lengths=self.lengths, links=(link,))
         (self.middle,) = np.flatnonzero(spline.entries == 7)  # of points (x, y, δ, x′, y′, δ′)

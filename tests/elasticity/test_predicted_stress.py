@@ -1,4 +1,4 @@
-"""Stress predicted by a Newton step: zero change for pure turns, order in the step, part of the stiffness."""
+"""The stress predicted by a step: for pure turns, its order in the step, and its part of the stiffness."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def stiffness(predicted):
 
 
 @pytest.mark.thorough
-def test_step_that_turns_promises_no_stress_where_its_displacements_stretch(body, predicted):
+def test_step_that_turns_predicts_no_stress_where_its_displacements_stretch(body, predicted):
     dim = body.model.dim
     skew = np.zeros((dim, dim))
     skew[0, 1], skew[1, 0] = 0.3, -0.3
@@ -66,19 +66,19 @@ def test_difference_to_the_stress_of_the_displacements_is_of_second_order_in_the
     assert np.log2(sizes[0] / sizes[1]) == pytest.approx(2.0, abs=0.05)
 
 
-def test_tangent_is_the_derivative_of_the_forces_of_the_promised_stress(body, predicted):
-    """∂/∂u ∫ F S : ∇v dV of a stress S that does not change is ∫ ∇v S : ∇w dV; S(u) itself is not promised but held."""
+def test_stiffness_is_the_derivative_of_the_forces_of_the_predicted_stress(body, predicted):
+    """∂/∂u ∫ F S : ∇v dV of a stress S that does not change is ∫ ∇v S : ∇w dV; S(u) is not predicted but held."""
     before, step, way = (values(body, wave(body.model.dim, 0.1, seed=seed)) for seed in (2, 3, 4))
     here = before + step
 
-    def held_forces(promise, u):
+    def held_forces(prediction, u):
         body.u.x.array[:] = u
-        predicted.take(*promise)
+        predicted.take(*prediction)
         return predicted.forces() + forces(body)
 
-    def derivative(promise):
+    def derivative(prediction):
         h = 1e-5
-        return (held_forces(promise, here + h * way) - held_forces(promise, here - h * way)) / (2.0 * h)
+        return (held_forces(prediction, here + h * way) - held_forces(prediction, here - h * way)) / (2.0 * h)
 
     expected = derivative((before, step)) - derivative((here, 0.0 * step))
     body.u.x.array[:] = here
