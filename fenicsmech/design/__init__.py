@@ -12,7 +12,7 @@ from fenicsmech.design.characterisation import Experiment, ModulusFit, fit_modul
 from fenicsmech.design.correction import Correction
 from fenicsmech.design.description import Bounds, SplineDesign, shape_request
 from fenicsmech.design.design_problem import DesignProblem
-from fenicsmech.design.equilibria import Known, SampleEquilibria
+from fenicsmech.design.equilibria import DesignEquilibria, SampleEquilibria
 from fenicsmech.design.objective import Objective, group_count, sample_numbers, split
 from fenicsmech.design.optimisers.bfgs import BFGS
 from fenicsmech.design.optimisers.levenberg_marquardt import LevenbergMarquardt, Resolution

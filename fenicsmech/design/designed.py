@@ -130,4 +130,4 @@ class DesignedSimulation:
                 )
         own = [given[link.name] for link in self.rest.links]
         parameters, theta = (np.concatenate(parts) for parts in ([o.parameters for o in own], [o.handles for o in own]))
-        return parameters, self.rest.known(parameters, theta)
+        return parameters, self.rest.placement_from(parameters, theta)

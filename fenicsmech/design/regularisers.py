@@ -204,9 +204,9 @@ class MeshQuality(Regulariser):
 
         def model(p: np.ndarray) -> Quadratic:
             step = p - placement.p
-            bend = here.curvature @ step
+            curved = here.curvature @ step
             return Quadratic(
-                here.value + float((here.gradient + 0.5 * bend) @ step), here.gradient + bend, here.curvature
+                here.value + float((here.gradient + 0.5 * curved) @ step), here.gradient + curved, here.curvature
             )
 
         return model if here.value else lambda p: Quadratic.zero(size)

@@ -108,7 +108,7 @@ class ParametricShape:
         shapes = shape_links(simulation.model.mesh, shape_requests(designs, simulation))
         return ParametricShape(simulation.model, shapes, designs)
 
-    def known(self, p: np.ndarray, theta: np.ndarray) -> HandlePlacement | None:
+    def placement_from(self, p: np.ndarray, theta: np.ndarray) -> HandlePlacement | None:
         """A placement to start from, for handle positions found before; None if their number has changed."""
         if theta.shape != self._map.initial_theta.shape:
             return None

@@ -228,7 +228,7 @@ class DesignResult:
             [SplineDesign(links[own.name], len(own.controls) - 1, centreline=own.centreline) for own in self.links],
         )
         p, theta = (np.concatenate(own) for own in zip(*((o.parameters, o.handles) for o in self.links), strict=True))
-        return rest.field(p, rest.known(p, theta))
+        return rest.field(p, rest.placement_from(p, theta))
 
     def save(self, path: str | Path, *, comm: MPI.Comm = MPI.COMM_WORLD) -> None:
         """Writes the result as JSON.

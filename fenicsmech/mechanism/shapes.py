@@ -219,8 +219,8 @@ class Centreline:
 
     def curvature(self, s: np.ndarray | float) -> np.ndarray:
         """Signed curvature det(c′, c″)/|c′|³ of a planar centreline, positive for a left turn, shape s.shape."""
-        velocity, bend = self._curve(s, 1), self._curve(s, 2)
-        cross = velocity[..., 0] * bend[..., 1] - velocity[..., 1] * bend[..., 0]
+        velocity, second = self._curve(s, 1), self._curve(s, 2)
+        cross = velocity[..., 0] * second[..., 1] - velocity[..., 1] * second[..., 0]
         return cross / np.linalg.norm(velocity, axis=-1) ** 3
 
     def samples(self, per_span: int) -> np.ndarray:

@@ -75,13 +75,13 @@ def test_displacements_pass_the_taylor_test_by_the_parameters(name, space, size,
     case = CASES[name]()
     both = bench(case, case.simulate(space, size=size, order=order, comm=comm))
     placed = both.rest.place(both.design(0.06), None)
-    known = both.equilibria.trace()
+    known = both.equilibria.from_zero()
     gradient = both.rest.gradient(placed, np.array([own.design for own in both.equilibria.gradients(known)]))
     direction = both.direction(7)
 
     def reached(h: np.ndarray) -> np.ndarray:
         both.rest.place(placed.p + h[0] * direction, placed)
-        return both.equilibria.values(both.equilibria.follow(known))
+        return both.equilibria.values(both.equilibria.from_design(known))
 
     rates = taylor_rates(reached, [0.0], [1.0], (gradient @ direction)[:, None], [0.02, 0.01, 0.005])
     assert rates.with_gradient.min() >= 1.95
