@@ -74,7 +74,7 @@ class Experiment:
             configuration=self.configuration,
             others=None,
         )
-        loads = sorted({control.target for control in request.controls}, key=abs)
+        loads = sorted({control.prescribed for control in request.controls}, key=abs)
         return CurveRequest(request.part, tuple(map(LoadControl, loads)), request.configuration, request.others)
 
 
@@ -167,7 +167,7 @@ class _Rig:
         assert isinstance(part, Force), "experiments prescribe forces"
         model, solver = simulation.model, simulation.solver(part)
         self._modulus.set(modulus)
-        curve = simulation.trace(self._request)
+        curve = simulation.compute(self._request)
         travel: list[Observable] = [Displacement(part).on(model)]
         slopes, travels = {}, {}
         for frame in curve.frames:

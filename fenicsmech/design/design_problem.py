@@ -142,7 +142,7 @@ class DesignProblem:
             assert round.initial is not None, "every run has a start"
             result = DesignResult(
                 mechanism=self.simulation.scene.mechanism.name,
-                links=link_designs(self._own.rest, self._own.shapes, end.placement),
+                links=link_designs(self._own.rest, end.placement),
                 numbers=self._own.rest.numbers.designs(
                     end.placement.p[self._own.rest.of_numbers], self.simulation.scene.units
                 ),

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fenicsmech.design.description import SplineDesign, shape_request
+from fenicsmech.design.description import SplineDesign, shape_requests
 from fenicsmech.design.equilibria import SampleEquilibria
 from fenicsmech.design.numbers import Number
 from fenicsmech.design.objective import Group, Objective, sample_numbers, split
@@ -57,14 +57,13 @@ class DesignedSimulation:
         check_targets(simulation, targets)
         self.simulation, self.designs, self.targets = simulation, tuple(designs), tuple(targets)
         self._regulariser, self.clock = regulariser, clock
-        mechanism, linkage = simulation.scene.mechanism, simulation.linkage
         self.shapes = tuple(own for own in self.designs if isinstance(own, SplineDesign))
         self.numbers = tuple(own for own in self.designs if isinstance(own, Number))
         for number in self.numbers:
             number.kind.check(simulation.scene)
         solids = [part for number in self.numbers if number.kind.changes_solids for part in number.kind.parts]
         self.changed = tuple(dict.fromkeys([*(own.link for own in self.shapes), *solids]))
-        self._requests = [shape_request(design, mechanism, linkage) for design in self.shapes]
+        self._requests = shape_requests(self.shapes, simulation)
 
     def on(self, simulation: Simulation) -> DesignedSimulation:
         """The same in another simulation."""
@@ -153,4 +152,5 @@ class DesignedSimulation:
         values = self.rest.numbers.scaled([known[str(number)] for number in self.numbers])
         own = [given[link.name] for link in self.rest.links]
         parameters = np.concatenate([*(o.parameters for o in own), values])
-        return parameters, self.rest.known(parameters, np.concatenate([np.zeros(0), *(o.handles for o in own)]))
+        theta = np.concatenate([np.zeros(0), *(o.handles for o in own)])
+        return parameters, self.rest.placement_from(parameters, theta)

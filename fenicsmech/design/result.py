@@ -43,7 +43,7 @@ class LinkDesign:
         controls: position and thickness (x, y, δ), then tangent, of every control point, (points, 2, 3).
         thickness: least and largest thickness in the plane.
         bend: largest curvature ratio.
-        centreline: points that the drawn centreline runs through, if they were given.
+        centreline: points that the drawn centreline runs through, as given, drawn or found.
     """
 
     name: str
@@ -160,7 +160,7 @@ class DesignResult:
         corrections: largest change of the corrections after each round, over the targets' scales; of a surrogate that
             was given up first.
         iterations, evaluations: of the objective.
-        mesh_ratio_max: largest circumradius over inradius among the cells.
+        mesh_ratio_max: largest circumradius over inradius among the cells that can deform.
         seconds: wall-clock time.
         phases: the same by phase, on the first process: setup, weights, handles, regularisers, equilibria, gradients,
             verification; the rest is the optimiser's own.
@@ -239,7 +239,7 @@ class DesignResult:
             np.concatenate([np.zeros(0), *parts])
             for parts in ([own.parameters for own in self.links], [own.handles for own in self.links])
         )
-        return replace(rest.design(p, rest.known(p, theta)), numbers=self.values(simulation.scene))
+        return replace(rest.design(p, rest.placement_from(p, theta)), numbers=self.values(simulation.scene))
 
     def values(self, scene: Scene) -> dict[NumberKind, float]:
         """The numbers by their kinds, of parts of a scene of the same mechanism. Local.
@@ -353,13 +353,11 @@ def component_values(components: np.ndarray) -> Value:
     return own[0] if len(own) == 1 else own
 
 
-def link_designs(
-    rest: ParametricShape, wanted: Sequence[SplineDesign], placement: HandlePlacement
-) -> tuple[LinkDesign, ...]:
+def link_designs(rest: ParametricShape, placement: HandlePlacement) -> tuple[LinkDesign, ...]:
     """The shapes of all links at a placement."""
     designs = []
-    for link, design, handles in zip(rest.links, wanted, rest.handles(placement), strict=True):
-        own, drawn = placement.p[link.place], design.centreline
+    for link, handles in zip(rest.links, rest.handles(placement), strict=True):
+        own = placement.p[link.place]
         thickness, bend = link.thickness * link.samples.thickness(own), link.samples.curvature(own)
         designs.append(
             LinkDesign(
@@ -369,7 +367,7 @@ def link_designs(
                 controls=tuple(tuple(map(tuple, point)) for point in link.spline.controls_at(own).tolist()),
                 thickness=(float(thickness.min()), float(thickness.max())),
                 bend=float(np.abs(bend).max(initial=0.0)),
-                centreline=None if drawn is None else tuple(tuple(map(float, point)) for point in drawn),
+                centreline=tuple(map(tuple, link.centreline.tolist())),
             )
         )
     return tuple(designs)

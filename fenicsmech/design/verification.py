@@ -93,11 +93,11 @@ def verified_parts(result: DesignResult, part: Simulation, targets: Sequence[Tar
     with part.model.shaped(numbers):
         equilibria = SampleEquilibria(designed, measured)
         try:
-            known = equilibria.trace()
+            solved = equilibria.from_zero()
         except Infeasible as failure:
             _log.warning("the exported parts do not reach all targets: %s", failure)
             return result
-        found_values, found_errors = equilibria.values(known), equilibria.errors(known)
+        found_values, found_errors = equilibria.values(solved), equilibria.errors(solved)
     of_part = np.repeat([target.quantity.of_part for target in targets], [target.size for target in targets])
     values, adds = (np.full(comparison.size, np.nan) for _ in range(2))
     values[of_part], adds[of_part] = found_values, found_errors

@@ -85,8 +85,8 @@ class _Stiffness(PosePotential):
         return self.numbers["stiffness"] * self.gradient_by("stiffness", poses)
 
     def hessian(self, poses):
-        slope, bend = self._coordinate.gradient(poses), self._coordinate.hessian(poses)
-        return self.numbers["stiffness"] * (np.outer(slope, slope) + self._coordinate.value(poses) * bend)
+        slope, hessian = self._coordinate.gradient(poses), self._coordinate.hessian(poses)
+        return self.numbers["stiffness"] * (np.outer(slope, slope) + self._coordinate.value(poses) * hessian)
 
     def gradient_by(self, name, poses):
         factor = self._coordinate.value(poses) if name == "stiffness" else 0.0

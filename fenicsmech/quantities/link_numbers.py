@@ -162,7 +162,7 @@ class _Depth(ModelNumber):
         owner[cell_dofs(space)] = mesh.link[:, None]
         for link in np.flatnonzero(self._chosen) if dim == 3 else ():
             across = nodes[owner == link, 2]
-            ends = mesh.mesh.comm.allgather((across.min(initial=np.inf), across.max(initial=-np.inf)))
+            ends = mesh.comm.allgather((across.min(initial=np.inf), across.max(initial=-np.inf)))
             middle = 0.0 if elastic.model.half else 0.5 * (min(low for low, _ in ends) + max(high for _, high in ends))
             heights[owner == link, 2] = across - middle
         return heights

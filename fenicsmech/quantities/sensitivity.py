@@ -140,7 +140,7 @@ class Sensitivity:
 
         terms = NumberTerms(partial, adjoint, by_link)
         own = np.array([number.through_field(design) for number in self._numbers])
-        shares = self._model.mesh.mesh.comm.allreduce(own, op=MPI.SUM)
+        shares = self._model.mesh.comm.allreduce(own, op=MPI.SUM)
         return shares + [number.slope(terms) for number in self._numbers]
 
     def _interface_terms(self, adjoint: Adjoint, stiff: np.ndarray) -> np.ndarray:
