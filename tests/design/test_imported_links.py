@@ -168,6 +168,27 @@ def test_half_as_thick_designs_of_a_wedge_are_half_as_thick_everywhere():
         assert upper - lower == pytest.approx(0.5 * drawn, rel=0.03)
 
 
+def test_a_wedge_with_one_joint_reaches_the_targets_of_its_free_end():
+    mechanism = fm.Mechanism("wedge")
+    base = mechanism.rigid("base", fixed=True)
+    wedge = mechanism.flexible("wedge", WEDGE, PLASTIC)
+    mechanism.weld(base, wedge, at=(0, 0), region=fm.Rectangle(10.0, 8.0))
+    push = mechanism.force(on=wedge, at=(LENGTH, 0), direction=(0, -1), region=fm.Face(), name="push")
+    targets = [fm.Target(push, force=force, displacement=wanted) for force, wanted in ((5.0, 4.0), (15.0, 11.0))]
+    result = Case(fm.Scene(mechanism), [fm.SplineDesign(wedge, 2)], targets).problem().optimise()
+    assert result.converged and result.worst_error < 0.01
+    (link,) = result.links
+    assert link.controls[-1][0][:2] == pytest.approx([LENGTH, 0.0], abs=1e-6)  # ends stay unless they may move
+    assert THIN / 3.0 < link.thickness[0] < link.thickness[1] < 3.0 * THICK
+
+
+def test_a_link_from_a_mesh_file_keeps_its_mesh_at_the_initial_design():
+    case = arm(fm.gmsh_mesh(Path(__file__).parents[2] / "meshes" / "strip2d.msh", depth=10.0), radius=2.0)
+    rest = ParametricShape.of(case.simulate(), case.designs)
+    assert np.abs(rest.field(rest.initial, None)).max() < 1e-9
+    assert rest.links[0].thickness == pytest.approx(3.0, rel=1e-6)
+
+
 def test_a_strip_from_a_step_file_has_the_same_optimum_as_the_strip(tmp_path):
     case = truss((0.1, 6.0), (0.4, 9.0))
     simulation = case.simulate(size=1.5)
