@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenicsmech.design.optimisers.problem import Evaluation, Iterate, exact, refuse_inequalities
+from fenicsmech.design.optimisers.problem import Evaluation, Iterate, no_errors, refuse_inequalities
 from fenicsmech.design.optimisers.sqp import SQP, Memory
 from fenicsmech.errors import DescriptionError
 
@@ -87,7 +87,7 @@ class Resolution:
     """
 
     def __init__(self, options: LevenbergMarquardt, start: Iterate, *, resumed: bool = False) -> None:
-        self._options, self._errors = options, exact()
+        self._options, self._errors = options, no_errors()
         self._estimated: Evaluation | None = None
         self._below = np.inf if resumed else options.again * _gain(start)
 
