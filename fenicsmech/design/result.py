@@ -127,12 +127,12 @@ class TargetResult:
         if self.wanted is None:
             return f"{self.name}: {reached}{unit}, from {_text(self.started)}{unit}{part}"
         if self.part is not None:
-            part += f", {_verdict(self.part)}"
+            part += f", {_met_text(self.part)}"
         wanted = f"{'' if self.relation == 'equals' else self.relation + ' '}{_text(self.wanted)}"
-        return f"{self.name}: {reached}{unit} of {wanted}{unit}, {_verdict(self)}{part}"
+        return f"{self.name}: {reached}{unit} of {wanted}{unit}, {_met_text(self)}{part}"
 
 
-def _verdict(found: TargetResult | PartValue) -> str:
+def _met_text(found: TargetResult | PartValue) -> str:
     return f"{'met' if found.met else 'missed'} ({found.error:+.2%})"
 
 
