@@ -16,7 +16,7 @@ from time import perf_counter
 from petsc4py import PETSc
 
 import fenicsmech as fm
-from fenicsmech.continuation import Constant, Hermite, Tangent
+from fenicsmech.continuation import ConstantPredictor, HermitePredictor, TangentPredictor
 from fenicsmech.elasticity import Quadrature
 from fenicsmech.equilibrium import Factor, LoadControl
 from fenicsmech.report import format_table
@@ -107,7 +107,7 @@ def main():
     sim, default = curve_of(options)
     reference = default.frames[-1].displacement
     rows = [row("default", default, reference)]
-    for predictor in (Constant(), Tangent(), Hermite()):
+    for predictor in (ConstantPredictor(), TangentPredictor(), HermitePredictor()):
         rows.append(row(f"predictor: {type(predictor).__name__}", curve_of(options, predictor=predictor)[1], reference))
     for degree in (2, 3, 4, 5):
         rows.append(row(f"quadrature degree {degree}", curve_of(options, quadrature=Quadrature(degree))[1], reference))

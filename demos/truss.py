@@ -6,6 +6,7 @@ moves by 6 mm under 0.1 N, and by no more than 9 mm under four times as much. Ge
 own.
 
     python3 demos/truss.py [--space SPACE] [--quick] [--simulate-only] [--resume] [--out DIR]
+    python3 demos/truss.py --part meshes/diagonal.step  # from a tapered diagonal, drawn elsewhere
     mpirun -n 2 python3 demos/truss.py
 """
 
@@ -19,12 +20,14 @@ FORCES = [0.0, 0.025, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4]  # N
 PIN = 3.0  # mm: radius of the discs that hold the diagonal, and diameter of the holes left for its pins
 
 
-def describe():
-    """The scene, the force that pushes the tip, and the configurations."""
+def describe(part=None):
+    """The scene, the diagonal from a STEP file if one is given, the force on the tip, and the configurations."""
     finger = fm.Mechanism("truss finger")
     base = finger.rigid("base", fixed=True)
     left, right, tip = (finger.rigid(name) for name in ("left leg", "right leg", "tip"))
     shape = fm.strip([(0, 0), (18, 34), (40, 60)], thickness=3.0, depth=20.0)
+    if part is not None:
+        shape = fm.step_file(part, depth=20.0)
     diagonal = finger.flexible("diagonal", shape, fm.SMOOTH_SIL_950)
     finger.revolute(base, left, at=(0, 0))
     finger.revolute(base, right, at=(40, 0))
@@ -49,10 +52,11 @@ def main():
     parser.add_argument("--quick", action="store_true", help=f"elements of {QUICK} mm instead of {SIZE} mm")
     parser.add_argument("--simulate-only", action="store_true", help="simulate the drawn design only")
     parser.add_argument("--resume", action="store_true", help="go on with an optimisation that was interrupted")
+    parser.add_argument("--part", type=Path, metavar="STEP", help="file of the diagonal, instead of a strip")
     parser.add_argument("--out", type=Path, default=Path("results/truss"), metavar="DIR", help="folder for files")
     options = parser.parse_args()
 
-    scene, push, configurations = describe()
+    scene, push, configurations = describe(options.part)
     sim = fm.Simulation(scene, space=options.space, size=QUICK if options.quick else SIZE)
     curves = [sim.load_displacement(push, forces=FORCES, configuration=place) for place in configurations]
     if options.simulate_only:

@@ -5,7 +5,15 @@ discretisation and load–displacement curves; a ``DesignProblem`` optimises the
 """
 
 from fenicsmech.collective import mpi_abort_on_error
-from fenicsmech.continuation import ArcSteps, Constant, Critical, CriticalPoint, Hermite, Predictor, Tangent
+from fenicsmech.continuation import (
+    ArcSteps,
+    ConstantPredictor,
+    Critical,
+    CriticalPoint,
+    HermitePredictor,
+    Predictor,
+    TangentPredictor,
+)
 from fenicsmech.design import (
     BFGS,
     SQP,
@@ -181,7 +189,8 @@ __all__ = [
     "Effect", "Faces", "LinkFields", "Obstacle", "PosePotential", "Stretch", "Boundary", "ElasticModel", "Linkage",
     "BodyPoint", "in_dimension",
     # simulation, its curves and their results
-    "Simulation", "SPACES", "Fidelity", "Quadrature", "Choice", "Predictor", "Hermite", "Tangent", "Constant",
+    "Simulation", "SPACES", "Fidelity", "Quadrature", "Choice", "Predictor", "HermitePredictor", "TangentPredictor",
+    "ConstantPredictor",
     "RestShape", "Curve", "Frame", "Axis", "Unknown", "Freedom", "Reaction", "Explanation", "Hint", "PinFriction",
     "write_report", "Report", "plot_curve", "CurveSeries", "CurveMark", "CurveTarget", "Trace", "read_csv",
     "print_once", "configure_logging", "mpi_abort_on_error",

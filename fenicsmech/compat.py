@@ -48,7 +48,7 @@ _DUPLICATES: list[PETSc.Comm] = []
 _ADD = (dolfinx.la.ScatterMode if _LEGACY else dolfinx.la.InsertMode).add
 
 # Strict IEEE arithmetic (no -ffast-math): energies rely on cancellation-free forms and on NaN where J ≤ 0.
-# Without -fno-schedule-insns2 some versions of gcc take half a minute for the tangent of solids; the code is as fast.
+# Without -fno-schedule-insns2 some versions of gcc take half a minute for the stiffness of solids; the code is as fast.
 _FLAGS = "-O3 -march=native -fno-math-errno -fno-trapping-math -fno-schedule-insns2 -g0"
 
 

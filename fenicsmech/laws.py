@@ -16,7 +16,7 @@ written in them as in a textbook:
         E = property(lambda self: 18 * self.C1 * self.bulk / (3 * self.bulk + 2 * self.C1))
         nu = property(lambda self: (3 * self.bulk - 4 * self.C1) / (6 * self.bulk + 4 * self.C1))
 
-That is all: stress and tangent follow by differentiation, plane stress by a local solve. A law may add
+That is all: stress and stiffness follow by differentiation, plane stress by a local solve. A law may add
 closed forms: ``mixed_energy``, the u–p (mixed) form for nearly incompressible materials, and ``contraction``, the
 thickness in plane stress.
 

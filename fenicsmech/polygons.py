@@ -14,12 +14,18 @@ def signed_area(polygon: np.ndarray) -> float:
 
 
 def is_inside(polygon: np.ndarray, point: np.ndarray) -> bool:
-    """Whether ``point`` (2,) lies in ``polygon``: a ray from it crosses an odd number of edges."""
-    a, b = polygon - point, np.roll(polygon, -1, axis=0) - point
-    straddles = (a[:, 1] > 0.0) != (b[:, 1] > 0.0)
+    """Whether ``point`` (2,) lies in ``polygon``."""
+    return bool(are_inside(polygon, point[None])[0])
+
+
+def are_inside(polygon: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Which of ``points`` (n, 2) lie in ``polygon``: a ray from them crosses an odd number of edges, (n,)."""
+    a, b = (corners - points[:, None] for corners in (polygon, np.roll(polygon, -1, axis=0)))
+    straddles = (a[..., 1] > 0.0) != (b[..., 1] > 0.0)
+    row, _ = np.nonzero(straddles)
     a, b = a[straddles], b[straddles]
     reach = a[:, 0] - a[:, 1] * (b[:, 0] - a[:, 0]) / (b[:, 1] - a[:, 1])
-    return bool(np.count_nonzero(reach > 0.0) % 2)
+    return np.bincount(row[reach > 0.0], minlength=len(points)) % 2 == 1
 
 
 def distance_to(polygon: np.ndarray, point: np.ndarray) -> float:

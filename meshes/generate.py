@@ -2,6 +2,8 @@
 
 curved_link.step   a solid: an arc 3 thick from (0, 0) to (60, 0), eyes of radius 4 with holes of radius 1.5 at both
                    ends, extruded from z = −5 to 5 (mm)
+diagonal.step      a solid: between two arcs from (0, 0) to (40, 60), 2 thick at its ends and 4 in the middle, eyes of
+                   radius 4 with holes of radius 1.5 at both ends, extruded from z = −10 to 10 (mm)
 strip2d.msh        triangles: a straight strip, 60 by 3, with discs of radius 3 at both ends (gmsh 4.1)
 strip3d.msh        tetrahedra: the same, 10 deep (gmsh 2.2)
 """
@@ -13,17 +15,19 @@ import os
 import re
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from fenicsmech.mechanism import Disc, strip
-from fenicsmech.meshing import InterfaceSite, LinkMesh, gmsh, gmsh_session, mesh_link
+from fenicsmech.meshing import CircleArc, InterfaceSite, LinkMesh, gmsh, gmsh_session, mesh_link
 
 SPAN, THICKNESS, DEPTH = 60.0, 3.0, 10.0
 RADIUS = 50.0  # of the curved link's centreline
 EYE, HOLE = 4.0, 1.5
+FAR, RISE = np.array([40.0, 60.0]), 6.0  # end of the diagonal, and the rise of its middle
+WIDEST, NARROWEST, BREADTH = 4.0, 2.0, 20.0  # in its middle, at its ends, and along z
 
 _SIMPLEX = {2: 2, 3: 4}  # gmsh's numbers of the triangle and the tetrahedron
 
@@ -46,11 +50,35 @@ def draw_curved_link() -> None:
     ]
     band = (2, occ.addPlaneSurface([occ.addCurveLoop(edges)]))
     occ.remove([(0, middle)])
+    extrude_with_eyes(band, ends, DEPTH)
+
+
+def draw_diagonal() -> None:
+    """Draw the tapered diagonal in the current gmsh model."""
+    occ, along = gmsh.model.occ, FAR / np.linalg.norm(FAR)
+    across, edges = np.array([-along[1], along[0]]), []
+    sides = []
+    for side in (-0.5, 0.5):
+        vias = [(side * NARROWEST, 0.0), (RISE + side * WIDEST, 0.5), (side * NARROWEST, 1.0)]
+        sides.append(CircleArc.through(*(at * FAR + offset * across for offset, at in vias)))
+    corners = [[occ.addPoint(*place, 0.0) for place in arc.at(np.array([0.0, 1.0]))] for arc in sides]
+    for arc, (start, end) in zip(sides, corners, strict=True):
+        middle = occ.addPoint(*arc.centre, 0.0)
+        edges.append(occ.addCircleArc(start, middle, end))
+        occ.remove([(0, middle)])
+    edges += [occ.addLine(corners[0][k], corners[1][k]) for k in (0, 1)]
+    band = (2, occ.addPlaneSurface([occ.addCurveLoop([edges[0], edges[3], edges[1], edges[2]])]))
+    extrude_with_eyes(band, [0.0 * FAR, FAR], BREADTH)
+
+
+def extrude_with_eyes(band: tuple[int, int], ends: Sequence[np.ndarray], depth: float) -> None:
+    """Make a solid, symmetric about z = 0, of a face with eyes at its ends."""
+    occ = gmsh.model.occ
     eyes = [(2, occ.addDisk(*end, 0.0, EYE, EYE)) for end in ends]
     holes = [(2, occ.addDisk(*end, 0.0, HOLE, HOLE)) for end in ends]
     face, _ = occ.cut(occ.fuse([band], eyes)[0], holes)
-    occ.translate(face, 0.0, 0.0, -0.5 * DEPTH)
-    occ.extrude(face, 0.0, 0.0, DEPTH)
+    occ.translate(face, 0.0, 0.0, -0.5 * depth)
+    occ.extrude(face, 0.0, 0.0, depth)
     occ.synchronize()
 
 
@@ -84,6 +112,7 @@ def generate(folder: Path) -> None:
     plane = mesh_link("strip", line, sites, dim=2, size=1.5)
     space = mesh_link("strip", line, sites, dim=3, size=2.0)
     write(folder / "curved_link.step", draw_curved_link)
+    write(folder / "diagonal.step", draw_diagonal)
     write(folder / "strip2d.msh", lambda: draw_mesh(plane))
     write(folder / "strip3d.msh", lambda: draw_mesh(space), version=2.2)
 

@@ -27,7 +27,7 @@ from . import SNES, AugmentedLagrangian, Globalisation, KKTNewton
 
 SOLVERS = {
     "default": fm.PrimalDualNewton(),
-    "without mixed stress": fm.PrimalDualNewton(mixed_stress=False, watchdog=4),
+    "without predicted stress": fm.PrimalDualNewton(predicted_stress=False, watchdog=4),
     "augmented Lagrangian": AugmentedLagrangian(),
     "KKT Newton": KKTNewton(),
     "with backtracking": KKTNewton(backtracking=True),

@@ -133,7 +133,7 @@ class AugmentedLagrangianSolver(EquilibriumSolver):
         multipliers = (weight * state.multipliers - violation) / (weight + system.compliances)
         force = state.force
         if control.constrained:
-            force -= (system.load_displacement(state) - control.target) / self._weights(softness).load[0]
+            force -= (system.load_displacement(state) - control.prescribed) / self._weights(softness).load[0]
         return replace(state, multipliers=multipliers, force=force)
 
     def _value(self, state: State, control: Control, softness: float) -> float:
@@ -145,7 +145,9 @@ class AugmentedLagrangianSolver(EquilibriumSolver):
         value = system.potential(state, new.force) - multipliers @ system.constraints(state, 0.5 * multipliers)
         value -= 0.5 * change @ (weight * change)
         if control.constrained:
-            value += new.force * control.target - 0.5 * self._weights(softness).load[0] * (new.force - state.force) ** 2
+            value += (
+                new.force * control.prescribed - 0.5 * self._weights(softness).load[0] * (new.force - state.force) ** 2
+            )
         return value
 
     def _weights(self, softness: float) -> Border:
@@ -182,7 +184,7 @@ class AugmentedLagrangianSolver(EquilibriumSolver):
                 break
             shift, following = following, 8.0 * following
         else:
-            raise NotConverged("no shift of the tangent gives a direction of descent", 0)
+            raise NotConverged("no shift of the KKT matrix gives a direction of descent", 0)
         x.scale(-1.0)
         return system.unknowns.step(x), x.dot(right), shift
 

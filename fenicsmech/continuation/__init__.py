@@ -4,11 +4,11 @@
 - ``load_steps``: natural continuation, past dead centres of motors too
 - ``arc_length``: arc-length continuation, past limit points and folds
 - ``critical``: limit points, turning points and bifurcations, and the paths that cross there
-- ``eigen``: the softest modes of a tangent, and buckling loads
+- ``eigen``: the softest modes of a KKT matrix, and buckling loads
 """
 
-from fenicsmech.continuation.arc_length import ArcLengthTracer, ArcSteps, Finish
+from fenicsmech.continuation.arc_length import ArcLengthStepper, ArcSteps, Finish
 from fenicsmech.continuation.critical import Critical, CriticalPoint, Sense, crossing, locate, null_space
 from fenicsmech.continuation.eigen import Mode, critical_changes, softest_modes
 from fenicsmech.continuation.load_steps import LoadStepper, LoadSteps, LoadStepsFailed, MotorStepper
-from fenicsmech.continuation.stepper import Constant, Hermite, Predictor, Tangent
+from fenicsmech.continuation.stepper import ConstantPredictor, HermitePredictor, Predictor, TangentPredictor

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from fenicsmech.continuation.stepper import Parabola, Stepper, on_cubic
+from fenicsmech.continuation.stepper import ParabolaPredictor, Stepper, on_cubic
 from fenicsmech.equilibrium import (
     ArcLengthControl,
     ArcMetric,
@@ -41,9 +41,9 @@ class ArcSteps:
         smallest: the shortest step, likewise; where even that fails the path ends with an error.
         motion: largest motion of a step, in lengths of the mechanism or rad.
         tolerance: of the location of limit points and bifurcations, over the step they lie in.
-        turn: target angle between the tangents at both ends of a step, rad.
+        turn: aimed angle between the tangents at both ends of a step, rad.
         largest_turn: angle from which on a step is repeated shorter: it jumps to another branch, or cuts off a bend.
-        iterations: target number per step; the last one only judges the stability.
+        iterations: aimed number per step; the last one only judges the stability.
 
     Raises:
         DescriptionError: a length is not positive, or the tolerance not between 0 and 1.
@@ -69,20 +69,20 @@ class ArcSteps:
 
 @dataclass(frozen=True)
 class Finish:
-    """A quantity whose ``target`` ends a path: its value at a point, its rate along the path there, and its scale."""
+    """A quantity that ends a path at ``end``: its value at a point, its rate along the path, and its scale."""
 
     value: Callable[[EquilibriumPoint], float]
     rate: Callable[[EquilibriumPoint], float]
-    target: float
+    end: float
     scale: float
 
     def passed(self, before: EquilibriumPoint, after: EquilibriumPoint) -> bool:
-        """Whether the target lies between two neighbouring points."""
-        a, b = self.value(before) - self.target, self.value(after) - self.target
+        """Whether the end lies between two neighbouring points."""
+        a, b = self.value(before) - self.end, self.value(after) - self.end
         return a * b < 0.0 or (b == 0.0 and a != 0.0)
 
 
-class ArcLengthTracer(Stepper):
+class ArcLengthStepper(Stepper):
     """Steps along the path through one equilibrium.
 
     Distances are in units of the arc on which a linear mechanism reaches ``value`` or ``conjugate``.
@@ -101,7 +101,7 @@ class ArcLengthTracer(Stepper):
         length: of the next step.
 
     Raises:
-        NotConverged: the followed value moves nothing, or the tangent is singular.
+        NotConverged: the followed value moves nothing, or the KKT matrix is singular.
     """
 
     def __init__(
@@ -126,7 +126,7 @@ class ArcLengthTracer(Stepper):
             reach = 0.01 / motion  # of the mechanism's length, or rad: of interest if nothing else is said
         self.metric = ArcMetric(system, followed, reach * motion, reach, reach * speed or math.inf)
         self.start = point.scaled(1.0 / self.metric.norm(point.tangent))
-        super().__init__(solver, Parabola(self.metric, steps.turn))
+        super().__init__(solver, ParabolaPredictor(self.metric, steps.turn))
 
     # -- points ------------------------------------------------------------------------------------------------
 
@@ -232,7 +232,7 @@ class ArcLengthTracer(Stepper):
         near, rising = min(1e-10 * finish.scale, 1e-8 * abs(change)), change > 0.0
         distance, best = width, after
         for _ in range(30):
-            gap = finish.value(best) - finish.target
+            gap = finish.value(best) - finish.end
             if abs(gap) <= near:
                 break
             low, high = (low, distance) if (gap > 0.0) == rising else (distance, high)
@@ -244,6 +244,6 @@ class ArcLengthTracer(Stepper):
             except NotConverged:
                 break
         reached = finish.value(best)
-        if abs(reached - finish.target) > 1e-6 * abs(change):
-            _log.warning("the path ends at %g, not at %g: no equilibrium was found there", reached, finish.target)
+        if abs(reached - finish.end) > 1e-6 * abs(change):
+            _log.warning("the path ends at %g, not at %g: no equilibrium was found there", reached, finish.end)
         return best

@@ -32,7 +32,7 @@ from enum import Enum
 
 import numpy as np
 
-from fenicsmech.continuation.arc_length import ArcLengthTracer
+from fenicsmech.continuation.arc_length import ArcLengthStepper
 from fenicsmech.continuation.eigen import softest_modes
 from fenicsmech.equilibrium import EquilibriumPoint, Linearisation, NotConverged, Step
 from fenicsmech.log import logger
@@ -77,7 +77,7 @@ class CriticalPoint:
     course: Step
 
 
-def locate(path: ArcLengthTracer, before: EquilibriumPoint, after: EquilibriumPoint) -> list[CriticalPoint]:
+def locate(path: ArcLengthStepper, before: EquilibriumPoint, after: EquilibriumPoint) -> list[CriticalPoint]:
     """All critical points between two neighbouring points of a path, in its order."""
     if not _changes(path, before, after):
         return []
@@ -85,8 +85,8 @@ def locate(path: ArcLengthTracer, before: EquilibriumPoint, after: EquilibriumPo
     return _search(piece, *piece.ends(), path.steps.tolerance * piece.width)
 
 
-def null_space(path: ArcLengthTracer, critical: CriticalPoint) -> list[Step]:
-    """A basis of the tangent's null space at a bifurcation, largest displacements the mechanism's length.
+def null_space(path: ArcLengthStepper, critical: CriticalPoint) -> list[Step]:
+    """A basis of the KKT matrix's null space at a bifurcation, largest displacements the mechanism's length.
 
     As many vectors as modes change their stability there.
     """
@@ -94,7 +94,7 @@ def null_space(path: ArcLengthTracer, critical: CriticalPoint) -> list[Step]:
     return [mode.step for mode in found]
 
 
-def crossing(path: ArcLengthTracer, critical: CriticalPoint, mode: Step, sense: Sense) -> EquilibriumPoint:
+def crossing(path: ArcLengthStepper, critical: CriticalPoint, mode: Step, sense: Sense) -> EquilibriumPoint:
     """The first point of the path that crosses at ``critical``, with the null vector ``mode``.
 
     Steps of ``path`` continue from there.
@@ -130,7 +130,7 @@ class _PiecePoint:
 class _Piece:
     """A step of the path, with the softest mode found last."""
 
-    def __init__(self, path: ArcLengthTracer, before: EquilibriumPoint, after: EquilibriumPoint) -> None:
+    def __init__(self, path: ArcLengthStepper, before: EquilibriumPoint, after: EquilibriumPoint) -> None:
         self.path, self.before, self.after = path, before, after
         self.width = path.along(before, after)
         self.course = path.metric.unit(path.chord(before, after))
@@ -164,7 +164,7 @@ class _Piece:
         return _PiecePoint(distance, point, self._stiffness(point.linearisation))
 
     def _stiffness(self, at: Linearisation) -> float:
-        """μ of a tangent, to a relative change of 1e-3.
+        """μ of a KKT matrix, to a relative change of 1e-3.
 
         Twelve iterations at most: where two modes are equally soft, either suffices.
         """
@@ -210,7 +210,7 @@ def _search(piece: _Piece, low: _PiecePoint, high: _PiecePoint, tolerance: float
     return _classified(piece, low, high)
 
 
-def _root(path: ArcLengthTracer, low: _PiecePoint, high: _PiecePoint) -> float:
+def _root(path: ArcLengthStepper, low: _PiecePoint, high: _PiecePoint) -> float:
     """Root of the line through the quantity that changes sign; the middle if none does."""
     pairs = zip((*_rates(path, low.point), low.stiffness), (*_rates(path, high.point), high.stiffness), strict=True)
     for first, second in pairs:
@@ -219,20 +219,20 @@ def _root(path: ArcLengthTracer, low: _PiecePoint, high: _PiecePoint) -> float:
     return 0.5 * (low.distance + high.distance)
 
 
-def _rates(path: ArcLengthTracer, point: EquilibriumPoint) -> tuple[float, float]:
+def _rates(path: ArcLengthStepper, point: EquilibriumPoint) -> tuple[float, float]:
     """v̇ and q̇ over their references, without rounding; extrema of the torques of motors, q̇, are not critical."""
     value = path.value_rate(point) / path.metric.value
     conjugate = 0.0 if path.followed.displaces else point.conjugate_rate / path.metric.conjugate
     return value if abs(value) > 1e-9 else 0.0, conjugate if abs(conjugate) > 1e-9 else 0.0
 
 
-def _turns(path: ArcLengthTracer, a: EquilibriumPoint, b: EquilibriumPoint) -> tuple[bool, bool]:
+def _turns(path: ArcLengthStepper, a: EquilibriumPoint, b: EquilibriumPoint) -> tuple[bool, bool]:
     """Whether v̇ and q̇ change sign between two points."""
     (value, conjugate), (other, other_conjugate) = _rates(path, a), _rates(path, b)
     return value * other < 0.0, conjugate * other_conjugate < 0.0
 
 
-def _changes(path: ArcLengthTracer, a: EquilibriumPoint, b: EquilibriumPoint) -> bool:
+def _changes(path: ArcLengthStepper, a: EquilibriumPoint, b: EquilibriumPoint) -> bool:
     return a.unstable_modes != b.unstable_modes or any(_turns(path, a, b))
 
 

@@ -1,4 +1,4 @@
-"""The softest modes of the tangent at an equilibrium, and the loads at which it becomes singular, by SLEPc.
+"""The softest modes of the KKT matrix at an equilibrium, and the loads at which it becomes singular, by SLEPc.
 
 With the KKT matrix K and the identity M of the coordinates s (0 for multipliers and force), the stiffnesses μ of the
 softest modes under the constraints are
@@ -65,7 +65,7 @@ def softest_modes(
 def critical_changes(
     solver: EquilibriumSolver, held: LoadControl | MotorControl, state: State, *, count: int
 ) -> list[Mode]:
-    """The ``count`` changes Δ of a control's value that make the tangent singular, nearest first.
+    """The ``count`` changes Δ of a control's value that make the KKT matrix singular, nearest first.
 
     Both senses count. Exact to second order in Δ.
 
@@ -81,16 +81,16 @@ def critical_changes(
     size = system.size(rate)
     unit = 1e-2 / size  # the change that eigenvalues are measured in; motions in lengths of the mechanism, or rad
     amount = 1e-5 / size
-    later, earlier = (_tangent(solver, control, system.moved(state, rate.scaled(t))) for t in (amount, -amount))
+    later, earlier = (_kkt_matrix(solver, control, system.moved(state, rate.scaled(t))) for t in (amount, -amount))
     first = _combined([(0.5 * unit / amount, later), (-0.5 * unit / amount, earlier)])
     at = solver.linearise(state, control)
-    bend = x.duplicate()
-    first.mult(x, bend)
-    bend.scale(-1.0 / unit)
-    bend = at.step(at.solve(bend))
+    curvature = x.duplicate()
+    first.mult(x, curvature)
+    curvature.scale(-1.0 / unit)
+    curvature = at.step(at.solve(curvature))
     amount = 1e-3 / size
     later, here, earlier = (
-        _tangent(solver, control, system.moved(state, rate.scaled(t) + bend.scaled(0.5 * t * t)))
+        _kkt_matrix(solver, control, system.moved(state, rate.scaled(t) + curvature.scaled(0.5 * t * t)))
         for t in (amount, 0.0, -amount)
     )
     weight = 0.5 * (unit / amount) ** 2
@@ -108,7 +108,7 @@ def critical_changes(
     return [Mode(unit * mode.value, mode.step) for mode in modes]
 
 
-def _tangent(solver: EquilibriumSolver, control: LoadControl | MotorControl, state: State) -> PETSc.Mat:
+def _kkt_matrix(solver: EquilibriumSolver, control: LoadControl | MotorControl, state: State) -> PETSc.Mat:
     """A copy of K at a loaded state."""
     solver.system.linearise(state, control, solver.system.residual(state, control))
     return solver.system.kkt.matrix().copy()

@@ -2,7 +2,7 @@
 
 An equilibrium is predicted from those before, corrected, and accepted. Steps halve when the solver fails and double
 when it took few iterations; the tangent bounds their motion; equilibria reached are kept. They end where they are small
-relative to the distance covered, however far the target: the softest stiffness falls as √(1 − p / p*)
+relative to the distance covered, however far the end: the softest stiffness falls as √(1 − p / p*)
 towards a limit load p*, and the last equilibrium, at p* − 2 p* / 1024 or nearer, keeps 5 % of it at most. A step that
 moves a coordinate outside the range of the tangents at its ends may have snapped over a fold, where the path turns
 back: it is halved too, and if that does not help the snap is accepted and counted.
@@ -25,7 +25,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from fenicsmech.continuation.stepper import Predictor, Stepper, Tangent
+from fenicsmech.continuation.stepper import Predictor, Stepper, TangentPredictor
 from fenicsmech.equilibrium import Control, EquilibriumPoint, EquilibriumSolver, NotConverged, State, Step
 from fenicsmech.log import logger
 
@@ -37,18 +37,18 @@ class LoadSteps:
     """Options of load steps; motions are in lengths of the mechanism, or rad.
 
     Attributes:
-        smallest: smallest step, over the distance to the target, or the distance covered if that is less.
+        smallest: smallest step, over the distance to the end, or the distance covered if that is less.
         motion: largest motion of a step along the tangent (measured).
-        smallest_limited: smallest step that ``motion`` may impose, over the distance to the target; smaller ones arise
+        smallest_limited: smallest step that ``motion`` may impose, over the distance to the end; smaller ones arise
             in singular positions, where the tangent is ignored.
         largest_prediction: motion from which on a prediction is discarded.
-        iterations: target number per step; after as many or fewer the next step is twice as long.
+        iterations: aimed number per step; after as many or fewer the next step is twice as long.
         deviation: of the rate over a step from the tangents at its ends, over the largest rate, that counts as a snap;
             kinks stay below.
         branching_rate: largest rate of a step off a bifurcation, over the rate at its end.
         smallest_snap: smallest motion that counts as a snap; bifurcations stay below.
         smallest_snap_step: smallest step, as ``smallest``, that is halved because of a snap.
-        minimum_shift: least shift of the tangent, in units of the mean stiffness, where a mechanism has zero-energy
+        minimum_shift: least shift of the KKT matrix, in units of the mean stiffness, where a mechanism has zero-energy
             modes, which would leave it singular.
         shift_factors: of ``minimum_shift``, tried in order: a shift slows Newton's method down where soft springs or
             forces hold zero-energy modes with a smaller stiffness.
@@ -68,7 +68,7 @@ class LoadSteps:
 
 
 class LoadStepsFailed(Exception):
-    """Load stepping ended before the target.
+    """Load stepping ended before the prescribed value.
 
     Attributes:
         last: the last equilibrium reached, or None.
@@ -83,12 +83,12 @@ class LoadStepsFailed(Exception):
 
 
 class LoadStepper(Stepper):
-    """Follows equilibria as the target of one control changes.
+    """Follows equilibria as the prescribed value of one control changes.
 
     Args:
         solver: of the equilibria.
         start: a first guess at the control's value there.
-        control: whose target changes.
+        control: whose prescribed value changes.
         predictor: of the next equilibrium.
         steps: options of the steps.
 
@@ -116,20 +116,20 @@ class LoadStepper(Stepper):
         self.iterations = self.snaps = 0
 
     def advance(self, control: Control) -> EquilibriumPoint:
-        """The equilibrium at ``control``'s target, reached in as many steps as needed.
+        """The equilibrium at ``control``'s prescribed value, reached in as many steps as needed.
 
         Raises:
             LoadStepsFailed: the smallest step failed.
         """
         if not self._points:
             self._settle(control.at(self._value))
-        steps, distance = self._steps, control.target - self._value
+        steps, distance = self._steps, control.prescribed - self._value
         step, tried = distance, []
         while True:
-            remaining = control.target - self._value
+            remaining = control.prescribed - self._value
             step = self._limited(step, distance)
             arrives = abs(step) >= abs(remaining) * (1.0 - 1e-9)
-            value = control.target if arrives else self._value + step
+            value = control.prescribed if arrives else self._value + step
             try:
                 point = self._correct(self._predict(value - self._value), control.at(value))
             except NotConverged as failure:
@@ -183,7 +183,7 @@ class LoadStepper(Stepper):
         if not self._points:
             return self._start
         system, last = self.system, self._points[-1].state
-        for predictor in (self.predictor, Tangent()):
+        for predictor in (self.predictor, TangentPredictor()):
             guess = predictor.predict(system, self._points, self._width, ahead)
             if system.size(system.difference(guess, last)) <= self._steps.largest_prediction:
                 return guess
@@ -198,7 +198,7 @@ class LoadStepper(Stepper):
         return limited if abs(limited) > self._steps.smallest_limited * abs(distance) else step
 
     def _scale(self, distance: float) -> float:
-        """Reference length of steps: the distance covered so far, at first the first step, whatever the target.
+        """Reference length of steps: the distance covered so far, at first the first step, whatever the end.
 
         A limit load is located as closely by a load a thousand times as large as by one just beyond it.
         """
@@ -215,7 +215,7 @@ class LoadStepper(Stepper):
         that. Close to a fold y₀′ grows beyond all bounds and is replaced by the rate of the step before. A step over
         which the two differ by a large motion is too long to judge.
         """
-        distance = point.control.target - self._value
+        distance = point.control.prescribed - self._value
         if not self._points or distance == 0.0:
             return False
         system, last, steps = self.system, self._points[-1], self._steps
@@ -238,8 +238,8 @@ class LoadStepper(Stepper):
 
     def _accept_at(self, point: EquilibriumPoint) -> None:
         """Keeps ``point``, at the value of its control."""
-        self._accept(point, point.control.target - self._value)
-        self._value = point.control.target
+        self._accept(point, point.control.prescribed - self._value)
+        self._value = point.control.prescribed
         self._covered = max(self._covered, abs(self._value - self._origin))
 
 
@@ -256,7 +256,7 @@ class MotorStepper(LoadStepper):
 
     def _pass_dead_centre(self, last: EquilibriumPoint, control: Control) -> bool:
         """Continues from the ``last`` equilibrium by straining links; whether this succeeded."""
-        system, steps, distance = self.system, self._steps, control.target - self._value
+        system, steps, distance = self.system, self._steps, control.prescribed - self._value
         try:
             rate = self._held_rate(last, control.at(self._value))
         except NotConverged:
@@ -284,10 +284,10 @@ class MotorStepper(LoadStepper):
         return self._beyond(rate, (held, last.tangent, point.tangent)) > self._steps.deviation * largest
 
     def _held_rate(self, last: EquilibriumPoint, control: Control) -> Step:
-        """Rate of the state with the target of ``control``, the dominant motion x held.
+        """Rate of the state with the value of ``control``, the dominant motion x held.
 
         Raises:
-            NotConverged: the tangent cannot be factored or solved with, or is not positive along the motion.
+            NotConverged: the KKT matrix cannot be factored or solved with, or is not positive along the motion.
         """
         at = self.solver.linearise(last.state, control)
         rate = at.rate()

@@ -28,14 +28,14 @@ class Predictor(ABC):
         """The guess ``ahead`` of the last of ``points``, of which there are one or two, ``width`` apart."""
 
 
-class Constant(Predictor):
+class ConstantPredictor(Predictor):
     """The last equilibrium again."""
 
     def predict(self, system, points, width, ahead):
         return points[-1].state
 
 
-class Tangent(Predictor):
+class TangentPredictor(Predictor):
     """Along the tangent."""
 
     def predict(self, system, points, width, ahead):
@@ -43,7 +43,7 @@ class Tangent(Predictor):
 
 
 @dataclass(frozen=True)
-class Hermite(Predictor):
+class HermitePredictor(Predictor):
     """The cubic through the last two equilibria and their tangents.
 
     The tangent replaces it while there is only one, and where the two lie close together compared with the step.
@@ -56,13 +56,13 @@ class Hermite(Predictor):
 
     def predict(self, system, points, width, ahead):
         if len(points) == 1 or abs(ahead) > self.extrapolation * abs(width):
-            return Tangent().predict(system, points, width, ahead)
+            return TangentPredictor().predict(system, points, width, ahead)
         before, last = points
         return on_cubic(system, (last.state, before.state), (last.tangent, before.tangent), -width, -ahead / width)
 
 
 @dataclass(frozen=True)
-class Parabola(Predictor):
+class ParabolaPredictor(Predictor):
     """Along the tangent and the curvature, unless that turns by more than ``turn`` rad over the step."""
 
     metric: ArcMetric
@@ -71,9 +71,9 @@ class Parabola(Predictor):
     def predict(self, system, points, width, ahead):
         step = points[-1].tangent.scaled(ahead)
         if len(points) == 2 and width > 0.0:
-            bend = points[1].tangent + points[0].tangent.scaled(-1.0)
-            if ahead * self.metric.norm(bend) <= 2.0 * self.turn * width:
-                step = step + bend.scaled(0.5 * ahead**2 / width)
+            change = points[1].tangent + points[0].tangent.scaled(-1.0)
+            if ahead * self.metric.norm(change) <= 2.0 * self.turn * width:
+                step = step + change.scaled(0.5 * ahead**2 / width)
         return system.moved(points[-1].state, step)
 
 

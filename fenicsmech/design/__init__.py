@@ -12,7 +12,7 @@ from fenicsmech.design.characterisation import Experiment, ModulusFit, fit_modul
 from fenicsmech.design.correction import Correction
 from fenicsmech.design.description import Bounds, SplineDesign, shape_request
 from fenicsmech.design.design_problem import DesignProblem
-from fenicsmech.design.equilibria import Known, SampleEquilibria
+from fenicsmech.design.equilibria import DesignEquilibria, SampleEquilibria
 from fenicsmech.design.objective import Objective, group_count, sample_numbers, split
 from fenicsmech.design.optimisers.bfgs import BFGS
 from fenicsmech.design.optimisers.levenberg_marquardt import LevenbergMarquardt, Resolution
@@ -35,6 +35,7 @@ from fenicsmech.design.rest_shape import DesignedLink, ParametricShape
 from fenicsmech.design.result import DesignResult, LinkDesign, PartValue, TargetResult, rest_meshes
 from fenicsmech.design.run import Checkpoint, DesignProgress, Round, minimise_together
 from fenicsmech.design.search import Scatter, Search, SearchResult, StartResult
+from fenicsmech.design.shape.centreline import LinkOutline, find_centreline
 from fenicsmech.design.shape.edges import MidEdgeNodes, edge_weights
 from fenicsmech.design.shape.handle_optimum import (
     HandleOptimum,

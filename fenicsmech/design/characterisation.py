@@ -74,7 +74,7 @@ class Experiment:
             configuration=self.configuration,
             others=None,
         )
-        loads = sorted({control.target for control in request.controls}, key=abs)
+        loads = sorted({control.prescribed for control in request.controls}, key=abs)
         return CurveRequest(request.part, tuple(map(LoadControl, loads)), request.configuration, request.others)
 
 
@@ -164,7 +164,7 @@ class _Rig:
         assert isinstance(part, Force), "experiments prescribe forces"
         model, solver = simulation.model, simulation.solver(part)
         model.set_parameter(self._links, "E", modulus)
-        curve = simulation.trace(self._request)
+        curve = simulation.compute(self._request)
         adjoint, travel = Sensitivity(model), [Displacement(part).on(model)]
         slopes, travels = {}, {}
         for frame in curve.frames:

@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fenicsmech.design.designed import DesignedSimulation
-from fenicsmech.design.equilibria import Known, SampleEquilibria
+from fenicsmech.design.equilibria import DesignEquilibria, SampleEquilibria
 from fenicsmech.design.objective import Objective
 from fenicsmech.design.optimisers.problem import Infeasible, Iterate, Optimiser, Reason, Start
 from fenicsmech.design.result import DesignResult, Reached
@@ -88,18 +88,18 @@ class Corrected:
 # -- values of the simulation that counts ---
 
 
-def carried(equilibria: SampleEquilibria, known: Known | None) -> Known:
-    """Equilibria at the design that the model holds: from those ``known`` of the last round, else from zero load.
+def carried(equilibria: SampleEquilibria, solved: DesignEquilibria | None) -> DesignEquilibria:
+    """Equilibria at the design that the model holds: from those ``solved`` in the last round, else from zero load.
 
     Raises:
         Infeasible: loading leads elsewhere.
     """
-    if known is not None:
+    if solved is not None:
         try:
-            return equilibria.follow(known)
+            return equilibria.from_design(solved)
         except Infeasible as failure:
             _log.info("equilibria of the last round do not lead to those of this one: %s", failure)
-    return equilibria.trace()
+    return equilibria.from_zero()
 
 
 def verified(
@@ -110,11 +110,11 @@ def verified(
     Where loading fails, the values followed from design to design stand; the log names the targets.
     """
     try:
-        known = equilibria.trace()
+        solved = equilibria.from_zero()
     except Infeasible as failure:
         _log.warning("loaded from zero, the optimum does not reach all its targets: %s", failure)
         return followed, False
-    values = equilibria.values(known)
+    values = equilibria.values(solved)
     # values of one equilibrium differ by less
     different = np.flatnonzero(np.abs(values - followed.values) > 1e-6 * comparison.scale_of)
     for k in different:
@@ -122,7 +122,7 @@ def verified(
             "%s of the optimum: %.6g when loaded from zero, %.6g when followed from the drawn design",
             *(comparison.names[k], values[k], followed.values[k]),
         )
-    errors = equilibria.errors(known) if len(different) else followed.errors
+    errors = equilibria.errors(solved) if len(different) else followed.errors
     return Reached(values, errors, values + errors if estimates else values), len(different) == 0
 
 
@@ -230,19 +230,19 @@ class CorrectedRun:
         if cheaper is None or (found is not None and not found.round.surrogate):
             return None
         placement: HandlePlacement | None = None
-        known: Known | None = None
+        solved: DesignEquilibria | None = None
 
         def truth(optimum: Optimum) -> Reached:
-            nonlocal placement, known
+            nonlocal placement, solved
             theta = self._comm.bcast(cheaper.team[1].placement.theta, root=0)
             with problem.clock.phase("verification"):
                 try:
-                    near = problem.rest.known(optimum.parameters, theta) or placement
+                    near = problem.rest.placement_from(optimum.parameters, theta) or placement
                     placement = problem.rest.place(optimum.parameters, near)
                 except ShapeError as failure:
                     raise Infeasible(str(failure)) from failure
-                known = carried(problem.loaded, known)
-                values, errors = problem.loaded.values(known), problem.loaded.errors(known)
+                solved = carried(problem.loaded, solved)
+                values, errors = problem.loaded.values(solved), problem.loaded.errors(solved)
             return Reached(values, errors, values + errors if self._options.estimates else values)
 
         try:
@@ -297,7 +297,7 @@ class CorrectedRun:
         """Start, its handles if known, and the first round: where the saved run was if there is one."""
         if self._found is not None:
             start = self._found.start
-            return start, low.rest.known(start.parameters, self._found.handles), self._found.round
+            return start, low.rest.placement_from(start.parameters, self._found.handles), self._found.round
         parameters, near = (low.rest.initial, None) if self._start is None else low.given(self._start)
         return Start(parameters), near, first
 

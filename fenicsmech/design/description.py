@@ -6,11 +6,17 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from fenicsmech.collective import from_one
+from fenicsmech.design.shape.centreline import LinkOutline, find_centreline
 from fenicsmech.design.shape.shape_map import ShapeRequest
 from fenicsmech.design.shape.spline import lay_out
-from fenicsmech.errors import DescriptionError, finite, positive
-from fenicsmech.mechanism import Centreline, Disc, FlexibleLink, Mechanism, Rectangle, Strip
+from fenicsmech.errors import DescriptionError, finite, points, positive
+from fenicsmech.mechanism import Centreline, Disc, FlexibleLink, Mechanism, Rectangle, Shape, Strip
+from fenicsmech.meshing import InterfaceSite, link_outline
 from fenicsmech.multibody import Body, Linkage
+from fenicsmech.simulation import Simulation
 
 
 @dataclass(frozen=True)
@@ -18,11 +24,12 @@ class Bounds:
     """Fabrication bounds of a link.
 
     Attributes:
-        thickness: least and largest thickness in the plane.
+        thickness: least and largest thickness in the plane; at each sample of a spline if relative to a thickness drawn
+            so.
         bend: largest curvature ratio r.
     """
 
-    thickness: tuple[float, float]
+    thickness: tuple[float | np.ndarray, float | np.ndarray]
     bend: float
 
 
@@ -35,9 +42,12 @@ class SplineDesign:
         segments: number of cubic segments; control points beyond those at joints and free ends go where these are
             farthest apart.
         thickness: least and largest thickness in the plane that can be made; a third to three times the drawn one
-            by default.
+            at the same place by default.
         bend: largest curvature ratio r, the spacing of 500 samples over the radius of curvature.
-        centreline: points the centreline runs through; that of a strip by default.
+        centreline: points the centreline runs through; by default that of a strip, and of other links the line that
+            halves the chords of their outline.
+        ends: points where the line found in an outline begins and ends; by default joints, or free ends where the link
+            runs on beyond them.
         ends_move: whether free ends, to which the centreline runs on beyond the last joint, may move; otherwise they
             stay where they are drawn, as a finger tip that has to reach a place.
 
@@ -50,6 +60,7 @@ class SplineDesign:
     thickness: tuple[float, float] | None = None
     bend: float = 0.08
     centreline: Sequence[Sequence[float]] | None = None
+    ends: Sequence[Sequence[float]] | None = None
     ends_move: bool = False
 
     def __post_init__(self) -> None:
@@ -61,6 +72,11 @@ class SplineDesign:
         if not isinstance(self.segments, int) or self.segments < 1:
             raise DescriptionError(part, f"{self.segments!r} segments", "Give a whole number of at least 1")
         positive(f"curvature bound of the {part}", self.bend)
+        if self.ends is not None:
+            if self.centreline is not None:
+                raise DescriptionError(part, "centreline and ends are both given", "Give one of the two")
+            if len(points(f"ends of the {part}", self.ends, least=2, dimensions=(2,))) > 2:
+                raise DescriptionError(part, f"{len(self.ends)} ends", "Give two points")
         if self.thickness is not None:
             if not isinstance(self.thickness, Sequence) or len(self.thickness) != 2:
                 raise DescriptionError(part, f"thickness {self.thickness!r}", "Give the least and the largest one")
@@ -70,50 +86,78 @@ class SplineDesign:
             if not least < most:
                 raise DescriptionError(part, f"thickness from {least:g} to {most:g}", "Give the smaller one first")
 
-    def bounds(self, thickness: float) -> Bounds:
-        """The bounds for a link drawn with ``thickness``.
+    def bounds(self, thickness: float | np.ndarray) -> Bounds:
+        """The bounds for a link drawn with ``thickness``, everywhere or at each sample of its spline (samples,).
 
         Raises:
             DescriptionError: the drawn thickness is not within them.
         """
         least, most = self.thickness or (thickness / 3.0, 3.0 * thickness)
-        if not least < thickness < most:
+        drawn = np.atleast_1d(thickness)
+        beyond = drawn[(drawn <= least) | (drawn >= most)]
+        if len(beyond):
+            worst = float(beyond[0])
             raise DescriptionError(
                 f"design of link {self.link.name!r}",
-                f"its drawn thickness {thickness:.3g} is not between {least:g} and {most:g}",
+                f"its drawn thickness {worst:.3g} is not between {least:g} and {most:g}",
                 "Draw it within the bounds, or widen them",
             )
         return Bounds((least, most), self.bend)
 
 
-def shape_request(design: SplineDesign, mechanism: Mechanism, linkage: Linkage) -> ShapeRequest:
-    """The handles and spline of ``design``.
+def shape_requests(designs: Sequence[SplineDesign], simulation: Simulation) -> list[ShapeRequest]:
+    """The handles and splines of ``designs`` in a simulation; errors are those of ``shape_request``.
+
+    Links from files are measured on the first process.
+    """
+    mechanism, linkage, shapes = simulation.scene.mechanism, simulation.linkage, simulation.shapes
+    return from_one(
+        simulation.comm, lambda: [shape_request(own, mechanism, linkage, shapes.get(own.link)) for own in designs]
+    )
+
+
+def shape_request(
+    design: SplineDesign, mechanism: Mechanism, linkage: Linkage, shape: Shape | None = None
+) -> ShapeRequest:
+    """The handles and spline of ``design``. Local.
+
+    Args:
+        design: of a link.
+        mechanism: with the link.
+        linkage: its bodies and joints.
+        shape: of the link, as drawn by default.
 
     Raises:
-        DescriptionError: no centreline is known, the link has one joint and no free end, or there are fewer segments
+        DescriptionError: no centreline is found, the link has one joint and no free end, or there are fewer segments
             than gaps between joints and free ends.
+        MeshingError: the file of the link cannot be read.
     """
     link = design.link
     part = f"design of link {link.name!r}"
     if link not in mechanism.flexible_links:
         raise DescriptionError(part, f"it is not a flexible link of {mechanism.name!r}", "Name one of its links")
-    points = design.centreline
-    if points is None:
-        if not isinstance(link.shape, Strip):
-            raise DescriptionError(part, "its shape has no centreline", "Give centreline=…, points along the link")
-        points = link.shape.centreline
-    centreline = Centreline(points, part=part)
-    bodies = [linkage.bodies[i] for i in linkage.interfaces[link]]
+    shape, bodies = shape or link.shape, [linkage.bodies[i] for i in linkage.interfaces[link]]
+    reach, line = tuple(_reach(body) for body in bodies), design.centreline
+    thickness: float | LinkOutline
+    if isinstance(shape, Strip):
+        if design.ends is not None:
+            raise DescriptionError(part, "a strip has a centreline, and ends were given", "Leave them out")
+        thickness, centreline = shape.thickness, Centreline(shape.centreline if line is None else line, part=part)
+    else:
+        sites = [InterfaceSite(b.centre[:2], b.region, name=b.name) for b in bodies if b.region is not None]
+        thickness = outline = LinkOutline(link_outline(link.name, shape, dim=linkage.dim), sites)
+        found = find_centreline(outline, reach, design.ends, part=part) if line is None else line
+        centreline = Centreline(found, part=part)
     request = ShapeRequest(
         link=mechanism.flexible_links.index(link),
         name=link.name,
         joints=tuple((body.centre[0], body.centre[1]) for body in bodies),
         turns=tuple(linkage.turns_about_z(body) for body in linkage.interfaces[link]),
-        reach=tuple(_reach(body) for body in bodies),
+        reach=reach,
         segments=design.segments,
         centreline=centreline,
         ends_move=design.ends_move,
-        thickness=link.shape.thickness if isinstance(link.shape, Strip) else None,
+        thickness=thickness,
     )
     lay_out(centreline, request.joints, request.reach, request.segments, part=part)  # refused before it is meshed
     return request

@@ -139,7 +139,7 @@ class DesignProblem:
             assert round.initial is not None, "every run has a start"
             result = DesignResult(
                 mechanism=self.simulation.scene.mechanism.name,
-                links=link_designs(self._own.rest, self.designs, end.placement),
+                links=link_designs(self._own.rest, end.placement),
                 targets=target_results(compared, self.simulation.scene.units, np.array(round.started), reached),
                 reason=end.optimum.reason.value,
                 converged=end.optimum.reason.converged,

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fenicsmech.design.description import SplineDesign, shape_request
+from fenicsmech.design.description import SplineDesign, shape_requests
 from fenicsmech.design.equilibria import SampleEquilibria
 from fenicsmech.design.objective import Group, Objective, sample_numbers, split
 from fenicsmech.design.regularisers import Regulariser
@@ -53,8 +53,7 @@ class DesignedSimulation:
         check_targets(simulation, targets)
         self.simulation, self.designs, self.targets = simulation, tuple(designs), tuple(targets)
         self._regulariser, self.clock = regulariser, clock
-        mechanism, linkage = simulation.scene.mechanism, simulation.linkage
-        self._requests = [shape_request(design, mechanism, linkage) for design in self.designs]
+        self._requests = shape_requests(self.designs, simulation)
 
     def on(self, simulation: Simulation) -> DesignedSimulation:
         """The same in another simulation."""
@@ -131,4 +130,4 @@ class DesignedSimulation:
                 )
         own = [given[link.name] for link in self.rest.links]
         parameters, theta = (np.concatenate(parts) for parts in ([o.parameters for o in own], [o.handles for o in own]))
-        return parameters, self.rest.known(parameters, theta)
+        return parameters, self.rest.placement_from(parameters, theta)

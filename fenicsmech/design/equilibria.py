@@ -76,7 +76,7 @@ class SampleState:
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class DesignEquilibria:
     """Equilibria of samples, and values of targets' quantities, at one design.
 
     Attributes:
@@ -131,7 +131,7 @@ class SampleEquilibria:
 
     # -- equilibria ----------------------------------------------------------------------------------------------
 
-    def trace(self) -> Known:
+    def from_zero(self) -> DesignEquilibria:
         """The equilibria of all samples, from zero load, at the present design.
 
         Raises:
@@ -144,9 +144,9 @@ class SampleEquilibria:
         found: dict[Sample, SampleState] = {}
         for samples in groups.values():
             found.update(self._traced(samples))
-        return self._known({sample: found[sample] for sample in self._paths})
+        return self._at_design({sample: found[sample] for sample in self._paths})
 
-    def follow(self, known: Known) -> Known:
+    def from_design(self, solved: DesignEquilibria) -> DesignEquilibria:
         """The equilibria at the present design, from those of another one.
 
         Raises:
@@ -155,46 +155,46 @@ class SampleEquilibria:
         design = self._model.elastic.d.x.array.copy()
         try:
             samples = {
-                path.sample: self._followed(path, known.samples[path.sample], known.design, design)
+                path.sample: self._followed(path, solved.samples[path.sample], solved.design, design)
                 for path in self._paths.values()
             }
         finally:
             self._model.reshape(design)
-        return self._known(samples)
+        return self._at_design(samples)
 
     # -- values of the targets' quantities -----------------------------------------------------------------------
 
-    def values(self, known: Known) -> np.ndarray:
+    def values(self, solved: DesignEquilibria) -> np.ndarray:
         """The components that are wanted, target by target, (components,)."""
-        reduced = [t.quantity.reduce(raw)[0][: t.size] for t, raw in zip(self.targets, known.raw, strict=True)]
+        reduced = [t.quantity.reduce(raw)[0][: t.size] for t, raw in zip(self.targets, solved.raw, strict=True)]
         return np.concatenate([*reduced, np.zeros(0)])
 
-    def gradients(self, known: Known) -> list[Gradient]:
+    def gradients(self, solved: DesignEquilibria) -> list[Gradient]:
         """Derivatives of the components at the design that the model holds."""
         found = {k: [self._sensitivity.at_rest(own)] for k, own in self._at_rest.items()}
         for path in self._paths.values():
             own = self._of(path.sample)
-            at = known.samples[path.sample]
-            places, partials = self._partials(known, path, at.state, own)
+            at = solved.samples[path.sample]
+            places, partials = self._partials(solved, path, at.state, own)
             loaded = self._sensitivity.of(path.solver, at.state, at.control, partials)
             if path.moves:
-                loaded = self._less_unloaded(known, path, places, loaded)
+                loaded = self._less_unloaded(solved, path, places, loaded)
             for k, gradient in zip(places, loaded, strict=True):
                 found.setdefault(k, []).append(gradient)
         return [gradient for k in range(len(self.targets)) for gradient in found[k]]
 
-    def errors(self, known: Known) -> np.ndarray:
+    def errors(self, solved: DesignEquilibria) -> np.ndarray:
         """Estimated discretisation errors of the components, to be added, (components,)."""
         found = {k: [0.0] for k in self._at_rest}
-        with self._model.shaped(known.design):
+        with self._model.shaped(solved.design):
             for path in self._paths.values():
-                at = known.samples[path.sample]
-                places, partials = self._partials(known, path, at.state, self._of(path.sample))
+                at = solved.samples[path.sample]
+                places, partials = self._partials(solved, path, at.state, self._of(path.sample))
                 adjoints = self._sensitivity.adjoints(path.solver, at.state, at.control, partials)
                 errors, slopes = self._estimated(adjoints), [own.by_control() if own else 0.0 for own in adjoints]
                 if path.moves:
-                    from_there, counted, prescribed = self._unloaded_partials(known, path, places)
-                    origin = known.samples[path.sample].unloaded
+                    from_there, counted, prescribed = self._unloaded_partials(solved, path, places)
+                    origin = solved.samples[path.sample].unloaded
                     unloaded = self._estimated(
                         self._sensitivity.adjoints(path.solver, origin, LoadControl(0.0), from_there)
                     )
@@ -213,7 +213,7 @@ class SampleEquilibria:
         pairs = enumerate(zip(self.targets, self._observables, strict=True))
         return [(observable, k) for k, (target, observable) in pairs if target.sample == sample]
 
-    def _known(self, samples: dict[Sample, SampleState]) -> Known:
+    def _at_design(self, samples: dict[Sample, SampleState]) -> DesignEquilibria:
         raw = {k: np.array([observable.value()]) for k, observable in self._at_rest.items()}
         for sample, at in samples.items():
             own = self._of(sample)
@@ -223,17 +223,17 @@ class SampleEquilibria:
                 for observable, k in pairs:
                     raw[k] = raw.get(k, 0.0) + sign * observable.values(state)
         design = self._model.elastic.d.x.array.copy()
-        return Known(design, samples, tuple(raw[k] for k in range(len(self.targets))))
+        return DesignEquilibria(design, samples, tuple(raw[k] for k in range(len(self.targets))))
 
     def _partials(
-        self, known: Known, path: _Path, state: State, own: Sequence[tuple[Observable, int]]
+        self, solved: DesignEquilibria, path: _Path, state: State, own: Sequence[tuple[Observable, int]]
     ) -> tuple[list[int], list[Partial]]:
         """The partial derivatives of the wanted components at a state, each with the place of its target."""
         self._model.load(state)
         places, partials = [], []
         for observable, k in own:
             target = self.targets[k]
-            _, slopes = target.quantity.reduce(known.raw[k])
+            _, slopes = target.quantity.reduce(solved.raw[k])
             parts = observable.partials(path.solver.system, state)
             for row in slopes[: target.size]:
                 places.append(k)
@@ -242,25 +242,25 @@ class SampleEquilibria:
         return places, partials
 
     def _unloaded_partials(
-        self, known: Known, path: _Path, places: Sequence[int]
+        self, solved: DesignEquilibria, path: _Path, places: Sequence[int]
     ) -> tuple[list[Partial], list[int], bool]:
         """Partial derivatives in the unloaded configuration: of the components that count from there, then of the
         prescribed displacement; which components these are; and whether a displacement is prescribed.
         """
-        unloaded, quantities = known.samples[path.sample].unloaded, [self.targets[k].quantity for k in places]
+        unloaded, quantities = solved.samples[path.sample].unloaded, [self.targets[k].quantity for k in places]
         counted = [place for place, quantity in enumerate(quantities) if quantity.from_unloaded]
         own = [pair for pair in self._of(path.sample) if self.targets[pair[1]].quantity.from_unloaded]
-        _, partials = self._partials(known, path, unloaded, own)
+        _, partials = self._partials(solved, path, unloaded, own)
         if path.moved is not None:
             partials += path.moved.partials(path.solver.system, unloaded)
         return partials, counted, path.moved is not None
 
     def _less_unloaded(
-        self, known: Known, path: _Path, places: Sequence[int], loaded: Sequence[Gradient]
+        self, solved: DesignEquilibria, path: _Path, places: Sequence[int], loaded: Sequence[Gradient]
     ) -> list[Gradient]:
         """Derivatives of components with those of the unloaded configuration."""
-        partials, counted, prescribed = self._unloaded_partials(known, path, places)
-        origin = known.samples[path.sample].unloaded
+        partials, counted, prescribed = self._unloaded_partials(solved, path, places)
+        origin = solved.samples[path.sample].unloaded
         unloaded = self._sensitivity.of(path.solver, origin, LoadControl(0.0), partials)
         found = list(loaded)
         for place, gradient in zip(counted, unloaded, strict=False):
@@ -284,7 +284,7 @@ class SampleEquilibria:
             loads += np.linspace(before, sample.value, max(count, 1) + 1)[1:].tolist()
             before = sample.value
         try:
-            curve = self._simulation.trace(sample_request(self._simulation, ordered[0], loads))
+            curve = self._simulation.compute(sample_request(self._simulation, ordered[0], loads))
         except EquilibriumError as error:
             raise Infeasible(str(error)) from error
         found, snapped = dict[Sample, SampleState](), False
@@ -356,8 +356,8 @@ class _Design:
 
     def halfway(self, other: _Design) -> _Design:
         """Their mean."""
-        target = 0.5 * (self.control.target + other.control.target)
-        return _Design(0.5 * (self.field + other.field), self.control.at(target))
+        value = 0.5 * (self.control.prescribed + other.control.prescribed)
+        return _Design(0.5 * (self.field + other.field), self.control.at(value))
 
 
 class _Lost(Infeasible):

@@ -18,7 +18,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenicsmech.collective import on_all
-from fenicsmech.design.equilibria import Known, SampleEquilibria
+from fenicsmech.design.equilibria import DesignEquilibria, SampleEquilibria
 from fenicsmech.design.optimisers.problem import Evaluation, Inequalities, Infeasible, Plain, TooHigh, merit
 from fenicsmech.design.regularisers import Model, Regulariser
 from fenicsmech.design.rest_shape import ParametricShape
@@ -26,7 +26,7 @@ from fenicsmech.design.shape.handle_optimum import HandlePlacement, ShapeError
 from fenicsmech.design.target import Comparison, Target
 from fenicsmech.log import Clock
 
-_PARTS = MPI.Comm.Create_keyval()  # attribute of a communicator: its parts by their number, split once
+_SPLITS = MPI.Comm.Create_keyval()  # attribute of a communicator: its splits by their number, each made once
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class _Base:
     """The best design so far, from which others are reached."""
 
     placement: HandlePlacement
-    known: Known
+    solved: DesignEquilibria
 
 
 class Objective:
@@ -119,23 +119,23 @@ class Objective:
             TooHigh: the merit is above ``below``; derivatives were not computed.
         """
         everyone = self._group.everyone
-        placement, model, known = on_all(everyone, lambda: self._solve(parameters, self._base))
-        reached = self._values(known)
+        placement, model, solved = on_all(everyone, lambda: self._solve(parameters, self._base))
+        reached = self._values(solved)
         if not self._scaled:
             self.comparison, self._scaled = self.comparison.relative_to(reached), True
         compared, values = self.comparison, reached + self.correction
         residuals, inequalities = compared.residuals(values), compared.inequalities(values)
         value = 0.5 * float(residuals @ residuals) + compared.plain(values) + model(parameters).value
         # decisions may depend on its last bit
-        height = everyone.bcast(merit(value, inequalities, penalties), root=0)
-        if height > below:
-            raise TooHigh(height)
+        reached_merit = everyone.bcast(merit(value, inequalities, penalties), root=0)
+        if reached_merit > below:
+            raise TooHigh(reached_merit)
         with self._clock.phase("gradients"):
             try:
-                rows = self._gathered(on_all(everyone, lambda: self._rest.gradient(placement, self._fields(known))))
+                rows = self._gathered(on_all(everyone, lambda: self._rest.gradient(placement, self._fields(solved))))
             except ShapeError as error:
                 raise Infeasible(str(error)) from error
-        self._base = _Base(placement, known)
+        self._base = _Base(placement, solved)
         self.reached, self._rows = reached, rows
         by_residuals, by_plain, by_inequalities = compared.slopes(rows)
         return Evaluation(
@@ -155,7 +155,7 @@ class Objective:
     def estimates(self) -> np.ndarray:
         """Estimated discretisation errors of the best design so far, to be added to its values, (components,)."""
         with self._clock.phase("estimates"):
-            estimates = on_all(self._group.everyone, lambda: self._equilibria.errors(self._best.known))
+            estimates = on_all(self._group.everyone, lambda: self._equilibria.errors(self._best.solved))
         return self._gathered(estimates[:, None])[:, 0]
 
     def sensitivities(self) -> np.ndarray:
@@ -172,13 +172,13 @@ class Objective:
         assert self._base is not None, "no design was evaluated yet"
         return self._base
 
-    def _values(self, known: Known) -> np.ndarray:
-        return self._gathered(self._equilibria.values(known)[:, None])[:, 0]
+    def _values(self, solved: DesignEquilibria) -> np.ndarray:
+        return self._gathered(self._equilibria.values(solved)[:, None])[:, 0]
 
-    def _fields(self, known: Known) -> np.ndarray:
-        return np.array([gradient.design for gradient in self._equilibria.gradients(known)])
+    def _fields(self, solved: DesignEquilibria) -> np.ndarray:
+        return np.array([gradient.design for gradient in self._equilibria.gradients(solved)])
 
-    def _solve(self, parameters: np.ndarray, base: _Base | None) -> tuple[HandlePlacement, Model, Known]:
+    def _solve(self, parameters: np.ndarray, base: _Base | None) -> tuple[HandlePlacement, Model, DesignEquilibria]:
         """Handle placement, model of R and this group's equilibria, followed from those of ``base`` if there is one."""
         with self._clock.phase("handles"):
             try:
@@ -188,8 +188,8 @@ class Objective:
         with self._clock.phase("regularisers"):
             model = self._regulariser.around(self._rest, placement)
         with self._clock.phase("equilibria"):
-            known = self._equilibria.follow(base.known) if base else self._equilibria.trace()
-        return placement, model, known
+            solved = self._equilibria.from_design(base.solved) if base else self._equilibria.from_zero()
+        return placement, model, solved
 
     def _gathered(self, rows: np.ndarray) -> np.ndarray:
         """One row per component from the rows of each group's targets, (components, n)."""
@@ -249,10 +249,10 @@ def split(comm: MPI.Comm, samples: Sequence[int]) -> Group:
     if count == 1:
         return Group(comm, comm, tuple(range(len(samples))))
     mine = comm.rank * count // comm.size
-    parts = comm.Get_attr(_PARTS)
+    parts = comm.Get_attr(_SPLITS)
     if not isinstance(parts, dict):
         parts = {}
-        comm.Set_attr(_PARTS, parts)
+        comm.Set_attr(_SPLITS, parts)
     if count not in parts:
         parts[count] = comm.Split(color=mine, key=comm.rank)
     return Group(comm, parts[count], tuple(k for k, own in enumerate(samples) if max(own, 0) % count == mine))

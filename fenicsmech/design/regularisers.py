@@ -140,34 +140,43 @@ class _Bound:
 
 def _bounds(link: DesignedLink, p: np.ndarray) -> list[_Bound]:
     """The bounds of a link, p its own parameters."""
-    samples, h = link.samples, link.thickness
-    thickness, bend = h * samples.thickness(p), samples.curvature(p)
+    samples, bend = link.samples, link.samples.curvature(p)
     least, most = link.bounds.thickness
+    # thickness over its bound at each sample, for δ = 1
+    lower, upper = (np.broadcast_to(link.thickness / bound, samples.t.shape)[:, None] for bound in (least, most))
+    delta, by_p = samples.thickness(p)[:, None], samples.thickness_gradient
     sharpest, name = Barrier(link.bounds.bend - 0.01, 0.01), f"curvature {link.bounds.bend:g}"
     return [
         _Bound(
-            f"least thickness {least:g}",
-            -thickness,
-            lambda chosen: -h * samples.thickness_gradient[chosen],
-            Barrier(-1.02 * least, 0.02 * least),
+            f"least thickness {_span(least)}",
+            -(lower * delta)[:, 0],
+            lambda chosen: -lower[chosen] * by_p[chosen],
+            Barrier(-1.02, 0.02),
         ),
         _Bound(
-            f"largest thickness {most:g}",
-            thickness,
-            lambda chosen: h * samples.thickness_gradient[chosen],
-            Barrier(0.98 * most, 0.02 * most),
+            f"largest thickness {_span(most)}",
+            (upper * delta)[:, 0],
+            lambda chosen: upper[chosen] * by_p[chosen],
+            Barrier(0.98, 0.02),
         ),
         _Bound(name, bend, lambda chosen: samples.curvature_gradient(p, chosen), sharpest),
         _Bound(name, -bend, lambda chosen: -samples.curvature_gradient(p, chosen), sharpest),
     ]
 
 
+def _span(bound: float | np.ndarray) -> str:
+    """A bound in words, from its least to its largest value along a link."""
+    low, high = (f"{end:g}" for end in (np.min(bound), np.max(bound)))
+    return low if low == high else f"{low} to {high}"
+
+
 @dataclass(frozen=True)
 class MeshQuality(Regulariser):
     """R_mesh = Σ_e β(ρ_e), ρ a cell's circumradius over its inradius; infinite where cells are inverted.
 
-    The constants are the paper's (appendix). A design with inverted cells has no placement at all and is refused
-    before R_mesh is evaluated.
+    The constants are the paper's (appendix). Cells that cannot deform do not count: those of other links, and those
+    that clamps or pins hold at all corners. A design with inverted cells has no placement at all and is refused before
+    R_mesh is evaluated.
 
     Attributes:
         limit: largest aspect ratio without penalty.
@@ -195,9 +204,9 @@ class MeshQuality(Regulariser):
 
         def model(p: np.ndarray) -> Quadratic:
             step = p - placement.p
-            bend = here.curvature @ step
+            curved = here.curvature @ step
             return Quadratic(
-                here.value + float((here.gradient + 0.5 * bend) @ step), here.gradient + bend, here.curvature
+                here.value + float((here.gradient + 0.5 * curved) @ step), here.gradient + curved, here.curvature
             )
 
         return model if here.value else lambda p: Quadratic.zero(size)

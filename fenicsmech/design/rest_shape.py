@@ -3,21 +3,24 @@
     p → θ*(p) → d(p, θ*(p)) → X = X₀ + c + d
 
 with the handle positions θ, the design field d and the bulge c of the drawn edges. Handle positions are best for the
-straight cells between the vertices. Edges of the outline follow the design between them too, their middles without the
-part along the chord; a design whose curved cells are squeezed too much has no rest shape.
+straight cells between the vertices. Links drawn by an outline keep their drawn shape at the initial design p₀: their
+handles are at θ₀ + θ*(p) − θ*(p₀), where those of strips are at θ*(p), since handles that move along a link of varying
+thickness, or turn about an eye, change its outline. Edges of the outline follow the design between them too, their
+middles without the part along the chord; a design whose curved cells are squeezed too much has no rest shape.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
-from fenicsmech.compat import cell_dofs, vector_space
-from fenicsmech.design.description import Bounds, SplineDesign, shape_request
+from fenicsmech.compat import cell_dofs, original_cells, vector_space
+from fenicsmech.design.description import Bounds, SplineDesign, shape_requests
 from fenicsmech.design.shape.edges import MidEdgeNodes
 from fenicsmech.design.shape.handle_optimum import HandleOptimum, HandlePlacement, ShapeError
 from fenicsmech.design.shape.quality import Barrier, QualitySum
@@ -37,16 +40,18 @@ class DesignedLink:
         place: its entries of p.
         spline: its centreline and thickness.
         samples: parameters at which they are bounded.
-        thickness: in the plane, where δ = 1.
+        thickness: in the plane, where δ = 1; at the samples where it is not the same everywhere.
         bounds: of fabrication.
+        centreline: points that the drawn centreline runs through, (k, 2).
     """
 
     name: str
     place: slice
     spline: LinkSpline
     samples: SplineSamples
-    thickness: float
+    thickness: float | np.ndarray
     bounds: Bounds
+    centreline: np.ndarray
 
 
 _LEAST_STRETCH = 0.1  # least det ∂X/∂X₁ in a cell, X₁ the straight cell; of the drawn shape it is at least 0.3
@@ -63,7 +68,7 @@ class ParametricShape:
     Attributes:
         links: the links that change.
         initial: p of the drawn design, (parameters,).
-        lengths: typical change ℓ of each parameter, (parameters,): a link's thickness; 1 for δ.
+        lengths: typical change ℓ of each parameter, (parameters,): a link's median thickness; 1 for δ.
 
     Raises:
         DescriptionError: the drawn thickness of a link is not within its bounds.
@@ -77,6 +82,7 @@ class ParametricShape:
         self._straight = fem.Function(vector_space(model.mesh.mesh, 1))
         self._vertex_map = ShapeMap(model.mesh, self._straight, shapes)
         self._ratio = QualitySum(self._straight, comm=model.mesh.comm)
+        self._deformable = _deformable(model, {shape.link for shape in shapes})
         self._optimum = HandleOptimum(self._vertex_map, self._ratio)
         ends, dim = node_ends(design.function_space), model.mesh.vertices.shape[1]
         drawn = model.mesh.vertices[ends].mean(axis=1)
@@ -89,17 +95,20 @@ class ParametricShape:
         for shape, wanted in zip(shapes, designs, strict=True):
             spline, h = shape.handles.spline, shape.thickness
             place = slice(first, first := first + spline.size)
-            links.append(DesignedLink(wanted.link.name, place, spline, SplineSamples(spline), h, wanted.bounds(h)))
+            samples, bounds = SplineSamples(spline), wanted.bounds(h)
+            links.append(DesignedLink(wanted.link.name, place, spline, samples, h, bounds, shape.centreline))
         self.links = tuple(links)
-        self.lengths = np.concatenate([np.where(s.spline.is_thickness, 1.0, s.thickness) for s in self.links])
+        self.lengths = np.concatenate(
+            [np.where(s.spline.is_thickness, 1.0, np.median(s.thickness)) for s in self.links]
+        )
 
     @staticmethod
     def of(simulation: Simulation, designs: Sequence[SplineDesign]) -> ParametricShape:
         """The rest shape of a simulation's links, handles and weights computed on its mesh."""
-        requests = [shape_request(design, simulation.scene.mechanism, simulation.linkage) for design in designs]
-        return ParametricShape(simulation.model, shape_links(simulation.model.mesh, requests), designs)
+        shapes = shape_links(simulation.model.mesh, shape_requests(designs, simulation))
+        return ParametricShape(simulation.model, shapes, designs)
 
-    def known(self, p: np.ndarray, theta: np.ndarray) -> HandlePlacement | None:
+    def placement_from(self, p: np.ndarray, theta: np.ndarray) -> HandlePlacement | None:
         """A placement to start from, for handle positions found before; None if their number has changed."""
         if theta.shape != self._map.initial_theta.shape:
             return None
@@ -119,17 +128,33 @@ class ParametricShape:
         Raises:
             ShapeError: cells stay inverted however the handles are placed, or curved ones are squeezed.
         """
+        lag = self._lag
         placement = self._optimum.solve(p, near)
-        self._model.reshape(self._placed(placement))
+        self._model.reshape(self._placed(placement, lag))
         return placement
 
     def field(self, p: np.ndarray, near: HandlePlacement | None) -> np.ndarray:
         """This rank's values of the design field for ``p``, ghosts last, flat; the links keep the shape they have."""
-        return self._placed(self._optimum.solve(p, near))
+        lag = self._lag
+        return self._placed(self._optimum.solve(p, near), lag)
 
-    def _placed(self, placement: HandlePlacement) -> np.ndarray:
+    @cached_property
+    def _lag(self) -> np.ndarray:
+        """θ*(p₀) − θ₀ of links drawn by an outline, 0 of others, (handles,)."""
+        drawn = self._map.initial_theta
+        outlined = np.repeat(*np.transpose([(np.ndim(own.thickness), len(own.handles)) for own in self._map.shapes]))
+        if not np.any(outlined):
+            return np.zeros_like(drawn)
+        return np.where(outlined, self._optimum.solve(self.initial).theta - drawn, 0.0)
+
+    def _placed(self, placement: HandlePlacement, lag: np.ndarray) -> np.ndarray:
         """The design field of a placement, this rank's values, ghosts last, flat."""
-        field, elastic, mesh = self._map.field(placement.p, placement.theta), self._model.elastic, self._model.mesh
+        theta, elastic, mesh = placement.theta - lag, self._model.elastic, self._model.mesh
+        field = self._map.field(placement.p, theta)
+        if np.any(lag):
+            self._straight.x.array[:] = self._vertex_map.field(placement.p, theta).ravel()
+            if self._ratio.value() == np.inf:
+                raise ShapeError("rest shape", "it inverts cells", "Change it by less, or mesh it finer")
         if self._middles is not None:
             field = self._middles.placed(field)
             bent = field if elastic.bulge is None else field + elastic.bulge.x.array.reshape(field.shape)
@@ -145,22 +170,41 @@ class ParametricShape:
     def gradient(self, placement: HandlePlacement, nodal: np.ndarray) -> np.ndarray:
         """dO/dp (…, parameters) from ∂O/∂d (…, owned values) of the design placed as in ``placement``."""
         fields = nodal.reshape(*nodal.shape[:-1], self._map.owned, -1)
+        theta = placement.theta - self._lag
         if self._middles is not None:
-            fields = self._middles.apply_transpose(self._map.field(placement.p, placement.theta), fields)
-        by_p, by_theta = self._map.apply_transpose(placement.p, placement.theta, fields)
+            fields = self._middles.apply_transpose(self._map.field(placement.p, theta), fields)
+        by_p, by_theta = self._map.apply_transpose(placement.p, theta, fields)
         return self._optimum.total_gradient(placement, by_p, by_theta)
 
     def worst_ratio(self) -> float:
-        """Largest ρ among the cells of the present rest shape."""
+        """Largest ρ among the cells of the present rest shape that can deform."""
         self._straight.interpolate(self._model.elastic.d)
-        worst = float(self._ratio.cell_values().max(initial=0.0))
+        worst = float(self._ratio.cell_values()[self._deformable].max(initial=0.0))
         return self._model.mesh.mesh.comm.allreduce(worst, op=MPI.MAX)
 
     def quality_penalty(self, barrier: Barrier, placement: HandlePlacement) -> tuple[float, np.ndarray]:
-        """Σ_e β(ρ_e) of the present rest shape, and its derivative by p."""
+        """Σ_e β(ρ_e) over the cells of the present rest shape that can deform, and its derivative by p."""
         if barrier not in self._penalties:
-            self._penalties[barrier] = QualitySum(self._straight, barrier.symbolic)
+            self._penalties[barrier] = QualitySum(self._straight, barrier.symbolic, counts=self._deformable)
         total = self._penalties[barrier]
         self._straight.interpolate(self._model.elastic.d)
-        by_p, by_theta = self._vertex_map.apply_transpose(placement.p, placement.theta, total.gradient())
+        by_p, by_theta = self._vertex_map.apply_transpose(placement.p, placement.theta - self._lag, total.gradient())
         return total.value(), self._optimum.total_gradient(placement, by_p, by_theta)
+
+
+def _deformable(model: MechanismModel, links: Set[int]) -> np.ndarray:
+    """Mask of the local cells of ``links`` that a design can deform, ghosts last, (cells,).
+
+    Cells with all corners on one interface move as a rigid body, whether it holds them or they lie between cells that
+    it holds.
+    """
+    mesh = model.mesh
+    own = original_cells(mesh.mesh)
+    corners, held = mesh.cells[own], mesh.interface >= 0
+    holder = np.full(len(mesh.vertices), -1)
+    # interfaces have no vertex in common; those held by a cell of another process count too
+    for cells, numbers in mesh.comm.allgather((corners[held], mesh.interface[held])):
+        holder[cells] = numbers[:, None]
+    there = holder[corners]
+    rigid = (there[:, 0] >= 0) & np.all(there == there[:, :1], axis=1)
+    return np.isin(mesh.link, list(links)) & ~rigid

@@ -40,7 +40,7 @@ class LinkDesign:
         controls: position and thickness (x, y, δ), then tangent, of every control point, (points, 2, 3).
         thickness: least and largest thickness in the plane.
         bend: largest curvature ratio.
-        centreline: points that the drawn centreline runs through, if they were given.
+        centreline: points that the drawn centreline runs through, as given, drawn or found.
     """
 
     name: str
@@ -156,7 +156,7 @@ class DesignResult:
         corrections: largest change of the corrections after each round, over the targets' scales; of a surrogate that
             was given up first.
         iterations, evaluations: of the objective.
-        mesh_ratio_max: largest circumradius over inradius among the cells.
+        mesh_ratio_max: largest circumradius over inradius among the cells that can deform.
         seconds: wall-clock time.
         phases: the same by phase, on the first process: setup, weights, handles, regularisers, equilibria, gradients,
             verification; the rest is the optimiser's own.
@@ -228,7 +228,7 @@ class DesignResult:
             [SplineDesign(links[own.name], len(own.controls) - 1, centreline=own.centreline) for own in self.links],
         )
         p, theta = (np.concatenate(own) for own in zip(*((o.parameters, o.handles) for o in self.links), strict=True))
-        return rest.field(p, rest.known(p, theta))
+        return rest.field(p, rest.placement_from(p, theta))
 
     def save(self, path: str | Path, *, comm: MPI.Comm = MPI.COMM_WORLD) -> None:
         """Writes the result as JSON.
@@ -332,13 +332,11 @@ def component_values(components: np.ndarray) -> Value:
     return own[0] if len(own) == 1 else own
 
 
-def link_designs(
-    rest: ParametricShape, wanted: Sequence[SplineDesign], placement: HandlePlacement
-) -> tuple[LinkDesign, ...]:
+def link_designs(rest: ParametricShape, placement: HandlePlacement) -> tuple[LinkDesign, ...]:
     """The shapes of all links at a placement."""
     designs = []
-    for link, design, handles in zip(rest.links, wanted, rest.handles(placement), strict=True):
-        own, drawn = placement.p[link.place], design.centreline
+    for link, handles in zip(rest.links, rest.handles(placement), strict=True):
+        own = placement.p[link.place]
         thickness, bend = link.thickness * link.samples.thickness(own), link.samples.curvature(own)
         designs.append(
             LinkDesign(
@@ -348,7 +346,7 @@ def link_designs(
                 controls=tuple(tuple(map(tuple, point)) for point in link.spline.controls_at(own).tolist()),
                 thickness=(float(thickness.min()), float(thickness.max())),
                 bend=float(np.abs(bend).max(initial=0.0)),
-                centreline=None if drawn is None else tuple(tuple(map(float, point)) for point in drawn),
+                centreline=tuple(map(tuple, link.centreline.tolist())),
             )
         )
     return tuple(designs)

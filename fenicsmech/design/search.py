@@ -44,7 +44,7 @@ class Scatter:
         spread: largest change of a parameter, in typical lengths: a link's thickness. Thicknesses change by half of
             the way to the nearer bound at most.
         seed: other seeds give other starts.
-        draws: most shapes drawn for a start until one is feasible.
+        attempts: most shapes tried for a start until one is feasible.
         trial: iterations after which the worse half is given up, but for designs that meet their targets.
         distinct: designs are one if no parameter differs by more typical lengths.
 
@@ -55,12 +55,12 @@ class Scatter:
     starts: int = 16
     spread: float = 2.0
     seed: int = 0
-    draws: int = 20
+    attempts: int = 20
     trial: int = 6
     distinct: float = 1.0
 
     def __post_init__(self) -> None:
-        for name, least in (("starts", 1), ("seed", 0), ("draws", 1), ("trial", 1)):
+        for name, least in (("starts", 1), ("seed", 0), ("attempts", 1), ("trial", 1)):
             value = getattr(self, name)
             if not isinstance(value, int) or value < least:
                 raise DescriptionError("search", f"{name} is {value!r}", f"Give a whole number of at least {least}")
@@ -74,7 +74,7 @@ class StartResult:
 
     Attributes:
         number: 0 is the drawn design.
-        rejected: shapes drawn before it that were not feasible.
+        rejected: shapes tried before it that were not feasible.
         failure: the reason why it has no value; None if it has.
         given_up: whether it was ended early, for others were better.
         result: the design it led to; None if it has no value.
@@ -209,8 +209,8 @@ class Search:
         """
         with Progress(2.0 * self._scatter.starts, "search", shown=self._comm.rank == 0) as progress:
             tried = self._shared("trial", self._tried, progress)
-            hopeful = promising(tried, self._problem.targets)
-            ends = self._shared("end", lambda k: self._ended(tried[k], hopeful), progress)
+            continued = better_half(tried, self._problem.targets)
+            ends = self._shared("end", lambda k: self._ended(tried[k], continued), progress)
         return outcome(ends, self._problem.targets, self._rest.lengths, self._scatter.distinct)
 
     def _shared(self, stage: str, work: Callable[[int], StartResult], progress: Progress) -> list[StartResult]:
@@ -241,16 +241,16 @@ class Search:
 
     def _tried(self, k: int) -> StartResult:
         """A start after its trial."""
-        p, rejected = self._drawn(k)
+        p, rejected = self._scattered(k)
         if p is None:
-            return StartResult(k, rejected, "no feasible shape was drawn", False, None)
+            return StartResult(k, rejected, "no feasible shape was found", False, None)
         return self._optimised(k, rejected, replace(self._optimiser, iterations=self._scatter.trial), p)
 
-    def _ended(self, tried: StartResult, hopeful: set[int]) -> StartResult:
+    def _ended(self, tried: StartResult, continued: set[int]) -> StartResult:
         """The end of a start that was tried."""
         if tried.result is None or not _unfinished(tried.result):
             return tried
-        if tried.number not in hopeful:
+        if tried.number not in continued:
             return replace(tried, given_up=True)
         return self._optimised(tried.number, tried.rejected, self._optimiser, tried.result)
 
@@ -262,18 +262,18 @@ class Search:
         except EquilibriumError as failure:
             return StartResult(k, rejected, str(failure), False, None)
 
-    def _drawn(self, k: int) -> tuple[np.ndarray | None, int]:
+    def _scattered(self, k: int) -> tuple[np.ndarray | None, int]:
         """Parameters of a start, None if no shape was feasible, and the number of shapes rejected before."""
         rest, scatter = self._rest, self._scatter
         if k == 0:
             return rest.initial, 0
         reach = np.concatenate([_reach(link, scatter.spread) for link in rest.links]) * rest.lengths
-        for draw in range(scatter.draws):
-            scattered = qmc.LatinHypercube(len(reach), seed=np.random.default_rng([scatter.seed, draw]))
+        for attempt in range(scatter.attempts):
+            scattered = qmc.LatinHypercube(len(reach), seed=np.random.default_rng([scatter.seed, attempt]))
             p = rest.initial + (2.0 * scattered.random(scatter.starts)[k] - 1.0) * reach
             if self._feasible(p):
-                return p, draw
-        return None, scatter.draws
+                return p, attempt
+        return None, scatter.attempts
 
     def _feasible(self, p: np.ndarray) -> bool:
         """Whether links are within their bounds, do not cross themselves, and have no inverted cells."""
@@ -291,7 +291,8 @@ class Search:
 
 def _reach(link: DesignedLink, spread: float) -> np.ndarray:
     """Largest changes of a link's parameters, in typical lengths."""
-    least, most = (bound / link.thickness for bound in link.bounds.thickness)
+    relative = [bound / link.thickness for bound in link.bounds.thickness]
+    least, most = float(np.max(relative[0])), float(np.min(relative[1]))
     return np.where(link.spline.is_thickness, min(spread, 0.5 * min(1.0 - least, most - 1.0)), spread)
 
 
@@ -299,7 +300,9 @@ def _outline(link: DesignedLink, p: np.ndarray) -> np.ndarray:
     """Both edges of a link as a polygon, p its own parameters, (n, 2)."""
     t = np.linspace(0.0, link.spline.segments, 20 * link.spline.segments + 1)
     points, (dx, dy, _) = link.spline.evaluate(p, t), link.spline.derivative(p, t).T
-    across = np.stack([-dy, dx], axis=1) / np.hypot(dx, dy)[:, None] * (0.5 * link.thickness * points[:, 2:])
+    samples = link.samples.t
+    drawn = np.interp(t, samples, np.broadcast_to(link.thickness, samples.shape))[:, None]
+    across = np.stack([-dy, dx], axis=1) / np.hypot(dx, dy)[:, None] * (0.5 * drawn * points[:, 2:])
     return np.concatenate([points[:, :2] + across, (points[:, :2] - across)[::-1]])
 
 
@@ -336,7 +339,7 @@ def _ordered(starts: Sequence[StartResult], targets: Sequence[Target]) -> list[t
     return [ended[k] for k in order]
 
 
-def promising(tried: Sequence[StartResult], targets: Sequence[Target]) -> set[int]:
+def better_half(tried: Sequence[StartResult], targets: Sequence[Target]) -> set[int]:
     """Numbers of the better half of the starts that have a value, and of those that meet their targets."""
     ordered = _ordered(tried, targets)
     half = (len(ordered) + 1) // 2

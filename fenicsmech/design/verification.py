@@ -84,13 +84,13 @@ def verified_parts(result: DesignResult, part: Simulation, targets: Sequence[Tar
     comparison, measured = Comparison(targets, part.scene.units), [t for t in targets if t.quantity.of_part]
     equilibria = SampleEquilibria(part, measured)
     try:
-        known = equilibria.trace()
+        solved = equilibria.from_zero()
     except Infeasible as failure:
         _log.warning("the exported parts do not reach all targets: %s", failure)
         return result
     of_part = np.repeat([target.quantity.of_part for target in targets], [target.size for target in targets])
     values, adds = (np.full(comparison.size, np.nan) for _ in range(2))
-    values[of_part], adds[of_part] = equilibria.values(known), equilibria.errors(known)
+    values[of_part], adds[of_part] = equilibria.values(solved), equilibria.errors(solved)
     errors, found = comparison.errors(values + adds), []
     for own, target, place, error in zip(result.targets, targets, comparison.places, errors, strict=True):
         pair = component_values(values[place]), component_values(adds[place])

@@ -228,9 +228,9 @@ class _Points(PosePotential):
         point, inside, offsets, motion = self._touching(poses)
         normal = self._gap.gradient(*point)[:, 0]
         slope = np.einsum("ni,nia->na", normal, motion)
-        bend = np.einsum("nij,nia,njb->ab", self._gap.hessian(*point, inside[:, None]), motion, motion)
+        hessian = np.einsum("nij,nia,njb->ab", self._gap.hessian(*point, inside[:, None]), motion, motion)
         turn = self._space.displacement_hessian(poses[self.bodies[0]], (inside[:, None] * normal).T @ offsets)
-        return self._stiffness * (slope.T @ slope - bend - turn)
+        return self._stiffness * (slope.T @ slope - hessian - turn)
 
     @cached_property
     def _gap(self) -> SmoothFunction:

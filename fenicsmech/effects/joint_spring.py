@@ -88,6 +88,6 @@ class _Spring(PosePotential):
         return (self._stiffness * self._coordinate.value(poses) - self._moment) * self._coordinate.gradient(poses)
 
     def hessian(self, poses):
-        slope, bend = self._coordinate.gradient(poses), self._coordinate.hessian(poses)
-        pull = self._stiffness * self._coordinate.value(poses) - self._moment
-        return self._stiffness * np.outer(slope, slope) + pull * bend
+        slope, hessian = self._coordinate.gradient(poses), self._coordinate.hessian(poses)
+        moment = self._stiffness * self._coordinate.value(poses) - self._moment
+        return self._stiffness * np.outer(slope, slope) + moment * hessian

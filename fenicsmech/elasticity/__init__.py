@@ -3,10 +3,10 @@
 - ``models``: assumptions about the third dimension (3D, whole or half; plane strain, plane stress) and about links
   of nearly incompressible material (displacement or u–p formulation)
 - ``fields``: shape, displacement, pressure, parameters of laws, growth
-- ``body``: energy, residual, tangent and stress of all links, and the stress predicted by a Newton step
+- ``body``: energy, residual, stiffness and stress of all links, and the stress predicted by a Newton step
 """
 
-from fenicsmech.elasticity.body import ElasticBody, MixedStress
+from fenicsmech.elasticity.body import ElasticBody, PredictedStress
 from fenicsmech.elasticity.fields import PressureField, Stretch
 from fenicsmech.elasticity.models import (
     LOCKING,

@@ -1,4 +1,4 @@
-"""Energy, residual, tangent and stress of all flexible links on the fixed reference mesh.
+"""Energy, residual, stiffness and stress of all flexible links on the fixed reference mesh.
 
 With the rest shape X = X₀ + c + d and the gradient H = F − I of ``fields``,
 
@@ -11,7 +11,7 @@ minimum in u, a maximum in p.
 A step of Newton's method that turns a slender link also stretches it, at second order, and stretching is stiffer than
 bending by the square of length over thickness: the stress S(u + δu) of the displacements is then far larger than the
 one that the step solved for, S(u) + ∂S/∂E : δE with δE = sym(Fᵀ ∇δu). Newton's method with S as an unknown of its own
-at the integration points, S eliminated, has the same residual as the one in displacements, and the tangent
+at the integration points, S eliminated, has the same residual as the one in displacements, and the stiffness
 
     K_uu + ∫ ∇v ΔS : ∇w dV,     ΔS = S(u) + ∂S/∂E : δE − S(u + δu),
 
@@ -125,7 +125,7 @@ class ElasticBody(BodyFields):
         return [compile_form(residual) for residual in self._residuals_ufl]
 
     @cached_property
-    def tangent_forms(self) -> list[list]:
+    def stiffness_forms(self) -> list[list]:
         """∂²E/∂(u, p)², block by block."""
         return [[compile_form(ufl.derivative(row, field)) for field in self.fields] for row in self._residuals_ufl]
 
@@ -149,7 +149,7 @@ class ElasticBody(BodyFields):
 
     def compile(self) -> None:
         """Compiles all forms of equilibria."""
-        _ = self.energy_form, self.residual_forms, self.tangent_forms
+        _ = self.energy_form, self.residual_forms, self.stiffness_forms
 
     # -- values -------------------------------------------------------------------------------------------------
 
@@ -181,18 +181,18 @@ class ElasticBody(BodyFields):
             part[:] = assemble_vector(form, work)
         return found
 
-    def create_tangent(self) -> PETSc.Mat:
-        """An empty matrix for ``tangent``: per rank, the owned values of u, then those of p."""
+    def create_stiffness(self) -> PETSc.Mat:
+        """An empty matrix for ``add_stiffness``: per rank, the owned values of u, then those of p."""
         if self.pressure is None:
-            return petsc.create_matrix(self.tangent_forms[0][0])
-        return create_block_matrix(self.tangent_forms)
+            return petsc.create_matrix(self.stiffness_forms[0][0])
+        return create_block_matrix(self.stiffness_forms)
 
-    def tangent(self, matrix: PETSc.Mat) -> None:
+    def add_stiffness(self, matrix: PETSc.Mat) -> None:
         """Adds ∂²E/∂(u, p)² into ``matrix`` and leaves it unassembled."""
         if self.pressure is None:
-            petsc.assemble_matrix(matrix, self.tangent_forms[0][0])
+            petsc.assemble_matrix(matrix, self.stiffness_forms[0][0])
         else:
-            add_blocks(matrix, self.tangent_forms)
+            add_blocks(matrix, self.stiffness_forms)
 
     @cached_property
     def pressure_unit(self) -> float:
@@ -222,7 +222,7 @@ class ElasticBody(BodyFields):
         return [compile_expression(ufl.sqrt(1.5 * ufl.inner(s, s)), midpoint, self.mesh.comm) for s in stresses]
 
 
-class MixedStress:
+class PredictedStress:
     """ΔS of the last step of Newton's method, at the displacements that ``body`` holds.
 
     Args:
@@ -241,7 +241,7 @@ class MixedStress:
             stiffness.append(ufl.inner(ufl.dot(w, change), v) * measure)
         self._forces, self._stiffness = compile_form(_sum(forces)), compile_form(_sum(stiffness))
 
-    def follow(self, before: np.ndarray, motion: np.ndarray) -> None:
+    def take(self, before: np.ndarray, motion: np.ndarray) -> None:
         """Takes the displacements u before the step, and the step δu, of this rank's owned nodes, flat."""
         for field, values in ((self._before, before), (self._motion, motion)):
             owned_values(field)[:] = values
@@ -251,7 +251,7 @@ class MixedStress:
         """∫ F ΔS : ∇v dV, this rank's owned values, flat."""
         return self._body.assembled(self._forces)
 
-    def tangent(self, matrix: PETSc.Mat) -> None:
+    def add_stiffness(self, matrix: PETSc.Mat) -> None:
         """Adds ∫ ∇v ΔS : ∇w dV into ``matrix`` and leaves it unassembled."""
         petsc.assemble_matrix(matrix, self._stiffness)
 

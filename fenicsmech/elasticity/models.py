@@ -119,7 +119,7 @@ class PlaneStress(PlaneStrain):
 
         The error of the energy is the square of that of h, and each step squares this in turn: three leave rounding
         up to stretches of 1.5, and 1e-8 of the stress at 2 (tests/elasticity/test_new_law.py). h is an expression:
-        tangents are those of these energies, and take long to compile.
+        stiffnesses are those of these energies, and take long to compile.
         """
         h = NeoHookean(1.0, 0.0).with_parameters({"E": law.E, "nu": law.nu}).contraction(H)
         for _ in range(3):

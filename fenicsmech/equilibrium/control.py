@@ -59,11 +59,11 @@ class Control(ABC):
     the control that prescribes their conjugate, ``change``, ``conjugate`` and ``moves``.
 
     Attributes:
-        target: the value.
+        prescribed: the value.
         along_path: whether a plane across a path is prescribed, where equilibria of any stability are wanted.
     """
 
-    target: float
+    prescribed: float
     along_path = False
 
     @property
@@ -71,9 +71,9 @@ class Control(ABC):
         """Whether f is the multiplier of a constraint on the displacement."""
         return False
 
-    def at(self, target: float) -> Self:
-        """The same control with another target."""
-        return replace(self, target=target)
+    def at(self, value: float) -> Self:
+        """The same control with another prescribed value."""
+        return replace(self, prescribed=value)
 
     @abstractmethod
     def value(self, system, state: State) -> float:
@@ -85,18 +85,18 @@ class Control(ABC):
 
     def gap(self, system, state: State) -> float:
         """Residual of the constraint on the displacement, at a loaded state."""
-        return system.load_displacement(state) - self.target
+        return system.load_displacement(state) - self.prescribed
 
     @abstractmethod
     def rate(self, system, state: State) -> PETSc.Vec:
-        """r: right-hand side whose solution is the rate of x with the target."""
+        """r: right-hand side whose solution is the rate of x with the prescribed value."""
 
     def tangent(self, step: Step) -> Step:
-        """The rate of the whole state with the target, from the ``step`` that solves for its unknowns."""
+        """The rate of the whole state with the prescribed value, from the ``step`` that solves for its unknowns."""
         return step
 
     def conjugate_rate(self, system, right: PETSc.Vec, x: PETSc.Vec, tangent: Step) -> float:
-        """Rate q′ of the conjugate with the target: r · x′ if q = −∂L/∂v."""
+        """Rate q′ of the conjugate with the prescribed value: r · x′ if q = −∂L/∂v."""
         return right.dot(x)
 
     def rates(self, system, right: PETSc.Vec, x: PETSc.Vec) -> tuple[Step, float]:
@@ -111,15 +111,15 @@ class Control(ABC):
 
 @dataclass(frozen=True)
 class LoadControl(Control):
-    """The force has magnitude ``target``."""
+    """The force has magnitude ``prescribed``."""
 
-    target: float = 0.0
+    prescribed: float = 0.0
 
     def value(self, system, state):
         return state.force
 
     def prepare(self, state):
-        return replace(state, force=self.target)
+        return replace(state, force=self.prescribed)
 
     def rate(self, system, state):
         return system.travel_gradient(system.controlled, state)
@@ -155,9 +155,9 @@ class LoadControl(Control):
 
 @dataclass(frozen=True)
 class DisplacementControl(Control):
-    """The force makes its point move by ``target`` along its direction."""
+    """The force makes its point move by ``prescribed`` along its direction."""
 
-    target: float = 0.0
+    prescribed: float = 0.0
 
     @property
     def constrained(self):
@@ -179,20 +179,20 @@ class DisplacementControl(Control):
 
 @dataclass(frozen=True, eq=False)
 class MotorControl(Control):
-    """Motors stand at ``target`` · ``direction`` and the others where they are; the force keeps its magnitude.
+    """Motors stand at ``prescribed`` · ``direction`` and the others where they are; the force keeps its magnitude.
 
     Attributes:
-        direction: d, motor values per unit of the target, (connections,).
+        direction: d, motor values per unit of the prescribed value, (connections,).
     """
 
-    target: float
+    prescribed: float
     direction: np.ndarray
 
     def value(self, system, state):
         return self._along(state.motors)
 
     def prepare(self, state):
-        return replace(state, motors=np.where(self.direction, self.target * self.direction, state.motors))
+        return replace(state, motors=np.where(self.direction, self.prescribed * self.direction, state.motors))
 
     def rate(self, system, state):
         constraints, poses = system.joints.motor_rate(state.poses, state.motors, state.multipliers, self.direction)
@@ -229,15 +229,15 @@ class MotorControl(Control):
 
 @dataclass(frozen=True)
 class LoadFactorControl(Control):
-    """Constant loads and effects act with the factor ``target``."""
+    """Constant loads and effects act with the factor ``prescribed``."""
 
-    target: float = 0.0
+    prescribed: float = 0.0
 
     def value(self, system, state):
         return state.load_factor
 
     def prepare(self, state):
-        return replace(state, load_factor=self.target)
+        return replace(state, load_factor=self.prescribed)
 
     def rate(self, system, state):
         return system.load_factor_rate(state)
@@ -277,7 +277,7 @@ class ArcMetric:
 
 @dataclass(frozen=True, eq=False)
 class ArcLengthControl(Control):
-    """The state lies in a plane normal to a path: ⟨n, y − y₀⟩ = ``target``.
+    """The state lies in a plane normal to a path: ⟨n, y − y₀⟩ = ``prescribed``.
 
     Attributes:
         metric: ⟨·, ·⟩.
@@ -287,7 +287,7 @@ class ArcLengthControl(Control):
             conjugate.
     """
 
-    target: float
+    prescribed: float
     metric: ArcMetric
     origin: State
     normal: Step
@@ -325,5 +325,5 @@ class ArcLengthControl(Control):
         rate = self.held.tangent(system.unknowns.step(x))
         # the value that the correction itself changes is left to the next iteration
         off = system.difference(state, self.origin) + replace(correction, force=0.0)
-        gap = self.metric.dot(self.normal, off) - self.target
+        gap = self.metric.dot(self.normal, off) - self.prescribed
         return correction + rate.scaled(-gap / self.metric.dot(self.normal, rate))

@@ -37,7 +37,7 @@ class KktMatrix:
 
     Attributes:
         version: number of linearisations and shifts so far.
-        extended: K̂, to which elastic stiffness may be added between ``tangent`` and ``linearise``.
+        extended: K̂, to which elastic stiffness may be added between ``set_stiffness`` and ``linearise``.
     """
 
     def __init__(
@@ -57,14 +57,14 @@ class KktMatrix:
         # G of the border, K̂ G of it, Gᵀ K̂ G of it
         self._border_map, self._images, self._border_columns = PETSc.Mat(), PETSc.Mat(), PETSc.Mat()
 
-    def tangent(self) -> None:
+    def set_stiffness(self) -> None:
         """Sets K̂ to ∂²E/∂u² of the present fields."""
         with self._clock.phase("assemble"):
             self.extended.zeroEntries()
-            self._elastic.tangent(self.extended)
+            self._elastic.add_stiffness(self.extended)
 
     def linearise(self, entries: Entries) -> None:
-        """Adds the ``entries`` of the border to the tangent in K̂, without shift and softness."""
+        """Adds the ``entries`` of the border to the stiffness in K̂, without shift and softness."""
         with self._clock.phase("assemble"):
             self.extended.assemble()
             if self._rows.last:
@@ -175,8 +175,8 @@ def create_extended_matrix(
 
     Holds ∂²E/∂(u, p)² of the current fields.
     """
-    fem = elastic.create_tangent()
-    elastic.tangent(fem)
+    fem = elastic.create_stiffness()
+    elastic.add_stiffness(fem)
     fem.assemble()
     starts, columns, values = fem.getValuesCSR()
     lgmap = fem.getLGMap()

@@ -1,6 +1,6 @@
 """The KKT matrix at an equilibrium and its factor LDLᵀ: rates along paths, stability, adjoints.
 
-The equilibrium y solves F(y, p) = Gᵀ ∇L = 0. With the KKT matrix K = ∂F/∂y, the rate y′ with the target of a control
+The equilibrium y solves F(y, p) = Gᵀ ∇L = 0. With the KKT matrix K = ∂F/∂y, the rate y′ with the value of a control
 and the adjoint x of a quantity Q solve
 
     K y′ = r,      K x = ∂Q/∂y,     dQ/dp = −xᵀ ∂F/∂p
@@ -27,7 +27,7 @@ from fenicsmech.equilibrium.kkt import KktMatrix
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 
-_EXACT = 1e-10  # relative error that iterative solvers may leave
+_ACCURACY = 1e-10  # relative error that iterative solvers may leave
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,7 @@ class EquilibriumPoint:
     Attributes:
         state: the equilibrium.
         control: under which it was found.
-        tangent: rate of the state with the control's target; with an arc length, the path's direction of norm one.
+        tangent: rate of the state with the control's value; with an arc length, the path's direction of norm one.
         conjugate_rate: that of the control's conjugate along it, or of the conjugate of the value that is followed.
         stability: from the inertia of K.
         iterations: KKT systems factored and solved on the way.
@@ -229,12 +229,12 @@ class Linearisation:
         self._check()
         x = right.duplicate()
         with self._system.clock.phase("solve"):
-            if not self._linear.solve(right, x, _EXACT):
+            if not self._linear.solve(right, x, _ACCURACY):
                 raise NotConverged("the linear solver stalled")
         return x
 
     def rate(self) -> PETSc.Vec:
-        """x′ of the scaled unknowns x with the control's target."""
+        """x′ of the scaled unknowns x with the control's value."""
         return self.solve(self.control_rate())
 
     def control_rate(self) -> PETSc.Vec:
@@ -243,10 +243,10 @@ class Linearisation:
         return self.control.rate(self._system, self.state)
 
     def tangent(self) -> Step:
-        """The rate of the state with the control's target."""
+        """The rate of the state with the control's value."""
         return self.control.tangent(self.step(self.rate()))
 
-    def point(self, residuals: Sequence[float], iterations: int, *, tolerance: float = _EXACT) -> EquilibriumPoint:
+    def point(self, residuals: Sequence[float], iterations: int, *, tolerance: float = _ACCURACY) -> EquilibriumPoint:
         """The equilibrium at this state, with its tangent and stability, from one solve; raises as ``solve``."""
         self._check()
         self._turn()

@@ -17,7 +17,7 @@ and at the new pressures p, with ½ ρ_m |∂E/∂p|² beside it.
 Slender links are far softer in bending than in tension, so a good step may raise every merit for a few iterations:
 steps are taken in full as long as a watchdog allows, then the iteration returns to its best state and searches the
 line. For the same reason ∇²L holds, far from equilibrium, the stress that the last step solved for
-instead of the one its displacements led to (``elasticity.MixedStress``): fewer iterations, and longer
+instead of the one its displacements led to (``elasticity.PredictedStress``): fewer iterations, and longer
 steps converge.
 
 Close to convergence the factor of the KKT matrix K is reused (simplified Newton method),
@@ -63,7 +63,7 @@ class PrimalDualNewton(EquilibriumMethod):
             off, steps descend.
         iterations: most iterations.
         watchdog: iterations in a row that may fail to improve on the best residual.
-        mixed_stress: whether tangents, as long as the residual is large, hold the stress that the last step solved
+        predicted_stress: whether K_uu, as long as the residual is large, holds the stress that the last step solved
             for instead of the one it led to.
         largest_turn: largest rotation (rad), or displacement over the mechanism's length, of one step.
         reuse_factor: largest contraction rate of corrections at which the last factor of K is reused, also for
@@ -78,7 +78,7 @@ class PrimalDualNewton(EquilibriumMethod):
     near: float = 1e-2
     iterations: int = 25
     watchdog: int = 12
-    mixed_stress: bool = True
+    predicted_stress: bool = True
     largest_turn: float = 0.5
     reuse_factor: float = 1e-3
     path_iterations: int = 10
@@ -106,20 +106,20 @@ class NewtonSolver(EquilibriumSolver):
         state, residual = start, system.residual(start, control)
         best, not_better, line_search, diverged = (state, residual), 0, False, None
         last: tuple[State, np.ndarray] | None = None  # where the last step began, and its motion of the nodes
-        residuals, shift, any_stability, mixed, norm = [], least, True, False, math.inf
+        residuals, shift, any_stability, predicted, norm = [], least, True, False, math.inf
         for iteration in range(limit + 1):
             residuals.append(self.relative(residual))
             if self.converged(residual, norm) and iteration > 0:
                 if path:  # critical points are located by its tangent and inertia
                     return self.linearise(state, control, residual).point(residuals, iteration + 1)
-                if mixed or shift > least or options.reuse_factor == 0.0:  # stability is of the true matrix
+                if predicted or shift > least or options.reuse_factor == 0.0:  # stability is of the true matrix
                     self.linearise(state, control, residual, iterations=iteration)
                 return self.accept(state, control, residual, residuals, iteration)
             if iteration == limit:
                 break
             near = path or (any_stability and residuals[-1] < options.near)
-            mixed = last is not None and not near
-            system.linearise(state, control, residual, last if mixed else None)
+            predicted = last is not None and not near
+            system.linearise(state, control, residual, last if predicted else None)
             x, shift = self._direction(residual, least, last=shift, any_stability=near)
             step = self.newton_step(x, state, control, residual)
             _log.debug("iteration %d: residual %.2e, shift %.1e", iteration, residuals[-1], shift)
@@ -134,7 +134,7 @@ class NewtonSolver(EquilibriumSolver):
             except NotConverged as failure:
                 return self.accept_best(*best, control, residuals, failure)
             # pressures of mixed elements are stresses that the step solves for already
-            last = (before, -length * motion) if options.mixed_stress and not system.blocks.pressures.size else None
+            last = (before, -length * motion) if options.predicted_stress and not system.blocks.pressures.size else None
             if near and residual.norm > norm and not self.converged(residual, norm):
                 if diverged is None and self.relative(residual) < options.near:
                     diverged = before  # once may happen: just beyond a bifurcation small residuals hide large motions
@@ -169,7 +169,7 @@ class NewtonSolver(EquilibriumSolver):
                 break
             shift, following = following, 8.0 * following
         else:
-            raise NotConverged("no shift of the tangent gives a direction of descent", 0)
+            raise NotConverged("no shift of the KKT matrix gives a direction of descent", 0)
         return x, shift
 
     def _path_step(self, state: State, control: Control, step: Step, residuals: list[float]) -> tuple[State, Residual]:
@@ -253,5 +253,5 @@ class NewtonSolver(EquilibriumSolver):
         value += 0.5 * stiffness * float(violation @ violation) + 5.0 * system.volume_violation() ** 2
         if control.constrained:
             gap = control.gap(system, state) / system.joints.length
-            value += force * control.target + 0.5 * stiffness * gap**2
+            value += force * control.prescribed + 0.5 * stiffness * gap**2
         return value

@@ -33,7 +33,7 @@ class EquilibriumMethod(ABC):
     Attributes:
         tolerance: residual over the forces that balance in it, at convergence.
         roundoff: residual in units of mean stiffness times the largest displacement (rotations: times length) below
-            which digits are lost; of mean stiffness times length where the tangent is nearly singular.
+            which digits are lost; of mean stiffness times length where the KKT matrix is nearly singular.
         linear: method for the linear systems; by default chosen by their size.
 
     Raises:
@@ -75,7 +75,7 @@ class EquilibriumSolver(ABC):
         """The equilibrium near ``start`` under ``control``.
 
         Args:
-            start: first guess; its least shift is that of all tangents.
+            start: first guess; its least shift is that of all KKT matrices.
             control: the prescribed value.
 
         Raises:
@@ -110,7 +110,7 @@ class EquilibriumSolver(ABC):
             residual = self.system.residual(state, control)
         self.system.linearise(state, control, residual)
         if not self.factor(state.minimum_shift):
-            raise NotConverged("the tangent at the equilibrium cannot be factored", iterations)
+            raise NotConverged("the KKT matrix at the equilibrium cannot be factored", iterations)
         return Linearisation(self.system, self.linear, state, control, residual)
 
     # -- parts of iterations -----------------------------------------------------------------------------------
@@ -180,7 +180,7 @@ class EquilibriumSolver(ABC):
     ) -> EquilibriumPoint:
         """The ``best`` state if its residual is rounding, as at a bifurcation; else raises the ``failure``.
 
-        Rounding is up to 1e-4 of the forces where the tangent is nearly singular.
+        Rounding is up to 1e-4 of the forces where the KKT matrix is nearly singular.
         """
         limit = min(1e-4 * residual.forces, self.options.roundoff * self.system.unknowns.unit)
         if not residual.norm <= limit < math.inf:

@@ -24,7 +24,7 @@ class State:
         force: magnitude f of the controlled force.
         motors: motor value per connection.
         load_factor: σ of the constant loads and effects, 0 … 1.
-        minimum_shift: least shift δ of the tangent, which zero-energy modes need, in units of the mean stiffness.
+        minimum_shift: least shift δ of the KKT matrix, which zero-energy modes need, in units of the mean stiffness.
     """
 
     u: np.ndarray

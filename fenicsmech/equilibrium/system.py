@@ -20,7 +20,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from fenicsmech.compat import destroy_garbage
-from fenicsmech.elasticity import ElasticBody, MixedStress
+from fenicsmech.elasticity import ElasticBody, PredictedStress
 from fenicsmech.equilibrium.border import REGULARISATION, BorderTerms, PointLoad
 from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.kkt import KktMatrix, create_extended_matrix
@@ -113,8 +113,8 @@ class EquilibriumSystem:
         self._regularisation = np.concatenate([REGULARISATION / scale.multipliers**2, 1.0 / scale.load**2])
 
     @cached_property
-    def _mixed(self) -> MixedStress:
-        return MixedStress(self.elastic)
+    def _predicted_stress(self) -> PredictedStress:
+        return PredictedStress(self.elastic)
 
     @property
     def rigid_rows(self) -> np.ndarray:
@@ -208,7 +208,7 @@ class EquilibriumSystem:
         links         ∂E/∂(u, p) − loads
         poses         ∂V/∂z − loads − Aᵀ λ
         multipliers   −(C + c λ)
-        load          −(a · u_P − target), or 0 where f is given
+        load          −(a · u_P − v), or 0 where f is given
         """
         with self.clock.phase("residual"):
             self.unknowns.turn(state.poses)
@@ -245,13 +245,13 @@ class EquilibriumSystem:
 
         It is the state before the step and δu of owned nodes, linear in it on interface nodes too, (owned dofs,).
         """
-        self.kkt.tangent()
+        self.kkt.set_stiffness()
         moments = residual.moments
         if last is not None:
             with self.clock.phase("assemble"):
-                self._mixed.follow(last[0].u, last[1])
-                self._mixed.tangent(self.kkt.extended)
-                moments = _added(moments, self._moments(self._mixed.forces()))
+                self._predicted_stress.take(last[0].u, last[1])
+                self._predicted_stress.add_stiffness(self.kkt.extended)
+                moments = _added(moments, self._moments(self._predicted_stress.forces()))
         self.kkt.linearise(self._border.entries(state, control, moments, self._regularisation))
 
     # -- right-hand sides whose KKT solutions are rates of x -----------------------------------------------------

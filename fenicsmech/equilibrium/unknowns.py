@@ -71,7 +71,7 @@ class Block:
         return PETSc.IS().createStride(self.count, self.first, 1, comm=self.comm)
 
 
-class Parts(NamedTuple):
+class BlockValues(NamedTuple):
     """The values of each block."""
 
     nodes: np.ndarray
@@ -121,10 +121,10 @@ class Blocks:
         self.local = here + (border + padding if self.last else 0)
         self.size = start + border + padding
 
-    def restrict(self, values: np.ndarray) -> Parts:
+    def restrict(self, values: np.ndarray) -> BlockValues:
         """Views of this rank's ``values`` by block. Local."""
         blocks = (self.nodes, self.pressures, self.poses, self.multipliers, self.load)
-        return Parts(*(values[block.local] for block in blocks))
+        return BlockValues(*(values[block.local] for block in blocks))
 
     def restrict_border(self, border: np.ndarray) -> Border:
         """Views of the values of a whole ``border``, (border,), by block. Local."""

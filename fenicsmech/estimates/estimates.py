@@ -147,7 +147,7 @@ class Estimates:
 
         Raises:
             DescriptionError: ``kinds`` hold the error of plane stress and the model is another one.
-            EquilibriumError: the tangent is singular.
+            EquilibriumError: the KKT matrix is singular.
         """
         with self._model.clock.phase("estimate"), self._model.shaped(equilibrium.design):
             return self.of(adjoint_at(solver, equilibrium, output), kinds)
@@ -174,7 +174,7 @@ def adjoint_at(solver: EquilibriumSolver, equilibrium: Equilibrium, output: Poin
     """The adjoint of the quantity of an equilibrium, or of the displacement of ``output``; the model keeps the state.
 
     Raises:
-        EquilibriumError: the tangent is singular.
+        EquilibriumError: the KKT matrix is singular.
     """
     system, state, force = solver.system, equilibrium.state, equilibrium.unknown is Unknown.FORCE
     system.load(state)

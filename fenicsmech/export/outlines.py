@@ -25,7 +25,7 @@ class OutlineTolerances:
         sharp: turn (rad) of a corner, whatever its neighbours; more than that of a circle of eight vertices.
         unexpected: largest deviation (rad) of the turn of a smooth curve from the one expected.
         irregular: the same over the turns nearby: 1/4 where a curvature sets in, and up to 1/2 if the edges grow there.
-        exact: largest distance of vertices from their line or arc over the polygon's extent; some CAD rounding.
+        distance: largest distance of vertices from their line or arc over the polygon's extent; some CAD rounding.
         widest_arc: greatest radius of an arc over the polygon's extent.
         least_sweep: of an arc (rad) inside a smooth curve; over shorter ones any curve is close to a circle.
     """
@@ -33,7 +33,7 @@ class OutlineTolerances:
     sharp: float = math.radians(60.0)
     unexpected: float = math.radians(15.0)
     irregular: float = 0.5
-    exact: float = 5e-8
+    distance: float = 5e-8
     widest_arc: float = 1e3
     least_sweep: float = 0.25 * math.pi
 
@@ -49,7 +49,7 @@ def smooth_outline(polygon: np.ndarray) -> list[Curve]:
         with two coefficients. Arcs of circles run through three vertices between corners, and wherever more of them
         are on one circle. The others are B-splines of degree 3, or 2 if there are only three vertices.
     """
-    allowed, count = TOLERANCES.exact * _extent(polygon), len(polygon)
+    allowed, count = TOLERANCES.distance * _extent(polygon), len(polygon)
     corner, ends = corners_of(polygon), set[int]()
     for first, last in _exact_runs(polygon):
         corner[np.arange(first + 1, last) % count] = False
@@ -60,7 +60,7 @@ def smooth_outline(polygon: np.ndarray) -> list[Curve]:
     curves: list[Curve] = []
     for start, end in zip(breaks, [*breaks[1:], breaks[0] + count], strict=True):
         run = polygon[np.arange(start, end + 1) % count]
-        if _bulge(run) <= allowed:
+        if _sagitta(run) <= allowed:
             curves.append(straight_line(*run[[0, -1]]))
         elif _is_arc(run, allowed):
             curves.append(_arc_through(run))
@@ -74,13 +74,13 @@ def _exact_runs(polygon: np.ndarray) -> Iterator[tuple[int, int]]:
 
     Four vertices are on one circle by chance: on a chamfer, or on both sides of the axis of a symmetric shape.
     """
-    count, allowed = len(polygon), TOLERANCES.exact * _extent(polygon)
+    count, allowed = len(polygon), TOLERANCES.distance * _extent(polygon)
     if count < 4:
         return
     sharp = _sharp_corners_of(polygon)
     fours = polygon[(np.arange(count)[:, None] + np.arange(4)) % count]
     smooth = ~np.roll(sharp, -1) & ~np.roll(sharp, -2)
-    straight = smooth & np.array([_bulge(four) <= allowed for four in fours])
+    straight = smooth & np.array([_sagitta(four) <= allowed for four in fours])
     circular = smooth & np.array([_is_arc(four, allowed) for four in fours])
     for first, last in _runs(straight):
         yield first, last + 3
@@ -108,7 +108,7 @@ def _extent(points: np.ndarray) -> float:
     return float(np.ptp(points, axis=0).max())
 
 
-def _bulge(points: np.ndarray) -> float:
+def _sagitta(points: np.ndarray) -> float:
     """The greatest distance of ``points`` ((n, 2)) from the line through the first and the last."""
     (x, y), offsets = points[-1] - points[0], points - points[0]
     return float(np.abs(x * offsets[:, 1] - y * offsets[:, 0]).max()) / math.hypot(x, y)
@@ -116,7 +116,7 @@ def _bulge(points: np.ndarray) -> float:
 
 def _is_arc(points: np.ndarray, allowed: float) -> bool:
     """Whether ``points`` ((n, 2)) lie on an arc but for ``allowed``, and not on a line."""
-    if _bulge(points[[0, len(points) // 2, -1]]) <= allowed:
+    if _sagitta(points[[0, len(points) // 2, -1]]) <= allowed:
         return False
     arc = _arc_through(points)
     off = np.abs(np.linalg.norm(points - arc.centre, axis=1) - arc.radius)
@@ -164,13 +164,13 @@ def corners_of(polygon: np.ndarray) -> np.ndarray:
     """
     ahead = np.linalg.norm(np.roll(polygon, -1, axis=0) - polygon, axis=1)
     behind, turn = np.roll(ahead, 1), _turns(polygon)
-    bend, corner = 2.0 * turn / (behind + ahead), _sharp_corners_of(polygon)
+    curvature, corner = 2.0 * turn / (behind + ahead), _sharp_corners_of(polygon)
     while True:
         # the bends at the vertices before and after, from the other side where one of these is a corner
-        before, after = np.roll(bend, 1), np.roll(bend, -1)
+        before, after = np.roll(curvature, 1), np.roll(curvature, -1)
         left, right = np.where(np.roll(corner, 1), after, before), np.where(np.roll(corner, -1), before, after)
         unexpected = np.abs(turn - 0.5 * (left * behind + right * ahead))
-        smooth = np.abs(np.where(corner, 0.0, bend))
+        smooth = np.abs(np.where(corner, 0.0, curvature))
         nearby = np.max([np.roll(smooth, k) for k in range(-2, 3)], axis=0)
         excess = unexpected / np.maximum(TOLERANCES.unexpected, TOLERANCES.irregular * 0.5 * nearby * (behind + ahead))
         excess[corner | _between(corner)] = 0.0

@@ -174,7 +174,7 @@ class Centreline:
         knots: parameters s_k of the points, shape (n,).
     """
 
-    def __init__(self, points: Sequence[Sequence[float]], *, part: str = "centreline") -> None:
+    def __init__(self, points: ArrayLike, *, part: str = "centreline") -> None:
         through = np.asarray(points, dtype=float)
         chords = np.linalg.norm(np.diff(through, axis=0), axis=1)
         if not np.all(chords > 0.0):
@@ -219,8 +219,8 @@ class Centreline:
 
     def curvature(self, s: np.ndarray | float) -> np.ndarray:
         """Signed curvature det(c′, c″)/|c′|³ of a planar centreline, positive for a left turn, shape s.shape."""
-        velocity, bend = self._curve(s, 1), self._curve(s, 2)
-        cross = velocity[..., 0] * bend[..., 1] - velocity[..., 1] * bend[..., 0]
+        velocity, second = self._curve(s, 1), self._curve(s, 2)
+        cross = velocity[..., 0] * second[..., 1] - velocity[..., 1] * second[..., 0]
         return cross / np.linalg.norm(velocity, axis=-1) ** 3
 
     def samples(self, per_span: int) -> np.ndarray:

@@ -11,6 +11,7 @@ Geometry that other layers use too
     ``radius_ratios``   shape quality of cells
     ``cell_measures``   signed areas and volumes of cells
     ``boundary_loops``  outline and holes of a plane mesh
+    ``link_outline``    the curves around a link, as they were drawn
     ``plan_of``         the plane mesh that an extruded one repeats
 
 Each kind of link has its file: ``strip``, ``outline`` and ``part_files``. It registers the functions with which
@@ -41,5 +42,15 @@ from fenicsmech.meshing.link_mesh import (
     radius_ratios,
 )
 from fenicsmech.meshing.link_mesher import LEAST_SEGMENTS, InterfaceSite, check_link, mesh_link, typical_thickness
-from fenicsmech.meshing.outline import CircleArc, Curve, draw_loop, sampled, start_of, straight_line
+from fenicsmech.meshing.outline import (
+    CircleArc,
+    Curve,
+    draw_loop,
+    link_outline,
+    points_on,
+    sample_parameters,
+    sampled,
+    start_of,
+    straight_line,
+)
 from fenicsmech.meshing.session import gmsh, gmsh_session, muted_output

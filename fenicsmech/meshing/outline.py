@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import singledispatch
 from itertools import pairwise
 from typing import TypeAlias
 
@@ -15,12 +16,20 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from fenicsmech.errors import MeshingError, counted, point_text
-from fenicsmech.mechanism import Arc, Line, Outline
+from fenicsmech.mechanism import Arc, Line, Outline, Shape
 from fenicsmech.meshing.cutting import PlaneDrawing, in_units_of, mesh_planar
 from fenicsmech.meshing.link_mesh import LinkMesh
-from fenicsmech.meshing.link_mesher import LEAST_SEGMENTS, InterfaceSite, MeshRequest, check_shape, holds, mesh_shape
+from fenicsmech.meshing.link_mesher import (
+    LEAST_SEGMENTS,
+    InterfaceSite,
+    MeshRequest,
+    check_shape,
+    holds,
+    mesh_shape,
+    typical_thickness,
+)
 from fenicsmech.meshing.session import gmsh
-from fenicsmech.polygons import distance_to, first_crossing, is_inside
+from fenicsmech.polygons import distance_to, first_crossing, is_inside, signed_area
 
 _SAMPLED = 0.02  # of the element size: how far the polygons that checks look at deviate from the outline
 
@@ -70,30 +79,67 @@ def straight_line(start: Sequence[float], end: Sequence[float]) -> BSpline:
     return BSpline([0.0, 0.0, 1.0, 1.0], np.array([start, end], dtype=float), 1)
 
 
+def points_on(curve: Curve, parameters: np.ndarray) -> np.ndarray:
+    """The points (k, 2) of a curve at ``parameters`` (k,): fractions of an arc's sweep, else those of the spline."""
+    return curve.at(parameters) if isinstance(curve, CircleArc) else curve(parameters)
+
+
 def start_of(curve: Curve) -> np.ndarray:
     """The point (2,) in which a curve begins."""
     return curve.at(np.zeros(1))[0] if isinstance(curve, CircleArc) else curve.c[0]
 
 
+def end_of(curve: Curve) -> np.ndarray:
+    """The point (2,) in which a curve ends."""
+    return curve.at(np.ones(1))[0] if isinstance(curve, CircleArc) else curve.c[-1]
+
+
+def turned(curve: Curve) -> Curve:
+    """A curve from its end to its start."""
+    if isinstance(curve, CircleArc):
+        return CircleArc(curve.centre, curve.radius, curve.first + curve.sweep, -curve.sweep)
+    return BSpline(curve.t[0] + curve.t[-1] - curve.t[::-1], curve.c[::-1], curve.k)
+
+
+def chained(curves: Sequence[Curve], tolerance: float) -> list[list[Curve]]:
+    """The closed loops of curves given in any order and sense, whose ends meet to within ``tolerance``."""
+    left, loops = list(curves), []
+    while left:
+        loop = [left.pop(0)]
+        while math.dist(end_of(loop[-1]), start_of(loop[0])) > tolerance:
+            here = end_of(loop[-1])
+            gaps = [[math.dist(here, end) for end in (start_of(curve), end_of(curve))] for curve in left]
+            k, far = min(np.ndindex(len(left), 2), key=lambda place: gaps[place[0]][place[1]])
+            curve = left.pop(k)
+            loop.append(turned(curve) if far else curve)
+        loops.append(loop)
+    return loops
+
+
+def outermost(loops: Sequence[list[Curve]], tolerance: float) -> list[Curve]:
+    """The loop that encloses the largest area."""
+    return max(loops, key=lambda loop: abs(signed_area(sampled(loop, tolerance))))
+
+
 def sampled(loop: Sequence[Curve], tolerance: float) -> np.ndarray:
     """The closed polygon (m, 2) with vertices on ``loop``, from which it deviates by at most ``tolerance``."""
-    return np.concatenate([_samples(curve, tolerance) for curve in loop])
+    return np.concatenate([points_on(curve, sample_parameters(curve, tolerance)[:-1]) for curve in loop])
 
 
-def _samples(curve: Curve, tolerance: float) -> np.ndarray:
-    """Points of a curve, from its start to before its end."""
+def sample_parameters(curve: Curve, tolerance: float) -> np.ndarray:
+    """Parameters (k,) from the start of a curve to its end; lines through their points deviate by ``tolerance``."""
     if isinstance(curve, CircleArc):
         # a chord over the angle 2 φ misses the arc by r (1 − cos φ)
         widest = max(math.cos(math.pi / LEAST_SEGMENTS), 1.0 - tolerance / curve.radius)
         parts = math.ceil(abs(curve.sweep) / (2.0 * math.acos(widest)))
-        return curve.at(np.arange(parts) / parts)
+        return np.linspace(0.0, 1.0, parts + 1)
     knots = np.unique(curve.t)
     # the chord over a piece of length h in the parameter misses the curve by at most h² max|C''| / 8
     second = np.linalg.norm(curve(knots, 2), axis=1) if curve.k > 1 else np.zeros(len(knots))
     most = np.maximum(second[:-1], second[1:])
     counts = np.maximum(1, np.ceil(np.diff(knots) * np.sqrt(most / (8.0 * tolerance)))).astype(int)
     pieces = zip(knots[:-1], knots[1:], counts, strict=True)
-    return curve(np.concatenate([np.linspace(a, b, n, endpoint=False) for a, b, n in pieces]))
+    return np.concatenate([*(np.linspace(a, b, n, endpoint=False) for a, b, n in pieces), knots[-1:]])
 
 
 def draw_loop(loop: Sequence[Curve], height: float = 0.0) -> int:
@@ -130,6 +176,32 @@ def _draw(curve: Curve, ends: tuple[int, int], height: float) -> list[int]:
     return edges
 
 
+@singledispatch
+def outer_loop(shape: object, request: MeshRequest) -> list[Curve]:
+    """The closed curve around ``shape`` in the plane, its holes filled; each kind of shape registers its own."""
+    raise TypeError(f"{type(shape).__name__} has no outline of curves")
+
+
+def link_outline(name: str, shape: Shape, *, dim: int) -> list[Curve]:
+    """The curves around a link in the plane, as they were drawn: those of its section where it is a solid.
+
+    Holes are filled. Curves of a STEP file that are neither lines nor circles are interpolated to 1e-8 of the link's
+    extent; a mesh file has the polygon of its boundary.
+
+    Args:
+        name: the link's name, for messages.
+        shape: an outline, or a link from a file.
+        dim: 2 or 3, of the mesh in a mesh file.
+
+    Raises:
+        MeshingError: a file cannot be read, or has no such section.
+    """
+    size = typical_thickness(shape, name) if isinstance(shape, Outline) else 1.0
+    request = MeshRequest(name, (), dim, size)
+    check_shape(shape, request)
+    return outer_loop(shape, request)
+
+
 @mesh_shape.register
 def _(shape: Outline, request: MeshRequest) -> LinkMesh:
     loop = _loop(shape, request)
@@ -158,6 +230,17 @@ def _(shape: Outline, request: MeshRequest, at: tuple[float, ...]) -> bool:
     polygon, place = sampled(_loop(shape, request), _SAMPLED), np.asarray(at[:2]) / request.size
     # a joint on the very edge may be off the polygon, by rounding too
     return is_inside(polygon, place) or distance_to(polygon, place) <= 0.1
+
+
+@outer_loop.register
+def _(shape: Outline, request: MeshRequest) -> list[Curve]:
+    return [_scaled(curve, request.size) for curve in _loop(shape, request)]
+
+
+def _scaled(curve: Curve, factor: float) -> Curve:
+    if isinstance(curve, CircleArc):
+        return CircleArc(factor * curve.centre, factor * curve.radius, curve.first, curve.sweep)
+    return BSpline(curve.t, factor * curve.c, curve.k)
 
 
 def _loop(outline: Outline, request: MeshRequest) -> list[Curve]:

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from scipy.interpolate import make_interp_spline
 
 from fenicsmech.errors import DescriptionError, MeshingError
 from fenicsmech.mechanism import MeshPart, StepPart
 from fenicsmech.meshing.cutting import DimTag, mesh_fragments, mesh_nodes, region_face, region_prism
-from fenicsmech.meshing.link_mesh import FREE, LinkMesh
+from fenicsmech.meshing.link_mesh import FREE, LinkMesh, boundary_polygons, plan_of
 from fenicsmech.meshing.link_mesher import MeshRequest, check_shape, mesh_shape
+from fenicsmech.meshing.outline import CircleArc, Curve, chained, outer_loop, outermost, straight_line
 from fenicsmech.meshing.session import gmsh, gmsh_session
 
+_INTERPOLATED = 1e-8  # of the extent of a part: how far splines deviate from its curves; sections are rounded to 1e-9
 _TOLERANCE = 1e-6  # of the extent of a mesh from a file, whose coordinates are rounded
 
 
@@ -103,6 +107,13 @@ def _moments(solids: list[DimTag], side: float) -> list[np.ndarray]:
 
 def _mesh_section(shape: StepPart, solid: DimTag, request: MeshRequest) -> LinkMesh:
     """Meshes the section with the plane z = ``shape.section``."""
+    faces = _section(shape, solid, request)
+    cutters = [region_face(site, height=shape.section) for site in request.sites]
+    return mesh_fragments(request, faces, cutters, size=request.size, sites=request.sites)
+
+
+def _section(shape: StepPart, solid: DimTag, request: MeshRequest) -> list[DimTag]:
+    """The faces that the solid has in common with the plane z = ``shape.section``."""
     occ = gmsh.model.occ
     x, y, bottom, right, far, top = occ.getBoundingBox(*solid)
     width, breadth = right - x, far - y
@@ -115,8 +126,54 @@ def _mesh_section(shape: StepPart, solid: DimTag, request: MeshRequest) -> LinkM
             f"which lies between z = {bottom:g} and {top:g} mm",
             "Choose a section in between",
         )
-    cutters = [region_face(site, height=shape.section) for site in request.sites]
-    return mesh_fragments(request, faces, cutters, size=request.size, sites=request.sites)
+    return faces
+
+
+@outer_loop.register
+def _(shape: StepPart, request: MeshRequest) -> list[Curve]:
+    with gmsh_session(request.part):
+        faces = _section(shape, _only_solid(shape.path, request), request)
+        gmsh.model.occ.synchronize()
+        edges = [edge for _, edge in gmsh.model.getBoundary(faces, oriented=False)]
+        x, y, _, right, far, _ = gmsh.model.getBoundingBox(-1, -1)
+        extent = max(right - x, far - y)
+        curves = [_curve(edge, _INTERPOLATED * extent) for edge in edges]
+    return outermost(chained(curves, _TOLERANCE * extent), 1e-3 * extent)
+
+
+def _curve(edge: int, tolerance: float) -> Curve:
+    """An edge of the current gmsh model; one that is neither straight nor round to within ``tolerance``."""
+    (low,), (high,) = gmsh.model.getParametrizationBounds(1, edge)
+
+    def at(fractions: np.ndarray) -> np.ndarray:
+        return gmsh.model.getValue(1, edge, low + (high - low) * fractions).reshape(-1, 3)[:, :2]
+
+    start, via, end = at(np.array([0.0, 0.5, 1.0]))
+    match gmsh.model.getType(1, edge):
+        case "Line":
+            return straight_line(start, end)
+        case "Circle":
+            if np.linalg.norm(end - start) > tolerance:
+                return CircleArc.through(start, via, end)
+            (x, y), centre = start - via, 0.5 * (start + via)
+            return CircleArc(centre, 0.5 * math.hypot(x, y), math.atan2(y, x), 2.0 * math.pi)
+    for parts in (16, 32, 64, 128, 256, 512):
+        fractions = np.linspace(0.0, 1.0, 2 * parts + 1)
+        fine = at(fractions)
+        spline = make_interp_spline(fractions[::2], fine[::2], k=3)
+        if np.linalg.norm(spline(fractions[1::2]) - fine[1::2], axis=1).max() <= tolerance:
+            break
+    return spline
+
+
+@outer_loop.register
+def _(shape: MeshPart, request: MeshRequest) -> list[Curve]:
+    plan = plan_of(mesh_shape(shape, request)).mesh
+    if plan.dim == 3:
+        problem = f"the mesh in {str(shape.path)!r} is not the same all through its depth, so its outline is not known"
+        raise MeshingError(request.part, problem, "Give the link as a STEP file")
+    polygon = boundary_polygons(request.part, plan)[0]
+    return [straight_line(*ends) for ends in zip(polygon, np.roll(polygon, -1, axis=0), strict=True)]
 
 
 @mesh_shape.register

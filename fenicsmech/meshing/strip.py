@@ -44,12 +44,12 @@ def _(shape: Strip, request: MeshRequest) -> LinkMesh:
 def _(shape: Strip, request: MeshRequest) -> None:
     centreline, thickness = Centreline(shape.centreline, part=f"centreline of {request.part}"), shape.thickness
     s = centreline.samples(32)
-    bend = np.abs(centreline.curvature(s))
-    sharpest = int(np.argmax(bend))
-    if bend[sharpest] * 0.5 * thickness >= 1.0:
+    curvature = np.abs(centreline.curvature(s))
+    sharpest = int(np.argmax(curvature))
+    if curvature[sharpest] * 0.5 * thickness >= 1.0:
         raise MeshingError(
             request.part,
-            f"the centreline bends with radius {1.0 / bend[sharpest]:g} near "
+            f"the centreline bends with radius {1.0 / curvature[sharpest]:g} near "
             f"{point_text(centreline.evaluate(s[sharpest]))}, which is not more than half the thickness {thickness:g}",
             "Make the strip thinner or its centreline smoother",
         )

@@ -62,9 +62,9 @@ def assemble(linkage: Linkage, configuration: Configuration, springs: Sequence[P
     Raises:
         AssemblyError: a loop does not close even with freely deformable links.
     """
-    poses, fraction, _ = _Assembler(linkage.rigid, springs).follow(configuration)
+    poses, fraction, _ = _Assembler(linkage.rigid, springs).move(configuration)
     if fraction < 1.0:
-        _, closing, worst = _Assembler(linkage.joints).follow(configuration)
+        _, closing, worst = _Assembler(linkage.joints).move(configuration)
         if closing < 1.0:
             raise AssemblyError(
                 f"configuration {configuration.name!r}",
@@ -80,13 +80,13 @@ def assemble_before_strain(
 ) -> Assembly:
     """As ``assemble``, but 98 % of the way to the last position free of strain where motors strain the links.
 
-    That one is a dead centre as a rule, where the tangent is not unique and freedoms count twice.
+    That one is a dead centre as a rule, where paths cross and freedoms count twice.
     """
     assembly = assemble(linkage, configuration, springs)
     if assembly.fraction == 1.0:
         return assembly
     fraction = 0.98 * assembly.fraction
-    poses, _, _ = _Assembler(linkage.rigid, springs).follow(configuration, fraction)
+    poses, _, _ = _Assembler(linkage.rigid, springs).move(configuration, fraction)
     return Assembly(poses, fraction)
 
 
@@ -114,11 +114,11 @@ class _Assembler:
     largest_turn: float = 0.3
     curved: float = 1e-9
 
-    def follow(self, configuration: Configuration, part: float = 1.0) -> tuple[np.ndarray, float, int]:
-        """Poses ``part`` of the way to ``configuration``, the fraction reached, and the row with the largest residual
-        where the motion ends early."""
+    def move(self, configuration: Configuration, limit: float = 1.0) -> tuple[np.ndarray, float, int]:
+        """Poses at the fraction ``limit`` of the way to ``configuration``, the part of that reached, and the row with
+        the largest residual where the motion ends early."""
         system = self.system
-        target = part * system.motor_values(configuration.position)
+        target = limit * system.motor_values(configuration.position)
         travel = system.travel(target)
         largest = 1.0 if travel <= self.largest_step else self.largest_step / travel
         poses, residual = self._close(system.drawn, np.zeros_like(target))

@@ -2,7 +2,7 @@
 
 - ``simulation``: the entry point, which computes curves
 - ``discretisation``: the meshed and compiled parts that simulations of several designs share
-- ``tracing``: curves at prescribed values
+- ``stepping``: curves at prescribed values
 - ``following``: curves along a path until an end, with its events
 - ``frame``, ``curve``: results and their evaluation
 - ``fields``: gathering, pictures and files of states
@@ -15,4 +15,4 @@ from fenicsmech.simulation.following import FollowedCurve, PathEvent, Until
 from fenicsmech.simulation.frame import BucklingLoad, BucklingPosition, Frame, ModeShape, SoftMode
 from fenicsmech.simulation.omitted_effects import Explanation, Hint, PinFriction, weight_influence
 from fenicsmech.simulation.simulation import RestShape, Simulation
-from fenicsmech.simulation.tracing import CurveRequest, read_request
+from fenicsmech.simulation.stepping import CurveRequest, read_request

@@ -155,7 +155,7 @@ class Curve:
 
         Raises:
             DescriptionError: motors move along the curve.
-            EquilibriumError: the tangent of a frame is singular.
+            EquilibriumError: the KKT matrix of a frame is singular.
         """
         return self._estimated([ErrorKind.ELEMENTS], output)[0].copy()
 
@@ -164,7 +164,7 @@ class Curve:
 
         Raises:
             DescriptionError: motors move along the curve, or it is not in plane stress.
-            EquilibriumError: the tangent of a frame is singular.
+            EquilibriumError: the KKT matrix of a frame is singular.
         """
         return self._estimated([ErrorKind.PLANE_STRESS], output)[0].copy()
 
@@ -205,7 +205,7 @@ class Curve:
     # -- stability, friction, assumptions ------------------------------------------------------------------------
 
     def buckling_loads(self, *, frame: Frame | None = None, count: int = 3) -> tuple[BucklingLoad, ...]:
-        """Forces at which the equilibrium would stop being unique, from the tangent and its rate.
+        """Forces at which the equilibrium would stop being unique, from the KKT matrix and its rate.
 
         Exact for columns and others that hardly move before they buckle; otherwise more accurate from closer frames.
 
@@ -215,7 +215,7 @@ class Curve:
 
         Raises:
             DescriptionError: motors move along the curve, or the frame is of another curve.
-            EquilibriumError: the force moves nothing, or the tangent is singular.
+            EquilibriumError: the force moves nothing, or the KKT matrix is singular.
         """
         self._need_force()
         at, found = self._modes(LoadControl(), critical_changes, frame, count)
@@ -228,7 +228,7 @@ class Curve:
 
         Raises:
             DescriptionError: a force changes along the curve, or the frame is of another curve.
-            EquilibriumError: the motors move nothing, or the tangent is singular.
+            EquilibriumError: the motors move nothing, or the KKT matrix is singular.
         """
         if isinstance(self.part, Force | ForceGroup):
             raise DescriptionError(
@@ -273,7 +273,7 @@ class Curve:
 
         Raises:
             DescriptionError: motors move along the curve, or the tolerance or weight is not a positive number.
-            EquilibriumError: the tangent of the frame is singular.
+            EquilibriumError: the KKT matrix of the frame is singular.
         """
         if weight is None and (self.units.length, self.units.force) == ("mm", "N"):
             weight = 1.2e-9 * 9810.0  # N/mm³

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from time import perf_counter
 
 from fenicsmech.continuation import (
-    ArcLengthTracer,
+    ArcLengthStepper,
     ArcSteps,
     Critical,
     CriticalPoint,
@@ -24,7 +24,7 @@ from fenicsmech.plot import CurveMark, CurveSeries
 from fenicsmech.simulation.curve import Curve, axes
 from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.frame import Frame, ModeShape, mode_shape
-from fenicsmech.simulation.tracing import CurveRequest, CurveTracer, check_force, check_motors, read_others
+from fenicsmech.simulation.stepping import CurveRequest, CurveStepper, check_force, check_motors, read_others
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class PathEvent:
         kind: limit point of the force, turning point of the displacement or of a motor, or bifurcation.
         frame: the equilibrium; also one of the curve's frames.
         index: of that frame.
-        null_space: at a bifurcation a basis of the tangent's null space, one direction for each of the modes that
+        null_space: at a bifurcation a basis of the KKT matrix's null space, one direction for each of the modes that
             change; else the direction of the path.
         critical: the point of the path that branches start from.
     """
@@ -130,7 +130,7 @@ class PathEvent:
 
     @property
     def value(self) -> float:
-        """Value of the prescribed part at the singular tangent; the frame is the nearest equilibrium found."""
+        """Value of the prescribed part where the KKT matrix is singular; the frame is the nearest equilibrium found."""
         return self.critical.value
 
     @property
@@ -204,39 +204,39 @@ class CurveFollower:
     """The path of one request, until an end."""
 
     def __init__(self, discretisation: Discretisation, request: CurveRequest, until: Until, steps: ArcSteps) -> None:
-        self._tracer, self._until, self._steps = CurveTracer(discretisation, request), until, steps
-        self._followed, self._system = self._tracer.followed, self._tracer.solver.system
-        self._frames, self._events = self._tracer.frames, list[PathEvent]()
+        self._stepper, self._until, self._steps = CurveStepper(discretisation, request), until, steps
+        self._followed, self._system = self._stepper.followed, self._stepper.solver.system
+        self._frames, self._events = self._stepper.frames, list[PathEvent]()
 
     def from_rest(self, watch: Callable[[int], None]) -> FollowedCurve:
         """The curve from the configuration without the controlled force; ``watch`` gets the number of frames so far."""
-        self._frames.append(self._tracer.frame(LoadControl(0.0)))
+        self._frames.append(self._stepper.frame(LoadControl(0.0)))
         try:
             path = self._path(self._frames[0].state)
         except NotConverged as failure:
             raise self._ended(failure) from failure
         start, finishes = path.start, self._finishes(path)
         # towards the first displacement or position that is wanted, or else the first force
-        wanted = next((finish for finish in finishes if finish.target != finish.value(start)), None)
-        if wanted and (wanted.target - wanted.value(start)) * wanted.rate(start) < 0.0:
+        wanted = next((finish for finish in finishes if finish.end != finish.value(start)), None)
+        if wanted and (wanted.end - wanted.value(start)) * wanted.rate(start) < 0.0:
             start = start.scaled(-1.0)
         return self._follow(path, start, watch)
 
     def from_bifurcation(self, event: PathEvent, mode: ModeShape, sense: Sense) -> FollowedCurve:
         """The curve that crosses another one at ``event`` along ``mode``."""
-        rest = self._tracer.frame(LoadControl(0.0))  # the tangent at the bifurcation has no scale
+        rest = self._stepper.frame(LoadControl(0.0))  # the tangent at the bifurcation has no scale
         self._frames.append(event.frame)
         try:
             path = self._path(rest.state)
             first = crossing(path, event.critical, mode.step, sense)
         except NotConverged as failure:
             raise self._ended(failure) from failure
-        self._frames.append(self._tracer.record(first))
+        self._frames.append(self._stepper.record(first))
         return self._follow(path, first, lambda done: None)
 
-    def _follow(self, path: ArcLengthTracer, start: EquilibriumPoint, watch: Callable[[int], None]) -> FollowedCurve:
-        tracer, request = self._tracer, self._tracer.request
-        clock = tracer.discretisation.clock
+    def _follow(self, path: ArcLengthStepper, start: EquilibriumPoint, watch: Callable[[int], None]) -> FollowedCurve:
+        stepper, request = self._stepper, self._stepper.request
+        clock = stepper.discretisation.clock
         steps = path.follow(start, self._finishes(path), most=self._until.frames - len(self._frames))
         while True:
             began, seconds = perf_counter(), dict(clock.seconds)
@@ -247,70 +247,70 @@ class CurveFollower:
                     self._record_event(path, critical)
             except NotConverged as failure:
                 raise self._ended(failure) from failure
-            frame = tracer.record(ends[1])
+            frame = stepper.record(ends[1])
             self._frames.append(replace(frame, seconds=perf_counter() - began, phases=clock.since(seconds)))
             watch(min(len(self._frames), self._until.frames))  # critical points come on top
         return FollowedCurve(
             request.part,
             request.configuration,
-            tracer.freedom,
+            stepper.freedom,
             tuple(self._frames),
-            tracer.discretisation,
-            tracer.unloaded,
+            stepper.discretisation,
+            stepper.unloaded,
             others=request.others,
             # loads have limit points, where no displacement belongs to a slightly larger one
             unknown=Unknown.FORCE,
             events=tuple(self._events),
         )
 
-    def _record_event(self, path: ArcLengthTracer, critical: CriticalPoint) -> None:
+    def _record_event(self, path: ArcLengthStepper, critical: CriticalPoint) -> None:
         if critical.kind is Critical.BIFURCATION:
             steps = null_space(path, critical)
         else:
             step = critical.point.tangent
             steps = [step.scaled(1.0 / path.system.size(step))]
-        frame = self._tracer.record(critical.point)
-        modes = tuple(mode_shape(self._tracer.discretisation.model, step) for step in steps)
+        frame = self._stepper.record(critical.point)
+        modes = tuple(mode_shape(self._stepper.discretisation.model, step) for step in steps)
         self._events.append(PathEvent(critical.kind, frame, len(self._frames), modes, critical))
         self._frames.append(frame)
 
-    def _path(self, state: State) -> ArcLengthTracer:
+    def _path(self, state: State) -> ArcLengthStepper:
         """The path through ``state``, in units of its ends."""
         until, value, conjugate = self._until, self._followed.value(self._system, state), self._conjugate(state)
         values, conjugates = until.displacements, until.forces
         if not self._followed.displaces:
             values, conjugates = conjugates, values
-        return ArcLengthTracer(
-            self._tracer.solver,
+        return ArcLengthStepper(
+            self._stepper.solver,
             self._followed,
             state,
             steps=self._steps,
-            value=max((abs(target - value) for target in values), default=0.0),
-            conjugate=max((abs(target - conjugate) for target in conjugates), default=0.0),
+            value=max((abs(end - value) for end in values), default=0.0),
+            conjugate=max((abs(end - conjugate) for end in conjugates), default=0.0),
         )
 
-    def _finishes(self, path: ArcLengthTracer) -> list[Finish]:
+    def _finishes(self, path: ArcLengthStepper) -> list[Finish]:
         """Displacements or positions first, then forces."""
         followed = path.value, path.value_rate
         conjugate = (lambda point: self._conjugate(point.state)), (lambda point: point.conjugate_rate)
         displacement, force = (followed, conjugate) if self._followed.displaces else (conjugate, followed)
         return [
-            Finish(value, rate, target, max(map(abs, targets)) or 1.0)
-            for (value, rate), targets in ((displacement, self._until.displacements), (force, self._until.forces))
-            for target in targets
+            Finish(value, rate, end, max(map(abs, ends)) or 1.0)
+            for (value, rate), ends in ((displacement, self._until.displacements), (force, self._until.forces))
+            for end in ends
         ]
 
     def _conjugate(self, state: State) -> float:
         """The conjugate of the followed value; displacements count from the unloaded configuration."""
         self._system.load(state)
-        origin = 0.0 if self._followed.displaces else self._tracer.origin
+        origin = 0.0 if self._followed.displaces else self._stepper.origin
         return self._followed.conjugate(self._system, state) - origin
 
     def _ended(self, failure: NotConverged) -> EquilibriumError:
-        tracer, last = self._tracer, self._frames[-1]
-        across, up = axes(tracer.request.part, tracer.discretisation.scene.units)
+        stepper, last = self._stepper, self._frames[-1]
+        across, up = axes(stepper.request.part, stepper.discretisation.scene.units)
         return EquilibriumError(
-            f"path of {tracer.request.where}",
+            f"path of {stepper.request.where}",
             f"it cannot be followed beyond {across.quantity} {across(last.displacement, 6)} at {up.quantity} "
             f"{up(last.force, 6)} ({failure})",
             "End it earlier, allow smaller steps with ArcSteps(smallest=…), or use a finer mesh",

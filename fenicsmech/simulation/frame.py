@@ -1,4 +1,4 @@
-"""Equilibria of a curve with their measured quantities, and modes of their tangents."""
+"""Equilibria of a curve with their measured quantities, and modes of their KKT matrices."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ class ModeShape:
 
 @dataclass(frozen=True)
 class BucklingLoad:
-    """A magnitude of the force that changes at which the tangent is singular, and the mode."""
+    """A magnitude of the force that changes at which the KKT matrix is singular, and the mode."""
 
     force: float
     mode: ModeShape
@@ -97,7 +97,7 @@ class BucklingLoad:
 
 @dataclass(frozen=True)
 class BucklingPosition:
-    """A position of the motors that move at which the tangent is singular while they are held there, and the mode."""
+    """A position of the motors that move at which the KKT matrix is singular while they are held, and the mode."""
 
     position: float
     mode: ModeShape
@@ -105,7 +105,7 @@ class BucklingPosition:
 
 @dataclass(frozen=True)
 class SoftMode:
-    """A mode of the tangent; its stiffness is in units of the mean stiffness of the links, negative if unstable."""
+    """A mode of the KKT matrix; its stiffness is in units of the mean stiffness of the links, negative if unstable."""
 
     stiffness: float
     mode: ModeShape

@@ -11,7 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenicsmech.collective import from_one
-from fenicsmech.continuation import ArcSteps, Hermite, Predictor
+from fenicsmech.continuation import ArcSteps, HermitePredictor, Predictor
 from fenicsmech.elasticity import Formulation, MixedFormulation, Quadrature
 from fenicsmech.equilibrium import EquilibriumMethod, EquilibriumSolver, PrimalDualNewton
 from fenicsmech.errors import AssemblyError, DescriptionError
@@ -39,7 +39,7 @@ from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.fields import rest_vertices
 from fenicsmech.simulation.following import CurveFollower, FollowedCurve, PathEvent, Until, branches, read_path
 from fenicsmech.simulation.frame import ModeShape
-from fenicsmech.simulation.tracing import CurveRequest, CurveTracer, read_request
+from fenicsmech.simulation.stepping import CurveRequest, CurveStepper, read_request
 
 
 class RestShape(Protocol):
@@ -119,7 +119,7 @@ class Simulation:
                 )
             self._control = AccuracyControl(scene, accuracy, size, formulation)
             fidelity = self._control.fidelity(self._control.level)
-        solver, predictor = solver or PrimalDualNewton(), predictor or Hermite()
+        solver, predictor = solver or PrimalDualNewton(), predictor or HermitePredictor()
         self._discretisation = Discretisation(scene, fidelity, solver, predictor, self.clock, comm)
         self._described = _description(scene.mechanism)
 
@@ -167,14 +167,14 @@ class Simulation:
         with Progress(len(request.controls), configuration.name, shown=self.comm.rank == 0) as progress:
             control = self._control
             if control is None:
-                return self.trace(request, watch=progress.update)
+                return self.compute(request, watch=progress.update)
             curves: list[Curve] = []
 
             def run(level: FidelityLevel) -> LevelErrors:
                 fidelity = control.fidelity(level)
                 if fidelity != self.fidelity:  # curves keep theirs
                     self._discretisation, self.choice = self._discretisation.at(fidelity, self.clock, self.comm), None
-                curves[:] = [self.trace(request, watch=progress.update)]
+                curves[:] = [self.compute(request, watch=progress.update)]
                 return _errors(curves[0])
 
             self.choice = control.choose(run, cause_of_growth(part))
@@ -350,6 +350,11 @@ class Simulation:
         return self._discretisation.fidelity
 
     @property
+    def shapes(self) -> Mapping[FlexibleLink, Shape]:
+        """The present shapes of the flexible links: as drawn, or others given to ``with_shapes``."""
+        return self._discretisation.shapes
+
+    @property
     def linkage(self) -> Linkage:
         """The mechanism's bodies and joints."""
         return self._discretisation.linkage
@@ -380,7 +385,7 @@ class Simulation:
         """The solver for a force or motors that change and some constant forces, kept for all configurations."""
         return self._discretisation.solver(part, others)
 
-    def trace(self, request: CurveRequest, *, watch: Callable[[int], None] = lambda done: None) -> Curve:
+    def compute(self, request: CurveRequest, *, watch: Callable[[int], None] = lambda done: None) -> Curve:
         """The curve of a checked request, as ``load_displacement`` without showing progress.
 
         Args:
@@ -388,7 +393,7 @@ class Simulation:
             watch: called with the number of frames so far.
         """
         with self._shaped():
-            return CurveTracer(self._discretisation, request).curve(watch)
+            return CurveStepper(self._discretisation, request).curve(watch)
 
     @contextmanager
     def _shaped(self) -> Iterator[None]:

@@ -14,7 +14,7 @@ from ..equilibrium.finger import RUBBER, finger
 from ..mechanism.truss_finger import truss_finger
 
 SOLVERS = {
-    "without mixed stress": fm.PrimalDualNewton(mixed_stress=False),
+    "without predicted stress": fm.PrimalDualNewton(predicted_stress=False),
     "augmented Lagrangian": AugmentedLagrangian(),
     "KKT Newton": KKTNewton(),
     "KKT Newton with backtracking": KKTNewton(backtracking=True),

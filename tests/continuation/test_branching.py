@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
 import fenicsmech as fm
-from fenicsmech.continuation import ArcLengthTracer
+from fenicsmech.continuation import ArcLengthStepper
 
 from ..equilibrium.column import DEPTH, EULER, LENGTH, THICKNESS, YOUNG, Column, column, critical_load
 
@@ -71,7 +71,7 @@ def test_second_branch_is_found_where_it_crosses():
 @pytest.mark.parametrize("size, most", [(THICKNESS, 3), (0.7 * THICKNESS, 10)])
 def test_bifurcation_is_located_by_few_equilibria_to_the_accuracy_of_the_eigenvalue(size, most, monkeypatch):
     # the finer mesh is not symmetric: it turns the bifurcation into two paths that pass each other
-    solved, between = [], ArcLengthTracer.between
+    solved, between = [], ArcLengthStepper.between
 
     def counted(*arguments):
         solved.append(1)
@@ -80,7 +80,7 @@ def test_bifurcation_is_located_by_few_equilibria_to_the_accuracy_of_the_eigenva
     case = column(size=size)
     near = case.simulation.load_displacement(case.push, forces=[0.9 * CRITICAL])
     loads = [load.force for load in near.buckling_loads(count=1)]
-    monkeypatch.setattr(ArcLengthTracer, "between", counted)
+    monkeypatch.setattr(ArcLengthStepper, "between", counted)
     steps = fm.ArcSteps(largest=0.2)
     curve = case.simulation.follow(case.push, until=fm.Until(force=1.1 * EULER, frames=50), steps=steps)
     (event,) = curve.bifurcations

@@ -1,4 +1,4 @@
-"""Buckling loads by eigenvalues of the tangent, and its softest modes."""
+"""Buckling loads by eigenvalues of the KKT matrix, and its softest modes."""
 
 import numpy as np
 import pytest

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.continuation import Hermite, LoadStepper, LoadStepsFailed
+from fenicsmech.continuation import HermitePredictor, LoadStepper, LoadStepsFailed
 from fenicsmech.equilibrium import EquilibriumPoint, LoadControl, NotConverged, Stability, State, Step
 
 from ..equilibrium import toggle
@@ -27,13 +27,13 @@ class OneFreedom:
 
     def solve(self, start: State, control: LoadControl) -> EquilibriumPoint:
         self.solved += 1
-        if control.target > 1.0:
+        if control.prescribed > 1.0:
             raise NotConverged("no equilibrium", 25)
-        stiffness = math.sqrt(1.0 - control.target)
+        stiffness = math.sqrt(1.0 - control.prescribed)
         self.softest = min(self.softest, stiffness)
         rate = math.inf if stiffness == 0.0 else 0.5 / stiffness
         tangent = Step(np.array([rate]), np.zeros(0), np.zeros(0), 1.0)
-        state = State(np.array([1.0 - stiffness]), np.zeros((0, 1)), np.zeros(0), control.target, np.zeros(0))
+        state = State(np.array([1.0 - stiffness]), np.zeros((0, 1)), np.zeros(0), control.prescribed, np.zeros(0))
         return EquilibriumPoint(state, control, tangent, rate, Stability(0, 0), 4, (0.0,), None)
 
     def size(self, step: Step) -> float:
@@ -56,7 +56,7 @@ def start() -> State:
 @pytest.mark.parametrize("beyond", BEYOND)
 def test_last_equilibrium_is_next_to_the_limit_load_and_has_lost_its_stiffness(beyond):
     freedom = OneFreedom()
-    path = LoadStepper(freedom, start(), LoadControl(), predictor=Hermite())
+    path = LoadStepper(freedom, start(), LoadControl(), predictor=HermitePredictor())
     with pytest.raises(LoadStepsFailed) as failure:
         path.advance(LoadControl(beyond))
     assert 1.0 - RESOLUTION < failure.value.reached <= 1.0
@@ -66,7 +66,7 @@ def test_last_equilibrium_is_next_to_the_limit_load_and_has_lost_its_stiffness(b
 
 @pytest.mark.parametrize("beyond", BEYOND)
 def test_load_steps_after_the_first_locate_it_as_closely_and_a_load_on_the_way_back_is_reached(beyond):
-    path = LoadStepper(OneFreedom(), start(), LoadControl(), predictor=Hermite())
+    path = LoadStepper(OneFreedom(), start(), LoadControl(), predictor=HermitePredictor())
     path.advance(LoadControl(0.5))
     with pytest.raises(LoadStepsFailed) as failure:
         path.advance(LoadControl(beyond))

@@ -103,6 +103,15 @@ def truss_alone(tmp_path_factory) -> tuple[dict, str, Path]:
     return *report("truss", folder, *QUICK), folder
 
 
+@pytest.mark.thorough
+def test_truss_reaches_its_targets_with_a_tapered_diagonal_from_a_step_file(tmp_path):
+    summary, _ = report("truss", tmp_path, *QUICK, "--part", str(ROOT / "meshes" / "diagonal.step"))
+    check_design(summary, tmp_path, THICKNESS["truss"])
+    assert summary["parameters"] == PARAMETERS["truss"]
+    for target in summary["targets"]:
+        assert target["part"]["value"] == pytest.approx(target["wanted"], rel=0.01)
+
+
 def check_quick(name: str, summary: dict, printed: str, folder: Path) -> None:
     check_design(summary, folder, THICKNESS[name])
     assert summary["parameters"] == PARAMETERS[name]

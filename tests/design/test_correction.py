@@ -17,7 +17,7 @@ WANTED = ((0.1, 2.0), (0.4, 3.2))
 COARSE = {"space": "3d", "size": 4.0, "order": 1}
 
 
-class Traced(Counter):
+class Counts(Counter):
     """Number of times that equilibria were loaded from zero, per space.
 
     Attributes:
@@ -29,21 +29,21 @@ class Traced(Counter):
 
 
 @pytest.fixture
-def traced(monkeypatch) -> Traced:
-    counts, trace, errors = Traced(), SampleEquilibria.trace, SampleEquilibria.errors
+def loads(monkeypatch) -> Counts:
+    counts, from_zero, errors = Counts(), SampleEquilibria.from_zero, SampleEquilibria.errors
 
     def counted(equilibria: SampleEquilibria):
         counts[equilibria._simulation.fidelity.model.name] += 1
-        return trace(equilibria)
+        return from_zero(equilibria)
 
-    def estimated(equilibria: SampleEquilibria, known):
+    def estimated(equilibria: SampleEquilibria, solved):
         if equilibria._simulation.fidelity.model.name == "3d":
             if counts.rounds >= counts.most:
                 raise KeyboardInterrupt
             counts.rounds += 1
-        return errors(equilibria, known)
+        return errors(equilibria, solved)
 
-    monkeypatch.setattr(SampleEquilibria, "trace", counted)
+    monkeypatch.setattr(SampleEquilibria, "from_zero", counted)
     monkeypatch.setattr(SampleEquilibria, "errors", estimated)
     return counts
 
@@ -70,12 +70,12 @@ def test_corrected_designs_are_nearer_to_their_targets_on_a_finer_mesh():
     assert missed[0] < 0.5 * missed[1]
 
 
-def test_plane_stress_with_corrections_ends_at_the_targets_in_space(traced):
+def test_plane_stress_with_corrections_ends_at_the_targets_in_space(loads):
     problem = truss(*WANTED).problem(**COARSE)
     result = problem.optimise()
     assert result.surrogate == "plane-stress" and result.verified
     assert result.worst_error < 5e-3
-    assert traced["3d"] == 1 < len(result.corrections) == traced.rounds <= 4
+    assert loads["3d"] == 1 < len(result.corrections) == loads.rounds <= 4
     # far from the truth at first, and nearer by at least the factor at which a surrogate is given up
     changes = np.array(result.corrections)
     assert changes[0] > 0.05
@@ -97,7 +97,7 @@ def misleading(case: Case) -> fm.Simulation:
     return sim.with_material(link.material, fm.Material("stiff rubber", 5.0 * 1.9, 0.475))
 
 
-def test_a_surrogate_that_misleads_is_given_up(traced, caplog):
+def test_a_surrogate_that_misleads_is_given_up(loads, caplog):
     case = truss(*WANTED)
     problem = case.problem(**COARSE)
     with caplog.at_level("INFO", logger="fenicsmech"):
@@ -107,14 +107,14 @@ def test_a_surrogate_that_misleads_is_given_up(traced, caplog):
     assert result.worst_error < 5e-3 and result.verified
 
 
-def test_a_run_killed_between_two_rounds_ends_as_if_nothing_had_happened(tmp_path, traced):
+def test_a_run_killed_between_two_rounds_ends_as_if_nothing_had_happened(tmp_path, loads):
     whole = truss(*WANTED).problem(**COARSE).optimise(checkpoint=tmp_path / "whole.json")
     assert len(whole.corrections) > 1
     file = tmp_path / "checkpoint.json"
-    traced.most = traced.rounds + 1
+    loads.most = loads.rounds + 1
     with pytest.raises(KeyboardInterrupt):
         truss(*WANTED).problem(**COARSE).optimise(checkpoint=file)
-    traced.most = float("inf")
+    loads.most = float("inf")
     again = truss(*WANTED).problem(**COARSE).optimise(checkpoint=file, resume=True)
     assert (again.iterations, again.reason, again.evaluations) == (whole.iterations, whole.reason, whole.evaluations)
     assert again.corrections == pytest.approx(whole.corrections, rel=1e-5, abs=1e-8)

@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.design import Infeasible, Known, SampleEquilibria
+from fenicsmech.design import DesignEquilibria, Infeasible, SampleEquilibria
 from fenicsmech.equilibrium import NewtonSolver, NotConverged
 
 from .mechanisms import Bench, Case, bench, bow, strained, strains, truss, turned_beam
@@ -27,16 +27,16 @@ def made(name: str, **fidelity) -> Bench:
     return bench(case, case.simulate(**fidelity))
 
 
-def displacements(known: Known) -> np.ndarray:
+def displacements(known: DesignEquilibria) -> np.ndarray:
     return np.concatenate(known.raw)
 
 
-def fields(both: Bench, known: Known) -> np.ndarray:
+def fields(both: Bench, known: DesignEquilibria) -> np.ndarray:
     """Derivatives of the displacements by the design field, (targets, owned values)."""
     return np.array([gradient.design for gradient in both.equilibria.gradients(known)])
 
 
-def assert_alike(followed: Known, traced: Known, *, digits: float = 1e-8) -> None:
+def assert_alike(followed: DesignEquilibria, traced: DesignEquilibria, *, digits: float = 1e-8) -> None:
     """The same states and displacements."""
     assert displacements(followed) == pytest.approx(displacements(traced), rel=digits)
     for sample, a in followed.samples.items():
@@ -52,10 +52,10 @@ def assert_alike(followed: Known, traced: Known, *, digits: float = 1e-8) -> Non
 def test_following_a_design_ends_where_its_loading_from_zero_ends(name):
     both = made(name)
     first = both.rest.place(both.design(0.03, seed=1), None)
-    known = both.equilibria.trace()
+    known = both.equilibria.from_zero()
     both.rest.place(both.design(0.08, seed=2), first)
-    followed = both.equilibria.follow(known)
-    assert_alike(followed, both.equilibria.trace())
+    followed = both.equilibria.from_design(known)
+    assert_alike(followed, both.equilibria.from_zero())
     assert np.abs(displacements(followed) - displacements(known)).max() > 1e-3 * np.abs(displacements(known)).max()
     assert np.array_equal(followed.design, both.field())
 
@@ -64,16 +64,16 @@ def test_following_a_design_ends_where_its_loading_from_zero_ends(name):
 def test_following_in_space_on_any_number_of_ranks():
     both = made("truss", space="3d", size=4.0, order=1, comm=MPI.COMM_WORLD)
     first = both.rest.place(both.rest.initial, None)
-    known = both.equilibria.trace()
+    known = both.equilibria.from_zero()
     both.rest.place(both.design(0.08), first)
-    assert_alike(both.equilibria.follow(known), both.equilibria.trace())
+    assert_alike(both.equilibria.from_design(known), both.equilibria.from_zero())
 
 
 def test_displacements_are_those_of_the_curve_that_a_user_computes():
     for name in CASES:
         both = made(name)
         both.rest.place(both.design(0.05), None)
-        known = both.equilibria.trace()
+        known = both.equilibria.from_zero()
         for target, reached in zip(both.equilibria.targets, displacements(known), strict=True):
             curve = both.simulation.load_displacement(
                 target.quantity.part,
@@ -90,9 +90,9 @@ def test_cases_are_what_they_claim_to_be():
         assert strains(simulation, case.targets[0]) == (name == "strained by motors")
         both = bench(case, simulation)
         first = both.rest.place(both.rest.initial, None)
-        known = both.equilibria.trace()
+        known = both.equilibria.from_zero()
         both.rest.place(both.design(0.05), first)
-        for sample, at in both.equilibria.follow(known).samples.items():
+        for sample, at in both.equilibria.from_design(known).samples.items():
             assert (at.unloaded is not known.samples[sample].unloaded) == (name in MOVING)
 
 
@@ -107,7 +107,7 @@ def bulged(both: Bench) -> np.ndarray:
 def test_a_large_change_of_design_is_halved_on_the_way(monkeypatch):
     both = made("truss")
     start = both.rest.place(both.rest.initial, None)
-    known = both.equilibria.trace()
+    known = both.equilibria.from_zero()
     both.rest.place(bulged(both), start)
     solver = both.simulation.solver(both.equilibria.targets[0].quantity.part)
     solve, failures = NewtonSolver.solve, []
@@ -120,22 +120,22 @@ def test_a_large_change_of_design_is_halved_on_the_way(monkeypatch):
             raise
 
     monkeypatch.setattr(NewtonSolver, "solve", counted)
-    solver.options = fm.PrimalDualNewton(iterations=6, mixed_stress=False)
-    followed = both.equilibria.follow(known)
+    solver.options = fm.PrimalDualNewton(iterations=6, predicted_stress=False)
+    followed = both.equilibria.from_design(known)
     assert len(failures) >= 1
     solver.options = fm.PrimalDualNewton()
-    assert_alike(followed, both.equilibria.trace())
+    assert_alike(followed, both.equilibria.from_zero())
 
 
 def test_a_change_that_is_too_large_is_infeasible_and_leaves_the_design_in_place():
     both = made("truss")
     start = both.rest.place(both.rest.initial, None)
-    known = both.equilibria.trace()
+    known = both.equilibria.from_zero()
     both.rest.place(bulged(both), start)
     design = both.field()
     both.simulation.solver(both.equilibria.targets[0].quantity.part).options = fm.PrimalDualNewton(iterations=2)
     with pytest.raises(Infeasible, match="no equilibrium under 'push on tip' of 0.1"):
-        both.equilibria.follow(known)
+        both.equilibria.from_design(known)
     assert np.array_equal(both.field(), design)
 
 
@@ -157,10 +157,10 @@ def test_unstable_equilibria_are_infeasible():
     case = column(0.5 * euler)
     stable = bench(case, case.simulate(size=2.0))
     stable.rest.place(stable.rest.initial, None)
-    stable.equilibria.trace()
+    stable.equilibria.from_zero()
     case = column(1.5 * euler)
     with pytest.raises(Infeasible, match="unstable"):
-        SampleEquilibria(case.simulate(size=2.0), case.targets).trace()
+        SampleEquilibria(case.simulate(size=2.0), case.targets).from_zero()
 
 
 def test_load_that_no_equilibrium_carries_is_infeasible():
@@ -168,20 +168,20 @@ def test_load_that_no_equilibrium_carries_is_infeasible():
     both = bench(case, case.simulate())
     both.rest.place(both.rest.initial, None)
     with pytest.raises(Infeasible, match="push on tip"):
-        both.equilibria.trace()
+        both.equilibria.from_zero()
 
 
 @each_case
 def test_gradients_agree_with_central_differences_of_followed_equilibria(name):
     both = made(name)
     placed = both.rest.place(both.design(0.05), None)
-    known = both.equilibria.trace()
+    known = both.equilibria.from_zero()
     gradient = both.rest.gradient(placed, fields(both, known))
     direction, step = both.direction(7), 1e-3
 
     def moved(h: float) -> np.ndarray:
         both.rest.place(placed.p + h * direction, placed)
-        return displacements(both.equilibria.follow(known))
+        return displacements(both.equilibria.from_design(known))
 
     slope = (moved(step) - moved(-step)) / (2.0 * step)
     assert gradient @ direction == pytest.approx(slope, rel=1e-5)
@@ -191,7 +191,7 @@ def test_gradients_agree_with_central_differences_of_followed_equilibria(name):
 def test_gradients_do_not_disturb_the_design(name):
     both = made(name)
     both.rest.place(both.design(0.05), None)
-    known = both.equilibria.trace()
+    known = both.equilibria.from_zero()
     before = both.field()
     first = fields(both, known)
     assert np.array_equal(both.field(), before)
@@ -216,9 +216,9 @@ def test_targets_of_several_forces_directions_and_sizes_are_told_apart():
     case = Case(scene, [fm.SplineDesign(diagonal, 3)], targets)
     both = bench(case, case.simulate())
     both.rest.place(both.rest.initial, None)
-    together = displacements(both.equilibria.trace())
+    together = displacements(both.equilibria.from_zero())
     for target, reached in zip(targets, together, strict=True):
-        alone = displacements(SampleEquilibria(both.simulation, [target]).trace())
+        alone = displacements(SampleEquilibria(both.simulation, [target]).from_zero())
         assert alone == pytest.approx([reached], rel=1e-8, abs=1e-12)
     assert together[2] == together[4]
     assert together[3] < 0.0 < together[2] < together[0]

@@ -69,25 +69,25 @@ def nearly_snapping():
 def test_design_path_across_a_fold_is_reported(nearly_snapping, fall):
     simulation, equilibria = nearly_snapping
     lowered(simulation.model, 0.0)
-    known = equilibria.trace()
+    known = equilibria.from_zero()
     lowered(simulation.model, fall)
     there = simulation.model.elastic.d.x.array.copy()
     if fall > 0.012:
         with pytest.raises(Infeasible, match="fold"):
-            equilibria.follow(known)
+            equilibria.from_design(known)
         assert np.array_equal(simulation.model.elastic.d.x.array, there)
         with pytest.raises(Infeasible, match="snaps"):
-            equilibria.trace()
+            equilibria.from_zero()
     else:
-        followed, traced = equilibria.values(equilibria.follow(known)), equilibria.values(equilibria.trace())
+        followed, traced = equilibria.values(equilibria.from_design(known)), equilibria.values(equilibria.from_zero())
         assert followed == pytest.approx(traced, rel=1e-7)
 
 
 def test_large_change_of_design_away_from_the_fold_is_followed(nearly_snapping):
     simulation, equilibria = nearly_snapping
     lowered(simulation.model, 0.0)
-    known = equilibria.trace()
+    known = equilibria.from_zero()
     lowered(simulation.model, -0.3)
-    followed, traced = equilibria.values(equilibria.follow(known)), equilibria.values(equilibria.trace())
+    followed, traced = equilibria.values(equilibria.from_design(known)), equilibria.values(equilibria.from_zero())
     assert followed == pytest.approx(traced, rel=1e-7)
     assert followed < 0.5 * equilibria.values(known)

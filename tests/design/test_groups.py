@@ -60,7 +60,7 @@ def test_number_of_groups(processes, targets, groups):
 
 @pytest.mark.parametrize("processes", range(1, 9))
 @pytest.mark.parametrize("targets", range(1, 7))
-def test_number_of_groups_promises_the_shortest_time(processes, targets):
+def test_number_of_groups_has_the_shortest_expected_time(processes, targets):
     def seconds(groups: int) -> float:
         return math.ceil(targets / groups) / math.sqrt(processes // groups)
 

@@ -87,12 +87,12 @@ def test_maps_pass_the_taylor_test_by_parameters_and_positions_together(link):
 def test_second_derivatives_of_the_maps(link):
     handles, p, theta = away(link)
     weights = np.random.default_rng(5).standard_normal((len(handles), 2, 3))
-    mixed, twice = handles.curvatures(p, theta, weights, segments=handles.segments(theta))
+    cross, twice = handles.curvatures(p, theta, weights, segments=handles.segments(theta))
 
     def slope(q, x):
         return np.sum(weights * handles.gradients(q, x)[1], axis=(1, 2))
 
-    assert mixed == pytest.approx(jacobian(lambda q: slope(q, theta), p), abs=1e-6)
+    assert cross == pytest.approx(jacobian(lambda q: slope(q, theta), p), abs=1e-6)
     step = 0.2 * np.min(np.abs(theta[handles.slides] - np.rint(theta[handles.slides])))
     along = jacobian(lambda shift: slope(p, theta + shift), [0.0], step=min(step, 0.05))[:, 0]
     assert twice == pytest.approx(along, rel=1e-6, abs=1e-6)

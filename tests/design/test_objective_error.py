@@ -30,13 +30,13 @@ def test_effectivity_is_between_a_half_and_two(name, monkeypatch):
         fm.Target(push, force=0.5 * load, displacement=0.3 * rough),
     ]
     equilibria = SampleEquilibria(simulation, targets)
-    known = equilibria.trace()
+    known = equilibria.from_zero()
     reached = equilibria.values(known)
     estimate = Comparison(targets, fm.Units()).objective_error(reached, equilibria.errors(known))
     refine(monkeypatch, 1)
     finer = fm.Simulation(scene, space="plane-stress", order=3, size=2.0, comm=MPI.COMM_SELF)
     there = SampleEquilibria(finer, targets)
-    there = there.values(there.trace())
+    there = there.values(there.from_zero())
     assert 0.5 < estimate / (value(targets, there) - value(targets, reached)) < 2.0
 
 

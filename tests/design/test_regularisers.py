@@ -41,10 +41,8 @@ def rest_of(link: LinkSpline, bounds: Bounds, *, count: int = 500, thickness: fl
     """The part of a rest shape that regularisers of the spline alone read."""
     lengths = np.where(link.is_thickness, 1.0, thickness)
     samples = SplineSamples(link, count=count)
-    whole = slice(0, link.size)
-    return SimpleNamespace(
-        links=(DesignedLink("arch", whole, link, samples, thickness, bounds),), initial=link.initial, lengths=lengths
-    )
+    arch = DesignedLink("arch", slice(0, link.size), link, samples, thickness, bounds, link.controls[:, 0, :2])
+    return SimpleNamespace(links=(arch,), initial=link.initial, lengths=lengths)
 
 
 def model_of(regulariser: Regulariser, rest: SimpleNamespace) -> Model:

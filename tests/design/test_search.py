@@ -47,7 +47,9 @@ class TwoValleys:
         controls = np.zeros((3, 2, 3))
         controls[:, 0, 0], controls[:, 1, 0], controls[:, 0, 2] = (0.0, 30.0, 60.0), 30.0, 1.0
         spline = LinkSpline(controls, np.array([True, False, True]))
-        link = DesignedLink("bar", slice(0, spline.size), spline, SplineSamples(spline), H, Bounds((1.0, 6.0), 0.08))
+        link = DesignedLink(
+            "bar", slice(0, spline.size), spline, SplineSamples(spline), H, Bounds((1.0, 6.0), 0.08), controls[:, 0, :2]
+        )
         self.lengths = np.where(spline.is_thickness, 1.0, H)
         self.rest = SimpleNamespace(initial=spline.initial, lengths=self.lengths, links=(link,))
         (self.middle,) = np.flatnonzero(spline.entries == 7)  # of points (x, y, δ, x′, y′, δ′)
@@ -158,9 +160,9 @@ def test_shapes_with_inverted_cells_are_drawn_anew():
 
 
 def test_starts_for_which_no_feasible_shape_is_drawn_are_told():
-    found = searched(TwoValleys(inverted=-np.inf), fm.Scatter(starts=3, draws=5))
+    found = searched(TwoValleys(inverted=-np.inf), fm.Scatter(starts=3, attempts=5))
     assert [start.result is None for start in found.starts] == [False, True, True]
-    assert str(found.starts[1]) == "start 1: no feasible shape was drawn, 5 shapes rejected before"
+    assert str(found.starts[1]) == "start 1: no feasible shape was found, 5 shapes rejected before"
 
 
 def test_infeasible_starts_are_survived_and_told():
@@ -242,7 +244,7 @@ def test_processes_share_the_starts_and_have_the_same_outcome():
     assert len(shared.asked) < len(alone.asked) or comm.size == 1
 
 
-@pytest.mark.parametrize("option", ["starts", "spread", "draws", "trial", "distinct"])
+@pytest.mark.parametrize("option", ["starts", "spread", "attempts", "trial", "distinct"])
 def test_numbers_of_a_search_are_positive(option):
     with pytest.raises(fm.DescriptionError, match=f"{option}.*search|search.*{option}"):
         fm.Scatter(**{option: 0})

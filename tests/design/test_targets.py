@@ -80,13 +80,13 @@ def test_short_form_is_the_displacement_of_a_force_at_its_sample():
 def test_gradients_of_all_kinds_agree_with_central_differences_of_followed_equilibria():
     both = every()
     placed = both.rest.place(both.design(0.05), None)
-    known = both.equilibria.trace()
+    known = both.equilibria.from_zero()
     fields = np.array([gradient.design for gradient in both.equilibria.gradients(known)])
     gradient, direction, step = both.rest.gradient(placed, fields), both.direction(7), 1e-3
 
     def moved(h: float) -> np.ndarray:
         both.rest.place(placed.p + h * direction, placed)
-        return both.equilibria.values(both.equilibria.follow(known))
+        return both.equilibria.values(both.equilibria.from_design(known))
 
     slope = (moved(step) - moved(-step)) / (2.0 * step)
     assert len(slope) == 13
@@ -97,16 +97,16 @@ def test_gradients_of_all_kinds_agree_with_central_differences_of_followed_equil
 def test_following_ends_where_tracing_does():
     both = every()
     placed = both.rest.place(both.design(0.05), None)
-    known = both.equilibria.trace()
+    known = both.equilibria.from_zero()
     both.rest.place(both.design(0.1, seed=2), placed)
-    followed = both.equilibria.values(both.equilibria.follow(known))
-    assert followed == pytest.approx(both.equilibria.values(both.equilibria.trace()), rel=1e-7, abs=1e-7)
+    followed = both.equilibria.values(both.equilibria.from_design(known))
+    assert followed == pytest.approx(both.equilibria.values(both.equilibria.from_zero()), rel=1e-7, abs=1e-7)
 
 
 def test_samples_say_what_a_user_computes():
     both = every()
     both.rest.place(both.rest.initial, None)
-    values = both.equilibria.values(both.equilibria.trace())
+    values = both.equilibria.values(both.equilibria.from_zero())
     simulation = both.simulation
     curve = simulation.load_displacement(arm().push, displacements=[5.0], others={arm().press: 1.0})
     assert values[2] == pytest.approx(curve.forces[0], rel=1e-8)
@@ -125,18 +125,18 @@ def test_equilibria_at_a_prescribed_displacement_may_be_unstable_under_the_force
     middle = next(frame for frame in path.frames if not frame.stable)
     held = fm.Target(fm.ForceMagnitude(push), fm.Sample({push: fm.at(middle.displacement)}), equals=1.0)
     known = SampleEquilibria(simulation, [held])
-    known = known.values(known.trace())
+    known = known.values(known.from_zero())
     assert known == pytest.approx([middle.force], rel=1e-6)
     limit = path.limit_points[0].frame
     pushed = fm.Target(push, force=1.2 * limit.force, displacement=limit.displacement)
     with pytest.raises(Infeasible, match="snaps|unstable|no equilibrium"):
-        SampleEquilibria(simulation, [pushed]).trace()
+        SampleEquilibria(simulation, [pushed]).from_zero()
 
 
 def test_vectors_and_forces_at_displacements_are_reached():
     case = arm().case()
     drawn = SampleEquilibria(case.simulate(size=4.0), arm().every()[:2])
-    x, y, force = drawn.values(drawn.trace())
+    x, y, force = drawn.values(drawn.from_zero())
     targets = [
         fm.Target(fm.Displacement(arm().hand, at=(60, 0)), arm().both, equals=(0.75 * float(x), 0.85 * float(y))),
         fm.Target(fm.ForceMagnitude(arm().push), arm().moved, equals=1.15 * float(force)),

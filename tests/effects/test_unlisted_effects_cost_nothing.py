@@ -54,7 +54,7 @@ def link(mechanism):
 @pytest.mark.parametrize("space", SPACES)
 def test_a_bare_scene_has_three_forms_and_one_term(space, monkeypatch):
     bare = counts(monkeypatch, space)
-    assert bare.forms == 3  # energy, residual, tangent
+    assert bare.forms == 3  # energy, residual, stiffness
     assert bare.terms == 1
     assert bare.body_potentials == 0
 

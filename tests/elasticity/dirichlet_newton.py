@@ -36,7 +36,7 @@ def solve(
 
 def _newton(body: ElasticBody, fixed: np.ndarray, values: np.ndarray, force: np.ndarray) -> list[float]:
     u = body.u.x.array
-    matrix = fem.petsc.create_matrix(body.tangent_forms[0][0])
+    matrix = fem.petsc.create_matrix(body.stiffness_forms[0][0])
     change, right = matrix.createVecs()
     solver = PETSc.KSP().create(matrix.comm)
     solver.setType(PETSc.KSP.Type.PREONLY)
@@ -48,7 +48,7 @@ def _newton(body: ElasticBody, fixed: np.ndarray, values: np.ndarray, force: np.
             missing = values - u[fixed]
             right.array[:] = force - body.assembled(body.residual_forms[0])
             matrix.zeroEntries()
-            body.tangent(matrix)
+            body.add_stiffness(matrix)
             matrix.assemble()
             change.set(0.0)
             change.array[fixed] = missing

@@ -48,7 +48,7 @@ def _newton(body: ElasticBody, fixed: np.ndarray, values: np.ndarray, force: np.
         residual, change = body.residuals(), np.zeros_like(x)
         residual[: len(force)] -= force
         change[fixed] = values - x[fixed]
-        residual, change, K = _joined(comm, residual), _joined(comm, change), tangent(body)
+        residual, change, K = _joined(comm, residual), _joined(comm, change), stiffness_matrix(body)
         change[free] = splu(K[free][:, free].tocsc()).solve(-(residual + K @ change)[free])
         x = x + change[own][: len(x)]
         body.take(x)
@@ -58,10 +58,10 @@ def _newton(body: ElasticBody, fixed: np.ndarray, values: np.ndarray, force: np.
     raise RuntimeError(f"last change {np.abs(change).max()}")
 
 
-def tangent(body: ElasticBody) -> csr_matrix:
+def stiffness_matrix(body: ElasticBody) -> csr_matrix:
     """∂²E/∂(u, p)² of all ranks, on each of them (collective)."""
-    matrix = body.create_tangent()
-    body.tangent(matrix)
+    matrix = body.create_stiffness()
+    body.add_stiffness(matrix)
     matrix.assemble()
     starts, columns, values = matrix.getValuesCSR()
     matrix.destroy()

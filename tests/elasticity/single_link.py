@@ -78,10 +78,10 @@ def forces(body: ElasticBody) -> np.ndarray:
     return body.assembled(body.residual_forms[0])
 
 
-def tangent(body: ElasticBody) -> np.ndarray:
+def stiffness_matrix(body: ElasticBody) -> np.ndarray:
     """∂²E/∂u², dense; on one rank."""
-    matrix = fem.petsc.create_matrix(body.tangent_forms[0][0])
-    body.tangent(matrix)
+    matrix = fem.petsc.create_matrix(body.stiffness_forms[0][0])
+    body.add_stiffness(matrix)
     matrix.assemble()
     values = matrix[:, :]
     matrix.destroy()

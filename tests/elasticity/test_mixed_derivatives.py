@@ -1,4 +1,4 @@
-"""Residual and tangent of displacement and pressure are the derivatives of the energy."""
+"""Residual and stiffness of displacement and pressure are the derivatives of the energy."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from fenicsmech.elasticity import PLANE_STRAIN, SPATIAL
 
 from ..oracles.dense import taylor_rates
 from .cases import each_law, name
-from .mixed_newton import tangent
+from .mixed_newton import stiffness_matrix
 from .single_link import distorted, interpolate, single_link, wave
 
 STEPS = 10.0 ** -np.arange(1.5, 3.6, 0.5)
@@ -38,7 +38,7 @@ def test_residual_is_the_derivative_of_the_energy(model, law):
 @pytest.mark.parametrize(("model", "order"), [(PLANE_STRAIN, 2), (PLANE_STRAIN, 3), (SPATIAL, 2)])
 def test_tangent_is_the_derivative_of_the_residual_and_symmetric(model, order, law):
     body, start, direction = loaded(model, law, order=order)
-    K = tangent(body)
+    K = stiffness_matrix(body)
     weights = np.random.default_rng(4).uniform(-1.0, 1.0, len(start))
 
     def weighted(x):

@@ -73,8 +73,8 @@ def test_blocks_of_the_kkt_matrix_are_those_of_a_dense_oracle(space):
     largest = np.where(joints.pose_scale == 1.0, 0.03, 0.03 * SIZE)
     follow = dense.jacobian(moved, np.zeros(joints.size), step=largest) * scale.poses
     system.load(state)
-    stiffness = system.elastic.create_tangent()
-    system.elastic.tangent(stiffness)
+    stiffness = system.elastic.create_stiffness()
+    system.elastic.add_stiffness(stiffness)
     stiffness.assemble()
     stiffness = entries(stiffness)
     constraints = joints.gradient(state.poses, state.motors)

@@ -75,7 +75,7 @@ def test_residual_is_the_gradient_of_the_lagrangian(space, where, kind):
         moved = shifted(system, state, x)
         value = system.potential(moved, moved.force)
         value -= moved.multipliers @ system.joints.value(moved.poses, moved.motors)
-        return value + (moved.force * control.target if control.constrained else 0.0)
+        return value + (moved.force * control.prescribed if control.constrained else 0.0)
 
     columns = sample(system, control)
     expected = dense.gradient(

@@ -51,7 +51,7 @@ def test_residual_and_kkt_matrix_are_derivatives_of_the_lagrangian(dim, comm):
 
     def lagrangian(h):
         moved = shifted(system, state, h * direction)
-        value = system.potential(moved, moved.force) + moved.force * control.target
+        value = system.potential(moved, moved.force) + moved.force * control.prescribed
         return value - moved.multipliers @ system.joints.value(moved.poses, moved.motors)
 
     def gradient_at(h):

@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.continuation import Constant, Hermite, Tangent
+from fenicsmech.continuation import ConstantPredictor, HermitePredictor, TangentPredictor
 from fenicsmech.equilibrium import LoadControl
 
 from ..simulation.clamped import cantilever
@@ -41,7 +41,7 @@ def test_residual_at_the_end_is_the_first_below_the_tolerance(space):
     assert rough.displacement == pytest.approx(fine.displacement, rel=1e-4)
 
 
-@pytest.mark.parametrize("predictor", [Constant(), Tangent(), Hermite()])
+@pytest.mark.parametrize("predictor", [ConstantPredictor(), TangentPredictor(), HermitePredictor()])
 def test_predictor_changes_the_cost_but_not_the_curve(predictor):
     loads = [1.0, 2.0, 3.0, 4.0, 5.0]
     simulation, push = finger("plane-stress")

@@ -21,7 +21,7 @@ def control(accuracy: float, **changes) -> AccuracyControl:
 
 
 class Recorder:
-    """Pretends to simulate: errors of elements shrink as the levels promise; that of plane stress is given."""
+    """Pretends to simulate: errors of elements shrink as the levels predict; that of plane stress is given."""
 
     def __init__(self, elements: float, plane_stress: float) -> None:
         self.elements, self.plane_stress, self.levels = elements, plane_stress, []
@@ -75,7 +75,7 @@ def test_the_next_curve_starts_from_the_level_that_did():
     assert run.levels[0].model is MID_PLANE_SYMMETRIC
 
 
-def test_finer_levels_promise_smaller_errors_and_more_work():
+def test_finer_levels_predict_smaller_errors_and_more_work():
     for model in (PLANE_STRESS, MID_PLANE_SYMMETRIC, SPATIAL):
         levels = fidelity_levels(model)
         assert all(a.gain > b.gain and a.work < b.work for a, b in zip(levels[:-1], levels[1:], strict=True))

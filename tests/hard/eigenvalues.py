@@ -1,4 +1,4 @@
-"""Buckling loads from the tangent of the unloaded mechanism alone, without going there."""
+"""Buckling loads from the KKT matrix of the unloaded mechanism alone, without going there."""
 
 from __future__ import annotations
 

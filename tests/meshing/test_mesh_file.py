@@ -62,11 +62,14 @@ def test_curved_cells_are_read_by_their_corners_and_turned_to_positive_area(tmp_
     assert mesh.points.shape == (4, 2)
 
 
+FILES = ["curved_link.step", "diagonal.step", "strip2d.msh", "strip3d.msh"]
+
+
 def test_the_committed_files_are_small_and_made_by_their_script(tmp_path):
     runpy.run_path(str(MESHES / "generate.py"))["generate"](tmp_path)
-    for name in ("curved_link.step", "strip2d.msh", "strip3d.msh"):
+    for name in FILES:
         assert (MESHES / name).stat().st_size < 200_000
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["curved_link.step", "strip2d.msh", "strip3d.msh"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == FILES
     assert "2000-01-01T00:00:00" in (tmp_path / "curved_link.step").read_text()
     for dim, file in ((2, "strip2d.msh"), (3, "strip3d.msh")):
         mesh = mesh_link("strip", gmsh_mesh(tmp_path / file, depth=10.0), SITES, dim=dim, size=1.5)

@@ -6,7 +6,7 @@ import pytest
 from slepc4py import SLEPc
 
 import fenicsmech as fm
-from fenicsmech.continuation import ArcLengthTracer
+from fenicsmech.continuation import ArcLengthStepper
 from fenicsmech.equilibrium import NewtonSolver, NotConverged
 
 from ..equilibrium.column import EULER, column
@@ -20,8 +20,8 @@ ASKED = {
 
 
 def failing(*arguments, **options):
-    """Singular tangents: every computation that needs one says so."""
-    raise NotConverged("the tangent cannot be factored", 0)
+    """Singular KKT matrices: every computation that needs one says so."""
+    raise NotConverged("the KKT matrix cannot be factored", 0)
 
 
 @pytest.mark.parametrize("ask", ASKED.values(), ids=ASKED)
@@ -59,7 +59,7 @@ def test_force_that_joints_hold_has_no_buckling_load_and_no_path():
 def test_curve_that_ends_off_its_target_warns(found, monkeypatch, caplog):
     case = column()
     if not found:
-        monkeypatch.setattr(ArcLengthTracer, "between", failing)
+        monkeypatch.setattr(ArcLengthStepper, "between", failing)
     curve = case.simulation.follow(case.push, until=fm.Until(force=0.333 * EULER))
     assert (abs(curve.forces[-1] / (0.333 * EULER) - 1.0) < 1e-9) == found
     assert ("the path ends at" in caplog.text) != found

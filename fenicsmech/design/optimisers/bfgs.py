@@ -141,9 +141,9 @@ def _fresh(here: Evaluation, lengths: np.ndarray) -> np.ndarray:
 def _model(here: Evaluation, curvature: np.ndarray, p: np.ndarray) -> Quadratic:
     """½ |r|² + f by its gradient and B, and R, at ``p``."""
     away, gradient, penalty = p - here.parameters, _gradient(here), here.regulariser(p)
-    bend = curvature @ away
-    value = here.value - here.penalty.value + float((gradient + 0.5 * bend) @ away) + penalty.value
-    return Quadratic(value, gradient + bend + penalty.gradient, curvature + penalty.curvature)
+    curved = curvature @ away
+    value = here.value - here.penalty.value + float((gradient + 0.5 * curved) @ away) + penalty.value
+    return Quadratic(value, gradient + curved + penalty.gradient, curvature + penalty.curvature)
 
 
 def _step(here: Evaluation, curvature: np.ndarray) -> np.ndarray:

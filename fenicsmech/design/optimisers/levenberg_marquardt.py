@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenicsmech.design.optimisers.problem import Evaluation, Iterate, exact, refuse_inequalities
+from fenicsmech.design.optimisers.problem import Evaluation, Iterate, no_errors, refuse_inequalities
 from fenicsmech.design.optimisers.sqp import SQP, Memory
 from fenicsmech.errors import DescriptionError
 
@@ -84,7 +84,7 @@ class Resolution:
     """Test of the remaining reduction against the errors, which are estimated a few times from ``start`` on."""
 
     def __init__(self, options: LevenbergMarquardt, start: Iterate) -> None:
-        self._options, self._errors = options, exact()
+        self._options, self._errors = options, no_errors()
         self._estimated: Evaluation | None = None
         self._below = options.again * _gain(start)
 

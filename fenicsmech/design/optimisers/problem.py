@@ -93,7 +93,7 @@ def merit(value: float, inequalities: np.ndarray, penalties: np.ndarray | float)
     return value + float(np.sum(penalties * violated * (1.0 + 0.5 * violated)))
 
 
-def exact() -> np.ndarray:
+def no_errors() -> np.ndarray:
     """The errors of residuals that have none."""
     return np.zeros(())
 
@@ -116,7 +116,7 @@ class Evaluation:
     residuals: np.ndarray
     jacobian: np.ndarray
     regulariser: Callable[[np.ndarray], Quadratic]
-    errors: Callable[[], np.ndarray] = exact
+    errors: Callable[[], np.ndarray] = no_errors
     plain: Plain = Plain()
     inequalities: Inequalities = Inequalities()
 

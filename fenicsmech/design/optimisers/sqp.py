@@ -135,7 +135,7 @@ class SQP(Optimiser):
 
     def _begin(self, here: Evaluation, lengths: np.ndarray) -> Memory:
         """Memory at the start: O changes by the scale, and f's gradient by itself, when p changes by its lengths."""
-        scale = max(_height(here, 0.0), float(np.linalg.norm(lengths * here.gradient)))
+        scale = max(_magnitude(here, 0.0), float(np.linalg.norm(lengths * here.gradient)))
         bend = float(np.linalg.norm(lengths * here.plain.gradient))
         return Memory(self.damping, 0, scale, _sizes(here, lengths, scale), bend * np.diag(lengths**-2))
 
@@ -152,25 +152,25 @@ class SQP(Optimiser):
         if (little and (stalled or self._stationary(here, memory, step, lengths))) or (stalled and not violated):
             return replace(last, reason=Reason.VIOLATED if violated else Reason.CONVERGED)
         memory = eased
-        height, damping = here.merit(memory.penalties), memory.damping
+        merit_here, damping = here.merit(memory.penalties), memory.damping
         for _ in range(self.refusals):
             step = self._step(here, memory, damping, lengths)
-            predicted = height - _predicted(here, memory, step)
+            predicted = merit_here - _predicted(here, memory, step)
             if predicted <= 0.0:
                 break  # damped to a standstill
             evaluations += 1
             try:
-                new = problem.evaluate(step.parameters, height - self.poor * predicted, memory.penalties)
+                new = problem.evaluate(step.parameters, merit_here - self.poor * predicted, memory.penalties)
             except TooHigh:
                 damping *= 4.0
                 continue
             except Infeasible:
                 damping *= 10.0
                 continue
-            gain, number = height - new.merit(memory.penalties), last.number + 1
+            gain, number = merit_here - new.merit(memory.penalties), last.number + 1
             if gain > self.good * predicted:
                 damping = max(damping / 5.0, self.least_damping)
-            stalls = memory.stalls + 1 if gain < self.least_reduction * _height(here, memory.penalties) else 0
+            stalls = memory.stalls + 1 if gain < self.least_reduction * _magnitude(here, memory.penalties) else 0
             bent = new.inequalities.jacobian - here.inequalities.jacobian
             y = new.plain.gradient - here.plain.gradient + bent.reshape(-1, len(lengths)).T @ step.multipliers
             s = new.parameters - here.parameters
@@ -192,7 +192,7 @@ class SQP(Optimiser):
         """The iterate with the reduction predicted for the undamped step: of the merit, or of violations."""
         step, eased = self._undamped(here, memory, lengths)
         reduction = here.merit(eased.penalties) - _predicted(here, eased, step)
-        reduction /= _height(here, eased.penalties)
+        reduction /= _magnitude(here, eased.penalties)
         removed = np.maximum(here.inequalities.values, 0.0) - np.maximum(_ahead(here, step), 0.0)
         reduction = max(reduction, self.least_reduction * float(np.max(removed, initial=0.0)) / self.violation)
         return Iterate(number, evaluations, here, memory.packed(), reduction, reason)
@@ -240,7 +240,7 @@ def _predicted(here: Evaluation, memory: Memory, step: Step) -> float:
     return merit(_model(here, memory.curvature, step.parameters).value, _ahead(here, step), memory.penalties)
 
 
-def _height(here: Evaluation, penalties: np.ndarray | float) -> float:
+def _magnitude(here: Evaluation, penalties: np.ndarray | float) -> float:
     """The size of the merit, which is positive whatever the sign of f."""
     return max(here.merit(penalties) + abs(here.plain.value) - here.plain.value, 1e-30)
 

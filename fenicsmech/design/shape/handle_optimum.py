@@ -119,7 +119,7 @@ class HandleOptimum:
         followed, links = [], self._second_derivatives(placement)
         for shape, link, slope in zip(self._map.shapes, links, self._map.positions(by_theta), strict=True):
             try:
-                followed.append(cho_solve(link.factor, slope[..., link.free].T).T @ link.mixed)
+                followed.append(cho_solve(link.factor, slope[..., link.free].T).T @ link.cross)
             except np.linalg.LinAlgError:
                 raise ShapeError(
                     f"shape of link {shape.name!r}",
@@ -145,7 +145,7 @@ class HandleOptimum:
             tangent = self._map.positions(start.theta.copy())
             changes = self._map.parameters(p - start.p)
             for theta, link, change in zip(tangent, self._known[1], changes, strict=True):
-                theta[link.free] -= cho_solve(link.factor, link.mixed @ change)
+                theta[link.free] -= cho_solve(link.factor, link.cross @ change)
             guesses.append(tangent)
         sums = np.array([self._sums(p, guess) for guess in guesses])
         if not np.all(np.isfinite(sums.min(axis=0))):
@@ -262,25 +262,25 @@ class PositionDerivatives:
         segments: the segment of the spline each of them stays in, (n,).
         free: which of them move, (n,).
         slope: S_θ, (f,).
-        bend: S_θθ, (f, f).
-        mixed: S_θp, (f, parameters).
+        hessian: S_θθ, (f, f).
+        cross: S_θp, (f, parameters).
     """
 
     handles: LinkHandles
     segments: np.ndarray
     free: np.ndarray
     slope: np.ndarray
-    bend: np.ndarray
-    mixed: np.ndarray
+    hessian: np.ndarray
+    cross: np.ndarray
 
     @cached_property
     def factor(self) -> tuple[np.ndarray, bool]:
         """The Cholesky factor of S_θθ at a minimum."""
-        return cho_factor(self.bend)
+        return cho_factor(self.hessian)
 
     def newton_step(self, flattest: float) -> np.ndarray:
         """−|S_θθ|⁻¹ S_θ, with the eigenvalues of the Hessian made positive, (n,)."""
-        values, vectors = np.linalg.eigh(self.bend)
+        values, vectors = np.linalg.eigh(self.hessian)
         values = np.maximum(np.abs(values), flattest * np.abs(values).max(initial=0.0))
         step = np.zeros(len(self.handles))
         step[self.free] = -vectors @ (vectors.T @ self.slope / values)
@@ -317,12 +317,12 @@ def by_positions(handles: LinkHandles, p: np.ndarray, theta: np.ndarray, by_T: M
         segments = np.where(at_kink & (forward >= 0.0), before, after)
         free &= ~(at_kink & (forward >= 0.0) & (backward <= 0.0))
     by_p, by_theta = handles.gradients(p, theta, segments=segments)
-    mixed, twice = handles.curvatures(p, theta, by_T.gradient, segments=segments)
+    cross, twice = handles.curvatures(p, theta, by_T.gradient, segments=segments)
     slope = np.einsum("jak,jak->j", by_T.gradient, by_theta)[free]
     rows = np.einsum("jak,jakmbl->jmbl", by_theta, by_T.hessian)[free]
-    bend = np.einsum("jmbl,mbl->jm", rows, by_theta)[:, free] + np.diag(twice[free])
-    mixed = np.einsum("jmbl,mblp->jp", rows, by_p) + mixed[free]
-    return PositionDerivatives(handles, segments, free, slope, 0.5 * (bend + bend.T), mixed)
+    hessian = np.einsum("jmbl,mbl->jm", rows, by_theta)[:, free] + np.diag(twice[free])
+    cross = np.einsum("jmbl,mblp->jp", rows, by_p) + cross[free]
+    return PositionDerivatives(handles, segments, free, slope, 0.5 * (hessian + hessian.T), cross)
 
 
 def follow_spline(handles: LinkHandles, p: np.ndarray) -> np.ndarray:

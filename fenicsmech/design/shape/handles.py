@@ -97,16 +97,16 @@ class LinkHandles:
         self, p: np.ndarray, theta: np.ndarray, weights: np.ndarray, *, segments: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Σ G ∂²T_j/∂θ_j∂p, (n, size), and Σ G ∂²T_j/∂θ_j², (n,), with ``weights`` G (n, 2, 3); others as above."""
-        mixed, twice = np.zeros((len(self), self.spline.size)), np.sum(weights * _turns(theta, order=2), axis=(1, 2))
+        cross, twice = np.zeros((len(self), self.spline.size)), np.sum(weights * _turns(theta, order=2), axis=(1, 2))
         q, G = self._q(p, theta, segments), weights[self.rides].reshape(-1, 6)
         slope = np.einsum("ni,niq->nq", G, _spline_maps().gradient(q, self._frames))
         velocity = self._q(p, theta, segments, order=1)
-        bend = np.einsum("nqr,nq->nr", _spline_maps().hessian(q, self._frames, G), velocity)
-        mixed[self.rides] = np.einsum("nq,nqp->np", bend, self._q_by_p(theta, segments)) + np.einsum(
+        turned = np.einsum("nqr,nq->nr", _spline_maps().hessian(q, self._frames, G), velocity)
+        cross[self.rides] = np.einsum("nq,nqp->np", turned, self._q_by_p(theta, segments)) + np.einsum(
             "nq,nqp->np", slope, self._q_by_p(theta, segments, order=1)
         )
-        twice[self.rides] = np.sum(bend * velocity + slope * self._q(p, theta, segments, order=2), axis=1)
-        return mixed, twice
+        twice[self.rides] = np.sum(turned * velocity + slope * self._q(p, theta, segments, order=2), axis=1)
+        return cross, twice
 
     def _q(self, p: np.ndarray, theta: np.ndarray, segments: np.ndarray, *, order: int = 0) -> np.ndarray:
         """q of the handles that ride, differentiated ``order`` times by t, (k, 5)."""

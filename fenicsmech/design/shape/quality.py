@@ -23,7 +23,14 @@ from dolfinx.fem import petsc
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fenicsmech.compat import assemble_matrix, assemble_vector, compile_expression, compile_form, evaluate_expression
+from fenicsmech.compat import (
+    assemble_matrix,
+    assemble_vector,
+    cellwise_space,
+    compile_expression,
+    compile_form,
+    evaluate_expression,
+)
 
 
 def aspect_ratio(design: fem.Function):
@@ -54,16 +61,22 @@ def _spatial(a, b, c):
 
 
 class QualitySum:
-    """Σ φ(ρ) over all cells, with its derivatives by the design field.
+    """Σ φ(ρ) over cells, with its derivatives by the design field.
 
     Args:
         design: the design field d, vector P1.
         penalty: φ, in UFL; ρ itself by default.
         comm: the processes that share the mesh; the mesh's own communicator by default.
+        counts: mask of the local cells that count, ghosts last, (cells,); all by default.
     """
 
     def __init__(
-        self, design: fem.Function, penalty: Callable = lambda rho: rho, *, comm: MPI.Comm | None = None
+        self,
+        design: fem.Function,
+        penalty: Callable = lambda rho: rho,
+        *,
+        comm: MPI.Comm | None = None,
+        counts: np.ndarray | None = None,
     ) -> None:
         self.design, self._mesh = design, design.function_space.mesh
         self._comm = comm or self._mesh.comm
@@ -71,10 +84,14 @@ class QualitySum:
         volume = abs(ufl.JacobianDeterminant(self._mesh)) / factorial(dim)
         self._penalty = penalty(aspect_ratio(design))
         measure = ufl.Measure("dx", domain=self._mesh, metadata={"quadrature_degree": 0})
-        self._sum = self._penalty / volume * measure
+        share = 1.0
+        if counts is not None:
+            share = fem.Function(cellwise_space(self._mesh))
+            share.x.array[: len(counts)] = counts
+        self._sum = share * self._penalty / volume * measure
 
     def value(self) -> float:
-        """The sum over the whole mesh, inf if a cell is inside out."""
+        """The sum over all processes, inf if a cell is inside out."""
         total = float(self._mesh.comm.allreduce(fem.assemble_scalar(self._form)))
         return inf if isnan(total) else total
 

@@ -17,9 +17,10 @@ from mpi4py import MPI
 
 from fenicsmech.collective import from_one
 from fenicsmech.compat import original_cells
+from fenicsmech.design.shape.centreline import LinkOutline
 from fenicsmech.design.shape.edges import EdgeWeights, edge_weights
 from fenicsmech.design.shape.handles import BETWEEN, LinkHandles
-from fenicsmech.design.shape.spline import SplineFit, fit_spline, lay_out
+from fenicsmech.design.shape.spline import LinkSpline, SplineFit, SplineSamples, fit_spline, lay_out
 from fenicsmech.design.shape.weights import handle_weights, pierced
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import Centreline
@@ -39,7 +40,7 @@ class ShapeRequest:
         segments: number of cubic segments.
         centreline: approximated by the spline.
         ends_move: whether free ends may move.
-        thickness: in the plane, where δ = 1; None: the mean width of the link.
+        thickness: in the plane, where δ = 1, or the outline that it is measured on; None: the mean width of the link.
         spacing: arc length between handles; None: the mean width of the link.
     """
 
@@ -51,7 +52,7 @@ class ShapeRequest:
     segments: int
     centreline: Centreline
     ends_move: bool = False
-    thickness: float | None = None
+    thickness: float | LinkOutline | None = None
     spacing: float | None = None
 
 
@@ -65,7 +66,8 @@ class LinkShape:
         handles: its handles.
         weights: of each handle at each vertex of the link, (n, handles).
         edges: weights at the midpoints of edges that follow the design.
-        thickness: in the plane, where δ = 1.
+        thickness: in the plane, where δ = 1; at the samples of the spline where it is not the same everywhere.
+        centreline: points that the drawn centreline runs through, (k, 2).
     """
 
     link: int
@@ -73,7 +75,8 @@ class LinkShape:
     handles: LinkHandles
     weights: np.ndarray
     edges: EdgeWeights
-    thickness: float
+    thickness: float | np.ndarray
+    centreline: np.ndarray
 
 
 def shape_link(mesh: LinkMesh, request: ShapeRequest) -> LinkShape:
@@ -96,7 +99,18 @@ def shape_link(mesh: LinkMesh, request: ShapeRequest) -> LinkShape:
             "Use smaller elements",
         )
     edges = edge_weights(mesh, weights)
-    return LinkShape(request.link, request.name, handles, weights, edges, request.thickness or width)
+    drawn = request.thickness or width
+    thickness = _measured(drawn, fit.spline, part=f"design of {part}") if isinstance(drawn, LinkOutline) else drawn
+    centreline = request.centreline.evaluate(request.centreline.knots)
+    return LinkShape(request.link, request.name, handles, weights, edges, thickness, centreline)
+
+
+def _measured(outline: LinkOutline, spline: LinkSpline, *, part: str) -> np.ndarray:
+    """The thickness of a link at the samples of its spline, (samples,)."""
+    t = SplineSamples(spline).t
+    tangents = spline.derivative(spline.initial, t)[:, :2]
+    tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
+    return outline.thickness(spline.evaluate(spline.initial, t)[:, :2], tangents, part=part)
 
 
 def shape_links(mesh: MechanismMesh, requests: Sequence[ShapeRequest]) -> list[LinkShape]:

@@ -129,7 +129,7 @@ def check_motors(mechanism: Mechanism, where: str, motors: Iterable[tuple[Motor,
             raise DescriptionError(where, f"{motor.name!r} is not a motor of {mechanism.name!r}", remedy)
 
 
-class CurveTracer:
+class CurveStepper:
     """The unloaded equilibrium of a configuration at the present rest shape, and load steps from there.
 
     Attributes:
@@ -187,7 +187,7 @@ class CurveTracer:
         clock, stepper = self._model.clock, self._stepper
         start, seconds, iterations, snaps = perf_counter(), dict(clock.seconds), stepper.iterations, stepper.snaps
         if control.constrained:
-            control = control.at(control.target + self.origin)
+            control = control.at(control.prescribed + self.origin)
         try:
             point = stepper.advance(control)
         except LoadStepsFailed as failure:
@@ -195,7 +195,9 @@ class CurveTracer:
         record = self.record(point)
         if self.freedom.mobility and not control.constrained and self._imbalance(point.state, control) > 1e-4:
             names = ", ".join(map(repr, self.freedom.mobile))
-            problem = f"the rest position of {names} at force {control.target:g} is lost in the rounding of stiff links"
+            problem = (
+                f"the rest position of {names} at force {control.prescribed:g} is lost in the rounding of stiff links"
+            )
             raise self._error(self.request.where, problem, self.frames[-1] if self.frames else None)
         snapped_through, self._snaps = self._snaps + stepper.snaps > snaps, 0
         spent, phases = perf_counter() - start, clock.since(seconds)
@@ -283,8 +285,8 @@ class CurveTracer:
         if control.constrained and self._is_held():
             return EquilibriumError(
                 where,
-                f"no equilibrium at displacement {control.target - self.origin:g}: joints and motors hold its point, "
-                "which cannot move along its direction",
+                f"no equilibrium at displacement {control.prescribed - self.origin:g}: joints and motors hold its "
+                "point, which cannot move along its direction",
                 "Choose another point or direction, or load control",
                 last=last,
                 frames=self.frames,
@@ -292,7 +294,7 @@ class CurveTracer:
         what, origin = ("displacement", self.origin) if control.constrained else ("force", 0.0)
         force = f" with a force of {last.force:g}" if control.constrained and last is not None else ""
         problem = (
-            f"no equilibrium at {what} {control.target - origin:g}; the last one is at {failure.reached - origin:g}"
+            f"no equilibrium at {what} {control.prescribed - origin:g}; the last one is at {failure.reached - origin:g}"
             f"{force} ({failure.reason}; {len(failure.tried)} smaller steps were tried)"
         )
         return self._error(where, problem, last)

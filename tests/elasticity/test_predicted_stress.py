@@ -1,13 +1,13 @@
-"""The stress that a step promises: what it is for pure turns, its order in the step, and its part of the tangent."""
+"""The stress predicted by a step: for pure turns, its order in the step, and its part of the stiffness."""
 
 import numpy as np
 import pytest
 from dolfinx import fem
 
-from fenicsmech.elasticity import MixedStress
+from fenicsmech.elasticity import PredictedStress
 
 from .cases import CASES, name
-from .single_link import distorted, forces, interpolate, nodes, single_link, tangent, wave
+from .single_link import distorted, forces, interpolate, nodes, single_link, stiffness_matrix, wave
 
 
 @pytest.fixture(scope="module", params=CASES, ids=lambda case: "-".join(map(name, case)))
@@ -19,8 +19,8 @@ def body(request):
 
 
 @pytest.fixture(scope="module")
-def mixed(body):
-    return MixedStress(body)
+def predicted(body):
+    return PredictedStress(body)
 
 
 def values(body, field):
@@ -28,10 +28,10 @@ def values(body, field):
     return field(nodes(body.u)).ravel()
 
 
-def stiffness(mixed):
+def stiffness(predicted):
     """∫ ∇v ΔS : ∇w dV, dense."""
-    matrix = fem.petsc.create_matrix(mixed._body.tangent_forms[0][0])
-    mixed.tangent(matrix)
+    matrix = fem.petsc.create_matrix(predicted._body.stiffness_forms[0][0])
+    predicted.add_stiffness(matrix)
     matrix.assemble()
     dense = matrix[:, :]
     matrix.destroy()
@@ -39,7 +39,7 @@ def stiffness(mixed):
 
 
 @pytest.mark.thorough
-def test_step_that_turns_promises_no_stress_where_its_displacements_stretch(body, mixed):
+def test_step_that_turns_predicts_no_stress_where_its_displacements_stretch(body, predicted):
     dim = body.model.dim
     skew = np.zeros((dim, dim))
     skew[0, 1], skew[1, 0] = 0.3, -0.3
@@ -48,47 +48,47 @@ def test_step_that_turns_promises_no_stress_where_its_displacements_stretch(body
     mesh_only = body.d.x.array.copy()
     body.d.x.array[:] = 0.0
     body.u.x.array[:] = turn
-    mixed.follow(at_rest, turn)
+    predicted.take(at_rest, turn)
     stretched = forces(body)
     assert np.abs(stretched).max() > 1e-3
-    assert mixed.forces() == pytest.approx(-stretched, abs=1e-12 * np.abs(stretched).max())
+    assert predicted.forces() == pytest.approx(-stretched, abs=1e-12 * np.abs(stretched).max())
     body.d.x.array[:] = mesh_only
 
 
-def test_difference_to_the_stress_of_the_displacements_is_of_second_order_in_the_step(body, mixed):
+def test_difference_to_the_stress_of_the_displacements_is_of_second_order_in_the_step(body, predicted):
     before, step = (values(body, wave(body.model.dim, 0.1, seed=seed)) for seed in (2, 3))
     sizes = []
     for length in (0.02, 0.01):
         body.u.x.array[:] = before + length * step
-        mixed.follow(before, length * step)
-        sizes.append(np.linalg.norm(mixed.forces()))
+        predicted.take(before, length * step)
+        sizes.append(np.linalg.norm(predicted.forces()))
     assert sizes[0] > 1e-8
     assert np.log2(sizes[0] / sizes[1]) == pytest.approx(2.0, abs=0.05)
 
 
-def test_tangent_is_the_derivative_of_the_forces_of_the_promised_stress(body, mixed):
-    """∂/∂u ∫ F S : ∇v dV of a stress S that does not change is ∫ ∇v S : ∇w dV; S(u) itself is not promised but held."""
+def test_stiffness_is_the_derivative_of_the_forces_of_the_predicted_stress(body, predicted):
+    """∂/∂u ∫ F S : ∇v dV of a stress S that does not change is ∫ ∇v S : ∇w dV; S(u) is not predicted but held."""
     before, step, way = (values(body, wave(body.model.dim, 0.1, seed=seed)) for seed in (2, 3, 4))
     here = before + step
 
-    def held_forces(promise, u):
+    def held_forces(prediction, u):
         body.u.x.array[:] = u
-        mixed.follow(*promise)
-        return mixed.forces() + forces(body)
+        predicted.take(*prediction)
+        return predicted.forces() + forces(body)
 
-    def derivative(promise):
+    def derivative(prediction):
         h = 1e-5
-        return (held_forces(promise, here + h * way) - held_forces(promise, here - h * way)) / (2.0 * h)
+        return (held_forces(prediction, here + h * way) - held_forces(prediction, here - h * way)) / (2.0 * h)
 
     expected = derivative((before, step)) - derivative((here, 0.0 * step))
     body.u.x.array[:] = here
-    mixed.follow(before, step)
-    assert stiffness(mixed) @ way == pytest.approx(expected, abs=1e-7 * np.abs(expected).max())
+    predicted.take(before, step)
+    assert stiffness(predicted) @ way == pytest.approx(expected, abs=1e-7 * np.abs(expected).max())
 
 
-def test_nothing_is_added_where_there_was_no_step(body, mixed):
+def test_nothing_is_added_where_there_was_no_step(body, predicted):
     here = values(body, wave(body.model.dim, 0.1, seed=2))
     body.u.x.array[:] = here
-    mixed.follow(here, 0.0 * here)
-    assert np.abs(mixed.forces()).max() < 1e-14
-    assert np.abs(stiffness(mixed)).max() < 1e-12 * np.abs(tangent(body)).max()
+    predicted.take(here, 0.0 * here)
+    assert np.abs(predicted.forces()).max() < 1e-14
+    assert np.abs(stiffness(predicted)).max() < 1e-12 * np.abs(stiffness_matrix(body)).max()
