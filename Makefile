@@ -84,7 +84,7 @@ test-slow: install-test ## the tests marked `slow`
 	$(call heading,slow tests)
 	$(SERIAL) -m slow $(TESTS)
 
-# Verdicts are kept: the same command goes on after an interruption.
+# Results are kept: the same command continues after an interruption.
 N := 1000
 SEED := 0
 

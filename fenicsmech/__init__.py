@@ -25,6 +25,9 @@ from fenicsmech.design import (
     LinkDesign,
     MeshQuality,
     ModulusFit,
+    Number,
+    NumberBounds,
+    NumberDesign,
     Optimiser,
     PartValue,
     Regulariser,
@@ -126,21 +129,26 @@ from fenicsmech.mechanism import (
     step_file,
     strip,
 )
-from fenicsmech.model import SPACES, Fidelity
+from fenicsmech.model import SPACES, Design, Fidelity
 from fenicsmech.multibody import BodyPoint, Freedom, Linkage, PosePotential
 from fenicsmech.plot import CurveMark, CurveSeries, CurveTarget, Trace, plot_curve
 from fenicsmech.quantities import (
     CentrelineLength,
     Component,
+    Depth,
     Displacement,
     ForceMagnitude,
     FormValue,
     JointForce,
     JointMoment,
+    LawParameter,
     LinkMass,
     LinkVolume,
     Magnitude,
+    ModelNumber,
     MotorTorque,
+    NumberKind,
+    NumberTerms,
     Observable,
     Partial,
     PrescribedDisplacement,
@@ -148,6 +156,8 @@ from fenicsmech.quantities import (
     RestObservable,
     Rotation,
     Sample,
+    SpringRest,
+    SpringStiffness,
     StrainEnergy,
     at,
     border_of,
@@ -209,7 +219,10 @@ __all__ = [
     "DesignProblem", "SplineDesign", "ShapeBounds", "Target", "StayClose", "MeshQuality", "Regulariser",
     "LevenbergMarquardt", "BFGS", "SQP", "Optimiser", "Correction", "DesignResult", "LinkDesign", "TargetResult",
     "PartValue", "Scatter", "SearchResult", "StartResult", "Optimisation", "design_study", "Experiment", "ModulusFit",
-    "fit_modulus",
+    "fit_modulus", "Design",
+    # numbers that designs change beside shapes; NumberKind for kinds of your own
+    "Number", "Depth", "LawParameter", "SpringStiffness", "SpringRest", "NumberBounds", "NumberDesign",
+    "NumberKind", "ModelNumber", "NumberTerms",
     # errors
     "FenicsmechError", "DescriptionError", "MeshingError", "AssemblyError", "EquilibriumError",
 ]

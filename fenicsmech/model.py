@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import dataclasses
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
@@ -173,11 +174,30 @@ def _mesh_options(link: FlexibleLink, linkage: Linkage, fidelity: Fidelity) -> d
     return dict(sites=sites, dim=model.dim, size=size, half=model.half, layers=layers, segments=fidelity.segments)
 
 
+@dataclass(frozen=True, eq=False)
+class Design:
+    """What designs change in a model.
+
+    Attributes:
+        field: the design field of the links' shapes, this rank's values with ghosts, flat.
+        numbers: values of design numbers by their kind; others are as drawn.
+    """
+
+    field: np.ndarray
+    numbers: Mapping[Any, float] = dataclasses.field(default_factory=dict)
+
+    def halfway(self, other: Design) -> Design:
+        """The mean of both."""
+        numbers = {kind: 0.5 * (value + other.numbers[kind]) for kind, value in self.numbers.items()}
+        return Design(0.5 * (self.field + other.field), numbers)
+
+
 class MechanismModel:
     """A mechanism at one fidelity, ready for equilibria.
 
     Attributes:
         materials: of the flexible links.
+        depths: of the flexible links.
         mesh: the reference mesh of all flexible links.
         elastic: their elastic energy.
         fields: the fields of effects' energies.
@@ -187,7 +207,8 @@ class MechanismModel:
         clock: of the phases.
         mixed: whether each flexible link is in the u–p formulation.
         effects: of the scene.
-        potentials: potentials of body poses.
+        effect_potentials: potentials of body poses of each effect.
+        potentials: all of these.
         spring_potentials: those of springs, which act from the start.
     """
 
@@ -200,10 +221,12 @@ class MechanismModel:
         clock: Clock,
         effects: Sequence[Effect] = (),
         materials: Sequence[Material] | None = None,
+        shapes: Sequence[Shape] | None = None,
     ) -> None:
         self.mechanism, self.linkage, self.mesh, self.clock = mechanism, linkage, mesh, clock
         self.effects, links = tuple(effects), mechanism.flexible_links
         self.materials = tuple(link.material for link in links) if materials is None else tuple(materials)
+        self.depths = tuple(shape.depth for shape in shapes or [link.shape for link in links])
         self.mixed = fidelity.formulation.mixed(list(self.materials), fidelity.model, fidelity.order)
         faces = [part for effect in effects for part in effect.faces]
         boundaries = find_boundaries(mesh.mesh, links, mesh.link, faces, half=fidelity.model.half)
@@ -216,7 +239,7 @@ class MechanismModel:
             link=mesh.link,
             free=mesh.interface < 0,
             materials=self.materials,
-            depths=[link.shape.depth for link in links],
+            depths=self.depths,
             model=fidelity.model,
             order=fidelity.order,
             quadrature=fidelity.quadrature,
@@ -227,7 +250,8 @@ class MechanismModel:
             mixed=self.mixed,
         )
         self.fields = LinkFields(tuple(links), self.elastic, boundaries)
-        self.potentials = [potential for effect in effects for potential in effect.pose_potentials(linkage)]
+        self.effect_potentials = [(effect, tuple(effect.pose_potentials(linkage))) for effect in effects]
+        self.potentials = [potential for _, found in self.effect_potentials for potential in found]
         self.spring_potentials = tuple(potential for potential in self.potentials if potential.holds)
         self._compliances: dict[int, float] = {}
         for effect in effects:
@@ -242,6 +266,8 @@ class MechanismModel:
         self.node_link = np.full(len(self.interfaces.body), -1)
         self.node_link[cell_dofs(self.elastic.u.function_space)] = mesh.link[:, None]
         self._point_loads: dict[Force | Output, PointLoad] = {}
+        self._numbers: dict[Hashable, Any] = {}
+        self._shape = np.zeros(len(self.elastic.d.x.array))
 
     @property
     def flexible_dofs(self) -> int:
@@ -258,17 +284,38 @@ class MechanismModel:
         """Coordinates of all rigid and interface bodies, fixed ones included."""
         return len(self.linkage.bodies) * self.linkage.joints.space.pose_size
 
-    # -- shape and material -------------------------------------------------------------------------------------
+    # -- shape, material and other numbers -----------------------------------------------------------------------
 
-    def reshape(self, design: np.ndarray) -> None:
-        """Gives the links the rest shape X₀ + c + d, d this rank's values with ghosts, flat."""
-        self.elastic.d.x.array[:] = design
+    @property
+    def design(self) -> Design:
+        """The present design, with all numbers that were asked for."""
+        return Design(self._shape.copy(), {kind: own.value for kind, own in self._numbers.items()})
+
+    def number(self, kind):
+        """The ``ModelNumber`` of a ``NumberKind`` on this model; designs of the model tell it from now on."""
+        if kind not in self._numbers:
+            self._numbers[kind] = kind.on(self)
+        return self._numbers[kind]
+
+    def reshape(self, design: Design | np.ndarray) -> None:
+        """Gives the links the rest shape X₀ + c + d, and other parts their numbers.
+
+        Args:
+            design: or a design field alone, this rank's values with ghosts, flat; numbers stay as they are.
+        """
+        given = self._given(design)
+        for kind in given.numbers:
+            self.number(kind)
+        for kind, own in self._numbers.items():
+            own.set(given.numbers.get(kind, own.drawn))
+        self._shape = np.array(given.field)
+        self.elastic.d.x.array[:] = self._field(given)
         self.interfaces.reshape(self.design_nodes.values())
 
     @contextmanager
-    def shaped(self, design: np.ndarray) -> Iterator[None]:
-        """A context in which the links have another rest shape."""
-        before = self.elastic.d.x.array.copy()
+    def shaped(self, design: Design | np.ndarray) -> Iterator[None]:
+        """A context in which the model has another design."""
+        before = self.design
         self.reshape(design)
         try:
             yield
@@ -278,6 +325,26 @@ class MechanismModel:
     def set_parameter(self, links: np.ndarray, name: str, value: float) -> None:
         """Gives the links in a mask (links,) another value of a parameter of their law, as "E". Local."""
         self.elastic.parameters[name].x.array[np.flatnonzero(links[self.mesh.link])] = value
+        self.materials = tuple(
+            replace(material, law=material.law.with_parameters({**material.law.parameters, name: value}))
+            if chosen
+            else material
+            for material, chosen in zip(self.materials, links, strict=True)
+        )
+
+    def set_depth(self, links: np.ndarray, value: float) -> None:
+        """Gives the links in a mask (links,) another depth, which counts in planar models. Local."""
+        self.elastic.depth.x.array[np.flatnonzero(links[self.mesh.link])] = value
+        self.depths = tuple(value if own else depth for depth, own in zip(self.depths, links, strict=True))
+
+    def _given(self, design: Design | np.ndarray) -> Design:
+        return Design(design, self.design.numbers) if isinstance(design, np.ndarray) else design
+
+    def _field(self, design: Design) -> np.ndarray:
+        """d of a design, the shares of numbers included."""
+        every = self._numbers.items()
+        shares = ((design.numbers.get(kind, own.drawn) - own.drawn) * own.rate for kind, own in every)
+        return sum(shares, start=design.field)
 
     # -- states -------------------------------------------------------------------------------------------------
 
@@ -285,13 +352,17 @@ class MechanismModel:
         """Makes the finite-element fields hold ``state``."""
         load_fields(self.elastic, self.interfaces, state)
 
-    def carry(self, state: State, design: np.ndarray) -> State:
-        """Reshapes the links and guesses the equilibrium there from the one at the present shape."""
+    def carry(self, state: State, design: Design | np.ndarray) -> State:
+        """Changes the design and guesses the equilibrium there from the one at the present design."""
         self.load(state)
-        carried = self.elastic.carried(design - self.elastic.d.x.array)
-        self.reshape(design)
+        given, before = self._given(design), self.design
+        carried = self.elastic.carried(self._field(given) - self.elastic.d.x.array)
+        self.reshape(given)
         displacements, *pressures = self.elastic.split(state.u)
-        return replace(state, u=np.concatenate([carried[: len(displacements)], *pressures]))
+        guess = replace(state, u=np.concatenate([carried[: len(displacements)], *pressures]))
+        for kind, own in self._numbers.items():
+            guess = own.carried(guess, own.value - before.numbers.get(kind, own.drawn))
+        return guess
 
     def assembled_state(self, poses: np.ndarray, motors: np.ndarray) -> State:
         """The state of a rigid assembly: every flexible link carried along by its first interface."""

@@ -19,7 +19,7 @@ def is_inside(polygon: np.ndarray, point: np.ndarray) -> bool:
 
 
 def are_inside(polygon: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Which of ``points`` (n, 2) lie in ``polygon``: a ray from them crosses an odd number of edges, (n,)."""
+    """Mask (n,) of the ``points`` (n, 2) in ``polygon``: a ray from them crosses an odd number of edges."""
     a, b = (corners - points[:, None] for corners in (polygon, np.roll(polygon, -1, axis=0)))
     straddles = (a[..., 1] > 0.0) != (b[..., 1] > 0.0)
     row, _ = np.nonzero(straddles)

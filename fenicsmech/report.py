@@ -105,7 +105,8 @@ def write_report(
         curve.write(folder / f"deformed{suffix}.xdmf")
         curve.write_csv(folder / f"curve{suffix}.csv", errors=True)
     if optimisation is not None:
-        optimisation.problem.picture(folder / "links.png", optimisation.result)
+        if optimisation.result.links:
+            optimisation.problem.picture(folder / "links.png", optimisation.result)
         optimisation.problem.export(folder / "links", optimisation.result, pin_diameter=optimisation.pin_diameter)
         optimisation.result.save(folder / "design.json", comm=comm)
     summary = _summarise(simulation, curves, optimisation)
@@ -245,7 +246,8 @@ def _summarise_design(optimisation: Optimisation) -> dict[str, object]:
         "part_fidelity": result.part_fidelity,
         "worst_part_error": result.worst_part_error,
         "verified": result.verified,
-        "curvature_ratio_max": max(link.bend for link in result.links),
+        "numbers": [asdict(number) for number in result.numbers],
+        "curvature_ratio_max": max((link.bend for link in result.links), default=0.0),
         "active_bounds": result.active,
         "ended": result.reason,
         "optimise_phases": result.phases,
@@ -333,7 +335,8 @@ def _design_text(summary: dict) -> list[str]:
             [*row, own["value"], own["finer_elements_add"], own["error"] and 100.0 * own["error"]]
             for row, own in zip(rows, parts, strict=True)
         ]
-    (least, most), objective, error = summary["thickness"], summary["objective"], summary["objective_error"]
+    thickness, objective, error = summary["thickness"], summary["objective"], summary["objective_error"]
+    numbers = [[own["name"], own["unit"], own["value"], own["drawn"], *own["bounds"]] for own in summary["numbers"]]
     phases, seconds = summary["optimise_phases"], summary["seconds"]["optimise"]
     phase_names = ("weights", "handles", "equilibria", "gradients", "verification")
     return [
@@ -345,7 +348,9 @@ def _design_text(summary: dict) -> list[str]:
         f"(corrections make {error:.2g} of it; {summary['ended']})",
         f"corrections changed by {', '.join(f'{change:.2%}' for change in summary['corrections'])} in as many rounds"
         + (f" of a surrogate in {summary['surrogate']}" if summary["surrogate"] else ""),
-        f"thickness {least:.2f} to {most:.2f} {length}, curvature ratio up to {summary['curvature_ratio_max']:.3f}, "
+        *([format_table(["number", "unit", "value", "drawn", "least", "largest"], numbers)] if numbers else []),
+        (f"thickness {thickness[0]:.2f} to {thickness[1]:.2f} {length}, " if thickness else "")
+        + f"curvature ratio up to {summary['curvature_ratio_max']:.3f}, "
         f"aspect ratio of cells up to {summary['mesh_ratio_max']:.1f}; "
         f"active: {', '.join(summary['active_bounds']) or 'no bound'}",
         f"optimisation: {seconds:.1f} s",

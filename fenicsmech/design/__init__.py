@@ -5,7 +5,8 @@ round by round with a ``correction`` that brings values near the truth, and ends
 scatters starts and ends in several. Its ``objective`` compares the quantities of each ``target`` at its ``equilibria``
 with the wanted values, and adds ``regularisers``. The ``rest_shape`` of the links follows the parameters through
 ``shape``: ``spline``, ``handles`` on it, ``weights`` by which handles move the mesh, the ``shape_map`` of these, and
-the ``handle_optimum`` of the mesh ``quality``. ``characterisation`` fits Young's modulus to measurements.
+the ``handle_optimum`` of the mesh ``quality``; ``numbers`` of parts may change beside it. ``characterisation`` fits
+Young's modulus to measurements.
 """
 
 from fenicsmech.design.characterisation import Experiment, ModulusFit, fit_modulus
@@ -13,6 +14,7 @@ from fenicsmech.design.correction import Correction
 from fenicsmech.design.description import Bounds, SplineDesign, shape_request
 from fenicsmech.design.design_problem import DesignProblem
 from fenicsmech.design.equilibria import DesignEquilibria, SampleEquilibria
+from fenicsmech.design.numbers import Number, NumberDesign, ScaledNumbers
 from fenicsmech.design.objective import Objective, group_count, sample_numbers, split
 from fenicsmech.design.optimisers.bfgs import BFGS
 from fenicsmech.design.optimisers.levenberg_marquardt import LevenbergMarquardt, Resolution
@@ -30,7 +32,7 @@ from fenicsmech.design.optimisers.problem import (
     TooHigh,
 )
 from fenicsmech.design.optimisers.sqp import SQP
-from fenicsmech.design.regularisers import MeshQuality, Model, Regulariser, ShapeBounds, StayClose
+from fenicsmech.design.regularisers import MeshQuality, Model, NumberBounds, Regulariser, ShapeBounds, StayClose
 from fenicsmech.design.rest_shape import DesignedLink, ParametricShape
 from fenicsmech.design.result import DesignResult, LinkDesign, PartValue, TargetResult, rest_meshes
 from fenicsmech.design.run import Checkpoint, DesignProgress, Round, minimise_together

@@ -23,7 +23,7 @@ from scipy.stats import t as student
 from fenicsmech.equilibrium import LoadControl
 from fenicsmech.errors import DescriptionError, counted, finite, set_fields
 from fenicsmech.mechanism import DRAWN, Configuration, Force, Material
-from fenicsmech.quantities import Displacement, Sensitivity
+from fenicsmech.quantities import Displacement, LawParameter, Observable, Sensitivity
 from fenicsmech.simulation import Curve, CurveRequest, Simulation, read_request
 
 
@@ -155,7 +155,10 @@ class _Rig:
     def __init__(self, experiment: Experiment, material: Material) -> None:
         self._experiment, self._request = experiment, experiment.request
         self._simulation = experiment.simulation.with_material(material, material)
-        self._links = np.array([made_of == material for made_of in self._simulation.model.materials])
+        model = self._simulation.model
+        links = zip(model.mechanism.flexible_links, model.materials, strict=True)
+        modulus = LawParameter("E", *(link for link, made_of in links if made_of == material))
+        self._modulus, self._adjoint = model.number(modulus), Sensitivity(model, [modulus])
         self.range = float(np.abs(experiment.displacements).max())
 
     def compare(self, modulus: float) -> tuple[Curve, np.ndarray, np.ndarray]:
@@ -163,14 +166,14 @@ class _Rig:
         simulation, part = self._simulation, self._request.part
         assert isinstance(part, Force), "experiments prescribe forces"
         model, solver = simulation.model, simulation.solver(part)
-        model.set_parameter(self._links, "E", modulus)
+        self._modulus.set(modulus)
         curve = simulation.compute(self._request)
-        adjoint, travel = Sensitivity(model), [Displacement(part).on(model)]
+        travel: list[Observable] = [Displacement(part).on(model)]
         slopes, travels = {}, {}
         for frame in curve.frames:
-            (gradient,) = adjoint.gradients(solver, frame.state, LoadControl(frame.force), travel)
+            (gradient,) = self._adjoint.gradients(solver, frame.state, LoadControl(frame.force), travel)
             travels[frame.force] = frame.displacement
-            slopes[frame.force] = modulus * float(gradient.parameters["E"][self._links].sum())
+            slopes[frame.force] = modulus * float(gradient.numbers[0])
         measured = self._experiment
         reached, slope = (np.array([values[force] for force in measured.forces]) for values in (travels, slopes))
         return curve, reached - measured.displacements, slope

@@ -1,4 +1,4 @@
-"""Links that may change, as plain data, and their checks."""
+"""Links and numbers that may change, as plain data, and their checks."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenicsmech.collective import from_one
+from fenicsmech.design.numbers import Number, check_numbers
 from fenicsmech.design.shape.centreline import LinkOutline, find_centreline
 from fenicsmech.design.shape.shape_map import ShapeRequest
 from fenicsmech.design.shape.spline import lay_out
@@ -173,14 +174,19 @@ def _reach(interface: Body) -> float:
     return 0.0
 
 
-def check_designs(designs: Sequence[SplineDesign]) -> None:
-    """Refuses designs of no link, and two of one link, with a DescriptionError."""
+def check_designs(designs: Sequence[SplineDesign | Number]) -> None:
+    """Refuses designs of nothing, and two of one link or of one number, with a DescriptionError."""
     if not designs:
-        raise DescriptionError("design problem", "no link may change", "Name links with SplineDesign(…)")
+        raise DescriptionError(
+            "design problem", "no link or number may change", "Name them with SplineDesign(…) or Number(…)"
+        )
     for design in designs:
-        if not isinstance(design, SplineDesign):
-            raise DescriptionError("design problem", f"{design!r} is not a design of a link", "Give SplineDesign(…)")
-    names = [design.link.name for design in designs]
+        if not isinstance(design, SplineDesign | Number):
+            raise DescriptionError(
+                "design problem", f"{design!r} is not a design of a link or number", "Give SplineDesign(…) or Number(…)"
+            )
+    check_numbers([design for design in designs if isinstance(design, Number)])
+    names = [design.link.name for design in designs if isinstance(design, SplineDesign)]
     for name in names:
         if names.count(name) > 1:
             raise DescriptionError(f"design of link {name!r}", "it is given twice", "Give each link once")

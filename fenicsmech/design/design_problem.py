@@ -16,10 +16,11 @@ from fenicsmech.collective import on_one
 from fenicsmech.design.correction import CorrectedRun, Correction
 from fenicsmech.design.description import SplineDesign, check_designs
 from fenicsmech.design.designed import DesignedSimulation
+from fenicsmech.design.numbers import Number
 from fenicsmech.design.optimisers.levenberg_marquardt import LevenbergMarquardt
 from fenicsmech.design.optimisers.problem import Optimiser
 from fenicsmech.design.optimisers.sqp import SQP
-from fenicsmech.design.regularisers import MeshQuality, Regulariser, ShapeBounds, StayClose
+from fenicsmech.design.regularisers import MeshQuality, NumberBounds, Regulariser, ShapeBounds, StayClose
 from fenicsmech.design.result import DesignResult, draw_links, link_designs, rest_meshes, target_results, write_solids
 from fenicsmech.design.run import Checkpoint, fingerprint
 from fenicsmech.design.search import Scatter, Search, SearchResult, cheapest
@@ -28,17 +29,19 @@ from fenicsmech.design.target import Target
 from fenicsmech.design.verification import part_simulation, verified_parts
 from fenicsmech.errors import DescriptionError
 from fenicsmech.log import Clock, logger
+from fenicsmech.mechanism import FlexibleLink
 from fenicsmech.meshing import LinkMesh
+from fenicsmech.model import Design
 from fenicsmech.simulation import Simulation
 
 _log = logger(__name__)
 
-DEFAULT_REGULARISER = MeshQuality() + ShapeBounds() + 1e-4 * StayClose()
+DEFAULT_REGULARISER = MeshQuality() + ShapeBounds() + NumberBounds() + 1e-4 * StayClose()
 DEFAULT_CORRECTION = Correction()
 
 
 class DesignProblem:
-    """Optimisation of the shapes of some links for targets.
+    """Optimisation of the shapes of some links, and of numbers of parts, for targets.
 
         min over p   Σ ½ w_k ((Q_k(p) − Q̄_k) / s_k)² + Σ w_k Q_k(p) / s_k + R(p)   subject to   ± (Q_k(p) − Q̄_k) ≤ 0
 
@@ -47,8 +50,8 @@ class DesignProblem:
     description is checked at once.
 
     Args:
-        simulation: of the equilibria; it keeps its shapes. ``simulation.with_design`` gives one of a result.
-        designs: the links that may change.
+        simulation: of the equilibria; it keeps its design. ``simulation.with_design`` gives one of a result.
+        designs: the links and the numbers that may change.
         targets: requirements on the mechanism.
         regulariser: R; by default mesh quality, bounds of fabrication, and closeness to the drawing with weight 1e-4,
             where the paper has 1: with 1 the demos miss their targets (benchmarks/closeness.py).
@@ -61,7 +64,7 @@ class DesignProblem:
     def __init__(
         self,
         simulation: Simulation,
-        designs: Sequence[SplineDesign],
+        designs: Sequence[SplineDesign | Number],
         *,
         targets: Sequence[Target],
         regulariser: Regulariser = DEFAULT_REGULARISER,
@@ -73,20 +76,20 @@ class DesignProblem:
 
     @property
     def initial(self) -> np.ndarray:
-        """Parameters of the drawn shapes, (parameters,)."""
+        """Parameters of the drawn design, (parameters,): those of shapes, then of numbers, in the order given."""
         return self._own.rest.initial
 
-    def rest_shape(self, design: DesignResult | np.ndarray) -> np.ndarray:
-        """The design field of a result or of parameters (parameters,), as ``Simulation.with_design`` takes it.
+    def rest_shape(self, design: DesignResult | np.ndarray) -> Design:
+        """The design of a result or of parameters (parameters,), as ``Simulation.with_design`` takes it.
 
-        This rank's values, ghosts last, flat. Parameters alone need not fix the shape: several positions of the
+        Parameters alone need not fix the shape: several positions of the
         handles can be minima, and results hold those found.
 
         Raises:
             DescriptionError: the design is one of other links.
-            ShapeError: cells of the mesh are inverted in this shape.
+            ShapeError: cells of the mesh are inverted in this shape, or a number is out of its bounds.
         """
-        return self._own.rest.field(*self._own.given(design))
+        return self._own.rest.design(*self._own.given(design))
 
     def optimise(
         self,
@@ -129,7 +132,7 @@ class DesignProblem:
             problem = fingerprint(self.simulation, self._own.rest, self.targets, self.regulariser, optimiser, other)
             saved = Checkpoint(Path(checkpoint), problem)
             found = saved.load_together(comm) if resume else None
-        with model.shaped(model.elastic.d.x.array.copy()):
+        with model.shaped(model.design):
             run = CorrectedRun(self._own, optimiser, correction, start, saved, found)
             end = run.from_surrogate(cheaper) or run.directly()
             reached, round, (group, objective) = end.reached, end.round, end.of.team
@@ -140,6 +143,9 @@ class DesignProblem:
             result = DesignResult(
                 mechanism=self.simulation.scene.mechanism.name,
                 links=link_designs(self._own.rest, end.placement),
+                numbers=self._own.rest.numbers.designs(
+                    end.placement.p[self._own.rest.of_numbers], self.simulation.scene.units
+                ),
                 targets=target_results(compared, self.simulation.scene.units, np.array(round.started), reached),
                 reason=end.optimum.reason.value,
                 converged=end.optimum.reason.converged,
@@ -206,8 +212,8 @@ class DesignProblem:
         Raises:
             DescriptionError: the design is one of other links.
         """
-        before, after = ((given[0], self._meshes(given)) for given in ((self.initial, None), self._own.given(design)))
-        links = [design.link for design in self.designs]
+        links, both = [own.link for own in self._own.shapes], ((self.initial, None), self._own.given(design))
+        before, after = ((given[0], self._meshes(links, given)[0]) for given in both)
         on_one(
             self.simulation.comm, lambda: draw_links(path, self.simulation, links, self._own.rest.links, before, after)
         )
@@ -215,7 +221,7 @@ class DesignProblem:
     def export(
         self, folder: str | Path, design: DesignResult | np.ndarray, *, pin_diameter: float | None = None
     ) -> None:
-        """Writes ``NAME.step`` and ``NAME.stl`` of every link that may change.
+        """Writes ``NAME.step`` and ``NAME.stl`` of every link whose shape or depth may change.
 
         Args:
             folder: where to; it is created.
@@ -226,8 +232,9 @@ class DesignProblem:
             DescriptionError: the design is one of other links.
             MeshingError: no solid can be made of a link.
         """
-        links, meshes = [own.link for own in self.designs], self._meshes(self._own.given(design))
-        on_one(self.simulation.comm, lambda: write_solids(folder, self.simulation.linkage, links, meshes, pin_diameter))
+        links, linkage = self._own.changed, self.simulation.linkage
+        solids = self._meshes(links, self._own.given(design))
+        on_one(self.simulation.comm, lambda: write_solids(folder, linkage, links, *solids, pin_diameter))
 
     def verify(self, result: DesignResult, folder: str | Path | None = None, *, finer: float = 2.0) -> DesignResult:
         """The result with the values of its targets in the parts to be made.
@@ -251,9 +258,10 @@ class DesignProblem:
                 "the result is one of other targets",
                 "Give a result of this problem",
             )
-        links, meshes = [own.link for own in self.designs], self._meshes(self._own.given(result))
+        links, given = self._own.changed, self._own.given(result)
+        solids = self._meshes(links, given)
         with TemporaryDirectory() as temporary:  # only the first process writes and reads
-            part = part_simulation(self.simulation, links, meshes, Path(folder or temporary), finer)
+            part = part_simulation(self.simulation, links, *solids, Path(folder or temporary), finer)
             verified = verified_parts(result, part, self.targets)
         return self.simulation.comm.bcast(verified, root=0)
 
@@ -269,8 +277,10 @@ class DesignProblem:
             return self._own.on(given)
         return None if given is None or self.simulation.fidelity.model.dim < 3 else self._own.in_plane_stress
 
-    def _meshes(self, given: tuple[np.ndarray, HandlePlacement | None]) -> list[LinkMesh]:
-        """Meshes of the links that may change, on the first process alone."""
-        model = self.simulation.model
-        with model.shaped(self._own.rest.field(*given)):
-            return rest_meshes(self.simulation, [design.link for design in self.designs])
+    def _meshes(
+        self, links: Sequence[FlexibleLink], given: tuple[np.ndarray, HandlePlacement | None]
+    ) -> tuple[list[LinkMesh], list[float]]:
+        """Meshes of some links, on the first process alone, and their depths."""
+        model, everyone = self.simulation.model, self.simulation.scene.mechanism.flexible_links
+        with model.shaped(self._own.rest.design(*given)):
+            return rest_meshes(self.simulation, links), [model.depths[everyone.index(link)] for link in links]

@@ -10,6 +10,7 @@ import numpy as np
 
 from fenicsmech.design.description import SplineDesign, shape_requests
 from fenicsmech.design.equilibria import SampleEquilibria
+from fenicsmech.design.numbers import Number
 from fenicsmech.design.objective import Group, Objective, sample_numbers, split
 from fenicsmech.design.regularisers import Regulariser
 from fenicsmech.design.rest_shape import ParametricShape
@@ -21,6 +22,7 @@ from fenicsmech.elasticity import PLANE_STRESS, Quadrature
 from fenicsmech.errors import DescriptionError
 from fenicsmech.log import Clock
 from fenicsmech.model import fits
+from fenicsmech.quantities import NumberKind
 from fenicsmech.simulation import Simulation
 
 
@@ -29,13 +31,15 @@ class DesignedSimulation:
 
     Args:
         simulation: of the equilibria.
-        designs: the links that may change.
+        designs: what may change.
         targets: requirements on the mechanism.
         regulariser: R.
         clock: of the phases.
 
     Attributes:
         simulation, designs, targets, clock: likewise.
+        shapes, numbers: the links whose shape may change, and numbers that may.
+        changed: the links whose solids change.
 
     Raises:
         DescriptionError: designs or targets name parts that the simulation does not have.
@@ -45,7 +49,7 @@ class DesignedSimulation:
     def __init__(
         self,
         simulation: Simulation,
-        designs: Sequence[SplineDesign],
+        designs: Sequence[SplineDesign | Number],
         targets: Sequence[Target],
         regulariser: Regulariser,
         clock: Clock,
@@ -53,7 +57,13 @@ class DesignedSimulation:
         check_targets(simulation, targets)
         self.simulation, self.designs, self.targets = simulation, tuple(designs), tuple(targets)
         self._regulariser, self.clock = regulariser, clock
-        self._requests = shape_requests(self.designs, simulation)
+        self.shapes = tuple(own for own in self.designs if isinstance(own, SplineDesign))
+        self.numbers = tuple(own for own in self.designs if isinstance(own, Number))
+        for number in self.numbers:
+            number.kind.check(simulation.scene)
+        solids = [part for number in self.numbers if number.kind.changes_solids for part in number.kind.parts]
+        self.changed = tuple(dict.fromkeys([*(own.link for own in self.shapes), *solids]))
+        self._requests = shape_requests(self.shapes, simulation)
 
     def on(self, simulation: Simulation) -> DesignedSimulation:
         """The same in another simulation."""
@@ -83,12 +93,16 @@ class DesignedSimulation:
     @cached_property
     def rest(self) -> ParametricShape:
         """The rest shape of the links that change."""
-        return ParametricShape(self.simulation.model, self._shapes, self.designs)
+        return ParametricShape(self.simulation.model, self._shapes, self.shapes, self.numbers)
 
     @cached_property
     def loaded(self) -> SampleEquilibria:
         """The equilibria of all targets, of all processes together."""
-        return SampleEquilibria(self.simulation, self.targets)
+        return SampleEquilibria(self.simulation, self.targets, numbers=self._kinds)
+
+    @property
+    def _kinds(self) -> list[NumberKind]:
+        return [own.kind for own in self.numbers]
 
     @cached_property
     def team(self) -> tuple[Group, Objective]:
@@ -98,8 +112,9 @@ class DesignedSimulation:
             group, simulation = split(self.simulation.comm, sample_numbers(self.targets)), self.simulation
             if group.comm is not simulation.comm:
                 simulation = simulation.on(group.comm)
-                rest = ParametricShape(simulation.model, self._shapes, self.designs)
-            equilibria = SampleEquilibria(simulation, [self.targets[k] for k in group.mine])
+                rest = ParametricShape(simulation.model, self._shapes, self.shapes, self.numbers)
+            mine = [self.targets[k] for k in group.mine]
+            equilibria = SampleEquilibria(simulation, mine, numbers=self._kinds)
             comparison = Comparison(self.targets, simulation.scene.units)
             objective = Objective(
                 rest, equilibria, comparison=comparison, regulariser=self._regulariser, group=group, clock=self.clock
@@ -128,6 +143,14 @@ class DesignedSimulation:
                     f"it has {found} parameters of link {link.name!r} instead of {size}",
                     "Use a result of the same links and numbers of segments",
                 )
+        known = {number.name: number.value for number in design.numbers}
+        for number in self.numbers:
+            if str(number) not in known:
+                raise DescriptionError(
+                    f"design of {design.mechanism!r}", f"it has no {number}", "Use a result of the same numbers"
+                )
+        values = self.rest.numbers.scaled([known[str(number)] for number in self.numbers])
         own = [given[link.name] for link in self.rest.links]
-        parameters, theta = (np.concatenate(parts) for parts in ([o.parameters for o in own], [o.handles for o in own]))
+        parameters = np.concatenate([*(o.parameters for o in own), values])
+        theta = np.concatenate([np.zeros(0), *(o.handles for o in own)])
         return parameters, self.rest.placement_from(parameters, theta)

@@ -38,8 +38,18 @@ from fenicsmech.equilibrium import (
     State,
 )
 from fenicsmech.errors import EquilibriumError
+from fenicsmech.model import Design
 from fenicsmech.multibody import assemble
-from fenicsmech.quantities import Displacement, Gradient, Observable, Partial, RestObservable, Sample, Sensitivity
+from fenicsmech.quantities import (
+    Displacement,
+    Gradient,
+    NumberKind,
+    Observable,
+    Partial,
+    RestObservable,
+    Sample,
+    Sensitivity,
+)
 from fenicsmech.simulation import Simulation
 
 
@@ -80,12 +90,12 @@ class DesignEquilibria:
     """Equilibria of samples, and values of targets' quantities, at one design.
 
     Attributes:
-        design: this rank's values of the design field, flat.
+        design: that they belong to.
         samples: the equilibrium of each sample.
         raw: values of each target's observable, from the unloaded configuration where they count from there.
     """
 
-    design: np.ndarray
+    design: Design
     samples: dict[Sample, SampleState]
     raw: tuple[np.ndarray, ...]
 
@@ -99,13 +109,16 @@ class _Path:
         moves: whether its unloaded configuration moves with the design.
     """
 
-    def __init__(self, simulation: Simulation, sample: Sample, observables: Iterable[Observable]) -> None:
+    def __init__(
+        self, simulation: Simulation, sample: Sample, observables: Iterable[Observable], numbers: Sequence[NumberKind]
+    ) -> None:
         self.sample, self._model = sample, simulation.model
         self.solver: EquilibriumSolver = simulation.solver(sample.part, sample.others)
         self.moved = None if sample.moved is None else Displacement(sample.moved[0]).on(simulation.model)
         strained = assemble(simulation.linkage, sample.configuration).fraction < 1.0
         own = observables if self.moved is None else (*observables, self.moved)
-        self.moves = strained or any(observable.on_link for observable in own)
+        moved = any(observable.on_link for observable in own)
+        self.moves = strained or moved or any(kind.moves_unloaded(sample.configuration) for kind in numbers)
 
     def control(self, unloaded: State) -> Control:
         """The sample's control at the design that the model holds."""
@@ -116,18 +129,31 @@ class _Path:
 
 
 class SampleEquilibria:
-    """The equilibria of the samples of ``targets`` in one simulation, and the values of their quantities."""
+    """The equilibria of the samples of ``targets`` in one simulation, and the values of their quantities.
 
-    def __init__(self, simulation: Simulation, targets: Sequence[Target], options: FollowOptions | None = None) -> None:
+    Args:
+        simulation: of the equilibria.
+        targets: whose samples they are.
+        options: of following them from design to design.
+        numbers: derivatives by which are wanted beside those by the design field.
+    """
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        targets: Sequence[Target],
+        options: FollowOptions | None = None,
+        numbers: Sequence[NumberKind] = (),
+    ) -> None:
         self._simulation, self._model, self._options = simulation, simulation.model, options or FollowOptions()
-        self.targets, self._sensitivity = tuple(targets), Sensitivity(simulation.model)
+        self.targets, self._sensitivity = tuple(targets), Sensitivity(simulation.model, numbers)
         kinds = {target.quantity: target.quantity.on(simulation.model) for target in targets}
         self._observables = [kinds[target.quantity] for target in targets]
         self._at_rest = {k: own for k, own in enumerate(self._observables) if isinstance(own, RestObservable)}
         self._paths: dict[Sample, _Path] = {}
         for sample in dict.fromkeys(target.sample for target in targets if target.sample is not None):
             counted = [o for o, own in self._of(sample) if self.targets[own].quantity.from_unloaded]
-            self._paths[sample] = _Path(simulation, sample, counted)
+            self._paths[sample] = _Path(simulation, sample, counted, numbers)
 
     # -- equilibria ----------------------------------------------------------------------------------------------
 
@@ -152,7 +178,7 @@ class SampleEquilibria:
         Raises:
             Infeasible: an equilibrium is not found or is unstable.
         """
-        design = self._model.elastic.d.x.array.copy()
+        design = self._model.design
         try:
             samples = {
                 path.sample: self._followed(path, solved.samples[path.sample], solved.design, design)
@@ -222,7 +248,7 @@ class SampleEquilibria:
                 self._model.load(state)
                 for observable, k in pairs:
                     raw[k] = raw.get(k, 0.0) + sign * observable.values(state)
-        design = self._model.elastic.d.x.array.copy()
+        design = self._model.design
         return DesignEquilibria(design, samples, tuple(raw[k] for k in range(len(self.targets))))
 
     def _partials(
@@ -303,16 +329,16 @@ class SampleEquilibria:
 
     # -- from one design to another ------------------------------------------------------------------------------
 
-    def _followed(self, path: _Path, at: SampleState, before: np.ndarray, after: np.ndarray) -> SampleState:
+    def _followed(self, path: _Path, at: SampleState, before: Design, after: Design) -> SampleState:
         unloaded, halvings, nothing = at.unloaded, self._options.halvings, LoadControl(0.0)
         if path.moves:
-            unloaded = self._moved(path, unloaded, _Design(before, nothing), _Design(after, nothing), halvings)
+            unloaded = self._moved(path, unloaded, _Prescribed(before, nothing), _Prescribed(after, nothing), halvings)
         self._model.reshape(after)
         control = path.control(unloaded)
-        state = self._moved(path, at.state, _Design(before, at.control), _Design(after, control), halvings)
+        state = self._moved(path, at.state, _Prescribed(before, at.control), _Prescribed(after, control), halvings)
         return SampleState(state, control, unloaded)
 
-    def _moved(self, path: _Path, state: State, before: _Design, after: _Design, halvings: int) -> State:
+    def _moved(self, path: _Path, state: State, before: _Prescribed, after: _Prescribed, halvings: int) -> State:
         """The equilibrium at design ``after``, from the one at ``before``, halfway first if need be."""
         try:
             return self._next(path, state, before, after)
@@ -323,11 +349,11 @@ class SampleEquilibria:
         state = self._moved(path, state, before, halfway, halvings - 1)
         return self._moved(path, state, halfway, after, halvings - 1)
 
-    def _next(self, path: _Path, start: State, before: _Design, after: _Design) -> State:
+    def _next(self, path: _Path, start: State, before: _Prescribed, after: _Prescribed) -> State:
         """The equilibrium at design ``after``, in one step."""
         model, solver = self._model, path.solver
-        model.reshape(before.field)
-        guess = model.carry(start, after.field)
+        model.reshape(before.design)
+        guess = model.carry(start, after.design)
         try:
             found = solver.solve(guess, after.control)
         except NotConverged as failure:
@@ -335,29 +361,29 @@ class SampleEquilibria:
         if found.unstable_under_control:
             raise Infeasible(_unstable(path.sample))
         # δ = −K₁⁻¹ R(y; d₀) with y the state carried back, and how far ŷ₀ = y + δ misses y₀
-        system, back = solver.system, before.control.prepare(model.carry(found.state, before.field))
+        system, back = solver.system, before.control.prepare(model.carry(found.state, before.design))
         model.load(back)
         x = found.linearisation.solve(system.residual(back, before.control).vector)
         x.scale(-1.0)
         step = system.unknowns.step(x)
         miss = system.size(system.difference(start, system.moved(back, step)))
-        model.reshape(after.field)
+        model.reshape(after.design)
         if miss > max(self._options.largest_miss * system.size(step), self._options.rounding):
             raise _Lost(_lost(path.sample, "a fold lies between this design and the last one"))
         return found.state
 
 
 @dataclass(frozen=True, eq=False)
-class _Design:
-    """A design field, this rank's values with ghosts, flat, and the control there."""
+class _Prescribed:
+    """A design, and the control there."""
 
-    field: np.ndarray
+    design: Design
     control: Control
 
-    def halfway(self, other: _Design) -> _Design:
+    def halfway(self, other: _Prescribed) -> _Prescribed:
         """Their mean."""
         value = 0.5 * (self.control.prescribed + other.control.prescribed)
-        return _Design(0.5 * (self.field + other.field), self.control.at(value))
+        return _Prescribed(self.design.halfway(other.design), self.control.at(value))
 
 
 class _Lost(Infeasible):

@@ -132,7 +132,9 @@ class Objective:
             raise TooHigh(reached_merit)
         with self._clock.phase("gradients"):
             try:
-                rows = self._gathered(on_all(everyone, lambda: self._rest.gradient(placement, self._fields(solved))))
+                rows = self._gathered(
+                    on_all(everyone, lambda: self._rest.slopes(placement, self._equilibria.gradients(solved)))
+                )
             except ShapeError as error:
                 raise Infeasible(str(error)) from error
         self._base = _Base(placement, solved)
@@ -174,9 +176,6 @@ class Objective:
 
     def _values(self, solved: DesignEquilibria) -> np.ndarray:
         return self._gathered(self._equilibria.values(solved)[:, None])[:, 0]
-
-    def _fields(self, solved: DesignEquilibria) -> np.ndarray:
-        return np.array([gradient.design for gradient in self._equilibria.gradients(solved)])
 
     def _solve(self, parameters: np.ndarray, base: _Base | None) -> tuple[HandlePlacement, Model, DesignEquilibria]:
         """Handle placement, model of R and this group's equilibria, followed from those of ``base`` if there is one."""

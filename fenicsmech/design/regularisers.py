@@ -72,19 +72,49 @@ class Weighted(Regulariser):
 class StayClose(Regulariser):
     """R_init = ½ Σ ((p − p₀) / h)², h the thickness of each link (the paper's equation 7, made free of units).
 
-    Thickness parameters δ are relative to h already. Design problems weight it 1e-4 by default where the paper's
-    equation has 1: with 1 the designs stay so close to the drawing that the demos miss their targets
-    (benchmarks/closeness.py).
+    The sum runs over parameters of shapes, numbers are free. Thickness parameters δ are relative to h already.
+    Design problems weight it 1e-4 by default where the paper's equation has 1: with 1 the designs stay so close to the
+    drawing that the demos miss their targets (benchmarks/closeness.py).
     """
 
     def around(self, rest, placement):
         scale = 1.0 / rest.lengths**2
+        scale[rest.of_numbers] = 0.0  # what is identified is not drawn back
 
         def model(p: np.ndarray) -> Quadratic:
             away = p - rest.initial
             return Quadratic(0.5 * float(away @ (scale * away)), scale * away, np.diag(scale))
 
         return model
+
+
+@dataclass(frozen=True)
+class NumberBounds(Regulariser):
+    """Barriers on numbers, which begin 2 % of the interval between their bounds before these.
+
+    No design leaves the bounds themselves.
+    """
+
+    def around(self, rest, placement):
+        q, barrier = rest.of_numbers, Barrier(-0.02, 0.02)
+
+        def model(p: np.ndarray) -> Quadratic:
+            low, high, found = -p[q], p[q] - 1.0, Quadratic.zero(len(p))
+            found.gradient[q] = barrier.slope(high) - barrier.slope(low)
+            found.curvature[q, q] = np.diag(barrier.curvature(high) + barrier.curvature(low))
+            value = float(np.sum(barrier.value(high) + barrier.value(low)))
+            return Quadratic(value, found.gradient, found.curvature)
+
+        return model
+
+    def active(self, rest, placement):
+        found = []
+        for own, at in zip(rest.numbers.numbers, placement.p[rest.of_numbers], strict=True):
+            if at < 0.02:
+                found.append(f"least {own} {own.least:g}")
+            if at > 0.98:
+                found.append(f"largest {own} {own.most:g}")
+        return tuple(found)
 
 
 @dataclass(frozen=True)

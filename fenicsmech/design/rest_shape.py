@@ -1,11 +1,12 @@
-"""The rest shape of a simulation's links as a function of the design p, with optimal handles.
+"""The design of a simulation as a function of parameters p: the links' rest shapes, with optimal handles, and numbers.
 
-    p → θ*(p) → d(p, θ*(p)) → X = X₀ + c + d
+    p = (p_shapes, q),     p_shapes → θ* → d(p_shapes, θ*) → X = X₀ + c + d
 
 with the handle positions θ, the design field d and the bulge c of the drawn edges. Handle positions are best for the
-straight cells between the vertices. Links drawn by an outline keep their drawn shape at the initial design p₀: their
-handles are at θ₀ + θ*(p) − θ*(p₀), where those of strips are at θ*(p), since handles that move along a link of varying
-thickness, or turn about an eye, change its outline. Edges of the outline follow the design between them too, their
+straight cells of drawn depth between the vertices. Links drawn by an outline keep their drawn shape at the initial
+design p₀: their handles are at θ₀ + θ*(p) − θ*(p₀), where those of strips are at θ*(p), since handles that move along a
+link of varying thickness, or turn about an eye, change its outline. Edges of the outline follow the design between them
+too, their
 middles without the part along the chord; a design whose curved cells are squeezed too much has no rest shape.
 """
 
@@ -19,15 +20,17 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
-from fenicsmech.compat import cell_dofs, original_cells, vector_space
+from fenicsmech.compat import cell_dofs, original_cells, owned_values, vector_space
 from fenicsmech.design.description import Bounds, SplineDesign, shape_requests
+from fenicsmech.design.numbers import TYPICAL, Number, ScaledNumbers
 from fenicsmech.design.shape.edges import MidEdgeNodes
 from fenicsmech.design.shape.handle_optimum import HandleOptimum, HandlePlacement, ShapeError
 from fenicsmech.design.shape.quality import Barrier, QualitySum
 from fenicsmech.design.shape.shape_map import LinkShape, ShapeMap, shape_links
 from fenicsmech.design.shape.spline import LinkSpline, SplineSamples
 from fenicsmech.meshing import edge_corners, least_stretches, node_ends
-from fenicsmech.model import MechanismModel
+from fenicsmech.model import Design, MechanismModel
+from fenicsmech.quantities import Gradient
 from fenicsmech.simulation import Simulation
 
 
@@ -58,23 +61,32 @@ _LEAST_STRETCH = 0.1  # least det ∂X/∂X₁ in a cell, X₁ the straight cell
 
 
 class ParametricShape:
-    """The rest shape of one model.
+    """The design of one model.
 
     Args:
         model: whose links change.
         shapes: handles and weights of these links.
         designs: how they may change.
+        numbers: that may change beside shapes.
 
     Attributes:
-        links: the links that change.
+        links: the links whose shape changes.
+        numbers: those that change.
         initial: p of the drawn design, (parameters,).
-        lengths: typical change ℓ of each parameter, (parameters,): a link's median thickness; 1 for δ.
+        lengths: typical change ℓ of each parameter, (parameters,): a link's median thickness; 1 for δ; 0.1 for q.
+        of_numbers: the entries q of p.
 
     Raises:
-        DescriptionError: the drawn thickness of a link is not within its bounds.
+        DescriptionError: the drawn thickness of a link, or a number, is not within its bounds.
     """
 
-    def __init__(self, model: MechanismModel, shapes: Sequence[LinkShape], designs: Sequence[SplineDesign]) -> None:
+    def __init__(
+        self,
+        model: MechanismModel,
+        shapes: Sequence[LinkShape],
+        designs: Sequence[SplineDesign],
+        numbers: Sequence[Number] = (),
+    ) -> None:
         self._model, design = model, model.elastic.d
         self._map = ShapeMap(model.mesh, design, shapes)
         self._cells = np.flatnonzero(np.isin(model.mesh.link, [shape.link for shape in shapes]))
@@ -90,7 +102,9 @@ class ParametricShape:
             drawn += model.elastic.bulge.x.array.reshape(-1, dim)
         self._middles = MidEdgeNodes(ends, drawn) if model.elastic.order > 1 else None
         self._penalties: dict[Barrier, QualitySum] = {}
-        self.initial = self._map.initial
+        self.numbers = ScaledNumbers(model, numbers)
+        self.initial = np.concatenate([self._map.initial, self.numbers.initial])
+        self.of_numbers = slice(len(self._map.initial), len(self.initial))
         links, first = [], 0
         for shape, wanted in zip(shapes, designs, strict=True):
             spline, h = shape.handles.spline, shape.thickness
@@ -98,15 +112,14 @@ class ParametricShape:
             samples, bounds = SplineSamples(spline), wanted.bounds(h)
             links.append(DesignedLink(wanted.link.name, place, spline, samples, h, bounds, shape.centreline))
         self.links = tuple(links)
-        self.lengths = np.concatenate(
-            [np.where(s.spline.is_thickness, 1.0, np.median(s.thickness)) for s in self.links]
-        )
+        lengths = [np.where(s.spline.is_thickness, 1.0, np.median(s.thickness)) for s in self.links]
+        self.lengths = np.concatenate([*lengths, np.full(len(self.numbers.initial), TYPICAL)])
 
     @staticmethod
-    def of(simulation: Simulation, designs: Sequence[SplineDesign]) -> ParametricShape:
-        """The rest shape of a simulation's links, handles and weights computed on its mesh."""
+    def of(simulation: Simulation, designs: Sequence[SplineDesign], numbers: Sequence[Number] = ()) -> ParametricShape:
+        """The design of a simulation, handles and weights of its links computed on its mesh."""
         shapes = shape_links(simulation.model.mesh, shape_requests(designs, simulation))
-        return ParametricShape(simulation.model, shapes, designs)
+        return ParametricShape(simulation.model, shapes, designs, numbers)
 
     def placement_from(self, p: np.ndarray, theta: np.ndarray) -> HandlePlacement | None:
         """A placement to start from, for handle positions found before; None if their number has changed."""
@@ -119,36 +132,47 @@ class ParametricShape:
         return self._map.positions(placement.theta)
 
     def place(self, p: np.ndarray, near: HandlePlacement | None) -> HandlePlacement:
-        """Gives the links the shape of design ``p`` with optimal handles.
+        """Gives the model the design ``p`` with optimal handles.
 
         Args:
             p: the design, (parameters,).
             near: placement of a design near by.
 
         Raises:
-            ShapeError: cells stay inverted however the handles are placed, or curved ones are squeezed.
+            ShapeError: cells stay inverted however the handles are placed, or curved ones are squeezed, or a number is
+                out of its bounds.
         """
         lag = self._lag
-        placement = self._optimum.solve(p, near)
+        placement = self._optimum.solve(p, near or self._drawn)
         self._model.reshape(self._placed(placement, lag))
         return placement
 
-    def field(self, p: np.ndarray, near: HandlePlacement | None) -> np.ndarray:
-        """This rank's values of the design field for ``p``, ghosts last, flat; the links keep the shape they have."""
+    def design(self, p: np.ndarray, near: HandlePlacement | None) -> Design:
+        """The design ``p``; the model keeps the one it has."""
         lag = self._lag
-        return self._placed(self._optimum.solve(p, near), lag)
+        return self._placed(self._optimum.solve(p, near or self._drawn), lag)
+
+    @property
+    def _drawn(self) -> HandlePlacement:
+        return HandlePlacement(self.initial, self._map.initial_theta)
 
     @cached_property
     def _lag(self) -> np.ndarray:
         """θ*(p₀) − θ₀ of links drawn by an outline, 0 of others, (handles,)."""
         drawn = self._map.initial_theta
-        outlined = np.repeat(*np.transpose([(np.ndim(own.thickness), len(own.handles)) for own in self._map.shapes]))
+        outlined = np.concatenate(
+            [np.zeros(0, bool), *(np.full(len(o.handles), np.ndim(o.thickness) > 0) for o in self._map.shapes)]
+        )
         if not np.any(outlined):
             return np.zeros_like(drawn)
-        return np.where(outlined, self._optimum.solve(self.initial).theta - drawn, 0.0)
+        return np.where(outlined, self._optimum.solve(self.initial, self._drawn).theta - drawn, 0.0)
 
-    def _placed(self, placement: HandlePlacement, lag: np.ndarray) -> np.ndarray:
-        """The design field of a placement, this rank's values, ghosts last, flat."""
+    def _placed(self, placement: HandlePlacement, lag: np.ndarray) -> Design:
+        """The design of a placement."""
+        q = placement.p[self.of_numbers]
+        for own, scaled in zip(self.numbers.numbers, q, strict=True):
+            if not 0.0 < scaled < 1.0:
+                raise ShapeError(str(own), "it is out of its bounds", "Change it by less")
         theta, elastic, mesh = placement.theta - lag, self._model.elastic, self._model.mesh
         field = self._map.field(placement.p, theta)
         if np.any(lag):
@@ -165,10 +189,15 @@ class ParametricShape:
             least = mesh.mesh.comm.allreduce(float(squeezed.min(initial=1.0)), op=MPI.MIN)
             if least < _LEAST_STRETCH:
                 raise ShapeError("rest shape", "its curved edges squeeze cells", "Change it by less, or mesh it finer")
-        return field.ravel()
+        return Design(field.ravel(), self.numbers.values(q))
+
+    def slopes(self, placement: HandlePlacement, gradients: Sequence[Gradient]) -> np.ndarray:
+        """dQ/dp of some components at the design placed as in ``placement``, (components, parameters)."""
+        fields = np.array([own.design for own in gradients])
+        return np.hstack([self.gradient(placement, fields), self.numbers.slopes(gradients)])
 
     def gradient(self, placement: HandlePlacement, nodal: np.ndarray) -> np.ndarray:
-        """dO/dp (…, parameters) from ∂O/∂d (…, owned values) of the design placed as in ``placement``."""
+        """dO/dp of shapes (…, parameters) from ∂O/∂d (…, owned values) of the design placed as in ``placement``."""
         fields = nodal.reshape(*nodal.shape[:-1], self._map.owned, -1)
         theta = placement.theta - self._lag
         if self._middles is not None:
@@ -188,8 +217,21 @@ class ParametricShape:
             self._penalties[barrier] = QualitySum(self._straight, barrier.symbolic, counts=self._deformable)
         total = self._penalties[barrier]
         self._straight.interpolate(self._model.elastic.d)
-        by_p, by_theta = self._vertex_map.apply_transpose(placement.p, placement.theta - self._lag, total.gradient())
-        return total.value(), self._optimum.total_gradient(placement, by_p, by_theta)
+        slope = total.gradient()
+        by_p, by_theta = self._vertex_map.apply_transpose(placement.p, placement.theta - self._lag, slope)
+        by_q = self._model.mesh.comm.allreduce(self._vertex_rates @ slope.ravel(), op=MPI.SUM) * self.numbers.width
+        return total.value(), np.concatenate([self._optimum.total_gradient(placement, by_p, by_theta), by_q])
+
+    @cached_property
+    def _vertex_rates(self) -> np.ndarray:
+        """∂d/∂v of each number's value v at this rank's owned vertices, flat, (numbers, owned values)."""
+        field, vertices = (fem.Function(own.function_space) for own in (self._model.elastic.d, self._straight))
+        rates = np.zeros((len(self.numbers.on_model), len(owned_values(vertices))))
+        for row, own in zip(rates, self.numbers.on_model, strict=True):
+            field.x.array[:] = own.rate
+            vertices.interpolate(field)
+            row[:] = owned_values(vertices)
+        return rates
 
 
 def _deformable(model: MechanismModel, links: Set[int]) -> np.ndarray:

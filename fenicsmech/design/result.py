@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 from fenicsmech.collective import on_one
 from fenicsmech.design.description import SplineDesign
+from fenicsmech.design.numbers import NumberDesign
 from fenicsmech.design.rest_shape import DesignedLink, ParametricShape
 from fenicsmech.design.shape.handle_optimum import HandlePlacement
 from fenicsmech.design.shape.shape_map import gather_links
@@ -19,13 +20,15 @@ from fenicsmech.design.target import Comparison
 from fenicsmech.errors import DescriptionError, counted, point_text
 from fenicsmech.export import PinHole, write_step, write_stl
 from fenicsmech.files import atomic_write
-from fenicsmech.mechanism import DRAWN, Disc, FlexibleLink, Units
+from fenicsmech.mechanism import DRAWN, Disc, FlexibleLink, Scene, Units
 from fenicsmech.meshing import LinkMesh, boundary_polygons, plan_of
+from fenicsmech.model import Design
 from fenicsmech.multibody import Linkage, assemble
 from fenicsmech.plot import DesignShape, LinkOutline, draw_designs
+from fenicsmech.quantities import NumberKind, read_kind
 from fenicsmech.simulation import MechanismPlotter, Simulation, rest_geometry
 
-_FORMAT = "fenicsmech design 3"
+_FORMAT = "fenicsmech design 4"
 
 
 @dataclass(frozen=True)
@@ -124,12 +127,12 @@ class TargetResult:
         if self.wanted is None:
             return f"{self.name}: {reached}{unit}, from {_text(self.started)}{unit}{part}"
         if self.part is not None:
-            part += f", {_verdict(self.part)}"
+            part += f", {_met_text(self.part)}"
         wanted = f"{'' if self.relation == 'equals' else self.relation + ' '}{_text(self.wanted)}"
-        return f"{self.name}: {reached}{unit} of {wanted}{unit}, {_verdict(self)}{part}"
+        return f"{self.name}: {reached}{unit} of {wanted}{unit}, {_met_text(self)}{part}"
 
 
-def _verdict(found: TargetResult | PartValue) -> str:
+def _met_text(found: TargetResult | PartValue) -> str:
     return f"{'met' if found.met else 'missed'} ({found.error:+.2%})"
 
 
@@ -144,6 +147,7 @@ class DesignResult:
     Attributes:
         mechanism: its name.
         links: the best shapes found.
+        numbers: the best numbers found.
         targets: their results, in the order they were given.
         reason: of the end of the optimisation, in words.
         converged: whether it ended at a minimum.
@@ -166,6 +170,7 @@ class DesignResult:
 
     mechanism: str
     links: tuple[LinkDesign, ...]
+    numbers: tuple[NumberDesign, ...]
     targets: tuple[TargetResult, ...]
     reason: str
     converged: bool
@@ -185,7 +190,8 @@ class DesignResult:
     part_fidelity: str = ""
 
     def __str__(self) -> str:
-        reached, ended = (f"  {target}" for target in self.targets), counted(self.iterations, "iteration")
+        every = (*self.targets, *self.numbers)
+        reached, ended = (f"  {found}" for found in every), counted(self.iterations, "iteration")
         return "\n".join([f"design of {self.mechanism!r} after {ended}: {self.reason}", *reached])
 
     @property
@@ -199,20 +205,22 @@ class DesignResult:
         return max((abs(target.part.error) for target in self.targets if target.part is not None), default=None)
 
     @property
-    def thickness(self) -> tuple[float, float]:
-        """Least and largest thickness among all links."""
+    def thickness(self) -> tuple[float, float] | None:
+        """Least and largest thickness among all links whose shape changed; None if there are none."""
+        if not self.links:
+            return None
         return min(link.thickness[0] for link in self.links), max(link.thickness[1] for link in self.links)
 
     @property
     def parameters(self) -> int:
         """Number of parameters."""
-        return sum(len(link.parameters) for link in self.links)
+        return sum(len(link.parameters) for link in self.links) + len(self.numbers)
 
-    def rest_shape(self, simulation: Simulation) -> np.ndarray:
-        """The design field on the mesh of a simulation of the same mechanism: this rank's values, ghosts last, flat.
+    def rest_shape(self, simulation: Simulation) -> Design:
+        """The design on the mesh of a simulation of the same mechanism.
 
         Raises:
-            DescriptionError: the mechanism has no such links.
+            DescriptionError: the mechanism has no such links, or no parts with such numbers.
             ShapeError: cells of the mesh are inverted in this shape.
         """
         links = {link.name: link for link in simulation.scene.mechanism.flexible_links}
@@ -227,8 +235,19 @@ class DesignResult:
             simulation,
             [SplineDesign(links[own.name], len(own.controls) - 1, centreline=own.centreline) for own in self.links],
         )
-        p, theta = (np.concatenate(own) for own in zip(*((o.parameters, o.handles) for o in self.links), strict=True))
-        return rest.field(p, rest.placement_from(p, theta))
+        p, theta = (
+            np.concatenate([np.zeros(0), *parts])
+            for parts in ([own.parameters for own in self.links], [own.handles for own in self.links])
+        )
+        return replace(rest.design(p, rest.placement_from(p, theta)), numbers=self.values(simulation.scene))
+
+    def values(self, scene: Scene) -> dict[NumberKind, float]:
+        """The numbers by their kinds, of parts of a scene of the same mechanism. Local.
+
+        Raises:
+            DescriptionError: the scene has no such part.
+        """
+        return {read_kind(scene, own.kind, own.words): own.value for own in self.numbers}
 
     def save(self, path: str | Path, *, comm: MPI.Comm = MPI.COMM_WORLD) -> None:
         """Writes the result as JSON.
@@ -276,12 +295,14 @@ def read_result(data: dict) -> DesignResult:
         return tuple(map(frozen, value)) if isinstance(value, list) else value
 
     links = tuple(LinkDesign(**{key: frozen(value) for key, value in link.items()}) for link in data.pop("links"))
+    numbers = [NumberDesign(**{k: frozen(value) for k, value in own.items()}) for own in data.pop("numbers")]
     targets = []
     for own in data.pop("targets"):
         part = own.pop("part", None)
         part = part and PartValue(**{key: frozen(value) for key, value in part.items()})
         targets.append(TargetResult(**{key: frozen(value) for key, value in own.items()}, part=part))
-    return DesignResult(links=links, targets=tuple(targets), **{key: frozen(value) for key, value in data.items()})
+    rest = {key: frozen(value) for key, value in data.items()}
+    return DesignResult(links=links, numbers=tuple(numbers), targets=tuple(targets), **rest)
 
 
 @dataclass(frozen=True, eq=False)
@@ -394,14 +415,19 @@ def draw_links(
 
 
 def write_solids(
-    folder: str | Path, linkage: Linkage, links: Sequence[FlexibleLink], meshes: Sequence[LinkMesh], hole: float | None
+    folder: str | Path,
+    linkage: Linkage,
+    links: Sequence[FlexibleLink],
+    meshes: Sequence[LinkMesh],
+    depths: Sequence[float],
+    hole: float | None,
 ) -> None:
     """Local. Writes ``NAME.step`` and ``NAME.stl`` of every link, with holes of this diameter for pins if given."""
-    for link, mesh in zip(links, meshes, strict=True):
+    for link, mesh, depth in zip(links, meshes, depths, strict=True):
         regions = [linkage.bodies[i] for i in linkage.interfaces[link]]
         pins = [PinHole((b.centre[0], b.centre[1]), hole) for b in regions if hole and isinstance(b.region, Disc)]
         for suffix, write in ((".step", write_step), (".stl", write_stl)):
-            write(solid_path(folder, link, suffix), mesh, depth=link.shape.depth, pins=pins, name=link.name)
+            write(solid_path(folder, link, suffix), mesh, depth=depth, pins=pins, name=link.name)
 
 
 def solid_path(folder: str | Path, link: FlexibleLink, suffix: str) -> Path:

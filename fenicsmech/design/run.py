@@ -242,6 +242,7 @@ def fingerprint(
         "drawing": [repr(link) for link in mechanism.flexible_links],
         "links": [[link.name, link.spline.initial.tolist()] for link in rest.links],
         "bounds": [repr(link.bounds) for link in rest.links],
+        "numbers": [repr(own) for own in rest.numbers.numbers],
         "targets": [repr(target) for target in targets],
         "regulariser": repr(regulariser),
         "optimiser": type(optimiser).__name__,

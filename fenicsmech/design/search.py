@@ -30,7 +30,7 @@ from fenicsmech.elasticity import PLANE_STRESS, ElasticModel
 from fenicsmech.errors import DescriptionError, EquilibriumError, counted, positive
 from fenicsmech.log import Progress
 from fenicsmech.mechanism import Strip
-from fenicsmech.model import fits
+from fenicsmech.model import Design, fits
 from fenicsmech.polygons import first_crossing
 from fenicsmech.simulation import Simulation
 
@@ -41,8 +41,9 @@ class Scatter:
 
     Attributes:
         starts: their number, the drawn design included.
-        spread: largest change of a parameter, in typical lengths: a link's thickness. Thicknesses change by half of
-            the way to the nearer bound at most.
+        spread: largest change of a parameter, in typical lengths: a link's thickness, and for numbers a tenth of the
+            interval between their bounds. Thicknesses and numbers change by half of the way to the nearer bound at
+            most.
         seed: other seeds give other starts.
         attempts: most shapes tried for a start until one is feasible.
         trial: iterations after which the worse half is given up, but for designs that meet their targets.
@@ -164,8 +165,8 @@ class Searchable(Protocol):
 
     targets: tuple[Target, ...]
 
-    def rest_shape(self, design: np.ndarray) -> np.ndarray:
-        """The design field, or a ShapeError."""
+    def rest_shape(self, design: np.ndarray) -> Design:
+        """The design of parameters, or a ShapeError."""
 
     def optimise(
         self, *, optimiser: Optimiser, start: DesignResult | np.ndarray, correction: Correction
@@ -267,7 +268,9 @@ class Search:
         rest, scatter = self._rest, self._scatter
         if k == 0:
             return rest.initial, 0
-        reach = np.concatenate([_reach(link, scatter.spread) for link in rest.links]) * rest.lengths
+        nearest = 0.5 * np.minimum(rest.numbers.initial, 1.0 - rest.numbers.initial)
+        numbers = np.minimum(scatter.spread, nearest / rest.lengths[rest.of_numbers])
+        reach = np.concatenate([*(_reach(link, scatter.spread) for link in rest.links), numbers]) * rest.lengths
         for attempt in range(scatter.attempts):
             scattered = qmc.LatinHypercube(len(reach), seed=np.random.default_rng([scatter.seed, attempt]))
             p = rest.initial + (2.0 * scattered.random(scatter.starts)[k] - 1.0) * reach
@@ -379,7 +382,10 @@ def outcome(
 
 def _distance(one: DesignResult, other: DesignResult, lengths: np.ndarray) -> float:
     """Largest difference of a parameter, in typical lengths."""
-    p, q = (np.concatenate([link.parameters for link in result.links]) for result in (one, other))
+    p, q = (
+        np.concatenate([*(link.parameters for link in result.links), [own.scaled for own in result.numbers]])
+        for result in (one, other)
+    )
     return float(np.max(np.abs(p - q) / lengths))
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenicsmech.design.description import SplineDesign
+from fenicsmech.design.numbers import Number
 from fenicsmech.errors import DescriptionError, counted, finite, positive
 from fenicsmech.mechanism import DRAWN, Configuration, Force, Units
 from fenicsmech.multibody import assemble
@@ -313,13 +314,17 @@ def sample_request(simulation: Simulation, sample: Sample, values: Sequence[floa
 
 
 def check_sensitivities(
-    targets: Sequence[Target], designs: Sequence[SplineDesign], *, sensitivities: np.ndarray, errors: np.ndarray
+    targets: Sequence[Target],
+    designs: Sequence[SplineDesign | Number],
+    *,
+    sensitivities: np.ndarray,
+    errors: np.ndarray,
 ) -> None:
     """Refuses targets that are missed and that no parameter moves.
 
     Args:
         targets: the targets.
-        designs: the links that may change.
+        designs: what may change.
         sensitivities: relative change of each component when a parameter changes by its length ℓ, (components,
             parameters).
         errors: relative errors of the targets, (targets,).
@@ -327,7 +332,8 @@ def check_sensitivities(
     Raises:
         DescriptionError: naming the first such target.
     """
-    names, rounding, first = ", ".join(repr(design.link.name) for design in designs), 1e-9, 0
+    names = ", ".join(str(own) if isinstance(own, Number) else repr(own.link.name) for own in designs)
+    rounding, first = 1e-9, 0
     for target, error in zip(targets, errors, strict=True):
         rows, first = sensitivities[first : first + target.size], first + target.size
         if np.abs(rows).max(initial=0.0) > rounding or (abs(error) <= rounding and target.relation != "least"):
@@ -338,5 +344,5 @@ def check_sensitivities(
             reason = f"{names} do not carry the force, or something rigid holds its point"
             remedy = "Let links change that carry it, or give targets of another force"
         raise DescriptionError(
-            f"target of the {target.name}", f"it does not depend on the shapes that may change: {reason}", remedy
+            f"target of the {target.name}", f"it does not depend on what may change: {reason}", remedy
         )

@@ -26,14 +26,19 @@ from fenicsmech.export import write_step
 from fenicsmech.log import logger
 from fenicsmech.mechanism import FlexibleLink, step_file
 from fenicsmech.meshing import LinkMesh
-from fenicsmech.model import Fidelity, fits
+from fenicsmech.model import Design, Fidelity, fits
 from fenicsmech.simulation import Simulation
 
 _log = logger(__name__)
 
 
 def part_simulation(
-    simulation: Simulation, links: Sequence[FlexibleLink], meshes: Sequence[LinkMesh], folder: Path, finer: float
+    simulation: Simulation,
+    links: Sequence[FlexibleLink],
+    meshes: Sequence[LinkMesh],
+    depths: Sequence[float],
+    folder: Path,
+    finer: float,
 ) -> Simulation:
     """The scene with ``links`` read from the STEP files of their ``meshes``, which this writes to ``folder``.
 
@@ -52,14 +57,15 @@ def part_simulation(
                 f"{point.name!r} is at a point of {point.on.name!r}, whose place in the part is not known",
                 "Join a rigid link there, and let it act on that",
             )
-    on_one(simulation.comm, lambda: _write(folder, links, meshes))
-    shapes = {link: step_file(solid_path(folder, link, ".step"), depth=link.shape.depth) for link in links}
+    on_one(simulation.comm, lambda: _write(folder, links, meshes, depths))
+    files = zip(links, depths, strict=True)
+    shapes = {link: step_file(solid_path(folder, link, ".step"), depth=depth) for link, depth in files}
     return simulation.with_shapes(shapes, fidelity=_finer(simulation, finer))
 
 
-def _write(folder: Path, links: Sequence[FlexibleLink], meshes: Sequence[LinkMesh]) -> None:
-    for link, mesh in zip(links, meshes, strict=True):
-        write_step(solid_path(folder, link, ".step"), mesh, depth=link.shape.depth, name=link.name)
+def _write(folder: Path, links: Sequence[FlexibleLink], meshes: Sequence[LinkMesh], depths: Sequence[float]) -> None:
+    for link, mesh, depth in zip(links, meshes, depths, strict=True):
+        write_step(solid_path(folder, link, ".step"), mesh, depth=depth, name=link.name)
 
 
 def _finer(simulation: Simulation, factor: float) -> Fidelity:
@@ -82,15 +88,19 @@ def verified_parts(result: DesignResult, part: Simulation, targets: Sequence[Tar
         targets: of the design problem.
     """
     comparison, measured = Comparison(targets, part.scene.units), [t for t in targets if t.quantity.of_part]
-    equilibria = SampleEquilibria(part, measured)
-    try:
-        solved = equilibria.from_zero()
-    except Infeasible as failure:
-        _log.warning("the exported parts do not reach all targets: %s", failure)
-        return result
+    numbers = Design(np.zeros(len(part.model.elastic.d.x.array)), result.values(part.scene))
+    designed = part.with_design(numbers)
+    with part.model.shaped(numbers):
+        equilibria = SampleEquilibria(designed, measured)
+        try:
+            solved = equilibria.from_zero()
+        except Infeasible as failure:
+            _log.warning("the exported parts do not reach all targets: %s", failure)
+            return result
+        found_values, found_errors = equilibria.values(solved), equilibria.errors(solved)
     of_part = np.repeat([target.quantity.of_part for target in targets], [target.size for target in targets])
     values, adds = (np.full(comparison.size, np.nan) for _ in range(2))
-    values[of_part], adds[of_part] = equilibria.values(solved), equilibria.errors(solved)
+    values[of_part], adds[of_part] = found_values, found_errors
     errors, found = comparison.errors(values + adds), []
     for own, target, place, error in zip(result.targets, targets, comparison.places, errors, strict=True):
         pair = component_values(values[place]), component_values(adds[place])

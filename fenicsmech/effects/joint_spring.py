@@ -63,31 +63,55 @@ class JointSpring(Effect):
 
     def pose_potentials(self, linkage):
         coordinate = JointCoordinate(linkage, self.joint)
-        preload = [_Spring(coordinate, moment=self.stiffness * self.rest, holds=False)] if self.rest else []
-        return [_Spring(coordinate, stiffness=self.stiffness, holds=True), *preload]
+        return [kind(coordinate, {"stiffness": self.stiffness, "rest": self.rest}) for kind in (_Stiffness, _Preload)]
 
     @property
     def _name(self) -> str:
         return f"spring in {self.joint.name!r}"
 
 
-class _Spring(PosePotential):
-    """½ k φ² − M φ of a joint's coordinate, with a torque or force M."""
+class _Stiffness(PosePotential):
+    """½ k φ²."""
 
-    def __init__(
-        self, coordinate: JointCoordinate, *, stiffness: float = 0.0, moment: float = 0.0, holds: bool
-    ) -> None:
-        self.bodies, self.holds, self._coordinate = coordinate.bodies, holds, coordinate
-        self._stiffness, self._moment = stiffness, moment
+    holds = True
+
+    def __init__(self, coordinate: JointCoordinate, numbers: dict[str, float]) -> None:
+        self.bodies, self.numbers, self._coordinate = coordinate.bodies, numbers, coordinate
 
     def value(self, poses):
-        position = self._coordinate.value(poses)
-        return (0.5 * self._stiffness * position - self._moment) * position
+        return 0.5 * self.numbers["stiffness"] * self._coordinate.value(poses) ** 2
 
     def gradient(self, poses):
-        return (self._stiffness * self._coordinate.value(poses) - self._moment) * self._coordinate.gradient(poses)
+        return self.numbers["stiffness"] * self.gradient_by("stiffness", poses)
 
     def hessian(self, poses):
         slope, hessian = self._coordinate.gradient(poses), self._coordinate.hessian(poses)
-        moment = self._stiffness * self._coordinate.value(poses) - self._moment
-        return self._stiffness * np.outer(slope, slope) + moment * hessian
+        return self.numbers["stiffness"] * (np.outer(slope, slope) + self._coordinate.value(poses) * hessian)
+
+    def gradient_by(self, name, poses):
+        factor = self._coordinate.value(poses) if name == "stiffness" else 0.0
+        return factor * self._coordinate.gradient(poses)
+
+
+class _Preload(PosePotential):
+    """−k φ₀ φ."""
+
+    def __init__(self, coordinate: JointCoordinate, numbers: dict[str, float]) -> None:
+        self.bodies, self.numbers, self._coordinate = coordinate.bodies, numbers, coordinate
+
+    def value(self, poses):
+        return -self._moment * self._coordinate.value(poses)
+
+    def gradient(self, poses):
+        return -self._moment * self._coordinate.gradient(poses)
+
+    def hessian(self, poses):
+        return -self._moment * self._coordinate.hessian(poses)
+
+    def gradient_by(self, name, poses):
+        other = {"stiffness": "rest", "rest": "stiffness"}[name]
+        return -self.numbers[other] * self._coordinate.gradient(poses)
+
+    @property
+    def _moment(self) -> float:
+        return self.numbers["stiffness"] * self.numbers["rest"]

@@ -134,6 +134,7 @@ class BodyFields:
         pressure: of the links in the u–p formulation, P_(order − 1); None if no link is.
         parameters: of the links' laws by name, each with one value per cell; changing them needs no compiling.
         depth: one value per cell.
+        numbers: what energies depend on of the numbers of links: ``parameters``, and in the plane ``depth``.
         load_factor: of the effects.
         growth: of the strain-free state; None if all links are as drawn.
         dx: measure of all cells, interfaces included.
@@ -166,6 +167,7 @@ class BodyFields:
             for name in dict.fromkeys(name for known in numbers for name in known)
         }
         self.depth = self.cellwise(depths)
+        self.numbers = self.parameters | ({"depth": self.depth} if model.dim == 2 else {})
         self.load_factor = fem.Constant(mesh, PETSc.ScalarType(1.0))
         mixed = tuple(mixed) or (False,) * len(materials)
         self.pressure = None

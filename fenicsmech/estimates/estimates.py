@@ -85,7 +85,7 @@ from fenicsmech.equilibrium import (
 )
 from fenicsmech.errors import DescriptionError, EquilibriumError
 from fenicsmech.meshing import MechanismMesh, on_mid_plane
-from fenicsmech.model import MechanismModel
+from fenicsmech.model import Design, MechanismModel
 
 
 class ErrorKind(Enum):
@@ -119,12 +119,12 @@ class Equilibrium:
 
     Attributes:
         state: the equilibrium.
-        design: the rest shape it belongs to, this rank's values of the design field, flat.
+        design: that it belongs to.
         unknown: the displacement under a prescribed force, or the force at a prescribed displacement.
     """
 
     state: State
-    design: np.ndarray
+    design: Design
     unknown: Unknown
 
 
@@ -337,7 +337,7 @@ class PlaneStressError:
                 f"only plane stress has an estimate, and space={elastic.model.name!r}",
                 "Simulate in plane stress, or in 3D",
             )
-        reach = elastic.cellwise([decay * link.shape.depth for link in model.mechanism.flexible_links])
+        reach = decay * elastic.depth
         # w decays within a cell: of a high degree
         energy = elastic.contraction_energy(ufl.exp(-_interface_distance(model.mesh) / reach), degree=8)
         self._force = compile_form(ufl.derivative(energy, elastic.u))

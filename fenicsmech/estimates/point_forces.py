@@ -31,12 +31,13 @@ def growth_by_halving(part: PrescribedPart, model: MechanismModel, sizes: Mappin
     """
     kind, total = model.elastic.model, 0.0
     for _, link, ratio in _at_points(part):
-        law = model.materials[model.mechanism.flexible_links.index(link)].law
+        index = model.mechanism.flexible_links.index(link)
+        law = model.materials[index].law
         if kind.dim == 3:
             compliance = 1.0 / (law.E * sizes[link])
         else:
             modulus = law.E / (1.0 - law.nu**2) if kind is PLANE_STRAIN else law.E
-            compliance = 2.0 * math.log(2.0) / (math.pi * modulus * link.shape.depth)
+            compliance = 2.0 * math.log(2.0) / (math.pi * modulus * model.depths[index])
         total += ratio**2 * compliance
     return total
 

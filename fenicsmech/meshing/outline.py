@@ -218,7 +218,7 @@ def _(shape: Outline, request: MeshRequest) -> None:
     crossing = first_crossing(sampled(_loop(shape, request), _SAMPLED))
     if crossing is not None:
         problem = f"the outline crosses itself near {point_text(crossing * request.size)}"
-        raise MeshingError(request.part, problem, "Lead its segments apart there")
+        raise MeshingError(request.part, problem, "Move its segments apart there")
     for site in request.sites:
         if not holds(shape, request, site.at):
             problem = f"the point {point_text(site.at[:2])} is not on the link"

@@ -56,7 +56,7 @@ def _(shape: Strip, request: MeshRequest) -> None:
     right, left = (_parallel(centreline, s, offset * thickness) for offset in (-0.5, 0.5))
     crossing = first_crossing(np.concatenate([right, left[::-1]]))
     if crossing is not None:
-        remedy = "Lead the centreline apart there, or make the strip thinner"
+        remedy = "Move the centreline's parts away from each other, or make the strip thinner"
         raise MeshingError(request.part, f"the strip crosses itself near {point_text(crossing)}", remedy)
     for site in request.sites:
         station = centreline.closest(site.at[:2])

@@ -10,6 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -256,10 +257,12 @@ class PosePotential(ABC):
     Attributes:
         bodies: indices of the bodies.
         holds: whether it acts in full from the start, as springs do, instead of growing with the load factor.
+        numbers: that designs may change, by name; none by default.
     """
 
     bodies: tuple[int, ...]
     holds: bool = False
+    numbers: dict[str, float] = MappingProxyType({})  # type: ignore[assignment]
 
     @abstractmethod
     def value(self, poses: np.ndarray) -> float:
@@ -272,6 +275,10 @@ class PosePotential(ABC):
     @abstractmethod
     def hessian(self, poses: np.ndarray) -> np.ndarray:
         """∂²V/∂z², (n · pose_size, n · pose_size)."""
+
+    def gradient_by(self, name: str, poses: np.ndarray) -> np.ndarray:
+        """∂²V/∂z∂p of one of ``numbers``, (n · pose_size,)."""
+        raise NotImplementedError(f"{type(self).__name__} has no numbers")
 
 
 def spring_potentials(effects: Sequence[Effect], linkage: Linkage) -> tuple[PosePotential, ...]:

@@ -1,16 +1,22 @@
-"""Quantities of equilibria and of links at rest, with their derivatives by the design and by the laws' numbers.
+"""Quantities of equilibria and of links at rest, with their derivatives by the design field and by numbers of parts.
 
 - ``quantity``: the interface of quantities; components and magnitudes of vectors
 - ``motion``: displacements and rotations
 - ``forces``: forces that prescribe displacements, torques of motors, reactions of joints
 - ``links``: strain energy, mass, volume and length of flexible links
 - ``sample``: the equilibria at which they are evaluated
+- ``number``: numbers of parts, and their derivatives from adjoints
+- ``link_numbers``: numbers of laws, depth
+- ``joint_numbers``: stiffness and rest of springs
 - ``sensitivity``: total derivatives by adjoints
 """
 
 from fenicsmech.quantities.forces import ForceMagnitude, JointForce, JointMoment, MotorTorque
+from fenicsmech.quantities.joint_numbers import SpringRest, SpringStiffness
+from fenicsmech.quantities.link_numbers import Depth, LawParameter
 from fenicsmech.quantities.links import CentrelineLength, LinkMass, LinkVolume, StrainEnergy
 from fenicsmech.quantities.motion import Displacement, Rotation
+from fenicsmech.quantities.number import ModelNumber, NumberKind, NumberTerms, read_kind
 from fenicsmech.quantities.quantity import (
     Component,
     FormValue,

@@ -139,7 +139,7 @@ class _Energy(Observable):
     def __init__(self, model: MechanismModel, form: ufl.Form) -> None:
         self._elastic = elastic = model.elastic
         self._states = {f"state {k}": own for k, own in enumerate(elastic.fields)}
-        self._form = FormValue(model, form, {"design": elastic.d, **self._states, **elastic.parameters})
+        self._form = FormValue(model, form, {"design": elastic.d, **self._states, **elastic.numbers})
 
     def values(self, state):
         return np.array([self._form.value()])
@@ -149,22 +149,25 @@ class _Energy(Observable):
             Partial(
                 links=np.concatenate([self._form.slope(name) for name in self._states]),
                 design=self._form.slope("design"),
-                parameters={name: self._form.per_link(name) for name in self._elastic.parameters},
+                per_link={name: self._form.per_link(name) for name in self._elastic.numbers},
             )
         ]
 
 
 class _Volume(RestObservable):
-    """A form in the design field."""
+    """A form in the design field and the depth."""
 
     def __init__(self, model: MechanismModel, form: ufl.Form) -> None:
-        self._form = FormValue(model, form, {"design": model.elastic.d})
+        self._depths = {name: own for name, own in model.elastic.numbers.items() if own is model.elastic.depth}
+        self._form = FormValue(model, form, {"design": model.elastic.d, **self._depths})
 
     def value(self):
         return self._form.value()
 
     def slope(self):
-        return self._form.slope("design")
+        return Partial(
+            design=self._form.slope("design"), per_link={name: self._form.per_link(name) for name in self._depths}
+        )
 
 
 @dataclass(frozen=True)
@@ -226,7 +229,7 @@ class _Chords(RestObservable):
         ends[:-1] -= along
         nodal = np.zeros((own.shape[1], self._model.elastic.model.dim))
         nodal[:, :2] = own.T @ ends
-        return nodal.ravel()
+        return Partial(design=nodal.ravel())
 
     def _chords(self) -> np.ndarray:
         """ΔX, (chords, 2)."""

@@ -1,6 +1,6 @@
 """Quantities Q(y, p) of an equilibrium: numbers or vectors with their derivatives.
 
-    y = (u, p, z, λ, f) the unknowns of the equilibrium,      p the design field d and the numbers of the links' laws
+    y = (u, p, z, λ, f) the unknowns of the equilibrium,      p the design field d and numbers of parts
 
 A ``Quantity`` is described as plain data. ``on`` a model it is an ``Observable``, which gives the values of a state
 and the partial derivatives of each component; the adjoint in ``sensitivity`` makes total ones of them. A new quantity
@@ -38,13 +38,15 @@ class Partial:
         links: by this rank's displacements and pressures of all nodes, (owned dofs,).
         border: by poses, multipliers and the controlled force, the same on all ranks, (border,).
         design: by this rank's owned values of the design field, flat.
-        parameters: by the numbers of the links' laws, by name, (links,).
+        per_link: by numbers of links, by their names in ``ElasticBody.numbers``, (links,).
+        motors: by the motors' positions, (connections,).
     """
 
     links: np.ndarray | float = 0.0
     border: np.ndarray | float = 0.0
     design: np.ndarray | float = 0.0
-    parameters: Mapping[str, np.ndarray] = field(default_factory=lambda: MappingProxyType({}))
+    per_link: Mapping[str, np.ndarray] = field(default_factory=lambda: MappingProxyType({}))
+    motors: np.ndarray | float = 0.0
 
     @property
     def of_state(self) -> bool:
@@ -52,15 +54,17 @@ class Partial:
         return isinstance(self.links, np.ndarray) or isinstance(self.border, np.ndarray)
 
     def __mul__(self, factor: float) -> Partial:
-        parameters = {name: np.multiply(factor, values) for name, values in self.parameters.items()}
-        return Partial(factor * self.links, factor * self.border, factor * self.design, parameters)
+        per_link = {name: np.multiply(factor, values) for name, values in self.per_link.items()}
+        border, design = factor * self.border, factor * self.design
+        return Partial(factor * self.links, border, design, per_link, factor * self.motors)
 
     __rmul__ = __mul__
 
     def __add__(self, other: Partial) -> Partial:
-        names = dict.fromkeys((*self.parameters, *other.parameters))
-        parameters = {name: np.add(self.parameters.get(name, 0.0), other.parameters.get(name, 0.0)) for name in names}
-        return Partial(self.links + other.links, self.border + other.border, self.design + other.design, parameters)
+        names = dict.fromkeys((*self.per_link, *other.per_link))
+        per_link = {name: np.add(self.per_link.get(name, 0.0), other.per_link.get(name, 0.0)) for name in names}
+        border, design = self.border + other.border, self.design + other.design
+        return Partial(self.links + other.links, border, design, per_link, self.motors + other.motors)
 
 
 class Observable(ABC):
@@ -91,14 +95,14 @@ class RestObservable(Observable):
         """Q at the design that the model holds."""
 
     @abstractmethod
-    def slope(self) -> np.ndarray:
-        """∂Q/∂d, this rank's owned values, flat."""
+    def slope(self) -> Partial:
+        """The derivatives by the design."""
 
     def values(self, state):
         return np.array([self.value()])
 
     def partials(self, system, state):
-        return [Partial(design=self.slope())]
+        return [self.slope()]
 
 
 @dataclass(frozen=True)

@@ -122,7 +122,7 @@ class Sample:
 
     @property
     def value(self) -> float:
-        """What is prescribed of ``part``: its displacement, or its magnitude."""
+        """The prescribed displacement of ``part``, or its magnitude."""
         return self.moved[1] if self.moved else self.magnitude
 
     @property

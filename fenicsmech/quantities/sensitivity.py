@@ -15,22 +15,26 @@ drawn enters its displacement through G, which is not a form; a quantity of such
 Nor is the work of forces at points, a of the controlled one; they stay at the same place of their cell, or of their
 body, so that it depends on d through the displacements of nodes alone, and the nodal forces r hold it.
 
+Numbers of parts (``number``) add one product with the same x each.
+
 Source: implicit function theorem, equations 8 and 9 of the paper this package follows.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
 
 import numpy as np
 import ufl
 from dolfinx import fem
+from mpi4py import MPI
 
 from fenicsmech.compat import destroy_garbage, owned_values
 from fenicsmech.equilibrium import Adjoint, Control, EquilibriumSolver, State
 from fenicsmech.model import MechanismModel
+from fenicsmech.quantities.number import NumberKind, NumberTerms
 from fenicsmech.quantities.quantity import FormValue, Observable, Partial, RestObservable
 
 
@@ -40,30 +44,33 @@ class Gradient:
 
     Attributes:
         design: by the design field, this rank's owned values, flat.
-        parameters: by the numbers of the links' laws, by name, (links,).
+        numbers: by the numbers of parts that were asked for, (numbers,).
         control: by the value of the control.
     """
 
     design: np.ndarray
-    parameters: Mapping[str, np.ndarray] = field(default_factory=dict)
+    numbers: np.ndarray
     control: float = 0.0
 
     def __add__(self, other: Gradient) -> Gradient:
-        parameters = {name: values + other.parameters[name] for name, values in self.parameters.items()}
-        return Gradient(self.design + other.design, parameters, self.control + other.control)
+        return Gradient(self.design + other.design, self.numbers + other.numbers, self.control + other.control)
 
     def __mul__(self, factor: float) -> Gradient:
-        parameters = {name: factor * values for name, values in self.parameters.items()}
-        return Gradient(factor * self.design, parameters, factor * self.control)
+        return Gradient(factor * self.design, factor * self.numbers, factor * self.control)
 
     __rmul__ = __mul__
 
 
 class Sensitivity:
-    """Sensitivities at equilibria of one model, which holds their design."""
+    """Sensitivities at equilibria of one model, which holds their design.
 
-    def __init__(self, model: MechanismModel) -> None:
-        self._model = model
+    Args:
+        model: the model.
+        numbers: derivatives by which are wanted beside those by the design field.
+    """
+
+    def __init__(self, model: MechanismModel, numbers: Sequence[NumberKind] = ()) -> None:
+        self._model, self._numbers = model, [model.number(kind) for kind in numbers]
         self._weights = [fem.Function(field.function_space, name="adjoint") for field in model.elastic.fields]
 
     def gradients(
@@ -92,7 +99,7 @@ class Sensitivity:
 
     def at_rest(self, observable: RestObservable) -> Gradient:
         """The derivatives of a quantity of links at rest."""
-        return self._gradient(None, Partial(design=observable.slope()))
+        return self._gradient(None, observable.slope())
 
     def adjoints(
         self, solver: EquilibriumSolver, state: State, control: Control, partials: Sequence[Partial]
@@ -110,23 +117,31 @@ class Sensitivity:
     def _gradient(self, adjoint: Adjoint | None, partial: Partial) -> Gradient:
         model = self._model
         design = np.zeros(len(owned_values(model.elastic.d))) + partial.design
-        links = len(model.mechanism.flexible_links)
-        parameters = {name: np.zeros(links) + partial.parameters.get(name, 0.0) for name in model.elastic.parameters}
         if adjoint is None:
-            return Gradient(design, parameters)
+            return Gradient(design, self._by_numbers(design, None, partial))
         for weight, values in zip(self._weights, model.elastic.split(adjoint.nodal), strict=True):
             owned_values(weight)[:] = values
             weight.x.scatter_forward()
         at, size = adjoint.at, len(adjoint.at.residual.nodal)
         held = adjoint.load * at.controlled_slopes() + partial.links
         stiff = self._work.slope("displacement") - held[:size]
-        return Gradient(
-            design=design
-            - self._work.slope("design")
-            - model.design_nodes.transpose(self._interface_terms(adjoint, stiff)),
-            parameters={name: own - self._work.per_link(name) for name, own in parameters.items()},
-            control=adjoint.by_control(),
-        )
+        design -= self._work.slope("design") + model.design_nodes.transpose(self._interface_terms(adjoint, stiff))
+        return Gradient(design, self._by_numbers(design, adjoint, partial), adjoint.by_control())
+
+    def _by_numbers(self, design: np.ndarray, adjoint: Adjoint | None, partial: Partial) -> np.ndarray:
+        """The derivatives by numbers, of a component whose derivative by the design field is ``design``, (numbers,)."""
+        links = len(self._model.mechanism.flexible_links)
+
+        @cache
+        def by_link(name: str) -> np.ndarray:
+            found = np.zeros(links) + partial.per_link.get(name, 0.0)
+            concerned = adjoint is not None and name in self._model.elastic.numbers
+            return found - self._work.per_link(name) if concerned else found
+
+        terms = NumberTerms(partial, adjoint, by_link)
+        own = np.array([number.through_field(design) for number in self._numbers])
+        shares = self._model.mesh.comm.allreduce(own, op=MPI.SUM)
+        return shares + [number.slope(terms) for number in self._numbers]
 
     def _interface_terms(self, adjoint: Adjoint, stiff: np.ndarray) -> np.ndarray:
         """(R − I)ᵀ ``stiff``_i + (ẑ_r ∂R/∂r)ᵀ r_i at owned interface nodes, (owned nodes, dim)."""
@@ -153,5 +168,5 @@ class Sensitivity:
             ufl.derivative(elastic.energy_ufl, own, weight)
             for own, weight in zip(elastic.fields, self._weights, strict=True)
         )
-        by = {"design": elastic.d, "displacement": elastic.u, **elastic.parameters}
+        by = {"design": elastic.d, "displacement": elastic.u, **elastic.numbers}
         return FormValue(self._model, sum(more, start=first), by)

@@ -88,7 +88,14 @@ class Discretisation:
         scene, mesh = self.scene, self.mesh
         with self.clock.phase("setup"):
             return MechanismModel(
-                scene.mechanism, self.linkage, mesh, self.fidelity, self.clock, scene.effects, self.materials
+                scene.mechanism,
+                self.linkage,
+                mesh,
+                self.fidelity,
+                self.clock,
+                scene.effects,
+                self.materials,
+                tuple(self.shapes.values()),
             )
 
     @cached_property

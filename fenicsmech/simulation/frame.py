@@ -9,7 +9,7 @@ import numpy as np
 
 from fenicsmech.equilibrium import Reaction, State, Step
 from fenicsmech.mechanism import Motor, Output
-from fenicsmech.model import MechanismModel
+from fenicsmech.model import Design, MechanismModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class Frame:
         seconds: wall-clock time.
         phases: the same, by phase.
         state: the equilibrium itself.
-        design: the rest shape it belongs to, this rank's values of the design field, flat.
+        design: that it belongs to.
     """
 
     force: float
@@ -52,7 +52,7 @@ class Frame:
     seconds: float
     phases: Mapping[str, float]
     state: State
-    design: np.ndarray
+    design: Design
 
     @property
     def stable(self) -> bool:

@@ -167,9 +167,8 @@ def weight_influence(model: MechanismModel, solver: EquilibriumSolver, at: Equil
     with model.shaped(at.design):
         adjoint = adjoint_at(solver, replace(at, unknown=Unknown.DISPLACEMENT))
         displacements = elastic.split(adjoint.nodal)[0]
-        depths = [elastic.model.multiplier(link.shape.depth) for link in model.mechanism.flexible_links]
         v = ufl.TestFunction(elastic.u.function_space)
-        depth = elastic.cellwise(depths) * ufl.det(elastic.rest_gradient)
+        depth = elastic.model.multiplier(elastic.depth) * ufl.det(elastic.rest_gradient)
         direction = fem.Constant(elastic.mesh, np.zeros(elastic.model.dim))
         form = compile_form(ufl.dot(direction, v) * depth * elastic.dx(metadata={"quadrature_degree": elastic.order}))
         slopes = []
@@ -226,13 +225,13 @@ def _buckling_hint(model: MechanismModel, frame: Frame, slender: float) -> Hint 
     N_cr = π² E I / L²,     I = h b³ / 12,     h in the plane, b the depth
     """
     fraction, name = 0.0, ""
-    for link, material in zip(model.mechanism.flexible_links, model.materials, strict=True):
+    for link, material, depth in zip(model.mechanism.flexible_links, model.materials, model.depths, strict=True):
         joints = [joint for joint in model.mechanism.joints if link in (joint.a, joint.b)]
         if isinstance(link.shape, Strip) and len(joints) > 1:
             length = hypot(*np.subtract(joints[-1].at[:2], joints[0].at[:2]))
             forces = [frame.reactions[joint.name].force[:2] for joint in joints if joint.name in frame.reactions]
             load = max((float(np.linalg.norm(force)) for force in forces), default=0.0)
-            critical = pi**2 * material.law.E * link.shape.thickness * link.shape.depth**3 / 12.0 / length**2
+            critical = pi**2 * material.law.E * link.shape.thickness * depth**3 / 12.0 / length**2
             fraction, name = max((fraction, name), (load / critical, link.name))
     if not name:
         return None

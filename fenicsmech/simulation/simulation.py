@@ -32,7 +32,7 @@ from fenicsmech.mechanism import (
     in_dimension,
 )
 from fenicsmech.meshing import radius_ratios
-from fenicsmech.model import Fidelity, MechanismModel, read_fidelity
+from fenicsmech.model import Design, Fidelity, MechanismModel, read_fidelity
 from fenicsmech.multibody import Linkage, assemble, spring_potentials
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.discretisation import Discretisation
@@ -43,10 +43,10 @@ from fenicsmech.simulation.stepping import CurveRequest, CurveStepper, read_requ
 
 
 class RestShape(Protocol):
-    """A design that has a rest shape on any mesh of its mechanism."""
+    """A design on any mesh of its mechanism."""
 
-    def rest_shape(self, simulation: Simulation) -> np.ndarray:
-        """This rank's values of the simulation's design field with ghosts, flat."""
+    def rest_shape(self, simulation: Simulation) -> Design:
+        """The rest shape of the simulation's links, and numbers of its parts."""
 
 
 class Simulation:
@@ -105,7 +105,7 @@ class Simulation:
         self.scene, self.comm, self.clock = scene, comm, Clock()
         self.choice: Choice | None = None
         self._control: AccuracyControl | None = None
-        self._design: np.ndarray | None = None
+        self._design: Design | None = None
         given = dict[str, Any](space=space, order=order, layers=layers, segments=segments, quadrature=quadrature)
         if accuracy is None:
             fidelity = read_fidelity(scene, size=size, formulation=formulation, **given)
@@ -273,26 +273,32 @@ class Simulation:
 
     # -- simulations derived from this one ------------------------------------------------------------------------
 
-    def with_design(self, design: RestShape | np.ndarray) -> Simulation:
-        """The same scene at the same fidelity with links of another rest shape; mesh and compiled forms are shared.
+    def with_design(self, design: RestShape | Design | np.ndarray) -> Simulation:
+        """The same scene at the same fidelity with links of another rest shape, and parts with other numbers.
+
+        Mesh and compiled forms are shared.
 
         Args:
-            design: the result of a design problem, or this rank's values of the design field with ghosts, flat.
+            design: the result of a design problem, or a design on the mesh of this simulation, or its design field
+                alone, this rank's values with ghosts, flat.
 
         Raises:
             DescriptionError: the design is one of other links, or of another mesh.
             ShapeError: cells of the mesh are inverted in this shape.
         """
-        values = design if isinstance(design, np.ndarray) else design.rest_shape(self)
+        if isinstance(design, np.ndarray):
+            given = Design(design)
+        else:
+            given = design if isinstance(design, Design) else design.rest_shape(self)
         size = len(self.model.elastic.d.x.array)
-        if self.comm.allreduce(int(values.shape != (size,))):
+        if self.comm.allreduce(int(given.field.shape != (size,))):
             raise DescriptionError(
                 f"design of {self.scene.mechanism.name!r}",
-                f"it has values of shape {values.shape}, and the mesh has {size}",
+                f"it has values of shape {given.field.shape}, and the mesh has {size}",
                 "Give the design field of this simulation",
             )
         other = copy(self)
-        other._design, other._control = values.copy(), None
+        other._design, other._control = Design(given.field.copy(), dict(given.numbers)), None
         return other
 
     def with_material(self, drawn: Material, other: Material) -> Simulation:
@@ -312,8 +318,8 @@ class Simulation:
     def with_shapes(self, shapes: Mapping[FlexibleLink, Shape], *, fidelity: Fidelity | None = None) -> Simulation:
         """The same scene with links of other shapes, meshed anew; joints keep their places and interfaces.
 
-        Quantities, samples, targets and effects that name these links mean those of other shapes. Links keep the depth
-        and the centreline they were described with.
+        Quantities, samples, targets and effects that name these links mean those of other shapes. Links keep the
+        centreline they were described with.
 
         Args:
             shapes: of some flexible links, as ``step_file`` of a designed part.

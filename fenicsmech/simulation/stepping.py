@@ -228,7 +228,7 @@ class CurveStepper:
                 seconds=0.0,
                 phases={},
                 state=state,
-                design=model.elastic.d.x.array.copy(),
+                design=model.design,
             )
 
     def _unloaded(self, assembly: Assembly) -> State:

@@ -33,7 +33,7 @@ class Case:
     """A mechanism, which of its links may change, and what is wanted of it."""
 
     scene: fm.Scene
-    designs: Sequence[fm.SplineDesign]
+    designs: Sequence[fm.SplineDesign | fm.Number]
     targets: Sequence[fm.Target] = ()
 
     def simulate(
@@ -72,8 +72,11 @@ class Bench:
 def bench(case: Case, simulation: fm.Simulation) -> Bench:
     """The parts of ``case`` in ``simulation`` (collective)."""
     mechanism, linkage, model = case.scene.mechanism, simulation.linkage, simulation.model
-    shapes = shape_links(model.mesh, [shape_request(design, mechanism, linkage) for design in case.designs])
-    return Bench(simulation, ParametricShape(model, shapes, case.designs), SampleEquilibria(simulation, case.targets))
+    designs = [design for design in case.designs if isinstance(design, fm.SplineDesign)]
+    numbers = [design for design in case.designs if isinstance(design, fm.Number)]
+    shapes = shape_links(model.mesh, [shape_request(design, mechanism, linkage) for design in designs])
+    equilibria = SampleEquilibria(simulation, case.targets, numbers=[number.kind for number in numbers])
+    return Bench(simulation, ParametricShape(model, shapes, designs, numbers), equilibria)
 
 
 def objective(

@@ -32,7 +32,7 @@ def test_no_link_may_change():
     refused(
         lambda: Case(case.scene, [], case.targets).problem(),
         part="design problem",
-        problem="no link may change",
+        problem="no link or number may change",
         remedy="SplineDesign",
     )
 

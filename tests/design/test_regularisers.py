@@ -42,7 +42,8 @@ def rest_of(link: LinkSpline, bounds: Bounds, *, count: int = 500, thickness: fl
     lengths = np.where(link.is_thickness, 1.0, thickness)
     samples = SplineSamples(link, count=count)
     arch = DesignedLink("arch", slice(0, link.size), link, samples, thickness, bounds, link.controls[:, 0, :2])
-    return SimpleNamespace(links=(arch,), initial=link.initial, lengths=lengths)
+    none = slice(len(lengths), len(lengths))
+    return SimpleNamespace(links=(arch,), initial=link.initial, lengths=lengths, of_numbers=none)
 
 
 def model_of(regulariser: Regulariser, rest: SimpleNamespace) -> Model:
@@ -118,7 +119,9 @@ def test_curvature_of_the_bend_barriers_is_positive_semidefinite():
 
 
 def test_staying_close_counts_lengths_in_thicknesses_of_the_link():
-    rest = SimpleNamespace(initial=np.array([10.0, -4.0, 1.0]), lengths=np.array([2.0, 2.0, 1.0]))
+    rest = SimpleNamespace(
+        initial=np.array([10.0, -4.0, 1.0]), lengths=np.array([2.0, 2.0, 1.0]), of_numbers=slice(3, 3)
+    )
     model = model_of(StayClose(), rest)
     assert model(rest.initial).value == 0.0
     here = model(rest.initial + [4.0, -2.0, 0.5])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.design import DesignResult, LinkDesign, TargetResult
+from fenicsmech.design import DesignResult, LinkDesign, NumberDesign, TargetResult
 
 
 def link(name: str, thickness: tuple[float, float]) -> LinkDesign:
@@ -28,6 +28,7 @@ def link(name: str, thickness: tuple[float, float]) -> LinkDesign:
 RESULT = DesignResult(
     mechanism="Zange “ß”",
     links=(link("coupler", (1.0 / 3.0, 2.0)), link("rocker", (0.7, 4.1))),
+    numbers=(NumberDesign("depth of 'rocker'", "Depth", ("rocker",), 10.0 / 3.0, 4.0, (1.0, 7.1), "mm"),),
     targets=(
         TargetResult(
             *("displacement of 'push' under 'push' of 0.1, as drawn", "as drawn", 0.1, "mm", "equals"),
@@ -100,7 +101,7 @@ def test_an_interrupted_save_leaves_the_result_before_it(tmp_path, monkeypatch):
 def test_summaries_look_at_all_links_and_targets():
     assert RESULT.worst_error == 0.1
     assert RESULT.thickness == (1.0 / 3.0, 4.1)
-    assert RESULT.parameters == 8
+    assert RESULT.parameters == 9
 
 
 @pytest.mark.parametrize(
@@ -150,4 +151,5 @@ def test_a_result_prints_how_far_each_target_is_reached():
         "  displacement of 'tip' at (1, 2) under 'push' of 0.4, geöffnet: (0.025, 0.2) mm of (0, 0.2) mm, "
         "missed (+10.00%)",
         "  mass of all links: 0.2 N s²/mm, from 0.3 N s²/mm",
+        "  depth of 'rocker': 3.33333 mm, drawn with 4 mm",
     ]

@@ -19,6 +19,7 @@ from fenicsmech.design import (
     Evaluation,
     LinkSpline,
     Quadratic,
+    ScaledNumbers,
     Search,
     ShapeBounds,
     ShapeError,
@@ -51,7 +52,9 @@ class TwoValleys:
             "bar", slice(0, spline.size), spline, SplineSamples(spline), H, Bounds((1.0, 6.0), 0.08), controls[:, 0, :2]
         )
         self.lengths = np.where(spline.is_thickness, 1.0, H)
-        self.rest = SimpleNamespace(initial=spline.initial, lengths=self.lengths, links=(link,))
+        size = len(spline.initial)
+        numbers = {"numbers": ScaledNumbers(None, []), "of_numbers": slice(size, size)}
+        self.rest = SimpleNamespace(initial=spline.initial, lengths=self.lengths, links=(link,), **numbers)
         (self.middle,) = np.flatnonzero(spline.entries == 7)  # of points (x, y, δ, x′, y′, δ′)
         self.wanted, self.broken, self.inverted = wanted, tuple(broken), inverted
         self.asked: list[np.ndarray] = []
@@ -79,6 +82,7 @@ class TwoValleys:
         return fm.DesignResult(
             mechanism="bar",
             links=(fm.LinkDesign("bar", tuple(here.parameters.tolist()), (), (), (H, H), 0.0),),
+            numbers=(),
             targets=(bow,),
             reason=last.reason.value,
             converged=last.reason.converged,

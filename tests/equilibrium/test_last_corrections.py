@@ -68,7 +68,7 @@ def solution_rate(newton, state):
 
 
 @pytest.mark.parametrize("nearness", [1e-2, 1e-3, 1e-4])
-def test_verdict_changes_at_the_limit_point_and_nowhere_else(nearness):
+def test_stability_changes_at_the_limit_point_and_nowhere_else(nearness):
     highest = minimize_scalar(
         lambda sunk: -toggle.force(sunk), bounds=(0.0, 5.0), method="bounded", options={"xatol": 1e-10}
     ).x
@@ -79,7 +79,7 @@ def test_verdict_changes_at_the_limit_point_and_nowhere_else(nearness):
     assert list(curve.stable) == [True, True, False, False]
 
 
-def test_verdicts_next_to_a_buckling_load_are_those_of_new_factors():
+def test_stability_next_to_a_buckling_load_is_that_of_new_factors():
     loads = EULER * np.concatenate([[0.9], 1.0 + np.linspace(-0.01, 0.01, 9)])
     modes = []
     for solver in (fm.PrimalDualNewton(), ALWAYS_ANEW):

@@ -70,8 +70,8 @@ class LevenbergMarquardt(SQP):
             )
         return replace(super()._begin(here, lengths), scale=1.0)
 
-    def _resolution(self, first: Iterate, lengths: np.ndarray) -> Callable[[Iterate], bool]:
-        resolution = Resolution(self, first)
+    def _resolution(self, first: Iterate, lengths: np.ndarray, resumed: bool) -> Callable[[Iterate], bool]:
+        resolution = Resolution(self, first, resumed=resumed)
 
         def resolved(last: Iterate) -> bool:
             undecided = self.tolerance is None and last.reduction > self.least_reduction
@@ -81,12 +81,15 @@ class LevenbergMarquardt(SQP):
 
 
 class Resolution:
-    """Test of the remaining reduction against the errors, which are estimated a few times from ``start`` on."""
+    """Test of the remaining reduction against the errors, which are estimated a few times from ``start`` on.
 
-    def __init__(self, options: LevenbergMarquardt, start: Iterate) -> None:
+    A resumed run does not know how far the start of the interrupted one was from the minimum, and estimates at once.
+    """
+
+    def __init__(self, options: LevenbergMarquardt, start: Iterate, *, resumed: bool = False) -> None:
         self._options, self._errors = options, no_errors()
         self._estimated: Evaluation | None = None
-        self._below = options.again * _gain(start)
+        self._below = np.inf if resumed else options.again * _gain(start)
 
     def reached(self, last: Iterate, lengths: np.ndarray) -> bool:
         """Whether the best point so far, ``last``, is as near to the minimum as the errors resolve."""

@@ -127,7 +127,7 @@ class SQP(Optimiser):
         memory = self._begin(here, lengths) if start.memory is None else Memory.unpacked(start.memory, here)
         last = self._iterate(start.number, start.evaluations + 1, here, memory, lengths)
         watch(last)
-        resolved = self._resolution(last, lengths)
+        resolved = self._resolution(last, lengths, start.memory is not None)
         while last.reason is None:
             last = replace(last, reason=Reason.RESOLVED) if resolved(last) else self._advance(problem, last, lengths)
             watch(last)
@@ -139,7 +139,7 @@ class SQP(Optimiser):
         bend = float(np.linalg.norm(lengths * here.plain.gradient))
         return Memory(self.damping, 0, scale, _sizes(here, lengths, scale), bend * np.diag(lengths**-2))
 
-    def _resolution(self, first: Iterate, lengths: np.ndarray) -> Callable[[Iterate], bool]:
+    def _resolution(self, first: Iterate, lengths: np.ndarray, resumed: bool) -> Callable[[Iterate], bool]:
         """A test of whether errors exceed the remaining reduction; here none, as errors of f and c are not known."""
         return lambda last: False
 

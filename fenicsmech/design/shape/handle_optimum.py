@@ -103,8 +103,11 @@ class HandleOptimum:
         Raises:
             ShapeError: cells stay inverted however the handles are placed.
         """
+        p = np.array(p, dtype=float)
+        if not self._handles:
+            return HandlePlacement(p, np.zeros(0))
         start = start or HandlePlacement(self._map.initial, self._map.initial_theta)
-        return self._solve(np.array(p, dtype=float), start, self._options.halvings)
+        return self._solve(p, start, self._options.halvings)
 
     def total_gradient(self, placement: HandlePlacement, by_p: np.ndarray, by_theta: np.ndarray) -> np.ndarray:
         """dO/dp = ∂O/∂p + ∂O/∂θ dθ/dp, (…, parameters).
@@ -116,6 +119,8 @@ class HandleOptimum:
         Raises:
             ShapeError: S_θθ is not positive definite.
         """
+        if not self._handles:
+            return by_p
         followed, links = [], self._second_derivatives(placement)
         for shape, link, slope in zip(self._map.shapes, links, self._map.positions(by_theta), strict=True):
             try:

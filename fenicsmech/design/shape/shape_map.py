@@ -232,18 +232,18 @@ class ShapeMap:
             self._nodes.append(nodes)
             self._local_reach.append(_at_nodes(np.searchsorted(vertices, ends[nodes]), reach, shape))
         handles = [shape.handles for shape in shapes]
-        self.initial = np.concatenate([h.spline.initial for h in handles])
-        self.initial_theta = np.concatenate([h.initial for h in handles])
-        self._p_ends = np.cumsum([h.spline.size for h in handles])[:-1]
-        self._theta_ends = np.cumsum([len(h) for h in handles])[:-1]
+        self.initial = np.concatenate([np.zeros(0), *(h.spline.initial for h in handles)])
+        self.initial_theta = np.concatenate([np.zeros(0), *(h.initial for h in handles)])
+        self._p_ends = np.cumsum([h.spline.size for h in handles], dtype=int)[:-1]
+        self._theta_ends = np.cumsum([len(h) for h in handles], dtype=int)[:-1]
 
     def parameters(self, p: np.ndarray) -> list[np.ndarray]:
-        """``p`` (…, parameters) link by link."""
-        return np.split(p, self._p_ends, axis=-1)
+        """``p`` (…, parameters) link by link; parameters of others than shapes may follow."""
+        return np.split(p[..., : len(self.initial)], self._p_ends, axis=-1)[: len(self.shapes)]
 
     def positions(self, theta: np.ndarray) -> list[np.ndarray]:
         """``theta`` (…, handles) link by link."""
-        return np.split(theta, self._theta_ends, axis=-1)
+        return np.split(theta, self._theta_ends, axis=-1)[: len(self.shapes)]
 
     def field(self, p: np.ndarray, theta: np.ndarray) -> np.ndarray:
         """d, (nodes, dim)."""
@@ -259,7 +259,8 @@ class ShapeMap:
         g: (…, owned nodes, dim), or (…, nodes, dim) with this rank's parts at nodes that others own; summed over all
         ranks.
         """
-        by_p, by_theta = [], []
+        nothing = np.zeros((*g.shape[:-2], 0))
+        by_p, by_theta = [nothing], [nothing]
         for (shape, *point), moments in zip(self._links(p, theta), self.moments(g), strict=True):
             p_slope, theta_slope = shape.handles.gradients(*point)
             by_p.append(np.einsum("...jak,jakp->...p", moments, p_slope))
@@ -283,10 +284,10 @@ class ShapeMap:
 
     def sum_over_ranks(self, parts: Sequence[np.ndarray]) -> list[np.ndarray]:
         """The sums over all ranks of arrays of any shapes, in one message."""
-        total = np.concatenate([part.ravel() for part in parts])
+        total = np.concatenate([np.zeros(0), *(part.ravel() for part in parts)])
         self.mesh.mesh.comm.Allreduce(MPI.IN_PLACE, total)
-        ends = np.cumsum([part.size for part in parts])[:-1]
-        return [piece.reshape(part.shape) for piece, part in zip(np.split(total, ends), parts, strict=True)]
+        ends = np.cumsum([part.size for part in parts], dtype=int)[:-1]
+        return [piece.reshape(part.shape) for piece, part in zip(np.split(total, ends), parts, strict=False)]
 
     def _links(self, p: np.ndarray, theta: np.ndarray):
         return zip(self.shapes, self.parameters(p), self.positions(theta), strict=True)

@@ -218,7 +218,7 @@ def lay_out(
     gaps = np.diff([*[0.0] * start, *np.sort(stations), *[centreline.end] * end])
     if not len(gaps):
         raise DescriptionError(
-            part, "the link has 1 joint and no free end", "Lead its centreline on to a free end, or give it two joints"
+            part, "the link has 1 joint and no free end", "Continue its centreline to a free end, or give it two joints"
         )
     if segments < len(gaps):
         between = "joints and free ends" if start or end else "joints"

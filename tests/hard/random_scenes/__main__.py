@@ -26,22 +26,22 @@ def main() -> int:
     options = parser.parse_args()
     seeds = range(options.seed, options.seed + options.count)
     path = options.out / f"seed-{options.seed}.jsonl"
-    verdicts = {seed: verdict for seed, verdict in read(path).items() if seed in seeds}
-    worker, start, before = Worker(options.limit), time.monotonic(), len(verdicts)
+    results = {seed: result for seed, result in read(path).items() if seed in seeds}
+    worker, start, before = Worker(options.limit), time.monotonic(), len(results)
     for seed in seeds:
-        if seed in verdicts:
+        if seed in results:
             continue
-        verdicts[seed] = worker.judge(seed)
-        append(path, verdicts[seed])
-        done, wrong = len(verdicts), sum(verdict.wrong for verdict in verdicts.values())
+        results[seed] = worker.judge(seed)
+        append(path, results[seed])
+        done, wrong = len(results), sum(result.wrong for result in results.values())
         left = (time.monotonic() - start) / (done - before) * (options.count - done)
         print(
             f"\r{done}/{options.count} scenes, {wrong} wrong, {left:.0f} s left ", end="", file=sys.stderr, flush=True
         )
     worker.close()
     print(file=sys.stderr)
-    publish("random_scenes", table(verdicts[seed] for seed in seeds), write=options.write)
-    return int(any(verdict.wrong for verdict in verdicts.values()))
+    publish("random_scenes", table(results[seed] for seed in seeds), write=options.write)
+    return int(any(result.wrong for result in results.values()))
 
 
 if __name__ == "__main__":

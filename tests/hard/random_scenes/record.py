@@ -5,24 +5,24 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from .verdict import Verdict
+from .scene_result import SceneResult
 
 
-def read(path: Path) -> dict[int, Verdict]:
+def read(path: Path) -> dict[int, SceneResult]:
     """Verdicts by seed; a line cut short by a stop is left out."""
-    verdicts = {}
+    results = {}
     if path.exists():
         for line in path.read_text().splitlines():
             try:
-                verdict = Verdict(**json.loads(line))
+                result = SceneResult(**json.loads(line))
             except ValueError:
                 continue
-            verdicts[verdict.seed] = verdict
-    return verdicts
+            results[result.seed] = result
+    return results
 
 
-def append(path: Path, verdict: Verdict) -> None:
+def append(path: Path, result: SceneResult) -> None:
     """Adds one line."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("a") as file:
-        file.write(json.dumps(verdict.record()) + "\n")
+        file.write(json.dumps(result.record()) + "\n")

@@ -5,24 +5,24 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 
-from .verdict import Verdict
+from .scene_result import SceneResult
 
 
-def table(verdicts: Iterable[Verdict]) -> str:
+def table(results: Iterable[SceneResult]) -> str:
     """Outcomes and how often they came, in Markdown, and every scene that is wrong."""
-    verdicts = list(verdicts)
-    counts = Counter(verdict.outcome for verdict in verdicts)
+    results = list(results)
+    counts = Counter(result.outcome for result in results)
     lines = ["| outcome | scenes |", "| --- | ---: |"]
     lines += [f"| {outcome} | {count} |" for outcome, count in sorted(counts.items(), key=lambda item: _order(*item))]
-    frames = sum(verdict.frames for verdict in verdicts)
-    seconds = sum(verdict.seconds for verdict in verdicts)
-    worst = max((v.residual for v in verdicts if v.outcome == "equilibrium"), default=0.0)
+    frames = sum(result.frames for result in results)
+    seconds = sum(result.seconds for result in results)
+    worst = max((v.residual for v in results if v.outcome == "equilibrium"), default=0.0)
     lines += [
         "",
-        f"{len(verdicts)} scenes, {frames} equilibria checked, {seconds / max(len(verdicts), 1):.2f} s per scene; "
-        f"largest relative residual {worst:.0e}; wrong: {sum(verdict.wrong for verdict in verdicts)}",
+        f"{len(results)} scenes, {frames} equilibria checked, {seconds / max(len(results), 1):.2f} s per scene; "
+        f"largest relative residual {worst:.0e}; wrong: {sum(result.wrong for result in results)}",
     ]
-    lines += [f"seed {v.seed} ({v.scene}): {v.outcome}: {v.detail}" for v in verdicts if v.wrong]
+    lines += [f"seed {v.seed} ({v.scene}): {v.outcome}: {v.detail}" for v in results if v.wrong]
     return "\n".join(lines)
 
 

@@ -12,9 +12,9 @@ from .generator import random_scene
 from .motions import STEP
 from .potential import Potential
 from .residual_check import check
+from .scene_result import BALANCED, TOLERANCE, judge
 from .stability_check import unstable_directions
 from .unstrained_check import unstrained_motions
-from .verdict import BALANCED, TOLERANCE, judge
 
 SOUND = st.integers(0, 10**6).map(lambda n: 10 * n + 5)
 SPOILED = st.integers(0, 10**6).map(lambda n: 10 * n + 1)
@@ -30,15 +30,15 @@ def small(seed: int) -> bool:
 @hypothesis.given(SPOILED)
 @hypothesis.settings(max_examples=12)
 def test_scenes_that_make_no_sense_are_refused_by_name(seed):
-    verdict = judge(seed)
-    assert not verdict.wrong, verdict
+    result = judge(seed)
+    assert not result.wrong, result
 
 
 @hypothesis.given(SOUND.filter(small))
 @hypothesis.settings(max_examples=4, suppress_health_check=list(hypothesis.HealthCheck))
 def test_scenes_that_make_sense_end_well(seed):
-    verdict = judge(seed)
-    assert not verdict.wrong, verdict
+    result = judge(seed)
+    assert not result.wrong, result
 
 
 def test_every_seed_gives_the_same_scene_again():
@@ -127,14 +127,14 @@ def test_loads_and_springs_balance_however_stiff_the_links(sprung):
 @pytest.mark.parametrize("seed", [17, 59, 538])
 def test_joints_are_not_opened_for_a_displacement_out_of_reach(seed):
     # reactions grow out of all bounds there, and with them what a residual of a billionth of them may hide
-    verdict = judge(seed)
-    assert not verdict.wrong, verdict
-    assert verdict.outcome.startswith("true")
+    result = judge(seed)
+    assert not result.wrong, result
+    assert result.outcome.startswith("true")
 
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("seed", [1097, pytest.param(3003, marks=pytest.mark.slow)])
 def test_a_limit_point_at_a_hundredth_of_the_load_is_told_where_it_is(seed):
     # of a led force, and of a constant one
-    verdict = judge(seed)
-    assert verdict.outcome == "true: EquilibriumError, at a limit point", verdict
+    result = judge(seed)
+    assert result.outcome == "true: EquilibriumError, at a limit point", result

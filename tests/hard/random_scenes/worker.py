@@ -8,7 +8,7 @@ import multiprocessing
 from contextlib import redirect_stderr
 from multiprocessing.connection import Connection
 
-from .verdict import Verdict, judge
+from .scene_result import SceneResult, judge
 
 
 class Worker:
@@ -22,7 +22,7 @@ class Worker:
         self._limit = limit
         self._process, self._pipe = None, None
 
-    def judge(self, seed: int) -> Verdict:
+    def judge(self, seed: int) -> SceneResult:
         """The outcome of a scene; a hang or a crash is one too."""
         if self._process is None:
             self._start()
@@ -34,7 +34,7 @@ class Worker:
         except (EOFError, ConnectionError):
             end = "wrong: crashes"
         self.close()
-        return Verdict(seed, "", end, f"limit {self._limit:g} s", self._limit)
+        return SceneResult(seed, "", end, f"limit {self._limit:g} s", self._limit)
 
     def close(self) -> None:
         """Ends the process."""

@@ -29,7 +29,7 @@ INVALID_SHARE = 3  # in ten
 
 
 @dataclass(frozen=True)
-class Verdict:
+class SceneResult:
     """The end of one scene.
 
     Attributes:
@@ -60,11 +60,11 @@ class Verdict:
         return asdict(self)
 
 
-def judge(seed: int) -> Verdict:
+def judge(seed: int) -> SceneResult:
     """Runs the scene of a seed; three in ten make no sense."""
     start = time.perf_counter()
     scene, outcome, detail, frames, residual = (_judge_spoiled if seed % 10 < INVALID_SHARE else _judge_sound)(seed)
-    return Verdict(seed, scene, outcome, detail, time.perf_counter() - start, frames, residual)
+    return SceneResult(seed, scene, outcome, detail, time.perf_counter() - start, frames, residual)
 
 
 def _judge_spoiled(seed: int) -> tuple[str, str, str, int, float]:

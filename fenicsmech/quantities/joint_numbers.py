@@ -1,0 +1,107 @@
+"""Numbers of springs in joints: their stiffness and rest position.
+
+A spring is a potential V(z; k, φ₀) of poses z, which counts with a factor σ. With ẑ the poses' part of the adjoint,
+
+    xᵀ ∂F/∂p = ẑ · σ ∂²V/∂z∂p.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fenicsmech.effects import JointSpring
+from fenicsmech.errors import finite
+from fenicsmech.mechanism import Configuration, Scene
+from fenicsmech.model import MechanismModel
+from fenicsmech.quantities.number import ModelNumber, NumberKind, NumberTerms
+
+
+class _OfSprings(NumberKind):
+    """A number of springs in joints."""
+
+    number: str
+    parts: tuple[JointSpring, ...]
+
+    @staticmethod
+    def candidates(scene: Scene) -> Sequence[JointSpring]:
+        return [effect for effect in scene.effects if isinstance(effect, JointSpring)]
+
+    @staticmethod
+    def label(part):
+        return part.joint.name if isinstance(part, JointSpring) else repr(part)
+
+    def described(self, part):
+        return getattr(part, self.number)
+
+    def on(self, model):
+        return _SpringNumber(model, self.parts, self.number)
+
+
+@dataclass(frozen=True, init=False)
+class SpringStiffness(_OfSprings):
+    """The stiffness of springs in joints: ``SpringStiffness(spring)``.
+
+    Args:
+        parts: a ``JointSpring`` of the scene, or several that share it.
+
+    Raises:
+        DescriptionError: there are no springs, or one is given twice.
+    """
+
+    what = "stiffness of the spring"
+    number = "stiffness"
+
+    def unit(self, units):
+        sliding = self.parts[0].joint.kind.sliding
+        return f"{units.force}/{units.length}" if sliding else f"{units.force} {units.length}/rad"
+
+    def moves_unloaded(self, configuration: Configuration) -> bool:
+        return any(position for _, position in configuration.positions)
+
+
+@dataclass(frozen=True, init=False)
+class SpringRest(_OfSprings):
+    """The rest position of springs in joints: ``SpringRest(spring)``.
+
+    Args:
+        parts: a ``JointSpring`` of the scene, or several that share it.
+
+    Raises:
+        DescriptionError: there are no springs, or one is given twice.
+    """
+
+    what = "rest position of the spring"
+    number = "rest"
+
+    def unit(self, units):
+        return units.length if self.parts[0].joint.kind.sliding else "rad"
+
+    def check_value(self, value):
+        finite(self.name, value)
+
+
+class _SpringNumber(ModelNumber):
+    """A number of the potentials of some springs."""
+
+    def __init__(self, model: MechanismModel, springs: Sequence[JointSpring], name: str) -> None:
+        self._joints, self._name = model.linkage.joints, name
+        self._potentials = [own for effect, found in model.effect_potentials if effect in springs for own in found]
+        self.drawn = self.value = self._potentials[0].numbers[name]
+
+    def set(self, value):
+        self.value = value
+        for potential in self._potentials:
+            potential.numbers[self._name] = value
+
+    def slope(self, terms: NumberTerms) -> float:
+        if terms.adjoint is None:
+            return 0.0
+        state, total, size = terms.adjoint.at.state, 0.0, self._joints.space.pose_size
+        for potential in self._potentials:
+            factor = 1.0 if potential.holds else state.load_factor
+            rates = potential.gradient_by(self._name, state.poses).reshape(-1, size)
+            for body, rate in zip(potential.bodies, rates, strict=True):
+                if body in self._joints.columns:
+                    total += factor * float(terms.adjoint.poses[self._joints.columns[body]] @ rate)
+        return -total

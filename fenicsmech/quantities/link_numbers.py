@@ -1,0 +1,168 @@
+"""Numbers of flexible links: numbers of their law, and their depth.
+
+Both are fields with one value per cell in the energy E, whose derivative by the value on one link is a form,
+
+    xᵀ ∂F/∂p = ∂(r · û)/∂p,     r = ∂E/∂u,     û = ∂u/∂y · x.
+
+In space the depth b is part of the rest shape: links are stretched along z from the middle of their depth,
+
+    d_z = (b / b₀ − 1) (Z − Z_m).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fenicsmech.compat import cell_dofs
+from fenicsmech.errors import DescriptionError, finite
+from fenicsmech.mechanism import FlexibleLink, Scene, Units
+from fenicsmech.model import MechanismModel
+from fenicsmech.quantities.number import ModelNumber, NumberKind
+
+
+class _OfLinks(NumberKind):
+    """A number of flexible links."""
+
+    parts: tuple[FlexibleLink, ...]
+
+    @staticmethod
+    def candidates(scene: Scene) -> Sequence[FlexibleLink]:
+        return scene.mechanism.flexible_links
+
+    def chosen(self, model: MechanismModel) -> np.ndarray:
+        """Which flexible links have it, (links,)."""
+        return np.array([link in self.parts for link in model.mechanism.flexible_links])
+
+
+@dataclass(frozen=True, init=False)
+class Depth(_OfLinks):
+    """The depth of flexible links: ``Depth(finger)``; in space they are stretched across their plane.
+
+    Args:
+        parts: a flexible link, or several that share it.
+
+    Raises:
+        DescriptionError: there are no links, or one is given twice.
+    """
+
+    what = "depth"
+    changes_solids = True
+
+    def described(self, part):
+        return part.shape.depth
+
+    def unit(self, units):
+        return units.length
+
+    def on(self, model):
+        return _Depth(model, self.chosen(model))
+
+
+@dataclass(frozen=True, init=False)
+class LawParameter(_OfLinks):
+    """A number of the law of flexible links: ``LawParameter("E", finger)``.
+
+    Args:
+        parameter: its name, as in ``law.parameters``.
+        parts: a flexible link, or several that share it.
+
+    Raises:
+        DescriptionError: there are no links, or one is given twice.
+    """
+
+    parameter: str = ""
+    what = "parameter"
+
+    def __init__(self, parameter: str, *parts: FlexibleLink) -> None:
+        if not isinstance(parameter, str):
+            raise DescriptionError(
+                self.what, f"{parameter!r} is not the name of a number", "Name it first, as in (“E”, link)"
+            )
+        object.__setattr__(self, "parameter", parameter)
+        super().__init__(*parts)
+
+    @property
+    def name(self):
+        return f"{self.parameter} of {' and '.join(repr(link.name) for link in self.parts)}"
+
+    @property
+    def slots(self):
+        return tuple((*slot, self.parameter) for slot in super().slots)
+
+    @property
+    def words(self):
+        return (self.parameter, *super().words)
+
+    @classmethod
+    def read(cls, scene, words):
+        return cls(words[0], *(cls._part(scene, word) for word in words[1:]))
+
+    def described(self, part):
+        known = part.material.law.parameters
+        if self.parameter not in known:
+            raise DescriptionError(
+                self.name, f"the law of {part.material.name!r} has no such number", f"It has {', '.join(known)}"
+            )
+        return known[self.parameter]
+
+    def check_value(self, value):
+        value = finite(self.name, value)
+        for link in self.parts:
+            law = link.material.law
+            replace(law.with_parameters({**law.parameters, self.parameter: value}))  # runs its checks
+
+    def unit(self, units: Units) -> str:
+        return units.stress if self.parameter == "E" else ""
+
+    def on(self, model):
+        return _LawParameter(model, self.parameter, self.chosen(model))
+
+
+class _LawParameter(ModelNumber):
+    """A number of the laws of the ``chosen`` links."""
+
+    def __init__(self, model: MechanismModel, name: str, chosen: np.ndarray) -> None:
+        self._model, self._name, self._chosen = model, name, chosen
+        self.drawn = self.value = model.materials[int(np.argmax(chosen))].law.parameters[name]
+
+    def set(self, value):
+        self.value = value
+        self._model.set_parameter(self._chosen, self._name, value)
+
+    def slope(self, terms):
+        return float(terms.by_link(self._name)[self._chosen].sum())
+
+
+class _Depth(ModelNumber):
+    """The depth of the ``chosen`` links."""
+
+    def __init__(self, model: MechanismModel, chosen: np.ndarray) -> None:
+        self._model, self._chosen = model, chosen
+        self.drawn = self.value = model.depths[int(np.argmax(chosen))]
+        self.rate = (self._heights() / self.drawn).ravel()
+
+    def set(self, value):
+        self.value = value
+        self._model.set_depth(self._chosen, value)
+
+    def slope(self, terms):
+        return float(terms.by_link("depth")[self._chosen].sum())
+
+    def _heights(self) -> np.ndarray:
+        """Z − Z_m of the nodes of the chosen links in space, else zero, as the design field, (nodes, dim)."""
+        elastic, mesh = self._model.elastic, self._model.mesh
+        space, dim = elastic.d.function_space, elastic.model.dim
+        nodes = space.tabulate_dof_coordinates()[:, :dim]
+        if elastic.bulge is not None:
+            nodes = nodes + elastic.bulge.x.array.reshape(-1, dim)
+        owner, heights = np.full(len(nodes), -1), np.zeros((len(nodes), dim))
+        owner[cell_dofs(space)] = mesh.link[:, None]
+        for link in np.flatnonzero(self._chosen) if dim == 3 else ():
+            across = nodes[owner == link, 2]
+            ends = mesh.comm.allgather((across.min(initial=np.inf), across.max(initial=-np.inf)))
+            middle = 0.0 if elastic.model.half else 0.5 * (min(low for low, _ in ends) + max(high for _, high in ends))
+            heights[owner == link, 2] = across - middle
+        return heights

@@ -1,0 +1,206 @@
+"""Numbers p of parts, which designs change beside shapes.
+
+A ``NumberKind`` is described as plain data: ``Depth(finger)``, or ``Depth(left, right)`` for parts that share a value.
+``on`` a model it is a ``ModelNumber``, which sets the value there and gives the derivative of a component Q of a
+quantity from its adjoint x, the same one that derivatives by the shape are made of:
+
+    dQ/dp = ∂Q/∂p − xᵀ ∂F/∂p + dQ/dd · ∂d/∂p
+
+with the equations F and the design field d, which is linear in p if it depends on it. A new kind is one subclass of
+each.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fenicsmech.equilibrium import Adjoint, State
+from fenicsmech.errors import DescriptionError, positive
+from fenicsmech.mechanism import Configuration, Scene, Units
+from fenicsmech.model import MechanismModel
+from fenicsmech.quantities.quantity import Partial
+
+
+@dataclass(frozen=True, eq=False)
+class NumberTerms:
+    """The derivatives of one component that those by numbers are made of.
+
+    Attributes:
+        partial: everything but the number held.
+        adjoint: x; None if the component does not depend on the state.
+        by_link: ∂Q/∂p − xᵀ ∂F/∂p of a number of every flexible link by its name among ``ElasticBody.numbers``,
+            (links,); zeros of names that are not among them.
+    """
+
+    partial: Partial
+    adjoint: Adjoint | None
+    by_link: Callable[[str], np.ndarray]
+
+
+class ModelNumber(ABC):
+    """A number on one model.
+
+    Attributes:
+        drawn: its value as described.
+        value: its present value.
+        rate: ∂d/∂p of the design field, this rank's values with ghosts, flat; zero by default.
+    """
+
+    drawn: float
+    value: float
+    rate: np.ndarray | float = 0.0
+
+    @abstractmethod
+    def set(self, value: float) -> None:
+        """Gives the parts the value, all but the design field. Local."""
+
+    @abstractmethod
+    def slope(self, terms: NumberTerms) -> float:
+        """∂Q/∂p − xᵀ ∂F/∂p."""
+
+    def through_field(self, design: np.ndarray) -> float:
+        """dQ/dd · ∂d/∂p on this rank, from its owned values of dQ/dd, flat. Local."""
+        return float(design @ self.rate[: len(design)]) if isinstance(self.rate, np.ndarray) else 0.0
+
+    def carried(self, state: State, change: float) -> State:
+        """``state`` with what a change of the number prescribes directly; the same by default. Local."""
+        return state
+
+
+@dataclass(frozen=True, init=False)
+class NumberKind(ABC):
+    """A kind of number, of one part or of several that share its value; a frozen dataclass.
+
+    Args:
+        parts: of the scene; their numbers are drawn alike.
+
+    Attributes:
+        parts: likewise.
+        changes_solids: whether the solids of its parts change.
+
+    Raises:
+        DescriptionError: there are no parts, or one is given twice.
+    """
+
+    what: ClassVar[str]
+    changes_solids: ClassVar[bool] = False
+    parts: tuple[Any, ...]
+
+    def __init__(self, *parts: Any) -> None:
+        if not parts:
+            raise DescriptionError(self.what, "no part is named", "Name one part, or several that share the number")
+        if len(set(map(id, parts))) < len(parts):
+            raise DescriptionError(self.what, f"{self.label(parts[0])!r} is given twice", "Give each part once")
+        object.__setattr__(self, "parts", tuple(parts))
+
+    @staticmethod
+    @abstractmethod
+    def candidates(scene: Scene) -> Sequence[Any]:
+        """The parts of a scene that have such a number."""
+
+    @abstractmethod
+    def described(self, part: Any) -> float:
+        """The number of a part as described."""
+
+    @abstractmethod
+    def unit(self, units: Units) -> str:
+        """Its unit."""
+
+    @abstractmethod
+    def on(self, model: MechanismModel) -> ModelNumber:
+        """The number on one model."""
+
+    @staticmethod
+    def label(part: Any) -> str:
+        """The name of a part, by which results find it."""
+        return getattr(part, "name", repr(part))
+
+    @property
+    def name(self) -> str:
+        """The number in words."""
+        return f"{self.what} of {' and '.join(repr(self.label(part)) for part in self.parts)}"
+
+    @property
+    def slots(self) -> tuple[Hashable, ...]:
+        """What it changes; two kinds that change the same contradict each other."""
+        return tuple((type(self), part) for part in self.parts)
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """Plain data from which ``read`` makes the kind again: names of the parts by default."""
+        return tuple(self.label(part) for part in self.parts)
+
+    @classmethod
+    def kinds(cls) -> list[type[NumberKind]]:
+        """All kinds derived from this one, of the package and of others that are imported."""
+        own = cls.__subclasses__()
+        return own + [found for kind in own for found in kind.kinds()]
+
+    @classmethod
+    def read(cls, scene: Scene, words: Sequence[str]) -> NumberKind:
+        """The kind with the ``words``, of parts of a scene.
+
+        Raises:
+            DescriptionError: the scene has no such part.
+        """
+        return cls(*(cls._part(scene, word) for word in words))
+
+    def moves_unloaded(self, configuration: Configuration) -> bool:
+        """Whether the unloaded configuration, from which displacements count, moves with it; not by default."""
+        return False
+
+    def check_value(self, value: float) -> None:
+        """Refuses a value that makes no sense with a DescriptionError; by default one that is not positive."""
+        positive(self.name, value)
+
+    def check(self, scene: Scene) -> None:
+        """Checks that the number exists in ``scene``.
+
+        Raises:
+            DescriptionError: a part is not one of the scene, or they are drawn with different numbers.
+        """
+        candidates = self.candidates(scene)
+        for part in self.parts:
+            if part not in candidates:
+                has = ", ".join(repr(self.label(other)) for other in candidates) or "nothing of this kind"
+                raise DescriptionError(
+                    self.name, f"{part!r} of {scene.mechanism.name!r} has none", f"The scene has {has}"
+                )
+        values = sorted({self.described(part) for part in self.parts})
+        if len(values) > 1:
+            raise DescriptionError(
+                self.name,
+                f"they are drawn with {', '.join(f'{v:g}' for v in values)}",
+                "Draw parts alike that share it",
+            )
+
+    @classmethod
+    def _part(cls, scene: Scene, word: str) -> Any:
+        for part in cls.candidates(scene):
+            if cls.label(part) == word:
+                return part
+        raise DescriptionError(
+            f"{cls.what} of {word!r}",
+            f"{scene.mechanism.name!r} has no such part",
+            "Give a scene of the same mechanism",
+        )
+
+    def __str__(self) -> str:
+        return self.name
+
+
+def read_kind(scene: Scene, kind: str, words: Sequence[str]) -> NumberKind:
+    """The kind of number whose class is named ``kind``, with its ``words``.
+
+    Raises:
+        DescriptionError: there is no such class, or the scene has no such part.
+    """
+    for known in NumberKind.kinds():
+        if known.__name__ == kind:
+            return known.read(scene, words)
+    raise DescriptionError(f"number {kind!r}", "there is no such kind", "Import the module that defines it")

@@ -1,0 +1,218 @@
+"""Designs of numbers: moduli and depths found from what is wanted, in closed form and beside shapes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import fenicsmech as fm
+from fenicsmech.design import Correction, MeshQuality, NumberBounds, ShapeBounds, StayClose
+
+from ..effects.levers import ARM, lever
+from .mechanisms import Case, objective, truss
+from .refusal import refused
+
+PLASTIC = fm.Material("plastic", 2000.0, 0.35, density=1.2e-9)
+EXACT = {"optimiser": fm.LevenbergMarquardt(tolerance=1e-16), "correction": Correction(estimates=False)}
+
+
+def cantilever(depth: float = 5.0, modulus: float = 2000.0) -> tuple[fm.Scene, fm.FlexibleLink, fm.Force]:
+    rig = fm.Mechanism("cantilever")
+    wall, hand = rig.rigid("wall", fixed=True), rig.rigid("hand")
+    material = fm.Material("plastic", modulus, 0.35, density=1.2e-9)
+    strip = rig.flexible("strip", fm.strip([(0, 0), (40, 0)], thickness=3.0, depth=depth), material)
+    rig.clamp(wall, strip, end="start", length=5.0)
+    rig.clamp(hand, strip, end="end", length=5.0)
+    return fm.Scene(rig), strip, rig.force(on=hand, at=(40, 0), direction=(0, 1))
+
+
+def curve(sim: fm.Simulation, push: fm.Force, forces: list[float]) -> np.ndarray:
+    return np.array(sim.load_displacement(push, forces=forces).displacements)
+
+
+def test_a_modulus_is_recovered_from_a_curve_computed_with_it():
+    scene, strip, push = cantilever(modulus=1234.5)
+    known = curve(fm.Simulation(scene, space="plane-stress", size=3.0), push, [1.0, 4.0])
+    scene, strip, push = cantilever()
+    sim = fm.Simulation(scene, space="plane-stress", size=3.0)
+    targets = [fm.Target(push, force=f, displacement=u) for f, u in zip((1.0, 4.0), known, strict=True)]
+    problem = fm.DesignProblem(sim, [fm.Number(fm.LawParameter("E", strip), 500.0, 4000.0)], targets=targets)
+    result = problem.optimise(**EXACT)
+    (modulus,) = result.numbers
+    assert modulus.value == pytest.approx(1234.5, rel=1e-6)
+    assert (modulus.name, modulus.unit, modulus.drawn) == ("E of 'strip'", "MPa", 2000.0)
+    assert curve(sim.with_design(result), push, [1.0, 4.0]) == pytest.approx(known, rel=1e-6)
+    assert curve(sim, push, [1.0, 4.0]) != pytest.approx(known, rel=0.1)
+
+
+@pytest.mark.parametrize("space", ["plane-stress", pytest.param("3d", marks=pytest.mark.thorough)])
+def test_depth_is_found_in_proportion_to_the_force(space):
+    scene, strip, push = cantilever(depth=5.0)
+    sim = fm.Simulation(scene, space=space, size=3.0)
+    (moved,) = curve(sim, push, [2.0])
+    targets = [fm.Target(push, force=2.6, displacement=float(moved))]
+    problem = fm.DesignProblem(sim, [fm.Number(fm.Depth(strip), 3.0, 9.0)], targets=targets)
+    result = problem.optimise(surrogate=None, **EXACT)
+    (depth,) = result.numbers
+    # in space the clamped ends hold the contraction across the depth, a few per mille of the stiffness
+    assert depth.value == pytest.approx(5.0 * 1.3, rel=1e-9 if space == "plane-stress" else 5e-3)
+    assert curve(sim.with_design(result), push, [2.6]) == pytest.approx([moved], rel=1e-9)
+    drawn, _, force = cantilever(depth=depth.value)
+    assert curve(fm.Simulation(drawn, space=space, size=3.0), force, [2.6]) == pytest.approx([moved], rel=1e-3)
+
+
+def test_depths_change_the_solid_that_is_exported_and_verified(tmp_path):
+    scene, strip, push = cantilever(depth=5.0)
+    sim = fm.Simulation(scene, space="plane-stress", size=3.0)
+    (moved,) = curve(sim, push, [2.0])
+    targets = [fm.Target(push, force=2.6, displacement=float(moved))]
+    problem = fm.DesignProblem(sim, [fm.Number(fm.Depth(strip), 3.0, 9.0)], targets=targets)
+    result = problem.verify(problem.optimise(**EXACT), tmp_path)
+    (found,) = result.targets
+    assert found.part.value == pytest.approx(found.reached, rel=5e-3)
+    again = fm.Mechanism("again")
+    wall, hand = again.rigid("wall", fixed=True), again.rigid("hand")
+    part = again.flexible("part", fm.step_file(tmp_path / "strip.step", depth=1.0), PLASTIC)
+    for link, at in ((wall, (2.5, 0)), (hand, (37.5, 0))):
+        again.weld(link, part, at=at, region=fm.Rectangle(5.0, 3.0))
+    solid = fm.Simulation(fm.Scene(again), space="3d", size=3.0)
+    heights = solid.model.mesh.vertices[:, 2]
+    assert np.ptp(heights) == pytest.approx(6.5, rel=1e-6)
+
+
+def test_results_tell_their_numbers_and_keep_them_in_files(tmp_path):
+    scene, strip, push = cantilever()
+    sim = fm.Simulation(scene, space="plane-stress", size=3.0)
+    numbers = [fm.Number(fm.Depth(strip), 3.0, 9.0), fm.Number(fm.LawParameter("E", strip), 500.0, 4000.0)]
+    problem = fm.DesignProblem(sim, numbers, targets=[fm.Target(push, force=2.0, displacement=1.0)])
+    result = problem.optimise(checkpoint=tmp_path / "checkpoint.json")
+    assert "depth of 'strip': " in str(result) and "drawn with 5 mm" in str(result)
+    assert result.parameters == 2 and result.links == () and result.thickness is None
+    result.save(tmp_path / "design.json")
+    loaded = fm.DesignResult.load(tmp_path / "design.json")
+    assert loaded == result
+    once, again = (curve(sim.with_design(own), push, [2.0]) for own in (result, loaded))
+    assert again == pytest.approx(once, rel=1e-12)
+    assert problem.optimise(checkpoint=tmp_path / "checkpoint.json", resume=True).numbers == result.numbers
+    wider = fm.DesignProblem(sim, [fm.Number(fm.Depth(strip), 3.0, 9.5), numbers[1]], targets=problem.targets)
+    with pytest.raises(fm.DescriptionError, match="another problem, with other numbers"):
+        wider.optimise(checkpoint=tmp_path / "checkpoint.json", resume=True)
+    other, _, _ = cantilever()
+    other.mechanism.name = "other"
+    assert loaded.values(other) == result.values(other)
+
+
+def test_mass_and_volume_see_the_depth():
+    scene, strip, push = cantilever(depth=5.0)
+    sim = fm.Simulation(scene, space="plane-stress", size=3.0)
+    (moved,) = curve(sim, push, [1.0])
+    targets = [
+        fm.Target(fm.LinkMass(strip), least=True),
+        fm.Target(fm.Displacement(push), fm.Sample({push: 1.0}), at_most=1.25 * float(moved)),
+    ]
+    result = fm.DesignProblem(sim, [fm.Number(fm.Depth(strip), 2.0, 9.0)], targets=targets).optimise(
+        correction=Correction(estimates=False)
+    )
+    assert result.numbers[0].value == pytest.approx(4.0, rel=0.02)
+    mass = result.targets[0]
+    assert mass.reached / mass.started == pytest.approx(result.numbers[0].value / 5.0, rel=1e-9)
+
+
+def both(case: Case) -> Case:
+    """A case with the depth and the modulus of its first link beside its shapes."""
+    link = case.designs[0].link
+    numbers = [fm.Number(fm.Depth(link), 8.0, 40.0), fm.Number(fm.LawParameter("E", link), 1.0, 4.0)]
+    return replace(case, designs=[*case.designs, *numbers])
+
+
+@pytest.mark.parametrize(
+    ("space", "size", "order"),
+    [
+        ("plane-stress", 3.0, 2),
+        pytest.param("3d-symmetric", 4.0, 2, marks=pytest.mark.thorough),
+        pytest.param("3d", 4.0, 2, marks=pytest.mark.thorough),
+    ],
+)
+def test_gradients_of_the_objective_by_shapes_and_numbers_agree_with_central_differences(space, size, order):
+    regulariser = MeshQuality(limit=2.5, width=2.5) + ShapeBounds() + NumberBounds() + 1e-3 * StayClose()
+    whole, bench = objective(both(truss((0.1, 2.0), (0.4, 3.2))), regulariser, space=space, size=size, order=order)
+    p, direction = bench.design(0.05, seed=5), bench.direction(6)
+    assert len(p) == 20
+    here = whole.evaluate(p)
+
+    def slope(of) -> np.ndarray:
+        """Central differences, extrapolated: numbers bend the objective more than shapes do."""
+        found = []
+        for step in (1e-3, 2e-3):
+            ahead, back = (of(whole.evaluate(p + h * direction)) for h in (step, -step))
+            found.append((ahead - back) / (2 * step))
+        return (4.0 * found[0] - found[1]) / 3.0
+
+    assert here.gradient @ direction == pytest.approx(slope(lambda own: own.value), rel=1e-5)
+    residuals = slope(lambda own: own.residuals)
+    assert here.jacobian @ direction == pytest.approx(residuals, rel=1e-5, abs=1e-5 * np.abs(residuals).max())
+
+
+@pytest.mark.parallel
+def test_any_number_of_processes_finds_the_same_derivatives_by_numbers():
+    seen = []
+    for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
+        whole, bench = objective(both(truss((0.1, 2.0), (0.4, 3.2))), StayClose(), comm=comm)
+        whole.evaluate(bench.rest.initial)
+        here = whole.evaluate(bench.design(0.05, seed=5))
+        seen.append((here.value, here.gradient))
+    for one, together in zip(*seen, strict=True):
+        assert together == pytest.approx(one, rel=1e-7, abs=1e-7 * np.abs(one).max())
+
+
+def test_numbers_that_make_no_sense_are_refused():
+    scene, strip, push = cantilever()
+    sim = fm.Simulation(scene, space="plane-stress", size=3.0)
+    targets, depth = [fm.Target(push, force=2.0, displacement=1.0)], fm.Depth(strip)
+    _, other, _ = cantilever(depth=4.0)
+
+    def problem(*numbers: fm.Number) -> fm.DesignProblem:
+        return fm.DesignProblem(sim, numbers, targets=targets)
+
+    refused(lambda: fm.Number(strip, 2.0, 3.0), part="number", problem="not a kind", remedy="Depth(link)")
+    refused(lambda: fm.Number(depth, 6.0, 2.0), part="depth of 'strip'", problem="6 to 2", remedy="smaller one first")
+    refused(lambda: fm.Number(depth, -1.0, 2.0), part="depth of 'strip'", problem="-1", remedy="greater than zero")
+    refused(
+        lambda: fm.Number(fm.LawParameter("nu", strip), 0.2, 0.6), part="NeoHookean", problem="0.6", remedy="0.5, both"
+    )
+    refused(lambda: fm.Depth(), part="depth", problem="no part", remedy="Name one")
+    refused(lambda: problem(fm.Number(fm.Depth(other), 2.0, 6.0)), part="depth", problem="has none", remedy="'strip'")
+    refused(
+        lambda: problem(fm.Number(fm.LawParameter("mu", strip), 2.0, 6.0)), part="mu", problem="no such", remedy="E, nu"
+    )
+    refused(
+        lambda: problem(fm.Number(depth, 2.0, 6.0), fm.Number(depth, 2.0, 7.0)),
+        part="depth of 'strip'",
+        problem="twice",
+        remedy="once",
+    )
+    refused(
+        lambda: problem(fm.Number(depth, 6.0, 9.0)).initial,
+        part="depth of 'strip'",
+        problem="5 is drawn",
+        remedy="Widen",
+    )
+
+
+def test_springs_are_as_stiff_as_the_moment_of_the_force_asks_for():
+    rest, angle, force = -0.2, 0.5, 1.5
+    case = lever(lambda hinge: [fm.JointSpring(hinge, 60.0, rest=rest)])
+    (spring,) = case.simulation.scene.effects
+    targets = [fm.Target(case.force, force=force, displacement=ARM * np.sin(angle))]
+    for kind, bounds, wanted in (
+        (fm.SpringStiffness(spring), (20.0, 200.0), force * ARM * np.cos(angle) / (angle - rest)),
+        (fm.SpringRest(spring), (-1.5, 0.5), angle - force * ARM * np.cos(angle) / 60.0),
+    ):
+        problem = fm.DesignProblem(case.simulation, [fm.Number(kind, *bounds)], targets=targets)
+        result = problem.optimise(**EXACT)
+        assert result.numbers[0].value == pytest.approx(wanted, rel=1e-6)
+        found = curve(case.simulation.with_design(result), case.force, [force])
+        assert found == pytest.approx([ARM * np.sin(angle)], rel=1e-6)

@@ -1,0 +1,61 @@
+"""Derivatives of every quantity pass Taylor tests in every number that designs change, away from the drawn shape."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import fenicsmech as fm
+from fenicsmech.quantities import Sensitivity
+
+from .test_sensitivity import COMMS, Bench, assert_slopes
+
+pytestmark = pytest.mark.parallel
+
+
+def links(bench: Bench) -> list[fm.FlexibleLink]:
+    return bench.simulation.scene.mechanism.flexible_links
+
+
+# kinds of numbers, and steps of their Taylor tests
+NUMBERS = {
+    "modulus": (lambda bench: fm.LawParameter("E", links(bench)[1]), (16.0, 8.0, 4.0)),
+    "Poisson's ratio": (lambda bench: fm.LawParameter("nu", links(bench)[1]), (0.016, 0.008, 0.004, 0.002)),
+    "modulus of both": (lambda bench: fm.LawParameter("E", *links(bench)), (16.0, 8.0, 4.0)),
+    "depth": (lambda bench: fm.Depth(links(bench)[1]), (0.1, 0.05, 0.025, 0.0125)),
+    "depth of both": (lambda bench: fm.Depth(*links(bench)), (0.1, 0.05, 0.025, 0.0125)),
+    "stiffness": (lambda bench: fm.SpringStiffness(*bench.simulation.scene.effects), (8.0, 4.0, 2.0, 1.0)),
+    "rest": (lambda bench: fm.SpringRest(*bench.simulation.scene.effects), (0.1, 0.05, 0.025)),
+}
+CASES = ("plane-stress", "plane-stress moved", "plane-strain pressure", "3d-symmetric", "3d moved", "3d pressure")
+
+
+@pytest.fixture(
+    scope="module",
+    params=[
+        pytest.param((space, comm), marks=() if space == "plane-stress" else pytest.mark.thorough)
+        for space in CASES
+        for comm in COMMS
+    ],
+    ids="-".join,
+)
+def bench(request) -> Bench:
+    (space, *more), comm = request.param[0].split(), request.param[1]
+    formulation = fm.MixedFormulation(above=0.3) if "pressure" in more else None
+    return Bench(space, COMMS[comm], formulation, moved="moved" in more, springs=True)
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_derivatives_by_a_number(bench, name):
+    describe, steps = NUMBERS[name]
+    kind, base = describe(bench), bench.field(1)
+    kind.check(bench.simulation.scene)
+    bench.adjoint, number = Sensitivity(bench.model, [kind]), bench.model.number(kind)
+    gradients = bench.gradients(fm.Design(base))
+    assert MPI.COMM_WORLD.size > 1 or np.any([gradient.numbers for gradient in gradients])
+
+    def changed(step: float) -> np.ndarray:
+        return bench.values(fm.Design(base, {kind: number.drawn + step}))
+
+    assert_slopes(bench, changed, [gradient.numbers[0] for gradient in gradients], steps)
