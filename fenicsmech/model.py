@@ -355,14 +355,11 @@ class MechanismModel:
     def carry(self, state: State, design: Design | np.ndarray) -> State:
         """Changes the design and guesses the equilibrium there from the one at the present design."""
         self.load(state)
-        given, before = self._given(design), self.design
+        given = self._given(design)
         carried = self.elastic.carried(self._field(given) - self.elastic.d.x.array)
         self.reshape(given)
         displacements, *pressures = self.elastic.split(state.u)
-        guess = replace(state, u=np.concatenate([carried[: len(displacements)], *pressures]))
-        for kind, own in self._numbers.items():
-            guess = own.carried(guess, own.value - before.numbers.get(kind, own.drawn))
-        return guess
+        return replace(state, u=np.concatenate([carried[: len(displacements)], *pressures]))
 
     def assembled_state(self, poses: np.ndarray, motors: np.ndarray) -> State:
         """The state of a rigid assembly: every flexible link carried along by its first interface."""

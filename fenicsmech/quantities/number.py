@@ -19,7 +19,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fenicsmech.equilibrium import Adjoint, State
+from fenicsmech.equilibrium import Adjoint
 from fenicsmech.errors import DescriptionError, positive
 from fenicsmech.mechanism import Configuration, Scene, Units
 from fenicsmech.model import MechanismModel
@@ -66,10 +66,6 @@ class ModelNumber(ABC):
     def through_field(self, design: np.ndarray) -> float:
         """dQ/dd · ∂d/∂p on this rank, from its owned values of dQ/dd, flat. Local."""
         return float(design @ self.rate[: len(design)]) if isinstance(self.rate, np.ndarray) else 0.0
-
-    def carried(self, state: State, change: float) -> State:
-        """``state`` with what a change of the number prescribes directly; the same by default. Local."""
-        return state
 
 
 @dataclass(frozen=True, init=False)

@@ -39,14 +39,12 @@ class Partial:
         border: by poses, multipliers and the controlled force, the same on all ranks, (border,).
         design: by this rank's owned values of the design field, flat.
         per_link: by numbers of links, by their names in ``ElasticBody.numbers``, (links,).
-        motors: by the motors' positions, (connections,).
     """
 
     links: np.ndarray | float = 0.0
     border: np.ndarray | float = 0.0
     design: np.ndarray | float = 0.0
     per_link: Mapping[str, np.ndarray] = field(default_factory=lambda: MappingProxyType({}))
-    motors: np.ndarray | float = 0.0
 
     @property
     def of_state(self) -> bool:
@@ -56,7 +54,7 @@ class Partial:
     def __mul__(self, factor: float) -> Partial:
         per_link = {name: np.multiply(factor, values) for name, values in self.per_link.items()}
         border, design = factor * self.border, factor * self.design
-        return Partial(factor * self.links, border, design, per_link, factor * self.motors)
+        return Partial(factor * self.links, border, design, per_link)
 
     __rmul__ = __mul__
 
@@ -64,7 +62,7 @@ class Partial:
         names = dict.fromkeys((*self.per_link, *other.per_link))
         per_link = {name: np.add(self.per_link.get(name, 0.0), other.per_link.get(name, 0.0)) for name in names}
         border, design = self.border + other.border, self.design + other.design
-        return Partial(self.links + other.links, border, design, per_link, self.motors + other.motors)
+        return Partial(self.links + other.links, border, design, per_link)
 
 
 class Observable(ABC):
