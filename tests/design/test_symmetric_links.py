@@ -29,7 +29,7 @@ def test_links_are_shaped_alike_and_exported_whole(tmp_path):
         simulation = case.simulate(space, size=5.0, order=1)
         problem = fm.DesignProblem(simulation, case.designs, targets=case.targets)
         parts = bench(case, simulation)
-        values = problem.rest_shape(parts.design()).reshape(-1, 3)
+        values = problem.rest_shape(parts.design()).field.reshape(-1, 3)
         places = simulation.model.elastic.d.function_space.tabulate_dof_coordinates()
         at_mid_plane = np.abs(places[:, 2]) < 1e-9
         order = np.lexsort(places[at_mid_plane].round(6).T)

@@ -110,18 +110,18 @@ def test_curves_are_as_accurate_as_asked_for_with_their_corrections(tmp_path):
 
 def test_curve_that_fails_on_a_finer_level_leaves_no_answers_of_a_coarser_one(monkeypatch):
     scene, push = describe("claw")
-    simulation, trace, traced = fm.Simulation(scene, accuracy=1e-4), fm.Simulation.trace, []
+    simulation, compute, computed = fm.Simulation(scene, accuracy=1e-4), fm.Simulation.compute, []
 
     def once(*arguments, **options):
-        if traced:
+        if computed:
             raise fm.EquilibriumError("the second level", "it fails", "Do not ask for it")
-        traced.append(trace(*arguments, **options))
-        return traced[0]
+        computed.append(compute(*arguments, **options))
+        return computed[0]
 
-    monkeypatch.setattr(fm.Simulation, "trace", once)
+    monkeypatch.setattr(fm.Simulation, "compute", once)
     with pytest.raises(fm.EquilibriumError, match="second level"):
         simulation.load_displacement(push, forces=[1.0])
-    assert traced and simulation.choice is None
+    assert computed and simulation.choice is None
 
 
 def test_forces_are_as_accurate_as_asked_for_where_displacements_are_prescribed():
