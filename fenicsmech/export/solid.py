@@ -19,8 +19,10 @@ from fenicsmech.errors import MeshingError, point, point_text, positive
 from fenicsmech.export.outlines import smooth_outline
 from fenicsmech.files import atomic_write
 from fenicsmech.meshing import (
+    FREE,
     CircleArc,
     Curve,
+    CurvedEdges,
     LinkMesh,
     boundary_polygons,
     cell_measures,
@@ -33,6 +35,10 @@ from fenicsmech.meshing import (
     straight_line,
 )
 from fenicsmech.polygons import distance_to, first_crossing, is_inside
+
+_SAME_SECTION = 0.01, 0.05
+"""Largest difference of the area of both faces of a solid, and of its volume, over those of a prism: on coarse meshes
+walls and faces are other polygons of one curve."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +65,7 @@ def write_step(
 
     Args:
         path: the file; missing parent folders are created.
-        mesh: the whole link, in mm (the unit of the file): triangles, or tetrahedra in layers along z.
+        mesh: the whole link, in mm (the unit of the file): triangles, or tetrahedra of one section all along z.
         depth: extent along z, symmetric about z = 0.
         pins: holes for pins.
         name: the link's name, for messages; None: that of the file.
@@ -160,15 +166,28 @@ def _plan(link: str, mesh: LinkMesh, depth: float) -> LinkMesh:
         raise MeshingError(link, problem, "Choose a design that deforms the mesh less")
     if mesh.dim == 2:
         return mesh
-    plan = plan_of(mesh).mesh
+    plan, meshed = plan_of(mesh).mesh, float(np.ptp(mesh.points[:, 2]))
     if plan.dim == 3:
-        problem = "its tetrahedra do not stand in layers along z, so it has no section to extrude"
-        raise MeshingError(link, problem, "Mesh it with the axes of all its joints along z, or in the plane")
-    meshed = float(np.ptp(mesh.points[:, 2]))
+        plan, below = _face(mesh, 1.0), _face(mesh, -1.0)
+        volume, area, other = (cell_measures(own.points, own.cells).sum() for own in (mesh, plan, below))
+        faces, whole = _SAME_SECTION
+        if abs(area - other) > faces * area or abs(volume - area * meshed) > whole * volume:
+            problem = "its section along z is not the same all through its depth, so it has none to extrude"
+            raise MeshingError(link, problem, "Write it from a mesh in the plane")
     if not math.isclose(meshed, depth, rel_tol=1e-6):
         problem = f"the mesh is {meshed:g} deep, not {depth:g}"
         raise MeshingError(link, problem, "Give the depth that the link was meshed with")
     return plan
+
+
+def _face(mesh: LinkMesh, side: float) -> LinkMesh:
+    """The triangles of a solid's face of greatest z, or with ``side`` −1 of least z."""
+    z = side * mesh.points[:, 2]
+    on_it = z >= z.max() - 1e-6 * np.ptp(z)
+    faces = np.concatenate([np.delete(mesh.cells, corner, axis=1) for corner in range(4)])
+    triangles = np.unique(np.sort(faces[on_it[faces].all(axis=1)], axis=1), axis=0)
+    curved = CurvedEdges(mesh.curved.ends, mesh.curved.bulges[:, :2])
+    return LinkMesh.from_cells(mesh.points[:, :2], triangles, np.full(len(triangles), FREE), curved)
 
 
 def _check_simple(link: str, polygons: Sequence[np.ndarray]) -> None:

@@ -70,6 +70,15 @@ def test_the_solid_has_the_volume_and_the_extent_of_a_fine_mesh(name, dim, tmp_p
     assert high - low == pytest.approx(extent, rel=3e-3)
 
 
+def test_a_solid_of_a_mesh_without_layers_is_the_one_that_was_meshed(tmp_path):
+    depth = 10.0  # that of the part
+    mesh = mesh_link("part", step_file(PART, depth=depth), dim=3, size=1.5)
+    write_step(tmp_path / "link.step", mesh, depth=depth)
+    (volume, *extent), (expected, *drawn) = measures(tmp_path / "link.step"), measures(PART)
+    assert volume == pytest.approx(expected, rel=3e-3)
+    assert extent[1] - extent[0] == pytest.approx(drawn[1] - drawn[0], rel=3e-3)
+
+
 @pytest.mark.thorough
 def test_the_solid_of_a_coarse_mesh_is_that_of_a_fine_one(tmp_path):
     volumes = []
@@ -191,6 +200,13 @@ def crossing():
     return replace(mesh, points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
 
 
+def narrowing():
+    """A solid that narrows upwards."""
+    mesh = mesh_link("part", step_file(PART, depth=DEPTH), dim=3, size=3.0)
+    x, y, z = mesh.points.T
+    return replace(mesh, points=np.column_stack([x * (1.0 - 0.02 * z), y, z]))
+
+
 @pytest.mark.parametrize("write", [write_step, write_stl])
 @pytest.mark.parametrize(
     "mesh, pins, message",
@@ -204,9 +220,9 @@ def crossing():
         ),
         (lambda: link(2.0), [PinHole((20.0, 0.0), 1.0)], r"pin hole at \(20, 0\) .*not on the link"),
         (lambda: link(2.0), [PinHole((0.0, 0.0), 2.0), PinHole((1.0, 1.0), 1.0)], r"it meets the one at \(0, 0\)"),
-        (lambda: mesh_link("p", step_file(PART, depth=DEPTH), dim=3, size=3.0), (), "do not stand in layers along z"),
+        (narrowing, (), "not the same all through its depth"),
     ],
-    ids=["turned over", "crossing", "too large", "off the link", "meeting", "no layers"],
+    ids=["turned over", "crossing", "too large", "off the link", "meeting", "narrowing"],
 )
 def test_links_that_cannot_be_exported_are_refused(write, mesh, pins, message, tmp_path):
     with pytest.raises(MeshingError, match=message):
