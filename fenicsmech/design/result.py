@@ -21,7 +21,7 @@ from fenicsmech.errors import DescriptionError, counted, point_text
 from fenicsmech.export import PinHole, write_step, write_stl
 from fenicsmech.files import atomic_write
 from fenicsmech.mechanism import DRAWN, Disc, FlexibleLink, Scene, Units
-from fenicsmech.meshing import LinkMesh, boundary_polygons, plan_of
+from fenicsmech.meshing import LinkMesh, boundary_polygons, section_of
 from fenicsmech.model import Design
 from fenicsmech.multibody import Linkage, assemble
 from fenicsmech.plot import DesignShape, LinkOutline, draw_designs
@@ -376,18 +376,17 @@ def link_designs(rest: ParametricShape, placement: HandlePlacement) -> tuple[Lin
 def rest_meshes(simulation: Simulation, links: Sequence[FlexibleLink]) -> list[LinkMesh]:
     """Meshes of some links in their present shape, on the first process alone.
 
-    Links of which one half is meshed are given by their plan.
+    Links of which one half is meshed are given by their section.
     """
     meshes = gather_links(simulation.model.mesh, rest_geometry(simulation.model))
     everyone, halves = simulation.scene.mechanism.flexible_links, simulation.fidelity.model.half
     chosen = [meshes[everyone.index(link)] for link in links]
-    return on_one(simulation.comm, lambda: [plan_of(mesh).mesh for mesh in chosen] if halves else chosen) or []
+    return on_one(simulation.comm, lambda: [section_of(mesh) for mesh in chosen] if halves else chosen) or []
 
 
 def _outline(link: DesignedLink, mesh: LinkMesh, p: np.ndarray) -> LinkOutline:
     """The outline of a link, with centreline, thickness and control points of its parameters ``p``."""
-    plan = plan_of(mesh).mesh
-    loops = boundary_polygons(f"link {link.name!r}", plan)
+    loops = boundary_polygons(f"link {link.name!r}", section_of(mesh))
     return LinkOutline(
         loops,
         centreline=link.spline.evaluate(p, link.samples.t)[:, :2],

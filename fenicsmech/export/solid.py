@@ -19,10 +19,8 @@ from fenicsmech.errors import MeshingError, point, point_text, positive
 from fenicsmech.export.outlines import smooth_outline
 from fenicsmech.files import atomic_write
 from fenicsmech.meshing import (
-    FREE,
     CircleArc,
     Curve,
-    CurvedEdges,
     LinkMesh,
     boundary_polygons,
     cell_measures,
@@ -30,8 +28,8 @@ from fenicsmech.meshing import (
     gmsh,
     gmsh_session,
     muted_output,
-    plan_of,
     sampled,
+    section_of,
     straight_line,
 )
 from fenicsmech.polygons import distance_to, first_crossing, is_inside
@@ -166,28 +164,16 @@ def _plan(link: str, mesh: LinkMesh, depth: float) -> LinkMesh:
         raise MeshingError(link, problem, "Choose a design that deforms the mesh less")
     if mesh.dim == 2:
         return mesh
-    plan, meshed = plan_of(mesh).mesh, float(np.ptp(mesh.points[:, 2]))
-    if plan.dim == 3:
-        plan, below = _face(mesh, 1.0), _face(mesh, -1.0)
-        volume, area, other = (cell_measures(own.points, own.cells).sum() for own in (mesh, plan, below))
-        faces, whole = _SAME_SECTION
-        if abs(area - other) > faces * area or abs(volume - area * meshed) > whole * volume:
-            problem = "its section along z is not the same all through its depth, so it has none to extrude"
-            raise MeshingError(link, problem, "Write it from a mesh in the plane")
+    plan, below, meshed = section_of(mesh), section_of(mesh, -1.0), float(np.ptp(mesh.points[:, 2]))
+    volume, area, other = (cell_measures(own.points, own.cells).sum() for own in (mesh, plan, below))
+    faces, whole = _SAME_SECTION
+    if abs(area - other) > faces * area or abs(volume - area * meshed) > whole * volume:
+        problem = "its section along z is not the same all through its depth, so it has none to extrude"
+        raise MeshingError(link, problem, "Write it from a mesh in the plane")
     if not math.isclose(meshed, depth, rel_tol=1e-6):
         problem = f"the mesh is {meshed:g} deep, not {depth:g}"
         raise MeshingError(link, problem, "Give the depth that the link was meshed with")
     return plan
-
-
-def _face(mesh: LinkMesh, side: float) -> LinkMesh:
-    """The triangles of a solid's face of greatest z, or with ``side`` −1 of least z."""
-    z = side * mesh.points[:, 2]
-    on_it = z >= z.max() - 1e-6 * np.ptp(z)
-    faces = np.concatenate([np.delete(mesh.cells, corner, axis=1) for corner in range(4)])
-    triangles = np.unique(np.sort(faces[on_it[faces].all(axis=1)], axis=1), axis=0)
-    curved = CurvedEdges(mesh.curved.ends, mesh.curved.bulges[:, :2])
-    return LinkMesh.from_cells(mesh.points[:, :2], triangles, np.full(len(triangles), FREE), curved)
 
 
 def _check_simple(link: str, polygons: Sequence[np.ndarray]) -> None:

@@ -13,6 +13,7 @@ Geometry that other layers use too
     ``boundary_loops``  outline and holes of a plane mesh
     ``link_outline``    the curves around a link, as they were drawn
     ``plan_of``         the plane mesh that an extruded one repeats
+    ``section_of``      that, or a solid's face
 
 Each kind of link has its file: ``strip``, ``outline`` and ``part_files``. It registers the functions with which
 ``link_mesher`` checks and meshes it. Links that are the same all through their depth are drawn in the plane, cut by
@@ -40,6 +41,7 @@ from fenicsmech.meshing.link_mesh import (
     on_mid_plane,
     plan_of,
     radius_ratios,
+    section_of,
 )
 from fenicsmech.meshing.link_mesher import LEAST_SEGMENTS, InterfaceSite, check_link, mesh_link, typical_thickness
 from fenicsmech.meshing.outline import (

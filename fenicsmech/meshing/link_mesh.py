@@ -373,6 +373,24 @@ def plan_of(link: LinkMesh) -> Plan:
     return Plan(link, np.arange(len(link.points)))
 
 
+def section_of(link: LinkMesh, side: float = 1.0) -> LinkMesh:
+    """The triangles of a link's plan; of a solid that is not extruded those of its face of greatest z.
+
+    Args:
+        link: the link.
+        side: −1 for the face of least z.
+    """
+    plan = plan_of(link).mesh
+    if plan.dim == 2:
+        return plan
+    z = side * link.points[:, 2]
+    on_face = z >= z.max() - 1e-6 * np.ptp(z)
+    facets = np.concatenate([np.delete(link.cells, corner, axis=1) for corner in range(4)])
+    triangles = np.unique(np.sort(facets[on_face[facets].all(axis=1)], axis=1), axis=0)
+    curved = CurvedEdges(link.curved.ends, link.curved.bulges[:, :2])
+    return LinkMesh.from_cells(link.points[:, :2], triangles, np.full(len(triangles), FREE), curved)
+
+
 @dataclass(frozen=True)
 class MechanismMesh:
     """The reference mesh of all flexible links.
