@@ -134,10 +134,10 @@ hard-cases: install-test ## every case of tests/hard/, slow ones too, as a table
 BENCHMARKS := verification solvers work_precision accuracy_control large stopping performance effects optimisers constrained closeness handles
 BENCH = OPENBLAS_NUM_THREADS=1 $(PYTHON) -m benchmarks
 
-bench: install ## seconds per load step of every demo's initial design: 3D, on ranks, plane stress
+bench: install ## seconds per load step of every demo's initial design: 3D, on ranks with whole designs, plane stress
 	$(call heading,benchmark)
 	$(BENCH).frames --write
-	$(MPIRUN) $(PYTHON) -m benchmarks.frames --write
+	$(MPIRUN) $(PYTHON) -m benchmarks.frames --designs --write
 	$(BENCH).frames --space plane-stress --write
 
 tables: bench $(BENCHMARKS:%=table-%) ## every table of the documentation, in docs/tables/ (hours)
