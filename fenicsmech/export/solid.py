@@ -25,11 +25,12 @@ from fenicsmech.meshing import (
     boundary_polygons,
     cell_measures,
     draw_loop,
+    face_of,
     gmsh,
     gmsh_session,
     muted_output,
+    plan_of,
     sampled,
-    section_of,
     straight_line,
 )
 from fenicsmech.polygons import distance_to, first_crossing, is_inside
@@ -164,12 +165,14 @@ def _plan(link: str, mesh: LinkMesh, depth: float) -> LinkMesh:
         raise MeshingError(link, problem, "Choose a design that deforms the mesh less")
     if mesh.dim == 2:
         return mesh
-    plan, below, meshed = section_of(mesh), section_of(mesh, -1.0), float(np.ptp(mesh.points[:, 2]))
-    volume, area, other = (cell_measures(own.points, own.cells).sum() for own in (mesh, plan, below))
-    faces, whole = _SAME_SECTION
-    if abs(area - other) > faces * area or abs(volume - area * meshed) > whole * volume:
-        problem = "its section along z is not the same all through its depth, so it has none to extrude"
-        raise MeshingError(link, problem, "Write it from a mesh in the plane")
+    plan, meshed = plan_of(mesh).mesh, float(np.ptp(mesh.points[:, 2]))
+    if plan.dim == 3:
+        plan, below = face_of(mesh, 1.0), face_of(mesh, -1.0)
+        volume, area, other = (cell_measures(own.points, own.cells).sum() for own in (mesh, plan, below))
+        faces, whole = _SAME_SECTION
+        if abs(area - other) > faces * area or abs(volume - area * meshed) > whole * volume:
+            problem = "its section along z is not the same all through its depth, so it has none to extrude"
+            raise MeshingError(link, problem, "Write it from a mesh in the plane")
     if not math.isclose(meshed, depth, rel_tol=1e-6):
         problem = f"the mesh is {meshed:g} deep, not {depth:g}"
         raise MeshingError(link, problem, "Give the depth that the link was meshed with")

@@ -36,6 +36,7 @@ from fenicsmech.meshing.link_mesh import (
     distribute,
     edge_corners,
     extrude,
+    face_of,
     least_stretches,
     node_ends,
     on_mid_plane,

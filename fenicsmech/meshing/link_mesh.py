@@ -373,22 +373,20 @@ def plan_of(link: LinkMesh) -> Plan:
     return Plan(link, np.arange(len(link.points)))
 
 
-def section_of(link: LinkMesh, side: float = 1.0) -> LinkMesh:
-    """The triangles of a link's plan; of a solid that is not extruded those of its face of greatest z.
-
-    Args:
-        link: the link.
-        side: −1 for the face of least z.
-    """
+def section_of(link: LinkMesh) -> LinkMesh:
+    """The triangles of a link's plan; of a solid that is not extruded those of its face of greatest z."""
     plan = plan_of(link).mesh
-    if plan.dim == 2:
-        return plan
-    z = side * link.points[:, 2]
+    return plan if plan.dim == 2 else face_of(link, 1.0)
+
+
+def face_of(solid: LinkMesh, side: float) -> LinkMesh:
+    """The triangles of a solid's face of greatest z, or of least z with ``side`` −1."""
+    z = side * solid.points[:, 2]
     on_face = z >= z.max() - 1e-6 * np.ptp(z)
-    facets = np.concatenate([np.delete(link.cells, corner, axis=1) for corner in range(4)])
+    facets = np.concatenate([np.delete(solid.cells, corner, axis=1) for corner in range(4)])
     triangles = np.unique(np.sort(facets[on_face[facets].all(axis=1)], axis=1), axis=0)
-    curved = CurvedEdges(link.curved.ends, link.curved.bulges[:, :2])
-    return LinkMesh.from_cells(link.points[:, :2], triangles, np.full(len(triangles), FREE), curved)
+    curved = CurvedEdges(solid.curved.ends, solid.curved.bulges[:, :2])
+    return LinkMesh.from_cells(solid.points[:, :2], triangles, np.full(len(triangles), FREE), curved)
 
 
 @dataclass(frozen=True)
