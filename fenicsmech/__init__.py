@@ -139,8 +139,10 @@ from fenicsmech.quantities import (
     Displacement,
     ForceMagnitude,
     FormValue,
+    JointAxis,
     JointForce,
     JointMoment,
+    JointPosition,
     LawParameter,
     LinkMass,
     LinkVolume,
@@ -221,7 +223,8 @@ __all__ = [
     "PartValue", "Scatter", "SearchResult", "StartResult", "Optimisation", "design_study", "Experiment", "ModulusFit",
     "fit_modulus", "Design",
     # numbers that designs change beside shapes; NumberKind for kinds of your own
-    "Number", "Depth", "LawParameter", "SpringStiffness", "SpringRest", "NumberBounds", "NumberDesign",
+    "Number", "Depth", "LawParameter", "SpringStiffness", "SpringRest", "JointPosition", "JointAxis",
+    "NumberBounds", "NumberDesign",
     "NumberKind", "ModelNumber", "NumberTerms",
     # errors
     "FenicsmechError", "DescriptionError", "MeshingError", "AssemblyError", "EquilibriumError",

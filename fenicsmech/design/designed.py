@@ -60,8 +60,8 @@ class DesignedSimulation:
         self.shapes = tuple(own for own in self.designs if isinstance(own, SplineDesign))
         self.numbers = tuple(own for own in self.designs if isinstance(own, Number))
         for number in self.numbers:
-            number.kind.check(simulation.scene)
-        solids = [part for number in self.numbers if number.kind.changes_solids for part in number.kind.parts]
+            number.kind.check(simulation.scene, simulation.linkage.dim)
+        solids = [link for number in self.numbers for link in number.kind.reshaped]
         self.changed = tuple(dict.fromkeys([*(own.link for own in self.shapes), *solids]))
         self._requests = shape_requests(self.shapes, simulation)
 

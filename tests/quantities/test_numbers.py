@@ -18,6 +18,10 @@ def links(bench: Bench) -> list[fm.FlexibleLink]:
     return bench.simulation.scene.mechanism.flexible_links
 
 
+def joints(bench: Bench) -> list[fm.Joint]:
+    return bench.simulation.scene.mechanism.joints
+
+
 # kinds of numbers, and steps of their Taylor tests
 NUMBERS = {
     "modulus": (lambda bench: fm.LawParameter("E", links(bench)[1]), (16.0, 8.0, 4.0)),
@@ -26,6 +30,11 @@ NUMBERS = {
     "depth": (lambda bench: fm.Depth(links(bench)[1]), (0.1, 0.05, 0.025, 0.0125)),
     "depth of both": (lambda bench: fm.Depth(*links(bench)), (0.1, 0.05, 0.025, 0.0125)),
     "stiffness": (lambda bench: fm.SpringStiffness(*bench.simulation.scene.effects), (8.0, 4.0, 2.0, 1.0)),
+    "shift": (lambda bench: fm.JointPosition(joints(bench)[3], direction=(1, 0.5)), (0.4, 0.2, 0.1, 0.05)),
+    "shift of both pivots": (
+        lambda bench: fm.JointPosition(joints(bench)[0], joints(bench)[2], direction=(0.3, 1)),
+        (0.4, 0.2, 0.1, 0.05),
+    ),
     "rest": (lambda bench: fm.SpringRest(*bench.simulation.scene.effects), (0.1, 0.05, 0.025)),
 }
 CASES = ("plane-stress", "plane-stress moved", "plane-strain pressure", "3d-symmetric", "3d moved", "3d pressure")
@@ -50,7 +59,7 @@ def bench(request) -> Bench:
 def test_derivatives_by_a_number(bench, name):
     describe, steps = NUMBERS[name]
     kind, base = describe(bench), bench.field(1)
-    kind.check(bench.simulation.scene)
+    kind.check(bench.simulation.scene, bench.model.linkage.dim)
     bench.adjoint, number = Sensitivity(bench.model, [kind]), bench.model.number(kind)
     gradients = bench.gradients(fm.Design(base))
     assert MPI.COMM_WORLD.size > 1 or np.any([gradient.numbers for gradient in gradients])
