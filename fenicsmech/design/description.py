@@ -106,19 +106,47 @@ class SplineDesign:
         return Bounds((least, most), self.bend)
 
 
-def shape_requests(designs: Sequence[SplineDesign], simulation: Simulation) -> list[ShapeRequest]:
+@dataclass(frozen=True)
+class FollowingLink(SplineDesign):
+    """A flexible link whose shape follows its joints, which numbers shift, and has no parameters of its own."""
+
+
+_FOLLOWED = 6  # segments of a link that follows its joints: its spline has to run inside it, and costs no parameters
+
+
+def with_followers(designs: Sequence[SplineDesign], numbers: Sequence[Number]) -> tuple[SplineDesign, ...]:
+    """``designs``, and those of further links that joints shifted by ``numbers`` take along."""
+    designed = [design.link for design in designs]
+    return (*designs, *(FollowingLink(link, _FOLLOWED) for link in taken_along(numbers) if link not in designed))
+
+
+def taken_along(numbers: Sequence[Number]) -> list[FlexibleLink]:
+    """The flexible links whose joints are shifted by ``numbers``."""
+    joints = [joint for own in numbers for joint, change in own.kind.changes(2).items() if np.any(change.shift)]
+    links = dict.fromkeys(link for joint in joints for link in (joint.a, joint.b))
+    return [link for link in links if isinstance(link, FlexibleLink)]
+
+
+def shape_requests(
+    designs: Sequence[SplineDesign], simulation: Simulation, numbers: Sequence[Number] = ()
+) -> list[ShapeRequest]:
     """The handles and splines of ``designs`` in a simulation; errors are those of ``shape_request``.
 
     Links from files are measured on the first process.
     """
     mechanism, linkage, shapes = simulation.scene.mechanism, simulation.linkage, simulation.shapes
     return from_one(
-        simulation.comm, lambda: [shape_request(own, mechanism, linkage, shapes.get(own.link)) for own in designs]
+        simulation.comm,
+        lambda: [shape_request(own, mechanism, linkage, shapes.get(own.link), numbers) for own in designs],
     )
 
 
 def shape_request(
-    design: SplineDesign, mechanism: Mechanism, linkage: Linkage, shape: Shape | None = None
+    design: SplineDesign,
+    mechanism: Mechanism,
+    linkage: Linkage,
+    shape: Shape | None = None,
+    numbers: Sequence[Number] = (),
 ) -> ShapeRequest:
     """The handles and spline of ``design``. Local.
 
@@ -127,6 +155,7 @@ def shape_request(
         mechanism: with the link.
         linkage: its bodies and joints.
         shape: of the link, as drawn by default.
+        numbers: that may shift joints.
 
     Raises:
         DescriptionError: no centreline is found, the link has one joint and no free end, or there are fewer segments
@@ -158,6 +187,8 @@ def shape_request(
         segments=design.segments,
         centreline=centreline,
         ends_move=design.ends_move,
+        joints_move=link in taken_along(numbers),
+        follows=isinstance(design, FollowingLink),
         thickness=thickness,
     )
     lay_out(centreline, request.joints, request.reach, request.segments, part=part)  # refused before it is meshed

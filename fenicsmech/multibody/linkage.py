@@ -285,6 +285,12 @@ class Linkage:
         body = self.body_of(link)
         return BodyPoint(body, np.array(in_dimension(at, self.dim)) - self.bodies[body].centre, self.joints.space)
 
+    def site(self, link: FlexibleLink, joint: Joint) -> int:
+        """Which interface of a flexible link belongs to one of its joints."""
+        connection = self.joints.connections[self.connection_of(joint)]
+        own = self.interfaces[link]
+        return next(own.index(body) for body in (connection.a, connection.b) if body in own)
+
     def connection_of(self, joint: Joint) -> int:
         """Index of a joint's connection."""
         return next(k for k, own in enumerate(self.joints.connections) if own.name == joint.name)

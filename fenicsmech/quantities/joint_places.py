@@ -68,13 +68,15 @@ class _OfJoints(NumberKind):
     def moves_unloaded(self, configuration: Configuration) -> bool:
         return any(position for _, position in configuration.positions)
 
+    def changes(self, dim):
+        return dict.fromkeys(self.parts, self.change(dim))
+
     def on(self, model):
-        dim = model.linkage.dim
-        return _Place(model, [model.linkage.connection_of(joint) for joint in self.parts], self.change(dim))
+        return _Place(model, self.changes(model.linkage.dim))
 
     @abstractmethod
     def change(self, dim: int) -> JointChange:
-        """By a unit of the number, in ``dim`` dimensions."""
+        """By a unit of the number, in ``dim`` dimensions, of each joint."""
 
 
 @dataclass(frozen=True, init=False)
@@ -111,10 +113,6 @@ class JointPosition(_OfJoints):
         return tuple(
             dict.fromkeys(o for joint in self.parts for o in (joint.a, joint.b) if isinstance(o, FlexibleLink))
         )
-
-    @property
-    def shifts(self) -> Mapping[Joint, tuple[float, ...]]:
-        return dict.fromkeys(self.parts, self.vector)
 
     def unit(self, units):
         return units.length
@@ -201,9 +199,9 @@ class _Place(ModelNumber):
 
     drawn = 0.0
 
-    def __init__(self, model: MechanismModel, connections: Sequence[int], unit: JointChange) -> None:
+    def __init__(self, model: MechanismModel, changes: Mapping[Joint, JointChange]) -> None:
         self._joints, self._model, self.value = model.linkage.joints, model, 0.0
-        self._changes = dict.fromkeys(connections, unit)
+        self._changes = {model.linkage.connection_of(joint): change for joint, change in changes.items()}
 
     def set(self, value):
         self.value = value

@@ -23,6 +23,7 @@ from fenicsmech.equilibrium import Adjoint
 from fenicsmech.errors import DescriptionError, positive
 from fenicsmech.mechanism import Configuration, FlexibleLink, Joint, Scene, Units
 from fenicsmech.model import MechanismModel
+from fenicsmech.multibody import JointChange
 from fenicsmech.quantities.quantity import Partial
 
 
@@ -149,9 +150,8 @@ class NumberKind(ABC):
         """Flexible links whose solids change with it; none by default."""
         return ()
 
-    @property
-    def shifts(self) -> Mapping[Joint, tuple[float, ...]]:
-        """Directions in which a unit of it shifts joints in the drawn configuration; none by default."""
+    def changes(self, dim: int) -> Mapping[Joint, JointChange]:
+        """How a unit of it changes the places of joints in ``dim`` dimensions; none by default."""
         return {}
 
     def moves_unloaded(self, configuration: Configuration) -> bool:

@@ -40,6 +40,8 @@ class ShapeRequest:
         segments: number of cubic segments.
         centreline: approximated by the spline.
         ends_move: whether free ends may move.
+        joints_move: whether joints may.
+        follows: whether the shape has no parameters of its own, and follows joints alone.
         thickness: in the plane, where δ = 1, or the outline that it is measured on; None: the mean width of the link.
         spacing: arc length between handles; None: the mean width of the link.
     """
@@ -52,6 +54,8 @@ class ShapeRequest:
     segments: int
     centreline: Centreline
     ends_move: bool = False
+    joints_move: bool = False
+    follows: bool = False
     thickness: float | LinkOutline | None = None
     spacing: float | None = None
 
@@ -68,6 +72,7 @@ class LinkShape:
         edges: weights at the midpoints of edges that follow the design.
         thickness: in the plane, where δ = 1; at the samples of the spline where it is not the same everywhere.
         centreline: points that the drawn centreline runs through, (k, 2).
+        follows: whether it has no parameters of its own, and follows joints alone.
     """
 
     link: int
@@ -77,6 +82,34 @@ class LinkShape:
     edges: EdgeWeights
     thickness: float | np.ndarray
     centreline: np.ndarray
+    follows: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class LinkParameters:
+    """The parameters of a link's spline as a function of those of the design, s = s₀ + S p.
+
+    Attributes:
+        place: the link's own entries of p.
+        fixed: s₀, (size,).
+        matrix: S, (size, parameters).
+    """
+
+    place: slice
+    fixed: np.ndarray
+    matrix: np.ndarray
+
+    @staticmethod
+    def own(first: int, spline: LinkSpline, count: int) -> LinkParameters:
+        """Those of a spline that all are parameters of the design, which has ``count``; the first one is ``first``."""
+        matrix = np.zeros((spline.size, count))
+        place = slice(first, first + spline.size)
+        matrix[:, place] = np.eye(spline.size)
+        return LinkParameters(place, np.zeros(spline.size), matrix)
+
+    def of(self, p: np.ndarray) -> np.ndarray:
+        """s (size,) of the design ``p``; parameters of others may follow those that it knows."""
+        return self.fixed + self.matrix @ p[: self.matrix.shape[1]]
 
 
 def shape_link(mesh: LinkMesh, request: ShapeRequest) -> LinkShape:
@@ -87,7 +120,8 @@ def shape_link(mesh: LinkMesh, request: ShapeRequest) -> LinkShape:
     """
     part, joints = f"link {request.name!r}", request.joints
     layout = lay_out(request.centreline, joints, request.reach, request.segments, part=f"design of {part}")
-    fit = fit_spline(request.centreline, joints, layout, ends_move=request.ends_move, part=f"spline of {part}")
+    moves = {"ends_move": request.ends_move, "joints_move": request.joints_move}
+    fit = fit_spline(request.centreline, joints, layout, **moves, part=f"spline of {part}")
     width = _mean_width(mesh, request.centreline.length)
     handles = _place_handles(mesh, fit, spacing=request.spacing or width, turns=request.turns, part=part)
     weights = handle_weights(mesh, handles, part=part)
@@ -102,7 +136,7 @@ def shape_link(mesh: LinkMesh, request: ShapeRequest) -> LinkShape:
     drawn = request.thickness or width
     thickness = _measured(drawn, fit.spline, part=f"design of {part}") if isinstance(drawn, LinkOutline) else drawn
     centreline = request.centreline.evaluate(request.centreline.knots)
-    return LinkShape(request.link, request.name, handles, weights, edges, thickness, centreline)
+    return LinkShape(request.link, request.name, handles, weights, edges, thickness, centreline, request.follows)
 
 
 def _measured(outline: LinkOutline, spline: LinkSpline, *, part: str) -> np.ndarray:
@@ -208,16 +242,26 @@ class ShapeMap:
         mesh: the mechanism's mesh.
         design: the design field d, vector P1, or P2 to bend edges too.
         shapes: the links that change, the same on all ranks.
+        parameters: of their splines as functions of p; those of one link after the other by default.
+        initial: p of the initial design; that of the splines by default.
 
     Attributes:
         owned: number of owned nodes.
         original: vertex of the whole mesh of every local node, of an edge's midpoint its lower end, (nodes,).
         vertices: per link, its vertices in the whole mesh, (n,).
         reach: per link, r_ij at ``vertices``, (n, handles, 3).
+        of_link: parameters of the spline of each link as functions of p.
         initial, initial_theta: p (parameters,) and θ (handles,) of the initial design.
     """
 
-    def __init__(self, mesh: MechanismMesh, design: fem.Function, shapes: Sequence[LinkShape]) -> None:
+    def __init__(
+        self,
+        mesh: MechanismMesh,
+        design: fem.Function,
+        shapes: Sequence[LinkShape],
+        parameters: Sequence[LinkParameters] | None = None,
+        initial: np.ndarray | None = None,
+    ) -> None:
         self.mesh, self.design, self.shapes = mesh, design, tuple(shapes)
         ends = node_ends(design.function_space)
         self.original = ends[:, 0]
@@ -232,14 +276,17 @@ class ShapeMap:
             self._nodes.append(nodes)
             self._local_reach.append(_at_nodes(np.searchsorted(vertices, ends[nodes]), reach, shape))
         handles = [shape.handles for shape in shapes]
-        self.initial = np.concatenate([np.zeros(0), *(h.spline.initial for h in handles)])
+        splines = [h.spline for h in handles]
+        firsts, count = np.cumsum([0, *(own.size for own in splines)]), sum(own.size for own in splines)
+        own = [LinkParameters.own(int(k), spline, count) for k, spline in zip(firsts, splines, strict=False)]
+        self.of_link = tuple(own if parameters is None else parameters)
+        self.initial = np.concatenate([np.zeros(0), *(s.initial for s in splines)]) if initial is None else initial
         self.initial_theta = np.concatenate([np.zeros(0), *(h.initial for h in handles)])
-        self._p_ends = np.cumsum([h.spline.size for h in handles], dtype=int)[:-1]
         self._theta_ends = np.cumsum([len(h) for h in handles], dtype=int)[:-1]
 
     def parameters(self, p: np.ndarray) -> list[np.ndarray]:
-        """``p`` (…, parameters) link by link; parameters of others than shapes may follow."""
-        return np.split(p[..., : len(self.initial)], self._p_ends, axis=-1)[: len(self.shapes)]
+        """Those of the spline of each link at the design ``p`` (parameters,); parameters of others may follow."""
+        return [own.of(p) for own in self.of_link]
 
     def positions(self, theta: np.ndarray) -> list[np.ndarray]:
         """``theta`` (…, handles) link by link."""
@@ -259,13 +306,13 @@ class ShapeMap:
         g: (…, owned nodes, dim), or (…, nodes, dim) with this rank's parts at nodes that others own; summed over all
         ranks.
         """
-        nothing = np.zeros((*g.shape[:-2], 0))
-        by_p, by_theta = [nothing], [nothing]
-        for (shape, *point), moments in zip(self._links(p, theta), self.moments(g), strict=True):
-            p_slope, theta_slope = shape.handles.gradients(*point)
-            by_p.append(np.einsum("...jak,jakp->...p", moments, p_slope))
+        by_p, by_theta = np.zeros((*g.shape[:-2], len(self.initial))), [np.zeros((*g.shape[:-2], 0))]
+        links = zip(self._links(p, theta), self.of_link, self.moments(g), strict=True)
+        for (shape, *point), own, moments in links:
+            slope, theta_slope = shape.handles.gradients(*point)
+            by_p += np.einsum("...jak,jakp->...p", moments, slope) @ own.matrix
             by_theta.append(np.einsum("...jak,jak->...j", moments, theta_slope))
-        return np.concatenate(by_p, axis=-1), np.concatenate(by_theta, axis=-1)
+        return by_p, np.concatenate(by_theta, axis=-1)
 
     def spread(self, transforms: Sequence[np.ndarray]) -> np.ndarray:
         """Σ_j T_j r_ij from the maps of each link's handles, (nodes, dim)."""
