@@ -261,7 +261,8 @@ class Simulation:
         point, drawn = linkage.point(part.on, part.at), np.array(in_dimension(part.at, linkage.dim))
         positions = []
         for configuration in configurations:
-            assembly = assemble(linkage, configuration, springs)
+            with self._shaped():
+                assembly = assemble(linkage, configuration, springs)
             if assembly.fraction < 1.0:
                 raise AssemblyError(
                     f"configuration {configuration.name!r}",

@@ -92,11 +92,13 @@ class Bench:
     def state(self, design: np.ndarray, change: float = 0.0) -> State:
         """The equilibrium of the given design."""
         self.model.reshape(design)
+        curve = self.simulation.load_displacement(self.force, forces=[0.0], configuration=self.turned)
+        self.model.load(curve.unloaded)
+        unloaded = self.model.travel(self.force, curve.unloaded)
         if not hasattr(self, "origin"):
-            curve = self.simulation.load_displacement(self.force, forces=[0.0], configuration=self.turned)
-            self.model.load(curve.frames[0].state)
-            self.origin = self.model.travel(self.force, curve.frames[0].state)
-        value = (PLACE if self.moved else FORCE) + change
+            self.origin = unloaded
+        # curves count displacements from the unloaded configuration of each design
+        value = PLACE + self.origin - unloaded + change if self.moved else FORCE + change
         samples = {"displacements" if self.moved else "forces": [value / 2, value]}
         return self.simulation.load_displacement(self.force, configuration=self.turned, **samples).frames[-1].state
 
