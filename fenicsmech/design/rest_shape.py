@@ -254,12 +254,12 @@ class ParametricShape:
             self._penalties[barrier] = QualitySum(self._straight, barrier.symbolic, counts=self._deformable)
         total = self._penalties[barrier]
         self._straight.interpolate(self._model.elastic.shape)
-        slope = total.gradient()
+        value, slope = total.value(), total.gradient()
         by_p, by_theta = self._vertex_map.apply_transpose(placement.p, placement.theta - self._lag, slope)
         by_q = self._model.mesh.comm.allreduce(self._vertex_rates @ slope.ravel(), op=MPI.SUM) * self.numbers.width
         gradient = self._optimum.total_gradient(placement, by_p, by_theta)
         gradient[self.of_numbers] += by_q
-        return total.value(), gradient
+        return value, gradient
 
     @cached_property
     def _vertex_rates(self) -> np.ndarray:

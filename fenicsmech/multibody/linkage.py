@@ -389,19 +389,26 @@ class JointCoordinate:
         return poses[list(self.bodies)].ravel(), self._places[self._k]
 
 
-def build_linkage(mechanism: Mechanism, dim: int) -> Linkage:
-    """The bodies and constraints of ``mechanism`` in ``dim`` dimensions."""
+def build_linkage(mechanism: Mechanism, dim: int, changes: Mapping[Joint, JointChange] | None = None) -> Linkage:
+    """The bodies and constraints of ``mechanism`` in ``dim`` dimensions.
+
+    Args:
+        mechanism: the mechanism.
+        dim: 2 or 3.
+        changes: of joints, which are placed there from the outset.
+    """
     length, joints = mechanism.length, mechanism.joints
+    placed = {joint: _placed(joint, dim, (changes or {}).get(joint)) for joint in joints}
     bodies: list[Body] = []
     for link in mechanism.rigid_links:
-        places = [in_dimension(joint.at, dim) for joint in joints if link in (joint.a, joint.b)]
+        places = [placed[joint][0] for joint in joints if link in (joint.a, joint.b)]
         centre = tuple(np.mean(places, axis=0)) if places else (0.0,) * dim
         bodies.append(Body(link.name, link, centre, link.fixed))
 
     def body(joint: Joint, link: Link) -> int:
         """The body of ``link`` that a joint is on, −1 if there is none yet."""
         for i, known in enumerate(bodies):
-            here = known.region is None or same_place(known.centre, joint.at, dim=dim, length=length)
+            here = known.region is None or same_place(known.centre, placed[joint][0], dim=dim, length=length)
             if known.link == link and here:
                 return i
         return -1
@@ -413,13 +420,13 @@ def build_linkage(mechanism: Mechanism, dim: int) -> Linkage:
             if flexible in (joint.a, joint.b) and body(joint, flexible) < 0:
                 region = joint.regions[(joint.a, joint.b).index(flexible)]
                 axis = joint.axis if joint.kind.pin_along_axis else (0.0, 0.0, 1.0)
-                bodies.append(Body(joint.name, flexible, in_dimension(joint.at, dim), False, region, axis))
+                bodies.append(Body(joint.name, flexible, placed[joint][0], False, region, axis))
         interfaces[flexible] = tuple(range(first, len(bodies)))
     driven = {motor.joint: motor for motor in mechanism.motors}
     connections = []
     for joint in joints:
-        a, b, at = body(joint, joint.a), body(joint, joint.b), in_dimension(joint.at, dim)
-        connections.append(Connection(joint.name, joint.kind, a, b, at, _triad(joint, dim), driven.get(joint)))
+        a, b, (at, triad) = body(joint, joint.a), body(joint, joint.b), placed[joint]
+        connections.append(Connection(joint.name, joint.kind, a, b, at, triad, driven.get(joint)))
     identity = tuple(map(tuple, np.eye(dim)))
     welds = [
         Connection(f"link {link.name!r}", WELD, group[0], other, bodies[other].centre, identity)
@@ -435,6 +442,17 @@ def build_linkage(mechanism: Mechanism, dim: int) -> Linkage:
         joints=JointSystem(bodies, connections, dim=dim, length=length, places=at_joints),
         rigid=JointSystem(bodies, [*connections, *welds], dim=dim, length=length, places=at_joints),
     )
+
+
+def _placed(
+    joint: Joint, dim: int, change: JointChange | None
+) -> tuple[tuple[float, ...], tuple[tuple[float, ...], ...]]:
+    """Place and triad of a joint that may have been changed."""
+    at, triad = in_dimension(joint.at, dim), _triad(joint, dim)
+    if change is None:
+        return at, triad
+    moved, turned = change.place(np.array(at), np.array(triad))
+    return tuple(moved.tolist()), tuple(map(tuple, turned.tolist()))
 
 
 def _triad(joint: Joint, dim: int) -> tuple[tuple[float, ...], ...]:

@@ -30,6 +30,13 @@ class JointChange:
 
     __rmul__ = __mul__
 
+    def place(self, at: np.ndarray, triad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The place (dim,) and the triad (dim, dim) of a joint after it."""
+        if not np.any(self.turn):
+            return at + self.shift, triad
+        vector, dim = self.turn if len(self.turn) == 3 else np.array([0.0, 0.0, *self.turn]), len(triad)
+        return at + self.shift, triad @ Rotation.from_rotvec(vector).as_matrix()[:dim, :dim].T
+
     def __add__(self, other: JointChange) -> JointChange:
         return JointChange(self.shift + other.shift, self.turn + other.turn)
 
@@ -77,12 +84,8 @@ class JointPlaces:
 
     def _changed(self, k: int) -> np.ndarray:
         total, drawn = self.total(k), self._drawn[k]
-        triad = self._triad(drawn)
-        if np.any(total.turn):
-            vector = total.turn if self.dim == 3 else np.array([0.0, 0.0, *total.turn])
-            triad = triad @ Rotation.from_rotvec(vector).as_matrix()[: self.dim, : self.dim].T
-        shifted = drawn[: 2 * self.dim] + np.tile(total.shift, 2)
-        return np.concatenate([shifted, triad.ravel()])
+        anchors, triad = total.place(drawn[: 2 * self.dim].reshape(2, -1), self._triad(drawn))
+        return np.concatenate([anchors.ravel(), triad.ravel()])
 
     def _triad(self, constants: np.ndarray) -> np.ndarray:
         return constants[2 * self.dim :].reshape(self.dim, self.dim)

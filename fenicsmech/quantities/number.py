@@ -198,6 +198,15 @@ class NumberKind(ABC):
         return self.name
 
 
+def joint_changes(values: Mapping[NumberKind, float], dim: int) -> dict[Joint, JointChange]:
+    """How numbers with some values change the places of joints, together, in ``dim`` dimensions."""
+    found: dict[Joint, JointChange] = {}
+    for kind, value in values.items():
+        for joint, unit in kind.changes(dim).items():
+            found[joint] = value * unit + found[joint] if joint in found else value * unit
+    return found
+
+
 def read_kind(scene: Scene, kind: str, words: Sequence[str]) -> NumberKind:
     """The kind of number whose class is named ``kind``, with its ``words``.
 
