@@ -26,4 +26,4 @@ from fenicsmech.multibody.linkage import (
     build_linkage,
     spring_potentials,
 )
-from fenicsmech.multibody.points import BodyPoint, DesignAtNodes, InterfaceMap, LinkPoint, link_point
+from fenicsmech.multibody.points import BodyPoint, DesignAtNodes, InterfaceMap, LinkPoint, link_point, shape_functions
