@@ -88,7 +88,7 @@ def guess(model: MechanismModel, found: WholeState, like: State) -> State:
 
 def _rest(model: MechanismModel) -> np.ndarray:
     """X of this rank's nodes of u, ghosts last, (nodes, dim)."""
-    return model.elastic.drawn_nodes + model.design_nodes.values()
+    return model.elastic.drawn_nodes + model.design_nodes.values(model.elastic.design)
 
 
 def _read(rest: np.ndarray, values: np.ndarray, points: np.ndarray) -> np.ndarray:

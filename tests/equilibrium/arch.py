@@ -28,7 +28,7 @@ def arch(comm: MPI.Comm = MPI.COMM_SELF, *, space: str = "plane-stress") -> tupl
 
 def lowered(model, by: float) -> None:
     """Makes the arch of ``model`` lower by a fraction of its rise."""
-    positions = model.elastic.d.function_space.tabulate_dof_coordinates()
+    positions = model.elastic.shape.function_space.tabulate_dof_coordinates()
     fall = np.zeros((len(positions), 2))
     fall[:, 1] = -by * RISE * np.sin(np.pi * positions[:, 0] / SPAN)
     model.reshape(fall.ravel())
