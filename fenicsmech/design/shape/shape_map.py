@@ -99,9 +99,8 @@ def shape_link(mesh: LinkMesh, request: ShapeRequest) -> LinkShape:
             "Use smaller elements",
         )
     edges = edge_weights(mesh, weights)
-    thickness = request.thickness
-    if isinstance(thickness, LinkOutline):
-        thickness = _measured(thickness, fit.spline, part=f"design of {part}")
+    drawn = request.thickness
+    thickness = _measured(drawn, fit.spline, part=f"design of {part}") if isinstance(drawn, LinkOutline) else drawn
     centreline = request.centreline.evaluate(request.centreline.knots)
     return LinkShape(request.link, request.name, handles, weights, edges, thickness, centreline)
 
