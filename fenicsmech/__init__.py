@@ -146,6 +146,7 @@ from fenicsmech.quantities import (
     LinkVolume,
     Magnitude,
     ModelNumber,
+    MotorOffset,
     MotorTorque,
     NumberKind,
     NumberTerms,
@@ -221,8 +222,8 @@ __all__ = [
     "PartValue", "Scatter", "SearchResult", "StartResult", "Optimisation", "design_study", "Experiment", "ModulusFit",
     "fit_modulus", "Design",
     # numbers that designs change beside shapes; NumberKind for kinds of your own
-    "Number", "Depth", "LawParameter", "SpringStiffness", "SpringRest", "NumberBounds", "NumberDesign",
-    "NumberKind", "ModelNumber", "NumberTerms",
+    "Number", "Depth", "LawParameter", "SpringStiffness", "SpringRest", "MotorOffset", "NumberBounds",
+    "NumberDesign", "NumberKind", "ModelNumber", "NumberTerms",
     # errors
     "FenicsmechError", "DescriptionError", "MeshingError", "AssemblyError", "EquilibriumError",
 ]

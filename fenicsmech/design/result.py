@@ -20,10 +20,10 @@ from fenicsmech.design.target import Comparison
 from fenicsmech.errors import DescriptionError, counted, point_text
 from fenicsmech.export import PinHole, write_step, write_stl
 from fenicsmech.files import atomic_write
-from fenicsmech.mechanism import DRAWN, Disc, FlexibleLink, Scene, Units
+from fenicsmech.mechanism import Disc, FlexibleLink, Scene, Units
 from fenicsmech.meshing import LinkMesh, boundary_polygons, section_of
 from fenicsmech.model import Design
-from fenicsmech.multibody import Linkage, assemble
+from fenicsmech.multibody import Linkage
 from fenicsmech.plot import DesignShape, LinkOutline, draw_designs
 from fenicsmech.quantities import NumberKind, read_kind
 from fenicsmech.simulation import MechanismPlotter, Simulation, rest_geometry
@@ -409,7 +409,7 @@ def draw_links(
         old, new = (_outline(change, meshes[k], p[change.place]) for p, meshes in (before, after))
         joints = np.array([linkage.bodies[i].centre[:2] for i in linkage.interfaces[link]])
         shapes.append(DesignShape(link.name, old, new, joints))
-    rigid = MechanismPlotter(simulation.model).rigid(assemble(linkage, DRAWN).poses)
+    rigid = MechanismPlotter(simulation.model).rigid(linkage.joints.drawn)
     draw_designs(path, shapes, rigid=rigid, unit=scene.units.length, title=f"{scene.mechanism.name}: links")
 
 

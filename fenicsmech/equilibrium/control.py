@@ -179,20 +179,24 @@ class DisplacementControl(Control):
 
 @dataclass(frozen=True, eq=False)
 class MotorControl(Control):
-    """Motors stand at ``prescribed`` · ``direction`` and the others where they are; the force keeps its magnitude.
+    """Motors stand at ``origin`` + ``prescribed`` · ``direction`` and the others where they are; the force keeps its
+    magnitude.
 
     Attributes:
         direction: d, motor values per unit of the prescribed value, (connections,).
+        origin: motor values at a prescribed value of zero, (connections,).
     """
 
     prescribed: float
     direction: np.ndarray
+    origin: np.ndarray | float = 0.0
 
     def value(self, system, state):
-        return self._along(state.motors)
+        return self._along(state.motors - self.origin)
 
     def prepare(self, state):
-        return replace(state, motors=np.where(self.direction, self.prescribed * self.direction, state.motors))
+        moved = self.origin + self.prescribed * self.direction
+        return replace(state, motors=np.where(self.direction, moved, state.motors))
 
     def rate(self, system, state):
         constraints, poses = system.joints.motor_rate(state.poses, state.motors, state.multipliers, self.direction)

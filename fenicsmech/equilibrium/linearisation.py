@@ -22,7 +22,7 @@ from petsc4py import PETSc
 
 from fenicsmech.compat import destroy_garbage
 from fenicsmech.equilibrium.border import PointLoad
-from fenicsmech.equilibrium.control import Control, Stability
+from fenicsmech.equilibrium.control import Control, MotorControl, Stability
 from fenicsmech.equilibrium.kkt import KktMatrix
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
@@ -242,6 +242,11 @@ class Linearisation:
         self._turn()
         return self.control.rate(self._system, self.state)
 
+    def motor_rate(self, direction: np.ndarray) -> PETSc.Vec:
+        """The right-hand side of the rate with motors that move by ``direction``, (connections,)."""
+        self._turn()
+        return MotorControl(0.0, direction).rate(self._system, self.state)
+
     def tangent(self) -> Step:
         """The rate of the state with the control's value."""
         return self.control.tangent(self.step(self.rate()))
@@ -329,6 +334,10 @@ class Adjoint:
     def by_control(self) -> float:
         """dQ/dv by the value v of the control."""
         return self.x.dot(self.at.control_rate())
+
+    def by_motors(self, direction: np.ndarray) -> float:
+        """dQ/dφ by motors that move by ``direction``, (connections,)."""
+        return self.x.dot(self.at.motor_rate(direction))
 
     @staticmethod
     def of_travel(at: Linearisation, load: PointLoad) -> Adjoint:

@@ -2,7 +2,7 @@
 
 Every link is moved as a rigid body until all joints close,
 
-    C(z, φ) = 0,  motors moved from φ = 0 (as drawn) to the wanted position,
+    C(z, φ + φ₀) = 0,  motors moved from φ = −φ₀ (as drawn) to the wanted position, φ₀ their offsets,
 
 by Gauss–Newton steps of least norm, z ← z − A⁺ C, which stay defined where A loses rank (redundant loops,
 dead centres). The assembled state carries no elastic energy in the links and starts every equilibrium.
@@ -119,10 +119,10 @@ class _Assembler:
         """Poses at the fraction ``limit`` of the way to ``configuration``, the part of that reached, and the row with
         the largest residual where the motion ends early."""
         system = self.system
-        target = limit * system.motor_values(configuration.position)
-        travel = system.travel(target)
+        start, target = (system.on_the_way(configuration.position, part) for part in (0.0, limit))
+        travel = system.travel(target - start)
         largest = 1.0 if travel <= self.largest_step else self.largest_step / travel
-        poses, residual = self._close(system.drawn, np.zeros_like(target))
+        poses, residual = self._close(system.drawn, start)
         if not self._is_closed(residual):
             return poses, 0.0, int(np.argmax(np.abs(residual)))
         before, fraction, step, last_step, worst = system.drawn, 0.0, largest, 0.0, 0
@@ -130,7 +130,7 @@ class _Assembler:
             step = min(step, 1.0 - fraction)
             here = system.unknowns(poses)
             guess = here + (here - system.unknowns(before)) * (step / last_step if last_step > 0.0 else 0.0)
-            motors = (fraction + step) * target
+            motors = start + (fraction + step) * (target - start)
             trial, residual = self._relax(*self._close(system.with_unknowns(poses, guess), motors), motors)
             there = system.unknowns(trial)
             missed = np.linalg.norm((there - guess) / system.pose_scale)

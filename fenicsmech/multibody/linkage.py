@@ -59,6 +59,7 @@ class JointSystem:
     Attributes:
         size: number of pose unknowns.
         rows: number of constraints.
+        offsets: φ₀ of motors, which add to their prescribed positions φ: C(z, φ + φ₀); per connection, zero as drawn.
         pose_scale: typical size of each pose unknown (``length`` or 1), (size,).
         row_scale: factors that make each constraint dimensionless and of unit gradient as drawn, (rows,).
     """
@@ -68,6 +69,7 @@ class JointSystem:
         self.space = RIGID_SPACES[dim]
         self._constraints = [constraint(c.kind, dim, c.motor is not None) for c in self.connections]
         self._drawn = [c.drawn(self.bodies) for c in self.connections]
+        self.offsets = np.zeros(len(self.connections))
 
         pose_size = self.space.pose_size
         # both bodies of each connection, with the places of their poses among the variables of its equations
@@ -106,6 +108,10 @@ class JointSystem:
     def motor_values(self, positions) -> np.ndarray:
         """φ per connection from ``positions``, a function of a motor; 0 where there is none."""
         return np.array([0.0 if c.motor is None else positions(c.motor) for c in self.connections])
+
+    def on_the_way(self, positions, fraction: float) -> np.ndarray:
+        """φ per connection at a part of the way to ``positions``, which begins where all parts are as drawn."""
+        return fraction * self.motor_values(positions) - (1.0 - fraction) * self.offsets
 
     def unknowns(self, poses: np.ndarray) -> np.ndarray:
         """The pose unknowns z of the free bodies, (size,)."""
@@ -207,7 +213,7 @@ class JointSystem:
     def _arguments(self, k: int, poses: np.ndarray, motors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Variables and constants of the equations of connection ``k``."""
         c = self.connections[k]
-        motor = [] if c.motor is None else [motors[k : k + 1]]
+        motor = [] if c.motor is None else [motors[k : k + 1] + self.offsets[k : k + 1]]
         return np.concatenate([poses[c.a], poses[c.b], *motor]), self._drawn[k]
 
 

@@ -7,12 +7,12 @@
 - ``sample``: the equilibria at which they are evaluated
 - ``number``: numbers of parts, and their derivatives from adjoints
 - ``link_numbers``: numbers of laws, depth
-- ``joint_numbers``: stiffness and rest of springs
+- ``joint_numbers``: stiffness and rest of springs, offsets of motors
 - ``sensitivity``: total derivatives by adjoints
 """
 
 from fenicsmech.quantities.forces import ForceMagnitude, JointForce, JointMoment, MotorTorque
-from fenicsmech.quantities.joint_numbers import SpringRest, SpringStiffness
+from fenicsmech.quantities.joint_numbers import MotorOffset, SpringRest, SpringStiffness
 from fenicsmech.quantities.link_numbers import Depth, LawParameter
 from fenicsmech.quantities.links import CentrelineLength, LinkMass, LinkVolume, StrainEnergy
 from fenicsmech.quantities.motion import Displacement, Rotation

@@ -1,8 +1,13 @@
-"""Numbers of springs in joints: their stiffness and rest position.
+"""Numbers of joints: stiffness and rest position of springs, and offsets of motors.
 
 A spring is a potential V(z; k, φ₀) of poses z, which counts with a factor σ. With ẑ the poses' part of the adjoint,
 
     xᵀ ∂F/∂p = ẑ · σ ∂²V/∂z∂p.
+
+A motor at the prescribed position φ stands at φ + φ₀ with the offset φ₀. Configurations are assembled with it,
+C(z, φ + φ₀) = 0, and
+
+    xᵀ ∂F/∂φ₀ = ẑ · ∂(Aᵀλ)/∂φ + λ̂ · ∂C/∂φ.
 """
 
 from __future__ import annotations
@@ -10,9 +15,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from fenicsmech.effects import JointSpring
 from fenicsmech.errors import finite
-from fenicsmech.mechanism import Configuration, Scene
+from fenicsmech.mechanism import Configuration, Motor, Scene
 from fenicsmech.model import MechanismModel
 from fenicsmech.quantities.number import ModelNumber, NumberKind, NumberTerms
 
@@ -105,3 +112,55 @@ class _SpringNumber(ModelNumber):
                 if body in self._joints.columns:
                     total += factor * float(terms.adjoint.poses[self._joints.columns[body]] @ rate)
         return -total
+
+
+@dataclass(frozen=True, init=False)
+class MotorOffset(NumberKind):
+    """What is added to each prescribed position of motors: ``MotorOffset(motor)``; zero as drawn.
+
+    Args:
+        parts: a motor of the mechanism, or several that share it.
+
+    Raises:
+        DescriptionError: there are no motors, or one is given twice.
+    """
+
+    what = "offset of the motor"
+    parts: tuple[Motor, ...]
+
+    @staticmethod
+    def candidates(scene: Scene) -> Sequence[Motor]:
+        return scene.mechanism.motors
+
+    def described(self, part):
+        return 0.0
+
+    def unit(self, units):
+        return units.length if self.parts[0].sliding else "rad"
+
+    def moves_unloaded(self, configuration: Configuration) -> bool:
+        return True
+
+    def check_value(self, value):
+        finite(self.name, value)
+
+    def on(self, model):
+        return _MotorOffset(model, self.parts)
+
+
+class _MotorOffset(ModelNumber):
+    """The offset of some motors."""
+
+    drawn = value = 0.0
+
+    def __init__(self, model: MechanismModel, motors: Sequence[Motor]) -> None:
+        self._linkage = model.linkage
+        self._chosen = model.linkage.joints.motor_values(lambda motor: float(motor in motors))
+
+    def set(self, value):
+        self.value = value
+        for system in (self._linkage.joints, self._linkage.rigid):
+            system.offsets[np.flatnonzero(self._chosen)] = value
+
+    def slope(self, terms: NumberTerms) -> float:
+        return 0.0 if terms.adjoint is None else terms.adjoint.by_motors(self._chosen)

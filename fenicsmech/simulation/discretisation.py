@@ -69,6 +69,8 @@ class Discretisation:
                 f"Give one of {', '.join(sorted({repr(material.name) for material in self.materials}))}",
             )
         changed = copy(self)
+        # with offsets of motors of its own
+        changed.linkage = build_linkage(self.scene.mechanism, self.fidelity.model.mechanism_dim)
         changed.materials = tuple(other if material == drawn else material for material in self.materials)
         changed.mesh, changed._solvers = self.mesh, {}
         for name in ("model", "estimates"):

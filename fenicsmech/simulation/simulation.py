@@ -261,7 +261,8 @@ class Simulation:
         point, drawn = linkage.point(part.on, part.at), np.array(in_dimension(part.at, linkage.dim))
         positions = []
         for configuration in configurations:
-            assembly = assemble(linkage, configuration, springs)
+            with self._shaped():
+                assembly = assemble(linkage, configuration, springs)
             if assembly.fraction < 1.0:
                 raise AssemblyError(
                     f"configuration {configuration.name!r}",
@@ -290,7 +291,7 @@ class Simulation:
             given = Design(design)
         else:
             given = design if isinstance(design, Design) else design.rest_shape(self)
-        size = len(self.model.elastic.d.x.array)
+        size = len(self.model.elastic.shape.x.array)
         if self.comm.allreduce(int(given.field.shape != (size,))):
             raise DescriptionError(
                 f"design of {self.scene.mechanism.name!r}",

@@ -145,7 +145,7 @@ class CurveStepper:
         self.frames: list[Frame] = []
         model, rigid = self._model, self._model.linkage.rigid
         assembly = assemble_before_strain(model.linkage, request.configuration, model.spring_potentials)
-        motors = assembly.fraction * rigid.motor_values(request.configuration.position)
+        motors = rigid.on_the_way(request.configuration.position, assembly.fraction)
         self.solver = discretisation.solver(request.part, request.others)
         self._system, self._joints = self.solver.system, model.linkage.joints
         self.freedom = count_freedom(rigid, assembly.poses, motors, model.spring_potentials, self._system.idle)
@@ -234,18 +234,18 @@ class CurveStepper:
     def _unloaded(self, assembly: Assembly) -> State:
         """The configuration without force or effect: the rigid assembly, or the equilibrium with strained links."""
         configuration, fraction = self.request.configuration, assembly.fraction
-        motors = self._joints.motor_values(configuration.position)
+        drawn, here, there = (self._joints.on_the_way(configuration.position, part) for part in (0.0, fraction, 1.0))
         state = replace(
-            self._model.assembled_state(assembly.poses, fraction * motors),
+            self._model.assembled_state(assembly.poses, here),
             load_factor=0.0 if self.request.others or self._model.effects else 1.0,
             minimum_shift=LoadSteps().minimum_shift if self.freedom.zero_energy else 0.0,
         )
         if fraction == 1.0:
             return state
-        control = MotorControl(fraction, motors)
+        control = MotorControl(fraction, there - drawn, origin=drawn)
         stepper = MotorStepper(self.solver, state, control, predictor=self.discretisation.predictor)
         # a quarter of a radian, or of the mechanism's length: in space a motor's equation is periodic
-        steps = int(np.ceil((1.0 - fraction) * self._joints.travel(motors) / 0.25))
+        steps = int(np.ceil((1.0 - fraction) * self._joints.travel(there - drawn) / 0.25))
         try:
             for value in np.linspace(fraction, 1.0, steps + 1)[1:]:
                 state = stepper.advance(control.at(float(value))).state

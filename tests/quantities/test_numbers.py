@@ -27,6 +27,7 @@ NUMBERS = {
     "depth of both": (lambda bench: fm.Depth(*links(bench)), (0.1, 0.05, 0.025, 0.0125)),
     "stiffness": (lambda bench: fm.SpringStiffness(*bench.simulation.scene.effects), (8.0, 4.0, 2.0, 1.0)),
     "rest": (lambda bench: fm.SpringRest(*bench.simulation.scene.effects), (0.1, 0.05, 0.025)),
+    "offset": (lambda bench: fm.MotorOffset(*bench.simulation.scene.mechanism.motors), (0.04, 0.02, 0.01, 0.005)),
 }
 CASES = ("plane-stress", "plane-stress moved", "plane-strain pressure", "3d-symmetric", "3d moved", "3d pressure")
 

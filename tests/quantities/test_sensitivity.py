@@ -54,7 +54,7 @@ class Bench:
         self.simulation = fm.Simulation(scene, space=space, size=4.0, formulation=formulation, comm=comm)
         self.model, self.moved = self.simulation.model, moved
         self.solver, self.adjoint = self.simulation.solver(self.force), Sensitivity(self.model)
-        self.space = self.model.elastic.d.function_space
+        self.space = self.model.elastic.shape.function_space
         self.owned = self.space.dofmap.index_map.size_local * self.space.dofmap.index_map_bs
         self.quantities: list[fm.Quantity] = [
             fm.ForceMagnitude(self.force) if moved else fm.Displacement(self.force),
@@ -92,11 +92,13 @@ class Bench:
     def state(self, design: np.ndarray, change: float = 0.0) -> State:
         """The equilibrium of the given design."""
         self.model.reshape(design)
+        curve = self.simulation.load_displacement(self.force, forces=[0.0], configuration=self.turned)
+        self.model.load(curve.unloaded)
+        unloaded = self.model.travel(self.force, curve.unloaded)
         if not hasattr(self, "origin"):
-            curve = self.simulation.load_displacement(self.force, forces=[0.0], configuration=self.turned)
-            self.model.load(curve.frames[0].state)
-            self.origin = self.model.travel(self.force, curve.frames[0].state)
-        value = (PLACE if self.moved else FORCE) + change
+            self.origin = unloaded
+        # curves count displacements from the unloaded configuration of each design
+        value = PLACE + self.origin - unloaded + change if self.moved else FORCE + change
         samples = {"displacements" if self.moved else "forces": [value / 2, value]}
         return self.simulation.load_displacement(self.force, configuration=self.turned, **samples).frames[-1].state
 
