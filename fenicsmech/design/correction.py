@@ -10,9 +10,9 @@ estimates of the discretisation error of Q̂. Only Q is differentiated. It is
   Those of the first round are loaded from zero and followed from round to round; the surrogate's at the optimum are
   loaded from zero again.
 
-c changes from round to round by the part by which the derivatives of Q and Q̂ + e differ, 2 to 8 % between plane stress
-and space. At the end the corrected values are the true ones to within the last change. Where a surrogate does not
-contract, the simulation that counts is minimised itself.
+c changes from round to round by the part by which the derivatives of Q and Q̂ + e differ. At the end the corrected
+values are the true ones to within the last change. Where a surrogate does not contract, the simulation that counts is
+minimised itself.
 
 Sources: J. W. Bandler et al., Space mapping: the state of the art (doi:10.1109/TMTT.2003.820904); for deferred
 correction V. Pereyra, Iterated deferred corrections for nonlinear operator equations (doi:10.1007/BF02165406).

@@ -60,7 +60,7 @@ class FollowOptions:
     Attributes:
         load_steps: least number to the largest load from zero; larger ones fail more often than they save a step.
         halvings: of a change of design whose equilibrium is not found, or lies elsewhere.
-        largest_miss: of the prediction, over |δ|: up to 1.7 on one branch, 3.8 and more across folds.
+        largest_miss: of the prediction, over |δ|; larger misses are those of equilibria across a fold.
         rounding: misses below this part of the mechanism's length, or rad, are rounding.
     """
 
