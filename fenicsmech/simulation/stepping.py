@@ -148,9 +148,9 @@ class CurveStepper:
         model, rigid = self._model, self._model.linkage.rigid
         assembly = assemble_before_strain(model.linkage, request.configuration, model.spring_potentials)
         motors = rigid.on_the_way(request.configuration.position, assembly.fraction)
-        self.freedom = count_freedom(rigid, assembly.poses, motors, model.spring_potentials)
         self.solver = discretisation.solver(request.part, request.others)
         self._system, self._joints = self.solver.system, model.linkage.joints
+        self.freedom = count_freedom(rigid, assembly.poses, motors, model.spring_potentials, self._system.idle)
         self.followed = discretisation.followed_control(request.part)
         self.origin, self._origins = 0.0, dict.fromkeys(model.mechanism.outputs, 0.0)
         self._snaps = 0  # so far, that no frame reports
