@@ -3,6 +3,7 @@
 - ``points``: interface nodes of the mesh as functions of body poses, the design field at nodes, material points
 - ``places``: the places of joints in the drawn configuration, which designs change
 - ``linkage``: bodies, constraints between them and potentials of their poses
+- ``idle_spins``: turns of bodies about the line through two balls, which nothing resists
 - ``assembly``: the rigid assembly of a configuration, and the motions that joints, motors and springs leave
 """
 
@@ -17,6 +18,7 @@ from fenicsmech.multibody.assembly import (
     is_held,
     stiff_motions,
 )
+from fenicsmech.multibody.idle_spins import IdleSpin, idle_spins
 from fenicsmech.multibody.linkage import (
     Body,
     Connection,
@@ -28,4 +30,4 @@ from fenicsmech.multibody.linkage import (
     spring_potentials,
 )
 from fenicsmech.multibody.places import JointChange, JointPlaces
-from fenicsmech.multibody.points import BodyPoint, DesignAtNodes, InterfaceMap, LinkPoint, link_point
+from fenicsmech.multibody.points import BodyPoint, DesignAtNodes, InterfaceMap, LinkPoint, link_point, shape_functions

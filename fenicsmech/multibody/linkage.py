@@ -126,6 +126,10 @@ class JointSystem:
         """Poses of all bodies as drawn, (bodies, pose_size)."""
         return np.tile(self.space.identity, (len(self.bodies), 1))
 
+    def is_ball(self, k: int) -> bool:
+        """Whether connection ``k`` holds a point and nothing else, in space."""
+        return self.space.dim == 3 and self.connections[k].kind.shares_point and len(self._joint_rows[k]) == 3
+
     def motor_values(self, positions) -> np.ndarray:
         """φ per connection from ``positions``, a function of a motor; 0 where there is none."""
         return np.array([0.0 if c.motor is None else positions(c.motor) for c in self.connections])
@@ -231,6 +235,11 @@ class JointSystem:
         """The point of connection ``k`` from the centre of one of its bodies, in the drawn configuration, (dim,)."""
         dim = self.space.dim
         return self.places[k][:dim] if body == self.connections[k].a else self.places[k][dim : 2 * dim]
+
+    def place(self, k: int, body: int, poses: np.ndarray) -> np.ndarray:
+        """Where the point of connection ``k`` on one of its bodies is at ``poses`` (bodies, pose_size), (dim,)."""
+        arm = self.arm(k, body)
+        return np.array(self.bodies[body].centre) + arm + self.space.displace(poses[body], arm[None])[0]
 
     def motor_rate(
         self, poses: np.ndarray, motors: np.ndarray, multipliers: np.ndarray, direction: np.ndarray

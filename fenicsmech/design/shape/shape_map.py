@@ -39,10 +39,10 @@ class ShapeRequest:
         reach: how far each interface extends from its joint in the plane, (sites,).
         segments: number of cubic segments.
         centreline: approximated by the spline.
+        thickness: in the plane, where δ = 1, or the outline that it is measured on.
         ends_move: whether free ends may move.
         joints_move: whether joints may.
         follows: whether the shape has no parameters of its own, and follows joints alone.
-        thickness: in the plane, where δ = 1, or the outline that it is measured on; None: the mean width of the link.
         spacing: arc length between handles; None: the mean width of the link.
     """
 
@@ -53,10 +53,10 @@ class ShapeRequest:
     reach: tuple[float, ...]
     segments: int
     centreline: Centreline
+    thickness: float | LinkOutline
     ends_move: bool = False
     joints_move: bool = False
     follows: bool = False
-    thickness: float | LinkOutline | None = None
     spacing: float | None = None
 
 
@@ -122,8 +122,8 @@ def shape_link(mesh: LinkMesh, request: ShapeRequest) -> LinkShape:
     layout = lay_out(request.centreline, joints, request.reach, request.segments, part=f"design of {part}")
     moves = {"ends_move": request.ends_move, "joints_move": request.joints_move}
     fit = fit_spline(request.centreline, joints, layout, **moves, part=f"spline of {part}")
-    width = _mean_width(mesh, request.centreline.length)
-    handles = _place_handles(mesh, fit, spacing=request.spacing or width, turns=request.turns, part=part)
+    spacing = request.spacing or _mean_width(mesh, request.centreline.length)
+    handles = _place_handles(mesh, fit, spacing=spacing, turns=request.turns, part=part)
     weights = handle_weights(mesh, handles, part=part)
     hidden = int(np.sum(weights.max(axis=0) < 1e-6))  # between vertices that interfaces hold
     if hidden:
@@ -133,7 +133,7 @@ def shape_link(mesh: LinkMesh, request: ShapeRequest) -> LinkShape:
             "Use smaller elements",
         )
     edges = edge_weights(mesh, weights)
-    drawn = request.thickness or width
+    drawn = request.thickness
     thickness = _measured(drawn, fit.spline, part=f"design of {part}") if isinstance(drawn, LinkOutline) else drawn
     centreline = request.centreline.evaluate(request.centreline.knots)
     return LinkShape(request.link, request.name, handles, weights, edges, thickness, centreline, request.follows)
