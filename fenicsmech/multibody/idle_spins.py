@@ -29,7 +29,7 @@ from fenicsmech.multibody.linkage import JointSystem, Linkage
 
 @dataclass(frozen=True)
 class IdleSpin:
-    """``bodies`` of a ``system`` that turn idly, and the connections ``balls`` that hold them, with the body of each."""
+    """``bodies`` of a ``system`` that turn idly; ``balls``, the connections that hold them, each with its body."""
 
     system: JointSystem
     bodies: tuple[int, ...]
