@@ -35,6 +35,7 @@ NUMBERS = {
         lambda bench: fm.JointPosition(joints(bench)[0], joints(bench)[2], direction=(0.3, 1)),
         (0.4, 0.2, 0.1, 0.05),
     ),
+    "axis": (lambda bench: fm.JointAxis(joints(bench)[3], about=(1, 0.4, 0)), (0.2, 0.1, 0.05)),
     "rest": (lambda bench: fm.SpringRest(*bench.simulation.scene.effects), (0.1, 0.05, 0.025)),
     "offset": (lambda bench: fm.MotorOffset(*bench.simulation.scene.mechanism.motors), (0.04, 0.02, 0.01, 0.005)),
 }
@@ -58,6 +59,8 @@ def bench(request) -> Bench:
 
 @pytest.mark.parametrize("name", NUMBERS)
 def test_derivatives_by_a_number(bench, name):
+    if name == "axis" and bench.model.linkage.dim == 2:
+        pytest.skip("axes of hinges do not turn in the plane")
     describe, steps = NUMBERS[name]
     kind, base = describe(bench), bench.field(1)
     kind.check(bench.simulation.scene, bench.model.linkage.dim)
