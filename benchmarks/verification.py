@@ -52,6 +52,11 @@ CASES = (
         "simulation/test_pinned_link.py",
     ),
     Case("two flexible links in a four-bar against CalculiX on the same mesh", "1e-3", "simulation/test_calculix.py"),
+    Case(
+        "forces on a disc, a rectangle, a face and a patch of a flexible link against CalculiX on the same mesh",
+        "1e-3",
+        "simulation/test_calculix_regions.py",
+    ),
     Case("Cook's membrane, plane strain, P2 on 16 × 16: 14.74 mm at mid-edge", "0.3 %", "elasticity/test_cook.py"),
     Case(
         "rubber, ν → 0.5, mixed u–p: evenly stretched blocks; orders of displacement and pressure in a blown-up tube",

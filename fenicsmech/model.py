@@ -280,12 +280,12 @@ class MechanismModel:
         self.interfaces = InterfaceMap(
             self.elastic.u, self.elastic.drawn_nodes, cell_body, centres, linkage.joints.space
         )
-        self.design_nodes = DesignAtNodes(self.elastic.d, self.elastic.u)
+        self.design_nodes = DesignAtNodes(self.elastic.shape.function_space, self.elastic.u.function_space)
         self.node_link = np.full(len(self.interfaces.body), -1)
         self.node_link[cell_dofs(self.elastic.u.function_space)] = mesh.link[:, None]
         self._point_loads: dict[Force | Output, PointLoad] = {}
         self._numbers: dict[Hashable, Any] = {}
-        self._shape = np.zeros(len(self.elastic.d.x.array))
+        self._shape = self.elastic.design
 
     @property
     def flexible_dofs(self) -> int:
@@ -327,8 +327,9 @@ class MechanismModel:
         for kind, own in self._numbers.items():
             own.set(given.numbers.get(kind, own.drawn))
         self._shape = np.array(given.field)
-        self.elastic.d.x.array[:] = self._field(given)
-        self.interfaces.reshape(self.design_nodes.values())
+        design = self._field(given)
+        self.elastic.reshape(design)
+        self.interfaces.reshape(self.design_nodes.values(design))
 
     @contextmanager
     def shaped(self, design: Design | np.ndarray) -> Iterator[None]:
@@ -374,7 +375,7 @@ class MechanismModel:
         """Changes the design and guesses the equilibrium there from the one at the present design."""
         self.load(state)
         given = self._given(design)
-        carried = self.elastic.carried(self._field(given) - self.elastic.d.x.array)
+        carried = self.elastic.carried(self._field(given) - self.elastic.design)
         self.reshape(given)
         displacements, *pressures = self.elastic.split(state.u)
         return replace(state, u=np.concatenate([carried[: len(displacements)], *pressures]))
@@ -382,7 +383,7 @@ class MechanismModel:
     def assembled_state(self, poses: np.ndarray, motors: np.ndarray) -> State:
         """The state of a rigid assembly: every flexible link carried along by its first interface."""
         dim, owned = self.linkage.dim, self.interfaces.owned
-        positions = self.elastic.drawn_nodes[:owned, :dim] + self.design_nodes.values()[:owned, :dim]
+        positions = self.elastic.drawn_nodes[:owned, :dim] + self.design_nodes.values(self.elastic.design)[:owned, :dim]
         u = np.zeros((owned, self.interfaces.block))
         for index, (body, *_) in enumerate(self.linkage.interfaces.values()):
             nodes = np.flatnonzero(self.node_link[:owned] == index)
@@ -405,10 +406,10 @@ class MechanismModel:
 
     def design_weights(self, part: str, link: FlexibleLink, positions: np.ndarray) -> csr_matrix:
         """Weights of this rank's owned nodes of the design field in it at drawn points of a link, (points, nodes)."""
-        d = self.elastic.d
-        index = d.function_space.dofmap.index_map
+        shape = self.elastic.shape
+        index = shape.function_space.dofmap.index_map
         weights = np.zeros((len(positions), index.size_local))
-        for row, point in zip(weights, self._link_points(part, link, positions, d), strict=True):
+        for row, point in zip(weights, self._link_points(part, link, positions, shape), strict=True):
             own = point.global_nodes - index.local_range[0]
             mine = (own >= 0) & (own < index.size_local)
             np.add.at(row, own[mine], point.weights[mine])

@@ -89,7 +89,7 @@ class ParametricShape:
         designs: Sequence[SplineDesign],
         numbers: Sequence[Number] = (),
     ) -> None:
-        self._model, design = model, model.elastic.d
+        self._model, design = model, fem.Function(model.elastic.shape.function_space)
         self._map = ShapeMap(model.mesh, design, shapes)
         changed = {piece.link: len(shape.every) for shape in shapes for piece in shape.every}
         self._cells = np.flatnonzero(np.isin(model.mesh.link, list(changed)))
@@ -102,9 +102,7 @@ class ParametricShape:
         self._shares = 1.0 / np.array([changed.get(link, 1) for link in range(len(model.mechanism.flexible_links))])
         self._optimum = HandleOptimum(self._vertex_map, self._ratio)
         ends, dim = node_ends(design.function_space), model.mesh.vertices.shape[1]
-        drawn = model.mesh.vertices[ends].mean(axis=1)
-        if model.elastic.bulge is not None:
-            drawn += model.elastic.bulge.x.array.reshape(-1, dim)
+        drawn = model.mesh.vertices[ends].mean(axis=1) + model.elastic.drawn_shape.reshape(-1, dim)
         self._middles = MidEdgeNodes(ends, drawn) if model.elastic.order > 1 else None
         self._penalties: dict[Barrier, QualitySum] = {}
         self.numbers = ScaledNumbers(model, numbers)
@@ -187,9 +185,9 @@ class ParametricShape:
                 raise ShapeError("rest shape", "it inverts cells", "Change it by less, or mesh it finer")
         if self._middles is not None:
             field = self._middles.placed(field)
-            bent = field if elastic.bulge is None else field + elastic.bulge.x.array.reshape(field.shape)
+            bent = field + elastic.drawn_shape.reshape(field.shape)
             corners, pairs = field.shape[1] + 1, edge_corners(field.shape[1] + 1)
-            values = bent[cell_dofs(elastic.d.function_space)[self._cells]]
+            values = bent[cell_dofs(elastic.shape.function_space)[self._cells]]
             bulges = values[:, corners:] - values[:, pairs].mean(axis=2)
             squeezed = least_stretches(mesh.corners(self._cells) + values[:, :corners], bulges[:, ::-1])
             least = mesh.mesh.comm.allreduce(float(squeezed.min(initial=1.0)), op=MPI.MIN)
@@ -213,7 +211,7 @@ class ParametricShape:
 
     def worst_ratio(self) -> float:
         """Largest ρ among the cells of the present rest shape that can deform."""
-        self._straight.interpolate(self._model.elastic.d)
+        self._straight.interpolate(self._model.elastic.shape)
         worst = float(self._ratio.cell_values()[self._deformable].max(initial=0.0))
         return self._model.mesh.mesh.comm.allreduce(worst, op=MPI.MAX)
 
@@ -223,7 +221,7 @@ class ParametricShape:
             counts = self._deformable * self._shares[self._model.mesh.link]
             self._penalties[barrier] = QualitySum(self._straight, barrier.symbolic, counts=counts)
         total = self._penalties[barrier]
-        self._straight.interpolate(self._model.elastic.d)
+        self._straight.interpolate(self._model.elastic.shape)
         slope = total.gradient()
         by_p, by_theta = self._vertex_map.apply_transpose(placement.p, placement.theta - self._lag, slope)
         by_q = self._model.mesh.comm.allreduce(self._vertex_rates @ slope.ravel(), op=MPI.SUM) * self.numbers.width
@@ -232,7 +230,7 @@ class ParametricShape:
     @cached_property
     def _vertex_rates(self) -> np.ndarray:
         """∂d/∂v of each number's value v at this rank's owned vertices, flat, (numbers, owned values)."""
-        field, vertices = (fem.Function(own.function_space) for own in (self._model.elastic.d, self._straight))
+        field, vertices = (fem.Function(own.function_space) for own in (self._model.elastic.shape, self._straight))
         rates = np.zeros((len(self.numbers.on_model), len(owned_values(vertices))))
         for row, own in zip(rates, self.numbers.on_model, strict=True):
             field.x.array[:] = own.rate

@@ -88,7 +88,7 @@ def verified_parts(result: DesignResult, part: Simulation, targets: Sequence[Tar
         targets: of the design problem.
     """
     comparison, measured = Comparison(targets, part.scene.units), [t for t in targets if t.quantity.of_part]
-    numbers = Design(np.zeros(len(part.model.elastic.d.x.array)), result.values(part.scene))
+    numbers = Design(np.zeros_like(part.model.elastic.shape.x.array), result.values(part.scene))
     designed = part.with_design(numbers)
     with part.model.shaped(numbers):
         equilibria = SampleEquilibria(designed, measured)

@@ -1,6 +1,6 @@
 """Energy, residual, stiffness and stress of all flexible links on the fixed reference mesh.
 
-With the rest shape X = X₀ + c + d and the gradient H = F − I of ``fields``,
+With the rest shape X = X₀ + s, s = c + d, and the gradient H = F − I of ``fields``,
 
     E(u, d) = ∫ W(H) det(∇X) b dX₀,
 

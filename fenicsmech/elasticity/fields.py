@@ -1,9 +1,11 @@
 """The fields of all flexible links on the fixed reference mesh: shape, displacement, pressure, parameters, growth.
 
-With reference coordinates X₀ of straight cells, the bulge c that curves them along the drawn outline, design d, rest
-shape X = X₀ + c + d and displacement u from the rest shape:
+With reference coordinates X₀ of straight cells, the bulge c that curves them along the drawn outline, the design d and
+displacement u from the rest shape:
 
-    H = F − I = ∇u (∇X)⁻¹,     ∇X = I + ∇c + ∇d.
+    X = X₀ + s,     s = c + d,     H = F − I = ∇u (∇X)⁻¹,     ∇X = I + ∇s.
+
+Forms hold s alone: c does not change, so ∂/∂d = ∂/∂s.
 
 Links whose strain-free state is not the one drawn have grown by F_p, and only F_e of F = F_e F_p strains the material:
 
@@ -129,8 +131,8 @@ class BodyFields:
 
     Attributes:
         u: displacement field, vector P_order.
-        d: design field, vector, of the same degree as c where that counts: P2, or P1 with linear displacements.
-        bulge: c, vector P2, or None.
+        shape: s = c + d, vector, P2, or P1 with linear displacements, which know no c.
+        bulge: c, in the space of s, or None.
         pressure: of the links in the u–p formulation, P_(order − 1); None if no link is.
         parameters: of the links' laws by name, each with one value per cell; changing them needs no compiling.
         depth: one value per cell.
@@ -160,7 +162,8 @@ class BodyFields:
         self.mesh, self.model, self.order, self.bulge, self._link = mesh, model, order, bulge, link
         self.effects = tuple(effects)
         self.u = fem.Function(vector_space(mesh, order), name="displacement")
-        self.d = fem.Function(vector_space(mesh, min(order, 2)), name="design")
+        self.shape = fem.Function(vector_space(mesh, min(order, 2)), name="shape")
+        self.reshape(np.zeros_like(self.shape.x.array))
         numbers = [material.law.parameters for material in materials]
         self.parameters = {
             name: self.cellwise([known.get(name, 0.0) for known in numbers])
@@ -206,14 +209,27 @@ class BodyFields:
 
     @property
     def rest_gradient(self):
-        """∇X = I + ∇c + ∇d, symbolic."""
-        return self.drawn_gradient + ufl.grad(self.d)
+        """∇X = I + ∇s, symbolic."""
+        return ufl.Identity(self.model.dim) + ufl.grad(self.shape)
 
     @property
     def rest(self):
-        """X = X₀ + c + d, symbolic."""
-        rest = ufl.SpatialCoordinate(self.mesh) + self.d
-        return rest if self.bulge is None else rest + self.bulge
+        """X = X₀ + s, symbolic."""
+        return ufl.SpatialCoordinate(self.mesh) + self.shape
+
+    @property
+    def drawn_shape(self) -> np.ndarray:
+        """c at this rank's nodes of s, ghosts last, flat."""
+        return np.zeros_like(self.shape.x.array) if self.bulge is None else self.bulge.x.array
+
+    @property
+    def design(self) -> np.ndarray:
+        """d = s − c at this rank's nodes of s, ghosts last, flat."""
+        return self.shape.x.array - self.drawn_shape
+
+    def reshape(self, design: np.ndarray) -> None:
+        """Takes values of d as those of ``design``."""
+        self.shape.x.array[:] = self.drawn_shape + design
 
     @cached_property
     def drawn_nodes(self) -> np.ndarray:
@@ -266,6 +282,6 @@ class BodyFields:
     @cached_property
     def _carrying(self) -> tuple[fem.Function, fem.Function, fem.Expression]:
         """A field for H δ, one for δ, and H δ at the nodes of u, compiled."""
-        V, change = self.u.function_space, fem.Function(self.d.function_space)
+        V, change = self.u.function_space, fem.Function(self.shape.function_space)
         moved = ufl.dot(self.gradient(self.u), change)
         return fem.Function(V), change, compile_expression(moved, interpolation_points(V), self.mesh.comm)

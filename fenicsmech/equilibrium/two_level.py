@@ -311,7 +311,7 @@ class CoarseLevel:
     def update(self) -> bool:
         """Takes the values of the KKT matrix; whether K₁ could be factored."""
         system, unknowns, first = self._system, self._system.unknowns, not self._matrix
-        self._design.interpolate(system.elastic.d)
+        self._design.interpolate(system.elastic.shape)  # at vertices, which bulges do not move
         self._interfaces.reshape(self._design.x.array.reshape(-1, system.joints.space.dim))
         self._map.turn(unknowns.poses)
         self._prolongation = self._values.matMult(self._map.map, result=self._prolongation)

@@ -112,11 +112,10 @@ class InterfaceMap:
 
 
 class DesignAtNodes:
-    """Interpolation of the vector field ``d`` at the nodes of the Lagrange field ``u`` on the same mesh."""
+    """Interpolation of design fields, vectors on the space ``coarse``, at the nodes of the Lagrange space ``fine``."""
 
-    def __init__(self, d: fem.Function, u: fem.Function) -> None:
-        coarse, fine = d.function_space, u.function_space
-        self._d, self._at_vertices, self._at_nodes = d, fem.Function(coarse), fem.Function(fine)
+    def __init__(self, coarse: fem.FunctionSpace, fine: fem.FunctionSpace) -> None:
+        self._at_vertices, self._at_nodes = fem.Function(coarse), fem.Function(fine)
         index, self._dim = coarse.dofmap.index_map, coarse.dofmap.index_map_bs
         # every component alike
         weights = interpolation_matrix(coarse, fine)[:: self._dim]
@@ -125,14 +124,14 @@ class DesignAtNodes:
         columns = order[np.searchsorted(vertices[order], weights.indices // self._dim)]
         self._matrix = csr_matrix((weights.data, columns, weights.indptr), shape=(weights.shape[0], len(vertices)))
 
-    def values(self) -> np.ndarray:
-        """d at all local nodes of u, (nodes, dim)."""
-        owned_values(self._at_nodes)[:] = (self._matrix @ self._d.x.array.reshape(-1, self._dim)).ravel()
+    def values(self, design: np.ndarray) -> np.ndarray:
+        """A field at all local nodes of ``fine``, (nodes, dim), from this rank's values with ghosts, flat."""
+        owned_values(self._at_nodes)[:] = (self._matrix @ design.reshape(-1, self._dim)).ravel()
         self._at_nodes.x.scatter_forward()
         return self._at_nodes.x.array.reshape(-1, self._dim).copy()
 
     def transpose(self, nodal: np.ndarray) -> np.ndarray:
-        """Nᵀ ``nodal`` ((owned nodes of u, dim)), this rank's owned values on the space of d, flat."""
+        """Nᵀ ``nodal`` ((owned nodes of ``fine``, dim)), this rank's owned values on ``coarse``, flat."""
         self._at_vertices.x.array[:] = (self._matrix.T @ nodal).ravel()
         add_ghosts(self._at_vertices)
         return owned_values(self._at_vertices).copy()

@@ -154,10 +154,8 @@ class _Depth(ModelNumber):
     def _heights(self) -> np.ndarray:
         """Z − Z_m of the nodes of the chosen links in space, else zero, as the design field, (nodes, dim)."""
         elastic, mesh = self._model.elastic, self._model.mesh
-        space, dim = elastic.d.function_space, elastic.model.dim
-        nodes = space.tabulate_dof_coordinates()[:, :dim]
-        if elastic.bulge is not None:
-            nodes = nodes + elastic.bulge.x.array.reshape(-1, dim)
+        space, dim = elastic.shape.function_space, elastic.model.dim
+        nodes = space.tabulate_dof_coordinates()[:, :dim] + elastic.drawn_shape.reshape(-1, dim)
         owner, heights = np.full(len(nodes), -1), np.zeros((len(nodes), dim))
         owner[cell_dofs(space)] = mesh.link[:, None]
         for link in np.flatnonzero(self._chosen) if dim == 3 else ():

@@ -139,7 +139,7 @@ class _Energy(Observable):
     def __init__(self, model: MechanismModel, form: ufl.Form) -> None:
         self._elastic = elastic = model.elastic
         self._states = {f"state {k}": own for k, own in enumerate(elastic.fields)}
-        self._form = FormValue(model, form, {"design": elastic.d, **self._states, **elastic.numbers})
+        self._form = FormValue(model, form, {"design": elastic.shape, **self._states, **elastic.numbers})
 
     def values(self, state):
         return np.array([self._form.value()])
@@ -155,11 +155,11 @@ class _Energy(Observable):
 
 
 class _Volume(RestObservable):
-    """A form in the design field and the depth."""
+    """A form in the shape and the depth."""
 
     def __init__(self, model: MechanismModel, form: ufl.Form) -> None:
         self._depths = {name: own for name, own in model.elastic.numbers.items() if own is model.elastic.depth}
-        self._form = FormValue(model, form, {"design": model.elastic.d, **self._depths})
+        self._form = FormValue(model, form, {"design": model.elastic.shape, **self._depths})
 
     def value(self):
         return self._form.value()
@@ -234,6 +234,6 @@ class _Chords(RestObservable):
     def _chords(self) -> np.ndarray:
         """ΔX, (chords, 2)."""
         elastic, own = self._model.elastic, self._weights
-        design = elastic.d.x.array.reshape(-1, elastic.model.dim)[: own.shape[1], :2]
+        design = elastic.design.reshape(-1, elastic.model.dim)[: own.shape[1], :2]
         moved = self._model.mesh.comm.allreduce(own @ design)
         return np.diff(self._drawn + moved, axis=0)

@@ -116,7 +116,7 @@ class Sensitivity:
 
     def _gradient(self, adjoint: Adjoint | None, partial: Partial) -> Gradient:
         model = self._model
-        design = np.zeros(len(owned_values(model.elastic.d))) + partial.design
+        design = np.zeros(len(owned_values(model.elastic.shape))) + partial.design
         if adjoint is None:
             return Gradient(design, self._by_numbers(design, None, partial))
         for weight, values in zip(self._weights, model.elastic.split(adjoint.nodal), strict=True):
@@ -168,5 +168,5 @@ class Sensitivity:
             ufl.derivative(elastic.energy_ufl, own, weight)
             for own, weight in zip(elastic.fields, self._weights, strict=True)
         )
-        by = {"design": elastic.d, "displacement": elastic.u, **elastic.numbers}
+        by = {"design": elastic.shape, "displacement": elastic.u, **elastic.numbers}
         return FormValue(self._model, sum(more, start=first), by)

@@ -72,16 +72,15 @@ def _gathered(comm: MPI.Comm, numbers: np.ndarray, values: np.ndarray, count: in
 def rest_vertices(model: MechanismModel) -> np.ndarray | None:
     """Vertices of the present rest shape on rank 0, (vertices, dim); None elsewhere."""
     mesh, drawn = model.mesh.mesh, model.mesh.vertices
-    design = _gathered(mesh.comm, original_nodes(mesh), at_vertices(model, model.elastic.d), len(drawn))
+    # which bulges do not move
+    design = _gathered(mesh.comm, original_nodes(mesh), at_vertices(model, model.elastic.shape), len(drawn))
     return None if design is None else drawn + design
 
 
 def rest_geometry(model: MechanismModel) -> tuple[np.ndarray, CurvedEdges] | None:
     """Vertices (vertices, dim) and curved edges of the present rest shape on rank 0; None elsewhere."""
     elastic, vertices = model.elastic, rest_vertices(model)
-    ends, nodes = node_ends(elastic.d.function_space), elastic.d.x.array.reshape(-1, elastic.model.dim)
-    if elastic.bulge is not None:
-        nodes = nodes + elastic.bulge.x.array.reshape(nodes.shape)
+    ends, nodes = node_ends(elastic.shape.function_space), elastic.shape.x.array.reshape(-1, elastic.model.dim)
     between = ends[:, 0] != ends[:, 1]
     parts = model.mesh.comm.gather((ends[between], nodes[between]), root=0)
     if parts is None or vertices is None:
@@ -200,7 +199,7 @@ def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame])
     folder, forces = from_one(comm, new_folder), np.array([frame.force for frame in frames])
     x, drawn = mesh.geometry.x, mesh.geometry.x.copy()
     with model.shaped(frames[0].design):
-        rest = at_vertices(model, elastic.d)
+        rest = at_vertices(model, elastic.shape)
     # only here the coordinates of a mesh change: dolfinx writes functions with their own mesh
     try:
         x[:, : elastic.model.dim] += rest

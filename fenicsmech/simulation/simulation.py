@@ -291,7 +291,7 @@ class Simulation:
             given = Design(design)
         else:
             given = design if isinstance(design, Design) else design.rest_shape(self)
-        size = len(self.model.elastic.d.x.array)
+        size = len(self.model.elastic.shape.x.array)
         if self.comm.allreduce(int(given.field.shape != (size,))):
             raise DescriptionError(
                 f"design of {self.scene.mechanism.name!r}",

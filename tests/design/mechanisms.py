@@ -66,7 +66,7 @@ class Bench:
 
     def field(self) -> np.ndarray:
         """The design field that the model holds, this rank's values, flat."""
-        return self.simulation.model.elastic.d.x.array.copy()
+        return self.simulation.model.design.field
 
 
 def bench(case: Case, simulation: fm.Simulation) -> Bench:

@@ -21,7 +21,7 @@ def test_displacement_sensitivities_hold_close_to_a_limit_point(gap):
     path = simulation.follow(push, until=fm.Until(displacement=0.7 * RISE))
     force = (1.0 - gap) * path.limit_points[0].frame.force
     model = simulation.model
-    positions = model.elastic.d.function_space.tabulate_dof_coordinates()
+    positions = model.elastic.shape.function_space.tabulate_dof_coordinates()
     rise = np.zeros((len(positions), 2))
     rise[:, 1] = np.sin(np.pi * positions[:, 0] / SPAN)
 
@@ -48,7 +48,7 @@ def test_displacement_sensitivities_hold_close_to_a_limit_point(gap):
 
 def lowered(model, by: float) -> None:
     """Makes the arch of ``model`` lower by a fraction of its rise."""
-    positions = model.elastic.d.function_space.tabulate_dof_coordinates()
+    positions = model.elastic.shape.function_space.tabulate_dof_coordinates()
     fall = np.zeros((len(positions), 2))
     fall[:, 1] = -by * RISE * np.sin(np.pi * positions[:, 0] / SPAN)
     model.reshape(fall.ravel())
@@ -71,11 +71,11 @@ def test_design_path_across_a_fold_is_reported(nearly_snapping, fall):
     lowered(simulation.model, 0.0)
     known = equilibria.from_zero()
     lowered(simulation.model, fall)
-    there = simulation.model.elastic.d.x.array.copy()
+    there = simulation.model.elastic.design
     if fall > 0.012:
         with pytest.raises(Infeasible, match="fold"):
             equilibria.from_design(known)
-        assert np.array_equal(simulation.model.elastic.d.x.array, there)
+        assert np.array_equal(simulation.model.elastic.design, there)
         with pytest.raises(Infeasible, match="snaps"):
             equilibria.from_zero()
     else:

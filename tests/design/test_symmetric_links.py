@@ -30,7 +30,7 @@ def test_links_are_shaped_alike_and_exported_whole(tmp_path):
         problem = fm.DesignProblem(simulation, case.designs, targets=case.targets)
         parts = bench(case, simulation)
         values = problem.rest_shape(parts.design()).field.reshape(-1, 3)
-        places = simulation.model.elastic.d.function_space.tabulate_dof_coordinates()
+        places = simulation.model.elastic.shape.function_space.tabulate_dof_coordinates()
         at_mid_plane = np.abs(places[:, 2]) < 1e-9
         order = np.lexsort(places[at_mid_plane].round(6).T)
         fields.append(values[at_mid_plane][order])

@@ -14,7 +14,7 @@ from ..design.in_plane import design_field
 def assert_design_gradient(simulation: fm.Simulation, push: Force, load: float) -> None:
     """The adjoint gradient of the displacement under ``load``, along a wavy change of shape."""
     model, dim = simulation.model, simulation.linkage.dim
-    places = model.elastic.d.function_space.tabulate_dof_coordinates()[:, :dim]
+    places = model.elastic.shape.function_space.tabulate_dof_coordinates()[:, :dim]
     direction = design_field(model, np.sin(places @ np.diag([0.2, 0.1, 0.3][:dim])))
 
     def solve_at(step: float) -> tuple[fm.Frame, float]:

@@ -92,7 +92,7 @@ def test_without_contact_no_boundary_is_looked_for():
 def test_displacements_in_contact_are_differentiated_by_the_design_field(space, comm):
     case = finger(space, comm=comm)
     model = case.simulation.model
-    V = model.elastic.d.function_space
+    V = model.elastic.shape.function_space
     wave = np.sin(V.tabulate_dof_coordinates()[:, : model.linkage.dim] @ np.diag([0.2, 0.1, 0.3][: model.linkage.dim]))
     base, direction = (design_field(model, field) for field in (0.2 * wave, 0.3 * np.roll(wave, 1, axis=1)))
 

@@ -28,7 +28,7 @@ def strip(space: str, obstacle, order: int) -> tuple[Contact, object]:
     contact = Contact(link, obstacle)
     model = fm.Simulation(fm.Scene(mechanism, effects=[contact]), space=space, size=2.0, order=order).model
     fields = model.fields
-    interpolate(fields.body.d, wave(fields.dim, 0.2, seed=1))
+    interpolate(fields.body.shape, wave(fields.dim, 0.2, seed=1))
     interpolate(fields.u, wave(fields.dim, 0.2, seed=2))
     return contact, fields
 
@@ -42,7 +42,7 @@ def test_energy_and_its_gradient_are_differentiated_by_state_and_design(space, o
     interpolate(work, wave(fields.dim, 1.0, seed=5))
     assert fem.assemble_scalar(compile_form(energy)) > 0.0
     for form in (energy, ufl.derivative(energy, fields.u, work)):
-        for field in (fields.u, fields.body.d):
+        for field in (fields.u, fields.body.shape):
             found = form_derivative(form, field, size=0.02, seed=4)
             # the gradient has kinks where points come into contact, none of them on the last step; on a half-plane it
             # is linear in u between them, and what remains is the rounding of values

@@ -74,11 +74,11 @@ def test_areas_are_those_of_the_rest_shape(bars):
     end, flank = Faces(lower, left), Faces(lower, top)
     fields = bars.fields(end, flank)
     dim = fields.dim
-    places = fields.body.d.function_space.tabulate_dof_coordinates()[:, :dim]
+    places = fields.body.shape.function_space.tabulate_dof_coordinates()[:, :dim]
     # x is stretched by 1.5, y by 0.5 and sheared along x
     change = np.zeros((dim, dim))
     change[0, 0], change[0, 1], change[1, 1] = 0.5, 0.75, -0.5
-    fields.body.d.x.array[:] = (places @ change.T).ravel()
+    fields.body.shape.x.array[:] = (places @ change.T).ravel()
     assert bars.area(fields, end) == pytest.approx(THICKNESS * np.hypot(0.75, 0.5) * DEPTH, rel=1e-12)
     assert bars.area(fields, flank) == pytest.approx(1.5 * LENGTH * DEPTH, rel=1e-12)
 

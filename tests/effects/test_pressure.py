@@ -31,7 +31,7 @@ MODELS = {2: PLANE_STRAIN, 3: SPATIAL}
 def test_virtual_work_on_a_closed_boundary_is_that_of_the_deformed_normals(dim, order, about):
     pressed = PressedBody(*distorted(dim), MODELS[dim], 0.7, order=order, about=about)
     fields, work = pressed.fields, fem.Function(pressed.body.u.function_space)
-    for field, size, seed in ((fields.body.d, 0.2, 1), (fields.u, 0.2, 2), (work, 1.0, 3)):
+    for field, size, seed in ((fields.body.shape, 0.2, 1), (fields.u, 0.2, 2), (work, 1.0, 3)):
         interpolate(field, wave(dim, size, seed=seed))
     found = fem.assemble_scalar(compile_form(ufl.derivative(pressed.effect.link_energy(fields), fields.u, work)))
     (part,) = pressed.effect.faces
@@ -44,11 +44,11 @@ def test_virtual_work_on_a_closed_boundary_is_that_of_the_deformed_normals(dim, 
 def test_energy_and_its_gradient_are_differentiated_by_state_and_design(dim, where):
     pressed = PressedBody(*distorted(dim), MODELS[dim], 0.7, where=where, about=(0.3, 0.2, 0.1)[:dim])
     fields, work = pressed.fields, fem.Function(pressed.body.u.function_space)
-    for field, size, seed in ((fields.body.d, 0.2, 1), (fields.u, 0.2, 2), (work, 1.0, 3)):
+    for field, size, seed in ((fields.body.shape, 0.2, 1), (fields.u, 0.2, 2), (work, 1.0, 3)):
         interpolate(field, wave(dim, size, seed=seed))
     energy = pressed.effect.link_energy(fields)
     for form in (energy, ufl.derivative(energy, fields.u, work)):
-        for field in (fields.u, fields.body.d):
+        for field in (fields.u, fields.body.shape):
             rates = form_derivative(form, field, size=0.1, seed=4).rates
             # areas in the plane are quadratic, so their gradient is linear
             assert rates.with_gradient.min() > 1.95 or rates.remainder.max() < 1e-12

@@ -71,7 +71,7 @@ def test_a_free_bar_of_rubber_does_so_without_pressure(space, stretch):
 @pytest.mark.parametrize("space", ["plane-strain", "3d"])
 def test_residuals_of_displacement_and_pressure_are_differentiated_by_the_load_factor(space):
     body = bar(space, 1.2, along=(0.8, 0.6), material=RUBBER)[0].model.elastic
-    for field, size, seed in ((body.d, 0.1, 1), (body.u, 0.1, 2)):
+    for field, size, seed in ((body.shape, 0.1, 1), (body.u, 0.1, 2)):
         interpolate(field, wave(body.model.dim, size, seed=seed))
     body.pressure.p.x.array[:] = np.linspace(-30.0, 20.0, len(body.pressure.p.x.array))
     weights = np.random.default_rng(4).uniform(-1.0, 1.0, len(body.values()))
@@ -115,12 +115,12 @@ def test_energy_and_its_gradient_are_differentiated(space, along):
     simulation, _ = bar(space, 1.2, along=along)
     body, dim = simulation.model.elastic, simulation.linkage.dim
     work = fem.Function(body.u.function_space)
-    for field, size, seed in ((body.d, 0.1, 1), (body.u, 0.1, 2), (work, 1.0, 3)):
+    for field, size, seed in ((body.shape, 0.1, 1), (body.u, 0.1, 2), (work, 1.0, 3)):
         interpolate(field, wave(dim, size, seed=seed))
     body.load_factor.value = 0.8
     residual = ufl.derivative(body.energy_ufl, body.u, work)
     for form in (body.energy_ufl, residual):
-        for field in (body.u, body.d):
+        for field in (body.u, body.shape):
             assert form_derivative(form, field, size=0.05, seed=5).rates.with_gradient[-1] > 1.95
 
     # what the path of growing effects needs: the derivative of the residual by the load factor

@@ -23,7 +23,8 @@ class ContactGauge:
         self._form = compile_form(-ufl.derivative(contact.link_energy(fields), fields.u))
         (faces,) = contact.faces
         V = fields.u.function_space
-        self._design, self._forces = fem.Function(V), fem.Function(V)
+        self._shape, self._forces = fem.Function(V), fem.Function(V)
+        self._straight = V.tabulate_dof_coordinates()[:, : fields.dim]
         self._nodes = fem.locate_dofs_topological(V, fields.dim - 1, fields.boundaries[faces].facets)
 
     def force(self) -> np.ndarray:
@@ -35,8 +36,8 @@ class ContactGauge:
     def gap(self) -> float:
         """The smallest gap at nodes of the link's boundary; where negative, the largest penetration."""
         fields = self._fields
-        self._design.interpolate(fields.body.d)
-        moved = fields.body.drawn_nodes + (self._design.x.array + fields.u.x.array).reshape(-1, fields.dim)
+        self._shape.interpolate(fields.body.shape)
+        moved = self._straight + (self._shape.x.array + fields.u.x.array).reshape(-1, fields.dim)
         gaps = self._obstacle.gap(moved[self._nodes].T, self._obstacle.numbers, np.sqrt)
         return fields.mesh.comm.allreduce(float(gaps.min(initial=np.inf)), op=MPI.MIN)
 

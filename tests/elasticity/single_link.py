@@ -69,7 +69,7 @@ def components(body: ElasticBody, where: Callable[[np.ndarray], np.ndarray]) -> 
 def rest_shape(body: ElasticBody) -> np.ndarray:
     """X = X₀ + d at the nodes of u, (n, dim)."""
     design = fem.Function(body.u.function_space)
-    design.interpolate(body.d)
+    design.interpolate(body.shape)
     return nodes(body.u) + design.x.array.reshape(-1, body.model.dim)
 
 

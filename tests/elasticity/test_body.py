@@ -73,7 +73,7 @@ def test_units_do_not_matter(model, law, order):
         body = single_link(
             points * length, cells, model=model, law=law, order=order, young=1770.0 * stress, depth=2.5 * length
         )
-        for field, seed in ((body.d, 1), (body.u, 2)):
+        for field, seed in ((body.shape, 1), (body.u, 2)):
             interpolate(field, lambda x, length=length, seed=seed: length * wave(model.dim, 0.2, seed=seed)(x / length))
         seen.append((body.energy() / length, forces(body), body.von_mises() / stress))
     (energy, force, stress), (energy_in_m, force_in_m, stress_in_pa) = seen

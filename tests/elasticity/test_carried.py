@@ -18,7 +18,7 @@ each_order = pytest.mark.parametrize("order", [1, 2])
 
 def change_of(body: ElasticBody, amplitude: float) -> np.ndarray:
     """A smooth change of the rest shape, as values of d."""
-    change = fem.Function(body.d.function_space)
+    change = fem.Function(body.shape.function_space)
     interpolate(change, wave(body.model.dim, amplitude, seed=7))
     return change.x.array.copy()
 
@@ -29,12 +29,12 @@ def change_of(body: ElasticBody, amplitude: float) -> np.ndarray:
 @each_model
 def test_a_link_that_was_moved_rigidly_stays_so_in_its_new_shape(model, order, angle):
     body = single_link(*distorted(model.dim), model=model, order=order, comm=MPI.COMM_WORLD)
-    interpolate(body.d, wave(model.dim, 0.2, seed=1))
+    interpolate(body.shape, wave(model.dim, 0.2, seed=1))
     turn = rotation(model.dim, angle)
     move(body, turn)
     change = change_of(body, 0.1)
     carried = body.carried(change).reshape(-1, model.dim)
-    body.d.x.array[:] += change
+    body.shape.x.array[:] += change
     X = rest_shape(body)
     expected = X @ (turn - np.eye(model.dim)).T + SHIFT[: model.dim]
     assert carried == pytest.approx(expected, abs=1e-12 * np.abs(expected).max())
@@ -44,13 +44,13 @@ def test_a_link_that_was_moved_rigidly_stays_so_in_its_new_shape(model, order, a
 @each_model
 def test_displacement_and_shape_are_left_as_they_are(model, order):
     body = single_link(*distorted(model.dim), model=model, order=order)
-    interpolate(body.d, wave(model.dim, 0.2, seed=1))
+    interpolate(body.shape, wave(model.dim, 0.2, seed=1))
     interpolate(body.u, wave(model.dim, 0.2, seed=2))
-    before = body.u.x.array.copy(), body.d.x.array.copy()
+    before = body.u.x.array.copy(), body.shape.x.array.copy()
     body.carried(change_of(body, 0.1))
     assert np.array_equal(body.u.x.array, before[0])
-    assert np.array_equal(body.d.x.array, before[1])
-    assert body.carried(np.zeros_like(body.d.x.array)) == pytest.approx(body.u.x.array, abs=1e-15)
+    assert np.array_equal(body.shape.x.array, before[1])
+    assert body.carried(np.zeros_like(body.shape.x.array)) == pytest.approx(body.u.x.array, abs=1e-15)
 
 
 @each_order
@@ -61,5 +61,5 @@ def test_a_uniform_stretch_carries_every_node_along(model, order):
     interpolate(body.u, lambda X: X @ stretch.T)
     change = change_of(body, 0.1)
     carried = body.carried(change).reshape(-1, model.dim)
-    body.d.x.array[:] += change
+    body.shape.x.array[:] += change
     assert carried == pytest.approx(rest_shape(body) @ stretch.T, abs=1e-13)

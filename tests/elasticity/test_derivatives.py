@@ -12,14 +12,14 @@ from .cases import CASES, name
 from .single_link import distorted, forces, interpolate, single_link, stiffness_matrix, wave
 
 STEPS = 10.0 ** -np.arange(2.0, 4.5, 0.5)
-PARAMETERS = ("u", "d", "E", "nu")
+PARAMETERS = ("u", "shape", "E", "nu")
 
 
 @pytest.fixture(scope="module", params=CASES, ids=lambda case: "-".join(map(name, case)))
 def body(request):
     model, law = request.param
     body = single_link(*distorted(model.dim), model=model, law=law, depth=2.5)
-    interpolate(body.d, wave(model.dim, 0.2, seed=1))
+    interpolate(body.shape, wave(model.dim, 0.2, seed=1))
     interpolate(body.u, wave(model.dim, 0.2, seed=2))
     return body
 
@@ -79,6 +79,6 @@ def test_work_of_the_residual_is_differentiated_by_the_design(body):
     z = fem.Function(body.u.function_space)
     interpolate(z, wave(body.model.dim, 1.0, seed=5))
     gradient = fem.assemble_vector(
-        compile_form(ufl.derivative(ufl.derivative(body.energy_ufl, body.u, z), body.d))
+        compile_form(ufl.derivative(ufl.derivative(body.energy_ufl, body.u, z), body.shape))
     ).array
-    assert rates(body.d, lambda: forces(body) @ z.x.array, gradient).min() > 1.95
+    assert rates(body.shape, lambda: forces(body) @ z.x.array, gradient).min() > 1.95

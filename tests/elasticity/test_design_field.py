@@ -18,7 +18,7 @@ def test_energy_force_and_stress_are_those_of_the_mesh_with_moved_vertices(model
     redesigned = single_link(points, cells, model=model, law=law, order=order, depth=2.5)
     linear = fem.Function(vector_space(redesigned.mesh, 1))  # straight edges stay straight
     interpolate(linear, redesign)
-    redesigned.d.interpolate(linear)
+    redesigned.shape.interpolate(linear)
     moved = single_link(points + redesign(points), cells, model=model, law=law, order=order, depth=2.5)
     assert nodes(moved.u) == pytest.approx(rest_shape(redesigned), abs=1e-14)  # the same numbering
     assert np.array_equal(original_cells(moved.mesh), original_cells(redesigned.mesh))

@@ -17,7 +17,7 @@ def loaded(model, law, *, order: int = 2):
     """A body somewhere, with no symmetry, and its values."""
     body = single_link(*distorted(model.dim), model=model, law=law, order=order, poisson=0.4999, mixed=True)
     interpolate(body.u, wave(model.dim, 0.05, seed=1))
-    interpolate(body.d, wave(model.dim, 0.02, seed=2))
+    interpolate(body.shape, wave(model.dim, 0.02, seed=2))
     random = np.random.default_rng(3)
     body.pressure.p.x.array[:] = random.uniform(-1.0, 1.0, len(body.pressure.p.x.array))
     return body, body.values(), random.uniform(-0.03, 0.03, len(body.values()))

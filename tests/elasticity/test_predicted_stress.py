@@ -14,7 +14,7 @@ from .single_link import distorted, forces, interpolate, nodes, single_link, sti
 def body(request):
     model, law = request.param
     body = single_link(*distorted(model.dim), model=model, law=law, depth=2.5)
-    interpolate(body.d, wave(model.dim, 0.1, seed=1))
+    interpolate(body.shape, wave(model.dim, 0.1, seed=1))
     return body
 
 
@@ -45,14 +45,14 @@ def test_step_that_turns_predicts_no_stress_where_its_displacements_stretch(body
     skew[0, 1], skew[1, 0] = 0.3, -0.3
     turn = values(body, lambda x: x @ skew)  # of the drawn shape: it turns all of it
     at_rest = np.zeros_like(turn)
-    mesh_only = body.d.x.array.copy()
-    body.d.x.array[:] = 0.0
+    mesh_only = body.shape.x.array.copy()
+    body.shape.x.array[:] = 0.0
     body.u.x.array[:] = turn
     predicted.take(at_rest, turn)
     stretched = forces(body)
     assert np.abs(stretched).max() > 1e-3
     assert predicted.forces() == pytest.approx(-stretched, abs=1e-12 * np.abs(stretched).max())
-    body.d.x.array[:] = mesh_only
+    body.shape.x.array[:] = mesh_only
 
 
 def test_difference_to_the_stress_of_the_displacements_is_of_second_order_in_the_step(body, predicted):

@@ -25,7 +25,7 @@ def test_one_point_is_exact_for_linear_displacements(model, law):
     energies = []
     for quadrature in (Quadrature.for_order(1, model.dim), Quadrature(4)):
         body = single_link(*distorted(model.dim), model=model, law=law, order=1, quadrature=quadrature)
-        interpolate(body.d, wave(model.dim, 0.2, seed=1))
+        interpolate(body.shape, wave(model.dim, 0.2, seed=1))
         interpolate(body.u, wave(model.dim, 0.2, seed=2))
         energies.append(body.energy())
     assert energies[0] == pytest.approx(energies[1], rel=1e-13)

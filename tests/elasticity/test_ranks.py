@@ -22,7 +22,7 @@ def bodies(request):
     points, cells = rectangle(6, 3, 2.0, 1.0) if model.dim == 2 else box(4, 2, 2, (2.0, 1.0, 1.0))
     both = [single_link(points, cells, model=model, comm=comm) for comm in (MPI.COMM_SELF, MPI.COMM_WORLD)]
     for body in both:
-        interpolate(body.d, wave(model.dim, 0.1, seed=1))
+        interpolate(body.shape, wave(model.dim, 0.1, seed=1))
         interpolate(body.u, wave(model.dim, 0.2, seed=2))
     return both
 

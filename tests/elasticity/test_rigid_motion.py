@@ -29,7 +29,7 @@ def move(body, turn):
 def body_of(request):
     def build(model, law, order=2):
         body = single_link(*distorted(model.dim), model=model, law=law, order=order)
-        interpolate(body.d, wave(model.dim, request.param, seed=1))
+        interpolate(body.shape, wave(model.dim, request.param, seed=1))
         return body
 
     return build

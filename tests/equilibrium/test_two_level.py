@@ -179,7 +179,7 @@ def test_interfaces_of_another_rest_shape_are_followed():
     for linear in (TwoLevel(), Direct()):
         simulation, push = finger("3d", size=6.0, solver=PrimalDualNewton(linear=linear))
         model = simulation.model
-        positions = model.elastic.d.function_space.tabulate_dof_coordinates()
+        positions = model.elastic.shape.function_space.tabulate_dof_coordinates()
         slope = np.zeros_like(positions)
         slope[:, 0] = 0.05 * positions[:, 1]
         with model.shaped(slope.ravel()):

@@ -102,7 +102,7 @@ def _edge(space: str, comm: MPI.Comm) -> Iterator[Check]:
     """A rest shape that leaves 1e-4 of a cell, and a design that turns cells inside out: no number may come of it."""
     elastic, stretch = LENGTH - 2.0 * CELL, 2.0
     simulation, mechanism = _block(space, comm, 1.0, (1, 0), 0.0)
-    field, push = simulation.model.elastic.d, mechanism.forces[0]
+    field, push = simulation.model.elastic.shape, mechanism.forces[0]
     dim = simulation.linkage.dim
     x = field.function_space.tabulate_dof_coordinates()[:, :dim]
     middle = np.zeros(dim)

@@ -54,7 +54,7 @@ class Bench:
         self.simulation = fm.Simulation(scene, space=space, size=4.0, formulation=formulation, comm=comm)
         self.model, self.moved = self.simulation.model, moved
         self.solver, self.adjoint = self.simulation.solver(self.force), Sensitivity(self.model)
-        self.space = self.model.elastic.d.function_space
+        self.space = self.model.elastic.shape.function_space
         self.owned = self.space.dofmap.index_map.size_local * self.space.dofmap.index_map_bs
         self.quantities: list[fm.Quantity] = [
             fm.ForceMagnitude(self.force) if moved else fm.Displacement(self.force),

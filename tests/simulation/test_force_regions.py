@@ -171,7 +171,7 @@ def test_derivatives_by_the_design(space):
     simulation, model = beam.simulation, beam.simulation.model
     quantities = [fm.Displacement(beam.force), fm.Displacement(output), fm.StrainEnergy()]
     observables = [quantity.on(model) for quantity in quantities]
-    space_of_d = model.elastic.d.function_space
+    space_of_d = model.elastic.shape.function_space
     owned = space_of_d.dofmap.index_map.size_local * space_of_d.dofmap.index_map_bs
     places = space_of_d.tabulate_dof_coordinates()[:, : model.linkage.dim]
     direction = design_field(model, np.sin(places[:, ::-1] * (0.3, 0.07) + (1.0, 2.0)))
