@@ -11,6 +11,7 @@ from mpi4py import MPI
 import fenicsmech as fm
 from fenicsmech.design import Correction, MeshQuality, ShapeBounds, StayClose
 
+from ..oracles.dense import taylor_rates
 from .mechanisms import Case, objective
 from .refusal import refused
 
@@ -96,6 +97,39 @@ def test_gradients_by_shared_shapes_agree_with_central_differences(move, space, 
     assert here.gradient @ direction == pytest.approx((ahead.value - back.value) / (2 * step), rel=1e-5)
     slopes = (ahead.residuals - back.residuals) / (2 * step)
     assert here.jacobian @ direction == pytest.approx(slopes, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("space", "size"), [("plane-stress", 3.0), pytest.param("3d", 4.0, marks=pytest.mark.thorough)]
+)
+def test_derivatives_of_quantities_by_shared_shapes_pass_taylor_tests(space, size):
+    own = case(mirrored)
+    (push,), (one, other) = own.scene.mechanism.forces, own.scene.mechanism.flexible_links
+    sample, joint = fm.Sample({push: 3.0}), own.scene.mechanism.joints[-1]
+    quantities = {
+        fm.Displacement(push): 1.0,
+        fm.Displacement(other, at=(-13.9, 15.0)): (1.0,) * (3 if space == "3d" else 2),
+        fm.StrainEnergy(): 1.0,
+        fm.Component(fm.JointForce(joint), (1.0, 0.5)): 1.0,
+        fm.LinkVolume(other): 1.0,
+        fm.CentrelineLength(one): 1.0,
+        fm.CentrelineLength(other): 1.0,
+    }
+    targets = [
+        fm.Target(q, sample if q.of_state else None, equals=1.0 if v == 1.0 else v, scale=1.0)
+        for q, v in quantities.items()
+    ]
+    whole, bench = objective(Case(own.scene, own.designs, targets), StayClose(), space=space, size=size)
+    p, direction = bench.design(0.05, seed=5), bench.direction(6)
+    slopes = whole.evaluate(p).jacobian @ direction
+    known = {h: whole.evaluate(p + h * direction).residuals for h in (0.0, 4e-3, 2e-3, 1e-3)}
+    for k, slope in enumerate(slopes):
+        first = abs(known[4e-3][k] - known[0.0][k])
+        if first <= 1e-9:
+            assert abs(slope) * 4e-3 <= 1e-9
+            continue
+        rates = taylor_rates(lambda t, k=k: known[t[0]][k], [0.0], [1.0], [slope], (4e-3, 2e-3, 1e-3))
+        assert np.max(rates.with_gradient) >= 1.95, targets[k].name
 
 
 @pytest.mark.parallel
