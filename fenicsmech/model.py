@@ -58,7 +58,7 @@ from fenicsmech.meshing import (
     mesh_link,
     same_mesh,
 )
-from fenicsmech.multibody import BodyPoint, DesignAtNodes, InterfaceMap, Linkage, LinkPoint, link_point
+from fenicsmech.multibody import BodyPoint, DesignAtNodes, InterfaceMap, Linkage, LinkPoint, idle_spins, link_point
 
 SPACES = {model.name: model for model in (SPATIAL, MID_PLANE_SYMMETRIC, PLANE_STRESS, PLANE_STRAIN)}
 """Names of the elastic models, as users type them."""
@@ -437,8 +437,16 @@ class MechanismModel:
         if force not in self._point_loads:
             dim = self.elastic.model.dim if isinstance(force.on, FlexibleLink) else self.linkage.dim
             direction = np.array(in_dimension(force.direction, dim))
-            self._point_loads[force] = PointLoad(force.name, ((self.point(force), direction),))
+            self._point_loads[force] = PointLoad(force.name, ((self.point(force), direction),), (force.on,))
         return self._point_loads[force]
+
+    def _acted_on(self, loads: Sequence[PointLoad]) -> set[int]:
+        """Bodies that loads, potentials, or effects on their links act on."""
+        links = {link for load in loads for link in load.links}
+        if self.elastic.effects_ufl is not None:
+            links.update(self.mechanism.flexible_links)
+        bodies = {body for potential in self.potentials for body in potential.bodies}
+        return bodies | {self.linkage.body_of(link) for link in links}
 
     def travel(self, part: Force | Output, state: State) -> float:
         """Travel of the point of a force or output in the loaded ``state``."""
@@ -454,6 +462,7 @@ class MechanismModel:
             loads=loads,
             potentials=self.potentials,
             compliances=self._compliances,
+            idle=idle_spins(self.linkage, self._acted_on([controlled, *(load for load, _ in loads)])),
             clock=self.clock,
             comm=self.mesh.comm,
         )

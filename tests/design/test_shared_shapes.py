@@ -58,10 +58,8 @@ def case(move: Move, wanted: float = 0.25) -> Case:
 def images(problem: fm.DesignProblem, design: fm.Design, move: Move) -> float:
     """Largest distance of the designed nodes of the second leg from the images of those of the first one."""
     elastic, mesh = problem.simulation.model.elastic, problem.simulation.model.mesh
-    space, dim = elastic.d.function_space, elastic.model.dim
-    places = space.tabulate_dof_coordinates()[:, :dim] + design.field.reshape(-1, dim)
-    if elastic.bulge is not None:
-        places = places + elastic.bulge.x.array.reshape(-1, dim)
+    space, dim = elastic.shape.function_space, elastic.model.dim
+    places = space.tabulate_dof_coordinates()[:, :dim] + (elastic.drawn_shape + design.field).reshape(-1, dim)
     cells = np.arange(space.mesh.topology.index_map(space.mesh.topology.dim).size_local)
     one, other = (
         places[np.unique(np.concatenate([space.dofmap.cell_dofs(cell) for cell in cells[mesh.link == link]]))]

@@ -53,8 +53,8 @@ class ShapeRequest:
         reach: how far each interface extends from its joint in the plane, (sites,).
         segments: number of cubic segments.
         centreline: approximated by the spline.
+        thickness: in the plane, where δ = 1, or the outline that it is measured on.
         ends_move: whether free ends may move.
-        thickness: in the plane, where δ = 1, or the outline that it is measured on; None: the mean width of the link.
         spacing: arc length between handles; None: the mean width of the link.
         images: links that share the shape.
     """
@@ -66,8 +66,8 @@ class ShapeRequest:
     reach: tuple[float, ...]
     segments: int
     centreline: Centreline
+    thickness: float | LinkOutline
     ends_move: bool = False
-    thickness: float | LinkOutline | None = None
     spacing: float | None = None
     images: tuple[ImageRequest, ...] = ()
 
@@ -152,15 +152,15 @@ def shape_link(mesh: LinkMesh, request: ShapeRequest, others: Sequence[LinkMesh]
     part, joints = f"link {request.name!r}", request.joints
     layout = lay_out(request.centreline, joints, request.reach, request.segments, part=f"design of {part}")
     fit = fit_spline(request.centreline, joints, layout, ends_move=request.ends_move, part=f"spline of {part}")
-    width = _mean_width(mesh, request.centreline.length)
-    handles = _place_handles(mesh, fit, spacing=request.spacing or width, turns=request.turns, part=part)
+    spacing = request.spacing or _mean_width(mesh, request.centreline.length)
+    handles = _place_handles(mesh, fit, spacing=spacing, turns=request.turns, part=part)
     weights, edges = _weights(mesh, handles, part=part)
     images = []
     for image, other in zip(request.images, others, strict=True):
         here = image_of(other, image.isometry.inverse, np.argsort(image.sites))
         own = (weights, edges) if _is_same(here, mesh) else _weights(here, handles, part=f"link {image.name!r}")
         images.append(LinkImage(image.link, image.name, image.isometry, *own))
-    drawn = request.thickness or width
+    drawn = request.thickness
     thickness = _measured(drawn, fit.spline, part=f"design of {part}") if isinstance(drawn, LinkOutline) else drawn
     centreline = request.centreline.evaluate(request.centreline.knots)
     return LinkShape(request.link, request.name, handles, weights, edges, thickness, centreline, tuple(images))
