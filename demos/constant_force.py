@@ -2,8 +2,7 @@
 
 The strut is pinned to a wall and to a shuttle on a straight guide. Pressed down, it buckles: its thrust hardly grows,
 and more and more of it points across the guide. The shape of the strut is optimised until both effects cancel, and the
-shuttle is pushed back by 8 N within 1 % from 2 mm to 8 mm, where the drawn strut's force changes by 8 %. Geometry and
-targets are this project's own.
+shuttle is pushed back by 8 N within 1 % from 2 mm to 8 mm. Geometry and targets are this project's own.
 
     python3 demos/constant_force.py [--space SPACE] [--quick] [--simulate-only] [--out DIR]
 """

@@ -45,6 +45,7 @@ def request(link: int, *, unit: float = 1.0, turns: bool = True, spacing: float 
         turns=(turns,) * len(joints),
         reach=(RADIUS / unit,) * len(joints),
         segments=3,
+        thickness=THICKNESS / unit,
         spacing=spacing,
     )
 

@@ -62,7 +62,7 @@ def measured(sim: fm.Simulation, push: Force, place: Configuration) -> np.ndarra
 def test_an_offset_is_the_same_as_another_position_of_the_motor(describe, space):
     scene, motor, push = describe()
     sim = fm.Simulation(scene, space=space, size=4.0)
-    nothing = np.zeros(len(sim.model.elastic.d.x.array))
+    nothing = np.zeros_like(sim.model.elastic.shape.x.array)
     shifted = sim.with_design(fm.Design(nothing, {fm.MotorOffset(motor): 0.08}))
     there, here = (scene.configuration(f"at {position:g}", {motor: position}) for position in (0.2, 0.12))
     wanted = measured(sim, push, there)

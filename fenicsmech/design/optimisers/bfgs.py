@@ -9,9 +9,8 @@ regulariser R, whose barriers are too steep to be learnt from gradients, enters 
 
 A BFGS that learns O as a whole advances slowly along the barriers of thickness and curvature. Line searches begin
 within half a length of each parameter, since distant designs are often infeasible, and B is made anew where none of its
-directions descends: without these two, the Klann leg ends a tenth away from its targets. Steps p + α d meet the strong
-Wolfe conditions (Nocedal & Wright, Numerical Optimization, doi:10.1007/978-0-387-40065-5, algorithms 3.5 and 3.6, as
-scipy has them); infeasible points count as infinitely high.
+directions descends. Steps p + α d meet the strong Wolfe conditions (Nocedal & Wright, Numerical Optimization,
+doi:10.1007/978-0-387-40065-5, algorithms 3.5 and 3.6, as scipy has them); infeasible points count as infinitely high.
 """
 
 from __future__ import annotations
