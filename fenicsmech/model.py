@@ -46,13 +46,17 @@ from fenicsmech.mechanism import (
 )
 from fenicsmech.meshing import (
     LEAST_SEGMENTS,
+    Figure,
     InterfaceSite,
     LinkMesh,
     MechanismMesh,
     bulge_field,
     check_link,
     distribute,
+    has_plain_outline,
+    image_of,
     mesh_link,
+    same_mesh,
 )
 from fenicsmech.multibody import BodyPoint, DesignAtNodes, InterfaceMap, Linkage, LinkPoint, idle_spins, link_point
 
@@ -149,9 +153,23 @@ def check_links(mechanism: Mechanism, shapes: Sequence[Shape], linkage: Linkage,
 
 
 def mesh_links(mechanism: Mechanism, shapes: Sequence[Shape], linkage: Linkage, fidelity: Fidelity) -> list[LinkMesh]:
-    """The mesh of every flexible link, of which each has one of ``shapes``. Local."""
+    """The mesh of every flexible link, of which each has one of ``shapes``; images of one another have one. Local."""
+    meshes: dict[FlexibleLink, LinkMesh] = {}
+    drawn: list[tuple[FlexibleLink, Figure, tuple]] = []
     pairs = zip(mechanism.flexible_links, shapes, strict=True)
-    return [mesh_link(link.name, shape, **_mesh_options(link, linkage, fidelity)) for link, shape in pairs]
+    for link, shape in sorted(pairs, key=lambda pair: pair[0].name):  # in whatever order they were described
+        options = _mesh_options(link, linkage, fidelity)
+        if has_plain_outline(shape):
+            figure = Figure.of(link.name, shape, options["sites"], dim=fidelity.model.dim)
+            same = shape.depth, type(shape), fidelity.sizes[link]
+            for other, known, there in drawn:
+                if there == same and (match := same_mesh(known, figure)) is not None:
+                    meshes[link] = image_of(meshes[other], match.isometry, match.sites)
+                    break
+            drawn.append((link, figure, same))
+        if link not in meshes:
+            meshes[link] = mesh_link(link.name, shape, **options)
+    return [meshes[link] for link in mechanism.flexible_links]
 
 
 def mesh_mechanism(

@@ -62,7 +62,7 @@ class DesignedSimulation:
             number.kind.check(simulation.scene, simulation.linkage.dim)
         self.shapes = with_followers([own for own in self.designs if isinstance(own, SplineDesign)], self.numbers)
         solids = [link for number in self.numbers for link in number.kind.reshaped]
-        self.changed = tuple(dict.fromkeys([*(own.link for own in self.shapes), *solids]))
+        self.changed = tuple(dict.fromkeys([*(link for own in self.shapes for link in own.links), *solids]))
         self._requests = shape_requests(self.shapes, simulation, self.numbers)
 
     def on(self, simulation: Simulation) -> DesignedSimulation:

@@ -164,10 +164,12 @@ class Objective:
 
     def equilibria(self) -> dict[Sample, WholeState]:
         """The equilibria of all samples at the best design so far."""
-        group = self._group
+        group, targets = self._group, self.comparison.targets
         own = on_all(group.everyone, lambda: self._equilibria.whole(self._best.solved))
-        parts = group.everyone.allgather(own if group.leads else {})
-        return {sample: state for part in parts for sample, state in part.items()}
+        # by number: samples of another process are other objects
+        places = {targets[k].sample: k for k in group.mine} if group.leads else {}
+        parts = group.everyone.allgather([(places[sample], state) for sample, state in own.items() if places])
+        return {sample: state for part in parts for k, state in part if (sample := targets[k].sample) is not None}
 
     def sensitivities(self) -> np.ndarray:
         """Relative change of each component when a parameter changes by its length ℓ, (components, parameters)."""

@@ -29,7 +29,7 @@ from fenicsmech.design.shape.edges import MidEdgeNodes
 from fenicsmech.design.shape.handle_optimum import HandleOptimum, HandlePlacement, ShapeError
 from fenicsmech.design.shape.handles import BETWEEN
 from fenicsmech.design.shape.quality import Barrier, QualitySum
-from fenicsmech.design.shape.shape_map import LinkParameters, LinkShape, ShapeMap, shape_links
+from fenicsmech.design.shape.shape_map import LinkImage, LinkParameters, LinkShape, ShapeMap, shape_links
 from fenicsmech.design.shape.spline import LinkSpline, SplineSamples
 from fenicsmech.meshing import edge_corners, least_stretches, node_ends
 from fenicsmech.model import Design, MechanismModel
@@ -50,6 +50,7 @@ class DesignedLink:
         bounds: of fabrication.
         centreline: points that the drawn centreline runs through, (k, 2).
         follows: whether it has no parameters of its own.
+        images: links that share the shape.
     """
 
     name: str
@@ -59,6 +60,7 @@ class DesignedLink:
     thickness: float | np.ndarray
     bounds: Bounds
     centreline: np.ndarray
+    images: tuple[LinkImage, ...] = ()
     follows: bool = False
 
     @property
@@ -104,12 +106,15 @@ class ParametricShape:
         self.of_numbers = slice(len(self.initial) - len(numbers), len(self.initial))
         parameters = [self._parameters(shape, own[:k]) for k, shape in enumerate(shapes)]
         self._map = ShapeMap(model.mesh, design, shapes, parameters, self.initial)
-        self._cells = np.flatnonzero(np.isin(model.mesh.link, [shape.link for shape in shapes]))
+        changed = {piece.link: len(shape.every) for shape in shapes for piece in shape.every}
+        self._cells = np.flatnonzero(np.isin(model.mesh.link, list(changed)))
         # the vertices' part, which handles are placed for
         self._straight = fem.Function(vector_space(model.mesh.mesh, 1))
         self._vertex_map = ShapeMap(model.mesh, self._straight, shapes, parameters, self.initial)
         self._ratio = QualitySum(self._straight, comm=model.mesh.comm)
-        self._deformable = _deformable(model, {shape.link for shape in shapes})
+        self._deformable = _deformable(model, changed.keys())
+        # a cell of each of the links that share a shape counts as one cell
+        self._shares = 1.0 / np.array([changed.get(link, 1) for link in range(len(model.mechanism.flexible_links))])
         self._optimum = HandleOptimum(self._vertex_map, self._ratio)
         ends, dim = node_ends(design.function_space), model.mesh.vertices.shape[1]
         drawn = model.mesh.vertices[ends].mean(axis=1) + model.elastic.drawn_shape.reshape(-1, dim)
@@ -124,6 +129,7 @@ class ParametricShape:
                 thickness=shape.thickness,
                 bounds=wanted.bounds(shape.thickness),
                 centreline=shape.centreline,
+                images=shape.images,
                 follows=shape.follows,
             )
             for shape, own, wanted in zip(shapes, parameters, designs, strict=True)
@@ -251,7 +257,8 @@ class ParametricShape:
     def quality_penalty(self, barrier: Barrier, placement: HandlePlacement) -> tuple[float, np.ndarray]:
         """Σ_e β(ρ_e) over the cells of the present rest shape that can deform, and its derivative by p."""
         if barrier not in self._penalties:
-            self._penalties[barrier] = QualitySum(self._straight, barrier.symbolic, counts=self._deformable)
+            counts = self._deformable * self._shares[self._model.mesh.link]
+            self._penalties[barrier] = QualitySum(self._straight, barrier.symbolic, counts=counts)
         total = self._penalties[barrier]
         self._straight.interpolate(self._model.elastic.shape)
         value, slope = total.value(), total.gradient()

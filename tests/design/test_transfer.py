@@ -13,7 +13,7 @@ from fenicsmech.joints import RIGID_SPACES
 
 from ..equilibrium.arch import RISE, arch, lowered
 from .alike import assert_alike
-from .mechanisms import Case, bench, bow, strained, truss, turned_beam
+from .mechanisms import Case, bench, bow, objective, strained, truss, turned_beam
 
 CASES = {
     "truss": lambda: truss((0.1, 1.0), (0.4, 2.0)),
@@ -89,7 +89,17 @@ def test_two_ranks_transfer_equilibria_of_one_and_of_both():
         assert_alike(solid.from_other(other), traced)
 
 
-@pytest.mark.parametrize("fall", [0.012, 0.1])
+@pytest.mark.parallel
+def test_every_process_gets_the_equilibria_of_all_samples():
+    """Under a motor, samples of another process are not equal to one's own."""
+    case = CASES["turned by 135°"]()
+    shared, own = objective(case, fm.StayClose(), comm=MPI.COMM_WORLD, size=4.0)
+    shared.evaluate(own.rest.initial)
+    solid = SampleEquilibria(case.simulate("3d-symmetric", size=4.0, comm=MPI.COMM_WORLD), case.targets)
+    assert_alike(solid.from_other(shared.equilibria()), solid.from_zero())
+
+
+@pytest.mark.parametrize("fall", [0.012, 0.015, 0.3])
 def test_equilibrium_beyond_a_fold_is_refused(fall):
     """An arch under 0.97 of its limit load, and arches lower by a part of its rise, whose limit may be lower."""
     simulation, push = arch()
