@@ -46,12 +46,13 @@ from fenicsmech.meshing.link_mesh import (
     radius_ratios,
     section_of,
 )
-from fenicsmech.meshing.link_mesher import LEAST_SEGMENTS, InterfaceSite, check_link, mesh_link, typical_thickness
+from fenicsmech.meshing.link_mesher import LEAST_SEGMENTS, InterfaceSite, check_link, mesh_link
 from fenicsmech.meshing.outline import (
     CircleArc,
     Curve,
     draw_loop,
     link_outline,
+    link_thickness,
     points_on,
     sample_parameters,
     sampled,

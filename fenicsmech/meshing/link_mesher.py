@@ -216,10 +216,10 @@ def check_link(
 
 
 def typical_thickness(shape: Shape, part: str) -> float:
-    """The thickness of a strip, or t = 2 A / P of the long strip with the area A and the perimeter P of an outline.
+    """The thickness of a strip, or 2 A / P of an outline, as described; ``part`` names the link.
 
     Raises:
-        DescriptionError: the shape is known from a file only; ``part`` names the link.
+        DescriptionError: the shape is that of a file.
     """
     match shape:
         case Strip():
