@@ -52,6 +52,13 @@ class InterfaceSite:
         return np.array([*self.at, 0.0][:3])
 
     @property
+    def reach(self) -> float:
+        """Radius of the smallest circle about the joint's point that contains the region."""
+        if isinstance(self.region, Disc):
+            return self.region.radius
+        return 0.5 * math.hypot(self.region.length, self.region.width)
+
+    @property
     def frame(self) -> np.ndarray:
         """Right-handed orthonormal frame with its third row along the axis, shape (3, 3).
 
