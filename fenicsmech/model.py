@@ -46,15 +46,19 @@ from fenicsmech.mechanism import (
 )
 from fenicsmech.meshing import (
     LEAST_SEGMENTS,
+    Figure,
     InterfaceSite,
     LinkMesh,
     MechanismMesh,
     bulge_field,
     check_link,
     distribute,
+    has_plain_outline,
+    image_of,
     mesh_link,
+    same_mesh,
 )
-from fenicsmech.multibody import BodyPoint, DesignAtNodes, InterfaceMap, Linkage, LinkPoint, link_point
+from fenicsmech.multibody import BodyPoint, DesignAtNodes, InterfaceMap, Linkage, LinkPoint, idle_spins, link_point
 
 SPACES = {model.name: model for model in (SPATIAL, MID_PLANE_SYMMETRIC, PLANE_STRESS, PLANE_STRAIN)}
 """Names of the elastic models, as users type them."""
@@ -149,9 +153,23 @@ def check_links(mechanism: Mechanism, shapes: Sequence[Shape], linkage: Linkage,
 
 
 def mesh_links(mechanism: Mechanism, shapes: Sequence[Shape], linkage: Linkage, fidelity: Fidelity) -> list[LinkMesh]:
-    """The mesh of every flexible link, of which each has one of ``shapes``. Local."""
+    """The mesh of every flexible link, of which each has one of ``shapes``; images of one another have one. Local."""
+    meshes: dict[FlexibleLink, LinkMesh] = {}
+    drawn: list[tuple[FlexibleLink, Figure, tuple]] = []
     pairs = zip(mechanism.flexible_links, shapes, strict=True)
-    return [mesh_link(link.name, shape, **_mesh_options(link, linkage, fidelity)) for link, shape in pairs]
+    for link, shape in sorted(pairs, key=lambda pair: pair[0].name):  # in whatever order they were described
+        options = _mesh_options(link, linkage, fidelity)
+        if has_plain_outline(shape):
+            figure = Figure.of(link.name, shape, options["sites"], dim=fidelity.model.dim)
+            same = shape.depth, type(shape), fidelity.sizes[link]
+            for other, known, there in drawn:
+                if there == same and (match := same_mesh(known, figure)) is not None:
+                    meshes[link] = image_of(meshes[other], match.isometry, match.sites)
+                    break
+            drawn.append((link, figure, same))
+        if link not in meshes:
+            meshes[link] = mesh_link(link.name, shape, **options)
+    return [meshes[link] for link in mechanism.flexible_links]
 
 
 def mesh_mechanism(
@@ -419,8 +437,16 @@ class MechanismModel:
         if force not in self._point_loads:
             dim = self.elastic.model.dim if isinstance(force.on, FlexibleLink) else self.linkage.dim
             direction = np.array(in_dimension(force.direction, dim))
-            self._point_loads[force] = PointLoad(force.name, ((self.point(force), direction),))
+            self._point_loads[force] = PointLoad(force.name, ((self.point(force), direction),), (force.on,))
         return self._point_loads[force]
+
+    def _acted_on(self, loads: Sequence[PointLoad]) -> set[int]:
+        """Bodies that loads, potentials, or effects on their links act on."""
+        links = {link for load in loads for link in load.links}
+        if self.elastic.effects_ufl is not None:
+            links.update(self.mechanism.flexible_links)
+        bodies = {body for potential in self.potentials for body in potential.bodies}
+        return bodies | {self.linkage.body_of(link) for link in links}
 
     def travel(self, part: Force | Output, state: State) -> float:
         """Travel of the point of a force or output in the loaded ``state``."""
@@ -436,6 +462,7 @@ class MechanismModel:
             loads=loads,
             potentials=self.potentials,
             compliances=self._compliances,
+            idle=idle_spins(self.linkage, self._acted_on([controlled, *(load for load, _ in loads)])),
             clock=self.clock,
             comm=self.mesh.comm,
         )

@@ -26,6 +26,7 @@ INNER = {
     "Equilibrium",
     "Estimates",
     "HandlePlacement",
+    "IdleSpin",
     "InterfaceMap",
     "Iterate",
     "JointSystem",

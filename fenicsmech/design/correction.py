@@ -7,8 +7,8 @@ estimates of the discretisation error of Q̂. Only Q is differentiated. It is
 
 - that of the same simulation (deferred correction): c = e,
 - or that of a surrogate, plane stress for space (space mapping): a few equilibria in space, and no gradient there.
-  Those of the first round are loaded from zero and followed from round to round; the surrogate's at the optimum are
-  loaded from zero again.
+  Those of the first round are found from the surrogate's at the same design and followed from round to round; the
+  surrogate's at the optimum are loaded from zero again. Equilibria in space that are not found so are loaded from zero.
 
 c changes from round to round by the part by which the derivatives of Q and Q̂ + e differ. At the end the corrected
 values are the true ones to within the last change. Where a surrogate does not contract, the simulation that counts is
@@ -20,7 +20,7 @@ correction V. Pereyra, Iterated deferred corrections for nonlinear operator equa
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,8 +33,10 @@ from fenicsmech.design.result import DesignResult, Reached
 from fenicsmech.design.run import Checkpoint, DesignProgress, Optimum, Round, Saved, minimise_together
 from fenicsmech.design.shape.handle_optimum import HandlePlacement, ShapeError
 from fenicsmech.design.target import Comparison, check_sensitivities
+from fenicsmech.design.transfer import WholeState
 from fenicsmech.errors import EquilibriumError, positive
 from fenicsmech.log import logger
+from fenicsmech.quantities import Sample
 
 _log = logger(__name__)
 
@@ -88,17 +90,20 @@ class Corrected:
 # -- values of the simulation that counts ---
 
 
-def carried(equilibria: SampleEquilibria, solved: DesignEquilibria | None) -> DesignEquilibria:
-    """Equilibria at the design that the model holds: from those ``solved`` in the last round, else from zero load.
+def carried(
+    equilibria: SampleEquilibria, solved: DesignEquilibria | None, surrogate: Callable[[], Mapping[Sample, WholeState]]
+) -> DesignEquilibria:
+    """Equilibria at the design that the model holds: from those ``solved`` in the last round, in the first one from
+    those of the ``surrogate``; where they do not lead there, from zero load.
 
     Raises:
         Infeasible: loading leads elsewhere.
     """
-    if solved is not None:
-        try:
-            return equilibria.from_design(solved)
-        except Infeasible as failure:
-            _log.info("equilibria of the last round do not lead to those of this one: %s", failure)
+    try:
+        return equilibria.from_other(surrogate()) if solved is None else equilibria.from_design(solved)
+    except Infeasible as failure:
+        before = "the surrogate" if solved is None else "the last round"
+        _log.info("equilibria of %s do not lead to those of this one: %s", before, failure)
     return equilibria.from_zero()
 
 
@@ -241,7 +246,7 @@ class CorrectedRun:
                     placement = problem.rest.place(optimum.parameters, near)
                 except ShapeError as failure:
                     raise Infeasible(str(failure)) from failure
-                solved = carried(problem.loaded, solved)
+                solved = carried(problem.loaded, solved, cheaper.team[1].equilibria)
                 values, errors = problem.loaded.values(solved), problem.loaded.errors(solved)
             return Reached(values, errors, values + errors if self._options.estimates else values)
 
@@ -252,7 +257,7 @@ class CorrectedRun:
             return None
         assert placement is not None, "the optimum was verified"
         if end.settled:
-            same = len(end.round.changes) == 1 or self._loads(cheaper, end.optimum)
+            same = self._loads(cheaper, end.optimum)
             return Outcome(cheaper, end.optimum, end.round, end.reached, placement, same)
         _log.info("corrections of the surrogate change by %s of the scale: it is given up", end.round.largest)
         optimum, reached = end.optimum, end.reached

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,13 +11,15 @@ import numpy as np
 from fenicsmech.collective import from_one
 from fenicsmech.design.numbers import Number, check_numbers
 from fenicsmech.design.shape.centreline import LinkOutline, find_centreline
-from fenicsmech.design.shape.shape_map import ShapeRequest
+from fenicsmech.design.shape.shape_map import ImageRequest, ShapeRequest
 from fenicsmech.design.shape.spline import lay_out
-from fenicsmech.errors import DescriptionError, finite, points, positive
+from fenicsmech.errors import DescriptionError, finite, points, positive, set_fields
 from fenicsmech.mechanism import Centreline, Disc, FlexibleLink, Mechanism, Rectangle, Shape, Strip
-from fenicsmech.meshing import InterfaceSite, link_outline
+from fenicsmech.meshing import Figure, InterfaceSite, link_outline, matches
 from fenicsmech.multibody import Body, Linkage
 from fenicsmech.simulation import Simulation
+
+_AGREE = 1e-4  # largest distance between outlines of links that share a shape, over their extent
 
 
 @dataclass(frozen=True)
@@ -51,9 +53,11 @@ class SplineDesign:
             runs on beyond them.
         ends_move: whether free ends, to which the centreline runs on beyond the last joint, may move; otherwise they
             stay where they are drawn, as a finger tip that has to reach a place.
+        same: a link or several that are the same part in another place and keep its shape.
+        mirrored: those that are mirror images of it.
 
     Raises:
-        DescriptionError: a number makes no sense.
+        DescriptionError: a number makes no sense, or a link is named twice.
     """
 
     link: FlexibleLink
@@ -63,6 +67,8 @@ class SplineDesign:
     centreline: Sequence[Sequence[float]] | None = None
     ends: Sequence[Sequence[float]] | None = None
     ends_move: bool = False
+    same: FlexibleLink | Sequence[FlexibleLink] = ()
+    mirrored: FlexibleLink | Sequence[FlexibleLink] = ()
 
     def __post_init__(self) -> None:
         if not isinstance(self.link, FlexibleLink):
@@ -70,6 +76,16 @@ class SplineDesign:
                 "spline design", f"{self.link!r} is not a flexible link", "Name a flexible link of the mechanism"
             )
         part = f"design of link {self.link.name!r}"
+        for name in ("same", "mirrored"):
+            given = getattr(self, name)
+            others = (given,) if isinstance(given, FlexibleLink) else given
+            if not isinstance(others, Sequence) or not all(isinstance(other, FlexibleLink) for other in others):
+                raise DescriptionError(part, f"{name}={given!r} are not flexible links", "Name links of the mechanism")
+            set_fields(self, **{name: tuple(others)})
+        names = [link.name for link in self.links]
+        if len(set(names)) < len(names):
+            twice = next(name for name in names if names.count(name) > 1)
+            raise DescriptionError(part, f"link {twice!r} is named twice", "Name each link once")
         if not isinstance(self.segments, int) or self.segments < 1:
             raise DescriptionError(part, f"{self.segments!r} segments", "Give a whole number of at least 1")
         positive(f"curvature bound of the {part}", self.bend)
@@ -86,6 +102,11 @@ class SplineDesign:
             finite(f"largest thickness of the {part}", most)
             if not least < most:
                 raise DescriptionError(part, f"thickness from {least:g} to {most:g}", "Give the smaller one first")
+
+    @property
+    def links(self) -> tuple[FlexibleLink, ...]:
+        """All links that have the shape: ``link``, ``same``, ``mirrored``."""
+        return (self.link, *self.same, *self.mirrored)  # type: ignore[misc]  # tuples by now
 
     def bounds(self, thickness: float | np.ndarray) -> Bounds:
         """The bounds for a link drawn with ``thickness``, everywhere or at each sample of its spline (samples,).
@@ -112,13 +133,11 @@ def shape_requests(designs: Sequence[SplineDesign], simulation: Simulation) -> l
     Links from files are measured on the first process.
     """
     mechanism, linkage, shapes = simulation.scene.mechanism, simulation.linkage, simulation.shapes
-    return from_one(
-        simulation.comm, lambda: [shape_request(own, mechanism, linkage, shapes.get(own.link)) for own in designs]
-    )
+    return from_one(simulation.comm, lambda: [shape_request(own, mechanism, linkage, shapes) for own in designs])
 
 
 def shape_request(
-    design: SplineDesign, mechanism: Mechanism, linkage: Linkage, shape: Shape | None = None
+    design: SplineDesign, mechanism: Mechanism, linkage: Linkage, shapes: Mapping[FlexibleLink, Shape] | None = None
 ) -> ShapeRequest:
     """The handles and spline of ``design``. Local.
 
@@ -126,18 +145,21 @@ def shape_request(
         design: of a link.
         mechanism: with the link.
         linkage: its bodies and joints.
-        shape: of the link, as drawn by default.
+        shapes: of the links, as drawn by default.
 
     Raises:
-        DescriptionError: no centreline is found, the link has one joint and no free end, or there are fewer segments
-            than gaps between joints and free ends.
+        DescriptionError: no centreline is found, the link has one joint and no free end, there are fewer segments
+            than gaps between joints and free ends, or links that are to share the shape have other outlines.
         MeshingError: the file of the link cannot be read.
     """
     link = design.link
     part = f"design of link {link.name!r}"
-    if link not in mechanism.flexible_links:
-        raise DescriptionError(part, f"it is not a flexible link of {mechanism.name!r}", "Name one of its links")
-    shape, bodies = shape or link.shape, [linkage.bodies[i] for i in linkage.interfaces[link]]
+    for own in design.links:
+        if own not in mechanism.flexible_links:
+            problem = f"it is not a flexible link of {mechanism.name!r}"
+            raise DescriptionError(f"design of link {own.name!r}", problem, "Name one of its links")
+    known = {own: (shapes or {}).get(own, own.shape) for own in design.links}
+    shape, bodies = known[link], [linkage.bodies[i] for i in linkage.interfaces[link]]
     reach, line = tuple(_reach(body) for body in bodies), design.centreline
     thickness: float | LinkOutline
     if isinstance(shape, Strip):
@@ -149,19 +171,66 @@ def shape_request(
         thickness = outline = LinkOutline(link_outline(link.name, shape, dim=linkage.dim), sites)
         found = find_centreline(outline, reach, design.ends, part=part) if line is None else line
         centreline = Centreline(found, part=part)
+    images = _images(design, mechanism, linkage, known)
+    everywhere = zip([link, *(mechanism.flexible_links[image.link] for image in images)], [None, *images], strict=True)
+    turns = [
+        [linkage.turns_about_z(linkage.interfaces[own][k]) for k in (range(len(bodies)) if i is None else i.sites)]
+        for own, i in everywhere
+    ]
     request = ShapeRequest(
         link=mechanism.flexible_links.index(link),
         name=link.name,
         joints=tuple((body.centre[0], body.centre[1]) for body in bodies),
-        turns=tuple(linkage.turns_about_z(body) for body in linkage.interfaces[link]),
+        turns=tuple(all(own) for own in zip(*turns, strict=True)),
         reach=reach,
         segments=design.segments,
         centreline=centreline,
         ends_move=design.ends_move,
         thickness=thickness,
+        images=images,
     )
     lay_out(centreline, request.joints, request.reach, request.segments, part=part)  # refused before it is meshed
     return request
+
+
+def _images(
+    design: SplineDesign, mechanism: Mechanism, linkage: Linkage, shapes: Mapping[FlexibleLink, Shape]
+) -> tuple[ImageRequest, ...]:
+    """The links that share the shape of a design, and the motions to them."""
+    others, part = design.links[1:], f"design of link {design.link.name!r}"
+    if not others:
+        return ()
+
+    def figure(link: FlexibleLink) -> Figure:
+        bodies = (linkage.bodies[i] for i in linkage.interfaces[link])
+        sites = [InterfaceSite(b.centre[:2], b.region, name=b.name) for b in bodies if b.region is not None]
+        return Figure.of(link.name, shapes[link], sites, dim=linkage.dim)
+
+    own, found = figure(design.link), []
+    for other in others:
+        mirrored = other in design.mirrored  # type: ignore[operator]  # a tuple by now
+        word = "a mirror image of" if mirrored else "the same as"
+        if shapes[other].depth != shapes[design.link].depth:
+            depths = f"{shapes[design.link].depth:g} and {shapes[other].depth:g}"
+            raise DescriptionError(part, f"{other.name!r} is of another depth: {depths}", "Draw both of one depth")
+        candidates = matches(own, figure(other), mirrored=mirrored)
+        if not candidates:
+            raise DescriptionError(
+                part,
+                f"no motion brings its interfaces to those of {other.name!r}, which is to be {word} it",
+                "Draw both with the same joints and interfaces, or choose between same=… and mirrored=…",
+            )
+        best = min(candidates, key=lambda match: match.misfit)
+        if best.misfit > _AGREE * own.extent:
+            raise DescriptionError(
+                part,
+                f"{other.name!r}, which is to be {word} it, has an outline up to {best.misfit:.3g} away",
+                "Draw both alike, or choose between same=… and mirrored=…",
+            )
+        close = [match for match in candidates if match.misfit <= max(2.0 * best.misfit, 1e-9 * own.extent)]
+        number = mechanism.flexible_links.index(other)
+        found.append(ImageRequest(number, other.name, close[0].isometry, close[0].sites))
+    return tuple(found)
 
 
 def _reach(interface: Body) -> float:
@@ -186,7 +255,16 @@ def check_designs(designs: Sequence[SplineDesign | Number]) -> None:
                 "design problem", f"{design!r} is not a design of a link or number", "Give SplineDesign(…) or Number(…)"
             )
     check_numbers([design for design in designs if isinstance(design, Number)])
-    names = [design.link.name for design in designs if isinstance(design, SplineDesign)]
+    shapes = [design for design in designs if isinstance(design, SplineDesign)]
+    names = [link.name for design in shapes for link in design.links]
     for name in names:
         if names.count(name) > 1:
             raise DescriptionError(f"design of link {name!r}", "it is given twice", "Give each link once")
+    solids = [design.kind for design in designs if isinstance(design, Number) and design.kind.changes_solids]
+    for shape in shapes:
+        for kind in solids:
+            missing = [link.name for link in shape.links if link not in kind.parts]
+            if 0 < len(missing) < len(shape.links):
+                raise DescriptionError(
+                    str(kind), f"{missing[0]!r} shares the shape of {shape.link.name!r}", "Name all links that do"
+                )

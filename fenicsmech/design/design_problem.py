@@ -212,7 +212,8 @@ class DesignProblem:
         Raises:
             DescriptionError: the design is one of other links.
         """
-        links, both = [own.link for own in self._own.shapes], ((self.initial, None), self._own.given(design))
+        links = [link for own in self._own.shapes for link in own.links]
+        both = (self.initial, None), self._own.given(design)
         before, after = ((given[0], self._meshes(links, given)[0]) for given in both)
         on_one(
             self.simulation.comm, lambda: draw_links(path, self.simulation, links, self._own.rest.links, before, after)

@@ -62,7 +62,7 @@ class DesignedSimulation:
         for number in self.numbers:
             number.kind.check(simulation.scene)
         solids = [part for number in self.numbers if number.kind.changes_solids for part in number.kind.parts]
-        self.changed = tuple(dict.fromkeys([*(own.link for own in self.shapes), *solids]))
+        self.changed = tuple(dict.fromkeys([*(link for own in self.shapes for link in own.links), *solids]))
         self._requests = shape_requests(self.shapes, simulation)
 
     def on(self, simulation: Simulation) -> DesignedSimulation:

@@ -1,4 +1,4 @@
-"""Equilibria of targets' samples, found once from zero load and then followed as the design changes.
+"""Equilibria of targets' samples, found once from zero load or another simulation, and followed as the design changes.
 
 Near a fold, where a mechanism is about to snap, a small change of design may leave no equilibrium near the old one, and
 Newton's method lands on another branch. So each change of design is checked by a backward prediction with the same
@@ -7,6 +7,10 @@ factor:
     ŷ₀ = y + δ,   δ = −K₁⁻¹ R(y; d₀),   y the state y₁ carried back,     |y₀ − ŷ₀| ≤ 2 |δ|
 
 on one branch if d₁ − d₀ is small enough, and halved if that fails. Halves that fail too mean a fold.
+
+The equilibrium y₀ of another simulation (``transfer``) is one of this simulation under the forces R(y₀) that it leaves
+open. These are taken away in one step, which is checked alike, with R(y; d₀) = R(y) − R(y₀) and so δ = K₁⁻¹ R(y₀),
+and by the distance of y from y₀.
 
 Displacements q count from the unloaded configuration y°. Where that moves with the design (a point lies on a flexible
 link, or motors strain the links), it is an equilibrium that is followed too. A prescribed displacement v = v̄ + q_v(y°)
@@ -21,17 +25,20 @@ not under a prescribed force.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from petsc4py import PETSc
 
 from fenicsmech.design.optimisers.problem import Infeasible
 from fenicsmech.design.target import Target, sample_request
+from fenicsmech.design.transfer import WholeState, guess, whole_state
 from fenicsmech.equilibrium import (
     Adjoint,
     Control,
     DisplacementControl,
+    EquilibriumPoint,
     EquilibriumSolver,
     LoadControl,
     NotConverged,
@@ -61,12 +68,18 @@ class FollowOptions:
         load_steps: least number to the largest load from zero; larger ones fail more often than they save a step.
         halvings: of a change of design whose equilibrium is not found, or lies elsewhere.
         largest_miss: of the prediction, over |δ|; larger misses are those of equilibria across a fold.
+        largest_transfer_miss: the same from another simulation: up to 2.9 on one branch, as δ holds the stress of links
+            that were at rest in a slightly different shape; 30 and more across folds.
+        farthest_transfer: distance from the equilibrium of another simulation, over its motion from the unloaded
+            configuration: up to 0.3 between plane stress and space, 2.8 and more across folds.
         rounding: misses below this part of the mechanism's length, or rad, are rounding.
     """
 
     load_steps: int = 8
     halvings: int = 2
     largest_miss: float = 2.0
+    largest_transfer_miss: float = 8.0
+    farthest_transfer: float = 0.5
     rounding: float = 1e-6
 
 
@@ -163,14 +176,23 @@ class SampleEquilibria:
         Raises:
             Infeasible: an equilibrium is not found or is unstable.
         """
-        groups: dict[tuple, list[Sample]] = {}
-        for sample in self._paths:
-            key = sample.part, sample.others, sample.configuration, sample.moved is None, sample.value < 0.0
-            groups.setdefault(key, []).append(sample)
         found: dict[Sample, SampleState] = {}
-        for samples in groups.values():
+        for samples in self._on_one_path():
             found.update(self._traced(samples))
         return self._at_design({sample: found[sample] for sample in self._paths})
+
+    def from_other(self, guesses: Mapping[Sample, WholeState]) -> DesignEquilibria:
+        """The equilibria of all samples at the present design, from those of another simulation at the same design.
+
+        Raises:
+            Infeasible: an equilibrium is not found, is unstable or is not a continuation of the guess.
+        """
+        samples: dict[Sample, SampleState] = {}
+        for first, *others in self._on_one_path():
+            unloaded = self._unloaded(first)
+            for sample in (first, *others):
+                samples[sample] = self._from_guess(self._paths[sample], guesses[sample], unloaded)
+        return self._at_design({sample: samples[sample] for sample in self._paths})
 
     def from_design(self, solved: DesignEquilibria) -> DesignEquilibria:
         """The equilibria at the present design, from those of another one.
@@ -187,6 +209,11 @@ class SampleEquilibria:
         finally:
             self._model.reshape(design)
         return self._at_design(samples)
+
+    def whole(self, solved: DesignEquilibria) -> dict[Sample, WholeState]:
+        """Equilibria as ``from_other`` of another simulation takes them, on all processes of this one."""
+        with self._model.shaped(solved.design):
+            return {sample: whole_state(self._model, at.state) for sample, at in solved.samples.items()}
 
     # -- values of the targets' quantities -----------------------------------------------------------------------
 
@@ -299,6 +326,14 @@ class SampleEquilibria:
         """Discretisation errors of quantities at the state that the model holds, from their adjoints."""
         return [self._simulation.estimates.of(adjoint)[0] if adjoint else 0.0 for adjoint in adjoints]
 
+    def _on_one_path(self) -> list[list[Sample]]:
+        """The samples, grouped by the path from zero load that they lie on."""
+        groups: dict[tuple, list[Sample]] = {}
+        for sample in self._paths:
+            key = sample.part, sample.others, sample.configuration, sample.moved is None, sample.value < 0.0
+            groups.setdefault(key, []).append(sample)
+        return list(groups.values())
+
     # -- paths from zero load ------------------------------------------------------------------------------------
 
     def _traced(self, samples: Sequence[Sample]) -> dict[Sample, SampleState]:
@@ -327,6 +362,29 @@ class SampleEquilibria:
             found[sample] = SampleState(frame.state, control, curve.unloaded)
         return found
 
+    # -- from another simulation ---------------------------------------------------------------------------------
+
+    def _unloaded(self, sample: Sample) -> State:
+        try:
+            return self._simulation.unloaded(sample_request(self._simulation, sample, [sample.value]))
+        except EquilibriumError as error:
+            raise Infeasible(str(error)) from error
+
+    def _from_guess(self, path: _Path, other: WholeState, unloaded: State) -> SampleState:
+        """The equilibrium near the one in another simulation, in one step: the forces that this leaves open vanish."""
+        system, control = path.solver.system, path.control(unloaded)
+        start = control.prepare(guess(self._model, other, unloaded))
+        found = self._solved(path, start, control)
+        self._model.load(start)
+        missing = system.residual(start, control).vector
+        system.unknowns.turn(found.state.poses)
+        missed = self._missed(path, found, start, found.state, missing)
+        distance, motion = (system.size(system.difference(start, other)) for other in (found.state, unloaded))
+        farthest = max(self._options.farthest_transfer * motion, self._options.rounding)
+        if missed > self._options.largest_transfer_miss or distance > farthest:
+            raise _Lost(_lost(path.sample, "a fold lies between this simulation and the other one"))
+        return SampleState(found.state, control, unloaded)
+
     # -- from one design to another ------------------------------------------------------------------------------
 
     def _followed(self, path: _Path, at: SampleState, before: Design, after: Design) -> SampleState:
@@ -351,26 +409,36 @@ class SampleEquilibria:
 
     def _next(self, path: _Path, start: State, before: _Prescribed, after: _Prescribed) -> State:
         """The equilibrium at design ``after``, in one step."""
-        model, solver = self._model, path.solver
+        model, system = self._model, path.solver.system
         model.reshape(before.design)
-        guess = model.carry(start, after.design)
+        found = self._solved(path, model.carry(start, after.design), after.control)
+        # y, the state carried back
+        back = before.control.prepare(model.carry(found.state, before.design))
+        model.load(back)
+        missing = system.residual(back, before.control).vector
+        missing.scale(-1.0)
+        missed = self._missed(path, found, start, back, missing)
+        model.reshape(after.design)
+        if missed > self._options.largest_miss:
+            raise _Lost(_lost(path.sample, "a fold lies between this design and the last one"))
+        return found.state
+
+    def _solved(self, path: _Path, start: State, control: Control) -> EquilibriumPoint:
+        """The stable equilibrium that Newton's method finds from ``start``."""
         try:
-            found = solver.solve(guess, after.control)
+            found = path.solver.solve(start, control)
         except NotConverged as failure:
             raise _Lost(f"no equilibrium under {path.sample} ({failure.reason})") from failure
         if found.unstable_under_control:
             raise Infeasible(_unstable(path.sample))
-        # δ = −K₁⁻¹ R(y; d₀) with y the state carried back, and how far ŷ₀ = y + δ misses y₀
-        system, back = solver.system, before.control.prepare(model.carry(found.state, before.design))
-        model.load(back)
-        x = found.linearisation.solve(system.residual(back, before.control).vector)
-        x.scale(-1.0)
-        step = system.unknowns.step(x)
+        return found
+
+    def _missed(self, path: _Path, found: EquilibriumPoint, start: State, back: State, missing: PETSc.Vec) -> float:
+        """|y₀ − ŷ₀| / |δ|, 0 within rounding: δ = K₁⁻¹ ``missing``, ŷ₀ = y + δ, y₀ is ``start`` and y ``back``."""
+        system = path.solver.system
+        step = system.unknowns.step(found.linearisation.solve(missing))
         miss = system.size(system.difference(start, system.moved(back, step)))
-        model.reshape(after.design)
-        if miss > max(self._options.largest_miss * system.size(step), self._options.rounding):
-            raise _Lost(_lost(path.sample, "a fold lies between this design and the last one"))
-        return found.state
+        return 0.0 if miss <= self._options.rounding else miss / max(system.size(step), 1e-300)
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,9 @@ from fenicsmech.design.regularisers import Model, Regulariser
 from fenicsmech.design.rest_shape import ParametricShape
 from fenicsmech.design.shape.handle_optimum import HandlePlacement, ShapeError
 from fenicsmech.design.target import Comparison, Target
+from fenicsmech.design.transfer import WholeState
 from fenicsmech.log import Clock
+from fenicsmech.quantities import Sample
 
 _SPLITS = MPI.Comm.Create_keyval()  # attribute of a communicator: its splits by their number, each made once
 
@@ -159,6 +161,15 @@ class Objective:
         with self._clock.phase("estimates"):
             estimates = on_all(self._group.everyone, lambda: self._equilibria.errors(self._best.solved))
         return self._gathered(estimates[:, None])[:, 0]
+
+    def equilibria(self) -> dict[Sample, WholeState]:
+        """The equilibria of all samples at the best design so far."""
+        group, targets = self._group, self.comparison.targets
+        own = on_all(group.everyone, lambda: self._equilibria.whole(self._best.solved))
+        # by number: samples of another process are other objects
+        places = {targets[k].sample: k for k in group.mine} if group.leads else {}
+        parts = group.everyone.allgather([(places[sample], state) for sample, state in own.items() if places])
+        return {sample: state for part in parts for k, state in part if (sample := targets[k].sample) is not None}
 
     def sensitivities(self) -> np.ndarray:
         """Relative change of each component when a parameter changes by its length ℓ, (components, parameters)."""

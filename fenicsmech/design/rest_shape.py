@@ -26,7 +26,7 @@ from fenicsmech.design.numbers import TYPICAL, Number, ScaledNumbers
 from fenicsmech.design.shape.edges import MidEdgeNodes
 from fenicsmech.design.shape.handle_optimum import HandleOptimum, HandlePlacement, ShapeError
 from fenicsmech.design.shape.quality import Barrier, QualitySum
-from fenicsmech.design.shape.shape_map import LinkShape, ShapeMap, shape_links
+from fenicsmech.design.shape.shape_map import LinkImage, LinkShape, ShapeMap, shape_links
 from fenicsmech.design.shape.spline import LinkSpline, SplineSamples
 from fenicsmech.meshing import edge_corners, least_stretches, node_ends
 from fenicsmech.model import Design, MechanismModel
@@ -46,6 +46,7 @@ class DesignedLink:
         thickness: in the plane, where δ = 1; at the samples where it is not the same everywhere.
         bounds: of fabrication.
         centreline: points that the drawn centreline runs through, (k, 2).
+        images: links that share the shape.
     """
 
     name: str
@@ -55,6 +56,7 @@ class DesignedLink:
     thickness: float | np.ndarray
     bounds: Bounds
     centreline: np.ndarray
+    images: tuple[LinkImage, ...] = ()
 
 
 _LEAST_STRETCH = 0.1  # least det ∂X/∂X₁ in a cell, X₁ the straight cell; of the drawn shape it is at least 0.3
@@ -89,12 +91,15 @@ class ParametricShape:
     ) -> None:
         self._model, design = model, fem.Function(model.elastic.shape.function_space)
         self._map = ShapeMap(model.mesh, design, shapes)
-        self._cells = np.flatnonzero(np.isin(model.mesh.link, [shape.link for shape in shapes]))
+        changed = {piece.link: len(shape.every) for shape in shapes for piece in shape.every}
+        self._cells = np.flatnonzero(np.isin(model.mesh.link, list(changed)))
         # the vertices' part, which handles are placed for
         self._straight = fem.Function(vector_space(model.mesh.mesh, 1))
         self._vertex_map = ShapeMap(model.mesh, self._straight, shapes)
         self._ratio = QualitySum(self._straight, comm=model.mesh.comm)
-        self._deformable = _deformable(model, {shape.link for shape in shapes})
+        self._deformable = _deformable(model, changed.keys())
+        # a cell of each of the links that share a shape counts as one cell
+        self._shares = 1.0 / np.array([changed.get(link, 1) for link in range(len(model.mechanism.flexible_links))])
         self._optimum = HandleOptimum(self._vertex_map, self._ratio)
         ends, dim = node_ends(design.function_space), model.mesh.vertices.shape[1]
         drawn = model.mesh.vertices[ends].mean(axis=1) + model.elastic.drawn_shape.reshape(-1, dim)
@@ -108,7 +113,8 @@ class ParametricShape:
             spline, h = shape.handles.spline, shape.thickness
             place = slice(first, first := first + spline.size)
             samples, bounds = SplineSamples(spline), wanted.bounds(h)
-            links.append(DesignedLink(wanted.link.name, place, spline, samples, h, bounds, shape.centreline))
+            drawn_on = shape.centreline, shape.images
+            links.append(DesignedLink(wanted.link.name, place, spline, samples, h, bounds, *drawn_on))
         self.links = tuple(links)
         lengths = [np.where(s.spline.is_thickness, 1.0, np.median(s.thickness)) for s in self.links]
         self.lengths = np.concatenate([*lengths, np.full(len(self.numbers.initial), TYPICAL)])
@@ -212,7 +218,8 @@ class ParametricShape:
     def quality_penalty(self, barrier: Barrier, placement: HandlePlacement) -> tuple[float, np.ndarray]:
         """Σ_e β(ρ_e) over the cells of the present rest shape that can deform, and its derivative by p."""
         if barrier not in self._penalties:
-            self._penalties[barrier] = QualitySum(self._straight, barrier.symbolic, counts=self._deformable)
+            counts = self._deformable * self._shares[self._model.mesh.link]
+            self._penalties[barrier] = QualitySum(self._straight, barrier.symbolic, counts=counts)
         total = self._penalties[barrier]
         self._straight.interpolate(self._model.elastic.shape)
         slope = total.gradient()

@@ -21,7 +21,7 @@ from fenicsmech.errors import DescriptionError, counted, point_text
 from fenicsmech.export import PinHole, write_step, write_stl
 from fenicsmech.files import atomic_write
 from fenicsmech.mechanism import Disc, FlexibleLink, Scene, Units
-from fenicsmech.meshing import LinkMesh, boundary_polygons, section_of
+from fenicsmech.meshing import Isometry, LinkMesh, boundary_polygons, section_of
 from fenicsmech.model import Design
 from fenicsmech.multibody import Linkage
 from fenicsmech.plot import DesignShape, LinkOutline, draw_designs
@@ -44,6 +44,7 @@ class LinkDesign:
         thickness: least and largest thickness in the plane.
         bend: largest curvature ratio.
         centreline: points that the drawn centreline runs through, as given, drawn or found.
+        same, mirrored: names of links that are the same part, and of mirror images of it.
     """
 
     name: str
@@ -53,6 +54,13 @@ class LinkDesign:
     thickness: tuple[float, float]
     bend: float
     centreline: tuple[tuple[float, ...], ...] | None = None
+    same: tuple[str, ...] = ()
+    mirrored: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of all links with this shape."""
+        return (self.name, *self.same, *self.mirrored)
 
 
 Value = float | tuple[float, ...]
@@ -224,17 +232,24 @@ class DesignResult:
             ShapeError: cells of the mesh are inverted in this shape.
         """
         links = {link.name: link for link in simulation.scene.mechanism.flexible_links}
-        for own in self.links:
-            if own.name not in links:
+        for name in (name for own in self.links for name in own.names):
+            if name not in links:
                 raise DescriptionError(
                     f"design of {self.mechanism!r}",
-                    f"{simulation.scene.mechanism.name!r} has no flexible link {own.name!r}",
+                    f"{simulation.scene.mechanism.name!r} has no flexible link {name!r}",
                     "Give a simulation of the same mechanism",
                 )
-        rest = ParametricShape.of(
-            simulation,
-            [SplineDesign(links[own.name], len(own.controls) - 1, centreline=own.centreline) for own in self.links],
-        )
+        designs = [
+            SplineDesign(
+                links[own.name],
+                len(own.controls) - 1,
+                centreline=own.centreline,
+                same=[links[name] for name in own.same],
+                mirrored=[links[name] for name in own.mirrored],
+            )
+            for own in self.links
+        ]
+        rest = ParametricShape.of(simulation, designs)
         p, theta = (
             np.concatenate([np.zeros(0), *parts])
             for parts in ([own.parameters for own in self.links], [own.handles for own in self.links])
@@ -368,6 +383,8 @@ def link_designs(rest: ParametricShape, placement: HandlePlacement) -> tuple[Lin
                 thickness=(float(thickness.min()), float(thickness.max())),
                 bend=float(np.abs(bend).max(initial=0.0)),
                 centreline=tuple(map(tuple, link.centreline.tolist())),
+                same=tuple(image.name for image in link.images if not image.isometry.mirrors),
+                mirrored=tuple(image.name for image in link.images if image.isometry.mirrors),
             )
         )
     return tuple(designs)
@@ -384,14 +401,14 @@ def rest_meshes(simulation: Simulation, links: Sequence[FlexibleLink]) -> list[L
     return on_one(simulation.comm, lambda: [section_of(mesh) for mesh in chosen] if halves else chosen) or []
 
 
-def _outline(link: DesignedLink, mesh: LinkMesh, p: np.ndarray) -> LinkOutline:
-    """The outline of a link, with centreline, thickness and control points of its parameters ``p``."""
+def _outline(link: DesignedLink, place: Isometry, mesh: LinkMesh, p: np.ndarray) -> LinkOutline:
+    """The outline of a link, with centreline, thickness and control points of its parameters ``p``, in its place."""
     loops = boundary_polygons(f"link {link.name!r}", section_of(mesh))
     return LinkOutline(
         loops,
-        centreline=link.spline.evaluate(p, link.samples.t)[:, :2],
+        centreline=place.points(link.spline.evaluate(p, link.samples.t)[:, :2]),
         thickness=link.thickness * link.samples.thickness(p),
-        controls=link.spline.controls_at(p)[:, 0, :2],
+        controls=place.points(link.spline.controls_at(p)[:, 0, :2]),
     )
 
 
@@ -405,8 +422,13 @@ def draw_links(
 ) -> None:
     """Local. Draws links before and after a change, from the parameters p and the meshes of both."""
     scene, linkage, shapes = simulation.scene, simulation.linkage, []
-    for k, (link, change) in enumerate(zip(links, designed, strict=True)):
-        old, new = (_outline(change, meshes[k], p[change.place]) for p, meshes in (before, after))
+    places = [
+        (change, place)
+        for change in designed
+        for place in (Isometry.identity(), *(image.isometry for image in change.images))
+    ]
+    for k, (link, (change, place)) in enumerate(zip(links, places, strict=True)):
+        old, new = (_outline(change, place, meshes[k], p[change.place]) for p, meshes in (before, after))
         joints = np.array([linkage.bodies[i].centre[:2] for i in linkage.interfaces[link]])
         shapes.append(DesignShape(link.name, old, new, joints))
     rigid = MechanismPlotter(simulation.model).rigid(linkage.joints.drawn)

@@ -240,7 +240,9 @@ def fingerprint(
         "sizes": list(fidelity.sizes.values()),
         "effects": [repr(effect) for effect in simulation.scene.effects],
         "drawing": [repr(link) for link in mechanism.flexible_links],
-        "links": [[link.name, link.spline.initial.tolist()] for link in rest.links],
+        "links": [
+            [link.name, *(image.name for image in link.images), link.spline.initial.tolist()] for link in rest.links
+        ],
         "bounds": [repr(link.bounds) for link in rest.links],
         "numbers": [repr(own) for own in rest.numbers.numbers],
         "targets": [repr(target) for target in targets],

@@ -18,7 +18,8 @@ from fenicsmech.elasticity import ElasticBody
 from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadControl
 from fenicsmech.equilibrium.state import State
 from fenicsmech.equilibrium.unknowns import Numbering
-from fenicsmech.multibody import BodyPoint, JointSystem, LinkPoint, PosePotential
+from fenicsmech.mechanism import Link
+from fenicsmech.multibody import BodyPoint, IdleSpin, JointSystem, LinkPoint, PosePotential
 
 REGULARISATION = 1e-8
 """ε = 1/ρ of the multipliers, the proximal term of the augmented Lagrangian: keeps redundant constraints regular. In
@@ -34,10 +35,12 @@ class PointLoad:
     Attributes:
         name: for messages.
         acting: points and directions, of as many coordinates as u(point), times the ratio of each force to f.
+        links: that carry the points.
     """
 
     name: str
     acting: tuple[tuple[BodyPoint | LinkPoint, np.ndarray], ...]
+    links: tuple[Link, ...]
 
     def travel(self, u: fem.Function, poses: np.ndarray) -> float:
         """Σ direction · u(point)."""
@@ -57,11 +60,12 @@ class BorderTerms:
         *,
         potentials: Sequence[PosePotential],
         compliances: np.ndarray,
+        idle: Sequence[IdleSpin],
     ) -> None:
         self._elastic, self._joints, self._numbering = elastic, joints, numbering
         self._controlled, self._constant = controlled, constant
         self._potentials = [(potential, self._places(potential)) for potential in potentials]
-        self._compliances = compliances
+        self._compliances, self._idle = compliances, tuple(idle)
 
     # -- values --------------------------------------------------------------------------------------------
 
@@ -122,17 +126,16 @@ class BorderTerms:
 
     # -- Hessian: entries of K̂ as (global rows, global columns, values) ------------------------------------------
 
-    def entries(
-        self, state: State, control: Control, moments: Mapping[int, np.ndarray], regularisation: np.ndarray
-    ) -> Entries:
+    def entries(self, state: State, control: Control, moments: Mapping[int, np.ndarray], scale: np.ndarray) -> Entries:
         """All entries at ``state``.
 
-            B = Σ_i r_i · ∂²u_i/∂z² − Σ f_k a_k · ∂²u_k/∂z² + ∂²V/∂z² − Σ λ_k ∂²C_k/∂z²
+            B = Σ_i r_i · ∂²u_i/∂z² − Σ f_k a_k · ∂²u_k/∂z² + ∂²V/∂z² − Σ λ_k ∂²C_k/∂z² + Σ e eᵀ
 
-        ``moments`` are Σ r_i ⊗ (X_i − c) over the nodes on the interfaces of each body, ``regularisation`` is ε by
-        constraint row and that of a given load, in the units of K̂, (rows + 1,).
+        ``moments`` are Σ r_i ⊗ (X_i − c) over the nodes on the interfaces of each body, ``scale`` are the units of the
+        border's unknowns, (border,), in which e, the gauge of an idle spin, has the size of one.
         """
         joints, rows = self._joints, self._numbering.rows
+        units = self._numbering.unknowns.restrict_border(scale)
         z, multipliers, load = rows.poses.first, rows.multipliers.first, np.array([rows.load.first])
         for body, moment in moments.items():
             columns = z + joints.columns[body]
@@ -147,27 +150,34 @@ class BorderTerms:
             for one, columns in places:
                 for other, other_columns in places:
                     yield z + columns, z + other_columns, curvature[one, other]
+        for spin in self._idle:
+            body, gauge = spin.gauge(joints, state.poses)
+            columns = joints.columns[body]
+            gauge /= units.poses[columns]
+            yield z + columns, z + columns, np.outer(gauge, gauge)
         for poses, other_poses, block in joints.hessian_blocks(state.poses, state.motors, state.multipliers):
             yield z + poses, z + other_poses, -block
         for constraints, columns, block in joints.gradient_blocks(state.poses, state.motors):
             yield multipliers + constraints, z + columns, -block
             yield z + columns, multipliers + constraints, -block.T
-        for row, value in enumerate(-regularisation[:-1] - self._compliances, start=multipliers):
+        regularisation = REGULARISATION / units.multipliers**2
+        for row, value in enumerate(-regularisation - self._compliances, start=multipliers):
             yield np.array([row]), np.array([row]), np.array([[value]])
         if control.constrained:
             for loaded, travel in self._travel_rows(state):
                 yield load, loaded, -travel
                 yield loaded, load, -travel.T
         else:  # f is given: its equation is f = f
-            yield load, load, np.array([[-regularisation[-1]]])
+            yield load, load, -1.0 / units.load[:, None] ** 2
 
     def pattern(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Pattern of ``entries``, as (global rows, global columns). Local."""
         joints, dim = self._joints, self._joints.space.dim
         drawn = State(np.zeros(0), joints.drawn, np.zeros(joints.rows), 0.0, np.zeros(len(joints.connections)))
         moments = {body: np.zeros((dim, dim)) for body in joints.columns}
+        scale = np.ones(self._numbering.unknowns.border.size)
         for control in (LoadControl(0.0), DisplacementControl(0.0)):
-            for rows, columns, _ in self.entries(drawn, control, moments, np.zeros(joints.rows + 1)):
+            for rows, columns, _ in self.entries(drawn, control, moments, scale):
                 yield rows, columns
 
     def _travel_rows(self, state: State) -> Iterator[tuple[np.ndarray, np.ndarray]]:

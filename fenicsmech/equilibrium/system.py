@@ -21,13 +21,13 @@ from petsc4py import PETSc
 
 from fenicsmech.compat import destroy_garbage
 from fenicsmech.elasticity import ElasticBody, PredictedStress
-from fenicsmech.equilibrium.border import REGULARISATION, BorderTerms, PointLoad
+from fenicsmech.equilibrium.border import BorderTerms, PointLoad
 from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.kkt import KktMatrix, create_extended_matrix
 from fenicsmech.equilibrium.state import State, Step, load_fields
 from fenicsmech.equilibrium.unknowns import Numbering, ScaledUnknowns
 from fenicsmech.log import Clock
-from fenicsmech.multibody import InterfaceMap, JointSystem, PosePotential
+from fenicsmech.multibody import IdleSpin, InterfaceMap, JointSystem, PosePotential
 
 _SHARED = ("u", "multipliers", "force", "motors", "load_factor")  # of states and steps
 
@@ -68,6 +68,7 @@ class EquilibriumSystem:
         loads: constant ones, with their magnitudes.
         potentials: of body poses.
         compliances: c by constraint row; 0 where none is given.
+        idle: spins that nothing resists.
         clock: of the phases.
         comm: the processes that share the links.
 
@@ -75,6 +76,7 @@ class EquilibriumSystem:
         numbering: of rows and unknowns.
         blocks: of the unknowns.
         compliances: c, (rows,).
+        idle: spins that nothing resists, whose gauge K fixes.
         unknowns: x and G, at the poses of the last ``residual``.
         kkt: the KKT matrix last linearised; take it before another ``residual``.
     """
@@ -89,6 +91,7 @@ class EquilibriumSystem:
         loads: tuple[tuple[PointLoad, float], ...] = (),
         potentials: Sequence[PosePotential] = (),
         compliances: Mapping[int, float] = MappingProxyType({}),
+        idle: Sequence[IdleSpin] = (),
         clock: Clock,
         comm: MPI.Comm,
     ) -> None:
@@ -97,9 +100,17 @@ class EquilibriumSystem:
         self.controlled, self.clock, self.comm = controlled, clock, comm
         self.numbering = numbering = Numbering(comm, interfaces, joints, elastic.pressure)
         self.blocks = numbering.unknowns
+        self.idle = tuple(idle)
         self.compliances = np.array([compliances.get(row, 0.0) for row in range(joints.rows)])
         self._border = BorderTerms(
-            elastic, joints, numbering, controlled, loads, potentials=potentials, compliances=self.compliances
+            elastic,
+            joints,
+            numbering,
+            controlled,
+            loads,
+            potentials=potentials,
+            compliances=self.compliances,
+            idle=idle,
         )
         with clock.phase("compile"):
             elastic.compile()
@@ -109,8 +120,6 @@ class EquilibriumSystem:
             extended = create_extended_matrix(elastic, numbering, self._border.pattern())
             self.unknowns = ScaledUnknowns(elastic, numbering, interfaces, joints, extended.getDiagonal().array_r)
             self.kkt = KktMatrix(elastic, numbering, self.unknowns, extended, clock=clock)
-        scale = self.blocks.restrict_border(self.unknowns.scale)
-        self._regularisation = np.concatenate([REGULARISATION / scale.multipliers**2, 1.0 / scale.load**2])
 
     @cached_property
     def _predicted_stress(self) -> PredictedStress:
@@ -252,7 +261,7 @@ class EquilibriumSystem:
                 self._predicted_stress.take(last[0].u, last[1])
                 self._predicted_stress.add_stiffness(self.kkt.extended)
                 moments = _added(moments, self._moments(self._predicted_stress.forces()))
-        self.kkt.linearise(self._border.entries(state, control, moments, self._regularisation))
+        self.kkt.linearise(self._border.entries(state, control, moments, self.unknowns.scale))
 
     # -- right-hand sides whose KKT solutions are rates of x -----------------------------------------------------
 

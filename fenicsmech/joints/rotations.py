@@ -68,6 +68,10 @@ class RigidSpace(ABC):
     def rotation_rates_gradient(self, pose: np.ndarray) -> np.ndarray:
         """∂B/∂r_a, (rotation_size, rotation_size, 1 or 3)."""
 
+    @abstractmethod
+    def converted(self, poses: np.ndarray) -> np.ndarray:
+        """Poses (n, 3 or 7) in the plane or in space as poses here, (n, pose_size); space to plane by what is in it."""
+
     def retract(self, poses: np.ndarray) -> np.ndarray:
         """``poses`` (..., pose_size) put back on the manifold of rotations, to first order unchanged."""
         return poses
@@ -137,6 +141,11 @@ class PlanarSpace(RigidSpace):
     def rotation_rates_gradient(self, pose):
         return np.zeros((1, 1, 1))
 
+    def converted(self, poses):
+        if poses.shape[1] == self.pose_size:
+            return poses
+        return np.column_stack([poses[:, :2], 2.0 * np.arctan2(poses[:, 6], poses[:, 3])])
+
 
 def _quaternion_hessian() -> np.ndarray:
     """∂²R/∂q_a∂q_b of the quadratic R(q), (4, 4, 3, 3)."""
@@ -185,6 +194,13 @@ class SpatialSpace(RigidSpace):
     def rotation_rates_gradient(self, pose):
         # linear in q
         return np.array([self.rotation_rates(np.append(np.zeros(3), unit)) for unit in np.eye(4)])
+
+    def converted(self, poses):
+        if poses.shape[1] == self.pose_size:
+            return poses
+        converted, half = np.zeros((len(poses), self.pose_size)), 0.5 * poses[:, 2]
+        converted[:, :2], converted[:, 3], converted[:, 6] = poses[:, :2], np.cos(half), np.sin(half)
+        return converted
 
     def retract(self, poses):
         poses = np.array(poses)

@@ -12,6 +12,7 @@ Geometry that other layers use too
     ``cell_measures``   signed areas and volumes of cells
     ``boundary_loops``  outline and holes of a plane mesh
     ``link_outline``    the curves around a link, as they were drawn
+    ``matches``         motions that make a link the image of another one
     ``plan_of``         the plane mesh that an extruded one repeats
     ``section_of``      that, or a solid's face
 
@@ -23,6 +24,7 @@ and makes dolfinx meshes of them, over parallel ranks.
 
 from fenicsmech.meshing import outline, part_files, strip  # each registers its shapes
 from fenicsmech.meshing.cutting import circle_segments
+from fenicsmech.meshing.images import Figure, Isometry, Match, has_plain_outline, image_of, matches, same_mesh
 from fenicsmech.meshing.link_mesh import (
     FREE,
     CurvedEdges,

@@ -2,6 +2,7 @@
 
 - ``points``: interface nodes of the mesh as functions of body poses, the design field at nodes, material points
 - ``linkage``: bodies, constraints between them and potentials of their poses
+- ``idle_spins``: turns of bodies about the line through two balls, which nothing resists
 - ``assembly``: the rigid assembly of a configuration, and the motions that joints, motors and springs leave
 """
 
@@ -16,6 +17,7 @@ from fenicsmech.multibody.assembly import (
     is_held,
     stiff_motions,
 )
+from fenicsmech.multibody.idle_spins import IdleSpin, idle_spins
 from fenicsmech.multibody.linkage import (
     Body,
     Connection,
@@ -26,4 +28,4 @@ from fenicsmech.multibody.linkage import (
     build_linkage,
     spring_potentials,
 )
-from fenicsmech.multibody.points import BodyPoint, DesignAtNodes, InterfaceMap, LinkPoint, link_point
+from fenicsmech.multibody.points import BodyPoint, DesignAtNodes, InterfaceMap, LinkPoint, link_point, shape_functions

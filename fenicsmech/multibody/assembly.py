@@ -40,6 +40,7 @@ from scipy.sparse.csgraph import breadth_first_order
 
 from fenicsmech.errors import AssemblyError
 from fenicsmech.mechanism import Configuration
+from fenicsmech.multibody.idle_spins import IdleSpin
 from fenicsmech.multibody.linkage import JointSystem, Linkage, PosePotential
 
 _RANK = 1e-9  # singular values of A below this are zero: rows and unknowns are scaled to one
@@ -244,7 +245,7 @@ class Freedom:
     Attributes:
         mobility: number of free directions left.
         mobile: names of the links that can move.
-        zero_energy: names of the links that move in zero-energy modes; empty if springs hold all.
+        zero_energy: names of the links that move in zero-energy modes, idle spins left out; empty if springs hold all.
         redundancy: number of dependent constraint equations.
         redundant: names of the joints whose equations depend on each other.
     """
@@ -257,7 +258,11 @@ class Freedom:
 
 
 def count_freedom(
-    system: JointSystem, poses: np.ndarray, motors: np.ndarray, springs: Sequence[PosePotential] = ()
+    system: JointSystem,
+    poses: np.ndarray,
+    motors: np.ndarray,
+    springs: Sequence[PosePotential] = (),
+    idle: Sequence[IdleSpin] = (),
 ) -> Freedom:
     """Mobility and redundancy at ``poses`` (bodies, pose_size), motors at ``motors`` (connections,)."""
     dependent = _null_space(system.scaled_gradient(poses, motors).T)
@@ -274,7 +279,7 @@ def count_freedom(
     return Freedom(
         mobility=len(free.motions),
         mobile=moving(free.motions),
-        zero_energy=moving(modes[:, flat].T @ free.motions),
+        zero_energy=moving(_without(modes[:, flat].T @ free.motions, [spin.motion(system, poses) for spin in idle])),
         redundancy=len(dependent),
         redundant=tuple(dict.fromkeys(np.array(system.row_names)[_takes_part(dependent)].tolist())),
     )
@@ -329,6 +334,13 @@ def stiff_motions(linkage: Linkage, poses: np.ndarray, motors: np.ndarray) -> li
     parts = [np.array(part) for part in zip(*basis, strict=True)]
     rates = joints.row_scale[:, None] * (joints.gradient(poses, motors) @ parts[0].T)
     return [Motion(*(np.tensordot(weights, part, 1) for part in parts)) for weights in _null_space(rates)]
+
+
+def _without(modes: np.ndarray, motions: Sequence[np.ndarray]) -> np.ndarray:
+    """An orthonormal basis of the part of the span of ``modes`` (n, size), orthonormal, normal to some ``motions``."""
+    if not len(modes) or not motions:
+        return modes
+    return _null_space(np.array(motions) @ modes.T) @ modes
 
 
 def _null_space(matrix: np.ndarray) -> np.ndarray:

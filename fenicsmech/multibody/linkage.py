@@ -101,6 +101,10 @@ class JointSystem:
         """Poses of all bodies as drawn, (bodies, pose_size)."""
         return np.tile(self.space.identity, (len(self.bodies), 1))
 
+    def is_ball(self, k: int) -> bool:
+        """Whether connection ``k`` holds a point and nothing else, in space."""
+        return self.space.dim == 3 and self.connections[k].kind.shares_point and len(self._joint_rows[k]) == 3
+
     def motor_values(self, positions) -> np.ndarray:
         """φ per connection from ``positions``, a function of a motor; 0 where there is none."""
         return np.array([0.0 if c.motor is None else positions(c.motor) for c in self.connections])
@@ -239,7 +243,10 @@ class Linkage:
 
     def point(self, link: Link, at: Sequence[float]) -> BodyPoint:
         """The point drawn at ``at``, of two or three coordinates, that moves with the body that carries ``link``."""
-        body = self.body_of(link)
+        return self.point_on(self.body_of(link), at)
+
+    def point_on(self, body: int, at: Sequence[float]) -> BodyPoint:
+        """The point of a body drawn at ``at``."""
         return BodyPoint(body, np.array(in_dimension(at, self.dim)) - self.bodies[body].centre, self.joints.space)
 
     def turns_about_z(self, body: int) -> bool:

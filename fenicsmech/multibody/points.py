@@ -205,12 +205,18 @@ def link_point(
     found = None
     if comm.rank == owner:
         nodes = V.dofmap.cell_dofs(cells[k])
-        order = {corners: 1, corners * (corners + 1) // 2: 2}.get(len(nodes), 3)
-        shape = basix.CellType.triangle if corners == 3 else basix.CellType.tetrahedron
-        element = basix.create_element(basix.ElementFamily.P, shape, order, basix.LagrangeVariant.gll_warped)
-        weights = element.tabulate(0, barycentric[k][None, 1:])[0, 0, :, 0]
+        (weights,) = shape_functions(barycentric[k][None], len(nodes))
         found = (V.dofmap.index_map.local_to_global(nodes.astype(np.int32)), weights)
     return LinkPoint(*comm.bcast(found, root=owner))
+
+
+def shape_functions(barycentric: np.ndarray, nodes: int) -> np.ndarray:
+    """N_i of the Lagrange element with ``nodes`` at barycentric coordinates (n, dim + 1), (n, nodes)."""
+    corners = barycentric.shape[1]
+    order = {corners: 1, corners * (corners + 1) // 2: 2}.get(nodes, 3)
+    shape = basix.CellType.triangle if corners == 3 else basix.CellType.tetrahedron
+    element = basix.create_element(basix.ElementFamily.P, shape, order, basix.LagrangeVariant.gll_warped)
+    return element.tabulate(0, np.ascontiguousarray(barycentric[:, 1:]))[0, :, :, 0]
 
 
 def _barycentric(position: np.ndarray, vertices: np.ndarray, bulges: np.ndarray) -> np.ndarray:

@@ -122,6 +122,7 @@ class Discretisation:
 
     def _controlled_load(self, part: PrescribedPart) -> PointLoad:
         """The load whose magnitude is unknown; for motors one that acts nowhere."""
-        acting = part.ratios if isinstance(part, Force | ForceGroup) else ()
-        loads = [(self.model.point_load(force), ratio) for force, ratio in acting]
-        return PointLoad(part.name, tuple((point, ratio * way) for load, ratio in loads for point, way in load.acting))
+        forces = part.ratios if isinstance(part, Force | ForceGroup) else ()
+        loads = [(self.model.point_load(force), ratio) for force, ratio in forces]
+        acting = tuple((point, ratio * way) for load, ratio in loads for point, way in load.acting)
+        return PointLoad(part.name, acting, tuple(link for load, _ in loads for link in load.links))

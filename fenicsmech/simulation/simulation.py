@@ -13,7 +13,7 @@ from mpi4py import MPI
 from fenicsmech.collective import from_one
 from fenicsmech.continuation import ArcSteps, HermitePredictor, Predictor
 from fenicsmech.elasticity import Formulation, MixedFormulation, Quadrature
-from fenicsmech.equilibrium import EquilibriumMethod, EquilibriumSolver, PrimalDualNewton
+from fenicsmech.equilibrium import EquilibriumMethod, EquilibriumSolver, PrimalDualNewton, State
 from fenicsmech.errors import AssemblyError, DescriptionError
 from fenicsmech.estimates import AccuracyControl, Choice, Estimates, FidelityLevel, LevelErrors, cause_of_growth
 from fenicsmech.log import Clock, Progress
@@ -401,6 +401,15 @@ class Simulation:
         """
         with self._shaped():
             return CurveStepper(self._discretisation, request).curve(watch)
+
+    def unloaded(self, request: CurveRequest) -> State:
+        """The configuration of a checked request without any force or effect.
+
+        Raises:
+            EquilibriumError: motors strain the links, and no equilibrium was found.
+        """
+        with self._shaped():
+            return CurveStepper(self._discretisation, request).unloaded
 
     @contextmanager
     def _shaped(self) -> Iterator[None]:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from time import perf_counter
 
 import numpy as np
@@ -136,6 +137,7 @@ class CurveStepper:
         frames: those of the curve so far.
         solver: for the request's forces.
         freedom: mobility of the configuration.
+        unloaded: the configuration without any force or effect.
         followed: the control whose value changes along the curve.
         origin: zero of displacements: that of the force's point in the unloaded configuration.
     """
@@ -146,9 +148,9 @@ class CurveStepper:
         model, rigid = self._model, self._model.linkage.rigid
         assembly = assemble_before_strain(model.linkage, request.configuration, model.spring_potentials)
         motors = rigid.on_the_way(request.configuration.position, assembly.fraction)
-        self.freedom = count_freedom(rigid, assembly.poses, motors, model.spring_potentials)
         self.solver = discretisation.solver(request.part, request.others)
         self._system, self._joints = self.solver.system, model.linkage.joints
+        self.freedom = count_freedom(rigid, assembly.poses, motors, model.spring_potentials, self._system.idle)
         self.followed = discretisation.followed_control(request.part)
         self.origin, self._origins = 0.0, dict.fromkeys(model.mechanism.outputs, 0.0)
         self._snaps = 0  # so far, that no frame reports
@@ -158,12 +160,19 @@ class CurveStepper:
         if not self.followed.displaces:  # motors count from where they were drawn
             self.origin = self.followed.conjugate(self._system, state)
         self._origins = {output: model.travel(output, state) for output in model.mechanism.outputs}
-        if request.others or model.effects:
-            state = self._under_constant_loads(state)
-            self._system.load(state)
-        self._state = state
-        control = DisplacementControl() if any(c.constrained for c in request.controls) else LoadControl()
-        self._stepper = LoadStepper(self.solver, state, control, predictor=discretisation.predictor)
+
+    @cached_property
+    def _state(self) -> State:
+        """The configuration under constant loads, where load steps start."""
+        if not (self.request.others or self._model.effects):
+            return self.unloaded
+        return self._under_constant_loads(self.unloaded)
+
+    @cached_property
+    def _stepper(self) -> LoadStepper:
+        self._system.load(self._state)
+        control = DisplacementControl() if any(c.constrained for c in self.request.controls) else LoadControl()
+        return LoadStepper(self.solver, self._state, control, predictor=self.discretisation.predictor)
 
     def curve(self, watch: Callable[[int], None]) -> Curve:
         """The frames of all prescribed values; ``watch`` is called with the number of frames so far."""

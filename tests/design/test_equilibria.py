@@ -10,6 +10,7 @@ import fenicsmech as fm
 from fenicsmech.design import DesignEquilibria, Infeasible, SampleEquilibria
 from fenicsmech.equilibrium import NewtonSolver, NotConverged
 
+from .alike import assert_alike, displacements
 from .mechanisms import Bench, Case, bench, bow, strained, strains, truss, turned_beam
 
 CASES = {
@@ -27,25 +28,9 @@ def made(name: str, **fidelity) -> Bench:
     return bench(case, case.simulate(**fidelity))
 
 
-def displacements(known: DesignEquilibria) -> np.ndarray:
-    return np.concatenate(known.raw)
-
-
 def fields(both: Bench, known: DesignEquilibria) -> np.ndarray:
     """Derivatives of the displacements by the design field, (targets, owned values)."""
     return np.array([gradient.design for gradient in both.equilibria.gradients(known)])
-
-
-def assert_alike(followed: DesignEquilibria, traced: DesignEquilibria, *, digits: float = 1e-8) -> None:
-    """The same states and displacements."""
-    assert displacements(followed) == pytest.approx(displacements(traced), rel=digits)
-    for sample, a in followed.samples.items():
-        b = traced.samples[sample]
-        assert a.unloaded.poses == pytest.approx(b.unloaded.poses, abs=digits * np.abs(b.state.poses).max())
-        for one, other in [(a.state, b.state)]:
-            assert one.u == pytest.approx(other.u, abs=digits * np.abs(other.u).max())
-            assert one.poses == pytest.approx(other.poses, abs=digits * np.abs(other.poses).max())
-            assert one.force == other.force
 
 
 @each_case

@@ -10,7 +10,7 @@ from fenicsmech.design import Infeasible, SampleEquilibria
 from fenicsmech.equilibrium import LoadControl
 from fenicsmech.quantities import Sensitivity
 
-from ..equilibrium.arch import RISE, SPAN, arch
+from ..equilibrium.arch import RISE, SPAN, arch, lowered
 from ..oracles.dense import taylor_rates
 
 
@@ -44,14 +44,6 @@ def test_displacement_sensitivities_hold_close_to_a_limit_point(gap):
     steps *= force / RISE
     rates = taylor_rates(lambda t: travel(np.zeros(1), force - t[0]), [0.0], [1.0], [-loaded.control], steps)
     assert np.all(rates.without > 0.9) and np.all(rates.with_gradient > 1.9)
-
-
-def lowered(model, by: float) -> None:
-    """Makes the arch of ``model`` lower by a fraction of its rise."""
-    positions = model.elastic.shape.function_space.tabulate_dof_coordinates()
-    fall = np.zeros((len(positions), 2))
-    fall[:, 1] = -by * RISE * np.sin(np.pi * positions[:, 0] / SPAN)
-    model.reshape(fall.ravel())
 
 
 @pytest.fixture(scope="module")

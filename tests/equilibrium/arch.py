@@ -26,6 +26,14 @@ def arch(comm: MPI.Comm = MPI.COMM_SELF, *, space: str = "plane-stress") -> tupl
     return fm.Simulation(fm.Scene(mechanism), space=space, size=SIZE[space], comm=comm), push
 
 
+def lowered(model, by: float) -> None:
+    """Makes the arch of ``model`` lower by a fraction of its rise."""
+    positions = model.elastic.shape.function_space.tabulate_dof_coordinates()
+    fall = np.zeros((len(positions), 2))
+    fall[:, 1] = -by * RISE * np.sin(np.pi * positions[:, 0] / SPAN)
+    model.reshape(fall.ravel())
+
+
 def beam_forces(displacements: np.ndarray) -> np.ndarray:
     """Forces of the symmetric beam, elastic from the rim of the pin's disc to the crown."""
     whole = centreline.through(POINTS)

@@ -1,6 +1,7 @@
 """Optimal handle positions, min over θ of S(θ, p) = Σ_e ρ(e), and their derivatives by p.
 
-Links do not have cells in common, so S is a sum of functions of the θ of one link each. Newton's method with exact
+Links do not have cells in common, so S is a sum of functions of the θ of one link each; the cells of links that share a
+shape depend on the same θ. Newton's method with exact
 Hessians minimises them together, with a line search for each that refuses inverted cells. By the implicit function
 theorem
 
@@ -15,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
@@ -210,7 +212,7 @@ class HandleOptimum:
         return trial, np.where([link in stuck for link in range(len(trial))], sums, new), stuck
 
     def _sums(self, p: np.ndarray, positions: Sequence[np.ndarray]) -> np.ndarray:
-        """Σρ of each link that changes, inf if cells are inverted or handles out of order, (links,)."""
+        """Σρ of the links of each shape, inf if cells are inverted or handles out of order, (shapes,)."""
         mesh = self._map.mesh
         self._map.apply(p, np.concatenate(positions))
         topology = mesh.mesh.topology
@@ -219,7 +221,9 @@ class HandleOptimum:
             mesh.link[:owned], self._quality.cell_values()[:owned], minlength=mesh.link_of_cell.max() + 1
         )
         (per_link,) = self._map.sum_over_ranks([per_link])
-        sums = per_link[[shape.link for shape in self._map.shapes]]
+        sums = np.zeros(len(self._map.shapes))
+        for piece in self._map.pieces:
+            sums[piece.shape] += per_link[piece.link]
         # between its ends, handles follow each other along the spline
         pairs = zip(self._handles, positions, strict=True)
         ordered = np.array([np.all(np.diff(_along(handles, theta)) > 0.0) for handles, theta in pairs])
@@ -359,26 +363,26 @@ class _MomentHessian:
         # class of each vertex of the whole mesh, −1 where no handle moves it; two unknowns (x, y) per class
         classes = np.full(len(shape_map.mesh.vertices), -1)
         self._arms, self._unknowns, first = [], [], 0
-        for vertices, reach in zip(shape_map.vertices, shape_map.reach, strict=True):
+        for piece in shape_map.pieces:
+            reach = piece.reach
             rows, inverse = np.unique(reach.reshape(len(reach), -1), axis=0, return_inverse=True)
-            classes[vertices] = first + inverse.ravel()
+            classes[piece.vertices] = first + inverse.ravel()
             # ∂d/∂T of every class from its r, (2 classes, 6 handles)
-            arms = np.zeros((len(rows), 2, reach.shape[1], 2, 3))
-            arms[:, 0, :, 0] = arms[:, 1, :, 1] = rows.reshape(-1, *reach.shape[1:])
+            arms = np.einsum("ab,njk->najbk", piece.matrix, rows.reshape(-1, *reach.shape[1:]))
             self._arms.append(arms.reshape(2 * len(rows), -1))
             self._unknowns.append(slice(2 * first, 2 * (first + len(rows))))
             first += len(rows)
         self._find_slots(hessian, classes, 2 * first)
 
     def reduce(self, hessian: PETSc.Mat) -> list[np.ndarray]:
-        """∂²/∂T∂T per link, (handles, 2, 3, handles, 2, 3)."""
+        """∂²/∂T∂T per shape, (handles, 2, 3, handles, 2, 3)."""
         values = hessian.getValuesCSR()[2][self._kept]
         self._sum.data = np.bincount(self._slots, weights=values, minlength=self._sum.nnz)
-        blocks = []
-        for mine, arms in zip(self._unknowns, self._arms, strict=True):
+        blocks: list[Any] = [0.0] * len(self._map.shapes)
+        for piece, mine, arms in zip(self._map.pieces, self._unknowns, self._arms, strict=True):
             handles = arms.shape[1] // 6
             block = arms.T @ (self._sum[mine, mine] @ arms)
-            blocks.append(block.reshape(handles, 2, 3, handles, 2, 3))
+            blocks[piece.shape] = blocks[piece.shape] + block.reshape(handles, 2, 3, handles, 2, 3)
         return self._map.sum_over_ranks(blocks)
 
     def _find_slots(self, hessian: PETSc.Mat, classes: np.ndarray, size: int) -> None:

@@ -67,7 +67,7 @@ class QualitySum:
         design: the design field d, vector P1.
         penalty: φ, in UFL; ρ itself by default.
         comm: the processes that share the mesh; the mesh's own communicator by default.
-        counts: mask of the local cells that count, ghosts last, (cells,); all by default.
+        counts: mask of the local cells that count, or their weights, ghosts last, (cells,); all by default.
     """
 
     def __init__(

@@ -3,6 +3,9 @@
     d_i = Σ_j w_ij T_j(p, θ_j) (X_i − X_j, 1) = Σ_j T_j r_ij,     d linear in the maps T_j (2 × 3) of the handles.
 
 The transpose takes a field g to the moments ∂/∂T_j = Σ_i g_i ⊗ r_ij of each handle, and from there to ∂/∂p and ∂/∂θ.
+
+Links that share a shape share p and θ. With the motion x′ = Q x + c from the first of them to another one, r_ij are
+those of the points Qᵀ (X′_i − c), and d′_i = Q Σ_j T_j r_ij.
 """
 
 from __future__ import annotations
@@ -10,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from dolfinx import fem
@@ -24,7 +28,17 @@ from fenicsmech.design.shape.spline import LinkSpline, SplineFit, SplineSamples,
 from fenicsmech.design.shape.weights import handle_weights, pierced
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import Centreline
-from fenicsmech.meshing import FREE, CurvedEdges, LinkMesh, MechanismMesh, cell_measures, node_ends, plan_of
+from fenicsmech.meshing import (
+    FREE,
+    CurvedEdges,
+    Isometry,
+    LinkMesh,
+    MechanismMesh,
+    cell_measures,
+    image_of,
+    node_ends,
+    plan_of,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +56,7 @@ class ShapeRequest:
         thickness: in the plane, where δ = 1, or the outline that it is measured on.
         ends_move: whether free ends may move.
         spacing: arc length between handles; None: the mean width of the link.
+        images: links that share the shape.
     """
 
     link: int
@@ -54,6 +69,43 @@ class ShapeRequest:
     thickness: float | LinkOutline
     ends_move: bool = False
     spacing: float | None = None
+    images: tuple[ImageRequest, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class ImageRequest:
+    """A link that shares the shape of another one.
+
+    Attributes:
+        link: index of the flexible link.
+        name: its name.
+        isometry: from the other link to this one.
+        sites: this link's interface at the place of each of the other's, (sites,).
+    """
+
+    link: int
+    name: str
+    isometry: Isometry
+    sites: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class LinkImage:
+    """A link that has the handles of a shape, its own or those of another link.
+
+    Attributes:
+        link: index of the flexible link.
+        name: its name.
+        isometry: from the link with the handles to this one.
+        weights: of each handle at each vertex of this link, (n, handles).
+        edges: weights at the midpoints of edges that follow the design, in the place of the link with the handles.
+    """
+
+    link: int
+    name: str
+    isometry: Isometry
+    weights: np.ndarray
+    edges: EdgeWeights
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +120,7 @@ class LinkShape:
         edges: weights at the midpoints of edges that follow the design.
         thickness: in the plane, where δ = 1; at the samples of the spline where it is not the same everywhere.
         centreline: points that the drawn centreline runs through, (k, 2).
+        images: links that share the shape.
     """
 
     link: int
@@ -77,10 +130,21 @@ class LinkShape:
     edges: EdgeWeights
     thickness: float | np.ndarray
     centreline: np.ndarray
+    images: tuple[LinkImage, ...] = ()
+
+    @property
+    def every(self) -> tuple[LinkImage, ...]:
+        """All links with this shape, this one first."""
+        return (LinkImage(self.link, self.name, Isometry.identity(), self.weights, self.edges), *self.images)
 
 
-def shape_link(mesh: LinkMesh, request: ShapeRequest) -> LinkShape:
+def shape_link(mesh: LinkMesh, request: ShapeRequest, others: Sequence[LinkMesh] = ()) -> LinkShape:
     """Spline, handles and weights of one link.
+
+    Args:
+        mesh: of the link.
+        request: of its shape.
+        others: meshes of the links that share the shape.
 
     Raises:
         DescriptionError: the spline does not fit the link, or elements are too large for its handles.
@@ -90,6 +154,20 @@ def shape_link(mesh: LinkMesh, request: ShapeRequest) -> LinkShape:
     fit = fit_spline(request.centreline, joints, layout, ends_move=request.ends_move, part=f"spline of {part}")
     spacing = request.spacing or _mean_width(mesh, request.centreline.length)
     handles = _place_handles(mesh, fit, spacing=spacing, turns=request.turns, part=part)
+    weights, edges = _weights(mesh, handles, part=part)
+    images = []
+    for image, other in zip(request.images, others, strict=True):
+        here = image_of(other, image.isometry.inverse, np.argsort(image.sites))
+        own = (weights, edges) if _is_same(here, mesh) else _weights(here, handles, part=f"link {image.name!r}")
+        images.append(LinkImage(image.link, image.name, image.isometry, *own))
+    drawn = request.thickness
+    thickness = _measured(drawn, fit.spline, part=f"design of {part}") if isinstance(drawn, LinkOutline) else drawn
+    centreline = request.centreline.evaluate(request.centreline.knots)
+    return LinkShape(request.link, request.name, handles, weights, edges, thickness, centreline, tuple(images))
+
+
+def _weights(mesh: LinkMesh, handles: LinkHandles, *, part: str) -> tuple[np.ndarray, EdgeWeights]:
+    """Weights at the vertices of a mesh and at midpoints of its edges."""
     weights = handle_weights(mesh, handles, part=part)
     hidden = int(np.sum(weights.max(axis=0) < 1e-6))  # between vertices that interfaces hold
     if hidden:
@@ -98,11 +176,16 @@ def shape_link(mesh: LinkMesh, request: ShapeRequest) -> LinkShape:
             f"handles move no vertex, as its elements are too large: {hidden} of {len(handles)}",
             "Use smaller elements",
         )
-    edges = edge_weights(mesh, weights)
-    drawn = request.thickness
-    thickness = _measured(drawn, fit.spline, part=f"design of {part}") if isinstance(drawn, LinkOutline) else drawn
-    centreline = request.centreline.evaluate(request.centreline.knots)
-    return LinkShape(request.link, request.name, handles, weights, edges, thickness, centreline)
+    return weights, edge_weights(mesh, weights)
+
+
+def _is_same(one: LinkMesh, other: LinkMesh) -> bool:
+    """Whether two meshes in one place are the same, vertex by vertex."""
+    if one.points.shape != other.points.shape or one.cells.shape != other.cells.shape:
+        return False
+    near = np.abs(one.points - other.points).max() <= 1e-9 * np.ptp(other.points, axis=0).max()
+    alike = np.array_equal(np.sort(one.cells, axis=1), np.sort(other.cells, axis=1))
+    return bool(near and alike and np.array_equal(one.interface, other.interface))
 
 
 def _measured(outline: LinkOutline, spline: LinkSpline, *, part: str) -> np.ndarray:
@@ -116,7 +199,11 @@ def _measured(outline: LinkOutline, spline: LinkSpline, *, part: str) -> np.ndar
 def shape_links(mesh: MechanismMesh, requests: Sequence[ShapeRequest]) -> list[LinkShape]:
     """The shapes of some links, computed on the first rank and the same on all; errors too."""
     links = gather_links(mesh)
-    return from_one(mesh.mesh.comm, lambda: [shape_link(links[request.link], request) for request in requests])
+
+    def shape(request: ShapeRequest) -> LinkShape:
+        return shape_link(links[request.link], request, [links[image.link] for image in request.images])
+
+    return from_one(mesh.mesh.comm, lambda: [shape(request) for request in requests])
 
 
 def gather_links(mesh: MechanismMesh, rest: tuple[np.ndarray, CurvedEdges] | None = None) -> list[LinkMesh]:
@@ -198,6 +285,29 @@ def _mean_width(mesh: LinkMesh, length: float) -> float:
     return size / length if plan.dim == 2 else size / length / np.ptp(plan.points[:, 2])
 
 
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """One link of those with a shape, on this rank.
+
+    Attributes:
+        shape: number of the shape.
+        link: index of the flexible link.
+        matrix: Q, (2, 2).
+        vertices: of the link in the whole mesh, (n,).
+        reach: r_ij there, (n, handles, 3).
+        nodes: local nodes of the link.
+        local_reach: r_ij there.
+    """
+
+    shape: int
+    link: int
+    matrix: np.ndarray
+    vertices: np.ndarray
+    reach: np.ndarray
+    nodes: np.ndarray
+    local_reach: np.ndarray
+
+
 class ShapeMap:
     """The shape of some links as a function of parameters p and handle positions θ, both link after link.
 
@@ -212,8 +322,7 @@ class ShapeMap:
     Attributes:
         owned: number of owned nodes.
         original: vertex of the whole mesh of every local node, of an edge's midpoint its lower end, (nodes,).
-        vertices: per link, its vertices in the whole mesh, (n,).
-        reach: per link, r_ij at ``vertices``, (n, handles, 3).
+        pieces: all links with these shapes.
         initial, initial_theta: p (parameters,) and θ (handles,) of the initial design.
     """
 
@@ -222,15 +331,11 @@ class ShapeMap:
         ends = node_ends(design.function_space)
         self.original = ends[:, 0]
         self.owned = design.function_space.dofmap.index_map.size_local
-        self.vertices = [np.unique(mesh.cells[mesh.link_of_cell == shape.link]) for shape in shapes]
-        self.reach = [
-            _reach(mesh.vertices[v], shape.weights, shape) for v, shape in zip(self.vertices, shapes, strict=True)
+        self.pieces = [
+            self._piece(number, image, shape.handles, ends)
+            for number, shape in enumerate(shapes)
+            for image in shape.every
         ]
-        self._nodes, self._local_reach = [], []
-        for shape, vertices, reach in zip(shapes, self.vertices, self.reach, strict=True):
-            nodes = np.flatnonzero(np.isin(self.original, vertices))
-            self._nodes.append(nodes)
-            self._local_reach.append(_at_nodes(np.searchsorted(vertices, ends[nodes]), reach, shape))
         handles = [shape.handles for shape in shapes]
         self.initial = np.concatenate([np.zeros(0), *(h.spline.initial for h in handles)])
         self.initial_theta = np.concatenate([np.zeros(0), *(h.initial for h in handles)])
@@ -270,16 +375,18 @@ class ShapeMap:
     def spread(self, transforms: Sequence[np.ndarray]) -> np.ndarray:
         """Σ_j T_j r_ij from the maps of each link's handles, (nodes, dim)."""
         d = np.zeros((len(self.original), self.mesh.vertices.shape[1]))
-        for nodes, reach, T in zip(self._nodes, self._local_reach, transforms, strict=True):
-            d[nodes, :2] = np.einsum("ijk,jak->ia", reach, T, optimize=True)
+        for own in self.pieces:
+            moved = np.einsum("ijk,jak->ia", own.local_reach, transforms[own.shape], optimize=True)
+            d[own.nodes, :2] = moved @ own.matrix.T
         return d
 
     def moments(self, g: np.ndarray) -> list[np.ndarray]:
-        """The transpose of ``spread``: Σ_i g_i ⊗ r_ij of each handle, per link (…, handles, 2, 3), over all ranks."""
-        parts = []
-        for nodes, reach in zip(self._nodes, self._local_reach, strict=True):
-            mine = nodes < g.shape[-2]
-            parts.append(np.einsum("...ia,ijk->...jak", g[..., nodes[mine], :2], reach[mine]))
+        """The transpose of ``spread``: Σ_i g_i ⊗ r_ij of each handle, per shape (…, handles, 2, 3), over all ranks."""
+        parts: list[Any] = [0.0] * len(self.shapes)
+        for own in self.pieces:
+            mine = own.nodes < g.shape[-2]
+            back = g[..., own.nodes[mine], :2] @ own.matrix
+            parts[own.shape] = parts[own.shape] + np.einsum("...ia,ijk->...jak", back, own.local_reach[mine])
         return self.sum_over_ranks(parts)
 
     def sum_over_ranks(self, parts: Sequence[np.ndarray]) -> list[np.ndarray]:
@@ -292,21 +399,29 @@ class ShapeMap:
     def _links(self, p: np.ndarray, theta: np.ndarray):
         return zip(self.shapes, self.parameters(p), self.positions(theta), strict=True)
 
+    def _piece(self, number: int, image: LinkImage, handles: LinkHandles, ends: np.ndarray) -> _Piece:
+        mesh = self.mesh
+        vertices = np.unique(mesh.cells[mesh.link_of_cell == image.link])
+        reach = _reach(image.isometry.inverse.points(mesh.vertices[vertices]), image.weights, handles)
+        nodes = np.flatnonzero(np.isin(self.original, vertices))
+        local = _at_nodes(np.searchsorted(vertices, ends[nodes]), reach, image.edges, handles)
+        return _Piece(number, image.link, image.isometry.matrix, vertices, reach, nodes, local)
 
-def _reach(points: np.ndarray, weights: np.ndarray, shape: LinkShape) -> np.ndarray:
+
+def _reach(points: np.ndarray, weights: np.ndarray, handles: LinkHandles) -> np.ndarray:
     """r_ij = w_ij (X_i − X_j, 1), (n, handles, 3)."""
-    arms = points[:, None, :2] - shape.handles.centre
+    arms = points[:, None, :2] - handles.centre
     return weights[..., None] * np.concatenate([arms, np.ones((*arms.shape[:2], 1))], axis=2)
 
 
-def _at_nodes(ends: np.ndarray, reach: np.ndarray, shape: LinkShape) -> np.ndarray:
+def _at_nodes(ends: np.ndarray, reach: np.ndarray, edges: EdgeWeights, handles: LinkHandles) -> np.ndarray:
     """r_ij at nodes between the vertices ``ends`` (n, 2) of a link, from that at its vertices, (n, handles, 3)."""
     if np.array_equal(ends[:, 0], ends[:, 1]):
         return reach[ends[:, 0]]
-    found, edges, count = 0.5 * (reach[ends[:, 0]] + reach[ends[:, 1]]), shape.edges, len(reach)
+    found, count = 0.5 * (reach[ends[:, 0]] + reach[ends[:, 1]]), len(reach)
     if len(edges.ends):
         keys, wanted = edges.ends @ (count, 1), ends @ (count, 1)
         place = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
         hit = np.flatnonzero(keys[place] == wanted)
-        found[hit] = _reach(edges.middles, edges.weights, shape)[place[hit]]
+        found[hit] = _reach(edges.middles, edges.weights, handles)[place[hit]]
     return found

@@ -1,0 +1,84 @@
+"""Idle spins: bodies held by two balls turn about the line through them, and nothing resists.
+
+Where a set of bodies meets the others at two ball joints only, and nothing else acts on it, the Lagrangian stays the
+same while the set turns as a rigid body about the line through the balls. With the spin n, the rate of the unknowns y
+in that turn,
+
+    n · ∇L = 0 at every y,      ∇²L n = 0 at equilibria:
+
+the matrix is singular, the equations are consistent, and whether its zero eigenvalue is counted as negative is a matter
+of rounding. Fixing the gauge,
+
+    ∇²L + e eᵀ,     e · n ≠ 0,
+
+makes the matrix regular, and leaves those solutions of ∇²L x = r that have e · x = 0; the spin counts as stable. Here e
+turns one body of the set about the line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import connected_components
+
+from fenicsmech.multibody.linkage import JointSystem, Linkage
+from fenicsmech.multibody.points import BodyPoint
+
+
+@dataclass(frozen=True)
+class IdleSpin:
+    """``bodies`` that turn idly, and the two ``balls`` that hold them, as points of theirs, drawn at ``places``."""
+
+    bodies: tuple[int, ...]
+    balls: tuple[BodyPoint, BodyPoint]
+    places: tuple[np.ndarray, np.ndarray]
+
+    def line(self, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """A point on the line through the balls at ``poses`` (bodies, pose_size), and its direction of length one."""
+        first, second = (at + ball.displacement(None, poses) for at, ball in zip(self.places, self.balls, strict=True))
+        return first, (second - first) / np.linalg.norm(second - first)
+
+    def gauge(self, joints: JointSystem, poses: np.ndarray) -> tuple[int, np.ndarray]:
+        """A body, and the rate of its pose in the turn about the line without its centre's motion, (pose_size,)."""
+        body = self.bodies[0]
+        rates = joints.space.rotation_rates(poses[body]) @ self.line(poses)[1]
+        return body, np.concatenate([np.zeros(joints.space.dim), rates])
+
+    def motion(self, joints: JointSystem, poses: np.ndarray) -> np.ndarray:
+        """n by the pose unknowns, in units of ``JointSystem.pose_scale`` and of norm one, (size,)."""
+        (point, axis), z = self.line(poses), np.zeros(joints.size)
+        for body in self.bodies:
+            centre = np.array(joints.bodies[body].centre) + poses[body, : joints.space.dim]
+            turn = joints.space.rotation_rates(poses[body]) @ axis
+            z[joints.columns[body]] = np.concatenate([np.cross(axis, centre - point), turn])
+        z /= joints.pose_scale
+        return z / np.linalg.norm(z)
+
+
+def idle_spins(linkage: Linkage, acted_on: Collection[int] = ()) -> tuple[IdleSpin, ...]:
+    """The idle spins of a linkage in space.
+
+    Args:
+        linkage: the bodies and their joints.
+        acted_on: indices of bodies on which, or on whose link, something beside joints acts: these do not spin idly.
+    """
+    system, found = linkage.rigid, []
+    balls = [c for k, c in enumerate(system.connections) if system.is_ball(k)]
+    pairs = np.array([(c.a, c.b) for c in system.connections if c not in balls], dtype=int).reshape(-1, 2)
+    graph = csr_matrix((np.ones(len(pairs)), pairs.T), shape=(len(system.bodies),) * 2)
+    _, group = connected_components(graph, directed=False)
+    for label in np.unique(group):
+        bodies = tuple(int(body) for body in np.flatnonzero(group == label))
+        if any(system.bodies[body].fixed or body in acted_on for body in bodies):
+            continue
+        ends = [(c, body) for c in balls for body in (c.a, c.b) if group[body] == label and group[c.a] != group[c.b]]
+        if len(ends) != 2:
+            continue
+        points = [linkage.point_on(body, c.at) for c, body in ends]
+        places = [np.array(c.at) for c, _ in ends]
+        if np.linalg.norm(places[1] - places[0]) > 1e-9 * linkage.length:
+            found.append(IdleSpin(bodies, (points[0], points[1]), (places[0], places[1])))
+    return tuple(found)

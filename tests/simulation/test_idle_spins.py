@@ -1,0 +1,65 @@
+"""Links between two balls turn about themselves without any effect: neither equilibria nor verdicts may notice."""
+
+import numpy as np
+import pytest
+
+import fenicsmech as fm
+
+# the rocker's arm at the force over that at the coupler, times Euler's load of the coupler between its balls
+BUCKLING = 40.0 / 30.0 * np.pi**2 * 1770.0 * 3.0**4 / 12.0 / 60.0**2
+
+
+def rssr(*, rod: bool = False):
+    """A four-bar in space, pushed at its rocker against the locked crank; the coupler may end in a rigid ``rod``."""
+    m = fm.Mechanism("RSSR four-bar")
+    ground, crank, rocker = m.rigid("ground", fixed=True), m.rigid("crank"), m.rigid("rocker")
+    end = (80.0, 0.0, 0.0)
+    coupler = m.flexible("coupler", fm.strip([(20, 0), (60 if rod else 80, 0)], thickness=3.0, depth=3.0), fm.ONYX)
+    held = coupler
+    if rod:
+        held = m.rigid("rod")
+        m.weld(coupler, held, at=(60, 0, 0), interface_radius=1.5)
+    hinge = m.revolute(ground, crank, at=(0, 0, 0))
+    m.spherical(crank, coupler, at=(20, 0, 0), interface_radius=1.5)
+    m.spherical(held, rocker, at=end, **({} if rod else {"interface_radius": 1.5}))
+    m.revolute(rocker, ground, at=(80, 0, 40), axis=(0, 1, 0))
+    motor = m.motor(hinge)
+    push = m.force(on=rocker, at=(80, 0, 10), direction=(-1, 0, 0), name="push")
+    return fm.Simulation(fm.Scene(m), space="3d", size=3.0), push, motor
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.6])
+def test_idle_coupler_carries_loads_up_to_buckling_without_a_remark(turn):
+    simulation, push, motor = rssr()
+    configuration = fm.Configuration("turned", [(motor, turn)])
+    curve = simulation.load_displacement(push, forces=[8.75, 17.5, 35.0], configuration=configuration)
+    assert 35.0 < BUCKLING
+    for frame in curve.frames:
+        assert (frame.unstable_modes, frame.snapped_through) == (0, False)
+        assert frame.iterations <= 4
+    followed = simulation.follow(push, until=fm.Until(force=35.0), configuration=configuration)
+    assert curve.frames[-1].displacement == pytest.approx(followed.frames[-1].displacement, rel=1e-8)
+
+
+def test_several_links_may_spin_together():
+    simulation, push, _ = rssr(rod=True)
+    curve = simulation.load_displacement(push, forces=[5.0, 20.0])
+    assert [frame.unstable_modes for frame in curve.frames] == [0, 0]
+    alone, own_push, _ = rssr()
+    softer = alone.load_displacement(own_push, forces=[5.0, 20.0])
+    # the rod does not shorten: nearly two thirds of the strip's length between its interfaces are left
+    ratio = curve.frames[0].displacement / softer.frames[0].displacement
+    assert ratio == pytest.approx((40.0 - 3.0) / (60.0 - 3.0), rel=0.05)
+
+
+def test_a_load_on_the_link_stops_it_from_spinning_idly():
+    m = fm.Mechanism("hanging rod")
+    ground = m.rigid("ground", fixed=True)
+    rod = m.flexible("rod", fm.strip([(0, 0), (60, 0)], thickness=3.0, depth=3.0), fm.ONYX)
+    arm = m.rigid("arm")
+    m.spherical(ground, rod, at=(0, 0, 0), interface_radius=1.5)
+    m.weld(rod, arm, at=(60, 0, 0), interface_radius=1.5)
+    m.spherical(arm, ground, at=(70, 0, 0))
+    pull = m.force(on=arm, at=(60, -5, 0), direction=(0, -1, 0), name="pull")
+    frame = fm.Simulation(fm.Scene(m), space="3d", size=3.0).load_displacement(pull, forces=[0.1]).frames[-1]
+    assert (frame.unstable_modes, frame.snapped_through) == (0, False)
