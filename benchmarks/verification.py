@@ -96,6 +96,11 @@ CASES = (
         "estimates/test_element_error.py::test_effectivity",
     ),
     Case(
+        "error estimates of designed links against their exported parts in finer elements, in the plane and in space",
+        "factor 2",
+        "design/test_objective_error.py::test_errors_of_designs",
+    ),
+    Case(
         "estimate of the error of plane stress against space",
         "factor 2",
         "estimates/test_plane_stress_error.py::test_estimate_is_near_what_space_adds",

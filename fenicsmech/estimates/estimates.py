@@ -6,7 +6,7 @@ displacement and e_z of the adjoint z of the quantity Q, to first order
     Q(u) − Q(u_h) = ∫ ∇e_u : ∂²W/∂F∂F : ∇e_z dV.
 
 Their gradients are estimated by recovery by averaging: G is the L² projection of the gradient to continuous
-fields of the gradient's degree (at least 1) over deformable cells,
+fields of the gradient's degree (at least 1) over deformable cells of the rest shape,
 
     ∇e ≈ c (G(∇u_h) − ∇u_h),
 
@@ -54,6 +54,7 @@ from functools import cached_property
 import numpy as np
 import ufl
 from dolfinx import fem
+from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.spatial import cKDTree
 
@@ -213,8 +214,9 @@ class ElementError:
             fields = (elastic.pressure.p, self._adjoint[1])
             self._pressures = [PressureError(elastic, field, linear) for field in fields]
         gradients = [elastic.gradient(elastic.u), elastic.gradient(self._adjoint[0])]
-        test, measure = ufl.TestFunction(tensors), elastic.free(2 * degree)
-        self._right_hand_sides = [compile_form(ufl.inner(H, test) * measure) for H in gradients]
+        test = ufl.TestFunction(tensors)
+        volume, measure = self._recovery.volume, elastic.free(2 * degree)
+        self._right_hand_sides = [compile_form(ufl.inner(H, test) * volume * measure) for H in gradients]
         self._error = compile_form(self._second_derivatives(gradients, 2 * degree))
 
     def of(self, adjoint: Adjoint) -> float:
@@ -224,6 +226,7 @@ class ElementError:
             owned_values(part)[:] = values
             part.x.scatter_forward()
         odd = [(k // dim == 2) != (k % dim == 2) for k in range(dim**2)]
+        self._recovery.update()
         for recovered, form in zip(self._recovered, self._right_hand_sides, strict=True):
             self._recovery.project(form, recovered, self._sums, odd)
         for pressure in self._pressures:
@@ -250,26 +253,46 @@ class ElementError:
 
 
 class Recovery:
-    """The projection to continuous fields of one ``degree`` over the deformable cells of a model."""
+    """The projection to continuous fields of one ``degree`` over the deformable cells of a model, on its rest shape."""
 
     def __init__(self, model: MechanismModel, degree: int) -> None:
-        elastic, comm = model.elastic, model.mesh.comm
-        V = scalar_space(elastic.mesh, degree)
+        self._elastic, self._comm = model.elastic, model.mesh.comm
+        V = scalar_space(self._elastic.mesh, degree)
         test, trial = ufl.TestFunction(V), ufl.TrialFunction(V)
-        self._mass = assemble_matrix(compile_form(test * trial * elastic.free(2 * degree)), comm)
+        self._product = compile_form(test * trial * self.volume * self._elastic.free(2 * degree))
+        self._mid_plane = np.zeros(0, dtype=PETSc.IntType)  # this rank's owned nodes there
+        if self._elastic.model.half:
+            points = V.tabulate_dof_coordinates()[: V.dofmap.index_map.size_local]
+            self._mid_plane = np.flatnonzero(on_mid_plane(points, V.mesh.comm)).astype(PETSc.IntType)
+        self._shape: np.ndarray | None = None
+        self._solvers: list[PETSc.KSP] = []
+        self.update()
+
+    @property
+    def volume(self):
+        """det ∇X, symbolic: cells count by their size in the rest shape, which designs change."""
+        return ufl.det(self._elastic.rest_gradient)
+
+    def update(self) -> None:
+        """Takes the present rest shape."""
+        shape = self._elastic.shape.x.array
+        same = self._shape is not None and np.array_equal(shape, self._shape)
+        if self._comm.allreduce(same, op=MPI.LAND):
+            return
+        for solver in self._solvers:
+            solver.destroy()
+        self._shape = shape.copy()
+        self._mass = assemble_matrix(self._product, self._comm)
         diagonal = self._mass.getDiagonal()
         # vertices inside interfaces, where nothing deforms
         diagonal.array_w[diagonal.array_r == 0.0] = 1.0
         self._mass.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, False)
         self._mass.setDiagonal(diagonal)
-        self._solver = self._odd_solver = _solver_of(self._mass)
-        self._mid_plane = np.zeros(0, dtype=PETSc.IntType)  # this rank's owned nodes there
-        if elastic.model.half:
-            points = V.tabulate_dof_coordinates()[: V.dofmap.index_map.size_local]
-            self._mid_plane = np.flatnonzero(on_mid_plane(points, V.mesh.comm)).astype(PETSc.IntType)
+        self._solvers = [_solver_of(self._mass)]
+        if self._elastic.model.half:
             vanishing = self._mass.copy()
             vanishing.zeroRowsColumns(self._mass.getOwnershipRange()[0] + self._mid_plane)
-            self._odd_solver = _solver_of(vanishing)
+            self._solvers.append(_solver_of(vanishing))
 
     def project(self, right_hand_side, field: fem.Function, work: fem.Function, odd: Sequence[bool]) -> None:
         """Sets ``field``, of any number of components, to the projection with a compiled right-hand side.
@@ -283,7 +306,7 @@ class Recovery:
             part.array_w[:] = right[k :: len(odd)]
             if vanishes:
                 part.array_w[self._mid_plane] = 0.0
-            (self._odd_solver if vanishes else self._solver).solve(part, values)
+            self._solvers[-1 if vanishes else 0].solve(part, values)
             owned_values(field)[k :: len(odd)] = values.array_r
         field.x.scatter_forward()
 
@@ -308,7 +331,7 @@ class PressureError:
         self._gradient = fem.Function(vector_space(elastic.mesh, 1), name=f"recovered_gradient_of_{field.name}")
         self._sums = fem.Function(self._gradient.function_space)
         test = ufl.TestFunction(self._gradient.function_space)
-        self._right_hand_side = compile_form(ufl.inner(ufl.grad(field), test) * elastic.free(2))
+        self._right_hand_side = compile_form(ufl.inner(ufl.grad(field), test) * recovery.volume * elastic.free(2))
         w = field - 0.5 * ufl.dot(self._gradient, ufl.SpatialCoordinate(elastic.mesh))
         V = scalar_space(elastic.mesh, 1)
         self._interpolated = fem.Function(V, name=f"interpolated_{field.name}")
@@ -317,6 +340,7 @@ class PressureError:
 
     def update(self) -> None:
         """Recovers the present values of the field."""
+        self._recovery.update()
         self._recovery.project(self._right_hand_side, self._gradient, self._sums, [k == 2 for k in range(self._dim)])
         self._interpolated.interpolate(self._expression)
         self._interpolated.x.scatter_forward()

@@ -1,4 +1,4 @@
-"""Error estimates of objectives: within a factor of two of what much finer elements give; results carry them."""
+"""Error estimates of objectives and designs: within a factor of two of what much finer elements give."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.design import Comparison, SampleEquilibria
+from fenicsmech import model
+from fenicsmech.design import Comparison, SampleEquilibria, rest_meshes
 
+from ..simulation.demo_scenes import demo
 from ..simulation.five_problems import case
 from ..simulation.refined import cantilever, refine
 from .mechanisms import truss
@@ -64,3 +66,47 @@ def test_designs_carry_the_errors_of_displacements_and_objective():
     assert result.objective_error == pytest.approx(
         Comparison(case.targets, fm.Units()).objective_error(reached, np.array(errors))
     )
+
+
+def test_estimates_do_not_know_whether_a_shape_was_drawn_or_designed(monkeypatch):
+    case = truss((0.1, 6.0), (0.4, 9.0))
+    problem = case.problem(size=4.0)
+    sim, push = problem.simulation, case.targets[0].quantity.part
+    result = problem.optimise(optimiser=fm.LevenbergMarquardt(iterations=2))
+    curve = sim.with_design(result).load_displacement(push, forces=[0.1, 0.4])
+    with sim.model.shaped(result.rest_shape(sim)):
+        links = rest_meshes(sim, sim.scene.mechanism.flexible_links)
+    monkeypatch.setattr(model, "mesh_links", lambda *_: links)
+    drawn = case.simulate(size=4.0).load_displacement(push, forces=[0.1, 0.4])
+    assert drawn.displacements == pytest.approx(curve.displacements, rel=1e-6)
+    assert drawn.error_estimates() == pytest.approx(curve.error_estimates(), rel=1e-4)
+
+
+def designed(name: str, space: str) -> tuple[fm.DesignProblem, fm.DesignResult]:
+    """The problem of a demo with its coarse elements, and its optimum."""
+    script = demo(name)
+    scene, *rest = script.describe()
+    simulation = fm.Simulation(scene, space=space, size=script.QUICK, comm=MPI.COMM_SELF)
+    problem = fm.DesignProblem(simulation, **script.wanted(scene, *rest))
+    return problem, problem.optimise()
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(
+    ("name", "space", "finer"),
+    [
+        ("truss", "plane-stress", 4.0),
+        ("claw", "plane-stress", 4.0),
+        ("klann", "plane-stress", 4.0),
+        ("truss", "3d", 2.0),
+    ],
+)
+def test_errors_of_designs_are_those_of_their_parts_in_finer_elements(name, space, finer):
+    problem, result = designed(name, space)
+    for target in problem.verify(result, finer=finer).targets:
+        value = target.part.value + target.part.finer_elements_add
+        error, estimate = value - target.reached, target.finer_elements_add
+        if abs(error) < 1e-3 * abs(value):  # the part's outline differs by as much
+            assert abs(estimate - error) < 1e-3 * abs(value)
+        else:
+            assert 0.5 < estimate / error < 2.0
