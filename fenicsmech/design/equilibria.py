@@ -9,7 +9,8 @@ factor:
 on one branch if d₁ − d₀ is small enough, and halved if that fails. Halves that fail too mean a fold.
 
 The equilibrium y₀ of another simulation (``transfer``) is one of this simulation under the forces R(y₀) that it leaves
-open. These are taken away in one step, which is checked alike, with R(y; d₀) = R(y) − R(y₀) and so δ = K₁⁻¹ R(y₀).
+open. These are taken away in one step, which is checked alike, with R(y; d₀) = R(y) − R(y₀) and so δ = K₁⁻¹ R(y₀),
+and by the distance of y from y₀.
 
 Displacements q count from the unloaded configuration y°. Where that moves with the design (a point lies on a flexible
 link, or motors strain the links), it is an equilibrium that is followed too. A prescribed displacement v = v̄ + q_v(y°)
@@ -67,12 +68,19 @@ class FollowOptions:
         load_steps: least number to the largest load from zero; larger ones fail more often than they save a step.
         halvings: of a change of design whose equilibrium is not found, or lies elsewhere.
         largest_miss: of the prediction, over |δ|; larger misses are those of equilibria across a fold.
+        largest_transfer_miss: the same from another simulation: up to 2.9 on one branch, as δ holds the stress of links
+            that were at rest in a slightly different shape; 30 and more across folds.
+        farthest_transfer: distance from the equilibrium of another simulation, over its motion from the unloaded
+            configuration: up to 0.3 between plane stress and space, more where motors strain links, 2.8 and more across
+            folds.
         rounding: misses below this part of the mechanism's length, or rad, are rounding.
     """
 
     load_steps: int = 8
     halvings: int = 2
     largest_miss: float = 2.0
+    largest_transfer_miss: float = 8.0
+    farthest_transfer: float = 1.0
     rounding: float = 1e-6
 
 
@@ -371,7 +379,10 @@ class SampleEquilibria:
         self._model.load(start)
         missing = system.residual(start, control).vector
         system.unknowns.turn(found.state.poses)
-        if not self._continues(path, found, start, found.state, missing):
+        missed = self._missed(path, found, start, found.state, missing)
+        distance, motion = (system.size(system.difference(start, other)) for other in (found.state, unloaded))
+        farthest = max(self._options.farthest_transfer * motion, self._options.rounding)
+        if missed > self._options.largest_transfer_miss or distance > farthest:
             raise _Lost(_lost(path.sample, "a fold lies between this simulation and the other one"))
         return SampleState(found.state, control, unloaded)
 
@@ -407,9 +418,9 @@ class SampleEquilibria:
         model.load(back)
         missing = system.residual(back, before.control).vector
         missing.scale(-1.0)
-        continues = self._continues(path, found, start, back, missing)
+        missed = self._missed(path, found, start, back, missing)
         model.reshape(after.design)
-        if not continues:
+        if missed > self._options.largest_miss:
             raise _Lost(_lost(path.sample, "a fold lies between this design and the last one"))
         return found.state
 
@@ -423,12 +434,12 @@ class SampleEquilibria:
             raise Infeasible(_unstable(path.sample))
         return found
 
-    def _continues(self, path: _Path, found: EquilibriumPoint, start: State, back: State, missing: PETSc.Vec) -> bool:
-        """Whether ŷ₀ = y + δ, δ = K₁⁻¹ ``missing``, meets ``start`` y₀, with y the equilibrium ``back`` where y₀ is."""
-        system, options = path.solver.system, self._options
+    def _missed(self, path: _Path, found: EquilibriumPoint, start: State, back: State, missing: PETSc.Vec) -> float:
+        """|y₀ − ŷ₀| / |δ|, 0 within rounding: δ = K₁⁻¹ ``missing``, ŷ₀ = y + δ, y₀ is ``start`` and y ``back``."""
+        system = path.solver.system
         step = system.unknowns.step(found.linearisation.solve(missing))
         miss = system.size(system.difference(start, system.moved(back, step)))
-        return miss <= max(options.largest_miss * system.size(step), options.rounding)
+        return 0.0 if miss <= self._options.rounding else miss / max(system.size(step), 1e-300)
 
 
 @dataclass(frozen=True, eq=False)

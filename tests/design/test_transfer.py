@@ -99,7 +99,7 @@ def test_every_process_gets_the_equilibria_of_all_samples():
     assert_alike(solid.from_other(shared.equilibria()), solid.from_zero())
 
 
-@pytest.mark.parametrize("fall", [0.012, 0.1])
+@pytest.mark.parametrize("fall", [0.012, 0.015, 0.3])
 def test_equilibrium_beyond_a_fold_is_refused(fall):
     """An arch under 0.97 of its limit load, and arches lower by a part of its rise, whose limit may be lower."""
     simulation, push = arch()
