@@ -19,6 +19,7 @@ Tisseur & Meerbergen (doi:10.1137/S0036144500381988) for the quadratic one.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 
 import numpy as np
@@ -140,24 +141,25 @@ def _largest(system: EquilibriumSystem, size: int, apply: Callable[[np.ndarray],
     """
     comm = system.comm
     total = comm.allreduce(size)
-    operator = PETSc.Mat().createPython(((size, total), (size, total)), _Operator(apply), comm=comm)
-    solver = SLEPc.EPS().create(comm)
-    solver.setOperators(operator)
-    solver.setProblemType(SLEPc.EPS.ProblemType.NHEP)
-    solver.setWhichEigenpairs(SLEPc.EPS.Which.LARGEST_MAGNITUDE)
-    wanted = count + 2  # a pair may be complex
-    solver.setDimensions(nev=wanted, ncv=min(total, 2 * wanted + 20))
-    solver.setTolerances(tol=1e-10, max_it=200)
-    solver.solve()
-    modes, vector, shape = [], operator.createVecRight(), system.unknowns.control_row()
-    for index in range(solver.getConverged()):
-        theta = solver.getEigenpair(index, vector)
-        if theta != 0.0 and abs(theta.imag) <= 1e-6 * abs(theta):  # rounding may make a real one complex
-            shape.array_w[:] = vector.array_r[-shape.local_size :]
-            step = system.unknowns.step(shape)
-            largest = system.size(step)
-            if largest > 0.0:
-                modes.append(Mode(1.0 / theta.real, step.scaled(1.0 / largest)))
-    solver.destroy()
-    operator.destroy()
+    with ExitStack() as own:  # at the end of the process it is too late to destroy what an error left
+        operator = PETSc.Mat().createPython(((size, total), (size, total)), _Operator(apply), comm=comm)
+        own.callback(operator.destroy)
+        solver = SLEPc.EPS().create(comm)
+        own.callback(solver.destroy)
+        solver.setOperators(operator)
+        solver.setProblemType(SLEPc.EPS.ProblemType.NHEP)
+        solver.setWhichEigenpairs(SLEPc.EPS.Which.LARGEST_MAGNITUDE)
+        wanted = count + 2  # a pair may be complex
+        solver.setDimensions(nev=wanted, ncv=min(total, 2 * wanted + 20))
+        solver.setTolerances(tol=1e-10, max_it=200)
+        solver.solve()
+        modes, vector, shape = [], operator.createVecRight(), system.unknowns.control_row()
+        for index in range(solver.getConverged()):
+            theta = solver.getEigenpair(index, vector)
+            if theta != 0.0 and abs(theta.imag) <= 1e-6 * abs(theta):  # rounding may make a real one complex
+                shape.array_w[:] = vector.array_r[-shape.local_size :]
+                step = system.unknowns.step(shape)
+                largest = system.size(step)
+                if largest > 0.0:
+                    modes.append(Mode(1.0 / theta.real, step.scaled(1.0 / largest)))
     return sorted(modes, key=lambda mode: abs(mode.value))[:count]

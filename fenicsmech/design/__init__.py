@@ -37,7 +37,6 @@ from fenicsmech.design.rest_shape import DesignedLink, ParametricShape
 from fenicsmech.design.result import DesignResult, LinkDesign, PartValue, TargetResult, rest_meshes
 from fenicsmech.design.run import Checkpoint, DesignProgress, Round, minimise_together
 from fenicsmech.design.search import Scatter, Search, SearchResult, StartResult
-from fenicsmech.design.shape.centreline import LinkOutline, find_centreline
 from fenicsmech.design.shape.edges import MidEdgeNodes, edge_weights
 from fenicsmech.design.shape.handle_optimum import (
     HandleOptimum,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -10,13 +9,13 @@ import numpy as np
 
 from fenicsmech.collective import from_one
 from fenicsmech.design.numbers import Number, check_numbers
-from fenicsmech.design.shape.centreline import LinkOutline, find_centreline
 from fenicsmech.design.shape.shape_map import ImageRequest, ShapeRequest
 from fenicsmech.design.shape.spline import lay_out
 from fenicsmech.errors import DescriptionError, finite, points, positive, set_fields
-from fenicsmech.mechanism import Centreline, Disc, FlexibleLink, Mechanism, Rectangle, Shape, Strip
-from fenicsmech.meshing import Figure, InterfaceSite, link_outline, matches
-from fenicsmech.multibody import Body, Linkage
+from fenicsmech.mechanism import Centreline, FlexibleLink, Mechanism, Shape, Strip
+from fenicsmech.meshing import Figure, LinkOutline, find_centreline, link_outline, matches
+from fenicsmech.model import plan_sites
+from fenicsmech.multibody import Linkage
 from fenicsmech.simulation import Simulation
 
 _AGREE = 1e-4  # largest distance between outlines of links that share a shape, over their extent
@@ -190,14 +189,14 @@ def shape_request(
             raise DescriptionError(f"design of link {own.name!r}", problem, "Name one of its links")
     known = {own: (shapes or {}).get(own, own.shape) for own in design.links}
     shape, bodies = known[link], [linkage.bodies[i] for i in linkage.interfaces[link]]
-    reach, line = tuple(_reach(body) for body in bodies), design.centreline
+    sites, line = plan_sites(linkage, link), design.centreline
+    reach = tuple(site.reach for site in sites)
     thickness: float | LinkOutline
     if isinstance(shape, Strip):
         if design.ends is not None:
             raise DescriptionError(part, "a strip has a centreline, and ends were given", "Leave them out")
         thickness, centreline = shape.thickness, Centreline(shape.centreline if line is None else line, part=part)
     else:
-        sites = [InterfaceSite(b.centre[:2], b.region, name=b.name) for b in bodies if b.region is not None]
         thickness = outline = LinkOutline(link_outline(link.name, shape, dim=linkage.dim), sites)
         found = find_centreline(outline, reach, design.ends, part=part) if line is None else line
         centreline = Centreline(found, part=part)
@@ -234,9 +233,7 @@ def _images(
         return ()
 
     def figure(link: FlexibleLink) -> Figure:
-        bodies = (linkage.bodies[i] for i in linkage.interfaces[link])
-        sites = [InterfaceSite(b.centre[:2], b.region, name=b.name) for b in bodies if b.region is not None]
-        return Figure.of(link.name, shapes[link], sites, dim=linkage.dim)
+        return Figure.of(link.name, shapes[link], plan_sites(linkage, link), dim=linkage.dim)
 
     own, found = figure(design.link), []
     for other in others:
@@ -263,16 +260,6 @@ def _images(
         number = mechanism.flexible_links.index(other)
         found.append(ImageRequest(number, other.name, close[0].isometry, close[0].sites))
     return tuple(found)
-
-
-def _reach(interface: Body) -> float:
-    """Radius of the smallest circle about a joint that contains its interface."""
-    match interface.region:
-        case Disc(radius=radius):
-            return radius
-        case Rectangle(length=length, width=width):
-            return 0.5 * math.hypot(length, width)
-    return 0.0
 
 
 def check_designs(designs: Sequence[SplineDesign | Number]) -> None:

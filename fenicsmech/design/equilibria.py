@@ -71,7 +71,8 @@ class FollowOptions:
         largest_transfer_miss: the same from another simulation: up to 2.9 on one branch, as δ holds the stress of links
             that were at rest in a slightly different shape; 30 and more across folds.
         farthest_transfer: distance from the equilibrium of another simulation, over its motion from the unloaded
-            configuration: up to 0.3 between plane stress and space, 2.8 and more across folds.
+            configuration: up to 0.3 between plane stress and space, more where motors strain links, 2.8 and more across
+            folds.
         rounding: misses below this part of the mechanism's length, or rad, are rounding.
     """
 
@@ -79,7 +80,7 @@ class FollowOptions:
     halvings: int = 2
     largest_miss: float = 2.0
     largest_transfer_miss: float = 8.0
-    farthest_transfer: float = 0.5
+    farthest_transfer: float = 1.0
     rounding: float = 1e-6
 
 

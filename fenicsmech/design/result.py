@@ -102,7 +102,7 @@ class TargetResult:
         finer_elements_add: estimated discretisation error of the reached value, to be added: the change by infinitely
             fine elements.
         corrected: their sum, with which the target is compared; the reached value alone of an optimisation without
-            estimates.
+            estimates. In plane stress it is the value in plane stress, where a curve's ``corrected`` is that in space.
         error: of the corrected value, relative to the target's scale; of a bound how far it is missed, of a vector the
             length of its error.
         part: the same in the exported parts; None before ``DesignProblem.verify``, and of quantities that parts do not

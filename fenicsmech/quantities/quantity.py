@@ -114,7 +114,7 @@ class Quantity(ABC):
     Attributes:
         of_state: whether it depends on an equilibrium; those that do not need no sample.
         from_unloaded: whether it counts from the unloaded configuration.
-        of_part: whether exported parts, known by their outline alone, have it; they have no centreline.
+        of_part: whether exported parts, known by their outline alone, have it.
     """
 
     of_state: ClassVar[bool] = True

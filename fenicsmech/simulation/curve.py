@@ -179,6 +179,9 @@ class Curve:
     def corrections(self) -> np.ndarray:
         """Sums of the estimated errors, to be added to ``values``, (frames,); 0 where they are too large.
 
+        They lead to infinitely fine elements in space, from plane stress too. Targets of designs are corrected by the
+        errors of elements alone, ``error_estimates``: they stay in the model of their simulation.
+
         Raises as ``error_estimates``.
         """
         elements, plane_stress = self.errors_by_kind()
@@ -358,7 +361,8 @@ class Curve:
 
         Args:
             path: the file.
-            errors: also ``error_estimates`` and ``corrected``, in columns of their own.
+            errors: also ``error_estimates``, in plane stress ``modelling_errors``, and ``corrected``, in columns of
+                their own.
         """
         (across, up), length, force, stress = self.axes, self.units.length, self.units.force, self.units.stress
         columns = {
@@ -371,7 +375,10 @@ class Curve:
         }
         if errors:
             name, unit = self.unknown.value, force if self.unknown is Unknown.FORCE else length
-            columns[f"finer elements add to the {name} [{unit}]"] = self.error_estimates()
+            elements, plane_stress = self.errors_by_kind()
+            columns[f"finer elements add to the {name} [{unit}]"] = elements
+            if self.discretisation.fidelity.model is PLANE_STRESS:
+                columns[f"space adds to the {name} [{unit}]"] = plane_stress
             columns[f"corrected {name} [{unit}]"] = self.corrected
         on_one(self.discretisation.comm, lambda: write_csv(path, columns))
 

@@ -65,7 +65,7 @@ class Simulation:
             displacement of every curve, or in the largest force where displacements are prescribed, once the estimates
             of its errors are added (``Curve.corrected``). ``load_displacement`` finds the cheapest fidelity that is
             good enough, see ``choice``; ``follow`` and ``branches`` use the one chosen last and raise an error before.
-            With links known from files only, ``size`` stands for their thickness.
+            Links from STEP files are measured; ``size`` stands for the thickness of those from mesh files.
         layers: of elements through the depth, or half of it where half is meshed; by default from depth and size.
         segments: of elements around pins, at least; 8 by default.
         quadrature: quadrature degree; the measured optimum by default.
@@ -118,7 +118,7 @@ class Simulation:
                     f"both are given, and {name}={given[name]!r} would decide what accuracy is to choose",
                     f"Leave out {name}, or give {name} and size=… instead of an accuracy",
                 )
-            self._control = AccuracyControl(scene, accuracy, size, formulation)
+            self._control = AccuracyControl(scene, accuracy, size, formulation, comm=comm)
             fidelity = self._control.fidelity(self._control.level)
         solver, predictor = solver or PrimalDualNewton(), predictor or HermitePredictor()
         self._discretisation = Discretisation(scene, fidelity, solver, predictor, self.clock, comm)

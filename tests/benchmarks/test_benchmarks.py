@@ -108,3 +108,12 @@ def test_optimal_handles_stretch_cells_less_than_naive_ones():
     assert cells[0] == cells[1] and inverted[1] == 0
     assert mean[1] - 1.0 < 0.75 * (mean[0] - 1.0)  # half of ρ is 1 in an equilateral triangle
     assert most[1] < most[0] and sizes[1] < sizes[0]
+
+
+@pytest.mark.thorough
+def test_parts_of_the_switch_meet_their_targets_and_are_kept(tmp_path):
+    options = ("switch", "--size", "2", "--results", str(tmp_path))
+    first = printed("parts", *options)[2:]
+    assert [path.name for path in tmp_path.iterdir()] == ["switch.json"]
+    assert len(first) == 2 and all(row[0] == "switch" and abs(float(row[-1])) < 1.0 for row in first)
+    assert printed("parts", *options)[2:] == first

@@ -73,8 +73,12 @@ def test_corrected_designs_are_nearer_to_their_targets_on_a_finer_mesh():
 
 def test_plane_stress_with_corrections_ends_at_the_targets_in_space(loads):
     problem = truss(*WANTED).problem(**COARSE)
-    result = problem.optimise()
+    # these elements are in error by up to 20 %; by default a tenth of that may be left, more than is asserted below
+    settled = fm.Correction(resolved=0.02)
+    result = problem.optimise(correction=settled)
     assert result.surrogate == "plane-stress" and result.verified
+    left = [max(settled.change, settled.resolved * abs(t.finer_elements_add) / t.wanted) for t in result.targets]
+    assert result.corrections[-1] <= max(left) < 5e-3
     assert result.worst_error < 5e-3
     assert loads["3d"] == 0 and 1 < len(result.corrections) == loads.rounds <= 4
     # far from the truth at first, and nearer by at least the factor at which a surrogate is given up
@@ -86,7 +90,7 @@ def test_plane_stress_with_corrections_ends_at_the_targets_in_space(loads):
     )
     assert [target.reached for target in result.targets] == pytest.approx(curve.displacements, rel=1e-8)
     assert [t.finer_elements_add for t in result.targets] == pytest.approx(curve.error_estimates(), rel=1e-5)
-    direct = problem.optimise(surrogate=None)
+    direct = problem.optimise(surrogate=None, correction=settled)
     assert direct.surrogate is None
     assert corrected(result) == pytest.approx(corrected(direct), rel=5e-3)
 

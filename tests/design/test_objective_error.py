@@ -62,6 +62,9 @@ def test_designs_carry_the_errors_of_displacements_and_objective():
     curve = problem.simulation.with_design(result).load_displacement(case.targets[0].quantity.part, forces=forces)
     errors = [target.finer_elements_add for target in result.targets]
     assert errors == pytest.approx(curve.error_estimates(), rel=1e-5)
+    # targets stay in plane stress, curves lead to space
+    towards_space = curve.corrected - [target.corrected for target in result.targets]
+    assert towards_space == pytest.approx(curve.modelling_errors(), rel=1e-4)
     reached = np.array([target.reached for target in result.targets])
     assert result.objective_error == pytest.approx(
         Comparison(case.targets, fm.Units()).objective_error(reached, np.array(errors))

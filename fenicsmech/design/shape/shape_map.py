@@ -21,7 +21,6 @@ from mpi4py import MPI
 
 from fenicsmech.collective import from_one
 from fenicsmech.compat import original_cells
-from fenicsmech.design.shape.centreline import LinkOutline
 from fenicsmech.design.shape.edges import EdgeWeights, edge_weights
 from fenicsmech.design.shape.handles import BETWEEN, LinkHandles
 from fenicsmech.design.shape.spline import LinkSpline, SplineFit, SplineSamples, fit_spline, lay_out
@@ -33,6 +32,7 @@ from fenicsmech.meshing import (
     CurvedEdges,
     Isometry,
     LinkMesh,
+    LinkOutline,
     MechanismMesh,
     cell_measures,
     image_of,
