@@ -130,7 +130,7 @@ from fenicsmech.mechanism import (
     strip,
 )
 from fenicsmech.model import SPACES, Design, Fidelity
-from fenicsmech.multibody import BodyPoint, Freedom, Linkage, PosePotential
+from fenicsmech.multibody import BodyPoint, Freedom, JointChange, Linkage, PosePotential
 from fenicsmech.plot import CurveMark, CurveSeries, CurveTarget, Trace, plot_curve
 from fenicsmech.quantities import (
     CentrelineLength,
@@ -226,6 +226,7 @@ __all__ = [
     # numbers that designs change beside shapes; NumberKind for kinds of your own
     "Number", "Depth", "LawParameter", "SpringStiffness", "SpringRest", "MotorOffset", "JointPosition", "JointAxis",
     "NumberBounds", "NumberDesign", "NumberKind", "ModelNumber", "NumberTerms",
+    "JointChange",
     # errors
     "FenicsmechError", "DescriptionError", "MeshingError", "AssemblyError", "EquilibriumError",
 ]
