@@ -6,7 +6,7 @@ PYTHON := .venv/bin/python3
 RANKS := 2
 SELECT := not slow
 MECHANISMS := truss claw klann
-DEMOS := $(MECHANISMS) characterise constant_force snap switch gripper
+DEMOS := $(MECHANISMS) characterise constant_force snap switch gripper suspension
 
 # Debian's packages and nothing else: not the user's ~/.local, not a PYTHONPATH meant for another Python.
 export PYTHONNOUSERSITE := 1

@@ -227,6 +227,17 @@ def test_contact_points_of_the_designed_gripper_move_by_the_wanted_vectors(tmp_p
 
 
 @pytest.mark.thorough
+def test_wheel_of_the_designed_suspension_leans_and_resists_as_wanted(tmp_path):
+    summary, _ = report("suspension", tmp_path, "--quick")
+    force, bump, rebound = (target["part"]["value"] for target in summary["targets"])
+    assert force == pytest.approx(900.0, rel=1e-3)
+    assert np.degrees([bump, rebound]) == pytest.approx([0.4, -0.1], abs=1e-3)
+    drawn = [frame["force"] for frame in summary["initial_frames"]]
+    assert drawn[-1] != pytest.approx(900.0, rel=5e-3)
+    assert {path.name for path in (tmp_path / "parts").iterdir()} == {"upper-arm.step"}
+
+
+@pytest.mark.thorough
 def test_switch_snaps_behind_its_spring_only(tmp_path):
     printed = run("snap", tmp_path, "--quick")
     direct, sprung = ([line for line in printed.splitlines() if line.startswith(f"{how}: limit point")]
