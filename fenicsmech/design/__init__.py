@@ -11,7 +11,7 @@ Young's modulus to measurements.
 
 from fenicsmech.design.characterisation import Experiment, ModulusFit, fit_modulus
 from fenicsmech.design.correction import Correction
-from fenicsmech.design.description import Bounds, SplineDesign, shape_request
+from fenicsmech.design.description import Bounds, SplineDesign, shape_request, with_followers
 from fenicsmech.design.design_problem import DesignProblem
 from fenicsmech.design.equilibria import DesignEquilibria, SampleEquilibria
 from fenicsmech.design.numbers import Number, NumberDesign, ScaledNumbers
@@ -47,7 +47,7 @@ from fenicsmech.design.shape.handle_optimum import (
 )
 from fenicsmech.design.shape.handles import BETWEEN, LinkHandles
 from fenicsmech.design.shape.quality import Barrier, QualitySum
-from fenicsmech.design.shape.shape_map import ShapeMap, ShapeRequest, shape_link, shape_links
+from fenicsmech.design.shape.shape_map import LinkParameters, ShapeMap, ShapeRequest, shape_link, shape_links
 from fenicsmech.design.shape.spline import ControlLayout, LinkSpline, SplineSamples, fit_spline, lay_out
 from fenicsmech.design.shape.weights import insert, lumped_mass, pierced, solve_partition, stiffness
 from fenicsmech.design.target import Comparison, Target
