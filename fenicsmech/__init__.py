@@ -130,7 +130,7 @@ from fenicsmech.mechanism import (
     strip,
 )
 from fenicsmech.model import SPACES, Design, Fidelity
-from fenicsmech.multibody import BodyPoint, Freedom, Linkage, PosePotential
+from fenicsmech.multibody import BodyPoint, Freedom, JointChange, Linkage, PosePotential
 from fenicsmech.plot import CurveMark, CurveSeries, CurveTarget, Trace, plot_curve
 from fenicsmech.quantities import (
     CentrelineLength,
@@ -139,8 +139,10 @@ from fenicsmech.quantities import (
     Displacement,
     ForceMagnitude,
     FormValue,
+    JointAxis,
     JointForce,
     JointMoment,
+    JointPosition,
     LawParameter,
     LinkMass,
     LinkVolume,
@@ -222,8 +224,9 @@ __all__ = [
     "PartValue", "Scatter", "SearchResult", "StartResult", "Optimisation", "design_study", "Experiment", "ModulusFit",
     "fit_modulus", "Design",
     # numbers that designs change beside shapes; NumberKind for kinds of your own
-    "Number", "Depth", "LawParameter", "SpringStiffness", "SpringRest", "MotorOffset", "NumberBounds",
-    "NumberDesign", "NumberKind", "ModelNumber", "NumberTerms",
+    "Number", "Depth", "LawParameter", "SpringStiffness", "SpringRest", "MotorOffset", "JointPosition", "JointAxis",
+    "NumberBounds", "NumberDesign", "NumberKind", "ModelNumber", "NumberTerms",
+    "JointChange",
     # errors
     "FenicsmechError", "DescriptionError", "MeshingError", "AssemblyError", "EquilibriumError",
 ]

@@ -179,6 +179,12 @@ def mesh_mechanism(
     return distribute(comm, on_one(comm, lambda: mesh_links(mechanism, shapes, linkage, fidelity)))
 
 
+def plan_sites(linkage: Linkage, link: FlexibleLink) -> list[InterfaceSite]:
+    """The interfaces of a link in the plane, in the order of its mesh."""
+    bodies = (linkage.bodies[index] for index in linkage.interfaces[link])
+    return [InterfaceSite(body.centre[:2], body.region, name=body.name) for body in bodies if body.region is not None]
+
+
 def _mesh_options(link: FlexibleLink, linkage: Linkage, fidelity: Fidelity) -> dict[str, Any]:
     """Arguments of ``mesh_link`` and ``check_link`` for ``link``."""
     bodies = [linkage.bodies[index] for index in linkage.interfaces[link]]
@@ -215,6 +221,7 @@ class MechanismModel:
 
     Attributes:
         materials: of the flexible links.
+        shapes: of the flexible links, as drawn.
         depths: of the flexible links.
         mesh: the reference mesh of all flexible links.
         elastic: their elastic energy.
@@ -244,7 +251,8 @@ class MechanismModel:
         self.mechanism, self.linkage, self.mesh, self.clock = mechanism, linkage, mesh, clock
         self.effects, links = tuple(effects), mechanism.flexible_links
         self.materials = tuple(link.material for link in links) if materials is None else tuple(materials)
-        self.depths = tuple(shape.depth for shape in shapes or [link.shape for link in links])
+        self.shapes = tuple(shapes or [link.shape for link in links])
+        self.depths = tuple(shape.depth for shape in self.shapes)
         self.mixed = fidelity.formulation.mixed(list(self.materials), fidelity.model, fidelity.order)
         faces = [part for effect in effects for part in effect.faces]
         boundaries = find_boundaries(mesh.mesh, links, mesh.link, faces, half=fidelity.model.half)

@@ -11,7 +11,7 @@ Young's modulus to measurements.
 
 from fenicsmech.design.characterisation import Experiment, ModulusFit, fit_modulus
 from fenicsmech.design.correction import Correction
-from fenicsmech.design.description import Bounds, SplineDesign, shape_request
+from fenicsmech.design.description import Bounds, SplineDesign, shape_request, with_followers
 from fenicsmech.design.design_problem import DesignProblem
 from fenicsmech.design.equilibria import DesignEquilibria, SampleEquilibria
 from fenicsmech.design.numbers import Number, NumberDesign, ScaledNumbers
@@ -37,7 +37,6 @@ from fenicsmech.design.rest_shape import DesignedLink, ParametricShape
 from fenicsmech.design.result import DesignResult, LinkDesign, PartValue, TargetResult, rest_meshes
 from fenicsmech.design.run import Checkpoint, DesignProgress, Round, minimise_together
 from fenicsmech.design.search import Scatter, Search, SearchResult, StartResult
-from fenicsmech.design.shape.centreline import LinkOutline, find_centreline
 from fenicsmech.design.shape.edges import MidEdgeNodes, edge_weights
 from fenicsmech.design.shape.handle_optimum import (
     HandleOptimum,
@@ -48,7 +47,7 @@ from fenicsmech.design.shape.handle_optimum import (
 )
 from fenicsmech.design.shape.handles import BETWEEN, LinkHandles
 from fenicsmech.design.shape.quality import Barrier, QualitySum
-from fenicsmech.design.shape.shape_map import ShapeMap, ShapeRequest, shape_link, shape_links
+from fenicsmech.design.shape.shape_map import LinkParameters, ShapeMap, ShapeRequest, shape_link, shape_links
 from fenicsmech.design.shape.spline import ControlLayout, LinkSpline, SplineSamples, fit_spline, lay_out
 from fenicsmech.design.shape.weights import insert, lumped_mass, pierced, solve_partition, stiffness
 from fenicsmech.design.target import Comparison, Target

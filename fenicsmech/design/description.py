@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -10,13 +9,13 @@ import numpy as np
 
 from fenicsmech.collective import from_one
 from fenicsmech.design.numbers import Number, check_numbers
-from fenicsmech.design.shape.centreline import LinkOutline, find_centreline
 from fenicsmech.design.shape.shape_map import ImageRequest, ShapeRequest
 from fenicsmech.design.shape.spline import lay_out
 from fenicsmech.errors import DescriptionError, finite, points, positive, set_fields
-from fenicsmech.mechanism import Centreline, Disc, FlexibleLink, Mechanism, Rectangle, Shape, Strip
-from fenicsmech.meshing import Figure, InterfaceSite, link_outline, matches
-from fenicsmech.multibody import Body, Linkage
+from fenicsmech.mechanism import Centreline, FlexibleLink, Mechanism, Shape, Strip
+from fenicsmech.meshing import Figure, LinkOutline, find_centreline, link_outline, matches
+from fenicsmech.model import plan_sites
+from fenicsmech.multibody import Linkage
 from fenicsmech.simulation import Simulation
 
 _AGREE = 1e-4  # largest distance between outlines of links that share a shape, over their extent
@@ -127,17 +126,46 @@ class SplineDesign:
         return Bounds((least, most), self.bend)
 
 
-def shape_requests(designs: Sequence[SplineDesign], simulation: Simulation) -> list[ShapeRequest]:
+@dataclass(frozen=True)
+class FollowingLink(SplineDesign):
+    """A flexible link whose shape follows its joints, which numbers shift, and has no parameters of its own."""
+
+
+_FOLLOWED = 6  # segments of a link that follows its joints: its spline has to run inside it, and costs no parameters
+
+
+def with_followers(designs: Sequence[SplineDesign], numbers: Sequence[Number]) -> tuple[SplineDesign, ...]:
+    """``designs``, and those of further links that joints shifted by ``numbers`` take along."""
+    designed = [link for design in designs for link in design.links]
+    return (*designs, *(FollowingLink(link, _FOLLOWED) for link in taken_along(numbers) if link not in designed))
+
+
+def taken_along(numbers: Sequence[Number]) -> list[FlexibleLink]:
+    """The flexible links whose joints are shifted by ``numbers``."""
+    joints = [joint for own in numbers for joint, change in own.kind.changes(2).items() if np.any(change.shift)]
+    links = dict.fromkeys(link for joint in joints for link in (joint.a, joint.b))
+    return [link for link in links if isinstance(link, FlexibleLink)]
+
+
+def shape_requests(
+    designs: Sequence[SplineDesign], simulation: Simulation, numbers: Sequence[Number] = ()
+) -> list[ShapeRequest]:
     """The handles and splines of ``designs`` in a simulation; errors are those of ``shape_request``.
 
     Links from files are measured on the first process.
     """
     mechanism, linkage, shapes = simulation.scene.mechanism, simulation.linkage, simulation.shapes
-    return from_one(simulation.comm, lambda: [shape_request(own, mechanism, linkage, shapes) for own in designs])
+    return from_one(
+        simulation.comm, lambda: [shape_request(own, mechanism, linkage, shapes, numbers) for own in designs]
+    )
 
 
 def shape_request(
-    design: SplineDesign, mechanism: Mechanism, linkage: Linkage, shapes: Mapping[FlexibleLink, Shape] | None = None
+    design: SplineDesign,
+    mechanism: Mechanism,
+    linkage: Linkage,
+    shapes: Mapping[FlexibleLink, Shape] | None = None,
+    numbers: Sequence[Number] = (),
 ) -> ShapeRequest:
     """The handles and spline of ``design``. Local.
 
@@ -146,6 +174,7 @@ def shape_request(
         mechanism: with the link.
         linkage: its bodies and joints.
         shapes: of the links, as drawn by default.
+        numbers: that may shift joints.
 
     Raises:
         DescriptionError: no centreline is found, the link has one joint and no free end, there are fewer segments
@@ -160,14 +189,14 @@ def shape_request(
             raise DescriptionError(f"design of link {own.name!r}", problem, "Name one of its links")
     known = {own: (shapes or {}).get(own, own.shape) for own in design.links}
     shape, bodies = known[link], [linkage.bodies[i] for i in linkage.interfaces[link]]
-    reach, line = tuple(_reach(body) for body in bodies), design.centreline
+    sites, line = plan_sites(linkage, link), design.centreline
+    reach = tuple(site.reach for site in sites)
     thickness: float | LinkOutline
     if isinstance(shape, Strip):
         if design.ends is not None:
             raise DescriptionError(part, "a strip has a centreline, and ends were given", "Leave them out")
         thickness, centreline = shape.thickness, Centreline(shape.centreline if line is None else line, part=part)
     else:
-        sites = [InterfaceSite(b.centre[:2], b.region, name=b.name) for b in bodies if b.region is not None]
         thickness = outline = LinkOutline(link_outline(link.name, shape, dim=linkage.dim), sites)
         found = find_centreline(outline, reach, design.ends, part=part) if line is None else line
         centreline = Centreline(found, part=part)
@@ -186,6 +215,8 @@ def shape_request(
         segments=design.segments,
         centreline=centreline,
         ends_move=design.ends_move,
+        joints_move=link in taken_along(numbers),
+        follows=isinstance(design, FollowingLink),
         thickness=thickness,
         images=images,
     )
@@ -202,9 +233,7 @@ def _images(
         return ()
 
     def figure(link: FlexibleLink) -> Figure:
-        bodies = (linkage.bodies[i] for i in linkage.interfaces[link])
-        sites = [InterfaceSite(b.centre[:2], b.region, name=b.name) for b in bodies if b.region is not None]
-        return Figure.of(link.name, shapes[link], sites, dim=linkage.dim)
+        return Figure.of(link.name, shapes[link], plan_sites(linkage, link), dim=linkage.dim)
 
     own, found = figure(design.link), []
     for other in others:
@@ -233,16 +262,6 @@ def _images(
     return tuple(found)
 
 
-def _reach(interface: Body) -> float:
-    """Radius of the smallest circle about a joint that contains its interface."""
-    match interface.region:
-        case Disc(radius=radius):
-            return radius
-        case Rectangle(length=length, width=width):
-            return 0.5 * math.hypot(length, width)
-    return 0.0
-
-
 def check_designs(designs: Sequence[SplineDesign | Number]) -> None:
     """Refuses designs of nothing, and two of one link or of one number, with a DescriptionError."""
     if not designs:
@@ -260,10 +279,17 @@ def check_designs(designs: Sequence[SplineDesign | Number]) -> None:
     for name in names:
         if names.count(name) > 1:
             raise DescriptionError(f"design of link {name!r}", "it is given twice", "Give each link once")
-    solids = [design.kind for design in designs if isinstance(design, Number) and design.kind.changes_solids]
-    for shape in shapes:
-        for kind in solids:
-            missing = [link.name for link in shape.links if link not in kind.parts]
+    numbers = [design for design in designs if isinstance(design, Number)]
+    for shape in (shape for shape in shapes if len(shape.links) > 1):
+        for link in taken_along(numbers):
+            if link in shape.links:
+                raise DescriptionError(
+                    f"design of link {shape.link.name!r}",
+                    f"it is shared, and joints of {link.name!r} are shifted",
+                    "Design such links each on its own, or leave their joints where they are",
+                )
+        for kind in (number.kind for number in numbers):
+            missing = [link.name for link in shape.links if link not in kind.reshaped]
             if 0 < len(missing) < len(shape.links):
                 raise DescriptionError(
                     str(kind), f"{missing[0]!r} shares the shape of {shape.link.name!r}", "Name all links that do"

@@ -29,9 +29,11 @@ from fenicsmech.design.target import Target
 from fenicsmech.design.verification import part_simulation, verified_parts
 from fenicsmech.errors import DescriptionError
 from fenicsmech.log import Clock, logger
-from fenicsmech.mechanism import FlexibleLink
+from fenicsmech.mechanism import FlexibleLink, Joint
 from fenicsmech.meshing import LinkMesh
 from fenicsmech.model import Design
+from fenicsmech.multibody import JointChange, build_linkage
+from fenicsmech.quantities import joint_changes
 from fenicsmech.simulation import Simulation
 
 _log = logger(__name__)
@@ -233,8 +235,9 @@ class DesignProblem:
             DescriptionError: the design is one of other links.
             MeshingError: no solid can be made of a link.
         """
-        links, linkage = self._own.changed, self.simulation.linkage
-        solids = self._meshes(links, self._own.given(design))
+        links, given = self._own.changed, self._own.given(design)
+        solids, mechanism = self._meshes(links, given), self.simulation.scene.mechanism
+        linkage = build_linkage(mechanism, self.simulation.linkage.dim, self._moved(given[0]))
         on_one(self.simulation.comm, lambda: write_solids(folder, linkage, links, *solids, pin_diameter))
 
     def verify(self, result: DesignResult, folder: str | Path | None = None, *, finer: float = 2.0) -> DesignResult:
@@ -262,7 +265,8 @@ class DesignProblem:
         links, given = self._own.changed, self._own.given(result)
         solids = self._meshes(links, given)
         with TemporaryDirectory() as temporary:  # only the first process writes and reads
-            part = part_simulation(self.simulation, links, *solids, Path(folder or temporary), finer)
+            folder, moved = Path(folder or temporary), self._moved(given[0])
+            part = part_simulation(self.simulation, links, *solids, folder, finer, moved)
             verified = verified_parts(result, part, self.targets)
         return self.simulation.comm.bcast(verified, root=0)
 
@@ -277,6 +281,11 @@ class DesignProblem:
         if isinstance(given, Simulation):
             return self._own.on(given)
         return None if given is None or self.simulation.fidelity.model.dim < 3 else self._own.in_plane_stress
+
+    def _moved(self, parameters: np.ndarray) -> dict[Joint, JointChange]:
+        """Where a design places joints otherwise than drawn."""
+        rest = self._own.rest
+        return joint_changes(rest.numbers.values(parameters[rest.of_numbers]), self.simulation.linkage.dim)
 
     def _meshes(
         self, links: Sequence[FlexibleLink], given: tuple[np.ndarray, HandlePlacement | None]

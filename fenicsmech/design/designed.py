@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fenicsmech.design.description import SplineDesign, shape_requests
+from fenicsmech.design.description import SplineDesign, shape_requests, with_followers
 from fenicsmech.design.equilibria import SampleEquilibria
 from fenicsmech.design.numbers import Number
 from fenicsmech.design.objective import Group, Objective, sample_numbers, split
@@ -38,7 +38,7 @@ class DesignedSimulation:
 
     Attributes:
         simulation, designs, targets, clock: likewise.
-        shapes, numbers: the links whose shape may change, and numbers that may.
+        shapes, numbers: the links whose shape may change, maybe with their joints alone, and numbers that may.
         changed: the links whose solids change.
 
     Raises:
@@ -57,13 +57,13 @@ class DesignedSimulation:
         check_targets(simulation, targets)
         self.simulation, self.designs, self.targets = simulation, tuple(designs), tuple(targets)
         self._regulariser, self.clock = regulariser, clock
-        self.shapes = tuple(own for own in self.designs if isinstance(own, SplineDesign))
         self.numbers = tuple(own for own in self.designs if isinstance(own, Number))
         for number in self.numbers:
-            number.kind.check(simulation.scene)
-        solids = [part for number in self.numbers if number.kind.changes_solids for part in number.kind.parts]
+            number.kind.check(simulation.scene, simulation.linkage.dim)
+        self.shapes = with_followers([own for own in self.designs if isinstance(own, SplineDesign)], self.numbers)
+        solids = [link for number in self.numbers for link in number.kind.reshaped]
         self.changed = tuple(dict.fromkeys([*(link for own in self.shapes for link in own.links), *solids]))
-        self._requests = shape_requests(self.shapes, simulation)
+        self._requests = shape_requests(self.shapes, simulation, self.numbers)
 
     def on(self, simulation: Simulation) -> DesignedSimulation:
         """The same in another simulation."""
@@ -136,7 +136,8 @@ class DesignedSimulation:
             return parameters, None
         given = {link.name: link for link in design.links}
         for link in self.rest.links:
-            size, found = link.spline.size, len(given[link.name].parameters) if link.name in given else 0
+            place = link.parameters.place
+            size, found = place.stop - place.start, len(given[link.name].parameters) if link.name in given else 0
             if found != size:
                 raise DescriptionError(
                     f"design of {design.mechanism!r}",

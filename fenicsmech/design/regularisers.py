@@ -129,15 +129,16 @@ class ShapeBounds(Regulariser):
         def model(p: np.ndarray) -> Quadratic:
             value, gradient, curvature = 0.0, np.zeros(len(p)), np.zeros((len(p), len(p)))
             for link in rest.links:
-                for bound in _bounds(link, p[link.place]):
+                own = link.parameters
+                for bound in _bounds(link, own.of(p)):
                     barrier, beyond = bound.barrier, bound.values > bound.barrier.limit
                     if not beyond.any():
                         continue
-                    x, by_p = bound.values[beyond], bound.gradient(beyond)
+                    x, by_p = bound.values[beyond], bound.gradient(beyond) @ own.matrix
                     value += float(barrier.value(x).sum())
-                    gradient[link.place] += barrier.slope(x) @ by_p
+                    gradient += barrier.slope(x) @ by_p
                     # the curvature of x itself is left out: it may be negative, and is multiplied by a small slope
-                    curvature[link.place, link.place] += by_p.T @ (barrier.curvature(x)[:, None] * by_p)
+                    curvature += by_p.T @ (barrier.curvature(x)[:, None] * by_p)
             return Quadratic(value, gradient, curvature)
 
         return model
@@ -145,7 +146,7 @@ class ShapeBounds(Regulariser):
     def active(self, rest, placement):
         found = []
         for link in rest.links:
-            for bound in _bounds(link, placement.p[link.place]):
+            for bound in _bounds(link, link.parameters.of(placement.p)):
                 if np.any(bound.values > bound.barrier.limit):
                     found.append(f"{bound.name} of {link.name!r}")
         return tuple(dict.fromkeys(found))
@@ -169,7 +170,9 @@ class _Bound:
 
 
 def _bounds(link: DesignedLink, p: np.ndarray) -> list[_Bound]:
-    """The bounds of a link, p its own parameters."""
+    """The bounds of a link, p the parameters of its spline; links that follow joints alone stay as drawn."""
+    if link.follows:
+        return []
     samples, bend = link.samples, link.samples.curvature(p)
     least, most = link.bounds.thickness
     # thickness over its bound at each sample, for δ = 1

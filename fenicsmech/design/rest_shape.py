@@ -1,8 +1,10 @@
 """The design of a simulation as a function of parameters p: the links' rest shapes, with optimal handles, and numbers.
 
-    p = (p_shapes, q),     p_shapes → θ* → d(p_shapes, θ*) → X = X₀ + c + d
+    p = (p_shapes, q),     p → s → θ* → d(s, θ*) → X = X₀ + c + d
 
-with the handle positions θ, the design field d and the bulge c of the drawn edges. Handle positions are best for the
+with the parameters s of the links' splines, the handle positions θ, the design field d and the bulge c of the drawn
+edges. Splines follow joints that numbers q shift, s = s(p_shapes) + Σ ∂s/∂δ_j · δ_j(q), also those of links that have
+no parameters of their own; these keep their drawn shape at the drawn joints. Handle positions are best for the
 straight cells of drawn depth between the vertices. Links drawn by an outline keep their drawn shape at the initial
 design p₀: their handles are at θ₀ + θ*(p) − θ*(p₀), where those of strips are at θ*(p), since handles that move along a
 link of varying thickness, or turn about an eye, change its outline. Edges of the outline follow the design between them
@@ -25,8 +27,9 @@ from fenicsmech.design.description import Bounds, SplineDesign, shape_requests
 from fenicsmech.design.numbers import TYPICAL, Number, ScaledNumbers
 from fenicsmech.design.shape.edges import MidEdgeNodes
 from fenicsmech.design.shape.handle_optimum import HandleOptimum, HandlePlacement, ShapeError
+from fenicsmech.design.shape.handles import BETWEEN
 from fenicsmech.design.shape.quality import Barrier, QualitySum
-from fenicsmech.design.shape.shape_map import LinkImage, LinkShape, ShapeMap, shape_links
+from fenicsmech.design.shape.shape_map import LinkImage, LinkParameters, LinkShape, ShapeMap, shape_links
 from fenicsmech.design.shape.spline import LinkSpline, SplineSamples
 from fenicsmech.meshing import edge_corners, least_stretches, node_ends
 from fenicsmech.model import Design, MechanismModel
@@ -40,23 +43,30 @@ class DesignedLink:
 
     Attributes:
         name: of the link.
-        place: its entries of p.
+        parameters: of its spline, as a function of p.
         spline: its centreline and thickness.
         samples: parameters at which they are bounded.
         thickness: in the plane, where δ = 1; at the samples where it is not the same everywhere.
         bounds: of fabrication.
         centreline: points that the drawn centreline runs through, (k, 2).
+        follows: whether it has no parameters of its own.
         images: links that share the shape.
     """
 
     name: str
-    place: slice
+    parameters: LinkParameters
     spline: LinkSpline
     samples: SplineSamples
     thickness: float | np.ndarray
     bounds: Bounds
     centreline: np.ndarray
     images: tuple[LinkImage, ...] = ()
+    follows: bool = False
+
+    @property
+    def is_thickness(self) -> np.ndarray:
+        """Mask of the thickness parameters among its own entries of p."""
+        return np.zeros(0, bool) if self.follows else self.spline.is_thickness[self.spline.of_shape]
 
 
 _LEAST_STRETCH = 0.1  # least det ∂X/∂X₁ in a cell, X₁ the straight cell; of the drawn shape it is at least 0.3
@@ -90,12 +100,17 @@ class ParametricShape:
         numbers: Sequence[Number] = (),
     ) -> None:
         self._model, design = model, fem.Function(model.elastic.shape.function_space)
-        self._map = ShapeMap(model.mesh, design, shapes)
+        self.numbers = ScaledNumbers(model, numbers)
+        own = [s.handles.spline.initial[[] if s.follows else s.handles.spline.of_shape] for s in shapes]
+        self.initial = np.concatenate([*own, self.numbers.initial])
+        self.of_numbers = slice(len(self.initial) - len(numbers), len(self.initial))
+        parameters = [self._parameters(shape, own[:k]) for k, shape in enumerate(shapes)]
+        self._map = ShapeMap(model.mesh, design, shapes, parameters, self.initial)
         changed = {piece.link: len(shape.every) for shape in shapes for piece in shape.every}
         self._cells = np.flatnonzero(np.isin(model.mesh.link, list(changed)))
         # the vertices' part, which handles are placed for
         self._straight = fem.Function(vector_space(model.mesh.mesh, 1))
-        self._vertex_map = ShapeMap(model.mesh, self._straight, shapes)
+        self._vertex_map = ShapeMap(model.mesh, self._straight, shapes, parameters, self.initial)
         self._ratio = QualitySum(self._straight, comm=model.mesh.comm)
         self._deformable = _deformable(model, changed.keys())
         # a cell of each of the links that share a shape counts as one cell
@@ -105,24 +120,47 @@ class ParametricShape:
         drawn = model.mesh.vertices[ends].mean(axis=1) + model.elastic.drawn_shape.reshape(-1, dim)
         self._middles = MidEdgeNodes(ends, drawn) if model.elastic.order > 1 else None
         self._penalties: dict[Barrier, QualitySum] = {}
-        self.numbers = ScaledNumbers(model, numbers)
-        self.initial = np.concatenate([self._map.initial, self.numbers.initial])
-        self.of_numbers = slice(len(self._map.initial), len(self.initial))
-        links, first = [], 0
-        for shape, wanted in zip(shapes, designs, strict=True):
-            spline, h = shape.handles.spline, shape.thickness
-            place = slice(first, first := first + spline.size)
-            samples, bounds = SplineSamples(spline), wanted.bounds(h)
-            drawn_on = shape.centreline, shape.images
-            links.append(DesignedLink(wanted.link.name, place, spline, samples, h, bounds, *drawn_on))
-        self.links = tuple(links)
-        lengths = [np.where(s.spline.is_thickness, 1.0, np.median(s.thickness)) for s in self.links]
+        self.links = tuple(
+            DesignedLink(
+                name=wanted.link.name,
+                parameters=own,
+                spline=shape.handles.spline,
+                samples=SplineSamples(shape.handles.spline),
+                thickness=shape.thickness,
+                bounds=wanted.bounds(shape.thickness),
+                centreline=shape.centreline,
+                images=shape.images,
+                follows=shape.follows,
+            )
+            for shape, own, wanted in zip(shapes, parameters, designs, strict=True)
+        )
+        lengths = [np.where(s.is_thickness, 1.0, np.median(s.thickness)) for s in self.links]
         self.lengths = np.concatenate([*lengths, np.full(len(self.numbers.initial), TYPICAL)])
+
+    def _parameters(self, shape: LinkShape, before: Sequence[np.ndarray]) -> LinkParameters:
+        """Parameters of a link's spline, whose own ones follow those ``before``."""
+        spline, linkage, first = shape.handles.spline, self._model.linkage, sum(map(len, before))
+        matrix, fixed = np.zeros((spline.size, len(self.initial))), spline.initial.copy()
+        chosen = np.zeros(0, int) if shape.follows else np.flatnonzero(spline.of_shape)
+        matrix[chosen, np.arange(first, first + len(chosen))] = 1.0
+        fixed[chosen] = 0.0
+        link = self._model.mechanism.flexible_links[shape.link]
+        sites = shape.handles.site[shape.handles.site != BETWEEN].tolist()  # in order along the spline
+        for column, number in enumerate(self.numbers.numbers, start=self.of_numbers.start):
+            shifts = np.zeros((len(sites), 2))
+            for joint, change in number.kind.changes(linkage.dim).items():
+                if link in (joint.a, joint.b):
+                    shifts[sites.index(linkage.site(link, joint))] = change.shift[:2]
+            if np.any(shifts):
+                width = self.numbers.width[column - self.of_numbers.start]
+                matrix[:, column] = np.einsum("sja,ja->s", spline.following(), shifts) * width
+                fixed -= matrix[:, column] * self.initial[column]
+        return LinkParameters(slice(first, first + len(chosen)), fixed, matrix)
 
     @staticmethod
     def of(simulation: Simulation, designs: Sequence[SplineDesign], numbers: Sequence[Number] = ()) -> ParametricShape:
         """The design of a simulation, handles and weights of its links computed on its mesh."""
-        shapes = shape_links(simulation.model.mesh, shape_requests(designs, simulation))
+        shapes = shape_links(simulation.model.mesh, shape_requests(designs, simulation, numbers))
         return ParametricShape(simulation.model, shapes, designs, numbers)
 
     def placement_from(self, p: np.ndarray, theta: np.ndarray) -> HandlePlacement | None:
@@ -162,11 +200,10 @@ class ParametricShape:
 
     @cached_property
     def _lag(self) -> np.ndarray:
-        """θ*(p₀) − θ₀ of links drawn by an outline, 0 of others, (handles,)."""
+        """θ*(p₀) − θ₀ of links drawn by an outline, or that follow joints alone, 0 of others, (handles,)."""
         drawn = self._map.initial_theta
-        outlined = np.concatenate(
-            [np.zeros(0, bool), *(np.full(len(o.handles), np.ndim(o.thickness) > 0) for o in self._map.shapes)]
-        )
+        kept = [np.full(len(o.handles), o.follows or np.ndim(o.thickness) > 0) for o in self._map.shapes]
+        outlined = np.concatenate([np.zeros(0, bool), *kept])
         if not np.any(outlined):
             return np.zeros_like(drawn)
         return np.where(outlined, self._optimum.solve(self.initial, self._drawn).theta - drawn, 0.0)
@@ -198,7 +235,9 @@ class ParametricShape:
     def slopes(self, placement: HandlePlacement, gradients: Sequence[Gradient]) -> np.ndarray:
         """dQ/dp of some components at the design placed as in ``placement``, (components, parameters)."""
         fields = np.array([own.design for own in gradients])
-        return np.hstack([self.gradient(placement, fields), self.numbers.slopes(gradients)])
+        total = self.gradient(placement, fields)
+        total[:, self.of_numbers] += self.numbers.slopes(gradients)
+        return total
 
     def gradient(self, placement: HandlePlacement, nodal: np.ndarray) -> np.ndarray:
         """dO/dp of shapes (…, parameters) from ∂O/∂d (…, owned values) of the design placed as in ``placement``."""
@@ -222,10 +261,12 @@ class ParametricShape:
             self._penalties[barrier] = QualitySum(self._straight, barrier.symbolic, counts=counts)
         total = self._penalties[barrier]
         self._straight.interpolate(self._model.elastic.shape)
-        slope = total.gradient()
+        value, slope = total.value(), total.gradient()
         by_p, by_theta = self._vertex_map.apply_transpose(placement.p, placement.theta - self._lag, slope)
         by_q = self._model.mesh.comm.allreduce(self._vertex_rates @ slope.ravel(), op=MPI.SUM) * self.numbers.width
-        return total.value(), np.concatenate([self._optimum.total_gradient(placement, by_p, by_theta), by_q])
+        gradient = self._optimum.total_gradient(placement, by_p, by_theta)
+        gradient[self.of_numbers] += by_q
+        return value, gradient
 
     @cached_property
     def _vertex_rates(self) -> np.ndarray:

@@ -11,8 +11,8 @@ import numpy as np
 from mpi4py import MPI
 
 from fenicsmech.collective import on_one
-from fenicsmech.design.description import SplineDesign
-from fenicsmech.design.numbers import NumberDesign
+from fenicsmech.design.description import FollowingLink, SplineDesign
+from fenicsmech.design.numbers import Number, NumberDesign
 from fenicsmech.design.rest_shape import DesignedLink, ParametricShape
 from fenicsmech.design.shape.handle_optimum import HandlePlacement
 from fenicsmech.design.shape.shape_map import gather_links
@@ -37,7 +37,7 @@ class LinkDesign:
 
     Attributes:
         name: of the link.
-        parameters: its part of p.
+        parameters: its part of p; none of a link that follows joints alone.
         handles: positions θ of its handles, the best near those of the designs on the way. Several can be good: the
             parameters alone need not fix the shape.
         controls: position and thickness (x, y, δ), then tangent, of every control point, (points, 2, 3).
@@ -247,14 +247,19 @@ class DesignResult:
                 same=[links[name] for name in own.same],
                 mirrored=[links[name] for name in own.mirrored],
             )
+            if own.parameters
+            else FollowingLink(links[own.name], len(own.controls) - 1, centreline=own.centreline)
             for own in self.links
         ]
-        rest = ParametricShape.of(simulation, designs)
+        values, dim = self.values(simulation.scene), simulation.linkage.dim
+        places = [(kind, own) for kind, own in zip(values, self.numbers, strict=True) if kind.changes(dim)]
+        rest = ParametricShape.of(simulation, designs, [Number(kind, *own.bounds) for kind, own in places])
+        scaled = [own.scaled for _, own in places]
         p, theta = (
             np.concatenate([np.zeros(0), *parts])
-            for parts in ([own.parameters for own in self.links], [own.handles for own in self.links])
+            for parts in ([*(own.parameters for own in self.links), scaled], [own.handles for own in self.links])
         )
-        return replace(rest.design(p, rest.placement_from(p, theta)), numbers=self.values(simulation.scene))
+        return replace(rest.design(p, rest.placement_from(p, theta)), numbers=values)
 
     def values(self, scene: Scene) -> dict[NumberKind, float]:
         """The numbers by their kinds, of parts of a scene of the same mechanism. Local.
@@ -372,12 +377,12 @@ def link_designs(rest: ParametricShape, placement: HandlePlacement) -> tuple[Lin
     """The shapes of all links at a placement."""
     designs = []
     for link, handles in zip(rest.links, rest.handles(placement), strict=True):
-        own = placement.p[link.place]
+        own = link.parameters.of(placement.p)
         thickness, bend = link.thickness * link.samples.thickness(own), link.samples.curvature(own)
         designs.append(
             LinkDesign(
                 name=link.name,
-                parameters=tuple(own.tolist()),
+                parameters=tuple(placement.p[link.parameters.place].tolist()),
                 handles=tuple(handles.tolist()),
                 controls=tuple(tuple(map(tuple, point)) for point in link.spline.controls_at(own).tolist()),
                 thickness=(float(thickness.min()), float(thickness.max())),
@@ -428,7 +433,7 @@ def draw_links(
         for place in (Isometry.identity(), *(image.isometry for image in change.images))
     ]
     for k, (link, (change, place)) in enumerate(zip(links, places, strict=True)):
-        old, new = (_outline(change, place, meshes[k], p[change.place]) for p, meshes in (before, after))
+        old, new = (_outline(change, place, meshes[k], change.parameters.of(p)) for p, meshes in (before, after))
         joints = np.array([linkage.bodies[i].centre[:2] for i in linkage.interfaces[link]])
         shapes.append(DesignShape(link.name, old, new, joints))
     rigid = MechanismPlotter(simulation.model).rigid(linkage.joints.drawn)

@@ -283,7 +283,7 @@ class Search:
         if ShapeBounds().active(self._rest, HandlePlacement(p, np.empty(0))):
             return False
         for link in self._rest.links:
-            if first_crossing(_outline(link, p[link.place])) is not None:
+            if first_crossing(_outline(link, link.parameters.of(p))) is not None:
                 return False
         try:
             self._problem.rest_shape(p)
@@ -296,7 +296,7 @@ def _reach(link: DesignedLink, spread: float) -> np.ndarray:
     """Largest changes of a link's parameters, in typical lengths."""
     relative = [bound / link.thickness for bound in link.bounds.thickness]
     least, most = float(np.max(relative[0])), float(np.min(relative[1]))
-    return np.where(link.spline.is_thickness, min(spread, 0.5 * min(1.0 - least, most - 1.0)), spread)
+    return np.where(link.is_thickness, min(spread, 0.5 * min(1.0 - least, most - 1.0)), spread)
 
 
 def _outline(link: DesignedLink, p: np.ndarray) -> np.ndarray:

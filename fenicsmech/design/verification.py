@@ -9,7 +9,7 @@ give the error of the part's own mesh.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,9 +24,10 @@ from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, SPATIAL
 from fenicsmech.errors import DescriptionError, positive
 from fenicsmech.export import write_step
 from fenicsmech.log import logger
-from fenicsmech.mechanism import FlexibleLink, step_file
+from fenicsmech.mechanism import FlexibleLink, Joint, step_file
 from fenicsmech.meshing import LinkMesh
 from fenicsmech.model import Design, Fidelity, fits
+from fenicsmech.multibody import JointChange
 from fenicsmech.simulation import Simulation
 
 _log = logger(__name__)
@@ -39,10 +40,12 @@ def part_simulation(
     depths: Sequence[float],
     folder: Path,
     finer: float,
+    moved: Mapping[Joint, JointChange],
 ) -> Simulation:
     """The scene with ``links`` read from the STEP files of their ``meshes``, which this writes to ``folder``.
 
-    In space half the depth is meshed where the scene allows it: exported links are symmetric.
+    Joints are drawn where they are ``moved`` to. In space half the depth is meshed where the scene allows it: exported
+    links are symmetric.
 
     Raises:
         DescriptionError: a point of a force or an output is on one of the links, so that its place in the part is not
@@ -60,7 +63,7 @@ def part_simulation(
     on_one(simulation.comm, lambda: _write(folder, links, meshes, depths))
     files = zip(links, depths, strict=True)
     shapes = {link: step_file(solid_path(folder, link, ".step"), depth=depth) for link, depth in files}
-    return simulation.with_shapes(shapes, fidelity=_finer(simulation, finer))
+    return simulation.with_shapes(shapes, fidelity=_finer(simulation, finer), moved=moved)
 
 
 def _write(folder: Path, links: Sequence[FlexibleLink], meshes: Sequence[LinkMesh], depths: Sequence[float]) -> None:
@@ -88,7 +91,9 @@ def verified_parts(result: DesignResult, part: Simulation, targets: Sequence[Tar
         targets: of the design problem.
     """
     comparison, measured = Comparison(targets, part.scene.units), [t for t in targets if t.quantity.of_part]
-    numbers = Design(np.zeros_like(part.model.elastic.shape.x.array), result.values(part.scene))
+    # places of joints are those of the part already
+    known = {kind: v for kind, v in result.values(part.scene).items() if not kind.changes(part.linkage.dim)}
+    numbers = Design(np.zeros_like(part.model.elastic.shape.x.array), known)
     designed = part.with_design(numbers)
     with part.model.shaped(numbers):
         equilibria = SampleEquilibria(designed, measured)

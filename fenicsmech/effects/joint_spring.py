@@ -92,6 +92,11 @@ class _Stiffness(PosePotential):
         factor = self._coordinate.value(poses) if name == "stiffness" else 0.0
         return factor * self._coordinate.gradient(poses)
 
+    def gradient_by_places(self, changes, poses):
+        rate, slope_rate = self._coordinate.place_rates(changes, poses)
+        slope = rate * self._coordinate.gradient(poses) + self._coordinate.value(poses) * slope_rate
+        return self.numbers["stiffness"] * slope
+
 
 class _Preload(PosePotential):
     """−k φ₀ φ."""
@@ -111,6 +116,9 @@ class _Preload(PosePotential):
     def gradient_by(self, name, poses):
         other = {"stiffness": "rest", "rest": "stiffness"}[name]
         return -self.numbers[other] * self._coordinate.gradient(poses)
+
+    def gradient_by_places(self, changes, poses):
+        return -self._moment * self._coordinate.place_rates(changes, poses)[1]
 
     @property
     def _moment(self) -> float:

@@ -42,6 +42,7 @@ from fenicsmech.equilibrium.state import (
     State,
     Step,
     joint_reaction,
+    joint_reaction_rate,
     joint_reaction_slopes,
     joint_reactions,
     load_fields,

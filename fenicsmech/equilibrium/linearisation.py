@@ -317,6 +317,7 @@ class Adjoint:
         nodal: ∂u/∂y x, so that forces δF on the links change Q by nodal · δF: this rank's owned values at the nodes of
             u, and of pressures behind them, flat.
         poses: ∂z/∂y x of the bodies' poses z, (size,).
+        multipliers: the part of the multipliers λ, (rows,).
         load: the part of the controlled force.
     """
 
@@ -324,6 +325,7 @@ class Adjoint:
     x: PETSc.Vec
     nodal: np.ndarray
     poses: np.ndarray
+    multipliers: np.ndarray
     load: float
 
     @staticmethod
@@ -355,4 +357,4 @@ class Adjoint:
     @staticmethod
     def _of(at: Linearisation, x: PETSc.Vec) -> Adjoint:
         step = at.step(x)
-        return Adjoint(at, x, at.displacements(x), step.z, step.force)
+        return Adjoint(at, x, at.displacements(x), step.z, step.multipliers, step.force)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fenicsmech.elasticity import ElasticBody
 from fenicsmech.mechanism import Motor
-from fenicsmech.multibody import InterfaceMap, JointSystem
+from fenicsmech.multibody import InterfaceMap, JointChange, JointSystem
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +117,7 @@ def joint_reaction(joints: JointSystem, k: int, state: State) -> Reaction:
     space, (body, sign) = joints.space, _acted_on(joints, k)
     pose, on_pose = state.poses[body], (state.poses, state.motors, state.multipliers)
     g = sign * joints.generalised_force(k, body, *on_pose)
-    force, lever = g[: space.dim], space.rotate(pose, _arm(joints, k, body))
+    force, lever = g[: space.dim], space.rotate(pose, joints.arm(k, body))
     return Reaction(force, space.rotation_rates(pose).T @ g[space.dim :] - _cross(lever, force))
 
 
@@ -126,7 +126,7 @@ def joint_reaction_slopes(joints: JointSystem, k: int, state: State) -> Reaction
     space, (body, sign) = joints.space, _acted_on(joints, k)
     pose, on_pose, dim = state.poses[body], (state.poses, state.motors, state.multipliers), joints.space.dim
     g = sign * joints.generalised_force(k, body, *on_pose)
-    arm, rates = _arm(joints, k, body), space.rotation_rates(pose)
+    arm, rates = joints.arm(k, body), space.rotation_rates(pose)
     lever, force, moment = space.rotate(pose, arm), [], []
     for by in joints.generalised_force_slopes(k, body, *on_pose):
         force.append(sign * by[:dim])
@@ -139,15 +139,23 @@ def joint_reaction_slopes(joints: JointSystem, k: int, state: State) -> Reaction
     return ReactionSlopes((force[0], force[1]), (moment[0], moment[1]))
 
 
+def joint_reaction_rate(joints: JointSystem, k: int, state: State, changes: Mapping[int, JointChange]) -> Reaction:
+    """The derivative of the reaction of connection ``k`` as the places of some connections change, at one state."""
+    space, (body, sign) = joints.space, _acted_on(joints, k)
+    if k not in changes:
+        return Reaction(np.zeros(space.dim), np.zeros(1 if space.dim == 2 else 3))
+    pose, on_pose = state.poses[body], (state.poses, state.motors, state.multipliers)
+    force = sign * joints.generalised_force(k, body, *on_pose)[: space.dim]
+    rate = sign * joints.place_rates(k, changes[k], *on_pose)[1][body]
+    lever, lever_rate = (space.rotate(pose, arm) for arm in (joints.arm(k, body), changes[k].shift))
+    turned = space.rotation_rates(pose).T @ rate[space.dim :]
+    return Reaction(rate[: space.dim], turned - _cross(lever_rate, force) - _cross(lever, rate[: space.dim]))
+
+
 def _acted_on(joints: JointSystem, k: int) -> tuple[int, float]:
     """The body whose pose gives the reaction of a connection, and the sign of the force on it."""
     connection = joints.connections[k]
     return (connection.b, 1.0) if connection.b in joints.columns else (connection.a, -1.0)
-
-
-def _arm(joints: JointSystem, k: int, body: int) -> np.ndarray:
-    """The joint's point from the centre of a body, as drawn."""
-    return np.array(joints.connections[k].at) - np.array(joints.bodies[body].centre)
 
 
 def motor_torques(joints: JointSystem, state: State) -> dict[Motor, float]:

@@ -20,15 +20,18 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from time import perf_counter
 
 import numpy as np
+from mpi4py import MPI
 
+from fenicsmech.collective import from_one
 from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRESS, SPATIAL, ElasticModel, Formulation, Quadrature
 from fenicsmech.errors import counted, positive
 from fenicsmech.log import logger
 from fenicsmech.mechanism import FlexibleLink, MeshPart, Scene, StepPart
-from fenicsmech.meshing import typical_thickness
+from fenicsmech.meshing import link_thickness
 from fenicsmech.model import Fidelity, check_scene, fits
 
 _log = logger(__name__)
@@ -205,10 +208,12 @@ class Choice:
 class AccuracyControl:
     """The levels of a scene for a required relative error, and the ``level`` chosen last; at first the coarsest.
 
-    The ``thickness`` is that of all links or of each; None where their shapes have one.
+    The ``thickness`` is that of all links or of each; None where their shapes have one. STEP files are measured on the
+    first process.
 
     Raises:
-        DescriptionError: the scene cannot be simulated, or the thickness of a link is not known.
+        DescriptionError: the scene cannot be simulated, or a link is a mesh, and its thickness is not given.
+        MeshingError: a file cannot be read.
     """
 
     def __init__(
@@ -218,13 +223,14 @@ class AccuracyControl:
         thickness: float | Mapping[FlexibleLink, float] | None,
         formulation: Formulation,
         options: AccuracyOptions | None = None,
+        comm: MPI.Comm = MPI.COMM_SELF,
     ) -> None:
         self._accuracy, self._formulation = positive("accuracy", accuracy), formulation
         self.options = options or AccuracyOptions()
         links = scene.mechanism.flexible_links
         given = thickness if isinstance(thickness, Mapping) else dict.fromkeys(links, thickness)
         self._thickness = {
-            link: typical_thickness(link.shape, f"link {link.name!r}")
+            link: from_one(comm, partial(link_thickness, link.name, link.shape))
             if given.get(link) is None
             else positive(f"thickness of {link.name!r}", given[link])
             for link in links

@@ -17,6 +17,8 @@ from fenicsmech.joints.joint import (
     PlanarMarker,
     SpatialMarker,
     constraint,
+    constraint_rate,
+    coordinate_rate,
     free_coordinate,
 )
 from fenicsmech.joints.rotations import RIGID_SPACES, RigidSpace

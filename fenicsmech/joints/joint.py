@@ -266,6 +266,33 @@ def constraint(kind: JointKind, dim: int, driven: bool) -> SmoothFunction:
 
 
 @cache
+def constraint_rate(kind: JointKind, dim: int, driven: bool) -> SmoothFunction:
+    """∂C/∂c · ċ of a ``constraint``, as the rates ċ of its constants, which follow these, say."""
+    poses, constants, a, b = _markers(dim)
+    variables, equations = poses, kind.equations(a, b) if dim == 3 else kind.planar_equations(a, b)
+    if driven:
+        value = sympy.Symbol("phi", real=True)
+        variables, equations = (*poses, value), [*equations, kind.motor(a, b, value)]
+    return _rate(equations, variables, constants)
+
+
+@cache
+def coordinate_rate(kind: JointKind, dim: int) -> SmoothFunction:
+    """∂φ/∂c · ċ of a ``free_coordinate``, (1,); arguments as of a ``constraint_rate``."""
+    poses, constants, a, b = _markers(dim)
+    return _rate([kind.coordinate(a, b)], poses, constants)
+
+
+def _rate(formulae, variables, constants) -> SmoothFunction:
+    """Σ ∂f/∂c ċ as a function of the variables of f, with constants (c, ċ)."""
+    rates = sympy.symbols(f"d0:{len(constants)}", real=True)
+    along = [
+        sum((sympy.diff(f, c) * rate for c, rate in zip(constants, rates, strict=True)), sympy.S.Zero) for f in formulae
+    ]
+    return derive(along, variables, (*constants, *rates))
+
+
+@cache
 def free_coordinate(kind: JointKind, dim: int) -> SmoothFunction:
     """The free coordinate φ of ``kind``, (1,); variables and constants are those of a ``constraint`` without motor."""
     poses, constants, a, b = _markers(dim)

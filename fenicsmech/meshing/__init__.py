@@ -23,6 +23,7 @@ and makes dolfinx meshes of them, over parallel ranks.
 """
 
 from fenicsmech.meshing import outline, part_files, strip  # each registers its shapes
+from fenicsmech.meshing.centreline import LinkOutline, find_centreline
 from fenicsmech.meshing.cutting import circle_segments
 from fenicsmech.meshing.images import Figure, Isometry, Match, has_plain_outline, image_of, matches, same_mesh
 from fenicsmech.meshing.link_mesh import (
@@ -46,12 +47,13 @@ from fenicsmech.meshing.link_mesh import (
     radius_ratios,
     section_of,
 )
-from fenicsmech.meshing.link_mesher import LEAST_SEGMENTS, InterfaceSite, check_link, mesh_link, typical_thickness
+from fenicsmech.meshing.link_mesher import LEAST_SEGMENTS, InterfaceSite, check_link, mesh_link
 from fenicsmech.meshing.outline import (
     CircleArc,
     Curve,
     draw_loop,
     link_outline,
+    link_thickness,
     points_on,
     sample_parameters,
     sampled,

@@ -52,6 +52,13 @@ class InterfaceSite:
         return np.array([*self.at, 0.0][:3])
 
     @property
+    def reach(self) -> float:
+        """Radius of the smallest circle about the joint's point that contains the region."""
+        if isinstance(self.region, Disc):
+            return self.region.radius
+        return 0.5 * math.hypot(self.region.length, self.region.width)
+
+    @property
     def frame(self) -> np.ndarray:
         """Right-handed orthonormal frame with its third row along the axis, shape (3, 3).
 
@@ -216,10 +223,10 @@ def check_link(
 
 
 def typical_thickness(shape: Shape, part: str) -> float:
-    """The thickness of a strip, or t = 2 A / P of the long strip with the area A and the perimeter P of an outline.
+    """The thickness of a strip, or 2 A / P of an outline, as described; ``part`` names the link.
 
     Raises:
-        DescriptionError: the shape is known from a file only; ``part`` names the link.
+        DescriptionError: the shape is that of a file.
     """
     match shape:
         case Strip():

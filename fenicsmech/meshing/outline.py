@@ -16,7 +16,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from fenicsmech.errors import MeshingError, counted, point_text
-from fenicsmech.mechanism import Arc, Line, Outline, Shape
+from fenicsmech.mechanism import Arc, Line, Outline, Shape, StepPart
 from fenicsmech.meshing.cutting import PlaneDrawing, in_units_of, mesh_planar
 from fenicsmech.meshing.link_mesh import LinkMesh
 from fenicsmech.meshing.link_mesher import (
@@ -200,6 +200,21 @@ def link_outline(name: str, shape: Shape, *, dim: int) -> list[Curve]:
     request = MeshRequest(name, (), dim, size)
     check_shape(shape, request)
     return outer_loop(shape, request)
+
+
+def link_thickness(name: str, shape: Shape) -> float:
+    """The thickness of a strip, or t = 2 A / P of the long strip with the area A and the perimeter P of an outline.
+
+    Raises:
+        DescriptionError: the link is a mesh, whose elements are given.
+        MeshingError: a file cannot be read, or has no such section.
+    """
+    if not isinstance(shape, StepPart):
+        return typical_thickness(shape, f"link {name!r}")
+    curves = link_outline(name, shape, dim=2)
+    polygon = sampled(curves, 1e-3 * float(np.ptp(sampled(curves, math.inf), axis=0).max()))
+    perimeter = np.linalg.norm(np.roll(polygon, -1, axis=0) - polygon, axis=1).sum()
+    return 2.0 * abs(signed_area(polygon)) / float(perimeter)
 
 
 @mesh_shape.register

@@ -1,6 +1,7 @@
 """The mechanism as bodies and constraints.
 
 - ``points``: interface nodes of the mesh as functions of body poses, the design field at nodes, material points
+- ``places``: the places of joints in the drawn configuration, which designs change
 - ``linkage``: bodies, constraints between them and potentials of their poses
 - ``idle_spins``: turns of bodies about the line through two balls, which nothing resists
 - ``assembly``: the rigid assembly of a configuration, and the motions that joints, motors and springs leave
@@ -28,4 +29,5 @@ from fenicsmech.multibody.linkage import (
     build_linkage,
     spring_potentials,
 )
+from fenicsmech.multibody.places import JointChange, JointPlaces
 from fenicsmech.multibody.points import BodyPoint, DesignAtNodes, InterfaceMap, LinkPoint, link_point, shape_functions

@@ -25,20 +25,19 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
 from fenicsmech.multibody.linkage import JointSystem, Linkage
-from fenicsmech.multibody.points import BodyPoint
 
 
 @dataclass(frozen=True)
 class IdleSpin:
-    """``bodies`` that turn idly, and the two ``balls`` that hold them, as points of theirs, drawn at ``places``."""
+    """``bodies`` of a ``system`` that turn idly; ``balls``, the connections that hold them, each with its body."""
 
+    system: JointSystem
     bodies: tuple[int, ...]
-    balls: tuple[BodyPoint, BodyPoint]
-    places: tuple[np.ndarray, np.ndarray]
+    balls: tuple[tuple[int, int], tuple[int, int]]
 
     def line(self, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """A point on the line through the balls at ``poses`` (bodies, pose_size), and its direction of length one."""
-        first, second = (at + ball.displacement(None, poses) for at, ball in zip(self.places, self.balls, strict=True))
+        first, second = (self.system.place(k, body, poses) for k, body in self.balls)
         return first, (second - first) / np.linalg.norm(second - first)
 
     def gauge(self, joints: JointSystem, poses: np.ndarray) -> tuple[int, np.ndarray]:
@@ -66,19 +65,19 @@ def idle_spins(linkage: Linkage, acted_on: Collection[int] = ()) -> tuple[IdleSp
         acted_on: indices of bodies on which, or on whose link, something beside joints acts: these do not spin idly.
     """
     system, found = linkage.rigid, []
-    balls = [c for k, c in enumerate(system.connections) if system.is_ball(k)]
-    pairs = np.array([(c.a, c.b) for c in system.connections if c not in balls], dtype=int).reshape(-1, 2)
+    balls = {k: c for k, c in enumerate(system.connections) if system.is_ball(k)}
+    pairs = np.array([(c.a, c.b) for k, c in enumerate(system.connections) if k not in balls], dtype=int).reshape(-1, 2)
     graph = csr_matrix((np.ones(len(pairs)), pairs.T), shape=(len(system.bodies),) * 2)
     _, group = connected_components(graph, directed=False)
     for label in np.unique(group):
         bodies = tuple(int(body) for body in np.flatnonzero(group == label))
         if any(system.bodies[body].fixed or body in acted_on for body in bodies):
             continue
-        ends = [(c, body) for c in balls for body in (c.a, c.b) if group[body] == label and group[c.a] != group[c.b]]
+        held = [(k, c) for k, c in balls.items() if group[c.a] != group[c.b]]
+        ends = [(k, body) for k, c in held for body in (c.a, c.b) if group[body] == label]
         if len(ends) != 2:
             continue
-        points = [linkage.point_on(body, c.at) for c, body in ends]
-        places = [np.array(c.at) for c, _ in ends]
-        if np.linalg.norm(places[1] - places[0]) > 1e-9 * linkage.length:
-            found.append(IdleSpin(bodies, (points[0], points[1]), (places[0], places[1])))
+        first, second = (system.place(k, body, system.drawn) for k, body in ends)
+        if np.linalg.norm(second - first) > 1e-9 * linkage.length:
+            found.append(IdleSpin(system, bodies, (ends[0], ends[1])))
     return tuple(found)

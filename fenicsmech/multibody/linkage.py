@@ -8,14 +8,23 @@ Fixed bodies carry no columns.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
 
-from fenicsmech.joints import RIGID_SPACES, WELD, JointKind, constraint, free_coordinate
+from fenicsmech.joints import (
+    RIGID_SPACES,
+    WELD,
+    JointKind,
+    constraint,
+    constraint_rate,
+    coordinate_rate,
+    free_coordinate,
+)
 from fenicsmech.mechanism import Effect, FlexibleLink, Joint, Link, Mechanism, Motor, Region, in_dimension, same_place
+from fenicsmech.multibody.places import JointChange, JointPlaces
 from fenicsmech.multibody.points import BodyPoint
 
 
@@ -56,7 +65,15 @@ class Connection:
 class JointSystem:
     """Constraints of ``connections`` between ``bodies`` in ``dim`` dimensions; ``length`` scales positions.
 
+    Args:
+        bodies: rigid bodies.
+        connections: joints between them.
+        dim: 2 or 3.
+        length: scales positions.
+        places: constants of the connections' equations, and maybe of further ones; as drawn by default.
+
     Attributes:
+        places: likewise; designs change them.
         size: number of pose unknowns.
         rows: number of constraints.
         offsets: φ₀ of motors, which add to their prescribed positions φ: C(z, φ + φ₀); per connection, zero as drawn.
@@ -64,11 +81,19 @@ class JointSystem:
         row_scale: factors that make each constraint dimensionless and of unit gradient as drawn, (rows,).
     """
 
-    def __init__(self, bodies: Sequence[Body], connections: Sequence[Connection], *, dim: int, length: float) -> None:
+    def __init__(
+        self,
+        bodies: Sequence[Body],
+        connections: Sequence[Connection],
+        *,
+        dim: int,
+        length: float,
+        places: JointPlaces | None = None,
+    ) -> None:
         self.bodies, self.connections, self.length = tuple(bodies), tuple(connections), length
         self.space = RIGID_SPACES[dim]
         self._constraints = [constraint(c.kind, dim, c.motor is not None) for c in self.connections]
-        self._drawn = [c.drawn(self.bodies) for c in self.connections]
+        self.places = places or JointPlaces([c.drawn(self.bodies) for c in self.connections], dim)
         self.offsets = np.zeros(len(self.connections))
 
         pose_size = self.space.pose_size
@@ -193,6 +218,29 @@ class JointSystem:
         by_multipliers[:, rows] = self._constraints[k].gradient(*arguments)[:, own].T
         return by_poses, by_multipliers
 
+    def place_rates(
+        self, k: int, change: JointChange, poses: np.ndarray, motors: np.ndarray, multipliers: np.ndarray
+    ) -> tuple[np.ndarray, dict[int, np.ndarray]]:
+        """Derivatives of C (rows,), and of Aᵀλ on each body of connection ``k`` (pose_size,), as its place changes."""
+        connection, rows = self.connections[k], self._joint_rows[k]
+        variables, constants = self._arguments(k, poses, motors)
+        formula = constraint_rate(connection.kind, self.space.dim, connection.motor is not None)
+        arguments = variables, np.concatenate([constants, self.places.rate(k, change)])
+        rate = np.zeros(self.rows)
+        rate[rows] = formula.value(*arguments)
+        forces = multipliers[rows] @ formula.gradient(*arguments)
+        return rate, {body: forces[own] for body, own in self._ends[k]}
+
+    def arm(self, k: int, body: int) -> np.ndarray:
+        """The point of connection ``k`` from the centre of one of its bodies, in the drawn configuration, (dim,)."""
+        dim = self.space.dim
+        return self.places[k][:dim] if body == self.connections[k].a else self.places[k][dim : 2 * dim]
+
+    def place(self, k: int, body: int, poses: np.ndarray) -> np.ndarray:
+        """Where the point of connection ``k`` on one of its bodies is at ``poses`` (bodies, pose_size), (dim,)."""
+        arm = self.arm(k, body)
+        return np.array(self.bodies[body].centre) + arm + self.space.displace(poses[body], arm[None])[0]
+
     def motor_rate(
         self, poses: np.ndarray, motors: np.ndarray, multipliers: np.ndarray, direction: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
@@ -214,7 +262,7 @@ class JointSystem:
         """Variables and constants of the equations of connection ``k``."""
         c = self.connections[k]
         motor = [] if c.motor is None else [motors[k : k + 1] + self.offsets[k : k + 1]]
-        return np.concatenate([poses[c.a], poses[c.b], *motor]), self._drawn[k]
+        return np.concatenate([poses[c.a], poses[c.b], *motor]), self.places[k]
 
 
 @dataclass(frozen=True)
@@ -243,11 +291,18 @@ class Linkage:
 
     def point(self, link: Link, at: Sequence[float]) -> BodyPoint:
         """The point drawn at ``at``, of two or three coordinates, that moves with the body that carries ``link``."""
-        return self.point_on(self.body_of(link), at)
-
-    def point_on(self, body: int, at: Sequence[float]) -> BodyPoint:
-        """The point of a body drawn at ``at``."""
+        body = self.body_of(link)
         return BodyPoint(body, np.array(in_dimension(at, self.dim)) - self.bodies[body].centre, self.joints.space)
+
+    def site(self, link: FlexibleLink, joint: Joint) -> int:
+        """Which interface of a flexible link belongs to one of its joints."""
+        connection = self.joints.connections[self.connection_of(joint)]
+        own = self.interfaces[link]
+        return next(own.index(body) for body in (connection.a, connection.b) if body in own)
+
+    def connection_of(self, joint: Joint) -> int:
+        """Index of a joint's connection."""
+        return next(k for k, own in enumerate(self.joints.connections) if own.name == joint.name)
 
     def turns_about_z(self, body: int) -> bool:
         """Whether all joints of a body stay closed while it alone turns about the parallel to z through its centre.
@@ -293,6 +348,13 @@ class PosePotential(ABC):
         """∂²V/∂z∂p of one of ``numbers``, (n · pose_size,)."""
         raise NotImplementedError(f"{type(self).__name__} has no numbers")
 
+    def gradient_by_places(self, changes: Mapping[int, JointChange], poses: np.ndarray) -> np.ndarray | float:
+        """∂²V/∂z∂p of a number that changes the places of some connections, (n · pose_size,).
+
+        Zero by default: V refers to no joint.
+        """
+        return 0.0
+
 
 def spring_potentials(effects: Sequence[Effect], linkage: Linkage) -> tuple[PosePotential, ...]:
     """The potentials of ``effects`` that act in full from the start."""
@@ -307,10 +369,10 @@ class JointCoordinate:
     """
 
     def __init__(self, linkage: Linkage, joint: Joint) -> None:
-        connection = next(c for c in linkage.joints.connections if c.name == joint.name)
+        self._k, self._places = linkage.connection_of(joint), linkage.joints.places
+        connection = linkage.joints.connections[self._k]
         self.bodies = (connection.a, connection.b)
-        self._drawn = connection.drawn(linkage.bodies)
-        self._formula = free_coordinate(joint.kind, linkage.dim)
+        self._kind, self._formula = joint.kind, free_coordinate(joint.kind, linkage.dim)
 
     def value(self, poses: np.ndarray) -> float:
         """φ, zero as drawn, from the ``poses`` of all bodies, (bodies, pose_size)."""
@@ -324,23 +386,38 @@ class JointCoordinate:
         """∂²φ/∂z², (2 pose_size, 2 pose_size)."""
         return self._formula.hessian(*self._point(poses), np.ones(1))
 
+    def place_rates(self, changes: Mapping[int, JointChange], poses: np.ndarray) -> tuple[float, np.ndarray | float]:
+        """Derivatives of φ, and of ∂φ/∂z (2 pose_size,), as the places of some connections change."""
+        if self._k not in changes:
+            return 0.0, 0.0
+        formula, (variables, constants) = coordinate_rate(self._kind, self._places.dim), self._point(poses)
+        arguments = variables, np.concatenate([constants, self._places.rate(self._k, changes[self._k])])
+        return float(formula.value(*arguments)[0]), formula.gradient(*arguments)[0]
+
     def _point(self, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return poses[list(self.bodies)].ravel(), self._drawn
+        return poses[list(self.bodies)].ravel(), self._places[self._k]
 
 
-def build_linkage(mechanism: Mechanism, dim: int) -> Linkage:
-    """The bodies and constraints of ``mechanism`` in ``dim`` dimensions."""
+def build_linkage(mechanism: Mechanism, dim: int, changes: Mapping[Joint, JointChange] | None = None) -> Linkage:
+    """The bodies and constraints of ``mechanism`` in ``dim`` dimensions.
+
+    Args:
+        mechanism: the mechanism.
+        dim: 2 or 3.
+        changes: of joints, which are placed there from the outset.
+    """
     length, joints = mechanism.length, mechanism.joints
+    placed = {joint: _placed(joint, dim, (changes or {}).get(joint)) for joint in joints}
     bodies: list[Body] = []
     for link in mechanism.rigid_links:
-        places = [in_dimension(joint.at, dim) for joint in joints if link in (joint.a, joint.b)]
+        places = [placed[joint][0] for joint in joints if link in (joint.a, joint.b)]
         centre = tuple(np.mean(places, axis=0)) if places else (0.0,) * dim
         bodies.append(Body(link.name, link, centre, link.fixed))
 
     def body(joint: Joint, link: Link) -> int:
         """The body of ``link`` that a joint is on, −1 if there is none yet."""
         for i, known in enumerate(bodies):
-            here = known.region is None or same_place(known.centre, joint.at, dim=dim, length=length)
+            here = known.region is None or same_place(known.centre, placed[joint][0], dim=dim, length=length)
             if known.link == link and here:
                 return i
         return -1
@@ -352,27 +429,39 @@ def build_linkage(mechanism: Mechanism, dim: int) -> Linkage:
             if flexible in (joint.a, joint.b) and body(joint, flexible) < 0:
                 region = joint.regions[(joint.a, joint.b).index(flexible)]
                 axis = joint.axis if joint.kind.pin_along_axis else (0.0, 0.0, 1.0)
-                bodies.append(Body(joint.name, flexible, in_dimension(joint.at, dim), False, region, axis))
+                bodies.append(Body(joint.name, flexible, placed[joint][0], False, region, axis))
         interfaces[flexible] = tuple(range(first, len(bodies)))
     driven = {motor.joint: motor for motor in mechanism.motors}
     connections = []
     for joint in joints:
-        a, b, at = body(joint, joint.a), body(joint, joint.b), in_dimension(joint.at, dim)
-        connections.append(Connection(joint.name, joint.kind, a, b, at, _triad(joint, dim), driven.get(joint)))
+        a, b, (at, triad) = body(joint, joint.a), body(joint, joint.b), placed[joint]
+        connections.append(Connection(joint.name, joint.kind, a, b, at, triad, driven.get(joint)))
     identity = tuple(map(tuple, np.eye(dim)))
     welds = [
         Connection(f"link {link.name!r}", WELD, group[0], other, bodies[other].centre, identity)
         for link, group in interfaces.items()
         for other in group[1:]
     ]
+    at_joints = JointPlaces([connection.drawn(bodies) for connection in (*connections, *welds)], dim)
     return Linkage(
         dim,
         length,
         tuple(bodies),
         interfaces,
-        joints=JointSystem(bodies, connections, dim=dim, length=length),
-        rigid=JointSystem(bodies, [*connections, *welds], dim=dim, length=length),
+        joints=JointSystem(bodies, connections, dim=dim, length=length, places=at_joints),
+        rigid=JointSystem(bodies, [*connections, *welds], dim=dim, length=length, places=at_joints),
     )
+
+
+def _placed(
+    joint: Joint, dim: int, change: JointChange | None
+) -> tuple[tuple[float, ...], tuple[tuple[float, ...], ...]]:
+    """Place and triad of a joint that may have been changed."""
+    at, triad = in_dimension(joint.at, dim), _triad(joint, dim)
+    if change is None:
+        return at, triad
+    moved, turned = change.place(np.array(at), np.array(triad))
+    return tuple(moved.tolist()), tuple(map(tuple, turned.tolist()))
 
 
 def _triad(joint: Joint, dim: int) -> tuple[tuple[float, ...], ...]:

@@ -8,15 +8,17 @@
 - ``number``: numbers of parts, and their derivatives from adjoints
 - ``link_numbers``: numbers of laws, depth
 - ``joint_numbers``: stiffness and rest of springs, offsets of motors
+- ``joint_places``: positions and axes of joints
 - ``sensitivity``: total derivatives by adjoints
 """
 
 from fenicsmech.quantities.forces import ForceMagnitude, JointForce, JointMoment, MotorTorque
 from fenicsmech.quantities.joint_numbers import MotorOffset, SpringRest, SpringStiffness
+from fenicsmech.quantities.joint_places import JointAxis, JointPosition
 from fenicsmech.quantities.link_numbers import Depth, LawParameter
 from fenicsmech.quantities.links import CentrelineLength, LinkMass, LinkVolume, StrainEnergy
 from fenicsmech.quantities.motion import Displacement, Rotation
-from fenicsmech.quantities.number import ModelNumber, NumberKind, NumberTerms, read_kind
+from fenicsmech.quantities.number import ModelNumber, NumberKind, NumberTerms, joint_changes, read_kind
 from fenicsmech.quantities.quantity import (
     Component,
     FormValue,

@@ -10,14 +10,17 @@ the body's centre.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from fenicsmech.equilibrium import joint_reaction, joint_reaction_slopes
+from fenicsmech.equilibrium import State, joint_reaction, joint_reaction_rate, joint_reaction_slopes
 from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import Drive, Force, Joint, Motor
 from fenicsmech.model import MechanismModel
+from fenicsmech.multibody import JointChange
 from fenicsmech.quantities.quantity import Observable, Partial, Quantity, border_of
 
 
@@ -191,6 +194,13 @@ class _Reaction(Observable):
         poses, multipliers = slopes.force if self._force else slopes.moment
         every = slice(None)
         return [
-            Partial(border=border_of(system, poses=(every, by_poses), multipliers=(every, by_multipliers)))
-            for by_poses, by_multipliers in zip(poses, multipliers, strict=True)
+            Partial(
+                border=border_of(system, poses=(every, by_poses), multipliers=(every, by_multipliers)),
+                by_places=((1.0, partial(self._rate, state, row)),),
+            )
+            for row, (by_poses, by_multipliers) in enumerate(zip(poses, multipliers, strict=True))
         ]
+
+    def _rate(self, state: State, row: int, changes: Mapping[int, JointChange]) -> float:
+        rate = joint_reaction_rate(self._joints, self._connection, state, changes)
+        return float((rate.force if self._force else rate.moment)[row])

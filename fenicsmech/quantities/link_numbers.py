@@ -49,7 +49,10 @@ class Depth(_OfLinks):
     """
 
     what = "depth"
-    changes_solids = True
+
+    @property
+    def reshaped(self):
+        return self.parts
 
     def described(self, part):
         return part.shape.depth

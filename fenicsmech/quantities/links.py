@@ -1,8 +1,9 @@
 """Quantities of links: strain energy, and at rest mass, volume and length.
 
-    E = ∫ W dV,     V = ∫ det(∇X) b dX₀,     m = ρ V,     L = (L₀ / Σ |ΔX₀|) Σ |ΔX|
+    E = ∫ W dV,     V = ∫ det(∇X) b dX₀,     m = ρ V,     L = L₀ + Σ (|ΔX| − |ΔX₀|)
 
-The sums run over chords between points of the drawn centreline, which the design carries along.
+The sums run over chords between points of the drawn centreline, which the design carries along. The centreline of a
+link that is known by its outline is the line that halves its chords.
 """
 
 from __future__ import annotations
@@ -14,9 +15,11 @@ from typing import ClassVar
 import numpy as np
 import ufl
 
+from fenicsmech.collective import from_one
 from fenicsmech.errors import DescriptionError, points, positive
 from fenicsmech.mechanism import Centreline, FlexibleLink, Strip
-from fenicsmech.model import MechanismModel
+from fenicsmech.meshing import LinkOutline, find_centreline, link_outline
+from fenicsmech.model import MechanismModel, plan_sites
 from fenicsmech.quantities.quantity import FormValue, Observable, Partial, Quantity, RestObservable
 
 _CHORDS = 48  # of a centreline: their length is in error by 1e-4 at most, and its change with the design by less
@@ -176,16 +179,20 @@ class CentrelineLength(Quantity):
 
     Attributes:
         link: the link.
-        centreline: drawn points it runs through; that of a strip by default.
+        centreline: drawn points it runs through; by default that of a strip, and of other links the line that halves
+            the chords of their outline, from joint to joint, or on to free ends.
 
     Raises:
-        DescriptionError: this is not a flexible link, or no centreline is known.
+        DescriptionError: this is not a flexible link; later: no line halves the chords of its outline.
     """
 
     link: FlexibleLink
     centreline: Sequence[Sequence[float]] | None = None
     of_state = False
-    of_part = False
+
+    @property
+    def of_part(self):  # type: ignore[override]
+        return self.centreline is None  # a given one is that of the drawn link
 
     def __post_init__(self) -> None:
         if not isinstance(self.link, FlexibleLink):
@@ -193,9 +200,8 @@ class CentrelineLength(Quantity):
         given = self.centreline
         if given is None and isinstance(self.link.shape, Strip):
             given = self.link.shape.centreline
-        if given is None:
-            raise DescriptionError(self.name, "its shape has no centreline", "Give centreline=…, points along the link")
-        object.__setattr__(self, "centreline", points(self.name, given, least=2, dimensions=(2,)))
+        if given is not None:
+            object.__setattr__(self, "centreline", points(self.name, given, least=2, dimensions=(2,)))
 
     @property
     def name(self):
@@ -208,22 +214,40 @@ class CentrelineLength(Quantity):
         return _Chords(model, self)
 
 
+def _found(model: MechanismModel, link: FlexibleLink, part: str) -> np.ndarray:
+    """Points of the line that halves the chords of a link's outline, (n, 2)."""
+    shape, dim = model.shapes[model.mechanism.flexible_links.index(link)], model.linkage.dim
+
+    def search() -> np.ndarray:
+        sites = plan_sites(model.linkage, link)
+        outline = LinkOutline(link_outline(link.name, shape, dim=dim), sites)
+        return find_centreline(outline, [site.reach for site in sites], part=part)
+
+    return from_one(model.mesh.comm, search)
+
+
 class _Chords(RestObservable):
     """The length of a chain of points that the design carries along."""
 
     def __init__(self, model: MechanismModel, length: CentrelineLength) -> None:
-        curve = Centreline(length.centreline or (), part=length.name)
+        through = length.centreline
+        curve = Centreline(_found(model, length.link, length.name) if through is None else through, part=length.name)
         drawn = curve.evaluate(np.linspace(0.0, curve.end, _CHORDS + 1))
+        if through is None:
+            # it may end on the outline, beyond the chords of the mesh, and runs through holes for pins in interfaces
+            drawn = curve.evaluate(np.linspace(1e-3 * curve.end, 0.999 * curve.end, _CHORDS + 1))
+            for site in plan_sites(model.linkage, length.link):
+                drawn = drawn[np.linalg.norm(drawn - site.centre[:2], axis=1) > site.reach]
         self._model, self._drawn = model, drawn
         self._weights = model.design_weights(length.name, length.link, drawn)  # (points, owned nodes)
-        self._factor = curve.length / float(np.linalg.norm(np.diff(drawn, axis=0), axis=1).sum())
+        self._rest = curve.length - float(np.linalg.norm(np.diff(drawn, axis=0), axis=1).sum())
 
     def value(self):
-        return float(self._factor * np.linalg.norm(self._chords(), axis=1).sum())
+        return self._rest + float(np.linalg.norm(self._chords(), axis=1).sum())
 
     def slope(self):
         chords, own = self._chords(), self._weights
-        along = self._factor * chords / np.linalg.norm(chords, axis=1, keepdims=True)
+        along = chords / np.linalg.norm(chords, axis=1, keepdims=True)
         ends = np.zeros_like(self._drawn)
         ends[1:] += along
         ends[:-1] -= along

@@ -13,7 +13,7 @@ each.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -21,8 +21,9 @@ import numpy as np
 
 from fenicsmech.equilibrium import Adjoint
 from fenicsmech.errors import DescriptionError, positive
-from fenicsmech.mechanism import Configuration, Scene, Units
+from fenicsmech.mechanism import Configuration, FlexibleLink, Joint, Scene, Units
 from fenicsmech.model import MechanismModel
+from fenicsmech.multibody import JointChange
 from fenicsmech.quantities.quantity import Partial
 
 
@@ -77,14 +78,12 @@ class NumberKind(ABC):
 
     Attributes:
         parts: likewise.
-        changes_solids: whether the solids of its parts change.
 
     Raises:
         DescriptionError: there are no parts, or one is given twice.
     """
 
     what: ClassVar[str]
-    changes_solids: ClassVar[bool] = False
     parts: tuple[Any, ...]
 
     def __init__(self, *parts: Any) -> None:
@@ -146,6 +145,15 @@ class NumberKind(ABC):
         """
         return cls(*(cls._part(scene, word) for word in words))
 
+    @property
+    def reshaped(self) -> Sequence[FlexibleLink]:
+        """Flexible links whose solids change with it; none by default."""
+        return ()
+
+    def changes(self, dim: int) -> Mapping[Joint, JointChange]:
+        """How a unit of it changes the places of joints in ``dim`` dimensions; none by default."""
+        return {}
+
     def moves_unloaded(self, configuration: Configuration) -> bool:
         """Whether the unloaded configuration, from which displacements count, moves with it; not by default."""
         return False
@@ -154,8 +162,8 @@ class NumberKind(ABC):
         """Refuses a value that makes no sense with a DescriptionError; by default one that is not positive."""
         positive(self.name, value)
 
-    def check(self, scene: Scene) -> None:
-        """Checks that the number exists in ``scene``.
+    def check(self, scene: Scene, dim: int) -> None:
+        """Checks that the number exists in ``scene`` in ``dim`` dimensions.
 
         Raises:
             DescriptionError: a part is not one of the scene, or they are drawn with different numbers.
@@ -188,6 +196,15 @@ class NumberKind(ABC):
 
     def __str__(self) -> str:
         return self.name
+
+
+def joint_changes(values: Mapping[NumberKind, float], dim: int) -> dict[Joint, JointChange]:
+    """How numbers with some values change the places of joints, together, in ``dim`` dimensions."""
+    found: dict[Joint, JointChange] = {}
+    for kind, value in values.items():
+        for joint, unit in kind.changes(dim).items():
+            found[joint] = value * unit + found[joint] if joint in found else value * unit
+    return found
 
 
 def read_kind(scene: Scene, kind: str, words: Sequence[str]) -> NumberKind:

@@ -12,7 +12,7 @@ Quantities of quantities follow by the chain rule: ``Component`` of a vector alo
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from types import MappingProxyType
@@ -28,6 +28,7 @@ from fenicsmech.equilibrium import EquilibriumSystem, State
 from fenicsmech.errors import DescriptionError, direction, point_text
 from fenicsmech.mechanism import FlexibleLink, Force, Joint, Motor, Output, RigidLink, Scene, Units, in_dimension
 from fenicsmech.model import MechanismModel
+from fenicsmech.multibody import JointChange
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,12 +40,14 @@ class Partial:
         border: by poses, multipliers and the controlled force, the same on all ranks, (border,).
         design: by this rank's owned values of the design field, flat.
         per_link: by numbers of links, by their names in ``ElasticBody.numbers``, (links,).
+        by_places: derivatives as the places of some connections change, each with a factor; they add up.
     """
 
     links: np.ndarray | float = 0.0
     border: np.ndarray | float = 0.0
     design: np.ndarray | float = 0.0
     per_link: Mapping[str, np.ndarray] = field(default_factory=lambda: MappingProxyType({}))
+    by_places: tuple[tuple[float, Callable[[Mapping[int, JointChange]], float]], ...] = ()
 
     @property
     def of_state(self) -> bool:
@@ -54,7 +57,8 @@ class Partial:
     def __mul__(self, factor: float) -> Partial:
         per_link = {name: np.multiply(factor, values) for name, values in self.per_link.items()}
         border, design = factor * self.border, factor * self.design
-        return Partial(factor * self.links, border, design, per_link)
+        by_places = tuple((factor * own, rate) for own, rate in self.by_places)
+        return Partial(factor * self.links, border, design, per_link, by_places)
 
     __rmul__ = __mul__
 
@@ -62,7 +66,7 @@ class Partial:
         names = dict.fromkeys((*self.per_link, *other.per_link))
         per_link = {name: np.add(self.per_link.get(name, 0.0), other.per_link.get(name, 0.0)) for name in names}
         border, design = self.border + other.border, self.design + other.design
-        return Partial(self.links + other.links, border, design, per_link)
+        return Partial(self.links + other.links, border, design, per_link, self.by_places + other.by_places)
 
 
 class Observable(ABC):
@@ -110,7 +114,7 @@ class Quantity(ABC):
     Attributes:
         of_state: whether it depends on an equilibrium; those that do not need no sample.
         from_unloaded: whether it counts from the unloaded configuration.
-        of_part: whether exported parts, known by their outline alone, have it; they have no centreline.
+        of_part: whether exported parts, known by their outline alone, have it.
     """
 
     of_state: ClassVar[bool] = True

@@ -14,10 +14,10 @@ from fenicsmech.equilibrium import EquilibriumMethod, EquilibriumSolver, LoadCon
 from fenicsmech.errors import DescriptionError
 from fenicsmech.estimates import Estimates
 from fenicsmech.log import Clock
-from fenicsmech.mechanism import FlexibleLink, Force, ForceGroup, Material, PrescribedPart, Scene, Shape
+from fenicsmech.mechanism import FlexibleLink, Force, ForceGroup, Joint, Material, PrescribedPart, Scene, Shape
 from fenicsmech.meshing import MechanismMesh
 from fenicsmech.model import Fidelity, MechanismModel, check_links, mesh_mechanism
-from fenicsmech.multibody import build_linkage
+from fenicsmech.multibody import JointChange, build_linkage
 
 
 class Discretisation:
@@ -27,6 +27,7 @@ class Discretisation:
         linkage: the bodies.
         materials: of the flexible links.
         shapes: of the flexible links.
+        moved: joints that are placed otherwise than drawn.
 
     Raises:
         DescriptionError: links, joints or points contradict each other.
@@ -41,10 +42,12 @@ class Discretisation:
         clock: Clock,
         comm: MPI.Comm,
         shapes: Mapping[FlexibleLink, Shape] | None = None,
+        moved: Mapping[Joint, JointChange] | None = None,
     ) -> None:
         self.scene, self.fidelity, self.clock, self.comm = scene, fidelity, clock, comm
         self.method, self.predictor = method, predictor
-        self.linkage = build_linkage(scene.mechanism, fidelity.model.mechanism_dim)
+        self.moved = dict(moved or {})
+        self.linkage = build_linkage(scene.mechanism, fidelity.model.mechanism_dim, self.moved)
         links = scene.mechanism.flexible_links
         self.materials = tuple(link.material for link in links)
         self.shapes = {link: link.shape for link in links} | dict(shapes or {})
@@ -52,11 +55,17 @@ class Discretisation:
         on_one(comm, lambda: check_links(scene.mechanism, tuple(self.shapes.values()), self.linkage, fidelity))
 
     def at(
-        self, fidelity: Fidelity, clock: Clock, comm: MPI.Comm, shapes: Mapping[FlexibleLink, Shape] | None = None
+        self,
+        fidelity: Fidelity,
+        clock: Clock,
+        comm: MPI.Comm,
+        shapes: Mapping[FlexibleLink, Shape] | None = None,
+        moved: Mapping[Joint, JointChange] | None = None,
     ) -> Discretisation:
-        """The same scene at another fidelity, on other processes or with links of other shapes, nothing meshed yet."""
-        shapes = self.shapes | dict(shapes or {})
-        other = Discretisation(self.scene, fidelity, self.method, self.predictor, clock, comm, shapes)
+        """The same scene at another fidelity, on other processes, with links of other shapes or joints at other places,
+        nothing meshed yet."""
+        shapes, moved = self.shapes | dict(shapes or {}), self.moved | dict(moved or {})
+        other = Discretisation(self.scene, fidelity, self.method, self.predictor, clock, comm, shapes, moved)
         other.materials = self.materials
         return other
 

@@ -23,6 +23,7 @@ from fenicsmech.mechanism import (
     FlexibleLink,
     Force,
     ForceGroup,
+    Joint,
     Material,
     Mechanism,
     Output,
@@ -33,7 +34,7 @@ from fenicsmech.mechanism import (
 )
 from fenicsmech.meshing import radius_ratios
 from fenicsmech.model import Design, Fidelity, MechanismModel, read_fidelity
-from fenicsmech.multibody import Linkage, assemble, spring_potentials
+from fenicsmech.multibody import JointChange, Linkage, assemble, spring_potentials
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.fields import rest_vertices
@@ -64,7 +65,7 @@ class Simulation:
             displacement of every curve, or in the largest force where displacements are prescribed, once the estimates
             of its errors are added (``Curve.corrected``). ``load_displacement`` finds the cheapest fidelity that is
             good enough, see ``choice``; ``follow`` and ``branches`` use the one chosen last and raise an error before.
-            With links known from files only, ``size`` stands for their thickness.
+            Links from STEP files are measured; ``size`` stands for the thickness of those from mesh files.
         layers: of elements through the depth, or half of it where half is meshed; by default from depth and size.
         segments: of elements around pins, at least; 8 by default.
         quadrature: quadrature degree; the measured optimum by default.
@@ -117,7 +118,7 @@ class Simulation:
                     f"both are given, and {name}={given[name]!r} would decide what accuracy is to choose",
                     f"Leave out {name}, or give {name} and size=… instead of an accuracy",
                 )
-            self._control = AccuracyControl(scene, accuracy, size, formulation)
+            self._control = AccuracyControl(scene, accuracy, size, formulation, comm=comm)
             fidelity = self._control.fidelity(self._control.level)
         solver, predictor = solver or PrimalDualNewton(), predictor or HermitePredictor()
         self._discretisation = Discretisation(scene, fidelity, solver, predictor, self.clock, comm)
@@ -316,8 +317,14 @@ class Simulation:
         simulation._discretisation, simulation._control = self._discretisation.with_material(drawn, other), None
         return simulation
 
-    def with_shapes(self, shapes: Mapping[FlexibleLink, Shape], *, fidelity: Fidelity | None = None) -> Simulation:
-        """The same scene with links of other shapes, meshed anew; joints keep their places and interfaces.
+    def with_shapes(
+        self,
+        shapes: Mapping[FlexibleLink, Shape],
+        *,
+        fidelity: Fidelity | None = None,
+        moved: Mapping[Joint, JointChange] | None = None,
+    ) -> Simulation:
+        """The same scene with links of other shapes, meshed anew; joints keep their interfaces.
 
         Quantities, samples, targets and effects that name these links mean those of other shapes. Links keep the
         centreline they were described with.
@@ -325,6 +332,7 @@ class Simulation:
         Args:
             shapes: of some flexible links, as ``step_file`` of a designed part.
             fidelity: by default that of this simulation.
+            moved: joints that are placed otherwise than drawn, as those of a designed part.
 
         Raises:
             DescriptionError: these are not shapes of links of the mechanism, or it does not fit the fidelity.
@@ -339,7 +347,8 @@ class Simulation:
                 )
         other = copy(self)
         other.clock, other.choice, other._control, other._design = Clock(), None, None, None
-        other._discretisation = self._discretisation.at(fidelity or self.fidelity, other.clock, self.comm, shapes)
+        fidelity = fidelity or self.fidelity
+        other._discretisation = self._discretisation.at(fidelity, other.clock, self.comm, shapes, moved)
         return other
 
     def on(self, comm: MPI.Comm) -> Simulation:

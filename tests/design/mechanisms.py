@@ -19,6 +19,7 @@ from fenicsmech.design import (
     shape_links,
     shape_request,
     split,
+    with_followers,
 )
 from fenicsmech.multibody import assemble
 
@@ -74,7 +75,9 @@ def bench(case: Case, simulation: fm.Simulation) -> Bench:
     mechanism, linkage, model = case.scene.mechanism, simulation.linkage, simulation.model
     designs = [design for design in case.designs if isinstance(design, fm.SplineDesign)]
     numbers = [design for design in case.designs if isinstance(design, fm.Number)]
-    shapes = shape_links(model.mesh, [shape_request(design, mechanism, linkage) for design in designs])
+    designs = with_followers(designs, numbers)
+    requests = [shape_request(design, mechanism, linkage, numbers=numbers) for design in designs]
+    shapes = shape_links(model.mesh, requests)
     equilibria = SampleEquilibria(simulation, case.targets, numbers=[number.kind for number in numbers])
     return Bench(simulation, ParametricShape(model, shapes, designs, numbers), equilibria)
 

@@ -9,18 +9,10 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.design import (
-    LinkOutline,
-    MeshQuality,
-    ParametricShape,
-    ShapeBounds,
-    StayClose,
-    find_centreline,
-    rest_meshes,
-)
+from fenicsmech.design import MeshQuality, ParametricShape, ShapeBounds, StayClose, rest_meshes
 from fenicsmech.export import write_step
 from fenicsmech.mechanism import Centreline, Disc, Shape
-from fenicsmech.meshing import InterfaceSite, boundary_polygons, link_outline
+from fenicsmech.meshing import InterfaceSite, LinkOutline, boundary_polygons, find_centreline, link_outline
 
 from .mechanisms import PLASTIC, Case, objective, truss
 from .refusal import refused
@@ -232,3 +224,26 @@ def test_ends_of_strips_and_joints_on_branches_are_refused():
         fm.SplineDesign(link, 2, centreline=CURVED_PINS, ends=CURVED_PINS)
     with pytest.raises(fm.DescriptionError, match="3 ends"):
         fm.SplineDesign(link, 2, ends=[(0, 0), (1, 1), (2, 2)])
+
+
+def test_the_length_of_an_imported_link_is_that_of_its_arc_and_is_found_again_in_the_part():
+    case = arm(CURVED)
+    link, (push,) = case.designs[0].link, case.scene.mechanism.forces
+    arc, length = 100.0 * np.arcsin(0.6), fm.CentrelineLength(case.designs[0].link)
+    simulation = case.simulate(size=3.0)
+    assert length.on(simulation.model).value() == pytest.approx(arc, rel=1e-4)
+    targets = [fm.Target(push, force=2.0, displacement=0.2), fm.Target(length, equals=1.01 * arc)]
+    problem = fm.DesignProblem(simulation, [fm.SplineDesign(link, 3)], targets=targets)
+    result = problem.verify(problem.optimise())
+    assert result.targets[1].reached == pytest.approx(1.01 * arc, rel=5e-3)
+    assert result.targets[1].part.value == pytest.approx(result.targets[1].reached, rel=2e-3)
+
+
+def test_derivatives_of_the_length_of_an_imported_link_agree_with_central_differences():
+    base = arm(CURVED)
+    case = Case(base.scene, base.designs, [fm.Target(fm.CentrelineLength(base.designs[0].link), equals=60.0)])
+    whole, bench = objective(case, StayClose(), size=3.0)
+    p, direction = bench.design(0.05, seed=5), bench.direction(6)
+    slope = whole.evaluate(p).jacobian @ direction
+    ahead, back = (whole.evaluate(p + h * direction).residuals for h in (1e-3, -1e-3))
+    assert slope == pytest.approx((ahead - back) / 2e-3, rel=1e-5)

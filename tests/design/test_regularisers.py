@@ -12,6 +12,7 @@ from fenicsmech.design import (
     Barrier,
     Bounds,
     DesignedLink,
+    LinkParameters,
     LinkSpline,
     MeshQuality,
     Model,
@@ -41,7 +42,8 @@ def rest_of(link: LinkSpline, bounds: Bounds, *, count: int = 500, thickness: fl
     """The part of a rest shape that regularisers of the spline alone read."""
     lengths = np.where(link.is_thickness, 1.0, thickness)
     samples = SplineSamples(link, count=count)
-    arch = DesignedLink("arch", slice(0, link.size), link, samples, thickness, bounds, link.controls[:, 0, :2])
+    own, controls = LinkParameters.own(0, link, link.size), link.controls[:, 0, :2]
+    arch = DesignedLink("arch", own, link, samples, thickness, bounds, controls)
     none = slice(len(lengths), len(lengths))
     return SimpleNamespace(links=(arch,), initial=link.initial, lengths=lengths, of_numbers=none)
 

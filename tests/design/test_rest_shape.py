@@ -28,10 +28,10 @@ def test_links_own_consecutive_parameters_that_count_in_thicknesses():
     assert [link.name for link in both.rest.links] == ["arch", "rod"]
     assert [link.thickness for link in both.rest.links] == [3.0, 3.0]
     for link in both.rest.links:
-        assert both.rest.initial[link.place] == pytest.approx(link.spline.initial)
-        assert both.rest.lengths[link.place] == pytest.approx(np.where(link.spline.is_thickness, 1.0, 3.0))
-    assert both.rest.links[0].place.stop == both.rest.links[1].place.start
-    assert both.rest.links[1].place.stop == len(both.rest.initial)
+        assert both.rest.initial[link.parameters.place] == pytest.approx(link.spline.initial)
+        assert both.rest.lengths[link.parameters.place] == pytest.approx(np.where(link.spline.is_thickness, 1.0, 3.0))
+    assert both.rest.links[0].parameters.place.stop == both.rest.links[1].parameters.place.start
+    assert both.rest.links[1].parameters.place.stop == len(both.rest.initial)
 
 
 def test_worst_ratio_is_that_of_the_simulation():

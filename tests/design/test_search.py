@@ -17,6 +17,7 @@ from fenicsmech.design import (
     Checkpoint,
     DesignedLink,
     Evaluation,
+    LinkParameters,
     LinkSpline,
     Quadratic,
     ScaledNumbers,
@@ -48,9 +49,8 @@ class TwoValleys:
         controls = np.zeros((3, 2, 3))
         controls[:, 0, 0], controls[:, 1, 0], controls[:, 0, 2] = (0.0, 30.0, 60.0), 30.0, 1.0
         spline = LinkSpline(controls, np.array([True, False, True]))
-        link = DesignedLink(
-            "bar", slice(0, spline.size), spline, SplineSamples(spline), H, Bounds((1.0, 6.0), 0.08), controls[:, 0, :2]
-        )
+        own, samples = LinkParameters.own(0, spline, spline.size), SplineSamples(spline)
+        link = DesignedLink("bar", own, spline, samples, H, Bounds((1.0, 6.0), 0.08), controls[:, 0, :2])
         self.lengths = np.where(spline.is_thickness, 1.0, H)
         size = len(spline.initial)
         numbers = {"numbers": ScaledNumbers(None, []), "of_numbers": slice(size, size)}

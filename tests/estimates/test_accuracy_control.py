@@ -10,7 +10,7 @@ from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRESS, SPATIAL, Mi
 from fenicsmech.estimates import AccuracyControl, AccuracyOptions, FidelityLevel, LevelErrors, Trial, fidelity_levels
 from fenicsmech.files import read_csv
 
-from ..simulation.demo_scenes import describe
+from ..simulation.demo_scenes import demo, describe
 from ..simulation.refined import arch, cantilever
 
 LOADS = {"truss": 0.4, "claw": 10.0, "klann": 5.0}
@@ -138,6 +138,26 @@ def test_forces_are_as_accurate_as_asked_for_where_displacements_are_prescribed(
 def test_estimates_beyond_first_order_are_no_corrections():
     found = AccuracyOptions().corrections(np.array([0.01, -0.5, 0.02]), np.array([0.1, 0.5, 1.0]))
     assert found.tolist() == [0.01, 0.0, 0.02]
+
+
+def test_links_from_step_files_are_measured_and_reach_the_accuracy_of_drawn_ones(tmp_path):
+    scene, push = describe("truss")[:2]
+    (diagonal,) = scene.mechanism.flexible_links
+    drawn = fm.Simulation(scene, space="plane-stress", size=3.0)
+    targets = [fm.Target(push, force=0.4, displacement=3.0)]
+    problem = fm.DesignProblem(drawn, [fm.SplineDesign(diagonal, 3)], targets=targets)
+    problem.export(tmp_path, problem.initial)
+    again = demo("truss").describe(tmp_path / "diagonal.step")[0]
+    (thrust,) = again.mechanism.forces
+    sims = [fm.Simulation(own, accuracy=0.02) for own in (scene, again)]
+    sizes = [sim.fidelity.size_text for sim in sims]
+    assert float(sizes[1]) == pytest.approx(float(sizes[0]), rel=0.4)  # with the eyes, of the same order
+    wanted, found = (
+        sim.load_displacement(force, forces=[0.2, 0.4]).corrected
+        for sim, force in zip(sims, (push, thrust), strict=True)
+    )
+    assert sims[1].choice.reached
+    assert np.max(np.abs(found - wanted)) <= 2 * 0.02 * np.max(np.abs(wanted))  # either may be off by as much
 
 
 @pytest.mark.slow

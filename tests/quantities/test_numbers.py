@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -18,6 +20,10 @@ def links(bench: Bench) -> list[fm.FlexibleLink]:
     return bench.simulation.scene.mechanism.flexible_links
 
 
+def joints(bench: Bench) -> list[fm.Joint]:
+    return bench.simulation.scene.mechanism.joints
+
+
 # kinds of numbers, and steps of their Taylor tests
 NUMBERS = {
     "modulus": (lambda bench: fm.LawParameter("E", links(bench)[1]), (16.0, 8.0, 4.0)),
@@ -26,6 +32,11 @@ NUMBERS = {
     "depth": (lambda bench: fm.Depth(links(bench)[1]), (0.1, 0.05, 0.025, 0.0125)),
     "depth of both": (lambda bench: fm.Depth(*links(bench)), (0.1, 0.05, 0.025, 0.0125)),
     "stiffness": (lambda bench: fm.SpringStiffness(*bench.simulation.scene.effects), (8.0, 4.0, 2.0, 1.0)),
+    "shift": (lambda bench: fm.JointPosition(joints(bench)[3], direction=(1, 0.5)), (0.4, 0.2, 0.1, 0.05)),
+    "shift of both pivots": (
+        lambda bench: fm.JointPosition(joints(bench)[0], joints(bench)[2], direction=(0.3, 1)),
+        (0.4, 0.2, 0.1, 0.05),
+    ),
     "rest": (lambda bench: fm.SpringRest(*bench.simulation.scene.effects), (0.1, 0.05, 0.025)),
     "offset": (lambda bench: fm.MotorOffset(*bench.simulation.scene.mechanism.motors), (0.04, 0.02, 0.01, 0.005)),
 }
@@ -50,13 +61,26 @@ def bench(request) -> Bench:
 @pytest.mark.parametrize("name", NUMBERS)
 def test_derivatives_by_a_number(bench, name):
     describe, steps = NUMBERS[name]
-    kind, base = describe(bench), bench.field(1)
-    kind.check(bench.simulation.scene)
+    assert_derivatives(bench, describe(bench), steps)
+
+
+def test_derivatives_by_the_axis_of_a_hinge_that_is_turned_already(bench):
+    if bench.model.linkage.dim == 2:
+        pytest.skip("axes of hinges do not turn in the plane")
+    hinge = joints(bench)[3]
+    assert_derivatives(bench, fm.JointAxis(hinge, about=(1, 0.4, 0)), (0.04, 0.02, 0.01, 0.005), start=0.2)
+
+
+def assert_derivatives(bench: Bench, kind: fm.NumberKind, steps: Sequence[float], start: float | None = None) -> None:
+    """Taylor tests of all quantities at a value of a number, the drawn one by default."""
+    base = bench.field(1)
+    kind.check(bench.simulation.scene, bench.model.linkage.dim)
     bench.adjoint, number = Sensitivity(bench.model, [kind]), bench.model.number(kind)
-    gradients = bench.gradients(fm.Design(base))
+    here = number.drawn if start is None else start
+    gradients = bench.gradients(fm.Design(base, {kind: here}))
     assert MPI.COMM_WORLD.size > 1 or np.any([gradient.numbers for gradient in gradients])
 
     def changed(step: float) -> np.ndarray:
-        return bench.values(fm.Design(base, {kind: number.drawn + step}))
+        return bench.values(fm.Design(base, {kind: here + step}))
 
     assert_slopes(bench, changed, [gradient.numbers[0] for gradient in gradients], steps)

@@ -123,17 +123,18 @@ class HandleOptimum:
         """
         if not self._handles:
             return by_p
-        followed, links = [], self._second_derivatives(placement)
-        for shape, link, slope in zip(self._map.shapes, links, self._map.positions(by_theta), strict=True):
+        total, links = by_p.copy(), self._second_derivatives(placement)
+        each = zip(self._map.shapes, self._map.of_link, links, self._map.positions(by_theta), strict=True)
+        for shape, own, link, slope in each:
             try:
-                followed.append(cho_solve(link.factor, slope[..., link.free].T).T @ link.cross)
+                total -= cho_solve(link.factor, slope[..., link.free].T).T @ (link.cross @ own.matrix)
             except np.linalg.LinAlgError:
                 raise ShapeError(
                     f"shape of link {shape.name!r}",
                     "its mesh does not determine the positions of all handles",
                     "Use smaller elements",
                 ) from None
-        return by_p - np.concatenate(followed, axis=-1)
+        return total
 
     def _solve(self, p: np.ndarray, start: HandlePlacement, halvings: int) -> HandlePlacement:
         theta = self._first_guess(p, start)
@@ -150,9 +151,9 @@ class HandleOptimum:
         guesses = [self._map.positions(start.theta), following]
         if self._known[0] is start:  # θ + dθ/dp Δp
             tangent = self._map.positions(start.theta.copy())
-            changes = self._map.parameters(p - start.p)
-            for theta, link, change in zip(tangent, self._known[1], changes, strict=True):
-                theta[link.free] -= cho_solve(link.factor, link.cross @ change)
+            before, after = self._map.parameters(start.p), self._map.parameters(p)
+            for theta, link, old, new in zip(tangent, self._known[1], before, after, strict=True):
+                theta[link.free] -= cho_solve(link.factor, link.cross @ (new - old))
             guesses.append(tangent)
         sums = np.array([self._sums(p, guess) for guess in guesses])
         if not np.all(np.isfinite(sums.min(axis=0))):

@@ -3,7 +3,8 @@
 A handle at X moves a point v around it by T (v_x − X_x, v_y − X_y, 1), with T of shape (2, 3); the out-of-plane
 coordinate does not change:
 
-    joint handles turn about their joint by θ = α:            T = [R(α) − I | 0],
+    joint handles turn about their joint by θ = α
+    and go with it where joints move:                         T = [R(α) − I | x − X],
     all others ride on the spline at θ = t; at x, with the
     unit tangent e and δ there:                               T = [δ R(e) R(eᵢₙᵢₜ)ᵀ − I | x − X].
 
@@ -77,6 +78,8 @@ class LinkHandles:
         T = _turns(theta)
         q = self._q(p, theta, self.segments(theta))
         T[self.rides] = _spline_maps().value(q, self._frames).reshape(-1, 2, 3)
+        if self.spline.joints_move:
+            T[~self.rides, :, 2] = self.spline.evaluate(p, self.t[~self.rides])[:, :2] - self.centre[~self.rides]
         return T
 
     def gradients(
@@ -91,6 +94,8 @@ class LinkHandles:
         by_q = _spline_maps().gradient(self._q(p, theta, segments), self._frames).reshape(-1, 2, 3, 5)
         by_p[self.rides] = np.einsum("nabq,nqp->nabp", by_q, self._q_by_p(theta, segments))
         by_theta[self.rides] = np.einsum("nabq,nq->nab", by_q, self._q(p, theta, segments, order=1))
+        if self.spline.joints_move:
+            by_p[~self.rides, :, 2] = self.spline.gradient(self.t[~self.rides])[:, :2]
         return by_p, by_theta
 
     def curvatures(

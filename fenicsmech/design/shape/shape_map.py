@@ -21,7 +21,6 @@ from mpi4py import MPI
 
 from fenicsmech.collective import from_one
 from fenicsmech.compat import original_cells
-from fenicsmech.design.shape.centreline import LinkOutline
 from fenicsmech.design.shape.edges import EdgeWeights, edge_weights
 from fenicsmech.design.shape.handles import BETWEEN, LinkHandles
 from fenicsmech.design.shape.spline import LinkSpline, SplineFit, SplineSamples, fit_spline, lay_out
@@ -33,6 +32,7 @@ from fenicsmech.meshing import (
     CurvedEdges,
     Isometry,
     LinkMesh,
+    LinkOutline,
     MechanismMesh,
     cell_measures,
     image_of,
@@ -55,6 +55,8 @@ class ShapeRequest:
         centreline: approximated by the spline.
         thickness: in the plane, where δ = 1, or the outline that it is measured on.
         ends_move: whether free ends may move.
+        joints_move: whether joints may.
+        follows: whether the shape has no parameters of its own, and follows joints alone.
         spacing: arc length between handles; None: the mean width of the link.
         images: links that share the shape.
     """
@@ -68,6 +70,8 @@ class ShapeRequest:
     centreline: Centreline
     thickness: float | LinkOutline
     ends_move: bool = False
+    joints_move: bool = False
+    follows: bool = False
     spacing: float | None = None
     images: tuple[ImageRequest, ...] = ()
 
@@ -120,6 +124,7 @@ class LinkShape:
         edges: weights at the midpoints of edges that follow the design.
         thickness: in the plane, where δ = 1; at the samples of the spline where it is not the same everywhere.
         centreline: points that the drawn centreline runs through, (k, 2).
+        follows: whether it has no parameters of its own, and follows joints alone.
         images: links that share the shape.
     """
 
@@ -131,11 +136,39 @@ class LinkShape:
     thickness: float | np.ndarray
     centreline: np.ndarray
     images: tuple[LinkImage, ...] = ()
+    follows: bool = False
 
     @property
     def every(self) -> tuple[LinkImage, ...]:
         """All links with this shape, this one first."""
         return (LinkImage(self.link, self.name, Isometry.identity(), self.weights, self.edges), *self.images)
+
+
+@dataclass(frozen=True, eq=False)
+class LinkParameters:
+    """The parameters of a link's spline as a function of those of the design, s = s₀ + S p.
+
+    Attributes:
+        place: the link's own entries of p.
+        fixed: s₀, (size,).
+        matrix: S, (size, parameters).
+    """
+
+    place: slice
+    fixed: np.ndarray
+    matrix: np.ndarray
+
+    @staticmethod
+    def own(first: int, spline: LinkSpline, count: int) -> LinkParameters:
+        """Those of a spline that all are parameters of the design, which has ``count``; the first one is ``first``."""
+        matrix = np.zeros((spline.size, count))
+        place = slice(first, first + spline.size)
+        matrix[:, place] = np.eye(spline.size)
+        return LinkParameters(place, np.zeros(spline.size), matrix)
+
+    def of(self, p: np.ndarray) -> np.ndarray:
+        """s (size,) of the design ``p``; parameters of others may follow those that it knows."""
+        return self.fixed + self.matrix @ p[: self.matrix.shape[1]]
 
 
 def shape_link(mesh: LinkMesh, request: ShapeRequest, others: Sequence[LinkMesh] = ()) -> LinkShape:
@@ -151,7 +184,8 @@ def shape_link(mesh: LinkMesh, request: ShapeRequest, others: Sequence[LinkMesh]
     """
     part, joints = f"link {request.name!r}", request.joints
     layout = lay_out(request.centreline, joints, request.reach, request.segments, part=f"design of {part}")
-    fit = fit_spline(request.centreline, joints, layout, ends_move=request.ends_move, part=f"spline of {part}")
+    moves = {"ends_move": request.ends_move, "joints_move": request.joints_move}
+    fit = fit_spline(request.centreline, joints, layout, **moves, part=f"spline of {part}")
     spacing = request.spacing or _mean_width(mesh, request.centreline.length)
     handles = _place_handles(mesh, fit, spacing=spacing, turns=request.turns, part=part)
     weights, edges = _weights(mesh, handles, part=part)
@@ -163,7 +197,8 @@ def shape_link(mesh: LinkMesh, request: ShapeRequest, others: Sequence[LinkMesh]
     drawn = request.thickness
     thickness = _measured(drawn, fit.spline, part=f"design of {part}") if isinstance(drawn, LinkOutline) else drawn
     centreline = request.centreline.evaluate(request.centreline.knots)
-    return LinkShape(request.link, request.name, handles, weights, edges, thickness, centreline, tuple(images))
+    drawn_on = centreline, tuple(images), request.follows
+    return LinkShape(request.link, request.name, handles, weights, edges, thickness, *drawn_on)
 
 
 def _weights(mesh: LinkMesh, handles: LinkHandles, *, part: str) -> tuple[np.ndarray, EdgeWeights]:
@@ -318,15 +353,25 @@ class ShapeMap:
         mesh: the mechanism's mesh.
         design: the design field d, vector P1, or P2 to bend edges too.
         shapes: the links that change, the same on all ranks.
+        parameters: of their splines as functions of p; those of one link after the other by default.
+        initial: p of the initial design; that of the splines by default.
 
     Attributes:
         owned: number of owned nodes.
         original: vertex of the whole mesh of every local node, of an edge's midpoint its lower end, (nodes,).
         pieces: all links with these shapes.
+        of_link: parameters of the spline of each shape as functions of p.
         initial, initial_theta: p (parameters,) and θ (handles,) of the initial design.
     """
 
-    def __init__(self, mesh: MechanismMesh, design: fem.Function, shapes: Sequence[LinkShape]) -> None:
+    def __init__(
+        self,
+        mesh: MechanismMesh,
+        design: fem.Function,
+        shapes: Sequence[LinkShape],
+        parameters: Sequence[LinkParameters] | None = None,
+        initial: np.ndarray | None = None,
+    ) -> None:
         self.mesh, self.design, self.shapes = mesh, design, tuple(shapes)
         ends = node_ends(design.function_space)
         self.original = ends[:, 0]
@@ -337,14 +382,17 @@ class ShapeMap:
             for image in shape.every
         ]
         handles = [shape.handles for shape in shapes]
-        self.initial = np.concatenate([np.zeros(0), *(h.spline.initial for h in handles)])
+        splines = [h.spline for h in handles]
+        firsts, count = np.cumsum([0, *(own.size for own in splines)]), sum(own.size for own in splines)
+        own = [LinkParameters.own(int(k), spline, count) for k, spline in zip(firsts, splines, strict=False)]
+        self.of_link = tuple(own if parameters is None else parameters)
+        self.initial = np.concatenate([np.zeros(0), *(s.initial for s in splines)]) if initial is None else initial
         self.initial_theta = np.concatenate([np.zeros(0), *(h.initial for h in handles)])
-        self._p_ends = np.cumsum([h.spline.size for h in handles], dtype=int)[:-1]
         self._theta_ends = np.cumsum([len(h) for h in handles], dtype=int)[:-1]
 
     def parameters(self, p: np.ndarray) -> list[np.ndarray]:
-        """``p`` (…, parameters) link by link; parameters of others than shapes may follow."""
-        return np.split(p[..., : len(self.initial)], self._p_ends, axis=-1)[: len(self.shapes)]
+        """Those of the spline of each link at the design ``p`` (parameters,); parameters of others may follow."""
+        return [own.of(p) for own in self.of_link]
 
     def positions(self, theta: np.ndarray) -> list[np.ndarray]:
         """``theta`` (…, handles) link by link."""
@@ -364,13 +412,13 @@ class ShapeMap:
         g: (…, owned nodes, dim), or (…, nodes, dim) with this rank's parts at nodes that others own; summed over all
         ranks.
         """
-        nothing = np.zeros((*g.shape[:-2], 0))
-        by_p, by_theta = [nothing], [nothing]
-        for (shape, *point), moments in zip(self._links(p, theta), self.moments(g), strict=True):
-            p_slope, theta_slope = shape.handles.gradients(*point)
-            by_p.append(np.einsum("...jak,jakp->...p", moments, p_slope))
+        by_p, by_theta = np.zeros((*g.shape[:-2], len(self.initial))), [np.zeros((*g.shape[:-2], 0))]
+        links = zip(self._links(p, theta), self.of_link, self.moments(g), strict=True)
+        for (shape, *point), own, moments in links:
+            slope, theta_slope = shape.handles.gradients(*point)
+            by_p += np.einsum("...jak,jakp->...p", moments, slope) @ own.matrix
             by_theta.append(np.einsum("...jak,jak->...j", moments, theta_slope))
-        return np.concatenate(by_p, axis=-1), np.concatenate(by_theta, axis=-1)
+        return by_p, np.concatenate(by_theta, axis=-1)
 
     def spread(self, transforms: Sequence[np.ndarray]) -> np.ndarray:
         """Σ_j T_j r_ij from the maps of each link's handles, (nodes, dim)."""

@@ -4,9 +4,15 @@ With control points C_k (position P_k and tangent M_k, three components each) an
 
     (x, y, δ)(p, t) = h₀₀(τ) P_k + h₁₀(τ) M_k + h₀₁(τ) P_{k+1} + h₁₁(τ) M_{k+1}.
 
-The parameters p are the tangents at joints, and position and tangent at all other control points: a joint stays where
-it is and keeps its thickness. Free ends change their thickness; they stay where they are drawn unless they may move.
-The curve is linear in p.
+The parameters p are the tangents at joints, and position and tangent at all other control points: a joint keeps its
+thickness, and stays where it is unless joints move. Free ends change their thickness; they stay where they are drawn
+unless they may move. The curve is linear in p.
+
+Where joints move, their places are parameters too. Shifts δ_j of joints take the curve along, linearly between them,
+
+    x(t) + δ_j + (t − t_j) / (t_{j+1} − t_j) · (δ_{j+1} − δ_j),     t_j ≤ t ≤ t_{j+1},
+
+so that a straight link stays straight, and beyond the last joint as they are; joints between others keep C¹ tangents.
 """
 
 from __future__ import annotations
@@ -36,11 +42,13 @@ class LinkSpline:
         controls: initial control points, (n, 2, 3): position and tangent, each (x, y, δ).
         is_joint: which control points are joints, (n,).
         ends_move: whether the places of free ends are parameters.
+        joints_move: whether those of joints are, and with them those of free ends, which follow.
     """
 
     controls: np.ndarray
     is_joint: np.ndarray
     ends_move: bool = False
+    joints_move: bool = False
 
     @property
     def segments(self) -> int:
@@ -55,11 +63,35 @@ class LinkSpline:
     @cached_property
     def entries(self) -> np.ndarray:
         """Indices of the parameters in ``controls.ravel()``, (size,)."""
+        free = self._shape.copy()
+        if self.joints_move:
+            free[:, 0, :2] = True
+        return np.flatnonzero(free)
+
+    @cached_property
+    def of_shape(self) -> np.ndarray:
+        """Mask of the parameters of the shape; the others are places that follow joints alone, (size,)."""
+        return self._shape.ravel()[self.entries]
+
+    @cached_property
+    def _shape(self) -> np.ndarray:
+        """Mask of the parameters of the shape, as ``controls``."""
         free = np.ones(self.controls.shape, dtype=bool)
         free[self.is_joint, 0] = False
         if not self.ends_move:
             free[[0, -1], 0, :2] = False
-        return np.flatnonzero(free)
+        return free
+
+    def following(self) -> np.ndarray:
+        """Derivatives of the parameters by the shifts δ_j of joints, in order along the curve, (size, joints, 2)."""
+        t, joints = np.arange(len(self.controls)), np.flatnonzero(self.is_joint)
+        share = np.array([np.interp(t, joints, row) for row in np.eye(len(joints))]).T  # (n, joints)
+        rise = np.diff(share, axis=0)
+        slope = 0.5 * (np.vstack([rise[:1], rise]) + np.vstack([rise, rise[-1:]]))
+        moved = np.zeros((*self.controls.shape, len(joints), 2))
+        for axis in range(2):
+            moved[:, 0, axis, :, axis], moved[:, 1, axis, :, axis] = share, slope
+        return moved.reshape(-1, len(joints), 2)[self.entries]
 
     @property
     def initial(self) -> np.ndarray:
@@ -237,6 +269,7 @@ def fit_spline(
     layout: ControlLayout,
     *,
     ends_move: bool = False,
+    joints_move: bool = False,
     part: str = "spline",
 ) -> SplineFit:
     """The spline along ``centreline`` with control points at ``joints``, free ends, and evenly spaced between them.
@@ -252,7 +285,7 @@ def fit_spline(
         centreline: the curve to follow.
         joints: positions of the link's joints, (n, 2), in any order.
         layout: of the control points.
-        ends_move: whether the places of free ends are parameters.
+        ends_move, joints_move: whether the places of free ends, of joints, are parameters.
         part: what the spline belongs to, for messages.
 
     Raises:
@@ -277,7 +310,7 @@ def fit_spline(
 
     controls = np.zeros((len(knots), 2, 3))
     controls[:, 0, :2], controls[:, 0, 2] = positions, 1.0
-    spline, each = LinkSpline(controls, is_joint, ends_move), 32  # samples per segment
+    spline, each = LinkSpline(controls, is_joint, ends_move, joints_move), 32  # samples per segment
     t = np.arange(0.5, spline.segments * each) / each
     feet = np.interp(t, np.arange(len(knots)), knots)
     for _ in range(40):  # the deviation has settled after a few

@@ -28,7 +28,8 @@ from scipy.spatial import Voronoi, cKDTree
 
 from fenicsmech.errors import DescriptionError, point_text
 from fenicsmech.mechanism import Centreline
-from fenicsmech.meshing import Curve, InterfaceSite, points_on, sample_parameters, sampled
+from fenicsmech.meshing.link_mesher import InterfaceSite
+from fenicsmech.meshing.outline import Curve, points_on, sample_parameters, sampled
 from fenicsmech.polygons import are_inside, distance_to, signed_area
 
 

@@ -1,0 +1,102 @@
+"""Places of joints in the drawn configuration, which designs change: shifted, and turned about an axis.
+
+    c = (P + δ − c_a, P + δ − c_b, E Qᵀ(ω)),     Q = exp [ω]×
+
+are the constants of a joint's equations, with its drawn place P, the centres of its bodies and the rows E of its triad.
+Both bodies attach at the same point, along the same axes, so that the poses of the drawn configuration close all joints
+at any δ and ω: they are the unloaded, assembled ones. The derivative by ω along a is that of the turn
+
+    Q′ Qᵀ = [J a]×,     J = ∫₀¹ exp(s [ω]×) ds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+
+@dataclass(frozen=True, eq=False)
+class JointChange:
+    """How one joint is changed, by a number or by a unit of it: its shift δ (dim,), and its turn ω (1,) or (3,)."""
+
+    shift: np.ndarray
+    turn: np.ndarray
+
+    def __mul__(self, factor: float) -> JointChange:
+        return JointChange(factor * self.shift, factor * self.turn)
+
+    __rmul__ = __mul__
+
+    def place(self, at: np.ndarray, triad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The place (dim,) and the triad (dim, dim) of a joint after it."""
+        if not np.any(self.turn):
+            return at + self.shift, triad
+        vector, dim = self.turn if len(self.turn) == 3 else np.array([0.0, 0.0, *self.turn]), len(triad)
+        return at + self.shift, triad @ Rotation.from_rotvec(vector).as_matrix()[:dim, :dim].T
+
+    def __add__(self, other: JointChange) -> JointChange:
+        return JointChange(self.shift + other.shift, self.turn + other.turn)
+
+
+class JointPlaces:
+    """The constants of the equations of all joints, shared by all that refer to them.
+
+    Args:
+        drawn: constants of each connection, as ``Connection.drawn`` gives them.
+        dim: 2 or 3.
+    """
+
+    def __init__(self, drawn: Sequence[np.ndarray], dim: int) -> None:
+        self._drawn, self.dim = tuple(drawn), dim
+        self._present = list(self._drawn)
+        self._changes: dict[Hashable, dict[int, JointChange]] = {}
+
+    def __getitem__(self, k: int) -> np.ndarray:
+        """The present constants of connection ``k``."""
+        return self._present[k]
+
+    @property
+    def nothing(self) -> JointChange:
+        """No change."""
+        return JointChange(np.zeros(self.dim), np.zeros(1 if self.dim == 2 else 3))
+
+    def change(self, by: Hashable, changes: Mapping[int, JointChange]) -> None:
+        """Changes some connections ``by`` what owns the change; it replaces those of the same owner, others add."""
+        before = self._changes.get(by, {})
+        self._changes[by] = dict(changes)
+        for k in {*before, *changes}:
+            self._present[k] = self._changed(k)
+
+    def total(self, k: int) -> JointChange:
+        """All changes of connection ``k`` together; turns add up as vectors."""
+        return sum((own[k] for own in self._changes.values() if k in own), start=self.nothing)
+
+    def rate(self, k: int, direction: JointChange) -> np.ndarray:
+        """Derivative of the present constants of connection ``k`` along a change."""
+        shift, triad = direction.shift, self._triad(self._present[k])
+        if self.dim == 2:
+            return np.concatenate([shift, shift, (direction.turn * triad @ [[0.0, 1.0], [-1.0, 0.0]]).ravel()])
+        spin = _mean_turn(self.total(k).turn) @ direction.turn
+        return np.concatenate([shift, shift, np.cross(spin, triad).ravel()])
+
+    def _changed(self, k: int) -> np.ndarray:
+        total, drawn = self.total(k), self._drawn[k]
+        anchors, triad = total.place(drawn[: 2 * self.dim].reshape(2, -1), self._triad(drawn))
+        return np.concatenate([anchors.ravel(), triad.ravel()])
+
+    def _triad(self, constants: np.ndarray) -> np.ndarray:
+        return constants[2 * self.dim :].reshape(self.dim, self.dim)
+
+
+def _mean_turn(vector: np.ndarray) -> np.ndarray:
+    """J, the mean of exp(s [ω]×) over 0 ≤ s ≤ 1, (3, 3)."""
+    x, y, z = vector
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    angle = float(np.linalg.norm(vector))
+    # (1 − cos |ω|) / |ω|² and (|ω| − sin |ω|) / |ω|³, of which the limit is good to rounding where the second cancels
+    first = 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
+    second = (angle - np.sin(angle)) / angle**3 if angle > 1e-4 else 1.0 / 6.0
+    return np.eye(3) + first * cross + second * cross @ cross

@@ -1,0 +1,235 @@
+"""Places of joints: positions and axes in the drawn configuration.
+
+Both bodies of a joint attach at the same point of this configuration, which stays assembled as the point is shifted and
+the axis turned. With the rates Ċ and Ṡ of the constraints C and of their forces S = Aᵀλ on the poses z as the place of
+a joint changes, of the potentials V of springs in joints, and with the parts ẑ and λ̂ of the adjoint,
+
+    −xᵀ ∂F/∂p = λ̂ · Ċ + ẑ · (Ṡ − σ ∂²V/∂z∂p).
+
+Forces, outputs and centres of mass keep their drawn places on rigid links. Flexible links that meet at a joint follow
+it by the handles of their shape (``fenicsmech.design.rest_shape``).
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+
+from fenicsmech.errors import DescriptionError, direction, finite, in_plane, point_text
+from fenicsmech.mechanism import Configuration, FlexibleLink, Joint, Scene, in_dimension, same_place
+from fenicsmech.model import MechanismModel
+from fenicsmech.multibody import JointChange
+from fenicsmech.quantities.number import ModelNumber, NumberKind, NumberTerms
+
+
+@dataclass(frozen=True, init=False)
+class _OfJoints(NumberKind):
+    """A number of the places of joints, zero as drawn."""
+
+    parts: tuple[Joint, ...]
+    vector: tuple[float, ...] = ()
+
+    def __init__(self, *parts: Joint, vector: Sequence[float]) -> None:
+        super().__init__(*parts)
+        object.__setattr__(self, "vector", direction(f"direction of the {self.what}", vector))
+
+    @staticmethod
+    def candidates(scene: Scene) -> Sequence[Joint]:
+        return scene.mechanism.joints
+
+    @property
+    def slots(self):
+        return tuple((*slot, self.vector) for slot in super().slots)
+
+    @property
+    def words(self):
+        return (" ".join(map(repr, self.vector)), *super().words)
+
+    @classmethod
+    def read(cls, scene, words):
+        parts = (cls._part(scene, word) for word in words[1:])
+        return cls._read(parts, tuple(map(float, words[0].split())))
+
+    @classmethod
+    @abstractmethod
+    def _read(cls, parts, vector):
+        """The kind of some parts and its vector."""
+
+    def described(self, part):
+        return 0.0
+
+    def check_value(self, value):
+        finite(self.name, value)
+
+    def moves_unloaded(self, configuration: Configuration) -> bool:
+        return any(position for _, position in configuration.positions)
+
+    def changes(self, dim):
+        return dict.fromkeys(self.parts, self.change(dim))
+
+    def on(self, model):
+        return _Place(model, self.changes(model.linkage.dim))
+
+    @abstractmethod
+    def change(self, dim: int) -> JointChange:
+        """By a unit of the number, in ``dim`` dimensions, of each joint."""
+
+
+@dataclass(frozen=True, init=False)
+class JointPosition(_OfJoints):
+    """The shift of joints from where they are drawn: ``JointPosition(pin, direction=(1, 0))``.
+
+    Two numbers, along x and y, let a joint go anywhere in the plane. All bodies that meet there attach at the shifted
+    point; flexible links follow with their interface, the ends of their centreline, and the rest between them in
+    proportion. Forces and outputs on rigid links stay where they are drawn on them, also those drawn at the joint.
+
+    Args:
+        parts: a joint, or several that are shifted alike, as those of a pin through several links.
+        direction: in which the shift is positive, of any length; 2 or 3 coordinates.
+
+    Raises:
+        DescriptionError: there are no joints, one is given twice, or the direction has no length.
+    """
+
+    what = "position"
+
+    def __init__(self, *parts: Joint, direction: Sequence[float]) -> None:
+        super().__init__(*parts, vector=direction)
+
+    @classmethod
+    def _read(cls, parts, vector):
+        return cls(*parts, direction=vector)
+
+    @property
+    def name(self):
+        return f"{super().name} along {point_text(self.vector)}"
+
+    @property
+    def reshaped(self):
+        return tuple(
+            dict.fromkeys(o for joint in self.parts for o in (joint.a, joint.b) if isinstance(o, FlexibleLink))
+        )
+
+    def unit(self, units):
+        return units.length
+
+    def check(self, scene, dim):
+        super().check(scene, dim)
+        in_plane(f"direction of the {self.name}", self.vector, dim)
+        mechanism = scene.mechanism
+        if self.reshaped and any(self.vector[2:]):
+            raise DescriptionError(
+                self.name,
+                f"{self.reshaped[0].name!r} is flexible, and follows its joints in the plane alone",
+                "Shift joints of flexible links along x and y",
+            )
+        for joint, link in ((joint, link) for joint in self.parts for link in self.reshaped):
+            for other in mechanism.joints:
+                here = same_place(joint.at, other.at, dim=dim, length=mechanism.length)
+                if other not in self.parts and link in (other.a, other.b) and link in (joint.a, joint.b) and here:
+                    raise DescriptionError(
+                        self.name,
+                        f"{other.name!r} is at the same place of {link.name!r}",
+                        f"Shift both: name {other.name!r} too",
+                    )
+
+    def change(self, dim):
+        nothing = np.zeros(1 if dim == 2 else 3)
+        return JointChange(np.array(in_dimension(self.vector, dim)), nothing)
+
+
+@dataclass(frozen=True, init=False)
+class JointAxis(_OfJoints):
+    """The turn, rad, of the axes of joints from how they are drawn: ``JointAxis(hinge, about=(1, 0, 0))``.
+
+    In the plane axes that lie in it turn about z, as those of sliders. Turns about several axes add up as vectors do.
+    Flexible links are held over the same region as drawn.
+
+    Args:
+        parts: a joint, or several whose axes turn alike.
+        about: the axis of the turn, of any length; 2 or 3 coordinates.
+
+    Raises:
+        DescriptionError: there are no joints, one is given twice, or the axis has no length.
+    """
+
+    what = "axis"
+
+    def __init__(self, *parts: Joint, about: Sequence[float] = (0.0, 0.0, 1.0)) -> None:
+        super().__init__(*parts, vector=about)
+
+    @classmethod
+    def _read(cls, parts, vector):
+        return cls(*parts, about=vector)
+
+    @property
+    def name(self):
+        return f"{super().name} about {point_text(self.vector)}"
+
+    def unit(self, units):
+        return "rad"
+
+    def check_value(self, value):
+        if not abs(finite(self.name, value)) < pi:
+            raise DescriptionError(self.name, f"a turn by {value:g} rad", "Turn it by less than half a turn")
+
+    def check(self, scene, dim):
+        super().check(scene, dim)
+        for joint in self.parts:
+            if dim == 2 and not joint.kind.axis_in_plane:
+                raise DescriptionError(
+                    self.name,
+                    f"a {joint.kind.name} joint has no axis in the plane",
+                    "Turn axes of hinges in space, or those of sliders",
+                )
+        if dim == 2 and abs(in_dimension(self.vector, 3)[2]) != 1.0:
+            raise DescriptionError(self.name, "the axis would leave the plane", "Turn it about z in the plane")
+
+    def change(self, dim):
+        vector = np.array(in_dimension(self.vector, 3))
+        return JointChange(np.zeros(dim), vector[2:] if dim == 2 else vector)
+
+
+class _Place(ModelNumber):
+    """A change of the places of some connections."""
+
+    drawn = 0.0
+
+    def __init__(self, model: MechanismModel, changes: Mapping[Joint, JointChange]) -> None:
+        self._joints, self._model, self.value = model.linkage.joints, model, 0.0
+        self._changes = {model.linkage.connection_of(joint): change for joint, change in changes.items()}
+
+    def set(self, value):
+        self.value = value
+        changes = {k: value * unit for k, unit in self._changes.items()} if value else {}
+        self._joints.places.change(self, changes)
+
+    def slope(self, terms: NumberTerms) -> float:
+        total = sum(factor * rate(self._changes) for factor, rate in terms.partial.by_places)
+        if terms.adjoint is None:
+            return total
+        adjoint, state = terms.adjoint, terms.adjoint.at.state
+        at, size = (state.poses, state.motors, state.multipliers), self._joints.space.pose_size
+        for k, unit in self._changes.items():
+            rate, forces = self._joints.place_rates(k, unit, *at)
+            total += float(adjoint.multipliers @ rate)
+            total += sum(float(self._part(terms, body) @ force) for body, force in forces.items())
+        for potential in self._model.potentials:
+            factor = 1.0 if potential.holds else state.load_factor
+            rates = np.broadcast_to(
+                potential.gradient_by_places(self._changes, state.poses), len(potential.bodies) * size
+            ).reshape(-1, size)
+            for body, own in zip(potential.bodies, rates, strict=True):
+                total -= factor * float(self._part(terms, body) @ own)
+        return total
+
+    def _part(self, terms: NumberTerms, body: int) -> np.ndarray:
+        """ẑ of one body; zero of fixed ones."""
+        columns = self._joints.columns.get(body)
+        if columns is None or terms.adjoint is None:
+            return np.zeros(self._joints.space.pose_size)
+        return terms.adjoint.poses[columns]
