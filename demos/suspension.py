@@ -15,7 +15,7 @@ from pathlib import Path
 import fenicsmech as fm
 
 STEEL = fm.Material("steel", 210e3, 0.3, density=7.85e-9)  # MPa, t/mm³
-INNER, OUTER = {"lower": (0, 0), "upper": (60, 190)}, {"lower": (340, -10), "upper": (310, 200)}  # mm, pins
+INNER, OUTER = {"lower": (0, 0), "upper": (60, 190)}, {"lower": (340, -10), "upper": (310, 200)}  # mm, joints
 WHEEL = (420, -80)  # where the tyre meets the road
 SPRING = 3e6  # N mm/rad, as drawn
 BUMP, REBOUND, LOAD = 30.0, -30.0, 900.0  # mm, mm, N
