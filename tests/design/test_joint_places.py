@@ -300,4 +300,22 @@ def test_places_that_make_no_sense_are_refused():
     )
     refused(lambda: problem(fm.JointAxis(tip[0], about=(1, 0, 0))), part="axis", problem="no axis", remedy="sliders")
     refused(lambda: fm.Number(fm.JointAxis(tip[0]), -4.0, 1.0), part="axis", problem="-4 rad", remedy="half a turn")
+    table = fm.Mechanism("table")
+    ground, top = table.rigid("ground", fixed=True), table.rigid("top")
+    legs, feet = [], []
+    for side in (-20, 20):
+        line = [(side, 0), (side, 40)]
+        legs.append(table.flexible(f"leg {side}", fm.strip(line, thickness=3.0, depth=10.0), PLASTIC))
+        feet.append(table.weld(ground, legs[-1], at=line[0], interface_radius=3.0))
+        table.weld(top, legs[-1], at=line[-1], interface_radius=3.0)
+    shared = fm.SplineDesign(legs[0], 2, same=legs[1])
+    shift = fm.Number(fm.JointPosition(feet[1], direction=(1, 0)), -1.0, 1.0)
+    target = fm.Target(table.force(on=top, at=(0, 40), direction=(1, 0)), force=1.0, displacement=0.1)
+    stand = fm.Simulation(fm.Scene(table), space="plane-stress", size=6.0)
+    refused(
+        lambda: fm.DesignProblem(stand, [shared, shift], targets=[target]),
+        part="leg -20",
+        problem="shared, and joints of 'leg 20'",
+        remedy="on its own",
+    )
     assert len(tip) == 2 and diagonal in (tip[0].a, tip[0].b, tip[1].a, tip[1].b)
