@@ -252,7 +252,10 @@ class Linearisation:
         return self.control.tangent(self.step(self.rate()))
 
     def point(self, residuals: Sequence[float], iterations: int, *, tolerance: float = _ACCURACY) -> EquilibriumPoint:
-        """The equilibrium at this state, with its tangent and stability, from one solve; raises as ``solve``."""
+        """The equilibrium at this state, with its tangent and stability, from one solve; raises as ``solve``.
+
+        Its multipliers are without self-stress, which is of rounding, and which predictions would amplify.
+        """
         self._check()
         self._turn()
         system, control = self._system, self.control
@@ -265,7 +268,8 @@ class Linearisation:
             raise NotConverged("the linear solver stalled", iterations)
         tangent, rate = control.rates(system, right, x)
         stability = control.stability(inertia.negative - system.negative_where_stable, tangent, rate)
-        return EquilibriumPoint(self.state, control, tangent, rate, stability, iterations, tuple(residuals), self)
+        state = system.without_self_stress(self.state)
+        return EquilibriumPoint(state, control, tangent, rate, stability, iterations, tuple(residuals), self)
 
     def travel_gradient(self, load: PointLoad) -> PETSc.Vec:
         """∂(a · u_P)/∂x of a load's travel."""

@@ -207,6 +207,11 @@ class EquilibriumSystem:
         missed = links[self.blocks.pressures.local]
         return float(np.sqrt(self.comm.allreduce(float(missed @ missed))))
 
+    def without_self_stress(self, state: State) -> State:
+        """``state`` with the least of all multipliers that balance the same forces. Local."""
+        least = self.joints.without_self_stress(state.multipliers, state.poses, state.motors, self.compliances)
+        return replace(state, multipliers=least)
+
     def constraints(self, state: State, multipliers: np.ndarray) -> np.ndarray:
         """C(s) + c λ at ``multipliers`` λ, (rows,). Local."""
         return self.joints.value(state.poses, state.motors) + self.compliances * multipliers

@@ -41,9 +41,7 @@ from scipy.sparse.csgraph import breadth_first_order
 from fenicsmech.errors import AssemblyError
 from fenicsmech.mechanism import Configuration
 from fenicsmech.multibody.idle_spins import IdleSpin
-from fenicsmech.multibody.linkage import JointSystem, Linkage, PosePotential
-
-_RANK = 1e-9  # singular values of A below this are zero: rows and unknowns are scaled to one
+from fenicsmech.multibody.linkage import RANK, JointSystem, Linkage, PosePotential
 
 
 @dataclass(frozen=True)
@@ -231,7 +229,7 @@ def free_motions(
         columns = [column for body in spring.bodies for column in system.columns.get(body, ())]
         slope[columns] += spring.gradient(poses)[own]
         curvature[np.ix_(columns, columns)] += spring.hessian(poses)[np.ix_(own, own)]
-    multipliers = system.row_scale * np.linalg.lstsq(scaled.T, scale * slope, rcond=_RANK)[0]
+    multipliers = system.row_scale * np.linalg.lstsq(scaled.T, scale * slope, rcond=RANK)[0]
     for rows, columns, block in system.hessian_blocks(poses, motors, multipliers):
         curvature[np.ix_(rows, columns)] -= block
     along = motions @ (curvature * np.outer(scale, scale)) @ motions.T
@@ -290,8 +288,8 @@ def is_held(system: JointSystem, poses: np.ndarray, motors: np.ndarray, rate: np
     constraints ``rows`` leave."""
     scaled = system.scaled_gradient(poses, motors)[rows]
     wanted = rate * system.pose_scale
-    left = wanted - scaled.T @ np.linalg.lstsq(scaled.T, wanted, rcond=_RANK)[0]
-    return bool(np.linalg.norm(left) <= _RANK * np.linalg.norm(wanted))
+    left = wanted - scaled.T @ np.linalg.lstsq(scaled.T, wanted, rcond=RANK)[0]
+    return bool(np.linalg.norm(left) <= RANK * np.linalg.norm(wanted))
 
 
 @dataclass(frozen=True)
@@ -346,7 +344,7 @@ def _without(modes: np.ndarray, motions: Sequence[np.ndarray]) -> np.ndarray:
 def _null_space(matrix: np.ndarray) -> np.ndarray:
     """Orthonormal rows that span the null space of a matrix whose rows and unknowns are scaled to one."""
     _, values, right = np.linalg.svd(matrix, full_matrices=True)
-    return right[int(np.sum(values > _RANK)) :]
+    return right[int(np.sum(values > RANK)) :]
 
 
 def _takes_part(vectors: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
+from scipy.linalg import qr
 
 from fenicsmech.joints import (
     RIGID_SPACES,
@@ -26,6 +27,9 @@ from fenicsmech.joints import (
 from fenicsmech.mechanism import Effect, FlexibleLink, Joint, Link, Mechanism, Motor, Region, in_dimension, same_place
 from fenicsmech.multibody.places import JointChange, JointPlaces
 from fenicsmech.multibody.points import BodyPoint
+
+RANK = 1e-9
+"""Singular values of A below this are zero: rows and unknowns are scaled to one."""
 
 
 @dataclass(frozen=True)
@@ -185,6 +189,24 @@ class JointSystem:
                     yield rows, self.columns[body], both[:, own]
         for body, rows in self._norm_rows.items():
             yield rows, self.columns[body], self.space.norm_gradient(poses[body])
+
+    def without_self_stress(
+        self, multipliers: np.ndarray, poses: np.ndarray, motors: np.ndarray, compliances: np.ndarray
+    ) -> np.ndarray:
+        """The multipliers of least norm, rows scaled to one, with the same forces Aᵀλ and gaps c λ.
+
+        Where constraints depend on each other, equilibrium leaves states of self-stress n open: Aᵀn = 0, c n = 0.
+
+        Args:
+            multipliers: λ, (rows,).
+            poses: of all bodies, (bodies, pose_size).
+            motors: φ per connection.
+            compliances: c by constraint row, (rows,).
+        """
+        fixed = np.column_stack([self.scaled_gradient(poses, motors), np.eye(self.rows)[:, compliances != 0.0]])
+        basis, triangle, _ = qr(fixed, mode="full", pivoting=True)
+        free = basis[:, int(np.sum(np.abs(np.diag(triangle)) > RANK)) :]
+        return multipliers - self.row_scale * (free @ (free.T @ (multipliers / self.row_scale)))
 
     def hessian_blocks(self, poses: np.ndarray, motors: np.ndarray, multipliers: np.ndarray):
         """Σ λ_k ∂²C_k/∂z² as (columns, columns, block) triples; which blocks there are never changes."""

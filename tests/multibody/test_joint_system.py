@@ -9,6 +9,7 @@ from fenicsmech.multibody import JointSystem, build_linkage
 
 from ..joints.poses import random_pose
 from ..oracles import dense
+from .planar_machines import parallelogram
 
 EVERY_DIMENSION = pytest.mark.parametrize("dim", [2, 3])
 SPATIAL_KINDS = (REVOLUTE, PRISMATIC, CYLINDRICAL, SPHERICAL, UNIVERSAL, PLANAR_JOINT, WELD)
@@ -176,3 +177,20 @@ def test_motor_values_come_by_connection(system):
     values = system.motor_values(lambda motor: {REVOLUTE: 2.0, PRISMATIC: 3.0}[motor.joint.kind])
     assert values[:2].tolist() == [2.0, 3.0]
     assert [c.motor is None for c in system.connections[2:]] == (values[2:] == 0.0).tolist()
+
+
+@pytest.mark.parametrize(("dim", "redundancy"), [(2, 0), (3, 3)])
+def test_multipliers_without_self_stress_balance_the_same_forces_with_the_least_norm(dim, redundancy):
+    machine = parallelogram(0.7, driven=None)
+    system = machine.linkage(dim).joints
+    poses, still, rigid = system.drawn, np.zeros(len(system.connections)), np.zeros(system.rows)
+    given = np.random.default_rng(3).standard_normal(system.rows)
+    found = system.without_self_stress(given, poses, still, rigid)
+    gradient = system.gradient(poses, still)
+    assert gradient.T @ found == pytest.approx(gradient.T @ given, abs=1e-12 * np.abs(gradient).max())
+    least = np.linalg.pinv(system.scaled_gradient(poses, still).T, rcond=1e-9)
+    forces = system.pose_scale * (gradient.T @ given)
+    assert found / system.row_scale == pytest.approx(least @ forces, abs=1e-10 * np.abs(given / system.row_scale).max())
+    assert bool(np.abs(found - given).max() > 1e-3) == (redundancy > 0)
+    # a soft joint tells its own multiplier
+    assert system.without_self_stress(given, poses, still, np.ones(system.rows)) == pytest.approx(given, rel=1e-12)
