@@ -44,6 +44,7 @@ def test_equal_points_are_on_the_front_once():
     assert pareto_front([], []) == []
 
 
+@pytest.mark.thorough
 def test_a_plot_has_a_fixed_size_and_the_same_bytes_every_time(tmp_path):
     for name in ("a.png", "b.png"):
         plot_work_precision(

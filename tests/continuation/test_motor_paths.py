@@ -76,6 +76,7 @@ def test_constant_force_acts_along_the_whole_path_of_a_motor():
     assert curve.forces == pytest.approx(0.25 - toggle.force(sunk), abs=1e-8)
 
 
+@pytest.mark.thorough
 def test_torque_of_the_crank_of_a_bistable_four_bar_is_that_of_beam_theory():
     case, level = four_bar(MPI.COMM_SELF), np.arctan2(RISE, RUN)
     mechanism = case.simulation.scene.mechanism

@@ -87,6 +87,7 @@ def test_toggle_that_a_motor_drives_beyond_its_fold_snaps_through():
         assert curve.snapped_through.tolist() == [snapped_through, False]
 
 
+@pytest.mark.thorough
 def test_snap_is_seen_among_motors_that_turn_much_farther():
     # both clamps of a shallow bow turn, by far more than it snaps; the fold is between the first two angles
     simulation, crown, motors = bow()

@@ -53,6 +53,7 @@ def corrected(result: fm.DesignResult) -> list[float]:
     return [target.corrected for target in result.targets]
 
 
+@pytest.mark.thorough
 def test_corrected_designs_are_nearer_to_their_targets_on_a_finer_mesh():
     case, wanted = truss(*WANTED), np.array([displacement for _, displacement in WANTED])
     problem, missed = case.problem(size=2.5, order=1), []
@@ -114,6 +115,7 @@ def misleading(case: Case) -> fm.Simulation:
     return sim.with_material(link.material, fm.Material("stiff rubber", 5.0 * 1.9, 0.475))
 
 
+@pytest.mark.thorough
 def test_a_surrogate_that_misleads_is_given_up(loads, caplog):
     case = truss(*WANTED)
     problem = case.problem(**COARSE)
@@ -124,6 +126,7 @@ def test_a_surrogate_that_misleads_is_given_up(loads, caplog):
     assert result.worst_error < 5e-3 and result.verified
 
 
+@pytest.mark.thorough
 def test_a_run_killed_between_two_rounds_ends_as_if_nothing_had_happened(tmp_path, loads):
     whole = truss(*WANTED).problem(**COARSE).optimise(checkpoint=tmp_path / "whole.json")
     assert len(whole.corrections) > 1

@@ -94,6 +94,7 @@ def test_the_drawn_shape_is_the_initial_design(reached):
     assert reached[1].targets[1].started == pytest.approx(drawn[0], rel=0.03)
 
 
+@pytest.mark.thorough
 def test_an_unreachable_target_ends_with_the_best_design_and_says_what_holds_it_back():
     result = truss((0.4, 0.05), thickness=(2.0, 3.5)).problem().optimise()
     (target,) = result.targets

@@ -226,6 +226,7 @@ def test_ends_of_strips_and_joints_on_branches_are_refused():
         fm.SplineDesign(link, 2, ends=[(0, 0), (1, 1), (2, 2)])
 
 
+@pytest.mark.thorough
 def test_the_length_of_an_imported_link_is_that_of_its_arc_and_is_found_again_in_the_part():
     case = arm(CURVED)
     link, (push,) = case.designs[0].link, case.scene.mechanism.forces

@@ -46,6 +46,7 @@ def test_no_thickness_is_left_to_take_away_where_the_bound_does_not_hold():
     assert result.targets[1].reached < stiff()[1].targets[1].reached
 
 
+@pytest.mark.thorough
 def test_a_band_is_kept_on_both_sides():
     _, result = lightest(3.0, at_least=3.0, at_most=3.2)
     assert [target.relation for target in result.targets[:2]] == ["at least", "at most"]

@@ -81,7 +81,7 @@ def test_materials_do_not_share_offsets():
         assert np.any(sim.linkage.joints.offsets) and not np.any(other.linkage.joints.offsets)
 
 
-@pytest.mark.parametrize("describe", [crank, strained])
+@pytest.mark.parametrize("describe", [crank, pytest.param(strained, marks=pytest.mark.thorough)])
 def test_an_offset_is_recovered_from_positions_measured_with_it(describe):
     scene, motor, push = describe()
     sim = fm.Simulation(scene, space="plane-stress", size=4.0)

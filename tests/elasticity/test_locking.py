@@ -49,6 +49,7 @@ def test_displacements_alone_lose_accuracy_with_every_nine_of_poissons_ratio_and
     assert pressed[1] < 1.1 * pressed[0]
 
 
+@pytest.mark.thorough
 def test_limit_is_where_displacements_alone_become_more_than_twice_as_wrong():
     below, at = (
         error(poisson, count=8, mixed=False) / error(poisson, count=8, mixed=True)

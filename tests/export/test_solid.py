@@ -70,6 +70,7 @@ def test_the_solid_has_the_volume_and_the_extent_of_a_fine_mesh(name, dim, tmp_p
     assert high - low == pytest.approx(extent, rel=3e-3)
 
 
+@pytest.mark.thorough
 def test_a_solid_of_a_mesh_without_layers_is_the_one_that_was_meshed(tmp_path):
     depth = 10.0  # that of the part
     mesh = mesh_link("part", step_file(PART, depth=depth), dim=3, size=1.5)

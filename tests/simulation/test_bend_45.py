@@ -44,7 +44,7 @@ def bend(order: int, size: float):
 @pytest.mark.parametrize(
     "order, size",
     [
-        pytest.param(3, 2.0, id="one cubic layer"),
+        pytest.param(3, 2.0, id="one cubic layer", marks=pytest.mark.thorough),
         # warping in torsion takes two quadratic layers: with one the tip moves 1.3 % less in the plane
         pytest.param(2, 0.25, id="two quadratic layers", marks=pytest.mark.slow),
     ],

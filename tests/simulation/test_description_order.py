@@ -62,7 +62,7 @@ def four_bar(space: str, seed: int | None) -> fm.Curve:
     return simulation.load_displacement(push, forces=[1.0, 3.0], configuration=turned)
 
 
-@pytest.mark.parametrize("space", ["plane-stress", "3d"])
+@pytest.mark.parametrize("space", ["plane-stress", pytest.param("3d", marks=pytest.mark.thorough)])
 def test_links_and_joints_in_any_order_give_the_same_curve(space):
     reference = four_bar(space, None)
     torque = [*reference.frames[-1].motors.values()]
