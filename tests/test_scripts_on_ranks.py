@@ -41,7 +41,7 @@ def test_files_are_written_and_lines_printed_once(mpirun, tmp_path, monkeypatch)
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("bends|") == 1
     assert {path.name for path in tmp_path.iterdir()} == {"script.py", "curve.png", "curve.csv", "both.png"}
-    assert [len(column) for column in fm.read_csv("curve.csv").values()] == 8 * [3]
+    assert {len(column) for column in fm.read_csv("curve.csv").values()} == {3}
 
 
 def test_a_file_that_cannot_be_written_is_an_error_on_all_ranks(mpirun, tmp_path, monkeypatch):

@@ -17,7 +17,11 @@ MPI.COMM_WORLD.Barrier()
 """
 
 
-@pytest.mark.parametrize("ranks", [[0], [1], [0, 1]], ids=["the first", "the second", "all"])
+@pytest.mark.parametrize(
+    "ranks",
+    [pytest.param([0], marks=pytest.mark.thorough), [1], pytest.param([0, 1], marks=pytest.mark.thorough)],
+    ids=["the first", "the second", "all"],
+)
 def test_a_program_ends_when_an_error_is_not_caught_on(ranks, mpirun, tmp_path):
     script = tmp_path / "failing.py"
     script.write_text(FAILING.format(ranks=ranks))

@@ -14,7 +14,7 @@ H = 1e-3
 
 
 @pytest.mark.parametrize("kind", [LoadControl, DisplacementControl])
-@pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
+@pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", pytest.param("3d", marks=pytest.mark.thorough)])
 def test_gradient_and_matrix_are_derivatives_of_the_value(space, kind):
     case = crowded(space)
     system, control = system_of(case, controlled=case.on_rigid), control_of(kind)

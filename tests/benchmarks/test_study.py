@@ -20,6 +20,8 @@ from fenicsmech.errors import DescriptionError
 
 from .cantilever import THICKNESS, cantilever
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.fixture(scope="module")
 def study() -> Study:
@@ -34,7 +36,6 @@ def study() -> Study:
     return run_study(case.scene, case.tip, levels, size=0.5 * THICKNESS, repeats=1, comm=MPI.COMM_SELF)
 
 
-@pytest.mark.thorough
 def test_limits_are_those_of_beam_theory(study):
     expected = cantilever().expected
     assert study.reference.value == pytest.approx(expected, rel=5e-3)
@@ -43,7 +44,6 @@ def test_limits_are_those_of_beam_theory(study):
         assert limit.uncertainty < 0.02 * expected
 
 
-@pytest.mark.thorough
 def test_without_contraction_across_the_depth_models_agree_within_their_uncertainty(study):
     assert len(study.limits) == 4
     for limit in study.limits.values():
@@ -109,7 +109,6 @@ def test_files_hold_every_level(study, tmp_path):
     assert "observed order" in text
 
 
-@pytest.mark.thorough
 def test_failures_and_levels_that_take_too_long_are_recorded(tmp_path):
     case = cantilever()
     (beam,) = case.scene.mechanism.flexible_links

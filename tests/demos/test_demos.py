@@ -125,7 +125,9 @@ def test_quick_truss_reaches_its_targets_in_plane_stress(truss_alone):
     check_quick("truss", *truss_alone)
 
 
-@pytest.mark.parametrize("name", ["claw", pytest.param("klann", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "name", [pytest.param("claw", marks=pytest.mark.thorough), pytest.param("klann", marks=pytest.mark.slow)]
+)
 def test_quick_demo_reaches_its_targets_in_plane_stress(name, tmp_path):
     check_quick(name, *report(name, tmp_path, *QUICK), tmp_path)
     assert name != "klann" or (tmp_path / "foot-path.png").exists()

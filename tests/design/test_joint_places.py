@@ -117,7 +117,7 @@ def test_turned_axes_of_rigid_links_are_axes_drawn_so():
         assert np.abs(found - _measured(sim, push, joint)).max() > 0.01 * np.abs(wanted).max()
 
 
-@pytest.mark.parametrize("space", ["plane-stress", "3d"])
+@pytest.mark.parametrize("space", ["plane-stress", pytest.param("3d", marks=pytest.mark.thorough)])
 def test_derivatives_by_places_of_joints_of_rigid_links_agree_with_differences(space):
     if space == "3d":
         sim, push, joints = chain()

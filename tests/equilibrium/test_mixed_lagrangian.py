@@ -72,7 +72,7 @@ def test_residual_and_kkt_matrix_are_derivatives_of_the_lagrangian(dim, comm):
     assert curvature == pytest.approx(extrapolated(gradient_at) - proximal, rel=1e-8)
 
 
-@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("dim", [2, pytest.param(3, marks=pytest.mark.thorough)])
 def test_shift_leaves_pressures_alone(dim):
     system, state, control = case_of(dim, MPI.COMM_WORLD)
     system.load(state)
@@ -85,7 +85,7 @@ def test_shift_leaves_pressures_alone(dim):
     assert not np.any(change.pressures)
 
 
-@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("dim", [2, pytest.param(3, marks=pytest.mark.thorough)])
 def test_residual_is_the_same_on_any_number_of_ranks(dim):
     values = []
     for comm in COMMS.values():
