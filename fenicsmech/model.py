@@ -157,7 +157,7 @@ def mesh_links(mechanism: Mechanism, shapes: Sequence[Shape], linkage: Linkage, 
     meshes: dict[FlexibleLink, LinkMesh] = {}
     drawn: list[tuple[FlexibleLink, Figure, tuple]] = []
     pairs = zip(mechanism.flexible_links, shapes, strict=True)
-    for link, shape in sorted(pairs, key=lambda pair: pair[0].name):  # in whatever order they were described
+    for link, shape in sorted(pairs, key=lambda pair: pair[0].name):  # independent of the order of description
         options = _mesh_options(link, linkage, fidelity)
         if has_plain_outline(shape):
             figure = Figure.of(link.name, shape, options["sites"], dim=fidelity.model.dim)
