@@ -1,9 +1,9 @@
 """Double wishbone suspension, seen from the front: the upper arm is placed for the camber of the wheel.
 
-The upper arm is a leaf of steel, clamped to the body; the lower arm is rigid and sprung there. A bump of 30 mm takes
-900 N; in bump the wheel leans inwards by 0.4°, in rebound outwards by 0.1°, where the drawn one leans by 0.77° and
-0.33°. Three numbers are found: where the clamp stands, in two directions, and how stiff the spring is.
-Geometry and targets are this project's own.
+The upper arm is a leaf of steel, clamped to the body; the lower arm is rigid, with a spring at the body. Targets are a
+force of 900 N in bump, 30 mm up, and the camber of the wheel: 0.4° inwards in bump, 0.1° outwards in rebound. Three
+numbers are found: the place of the clamp, in two directions, and the stiffness of the spring. Geometry and targets are
+this project's own.
 
     python3 demos/suspension.py [--quick] [--simulate-only] [--out DIR]
 """

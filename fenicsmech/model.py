@@ -157,7 +157,7 @@ def mesh_links(mechanism: Mechanism, shapes: Sequence[Shape], linkage: Linkage, 
     meshes: dict[FlexibleLink, LinkMesh] = {}
     drawn: list[tuple[FlexibleLink, Figure, tuple]] = []
     pairs = zip(mechanism.flexible_links, shapes, strict=True)
-    for link, shape in sorted(pairs, key=lambda pair: pair[0].name):  # in whatever order they were described
+    for link, shape in sorted(pairs, key=lambda pair: pair[0].name):  # independent of the order of description
         options = _mesh_options(link, linkage, fidelity)
         if has_plain_outline(shape):
             figure = Figure.of(link.name, shape, options["sites"], dim=fidelity.model.dim)
@@ -202,9 +202,12 @@ def _mesh_options(link: FlexibleLink, linkage: Linkage, fidelity: Fidelity) -> d
 class Design:
     """What designs change in a model.
 
+    Numbers that shift joints do not reshape flexible links: ``field`` has to take these along, as that of
+    ``DesignProblem.rest_shape`` and of results does. Numbers of depth stretch links beside ``field``.
+
     Attributes:
         field: the design field of the links' shapes, this rank's values with ghosts, flat.
-        numbers: values of design numbers by their kind; others are as drawn.
+        numbers: values of design numbers by their kind (``NumberKind``), in its unit; others are as drawn.
     """
 
     field: np.ndarray

@@ -52,11 +52,14 @@ class SplineDesign:
             runs on beyond them.
         ends_move: whether free ends, to which the centreline runs on beyond the last joint, may move; otherwise they
             stay where they are drawn, as a finger tip that has to reach a place.
-        same: a link or several that are the same part in another place and keep its shape.
+        same: a link or several that are the same part in another place and keep its shape. Joints of links that share a
+            shape cannot be shifted by numbers, and numbers of their depth name all of them.
         mirrored: those that are mirror images of it.
 
     Raises:
-        DescriptionError: a number makes no sense, or a link is named twice.
+        DescriptionError: a number makes no sense, or a link is named twice. Later, by a design problem: no motion
+            brings the drawn link to one of ``same`` or ``mirrored``, or numbers shift joints of links that share a
+            shape.
     """
 
     link: FlexibleLink

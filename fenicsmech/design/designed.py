@@ -38,7 +38,8 @@ class DesignedSimulation:
 
     Attributes:
         simulation, designs, targets, clock: likewise.
-        shapes, numbers: the links whose shape may change, maybe with their joints alone, and numbers that may.
+        shapes: the links whose shape may change, by parameters of their own or with their joints alone.
+        numbers: those that may change.
         changed: the links whose solids change.
 
     Raises:

@@ -8,9 +8,9 @@ factor:
 
 on one branch if d₁ − d₀ is small enough, and halved if that fails. Halves that fail too mean a fold.
 
-The equilibrium y₀ of another simulation (``transfer``) is one of this simulation under the forces R(y₀) that it leaves
-open. These are taken away in one step, which is checked alike, with R(y; d₀) = R(y) − R(y₀) and so δ = K₁⁻¹ R(y₀),
-and by the distance of y from y₀.
+The equilibrium y₀ of another simulation (``transfer``) is one of this simulation under additional forces, its residual
+R(y₀). These are removed in one step. The same check applies, with R(y; d₀) = R(y) − R(y₀) and so δ = K₁⁻¹ R(y₀), and a
+second one to the distance of y from y₀.
 
 Displacements q count from the unloaded configuration y°. Where that moves with the design (a point lies on a flexible
 link, or motors strain the links), it is an equilibrium that is followed too. A prescribed displacement v = v̄ + q_v(y°)
@@ -372,7 +372,7 @@ class SampleEquilibria:
             raise Infeasible(str(error)) from error
 
     def _from_guess(self, path: _Path, other: WholeState, unloaded: State) -> SampleState:
-        """The equilibrium near the one in another simulation, in one step: the forces that this leaves open vanish."""
+        """The equilibrium near the one in another simulation, whose residual is removed in one step."""
         system, control = path.solver.system, path.control(unloaded)
         start = control.prepare(guess(self._model, other, unloaded))
         found = self._solved(path, start, control)

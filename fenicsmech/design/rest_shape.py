@@ -3,13 +3,13 @@
     p = (p_shapes, q),     p → s → θ* → d(s, θ*) → X = X₀ + c + d
 
 with the parameters s of the links' splines, the handle positions θ, the design field d and the bulge c of the drawn
-edges. Splines follow joints that numbers q shift, s = s(p_shapes) + Σ ∂s/∂δ_j · δ_j(q), also those of links that have
-no parameters of their own; these keep their drawn shape at the drawn joints. Handle positions are best for the
-straight cells of drawn depth between the vertices. Links drawn by an outline keep their drawn shape at the initial
+edges. Splines follow joints that numbers q shift, s = s(p_shapes) + Σ ∂s/∂δ_j · δ_j(q), also those of links without
+parameters of their own, which keep their drawn shape while their joints stay as drawn. Handle positions are best for
+the straight cells of drawn depth between the vertices. Links drawn by an outline keep their drawn shape at the initial
 design p₀: their handles are at θ₀ + θ*(p) − θ*(p₀), where those of strips are at θ*(p), since handles that move along a
-link of varying thickness, or turn about an eye, change its outline. Edges of the outline follow the design between them
-too, their
-middles without the part along the chord; a design whose curved cells are squeezed too much has no rest shape.
+link of varying thickness, or turn about an eye, change its outline. Edges of the outline follow the design between
+vertices too, their middles without the part along the chord. A design whose curved cells are squeezed too much has no
+rest shape.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ class LinkDesign:
 
     Attributes:
         name: of the link.
-        parameters: its part of p; none of a link that follows joints alone.
+        parameters: its part of p; empty if the link follows its joints alone.
         handles: positions θ of its handles, the best near those of the designs on the way. Several can be good: the
             parameters alone need not fix the shape.
         controls: position and thickness (x, y, δ), then tangent, of every control point, (points, 2, 3).
@@ -102,7 +102,8 @@ class TargetResult:
         finer_elements_add: estimated discretisation error of the reached value, to be added: the change by infinitely
             fine elements.
         corrected: their sum, with which the target is compared; the reached value alone of an optimisation without
-            estimates. In plane stress it is the value in plane stress, where a curve's ``corrected`` is that in space.
+            estimates. Of a simulation in plane stress it is the value in plane stress; ``Curve.corrected`` is that in
+            space.
         error: of the corrected value, relative to the target's scale; of a bound how far it is missed, of a vector the
             length of its error.
         part: the same in the exported parts; None before ``DesignProblem.verify``, and of quantities that parts do not

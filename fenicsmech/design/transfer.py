@@ -5,9 +5,9 @@ that is another dimension:
 
     u(X, Y, Z) ≈ (u₁(X, Y), 0),     X = X₀ + c + d.
 
-Reference coordinates X₀ would not do: handles settle elsewhere along a link on another mesh, with the same outline.
-Contraction across the depth and multipliers are left to the first step of Newton's method: the one solves for stresses
-in a thin body, the others are linear unknowns, and guesses of both save none of the few steps from there.
+Points are compared at rest, not by reference coordinates X₀: on another mesh handles settle elsewhere along a link,
+with the same outline. Displacements along Z and multipliers start at zero and come from the first step of Newton's
+method, whose number of steps guesses of them do not reduce.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from fenicsmech.equilibrium import State
 from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import shape_functions
 
-_NEAREST = 16  # cells by their midpoints, among which the one that holds a point is looked for
+_NEAREST = 16  # cells with the nearest midpoints, among which a point is located
 _CORRECTIONS = 8  # of coordinates in curved cells, each of which at least halves the error
 
 
@@ -48,7 +48,7 @@ class WholeState:
 
 
 def whole_state(model: MechanismModel, state: State) -> WholeState:
-    """``state`` of a model that has its design, on all processes of the model."""
+    """The equilibrium ``state`` of a model that has the state's design, gathered on all processes of the model."""
     model.load(state)
     mesh, u = model.mesh.mesh, model.elastic.u
     owned = mesh.topology.index_map(mesh.topology.dim).size_local

@@ -55,7 +55,10 @@ class Effect(ABC):
         return None
 
     def pose_potentials(self, linkage):
-        """A sequence of ``PosePotential``, potentials of the poses of bodies of the ``Linkage``."""
+        """A sequence of ``PosePotential``, potentials of the poses of bodies of the ``Linkage``.
+
+        Those that refer to a joint override ``PosePotential.gradient_by_places``.
+        """
         return ()
 
     def soften(self, linkage):

@@ -2,9 +2,9 @@
 
     x′ = Q x + c,     Qᵀ Q = I,     det Q = 1, or −1 of a mirror image
 
-Q and c follow from the joints, which have to fall on joints with interfaces of the same extent, and with a single joint
-from the centroid of the outline as well; then outlines have to agree. Such links have meshes that are images too: what
-is symmetric as drawn is symmetric as meshed.
+Q and c follow from the joints, and where there is a single one from the centroid of the outline as well. Joints have to
+fall on joints with interfaces of the same extent, outlines on outlines. Such links have meshes that are images too: a
+mechanism that is symmetric as drawn is symmetric as meshed.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Isometry:
 
     @property
     def mirrors(self) -> bool:
-        """Whether it turns figures over."""
+        """Whether det Q = −1."""
         return bool(np.linalg.det(self.matrix) < 0.0)
 
     @property
@@ -71,7 +71,7 @@ class Figure:
     """The outline of a link and its interfaces.
 
     Attributes:
-        polygon: (n, 2).
+        polygon: vertices of the outline, (n, 2).
         sites: its interfaces.
     """
 
@@ -127,9 +127,14 @@ class Match:
 
 
 def matches(one: Figure, other: Figure, *, mirrored: bool) -> list[Match]:
-    """The motions of ``one`` to ``other`` that bring interfaces to interfaces of the same extent, turned over or not.
+    """The motions of ``one`` to ``other`` that bring interfaces to interfaces of the same extent.
 
-    A symmetric link has several; they come in an order that depends on where both are drawn alone, translations first.
+    A symmetric link has several. Their order depends only on where both are drawn; translations come first.
+
+    Args:
+        one: a link.
+        other: another one.
+        mirrored: whether det Q = −1, else det Q = 1.
     """
     if len(one.sites) != len(other.sites) or not one.sites:
         return []
@@ -157,9 +162,9 @@ def matches(one: Figure, other: Figure, *, mirrored: bool) -> list[Match]:
 
 
 def same_mesh(one: Figure, other: Figure) -> Match | None:
-    """The motion of ``one`` to ``other`` where both may have one mesh.
+    """The motion of ``one`` to ``other`` where outlines agree to rounding, so that both can have one mesh; else None.
 
-    Of those of a symmetric link a translation is taken, else one that mirrors.
+    Among several, as of symmetric links, translations come first, then mirror images.
     """
     if abs(abs(signed_area(one.polygon)) - abs(signed_area(other.polygon))) > _EXACT * one.extent**2:
         return None
@@ -179,7 +184,7 @@ def image_of(mesh: LinkMesh, isometry: Isometry, sites: np.ndarray) -> LinkMesh:
 
 
 def has_plain_outline(shape: Shape) -> bool:
-    """Whether the outline of a shape, and its depth, say all of it: no file does."""
+    """Whether outline and depth describe a shape completely; those of files have more."""
     return isinstance(shape, Strip | Outline)
 
 

@@ -1,18 +1,19 @@
-"""Idle spins: bodies held by two balls turn about the line through them, and nothing resists.
+"""Idle spins: bodies between two ball joints turn about the line through these, and nothing resists.
 
-Where a set of bodies meets the others at two ball joints only, and nothing else acts on it, the Lagrangian stays the
-same while the set turns as a rigid body about the line through the balls. With the spin n, the rate of the unknowns y
-in that turn,
+In kinematics this is a passive degree of freedom (L.-W. Tsai, Robot Analysis, Wiley 1999). Where two ball joints alone
+connect a set of bodies to the others, and nothing else acts on it, the Lagrangian L is invariant while the set turns as
+a rigid body about the line through the joints. With the spin n, the rate of the unknowns y in that turn,
 
-    n · ∇L = 0 at every y,      ∇²L n = 0 at equilibria:
+    n · ∇L = 0 at every y,      ∇²L n = 0 at equilibria.
 
-the matrix is singular, the equations are consistent, and whether its zero eigenvalue is counted as negative is a matter
-of rounding. Fixing the gauge,
+The matrix is singular, the equations are consistent, and rounding decides the sign of the computed zero eigenvalue.
+Fixing the gauge,
 
     ∇²L + e eᵀ,     e · n ≠ 0,
 
-makes the matrix regular, and leaves those solutions of ∇²L x = r that have e · x = 0; the spin counts as stable. Here e
-turns one body of the set about the line.
+makes the matrix regular. Its solutions are those of ∇²L x = r with e · x = 0, and the spin counts as stable. The gauge
+e turns one body of the set about the line. No gauge is added where a force, a spring or an effect acts on a body of the
+set, or on its link: there the turn may change L.
 """
 
 from __future__ import annotations
@@ -29,19 +30,26 @@ from fenicsmech.multibody.linkage import JointSystem, Linkage
 
 @dataclass(frozen=True)
 class IdleSpin:
-    """``bodies`` of a ``system`` that turn idly; ``balls``, the connections that hold them, each with its body."""
+    """Bodies that turn idly about the line through two ball joints.
+
+    Attributes:
+        system: joints and links as rigid bodies.
+        bodies: indices of the bodies.
+        balls: of both ball joints the index of the connection, and that of its body in ``bodies``.
+    """
 
     system: JointSystem
     bodies: tuple[int, ...]
     balls: tuple[tuple[int, int], tuple[int, int]]
 
     def line(self, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """A point on the line through the balls at ``poses`` (bodies, pose_size), and its direction of length one."""
+        """A point on the line at ``poses`` (bodies, pose_size), and the unit vector along it, (3,) each."""
         first, second = (self.system.place(k, body, poses) for k, body in self.balls)
         return first, (second - first) / np.linalg.norm(second - first)
 
     def gauge(self, joints: JointSystem, poses: np.ndarray) -> tuple[int, np.ndarray]:
-        """A body, and the rate of its pose in the turn about the line without its centre's motion, (pose_size,)."""
+        """e: a body, and the rate of its pose as it turns about the parallel to the line through its centre,
+        (pose_size,)."""
         body = self.bodies[0]
         rates = joints.space.rotation_rates(poses[body]) @ self.line(poses)[1]
         return body, np.concatenate([np.zeros(joints.space.dim), rates])
@@ -62,7 +70,8 @@ def idle_spins(linkage: Linkage, acted_on: Collection[int] = ()) -> tuple[IdleSp
 
     Args:
         linkage: the bodies and their joints.
-        acted_on: indices of bodies on which, or on whose link, something beside joints acts: these do not spin idly.
+        acted_on: indices of bodies on which, or on whose link, forces, potentials or effects act; these do not spin
+            idly.
     """
     system, found = linkage.rigid, []
     balls = {k: c for k, c in enumerate(system.connections) if system.is_ball(k)}

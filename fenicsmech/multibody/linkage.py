@@ -77,10 +77,10 @@ class JointSystem:
         places: constants of the connections' equations, and maybe of further ones; as drawn by default.
 
     Attributes:
-        places: likewise; designs change them.
+        places: constants of the connections' equations, which designs change.
         size: number of pose unknowns.
         rows: number of constraints.
-        offsets: φ₀ of motors, which add to their prescribed positions φ: C(z, φ + φ₀); per connection, zero as drawn.
+        offsets: φ₀ of motors, added to their prescribed positions φ in C(z, φ + φ₀), (connections,); zero as drawn.
         pose_scale: typical size of each pose unknown (``length`` or 1), (size,).
         row_scale: factors that make each constraint dimensionless and of unit gradient as drawn, (rows,).
     """
@@ -139,7 +139,7 @@ class JointSystem:
         return np.array([0.0 if c.motor is None else positions(c.motor) for c in self.connections])
 
     def on_the_way(self, positions, fraction: float) -> np.ndarray:
-        """φ per connection at a part of the way to ``positions``, which begins where all parts are as drawn."""
+        """φ (connections,) at a ``fraction`` of the way to ``positions`` from the drawn configuration, φ = −φ₀."""
         return fraction * self.motor_values(positions) - (1.0 - fraction) * self.offsets
 
     def unknowns(self, poses: np.ndarray) -> np.ndarray:
@@ -371,9 +371,15 @@ class PosePotential(ABC):
         raise NotImplementedError(f"{type(self).__name__} has no numbers")
 
     def gradient_by_places(self, changes: Mapping[int, JointChange], poses: np.ndarray) -> np.ndarray | float:
-        """∂²V/∂z∂p of a number that changes the places of some connections, (n · pose_size,).
+        """∂²V/∂z∂p of a number p that changes the places of joints, (n · pose_size,).
 
-        Zero by default: V refers to no joint.
+        Zero by default, which is right where V refers to no joint. A potential that does overrides it, and reads
+        places from ``JointSystem.places``, as ``JointCoordinate`` does; otherwise derivatives by ``JointPosition`` and
+        ``JointAxis`` are wrong.
+
+        Args:
+            changes: by a unit of p, by index of the connection (``Linkage.connection_of``).
+            poses: of all bodies, (bodies, pose_size).
         """
         return 0.0
 
@@ -426,7 +432,7 @@ def build_linkage(mechanism: Mechanism, dim: int, changes: Mapping[Joint, JointC
     Args:
         mechanism: the mechanism.
         dim: 2 or 3.
-        changes: of joints, which are placed there from the outset.
+        changes: of the places of joints; bodies, interfaces and connections are made at the changed ones.
     """
     length, joints = mechanism.length, mechanism.joints
     placed = {joint: _placed(joint, dim, (changes or {}).get(joint)) for joint in joints}

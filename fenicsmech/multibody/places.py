@@ -2,11 +2,13 @@
 
     c = (P + δ − c_a, P + δ − c_b, E Qᵀ(ω)),     Q = exp [ω]×
 
-are the constants of a joint's equations, with its drawn place P, the centres of its bodies and the rows E of its triad.
-Both bodies attach at the same point, along the same axes, so that the poses of the drawn configuration close all joints
-at any δ and ω: they are the unloaded, assembled ones. The derivative by ω along a is that of the turn
+are the constants of a joint's equations, with its drawn place P, the centres c_a and c_b of its bodies and the rows E
+of its triad. Both bodies attach at the same point, along the same axes. So the poses of the drawn configuration close
+all joints at any δ and ω, as the unloaded, assembled ones. The derivative Q′ of Q as ω changes by a is given by
 
-    Q′ Qᵀ = [J a]×,     J = ∫₀¹ exp(s [ω]×) ds.
+    Q′ Qᵀ = [J a]×,     J = ∫₀¹ exp(s [ω]×) ds,
+
+with the left Jacobian J of SO(3) (T. D. Barfoot, State Estimation for Robotics, doi:10.1017/9781316671528, ch. 7).
 """
 
 from __future__ import annotations
@@ -20,7 +22,12 @@ from scipy.spatial.transform import Rotation
 
 @dataclass(frozen=True, eq=False)
 class JointChange:
-    """How one joint is changed, by a number or by a unit of it: its shift δ (dim,), and its turn ω (1,) or (3,)."""
+    """The change of the place of one joint by a number, or by a unit of it. Changes add up and scale as vectors.
+
+    Attributes:
+        shift: δ of its point, in units of length, (dim,).
+        turn: rotation vector ω of its axes, rad, (1,) about z in the plane, (3,) in space.
+    """
 
     shift: np.ndarray
     turn: np.ndarray
@@ -31,7 +38,7 @@ class JointChange:
     __rmul__ = __mul__
 
     def place(self, at: np.ndarray, triad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The place (dim,) and the triad (dim, dim) of a joint after it."""
+        """The changed place (dim,) and triad (dim, dim) of a joint, unit vectors as rows, from the drawn ones."""
         if not np.any(self.turn):
             return at + self.shift, triad
         vector, dim = self.turn if len(self.turn) == 3 else np.array([0.0, 0.0, *self.turn]), len(triad)
@@ -64,7 +71,7 @@ class JointPlaces:
         return JointChange(np.zeros(self.dim), np.zeros(1 if self.dim == 2 else 3))
 
     def change(self, by: Hashable, changes: Mapping[int, JointChange]) -> None:
-        """Changes some connections ``by`` what owns the change; it replaces those of the same owner, others add."""
+        """Changes some connections. The changes replace those of the same owner ``by``; those of others add up."""
         before = self._changes.get(by, {})
         self._changes[by] = dict(changes)
         for k in {*before, *changes}:

@@ -5,9 +5,9 @@ A spring is a potential V(z; k, φ₀) of poses z, which counts with a factor σ
     xᵀ ∂F/∂p = ẑ · σ ∂²V/∂z∂p.
 
 A motor at the prescribed position φ stands at φ + φ₀ with the offset φ₀. Configurations are assembled with it,
-C(z, φ + φ₀) = 0, and
+C(z, φ + φ₀) = 0, and with the multipliers' part λ̂ of the adjoint
 
-    xᵀ ∂F/∂φ₀ = ẑ · ∂(Aᵀλ)/∂φ + λ̂ · ∂C/∂φ.
+    −xᵀ ∂F/∂φ₀ = ẑ · ∂(Aᵀλ)/∂φ + λ̂ · ∂C/∂φ.
 """
 
 from __future__ import annotations
@@ -116,7 +116,9 @@ class _SpringNumber(ModelNumber):
 
 @dataclass(frozen=True, init=False)
 class MotorOffset(NumberKind):
-    """What is added to each prescribed position of motors: ``MotorOffset(motor)``; zero as drawn.
+    """The offset φ₀ of motors from each prescribed position: ``MotorOffset(motor)``; rad or length, zero as drawn.
+
+    It counts at the position zero too. Configurations are assembled with it, and displacements count from there.
 
     Args:
         parts: a motor of the mechanism, or several that share it.

@@ -1,8 +1,8 @@
 """Places of joints: positions and axes in the drawn configuration.
 
 Both bodies of a joint attach at the same point of this configuration, which stays assembled as the point is shifted and
-the axis turned. With the rates Ċ and Ṡ of the constraints C and of their forces S = Aᵀλ on the poses z as the place of
-a joint changes, of the potentials V of springs in joints, and with the parts ẑ and λ̂ of the adjoint,
+the axis turned. As the place of a joint changes, the constraints C change at the rate Ċ and their forces S = Aᵀλ on the
+poses z at the rate Ṡ. Potentials V of springs count with a factor σ. With the parts ẑ and λ̂ of the adjoint x,
 
     −xᵀ ∂F/∂p = λ̂ · Ċ + ẑ · (Ṡ − σ ∂²V/∂z∂p).
 
@@ -76,23 +76,28 @@ class _OfJoints(NumberKind):
 
     @abstractmethod
     def change(self, dim: int) -> JointChange:
-        """By a unit of the number, in ``dim`` dimensions, of each joint."""
+        """The change of each joint by a unit of the number, in ``dim`` dimensions."""
 
 
 @dataclass(frozen=True, init=False)
 class JointPosition(_OfJoints):
-    """The shift of joints from where they are drawn: ``JointPosition(pin, direction=(1, 0))``.
+    """The shift of joints from where they are drawn, in units of length: ``JointPosition(pin, direction=(1, 0))``.
+
+        P + v e,     e the unit vector along ``direction``, v the number, zero as drawn
 
     Two numbers, along x and y, let a joint go anywhere in the plane. All bodies that meet there attach at the shifted
-    point; flexible links follow with their interface, the ends of their centreline, and the rest between them in
-    proportion. Forces and outputs on rigid links stay where they are drawn on them, also those drawn at the joint.
+    point. In a design problem flexible links follow: their interface by the shift, their centreline by the linear
+    interpolation of the shifts of its joints. Forces and outputs on rigid links stay where they are drawn on them, also
+    those drawn at the joint. Joints of flexible links are shifted in the plane only, all those at one place of a link
+    together, and not at all if the link shares its shape with others (``SplineDesign.same``).
 
     Args:
-        parts: a joint, or several that are shifted alike, as those of a pin through several links.
+        parts: a joint, or several with the same shift, as those of a pin through several links.
         direction: in which the shift is positive, of any length; 2 or 3 coordinates.
 
     Raises:
-        DescriptionError: there are no joints, one is given twice, or the direction has no length.
+        DescriptionError: there are no joints, one is given twice, or the direction has no length. Later, by a design
+            problem: a flexible link does not allow the shift.
     """
 
     what = "position"
@@ -146,15 +151,18 @@ class JointPosition(_OfJoints):
 class JointAxis(_OfJoints):
     """The turn, rad, of the axes of joints from how they are drawn: ``JointAxis(hinge, about=(1, 0, 0))``.
 
-    In the plane axes that lie in it turn about z, as those of sliders. Turns about several axes add up as vectors do.
-    Flexible links are held over the same region as drawn.
+        exp [v e]×,     e the unit vector along ``about``, v the number, zero as drawn, |v| < π
+
+    In the plane only axes that lie in it turn, about z, as those of sliders. Turns of one joint about several axes add
+    up as rotation vectors. Interfaces of flexible links keep their regions.
 
     Args:
-        parts: a joint, or several whose axes turn alike.
-        about: the axis of the turn, of any length; 2 or 3 coordinates.
+        parts: a joint, or several whose axes turn by the same angle.
+        about: the axis of the turn, of any length; 2 or 3 coordinates, z by default.
 
     Raises:
-        DescriptionError: there are no joints, one is given twice, or the axis has no length.
+        DescriptionError: there are no joints, one is given twice, or the axis has no length. Later, by a design
+            problem: a joint has no axis in the plane, or the axis would leave it.
     """
 
     what = "axis"

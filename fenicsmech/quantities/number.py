@@ -147,11 +147,11 @@ class NumberKind(ABC):
 
     @property
     def reshaped(self) -> Sequence[FlexibleLink]:
-        """Flexible links whose solids change with it; none by default."""
+        """Flexible links whose solids change with the number; none by default."""
         return ()
 
     def changes(self, dim: int) -> Mapping[Joint, JointChange]:
-        """How a unit of it changes the places of joints in ``dim`` dimensions; none by default."""
+        """Changes of the places of joints by a unit of the number, in ``dim`` dimensions; none by default."""
         return {}
 
     def moves_unloaded(self, configuration: Configuration) -> bool:
@@ -199,7 +199,7 @@ class NumberKind(ABC):
 
 
 def joint_changes(values: Mapping[NumberKind, float], dim: int) -> dict[Joint, JointChange]:
-    """How numbers with some values change the places of joints, together, in ``dim`` dimensions."""
+    """Total changes of the places of joints by numbers with some ``values``, in ``dim`` dimensions."""
     found: dict[Joint, JointChange] = {}
     for kind, value in values.items():
         for joint, unit in kind.changes(dim).items():

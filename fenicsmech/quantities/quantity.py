@@ -40,7 +40,8 @@ class Partial:
         border: by poses, multipliers and the controlled force, the same on all ranks, (border,).
         design: by this rank's owned values of the design field, flat.
         per_link: by numbers of links, by their names in ``ElasticBody.numbers``, (links,).
-        by_places: derivatives as the places of some connections change, each with a factor; they add up.
+        by_places: pairs of a factor and a function, which gives the derivative from changes of joints by index of the
+            connection; they add up.
     """
 
     links: np.ndarray | float = 0.0

@@ -278,7 +278,8 @@ class Simulation:
     def with_design(self, design: RestShape | Design | np.ndarray) -> Simulation:
         """The same scene at the same fidelity with links of another rest shape, and parts with other numbers.
 
-        Mesh and compiled forms are shared.
+        Mesh and compiled forms are shared. A result shifts joints and flexible links together; the numbers of a
+        ``Design`` shift joints alone, and its field has to carry flexible links along.
 
         Args:
             design: the result of a design problem, or a design on the mesh of this simulation, or its design field

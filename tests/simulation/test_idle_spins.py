@@ -1,4 +1,4 @@
-"""Links between two balls turn about themselves without any effect: neither equilibria nor verdicts may notice."""
+"""Links between two ball joints spin idly: equilibria and their stability do not depend on it."""
 
 import numpy as np
 import pytest

@@ -1,9 +1,8 @@
 """Optimal handle positions, min over θ of S(θ, p) = Σ_e ρ(e), and their derivatives by p.
 
-Links do not have cells in common, so S is a sum of functions of the θ of one link each; the cells of links that share a
-shape depend on the same θ. Newton's method with exact
-Hessians minimises them together, with a line search for each that refuses inverted cells. By the implicit function
-theorem
+Links do not have cells in common, so S is a sum of functions of the θ of one shape each; the cells of links that share
+a shape depend on the same θ. Newton's method with exact Hessians minimises them together, with a line search for each
+that refuses inverted cells. By the implicit function theorem
 
     dθ/dp = −S_θθ⁻¹ S_θp     (0 for handles held at a kink of the spline).
 

@@ -160,14 +160,14 @@ class LinkParameters:
 
     @staticmethod
     def own(first: int, spline: LinkSpline, count: int) -> LinkParameters:
-        """Those of a spline that all are parameters of the design, which has ``count``; the first one is ``first``."""
+        """All parameters of a spline as entries of the ``count`` of the design, from the entry ``first`` on."""
         matrix = np.zeros((spline.size, count))
         place = slice(first, first + spline.size)
         matrix[:, place] = np.eye(spline.size)
         return LinkParameters(place, np.zeros(spline.size), matrix)
 
     def of(self, p: np.ndarray) -> np.ndarray:
-        """s (size,) of the design ``p``; parameters of others may follow those that it knows."""
+        """s (size,) of the design ``p``, which may have further entries than S has columns."""
         return self.fixed + self.matrix @ p[: self.matrix.shape[1]]
 
 
@@ -391,7 +391,7 @@ class ShapeMap:
         self._theta_ends = np.cumsum([len(h) for h in handles], dtype=int)[:-1]
 
     def parameters(self, p: np.ndarray) -> list[np.ndarray]:
-        """Those of the spline of each link at the design ``p`` (parameters,); parameters of others may follow."""
+        """Parameters (size,) of the spline of each shape at the design ``p``, which may have further entries."""
         return [own.of(p) for own in self.of_link]
 
     def positions(self, theta: np.ndarray) -> list[np.ndarray]:

@@ -8,11 +8,12 @@ The parameters p are the tangents at joints, and position and tangent at all oth
 thickness, and stays where it is unless joints move. Free ends change their thickness; they stay where they are drawn
 unless they may move. The curve is linear in p.
 
-Where joints move, their places are parameters too. Shifts δ_j of joints take the curve along, linearly between them,
+Where joints move, their places are parameters too. Shifts δ_j of joints shift the curve between two of them to
 
     x(t) + δ_j + (t − t_j) / (t_{j+1} − t_j) · (δ_{j+1} − δ_j),     t_j ≤ t ≤ t_{j+1},
 
-so that a straight link stays straight, and beyond the last joint as they are; joints between others keep C¹ tangents.
+and beyond the last joint by that joint's shift. A straight link with two joints stays straight. At joints between
+others the change of the tangent is the mean of both sides, so that the curve stays C¹.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ class LinkSpline:
         controls: initial control points, (n, 2, 3): position and tangent, each (x, y, δ).
         is_joint: which control points are joints, (n,).
         ends_move: whether the places of free ends are parameters.
-        joints_move: whether those of joints are, and with them those of free ends, which follow.
+        joints_move: whether those of joints are, and with them those of free ends, which follow the last joint.
     """
 
     controls: np.ndarray
