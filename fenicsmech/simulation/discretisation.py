@@ -79,7 +79,7 @@ class Discretisation:
             )
         changed = copy(self)
         # with offsets of motors of its own
-        changed.linkage = build_linkage(self.scene.mechanism, self.fidelity.model.mechanism_dim)
+        changed.linkage = build_linkage(self.scene.mechanism, self.fidelity.model.mechanism_dim, self.moved)
         changed.materials = tuple(other if material == drawn else material for material in self.materials)
         changed.mesh, changed._solvers = self.mesh, {}
         for name in ("model", "estimates"):

@@ -19,6 +19,7 @@ from .refusal import refused
 
 PLASTIC = fm.Material("plastic", 2000.0, 0.35)
 EXACT = {"optimiser": fm.LevenbergMarquardt(tolerance=1e-16), "correction": Correction(estimates=False)}
+RUBBER = fm.Material("rubber", 2.0, 0.35)
 SHIFTS = {"shaft": (2.0, -1.0), "pin": (-3.0, 2.0), "joint": (1.5, 4.0), "axle": (-2.0, 3.0)}
 
 
@@ -57,8 +58,7 @@ class Machine:
 
 def _leaf(rig: fm.Mechanism, ground: fm.RigidLink) -> None:
     # as soft as the springs: the equations are regularised relative to the mean stiffness
-    rubber = fm.Material("rubber", 2.0, 0.35)
-    leaf = rig.flexible("leaf", fm.strip([(0, -30), (20, -30)], thickness=6.0, depth=6.0), rubber)
+    leaf = rig.flexible("leaf", fm.strip([(0, -30), (20, -30)], thickness=6.0, depth=6.0), RUBBER)
     rig.weld(ground, leaf, at=(3, -30), interface_radius=2.0)
 
 
@@ -101,6 +101,14 @@ def test_shifted_joints_of_rigid_links_are_joints_drawn_there(space):
     assert found == pytest.approx(wanted, rel=1e-10, abs=1e-10 * np.abs(wanted).max())
     before = drawn.measured(sim)
     assert np.abs(found - before).max() > 0.01 * np.abs(before).max()
+
+
+def test_joints_keep_their_places_when_links_are_made_of_another_material():
+    drawn = Machine()
+    moved = {drawn.joints[name]: fm.JointChange(np.array(by), np.zeros(1)) for name, by in SHIFTS.items()}
+    there = drawn.simulate().with_shapes({}, moved=moved)
+    other = there.with_material(RUBBER, fm.Material("other rubber", 2.0, 0.35))
+    assert drawn.measured(other) == pytest.approx(drawn.measured(there), rel=1e-12)
 
 
 def test_turned_axes_of_rigid_links_are_axes_drawn_so():
