@@ -135,16 +135,7 @@ class DesignedSimulation:
                     "design", f"parameters of shape {parameters.shape}", f"Give {len(self.rest.initial)} finite numbers"
                 )
             return parameters, None
-        given = {link.name: link for link in design.links}
-        for link in self.rest.links:
-            place = link.parameters.place
-            size, found = place.stop - place.start, len(given[link.name].parameters) if link.name in given else 0
-            if found != size:
-                raise DescriptionError(
-                    f"design of {design.mechanism!r}",
-                    f"it has {found} parameters of link {link.name!r} instead of {size}",
-                    "Use a result of the same links and numbers of segments",
-                )
+        own = design.of_links(self.rest.links)
         known = {number.name: number.value for number in design.numbers}
         for number in self.numbers:
             if str(number) not in known:
@@ -152,7 +143,6 @@ class DesignedSimulation:
                     f"design of {design.mechanism!r}", f"it has no {number}", "Use a result of the same numbers"
                 )
         values = self.rest.numbers.scaled([known[str(number)] for number in self.numbers])
-        own = [given[link.name] for link in self.rest.links]
         parameters = np.concatenate([*(o.parameters for o in own), values])
         theta = np.concatenate([np.zeros(0), *(o.handles for o in own)])
         return parameters, self.rest.placement_from(parameters, theta)

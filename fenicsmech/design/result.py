@@ -45,6 +45,7 @@ class LinkDesign:
         bend: largest curvature ratio.
         centreline: points that the drawn centreline runs through, as given, drawn or found.
         same, mirrored: names of links that are the same part, and of mirror images of it.
+        ends_move: whether the places of free ends are among the parameters.
     """
 
     name: str
@@ -56,6 +57,7 @@ class LinkDesign:
     centreline: tuple[tuple[float, ...], ...] | None = None
     same: tuple[str, ...] = ()
     mirrored: tuple[str, ...] = ()
+    ends_move: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -229,7 +231,8 @@ class DesignResult:
         """The design on the mesh of a simulation of the same mechanism.
 
         Raises:
-            DescriptionError: the mechanism has no such links, or no parts with such numbers.
+            DescriptionError: the mechanism has no such links, their splines have not as many parameters, or it has no
+                parts with such numbers.
             ShapeError: cells of the mesh are inverted in this shape.
         """
         links = {link.name: link for link in simulation.scene.mechanism.flexible_links}
@@ -245,6 +248,7 @@ class DesignResult:
                 links[own.name],
                 len(own.controls) - 1,
                 centreline=own.centreline,
+                ends_move=own.ends_move,
                 same=[links[name] for name in own.same],
                 mirrored=[links[name] for name in own.mirrored],
             )
@@ -255,12 +259,30 @@ class DesignResult:
         values, dim = self.values(simulation.scene), simulation.linkage.dim
         places = [(kind, own) for kind, own in zip(values, self.numbers, strict=True) if kind.changes(dim)]
         rest = ParametricShape.of(simulation, designs, [Number(kind, *own.bounds) for kind, own in places])
-        scaled = [own.scaled for _, own in places]
+        scaled, chosen = [own.scaled for _, own in places], self.of_links(rest.links)
         p, theta = (
             np.concatenate([np.zeros(0), *parts])
-            for parts in ([*(own.parameters for own in self.links), scaled], [own.handles for own in self.links])
+            for parts in ([*(own.parameters for own in chosen), scaled], [own.handles for own in chosen])
         )
         return replace(rest.design(p, rest.placement_from(p, theta)), numbers=values)
+
+    def of_links(self, links: Sequence[DesignedLink]) -> list[LinkDesign]:
+        """Local. The shapes of ``links``, in their order.
+
+        Raises:
+            DescriptionError: a link has another number of parameters here.
+        """
+        given = {link.name: link for link in self.links}
+        for link in links:
+            size = link.parameters.place.stop - link.parameters.place.start
+            found = len(given[link.name].parameters) if link.name in given else 0
+            if found != size:
+                raise DescriptionError(
+                    f"design of {self.mechanism!r}",
+                    f"it has {found} parameters of link {link.name!r} instead of {size}",
+                    "Use a result of the same links, numbers of segments and ends_move",
+                )
+        return [given[link.name] for link in links]
 
     def values(self, scene: Scene) -> dict[NumberKind, float]:
         """The numbers by their kinds, of parts of a scene of the same mechanism. Local.
@@ -391,6 +413,7 @@ def link_designs(rest: ParametricShape, placement: HandlePlacement) -> tuple[Lin
                 centreline=tuple(map(tuple, link.centreline.tolist())),
                 same=tuple(image.name for image in link.images if not image.isometry.mirrors),
                 mirrored=tuple(image.name for image in link.images if image.isometry.mirrors),
+                ends_move=link.spline.ends_move,
             )
         )
     return tuple(designs)
