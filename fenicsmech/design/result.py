@@ -26,7 +26,7 @@ from fenicsmech.model import Design
 from fenicsmech.multibody import Linkage
 from fenicsmech.plot import DesignShape, LinkOutline, draw_designs
 from fenicsmech.quantities import NumberKind, read_kind
-from fenicsmech.simulation import MechanismPlotter, Simulation, rest_geometry
+from fenicsmech.simulation import MechanismPlotter, Simulation, joint_points, rest_geometry
 
 _FORMAT = "fenicsmech design 4"
 
@@ -460,7 +460,7 @@ def draw_links(
         old, new = (_outline(change, place, meshes[k], change.parameters.of(p)) for p, meshes in (before, after))
         joints = np.array([linkage.bodies[i].centre[:2] for i in linkage.interfaces[link]])
         shapes.append(DesignShape(link.name, old, new, joints))
-    rigid = MechanismPlotter(simulation.model).rigid(linkage.joints.drawn)
+    rigid = MechanismPlotter(simulation.model).rigid(linkage.joints.drawn, joint_points(linkage, linkage.joints.drawn))
     draw_designs(path, shapes, rigid=rigid, unit=scene.units.length, title=f"{scene.mechanism.name}: links")
 
 
