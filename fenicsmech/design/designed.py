@@ -14,7 +14,7 @@ from fenicsmech.design.numbers import Number
 from fenicsmech.design.objective import Group, Objective, sample_numbers, split
 from fenicsmech.design.regularisers import Regulariser
 from fenicsmech.design.rest_shape import ParametricShape
-from fenicsmech.design.result import DesignResult
+from fenicsmech.design.result import DesignResult, shapes_of
 from fenicsmech.design.shape.handle_optimum import HandlePlacement
 from fenicsmech.design.shape.shape_map import LinkShape, shape_links
 from fenicsmech.design.target import Comparison, Target, check_targets
@@ -135,7 +135,7 @@ class DesignedSimulation:
                     "design", f"parameters of shape {parameters.shape}", f"Give {len(self.rest.initial)} finite numbers"
                 )
             return parameters, None
-        own = design.of_links(self.rest.links)
+        own = shapes_of(design, self.rest.links)
         known = {number.name: number.value for number in design.numbers}
         for number in self.numbers:
             if str(number) not in known:

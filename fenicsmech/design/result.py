@@ -259,30 +259,12 @@ class DesignResult:
         values, dim = self.values(simulation.scene), simulation.linkage.dim
         places = [(kind, own) for kind, own in zip(values, self.numbers, strict=True) if kind.changes(dim)]
         rest = ParametricShape.of(simulation, designs, [Number(kind, *own.bounds) for kind, own in places])
-        scaled, chosen = [own.scaled for _, own in places], self.of_links(rest.links)
+        scaled, chosen = [own.scaled for _, own in places], shapes_of(self, rest.links)
         p, theta = (
             np.concatenate([np.zeros(0), *parts])
             for parts in ([*(own.parameters for own in chosen), scaled], [own.handles for own in chosen])
         )
         return replace(rest.design(p, rest.placement_from(p, theta)), numbers=values)
-
-    def of_links(self, links: Sequence[DesignedLink]) -> list[LinkDesign]:
-        """Local. The shapes of ``links``, in their order.
-
-        Raises:
-            DescriptionError: a link has another number of parameters here.
-        """
-        given = {link.name: link for link in self.links}
-        for link in links:
-            size = link.parameters.place.stop - link.parameters.place.start
-            found = len(given[link.name].parameters) if link.name in given else 0
-            if found != size:
-                raise DescriptionError(
-                    f"design of {self.mechanism!r}",
-                    f"it has {found} parameters of link {link.name!r} instead of {size}",
-                    "Use a result of the same links, numbers of segments and ends_move",
-                )
-        return [given[link.name] for link in links]
 
     def values(self, scene: Scene) -> dict[NumberKind, float]:
         """The numbers by their kinds, of parts of a scene of the same mechanism. Local.
@@ -417,6 +399,25 @@ def link_designs(rest: ParametricShape, placement: HandlePlacement) -> tuple[Lin
             )
         )
     return tuple(designs)
+
+
+def shapes_of(result: DesignResult, links: Sequence[DesignedLink]) -> list[LinkDesign]:
+    """Local. The shapes in a result of ``links``, in their order.
+
+    Raises:
+        DescriptionError: a link has another number of parameters there.
+    """
+    given = {link.name: link for link in result.links}
+    for link in links:
+        size = link.parameters.place.stop - link.parameters.place.start
+        found = len(given[link.name].parameters) if link.name in given else 0
+        if found != size:
+            raise DescriptionError(
+                f"design of {result.mechanism!r}",
+                f"it has {found} parameters of link {link.name!r} instead of {size}",
+                "Use a result of the same links, numbers of segments and ends_move",
+            )
+    return [given[link.name] for link in links]
 
 
 def rest_meshes(simulation: Simulation, links: Sequence[FlexibleLink]) -> list[LinkMesh]:
