@@ -26,7 +26,7 @@ from fenicsmech.model import Design
 from fenicsmech.multibody import Linkage
 from fenicsmech.plot import DesignShape, LinkOutline, draw_designs
 from fenicsmech.quantities import NumberKind, read_kind
-from fenicsmech.simulation import MechanismPlotter, Simulation, joint_points, rest_geometry
+from fenicsmech.simulation import MechanismPlotter, Simulation, rest_geometry
 
 _FORMAT = "fenicsmech design 4"
 
@@ -449,9 +449,14 @@ def draw_links(
     designed: Sequence[DesignedLink],
     before: tuple[np.ndarray, Sequence[LinkMesh]],
     after: tuple[np.ndarray, Sequence[LinkMesh]],
+    joints: np.ndarray,
 ) -> None:
-    """Local. Draws links before and after a change, from the parameters p and the meshes of both."""
+    """Local. Draws links before and after a change, from the parameters p and the meshes of both.
+
+    ``joints`` are points of connections after it, on both of their bodies, (connections, 2, 2).
+    """
     scene, linkage, shapes = simulation.scene, simulation.linkage, []
+    ends = np.array([(c.a, c.b) for c in linkage.joints.connections])
     places = [
         (change, place)
         for change in designed
@@ -459,9 +464,8 @@ def draw_links(
     ]
     for k, (link, (change, place)) in enumerate(zip(links, places, strict=True)):
         old, new = (_outline(change, place, meshes[k], change.parameters.of(p)) for p, meshes in (before, after))
-        joints = np.array([linkage.bodies[i].centre[:2] for i in linkage.interfaces[link]])
-        shapes.append(DesignShape(link.name, old, new, joints))
-    rigid = MechanismPlotter(simulation.model).rigid(linkage.joints.drawn, joint_points(linkage, linkage.joints.drawn))
+        shapes.append(DesignShape(link.name, old, new, joints[np.isin(ends, linkage.interfaces[link])]))
+    rigid = MechanismPlotter(simulation.model).rigid(linkage.joints.drawn, joints)
     draw_designs(path, shapes, rigid=rigid, unit=scene.units.length, title=f"{scene.mechanism.name}: links")
 
 
