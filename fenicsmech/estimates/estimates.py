@@ -16,13 +16,13 @@ e_p of p and e_q of its adjoint q:
 
     + ∫ e_p ∂²Π/∂p∂F : ∇e_z + e_q ∂²Π/∂p∂F : ∇e_u + e_p ∂²Π/∂p² e_q dV.
 
-The gradient of the linear pressure p, recovered as a continuous linear field G and integrated along the edges of each
-cell from its vertices, where p is most accurate, gives a quadratic p*. With w = p − ½ G · X and I w its interpolation
-at the vertices,
+The gradient of the linear pressure p on the rest shape, recovered as a continuous linear field G and integrated along
+the edges of each cell from its vertices, where p is most accurate, gives a quadratic p*. With w = p − ½ G · X and I w
+its interpolation at the vertices,
 
     e_p ≈ p* − p = I w − w,
 
-where p is linear ½ Σ λ_i λ_j (G_i − G_j) · (X_j − X_i) over the edges of a cell. Not included: with elements of order
+in straight cells ½ Σ λ_i λ_j (G_i − G_j) · (X_j − X_i) over the edges. Not included: with elements of order
 1, the approximation of curved outlines by polygons.
 
 Error of plane stress: pins hold links all through their depth, so that near them links cannot contract there. Blocked
@@ -331,8 +331,9 @@ class PressureError:
         self._gradient = fem.Function(vector_space(elastic.mesh, 1), name=f"recovered_gradient_of_{field.name}")
         self._sums = fem.Function(self._gradient.function_space)
         test = ufl.TestFunction(self._gradient.function_space)
-        self._right_hand_side = compile_form(ufl.inner(ufl.grad(field), test) * recovery.volume * elastic.free(2))
-        w = field - 0.5 * ufl.dot(self._gradient, ufl.SpatialCoordinate(elastic.mesh))
+        recovered = ufl.inner(elastic.gradient(field), test)
+        self._right_hand_side = compile_form(recovered * recovery.volume * elastic.free(2))
+        w = field - 0.5 * ufl.dot(self._gradient, elastic.rest)
         V = scalar_space(elastic.mesh, 1)
         self._interpolated = fem.Function(V, name=f"interpolated_{field.name}")
         self._expression = compile_expression(w, interpolation_points(V), elastic.mesh.comm)

@@ -38,10 +38,17 @@ class Case:
     targets: Sequence[fm.Target] = ()
 
     def simulate(
-        self, space: str = "plane-stress", *, size: float = 3.0, order: int = 2, comm: MPI.Comm = MPI.COMM_SELF
+        self,
+        space: str = "plane-stress",
+        *,
+        size: float = 3.0,
+        order: int = 2,
+        formulation: fm.MixedFormulation | None = None,
+        comm: MPI.Comm = MPI.COMM_SELF,
     ) -> fm.Simulation:
         """The mechanism at a fidelity."""
-        return fm.Simulation(self.scene, space=space, size=size, order=order, comm=comm)
+        given = {"space": space, "size": size, "order": order, "formulation": formulation}
+        return fm.Simulation(self.scene, **given, comm=comm)
 
     def problem(self, *, regulariser: Regulariser | None = None, **fidelity) -> fm.DesignProblem:
         """The design problem at a fidelity."""

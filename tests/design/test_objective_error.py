@@ -71,16 +71,21 @@ def test_designs_carry_the_errors_of_displacements_and_objective():
     )
 
 
-def test_estimates_do_not_know_whether_a_shape_was_drawn_or_designed(monkeypatch):
+@pytest.mark.parametrize(
+    "fidelity",
+    [{}, {"space": "plane-strain", "formulation": fm.MixedFormulation(above=0.3)}],
+    ids=["displacement", "pressure"],
+)
+def test_estimates_do_not_know_whether_a_shape_was_drawn_or_designed(fidelity, monkeypatch):
     case = truss((0.1, 6.0), (0.4, 9.0))
-    problem = case.problem(size=4.0)
+    problem = case.problem(size=4.0, **fidelity)
     sim, push = problem.simulation, case.targets[0].quantity.part
-    result = problem.optimise(optimiser=fm.LevenbergMarquardt(iterations=2))
+    result = problem.optimise(optimiser=fm.LevenbergMarquardt(iterations=2), surrogate=None)
     curve = sim.with_design(result).load_displacement(push, forces=[0.1, 0.4])
     with sim.model.shaped(result.rest_shape(sim)):
         links = rest_meshes(sim, sim.scene.mechanism.flexible_links)
     monkeypatch.setattr(model, "mesh_links", lambda *_: links)
-    drawn = case.simulate(size=4.0).load_displacement(push, forces=[0.1, 0.4])
+    drawn = case.simulate(size=4.0, **fidelity).load_displacement(push, forces=[0.1, 0.4])
     assert drawn.displacements == pytest.approx(curve.displacements, rel=1e-6)
     assert drawn.error_estimates() == pytest.approx(curve.error_estimates(), rel=1e-4)
 
