@@ -80,9 +80,9 @@ def test_estimates_do_not_know_whether_a_shape_was_drawn_or_designed(fidelity, m
     case = truss((0.1, 6.0), (0.4, 9.0))
     problem = case.problem(size=4.0, **fidelity)
     sim, push = problem.simulation, case.targets[0].quantity.part
-    result = problem.optimise(optimiser=fm.LevenbergMarquardt(iterations=2), surrogate=None)
-    curve = sim.with_design(result).load_displacement(push, forces=[0.1, 0.4])
-    with sim.model.shaped(result.rest_shape(sim)):
+    design = problem.rest_shape(1.05 * problem.initial)
+    curve = sim.with_design(design).load_displacement(push, forces=[0.1, 0.4])
+    with sim.model.shaped(design):
         links = rest_meshes(sim, sim.scene.mechanism.flexible_links)
     monkeypatch.setattr(model, "mesh_links", lambda *_: links)
     drawn = case.simulate(size=4.0, **fidelity).load_displacement(push, forces=[0.1, 0.4])
