@@ -64,7 +64,7 @@ def main():
     options = parser.parse_args()
     lines = []
     for name in options.demos:
-        kept = options.results / f"{name}.json"
+        kept = options.results / (f"{name}.json" if options.size is None else f"{name}-{options.size:g}.json")
         if not kept.exists():
             verified(name, options.size).save(kept)
         lines += rows(name, fm.DesignResult.load(kept))

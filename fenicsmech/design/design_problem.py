@@ -34,7 +34,7 @@ from fenicsmech.meshing import LinkMesh
 from fenicsmech.model import Design
 from fenicsmech.multibody import JointChange, build_linkage
 from fenicsmech.quantities import joint_changes
-from fenicsmech.simulation import Simulation
+from fenicsmech.simulation import Simulation, joint_points
 
 _log = logger(__name__)
 
@@ -217,8 +217,12 @@ class DesignProblem:
         links = [link for own in self._own.shapes for link in own.links]
         both = (self.initial, None), self._own.given(design)
         before, after = ((given[0], self._meshes(links, given)[0]) for given in both)
+        linkage = self.simulation.linkage
+        with self.simulation.model.shaped(self._own.rest.design(*both[1])):
+            joints = joint_points(linkage, linkage.joints.drawn)
         on_one(
-            self.simulation.comm, lambda: draw_links(path, self.simulation, links, self._own.rest.links, before, after)
+            self.simulation.comm,
+            lambda: draw_links(path, self.simulation, links, self._own.rest.links, before, after, joints),
         )
 
     def export(

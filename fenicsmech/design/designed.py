@@ -14,7 +14,7 @@ from fenicsmech.design.numbers import Number
 from fenicsmech.design.objective import Group, Objective, sample_numbers, split
 from fenicsmech.design.regularisers import Regulariser
 from fenicsmech.design.rest_shape import ParametricShape
-from fenicsmech.design.result import DesignResult
+from fenicsmech.design.result import DesignResult, shapes_of
 from fenicsmech.design.shape.handle_optimum import HandlePlacement
 from fenicsmech.design.shape.shape_map import LinkShape, shape_links
 from fenicsmech.design.target import Comparison, Target, check_targets
@@ -137,16 +137,7 @@ class DesignedSimulation:
                     "design", f"parameters of shape {parameters.shape}", f"Give {len(self.rest.initial)} finite numbers"
                 )
             return parameters, None
-        given = {link.name: link for link in design.links}
-        for link in self.rest.links:
-            place = link.parameters.place
-            size, found = place.stop - place.start, len(given[link.name].parameters) if link.name in given else 0
-            if found != size:
-                raise DescriptionError(
-                    f"design of {design.mechanism!r}",
-                    f"it has {found} parameters of link {link.name!r} instead of {size}",
-                    "Use a result of the same links and numbers of segments",
-                )
+        own = shapes_of(design, self.rest.links)
         known = {number.name: number.value for number in design.numbers}
         for number in self.numbers:
             if str(number) not in known:
@@ -154,7 +145,6 @@ class DesignedSimulation:
                     f"design of {design.mechanism!r}", f"it has no {number}", "Use a result of the same numbers"
                 )
         values = self.rest.numbers.scaled([known[str(number)] for number in self.numbers])
-        own = [given[link.name] for link in self.rest.links]
         parameters = np.concatenate([*(o.parameters for o in own), values])
         theta = np.concatenate([np.zeros(0), *(o.handles for o in own)])
         return parameters, self.rest.placement_from(parameters, theta)

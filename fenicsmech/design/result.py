@@ -45,6 +45,7 @@ class LinkDesign:
         bend: largest curvature ratio.
         centreline: points that the drawn centreline runs through, as given, drawn or found.
         same, mirrored: names of links that are the same part, and of mirror images of it.
+        ends_move: whether the places of free ends are among the parameters.
     """
 
     name: str
@@ -56,6 +57,7 @@ class LinkDesign:
     centreline: tuple[tuple[float, ...], ...] | None = None
     same: tuple[str, ...] = ()
     mirrored: tuple[str, ...] = ()
+    ends_move: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -229,7 +231,8 @@ class DesignResult:
         """The design on the mesh of a simulation of the same mechanism.
 
         Raises:
-            DescriptionError: the mechanism has no such links, or no parts with such numbers.
+            DescriptionError: the mechanism has no such links, their splines have not as many parameters, or it has no
+                parts with such numbers.
             ShapeError: cells of the mesh are inverted in this shape.
         """
         links = {link.name: link for link in simulation.scene.mechanism.flexible_links}
@@ -245,6 +248,7 @@ class DesignResult:
                 links[own.name],
                 len(own.controls) - 1,
                 centreline=own.centreline,
+                ends_move=own.ends_move,
                 same=[links[name] for name in own.same],
                 mirrored=[links[name] for name in own.mirrored],
             )
@@ -255,10 +259,10 @@ class DesignResult:
         values, dim = self.values(simulation.scene), simulation.linkage.dim
         places = [(kind, own) for kind, own in zip(values, self.numbers, strict=True) if kind.changes(dim)]
         rest = ParametricShape.of(simulation, designs, [Number(kind, *own.bounds) for kind, own in places])
-        scaled = [own.scaled for _, own in places]
+        scaled, chosen = [own.scaled for _, own in places], shapes_of(self, rest.links)
         p, theta = (
             np.concatenate([np.zeros(0), *parts])
-            for parts in ([*(own.parameters for own in self.links), scaled], [own.handles for own in self.links])
+            for parts in ([*(own.parameters for own in chosen), scaled], [own.handles for own in chosen])
         )
         return replace(rest.design(p, rest.placement_from(p, theta)), numbers=values)
 
@@ -391,9 +395,29 @@ def link_designs(rest: ParametricShape, placement: HandlePlacement) -> tuple[Lin
                 centreline=tuple(map(tuple, link.centreline.tolist())),
                 same=tuple(image.name for image in link.images if not image.isometry.mirrors),
                 mirrored=tuple(image.name for image in link.images if image.isometry.mirrors),
+                ends_move=link.spline.ends_move,
             )
         )
     return tuple(designs)
+
+
+def shapes_of(result: DesignResult, links: Sequence[DesignedLink]) -> list[LinkDesign]:
+    """Local. The shapes in a result of ``links``, in their order.
+
+    Raises:
+        DescriptionError: a link has another number of parameters there.
+    """
+    given = {link.name: link for link in result.links}
+    for link in links:
+        size = link.parameters.place.stop - link.parameters.place.start
+        found = len(given[link.name].parameters) if link.name in given else 0
+        if found != size:
+            raise DescriptionError(
+                f"design of {result.mechanism!r}",
+                f"it has {found} parameters of link {link.name!r} instead of {size}",
+                "Use a result of the same links, numbers of segments and ends_move",
+            )
+    return [given[link.name] for link in links]
 
 
 def rest_meshes(simulation: Simulation, links: Sequence[FlexibleLink]) -> list[LinkMesh]:
@@ -425,9 +449,14 @@ def draw_links(
     designed: Sequence[DesignedLink],
     before: tuple[np.ndarray, Sequence[LinkMesh]],
     after: tuple[np.ndarray, Sequence[LinkMesh]],
+    joints: np.ndarray,
 ) -> None:
-    """Local. Draws links before and after a change, from the parameters p and the meshes of both."""
+    """Local. Draws links before and after a change, from the parameters p and the meshes of both.
+
+    ``joints`` are points of connections after it, on both of their bodies, (connections, 2, 2).
+    """
     scene, linkage, shapes = simulation.scene, simulation.linkage, []
+    ends = np.array([(c.a, c.b) for c in linkage.joints.connections])
     places = [
         (change, place)
         for change in designed
@@ -435,9 +464,8 @@ def draw_links(
     ]
     for k, (link, (change, place)) in enumerate(zip(links, places, strict=True)):
         old, new = (_outline(change, place, meshes[k], change.parameters.of(p)) for p, meshes in (before, after))
-        joints = np.array([linkage.bodies[i].centre[:2] for i in linkage.interfaces[link]])
-        shapes.append(DesignShape(link.name, old, new, joints))
-    rigid = MechanismPlotter(simulation.model).rigid(linkage.joints.drawn)
+        shapes.append(DesignShape(link.name, old, new, joints[np.isin(ends, linkage.interfaces[link])]))
+    rigid = MechanismPlotter(simulation.model).rigid(linkage.joints.drawn, joints)
     draw_designs(path, shapes, rigid=rigid, unit=scene.units.length, title=f"{scene.mechanism.name}: links")
 
 

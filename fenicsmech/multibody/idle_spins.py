@@ -35,7 +35,7 @@ class IdleSpin:
     Attributes:
         system: joints and links as rigid bodies.
         bodies: indices of the bodies.
-        balls: of both ball joints the index of the connection, and that of its body in ``bodies``.
+        balls: of one ball joint at either place the index of the connection, and that of its body in ``bodies``.
     """
 
     system: JointSystem
@@ -84,9 +84,13 @@ def idle_spins(linkage: Linkage, acted_on: Collection[int] = ()) -> tuple[IdleSp
             continue
         held = [(k, c) for k, c in balls.items() if group[c.a] != group[c.b]]
         ends = [(k, body) for k, c in held for body in (c.a, c.b) if group[body] == label]
-        if len(ends) != 2:
+        if not ends:
             continue
-        first, second = (system.place(k, body, system.drawn) for k, body in ends)
-        if np.linalg.norm(second - first) > 1e-9 * linkage.length:
-            found.append(IdleSpin(system, bodies, (ends[0], ends[1])))
+        # balls of several links may share a place
+        places = np.array([system.place(k, body, system.drawn) for k, body in ends])
+        from_first = np.linalg.norm(places - places[0], axis=1)
+        last = int(np.argmax(from_first))
+        from_last, rounding = np.linalg.norm(places - places[last], axis=1), 1e-9 * linkage.length
+        if from_first[last] > rounding and np.all(np.minimum(from_first, from_last) <= rounding):
+            found.append(IdleSpin(system, bodies, (ends[0], ends[last])))
     return tuple(found)

@@ -27,6 +27,7 @@ from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import Force, Link, in_dimension
 from fenicsmech.meshing import CurvedEdges, node_ends
 from fenicsmech.model import MechanismModel
+from fenicsmech.multibody import Linkage
 from fenicsmech.plot import Arrow, FlexibleShape, MechanismShape, Pin, RigidShape, plan_view, rigid_outline
 from fenicsmech.simulation.frame import Frame
 
@@ -40,12 +41,21 @@ class Snapshot:
         displacement: from there, (vertices, dim).
         von_mises: at the midpoints of the mesh's cells, (cells,).
         poses: (bodies, pose_size).
+        joints: points of each connection on both of its bodies, in the plane, (connections, 2, 2).
     """
 
     rest: np.ndarray
     displacement: np.ndarray
     von_mises: np.ndarray
     poses: np.ndarray
+    joints: np.ndarray
+
+
+def joint_points(linkage: Linkage, poses: np.ndarray) -> np.ndarray:
+    """Points of each connection at ``poses`` on both of its bodies, in the plane, (connections, 2, 2)."""
+    system = linkage.joints
+    pairs = [[system.place(k, body, poses)[:2] for body in (c.a, c.b)] for k, c in enumerate(system.connections)]
+    return np.array(pairs).reshape(-1, 2, 2)
 
 
 def at_vertices(model: MechanismModel, field: fem.Function) -> np.ndarray:
@@ -96,12 +106,12 @@ def gather(model: MechanismModel, frame: Frame) -> Snapshot | None:
     with model.shaped(frame.design):
         model.load(frame.state)
         u, stress = at_vertices(model, elastic.u), elastic.von_mises()[:own]
-        rest = rest_vertices(model)
+        rest, joints = rest_vertices(model), joint_points(model.linkage, frame.state.poses)
     displacement = _gathered(mesh.comm, original_nodes(mesh), u, len(model.mesh.vertices))
     von_mises = _gathered(mesh.comm, original_cells(mesh)[:own], stress, len(model.mesh.cells))
     if rest is None or displacement is None or von_mises is None:
         return None
-    return Snapshot(rest, displacement, von_mises, frame.state.poses)
+    return Snapshot(rest, displacement, von_mises, frame.state.poses, joints)
 
 
 class MechanismPlotter:
@@ -119,12 +129,16 @@ class MechanismPlotter:
             FlexibleShape(positions, triangles, snapshot.von_mises[cells] if stress else None, name=link.name)
             for (triangles, cells), link in zip(self._faces, self._mechanism.flexible_links, strict=True)
         )
-        return MechanismShape(flexible, self.rigid(snapshot.poses), self._pins(snapshot.poses))
+        pins = tuple(
+            Pin(points[0], welded=each.kind.clamps)
+            for each, points in zip(self._linkage.joints.connections, snapshot.joints, strict=True)
+        )
+        return MechanismShape(flexible, self.rigid(snapshot.poses, snapshot.joints), pins)
 
-    def rigid(self, poses: np.ndarray) -> tuple[RigidShape, ...]:
-        """The rigid links at ``poses`` (bodies, pose_size)."""
+    def rigid(self, poses: np.ndarray, joints: np.ndarray) -> tuple[RigidShape, ...]:
+        """The rigid links at ``poses`` (bodies, pose_size), with the points of ``joints`` there."""
         return tuple(
-            RigidShape(rigid_outline(self._places(link, poses), self._width), link.name, link.fixed)
+            RigidShape(rigid_outline(self._places(link, poses, joints), self._width), link.name, link.fixed)
             for link in self._mechanism.rigid_links
         )
 
@@ -135,24 +149,20 @@ class MechanismPlotter:
 
     def position(self, link: Link, at: Sequence[float], poses: np.ndarray) -> np.ndarray:
         """Position of the point drawn at ``at`` of ``link``, (2,); a flexible link moves with its first interface."""
-        return self._moved(self._linkage.body_of(link), in_dimension(tuple(at), self._linkage.dim), poses)
+        drawn = np.array(in_dimension(tuple(at), self._linkage.dim))
+        return (drawn + self._linkage.point(link, at).displacement(None, poses))[:2]
 
-    def _places(self, link: Link, poses: np.ndarray) -> np.ndarray:
-        """Current positions of the joints, forces and outputs of a rigid link, (k, 2)."""
-        joints = [joint.at for joint in self._mechanism.joints if link in (joint.a, joint.b)]
-        points = [part.at for part in (*self._mechanism.forces, *self._mechanism.outputs) if part.on == link]
-        return np.array([self.position(link, at, poses) for at in (*joints, *points)])
-
-    def _pins(self, poses: np.ndarray) -> tuple[Pin, ...]:
-        return tuple(
-            Pin(self._moved(each.a, each.at, poses), welded=each.kind.clamps)
-            for each in self._linkage.joints.connections
-        )
-
-    def _moved(self, body: int, at: Sequence[float], poses: np.ndarray) -> np.ndarray:
-        """Position of the point drawn at ``at`` of a body, (2,)."""
-        offset = np.array(at) - np.array(self._linkage.bodies[body].centre)
-        return (np.array(at) + self._linkage.joints.space.displace(poses[body], offset[None])[0])[:2]
+    def _places(self, link: Link, poses: np.ndarray, joints: np.ndarray) -> np.ndarray:
+        """Positions of the joints, forces and outputs of a rigid link, (k, 2)."""
+        body, connections = self._linkage.body_of(link), self._linkage.joints.connections
+        held = [
+            point
+            for each, points in zip(connections, joints, strict=True)
+            for own, point in zip((each.a, each.b), points, strict=True)
+            if own == body
+        ]
+        parts = [part for part in (*self._mechanism.forces, *self._mechanism.outputs) if part.on == link]
+        return np.array([*held, *(self.position(link, part.at, poses) for part in parts)])
 
     def _visible(self, index: int) -> tuple[np.ndarray, np.ndarray]:
         """Triangles of a link seen from above, and the cell each belongs to."""

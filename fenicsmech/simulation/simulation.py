@@ -258,7 +258,9 @@ class Simulation:
         Raises:
             AssemblyError: one of the configurations does not assemble, or its motors strain the links.
         """
-        linkage, springs = self.linkage, spring_potentials(self.scene.effects, self.linkage)
+        linkage, designed = self.linkage, self._design is not None
+        # designs change the model's springs; those drawn need no mesh
+        springs = self.model.spring_potentials if designed else spring_potentials(self.scene.effects, linkage)
         point, drawn = linkage.point(part.on, part.at), np.array(in_dimension(part.at, linkage.dim))
         positions = []
         for configuration in configurations:

@@ -370,12 +370,13 @@ class CurveStepper:
         """|r · u̇ + ∂L/∂z · ż| of a motion."""
         model, linkage, owned = self._model, self._model.linkage, self._model.interfaces.owned
         u = state.u[: owned * model.interfaces.block].reshape(owned, -1)
+        places = u + model.elastic.drawn_nodes[:owned] + model.design_nodes.values(model.elastic.design)[:owned]
         velocity = np.zeros(u.shape)
         for number, link in enumerate(model.mechanism.flexible_links):
             body = linkage.interfaces[link][0]
             nodes = np.flatnonzero(model.node_link[:owned] == number)
             centre = np.array(linkage.bodies[body].centre) + state.poses[body, : linkage.dim]
-            offsets = (model.elastic.drawn_nodes[nodes] + u[nodes])[:, : linkage.dim] - centre
+            offsets = places[nodes][:, : linkage.dim] - centre
             velocity[nodes, : linkage.dim] = motion.at(body, offsets)
         nodal = model.mesh.mesh.comm.allreduce(float(residual.nodal @ velocity.ravel()))
         return abs(nodal + float(residual.rigid @ motion.z))

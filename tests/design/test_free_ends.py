@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -11,6 +14,7 @@ from fenicsmech.design import BETWEEN, MeshQuality, ShapeBounds, StayClose, rest
 
 from ..oracles.dense import taylor_rates
 from .mechanisms import PLASTIC, Case, objective
+from .refusal import refused
 
 TIP = (50.0, 0.0)
 REGULARISER = MeshQuality(limit=2.5, width=2.5) + ShapeBounds() + 1e-3 * StayClose()
@@ -95,6 +99,26 @@ def test_a_leaf_reaches_its_targets_and_its_exported_part_does(ends_move, tmp_pa
     part = fm.step_file(tmp_path / "blade.step", depth=6.0)
     again = part_curve(part, tuple(link.controls[-1][0][:2]))
     assert again == pytest.approx([4.0, 11.0], rel=0.02)
+
+
+def test_a_result_with_a_moved_end_has_the_same_curve_elsewhere_and_from_a_file(tmp_path):
+    case = leaf((5.0, 4.0), (15.0, 11.0), ends_move=True)
+    result = case.problem().optimise(optimiser=fm.LevenbergMarquardt(iterations=1))
+    assert np.linalg.norm(np.subtract(result.links[0].controls[-1][0][:2], TIP)) > 1e-3
+    result.save(tmp_path / "leaf.json")
+    simulation, push = case.simulate(), case.scene.mechanism.forces[0]
+    for given in (result, fm.DesignResult.load(tmp_path / "leaf.json")):
+        curve = simulation.with_design(given).load_displacement(push, forces=[5.0, 15.0])
+        assert curve.displacements == pytest.approx([target.reached for target in result.targets], rel=1e-9)
+    # files that do not say so are of ends that stay, and have two parameters less
+    data = json.loads((tmp_path / "leaf.json").read_text())
+    del data["links"][0]["ends_move"]
+    (tmp_path / "old.json").write_text(json.dumps(data))
+    old = fm.DesignResult.load(tmp_path / "old.json")
+    assert old == replace(result, links=(replace(result.links[0], ends_move=False),))
+    refused(
+        lambda: simulation.with_design(old), part="'leaf'", problem="15 parameters .* instead of 13", remedy="ends_move"
+    )
 
 
 def part_curve(part, tip) -> np.ndarray:

@@ -111,6 +111,21 @@ def test_joints_keep_their_places_when_links_are_made_of_another_material():
     assert drawn.measured(other) == pytest.approx(drawn.measured(there), rel=1e-12)
 
 
+def test_pictures_show_joints_where_numbers_place_them():
+    drawn, there = Machine(), Machine(SHIFTS)
+    shifts = {
+        fm.JointPosition(drawn.joints[name], direction=way): shift
+        for name, by in SHIFTS.items()
+        for way, shift in zip(((1, 0), (0, 1)), by, strict=True)
+    }
+    panel = designed(drawn.simulate(), shifts).load_displacement(drawn.push, forces=[0.0]).panel()
+    pins = {tuple(np.round(pin.at, 6)) for pin in panel.undeformed.pins}
+    assert pins >= {tuple(np.round(at, 6)) for at in there.places.values()}
+    (coupler,) = (shape.outline for shape in panel.undeformed.rigid if shape.name == "coupler")
+    (x, y), far = there.places["joint"], coupler.max(axis=0)
+    assert far[0] > x and far[1] > y
+
+
 def test_turned_axes_of_rigid_links_are_axes_drawn_so():
     turns = {"hinge": (0.3, -0.4, 0.0), "slider": (0.0, 0.2, 0.5)}
     (sim, push, joints), (there, other, _) = chain(), chain(turns)

@@ -216,3 +216,22 @@ def test_springs_are_as_stiff_as_the_moment_of_the_force_asks_for():
         assert result.numbers[0].value == pytest.approx(wanted, rel=1e-6)
         found = curve(case.simulation.with_design(result), case.force, [force])
         assert found == pytest.approx([ARM * np.sin(angle)], rel=1e-6)
+
+
+def test_paths_are_those_of_springs_as_designed():
+    # two springs in a row share the travel of a motor, k₁ x₁ = k₂ x₂
+    rig = fm.Mechanism("slides")
+    ground, slide, crank = rig.rigid("ground", fixed=True), rig.rigid("slide"), rig.rigid("crank")
+    leaf = rig.flexible("leaf", fm.strip([(0, -30), (20, -30)], thickness=6.0, depth=6.0), PLASTIC)
+    rig.weld(ground, leaf, at=(3, -30), interface_radius=2.0)
+    springs = [
+        fm.JointSpring(rig.prismatic(*links, at=(0, 0), axis=(1, 0)), 2.0)
+        for links in ((ground, slide), (slide, crank))
+    ]
+    motor = rig.motor(rig.prismatic(ground, crank, at=(0, 0), axis=(1, 0)))
+    push, scene = rig.force(on=slide, at=(0, 0), direction=(1, 0)), fm.Scene(rig, effects=springs)
+    sim = fm.Simulation(scene, space="plane-stress", order=1, size=6.0)
+    apart = [scene.configuration("apart", {motor: 5.0})]
+    soft = sim.with_design(fm.Design(sim.model.design.field, {fm.SpringStiffness(springs[0]): 0.5}))
+    assert soft.path(push, apart)[0] == pytest.approx((4.0, 0.0), abs=1e-9)
+    assert sim.path(push, apart)[0] == pytest.approx((2.5, 0.0), abs=1e-9)

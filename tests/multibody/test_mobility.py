@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fenicsmech.mechanism import Mechanism
-from fenicsmech.multibody import count_freedom
+from fenicsmech.multibody import build_linkage, count_freedom, idle_spins
 
 from .flexible_machines import finger, flexible_four_bar
 from .machine import Machine, freedom_as_drawn
@@ -78,6 +78,25 @@ def test_rod_between_two_balls_spins_about_itself():
     freedom = freedom_as_drawn(two_ball_rod(), 3)
     assert (freedom.mobility, freedom.mobile, freedom.redundancy) == (1, ("rod",), 0)
     assert freedom_as_drawn(two_ball_rod(driven=False), 3).mobility == 2
+
+
+def test_spins_are_idle_where_balls_hold_a_link_at_two_places():
+    def idle(*balls: tuple[float, float, float], acted_on: bool = False) -> int:
+        m = Mechanism("rod")
+        ground, rod = m.rigid("ground", fixed=True), m.rigid("rod")
+        for k, at in enumerate(balls):
+            other = m.rigid(f"other {k}")
+            m.spherical(rod, other, at=at)
+            m.weld(other, ground, at=at)
+        linkage = build_linkage(m, 3)
+        return len(idle_spins(linkage, {linkage.body_of(rod)} if acted_on else ()))
+
+    start, end = (0.0, 0.0, 0.0), (30.0, 5.0, 10.0)
+    assert idle(start, end) == 1
+    assert idle(start, end, acted_on=True) == 0
+    assert idle(start, start, end) == 1  # a node of three links
+    assert idle(start, end, (0.0, 5.0, 0.0)) == 0
+    assert idle(start, start) == 0
 
 
 def test_spin_without_effect_does_not_stop_the_assembly():

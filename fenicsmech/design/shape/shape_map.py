@@ -167,8 +167,8 @@ class LinkParameters:
         return LinkParameters(place, np.zeros(spline.size), matrix)
 
     def of(self, p: np.ndarray) -> np.ndarray:
-        """s (size,) of the design ``p``, which may have further entries than S has columns."""
-        return self.fixed + self.matrix @ p[: self.matrix.shape[1]]
+        """s (size,) of the design ``p``."""
+        return self.fixed + self.matrix @ p
 
 
 def shape_link(mesh: LinkMesh, request: ShapeRequest, others: Sequence[LinkMesh] = ()) -> LinkShape:
@@ -391,7 +391,7 @@ class ShapeMap:
         self._theta_ends = np.cumsum([len(h) for h in handles], dtype=int)[:-1]
 
     def parameters(self, p: np.ndarray) -> list[np.ndarray]:
-        """Parameters (size,) of the spline of each shape at the design ``p``, which may have further entries."""
+        """Parameters (size,) of the spline of each shape at the design ``p``."""
         return [own.of(p) for own in self.of_link]
 
     def positions(self, theta: np.ndarray) -> list[np.ndarray]:
