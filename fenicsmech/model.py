@@ -208,10 +208,21 @@ class Design:
     Attributes:
         field: the design field of the links' shapes, this rank's values with ghosts, flat.
         numbers: values of design numbers by their kind (``NumberKind``), in its unit; others are as drawn.
+
+    Raises:
+        DescriptionError: two numbers change the same.
     """
 
     field: np.ndarray
     numbers: Mapping[Any, float] = dataclasses.field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        kinds = list(self.numbers)
+        for k, kind in enumerate(kinds):
+            if (other := _contradicted(kind, kinds[:k])) is not None:
+                raise DescriptionError(
+                    str(kind), f"{other} is given too, and both change the same", "Give each number of a part once"
+                )
 
     def halfway(self, other: Design) -> Design:
         """The mean of both."""
@@ -296,6 +307,7 @@ class MechanismModel:
         self.node_link[cell_dofs(self.elastic.u.function_space)] = mesh.link[:, None]
         self._point_loads: dict[Force | Output, PointLoad] = {}
         self._numbers: dict[Hashable, Any] = {}
+        self._given_last: tuple[Hashable, ...] = ()
         self._shape = self.elastic.design
 
     @property
@@ -317,13 +329,18 @@ class MechanismModel:
 
     @property
     def design(self) -> Design:
-        """The present design, with all numbers that were asked for."""
-        return Design(self._shape.copy(), {kind: own.value for kind, own in self._numbers.items()})
+        """The present design, with all numbers that were asked for, but those that contradict the ones given last."""
+        told: list[Any] = []
+        for kind in (*self._given_last, *self._numbers):
+            if kind not in told and _contradicted(kind, told) is None:
+                told.append(kind)
+        return Design(self._shape.copy(), {kind: self._numbers[kind].value for kind in told})
 
     def number(self, kind):
         """The ``ModelNumber`` of a ``NumberKind`` on this model; designs of the model tell it from now on."""
         if kind not in self._numbers:
-            self._numbers[kind] = kind.on(self)
+            with self.shaped(Design(self._shape)):  # the drawn value is read off the parts
+                self._numbers[kind] = kind.on(self)
         return self._numbers[kind]
 
     def reshape(self, design: Design | np.ndarray) -> None:
@@ -335,9 +352,11 @@ class MechanismModel:
         given = self._given(design)
         for kind in given.numbers:
             self.number(kind)
-        for kind, own in self._numbers.items():
+        # drawn ones first: they may change the same parts as those given
+        for kind in sorted(self._numbers, key=lambda kind: kind in given.numbers):
+            own = self._numbers[kind]
             own.set(given.numbers.get(kind, own.drawn))
-        self._shape = np.array(given.field)
+        self._given_last, self._shape = tuple(given.numbers), np.array(given.field)
         design = self._field(given)
         self.elastic.reshape(design)
         self.interfaces.reshape(self.design_nodes.values(design))
@@ -477,6 +496,11 @@ class MechanismModel:
             clock=self.clock,
             comm=self.mesh.comm,
         )
+
+
+def _contradicted(kind: Any, others: Sequence[Any]) -> Any | None:
+    """The first of some kinds of numbers that changes the same as ``kind``."""
+    return next((other for other in others if not set(other.slots).isdisjoint(kind.slots)), None)
 
 
 def _stretches(links: Sequence[FlexibleLink], model: ElasticModel, effects: Sequence[Effect]) -> list[Stretch | None]:

@@ -39,8 +39,8 @@ class Experiment:
         configuration: motor positions.
 
     Raises:
-        DescriptionError: there are not as many forces as displacements, a number is not finite, or no force moves
-            anything.
+        DescriptionError: there are not as many forces as displacements, a number is not finite, no force moves
+            anything, or the simulation is one of another design.
     """
 
     simulation: Simulation
@@ -51,6 +51,7 @@ class Experiment:
 
     def __post_init__(self) -> None:
         part = f"measurements of {self.simulation.scene.mechanism.name!r}"
+        self.simulation.check_drawn(part)
         forces = np.array([finite(f"force among the {part}", value) for value in self.forces])
         displacements = np.array([finite(f"displacement among the {part}", value) for value in self.displacements])
         if len(forces) != len(displacements):

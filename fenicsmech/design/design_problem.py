@@ -52,14 +52,14 @@ class DesignProblem:
     description is checked at once.
 
     Args:
-        simulation: of the equilibria; it keeps its design. ``simulation.with_design`` gives one of a result.
+        simulation: of the equilibria, as drawn; it stays so. ``simulation.with_design`` gives one of a result.
         designs: the links and the numbers that may change.
         targets: requirements on the mechanism.
         regulariser: R; by default mesh quality, bounds of fabrication, and closeness to the drawing with weight 1e-4,
             where the paper has 1: with 1 the demos miss their targets (benchmarks/closeness.py).
 
     Raises:
-        DescriptionError: the problem contradicts itself or the simulation's scene.
+        DescriptionError: the problem contradicts itself or the simulation's scene, or that is one of another design.
         AssemblyError: a target's configuration does not assemble.
     """
 
@@ -194,7 +194,7 @@ class DesignProblem:
         """
         scatter, comm = scatter or Scatter(), self.simulation.comm
         alone = DesignProblem(
-            cheapest(self.simulation, self.targets).on(MPI.COMM_SELF),
+            cheapest(self.simulation, self.targets, self._own.numbers).on(MPI.COMM_SELF),
             self.designs,
             targets=self.targets,
             regulariser=self.regulariser,

@@ -43,7 +43,8 @@ class DesignedSimulation:
         changed: the links whose solids change.
 
     Raises:
-        DescriptionError: designs or targets name parts that the simulation does not have.
+        DescriptionError: designs or targets name parts that the simulation does not have, or it is one of another
+            design.
         AssemblyError: a target's configuration does not assemble.
     """
 
@@ -55,6 +56,7 @@ class DesignedSimulation:
         regulariser: Regulariser,
         clock: Clock,
     ) -> None:
+        simulation.check_drawn("design problem")
         check_targets(simulation, targets)
         self.simulation, self.designs, self.targets = simulation, tuple(designs), tuple(targets)
         self._regulariser, self.clock = regulariser, clock

@@ -241,7 +241,8 @@ def fingerprint(
         "effects": [repr(effect) for effect in simulation.scene.effects],
         "drawing": [repr(link) for link in mechanism.flexible_links],
         "links": [
-            [link.name, *(image.name for image in link.images), link.spline.initial.tolist()] for link in rest.links
+            [link.name, *((i.name, i.isometry.mirrors) for i in link.images), link.spline.initial.tolist()]
+            for link in rest.links
         ],
         "bounds": [repr(link.bounds) for link in rest.links],
         "numbers": [repr(own) for own in rest.numbers.numbers],

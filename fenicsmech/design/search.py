@@ -19,6 +19,7 @@ from scipy.stats import qmc
 
 from fenicsmech.collective import on_all
 from fenicsmech.design.correction import Correction
+from fenicsmech.design.numbers import Number
 from fenicsmech.design.optimisers.problem import Optimiser, Reason
 from fenicsmech.design.regularisers import ShapeBounds
 from fenicsmech.design.rest_shape import DesignedLink, ParametricShape
@@ -137,8 +138,8 @@ class SearchResult:
         return "\n".join([*lines, *(f"  {sentence}" for sentence in self.evidence)])
 
 
-def cheapest(simulation: Simulation, targets: Sequence[Target]) -> Simulation:
-    """The scene as drawn, in a plane model if it and the targets fit, with elements as large as strips are thick."""
+def cheapest(simulation: Simulation, targets: Sequence[Target], numbers: Sequence[Number]) -> Simulation:
+    """The scene as drawn, in a plane model if targets and numbers fit too, elements as large as strips are thick."""
     fidelity = simulation.fidelity
     sizes = {
         link: max(size, link.shape.thickness) if isinstance(link.shape, Strip) else size
@@ -154,9 +155,11 @@ def cheapest(simulation: Simulation, targets: Sequence[Target]) -> Simulation:
     if fidelity.model.dim == 3 and fits(simulation.scene, PLANE_STRESS):
         try:
             check_targets(flat := at(PLANE_STRESS), targets)
+            for number in numbers:
+                number.kind.check(flat.scene, flat.linkage.dim)
             return flat
         except DescriptionError:
-            pass  # a target names a part that a plane model does not have
+            pass  # a target names a part that a plane model does not have, or a number leaves the plane
     return at(fidelity.model)
 
 

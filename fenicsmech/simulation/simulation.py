@@ -423,6 +423,19 @@ class Simulation:
         with self._shaped():
             return CurveStepper(self._discretisation, request).unloaded
 
+    def check_drawn(self, part: str) -> None:
+        """Refuses a simulation ``with_design`` for a ``part`` that changes the design itself.
+
+        Raises:
+            DescriptionError: this is one.
+        """
+        if self._design is not None:
+            raise DescriptionError(
+                part,
+                f"its simulation of {self.scene.mechanism.name!r} has another design than the drawn one",
+                "Give it as drawn, before with_design(); problem.optimise(start=result) starts from a result",
+            )
+
     @contextmanager
     def _shaped(self) -> Iterator[None]:
         """A context in which the model has the design of this simulation."""

@@ -111,6 +111,13 @@ def test_data_that_tell_nothing_are_refused(forces, displacements, message):
         Experiment(simulation, push, forces, displacements)
 
 
+def test_specimens_of_another_design_are_refused():
+    simulation, push = bench(GUESS)
+    changed = simulation.with_design(np.zeros_like(simulation.model.elastic.shape.x.array))
+    with pytest.raises(DescriptionError, match="another design than the drawn one"):
+        Experiment(changed, push, (1.0,), (1.0,))
+
+
 def test_a_material_that_no_sample_is_made_of_is_refused():
     with pytest.raises(DescriptionError, match="no link of 'bench' is made of it"):
         fit_modulus([experiment(exact())], fm.ONYX)

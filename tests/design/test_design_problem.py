@@ -94,6 +94,16 @@ def test_the_drawn_shape_is_the_initial_design(reached):
     assert reached[1].targets[1].started == pytest.approx(drawn[0], rel=0.03)
 
 
+def test_simulations_of_another_design_are_refused(reached):
+    whole, result = reached
+    changed = whole.simulation.with_design(result)
+    for describe in (
+        lambda: fm.DesignProblem(changed, whole.designs, targets=whole.targets),
+        lambda: whole.optimise(surrogate=changed),
+    ):
+        refused(describe, part="design problem", problem="another design", remedy="start=result")
+
+
 @pytest.mark.thorough
 def test_an_unreachable_target_ends_with_the_best_design_and_says_what_holds_it_back():
     result = truss((0.4, 0.05), thickness=(2.0, 3.5)).problem().optimise()

@@ -28,6 +28,7 @@ from fenicsmech.design import (
     Start,
 )
 
+from ..effects.levers import lever
 from .mechanisms import PLASTIC, Case
 
 H = 3.0  # thickness of the link
@@ -285,6 +286,21 @@ def test_a_bar_may_bow_to_either_side_and_its_search_is_in_plane_stress_on_any_n
     assert up.processes == 1
     everywhere = MPI.COMM_WORLD.allgather([design.links for design in found.optima])
     assert everywhere == everywhere[:1] * len(everywhere)
+
+
+@pytest.mark.thorough
+def test_numbers_that_leave_the_plane_are_searched_in_space():
+    case = lever(lambda hinge: [fm.JointSpring(hinge, 60.0)], space="3d")
+    (spring,) = case.simulation.scene.effects
+    numbers = [
+        fm.Number(fm.JointAxis(case.joint, about=(1, 0, 0)), -0.4, 0.5),
+        fm.Number(fm.SpringStiffness(spring), 20.0, 200.0),
+    ]
+    targets = [fm.Target(case.force, force=0.5, displacement=10.0)]
+    problem = fm.DesignProblem(case.simulation, numbers, targets=targets)
+    found = problem.search(fm.Scatter(starts=1, trial=1), optimiser=fm.LevenbergMarquardt(iterations=1))
+    assert found.best.targets[0].error != 0.0
+    assert [own.name for own in found.best.numbers] == [str(own) for own in numbers]
 
 
 def test_a_bar_whose_bounds_hold_it_back_says_so():

@@ -33,13 +33,15 @@ def turned(x: np.ndarray) -> np.ndarray:
     return np.column_stack([22.0 - x[:, 0], 30.0 - x[:, 1]]) + (16.0, 0.0)
 
 
-def legs(*moves: Move, thickness: float = 2.0, radius: float = 2.0) -> tuple[fm.Scene, list[fm.FlexibleLink], fm.Force]:
-    """A table on a curved leg and its images, pushed sideways."""
+def legs(
+    *moves: Move, leg: np.ndarray = LEG, thickness: float = 2.0, radius: float = 2.0
+) -> tuple[fm.Scene, list[fm.FlexibleLink], fm.Force]:
+    """A table on a leg, curved by default, and its images, pushed sideways."""
     mechanism = fm.Mechanism("table")
     ground, table = mechanism.rigid("ground", fixed=True), mechanism.rigid("table")
     made = []
     for k, move in enumerate((lambda x: x, *moves)):
-        points = move(LEG)
+        points = move(leg)
         shape = fm.strip(points, thickness=thickness if k else 2.0, depth=5.0)
         made.append(mechanism.flexible(f"leg {k}", shape, PLASTIC))
         for end in (0, -1):
@@ -225,6 +227,20 @@ def test_imported_links_share_a_shape_up_to_their_meshes(tmp_path):
     assert np.max(np.abs(design.field)) > 0.05
     result = problem.optimise()
     assert result.worst_error < 0.01
+
+
+def test_checkpoints_of_shapes_that_are_shared_in_another_way_are_refused(tmp_path):
+    scene, (one, other), push = legs(shifted, leg=np.array([(10.0, 0.0), (10.0, 30.0)]))
+    file, targets = tmp_path / "checkpoint.json", [fm.Target(push, force=1.0, displacement=0.1)]
+
+    def problem(**how) -> fm.DesignProblem:
+        return Case(scene, [fm.SplineDesign(one, 2, **how)], targets).problem(space="plane-stress", size=4.0)
+
+    once = {"optimiser": fm.LevenbergMarquardt(iterations=1), "surrogate": None, "checkpoint": file}
+    problem(same=other).optimise(**once)
+    assert problem(same=other).optimise(**once, resume=True).iterations == 1
+    with pytest.raises(fm.DescriptionError, match="another problem, with other links"):
+        problem(mirrored=other).optimise(**once, resume=True)
 
 
 def test_links_that_are_no_images_are_refused():
