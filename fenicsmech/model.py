@@ -492,6 +492,7 @@ class MechanismModel:
             loads=loads,
             potentials=self.potentials,
             compliances=self._compliances,
+            one_sided=[constraint for effect in self.effects for constraint in effect.one_sided(self.fields)],
             idle=idle_spins(self.linkage, self._acted_on([controlled, *(load for load, _ in loads)])),
             clock=self.clock,
             comm=self.mesh.comm,

@@ -7,6 +7,7 @@
 - ``joint_compliance``: elastic pins
 - ``pressure``: of a fluid on the boundary of a link
 - ``prestrain``: links whose strain-free length is not the drawn one
+- ``one_sided``: constraints g ≥ 0 at points of the boundary, whose pressures may be unknowns
 - ``contact``: obstacles, and frictionless contact with them
 
 Each is an ``Effect`` of the ``mechanism`` layer in a file of its own. An effect that a scene does not list costs
@@ -19,5 +20,6 @@ from fenicsmech.effects.gravity import Gravity, Mass
 from fenicsmech.effects.joint_compliance import JointCompliance
 from fenicsmech.effects.joint_spring import JointSpring
 from fenicsmech.effects.link_fields import Boundary, Faces, LinkFields, find_boundaries
+from fenicsmech.effects.one_sided import OneSided
 from fenicsmech.effects.pressure import Pressure
 from fenicsmech.effects.prestrain import Prestrain

@@ -20,11 +20,14 @@ import ufl
 from dolfinx import fem
 
 from fenicsmech.effects.link_fields import Faces, LinkFields
+from fenicsmech.effects.one_sided import OneSided
 from fenicsmech.errors import DescriptionError, direction, in_plane, point, points, positive, set_fields
 from fenicsmech.mechanism import Effect, FlexibleLink, Link, RigidLink, in_dimension
 from fenicsmech.multibody import Linkage, PosePotential
 from fenicsmech.symbolic import SmoothFunction, derive
 
+
+_RELATIVE_STIFFNESS = 0.1
 
 class Obstacle(ABC):
     """A rigid, fixed obstacle."""
@@ -37,6 +40,11 @@ class Obstacle(ABC):
     @abstractmethod
     def gap(self, x, numbers, sqrt):
         """g at the coordinates ``x``, two or three, with ``numbers`` and ``sqrt``: of NumPy, UFL or SymPy."""
+
+    def smooth_gap(self, dim: int) -> SmoothFunction:
+        """g at many points in ``dim`` dimensions, with its derivatives."""
+        x, numbers = sympy.symbols(f"x:{dim}"), sympy.symbols(f"c:{len(self.numbers)}")
+        return derive([self.gap(x, numbers, sympy.sqrt)], x, numbers, many=True)
 
     @property
     def core(self) -> float | None:
@@ -180,6 +188,9 @@ class Contact(Effect):
     def faces(self):
         return (Faces(self.link),) if isinstance(self.link, FlexibleLink) else ()
 
+    def one_sided(self, fields):
+        return [_Surface(self, fields)] if isinstance(self.link, FlexibleLink) else []
+
     def link_energy(self, fields):
         if not isinstance(self.link, FlexibleLink):
             return None
@@ -200,10 +211,32 @@ class Contact(Effect):
             return fem.Constant(fields.mesh, self.stiffness)
         height = fields.dim * ufl.CellVolume(fields.mesh) / ufl.FacetArea(fields.mesh)
         # ten times more costs slender links several times the iterations
-        return fem.Constant(fields.mesh, 0.1 * link.material.law.E) / height
+        return fem.Constant(fields.mesh, _RELATIVE_STIFFNESS * link.material.law.E) / height
 
     def pose_potentials(self, linkage):
         return [_Points(self, linkage)] if isinstance(self.link, RigidLink) else []
+
+
+class _Surface(OneSided):
+    """The surface of a flexible link, at the points of the quadrature of its energy."""
+
+    def __init__(self, contact: Contact, fields: LinkFields) -> None:
+        self._obstacle, boundary = contact.obstacle, fields.boundaries[Faces(contact.link)]
+        super().__init__(fields, boundary, degree=2 * fields.order)
+        if contact.stiffness is not None:
+            stiffness = np.full(len(boundary.cells), contact.stiffness)
+        else:
+            stiffness = _RELATIVE_STIFFNESS * contact.link.material.law.E / self.heights()
+        self.compliances = self.at_points(1.0 / stiffness)
+
+    @cached_property
+    def _gap(self) -> SmoothFunction:
+        return self._obstacle.smooth_gap(self._body.model.dim)
+
+    def gap(self, x):
+        numbers = np.array([self._obstacle.numbers])
+        weights = np.ones((len(x), 1))
+        return self._gap.value(x, numbers)[:, 0], self._gap.gradient(x, numbers)[:, 0], self._gap.hessian(x, numbers, weights)
 
 
 class _Points(PosePotential):
@@ -234,8 +267,7 @@ class _Points(PosePotential):
 
     @cached_property
     def _gap(self) -> SmoothFunction:
-        x, numbers = sympy.symbols(f"x:{self._space.dim}"), sympy.symbols(f"c:{len(self._obstacle.numbers)}")
-        return derive([self._obstacle.gap(x, numbers, sympy.sqrt)], x, numbers, many=True)
+        return self._obstacle.smooth_gap(self._space.dim)
 
     def _touching(self, poses: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray, np.ndarray, np.ndarray]:
         """Of the points inside: arguments of g, −g, offsets from the body's centre, and ∂u/∂z."""

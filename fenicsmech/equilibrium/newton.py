@@ -43,6 +43,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from fenicsmech.equilibrium.control import Control
+from fenicsmech.equilibrium.interior_point import InteriorPressures
 from fenicsmech.equilibrium.linearisation import EquilibriumPoint, NotConverged
 from fenicsmech.equilibrium.solver import EquilibriumMethod, EquilibriumSolver
 from fenicsmech.equilibrium.state import State, Step
@@ -82,6 +83,7 @@ class PrimalDualNewton(EquilibriumMethod):
     largest_turn: float = 0.5
     reuse_factor: float = 1e-3
     path_iterations: int = 10
+    contact_changes: int = 3
     divergence: float = 1e3
 
     def __post_init__(self) -> None:
@@ -107,6 +109,7 @@ class NewtonSolver(EquilibriumSolver):
         best, not_better, line_search, diverged = (state, residual), 0, False, None
         last: tuple[State, np.ndarray] | None = None  # where the last step began, and its motion of the nodes
         residuals, shift, any_stability, predicted, norm = [], least, True, False, math.inf
+        touching, changes = system.touching(), 0
         for iteration in range(limit + 1):
             residuals.append(self.relative(residual))
             if self.converged(residual, norm) and iteration > 0:
@@ -145,6 +148,16 @@ class NewtonSolver(EquilibriumSolver):
                     residual = system.residual(state, control)
             elif near and shift == least and length == 1.0:
                 state, residual, norm = self._finish(state, control, residual, norm, step)
+            if len(system.one_sided) and changes >= 0:
+                now = system.touching()
+                changes += system.differ(now, touching)
+                touching = now
+                _log.debug("changes %d", changes)
+                if changes >= options.contact_changes:
+                    changes = -1
+                    found = self._interior(state, control, residual, residuals, limit - iteration - 1)
+                    if found is not None:
+                        state, residual, last, any_stability = *found, None, True
             if residual.norm < best[1].norm:
                 best, not_better = (state, residual), 0
             else:
@@ -154,6 +167,48 @@ class NewtonSolver(EquilibriumSolver):
                 system.load(state)
                 residual = system.residual(state, control)
         return self.accept_best(*best, control, residuals, self.exhausted(residuals, limit))
+
+    def _interior(
+        self, state: State, control: Control, residual: Residual, residuals: list[float], limit: int
+    ) -> tuple[State, Residual] | None:
+        """A state near the equilibrium, from iterations with the pressures of contact as unknowns; None in vain."""
+        system, options, begin = self.system, self.options, state
+        system.load(state)
+        force = residual.forces / system.unknowns.unit_u
+        pressures = InteriorPressures(system.one_sided, state.load_factor, force, system.comm)
+        shift, last = state.minimum_shift, None
+        for _ in range(limit):
+            system.pressures = pressures
+            try:
+                pressures.aim(0.0)
+                residual = system.residual(state, control)
+                system.linearise(state, control, residual, last)
+                x, shift = self._direction(residual, state.minimum_shift, last=shift, any_stability=False)
+                motion = system.unknowns.apply(x)[system.numbering.rows.nodes.local]
+                change = pressures.solved(-motion)
+                pressures.aim(pressures.target(change), change[0] * change[1])
+                residual = system.residual(state, control)
+                x = self.try_solve(residual.vector, self.step_accuracy(residual))
+                step = self.newton_step(x, state, control, residual)
+                motion = system.unknowns.apply(x)
+                change = pressures.solved(-motion[system.numbering.rows.nodes.local])
+                length = min(pressures.length(change), options.largest_turn / max(system.size(step), 1e-300))
+                before = state
+                for _ in range(12):
+                    state = system.moved(before, step.scaled(length))
+                    if math.isfinite(system.elastic_energy()):
+                        break
+                    length *= 0.5
+                pressures.advance(change, length)
+                last = (before, -length * motion) if options.predicted_stress and not system.blocks.pressures.size else None
+            finally:
+                system.pressures = None
+            plain = system.residual(state, control)
+            residuals.append(self.relative(plain))
+            _log.debug("interior: residual %.2e, plain %.2e, mu %.2e, length %.3f shift %.1e", self.relative(residual), residuals[-1], pressures.complementarity, length, shift)
+            if residuals[-1] < 1e-3:
+                return state, plain
+        return None
 
     def _direction(
         self, residual: Residual, least: float, *, last: float, any_stability: bool

@@ -20,9 +20,11 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from fenicsmech.compat import destroy_garbage
+from fenicsmech.effects import OneSided
 from fenicsmech.elasticity import ElasticBody, PredictedStress
 from fenicsmech.equilibrium.border import BorderTerms, PointLoad
 from fenicsmech.equilibrium.control import Control
+from fenicsmech.equilibrium.interior_point import InteriorPressures
 from fenicsmech.equilibrium.kkt import KktMatrix, create_extended_matrix
 from fenicsmech.equilibrium.state import State, Step, load_fields
 from fenicsmech.equilibrium.unknowns import Numbering, ScaledUnknowns
@@ -69,6 +71,7 @@ class EquilibriumSystem:
         potentials: of body poses.
         compliances: c by constraint row; 0 where none is given.
         idle: spins that nothing resists.
+        one_sided: constraints whose energy is in that of the links.
         clock: of the phases.
         comm: the processes that share the links.
 
@@ -76,6 +79,8 @@ class EquilibriumSystem:
         numbering: of rows and unknowns.
         blocks: of the unknowns.
         compliances: c, (rows,).
+        one_sided: constraints on links, whose pressures may be unknowns.
+        pressures: these, while they are; None otherwise.
         idle: spins that nothing resists, whose gauge K fixes.
         unknowns: x and G, at the poses of the last ``residual``.
         kkt: the KKT matrix last linearised; take it before another ``residual``.
@@ -92,6 +97,7 @@ class EquilibriumSystem:
         potentials: Sequence[PosePotential] = (),
         compliances: Mapping[int, float] = MappingProxyType({}),
         idle: Sequence[IdleSpin] = (),
+        one_sided: Sequence[OneSided] = (),
         clock: Clock,
         comm: MPI.Comm,
     ) -> None:
@@ -100,7 +106,8 @@ class EquilibriumSystem:
         self.controlled, self.clock, self.comm = controlled, clock, comm
         self.numbering = numbering = Numbering(comm, interfaces, joints, elastic.pressure)
         self.blocks = numbering.unknowns
-        self.idle = tuple(idle)
+        self.idle, self.one_sided = tuple(idle), tuple(one_sided)
+        self.pressures: InteriorPressures | None = None
         self.compliances = np.array([compliances.get(row, 0.0) for row in range(joints.rows)])
         self._border = BorderTerms(
             elastic,
@@ -228,6 +235,8 @@ class EquilibriumSystem:
             self.unknowns.turn(state.poses)
             scale, joints = self.unknowns.scale, self.joints
             r = self.elastic.residuals()
+            if self.pressures is not None:
+                r[self.numbering.rows.nodes.local] += self.pressures.forces()
             loads, rigid_loads = self._border.load_forces(self._border.loads(state), state)
             r -= loads
             reactions = joints.gradient(state.poses, state.motors).T @ state.multipliers
@@ -250,6 +259,15 @@ class EquilibriumSystem:
             moments = self._moments(nodal)
             return Residual(vector, vector.norm(), float(np.sqrt(forces)), gap, motion, moments, nodal, poses.copy())
 
+    def touching(self) -> np.ndarray:
+        """Whether each point of one-sided constraints on this rank is inside. Local."""
+        for constraints in self.one_sided:
+            constraints.update()
+        return np.concatenate([np.zeros(0, bool), *(constraints.gaps < 0.0 for constraints in self.one_sided)])
+
+    def differ(self, one: np.ndarray, other: np.ndarray) -> bool:
+        return self.comm.allreduce(int((one != other).sum())) > 0
+
     # -- derivatives at the loaded state -------------------------------------------------------------------
 
     def linearise(
@@ -261,6 +279,9 @@ class EquilibriumSystem:
         """
         self.kkt.set_stiffness()
         moments = residual.moments
+        if self.pressures is not None:
+            with self.clock.phase("assemble"):
+                self.pressures.add_stiffness(self.kkt.extended, self.numbering)
         if last is not None:
             with self.clock.phase("assemble"):
                 self._predicted_stress.take(last[0].u, last[1])

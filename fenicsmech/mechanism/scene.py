@@ -54,6 +54,11 @@ class Effect(ABC):
         """A potential energy of flexible links in UFL, a form in the ``LinkFields``; None if no link is concerned."""
         return None
 
+    def one_sided(self, fields):
+        """A sequence of ``OneSided`` constraints, whose energy ``link_energy`` contains: where plain Newton iterations
+        keep changing the points that touch, their pressures become unknowns."""
+        return ()
+
     def pose_potentials(self, linkage):
         """A sequence of ``PosePotential``, potentials of the poses of bodies of the ``Linkage``.
 

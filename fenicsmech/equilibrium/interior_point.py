@@ -1,0 +1,137 @@
+"""Pressures of one-sided constraints as unknowns of their own, by a primal–dual interior-point method.
+
+At every point of a surface that obstacles may touch, with the gap g(u), the compliance c and the slack s,
+
+    p s = μ,     s = g + c p,     p > 0,     s > 0,
+
+and μ falls to zero. Newton's method in (u, p, s), with p and s eliminated,
+
+    D = p / (s + c p),     δp = q − D ∇g · δu,     q = (μ − p s − e + p r_s) / (s + c p),     r_s = s − g − c p,
+
+adds ∫ D ∇g ⊗ ∇g − p ∇²g dA to the stiffness and has the residual of the pressures p + q. Every step is as long as p and
+s stay positive. The first solve, with μ = 0 and e = 0, shows how far that goes; the second one, with the same factor, aims
+at what it leaves, μ ← μ (μ_1 / μ)³, with its second-order term e = δp δs.
+
+Newton's method on p = ⟨−g⟩ / c itself adds or drops a few points in an iteration: as a slender link peels off an
+obstacle, the reaction stands in a layer whose width is that of the elements, and moves by as much. The steps of an
+interior-point method move the whole border of contact; their number hardly depends on the elements or on c.
+
+Source: Mehrotra, On the implementation of a primal–dual interior point method (SIAM Journal on Optimization 2, 1992,
+doi:10.1137/0802028); Nocedal & Wright, Numerical Optimization (doi:10.1007/978-0-387-40065-5), chapters 14 and 19.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from fenicsmech.effects import OneSided
+from fenicsmech.equilibrium.unknowns import Numbering
+
+_TO_BOUNDARY = 0.99  # of the way to where a pressure or slack vanishes
+
+
+class InteriorPressures:
+    """p and s at all points of some surfaces.
+
+    Args:
+        surfaces: in the present shape; the displacements that fields hold are those of the first iterate.
+        factor: of their energies.
+        force: scale of the forces that balance.
+        comm: the processes.
+    """
+
+    def __init__(self, surfaces: Sequence[OneSided], factor: float, force: float, comm: MPI.Comm) -> None:
+        self._surfaces, self._comm = surfaces, comm
+        for surface in surfaces:
+            surface.reshape()
+        self._sections = np.cumsum([len(surface.weights) for surface in surfaces])[:-1]
+        self._weights = factor * self._joined(lambda surface: surface.weights)
+        self._factor, self._compliances = factor, self._joined(lambda surface: surface.compliances)
+        self.update()
+        area = self._sum(self._weights)
+        depth = self._largest(-self._gaps)
+        self.pressures = np.full(len(self._gaps), force / area)
+        self.slacks = np.maximum(self._gaps + self._compliances * self.pressures, depth)
+        self.aim(0.0)
+
+    def update(self) -> None:
+        """Takes the displacements that the fields hold."""
+        for surface in self._surfaces:
+            surface.update()
+        self._gaps = self._joined(lambda surface: surface.gaps)
+
+    @property
+    def complementarity(self) -> float:
+        """μ, the mean of p s."""
+        return self._sum(self._weights * self.pressures * self.slacks) / self._sum(self._weights)
+
+    def aim(self, target: float, second_order: np.ndarray | float = 0.0) -> None:
+        """Sets q for the ``target`` of p s and a ``second_order`` term e."""
+        p, s, c = self.pressures, self.slacks, self._compliances
+        self._aimed = (target - p * s - second_order + p * (s - self._gaps - c * p)) / (s + c * p)
+
+    def forces(self) -> np.ndarray:
+        """The gradient of the energy with p + q, minus that with ⟨−g⟩ / c, this rank's owned values, flat."""
+        excess = self._factor * (self.pressures + self._aimed - self._penalties)
+        return sum(surface.forces(own) for surface, own in self._each(excess))
+
+    def add_stiffness(self, matrix: PETSc.Mat, numbering: Numbering) -> None:
+        """Adds the stiffness with p and D, minus that with ⟨−g⟩ / c, into ``matrix`` and leaves it unassembled."""
+        p, s, c = self.pressures, self.slacks, self._compliances
+        excess = self._factor * (p / (s + c * p) - (self._gaps < 0.0) / c)
+        pressures = self._factor * (p - self._penalties)
+        for (surface, own), (_, pressure) in zip(self._each(excess), self._each(pressures), strict=True):
+            surface.add_stiffness(matrix, numbering.rows_of, own, pressure)
+
+    def solved(self, motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """δp and δs with δu of this rank's owned nodes, flat."""
+        p, s, c = self.pressures, self.slacks, self._compliances
+        rates = self._joined(lambda surface: surface.rates(motion))
+        change = self._aimed - p / (s + c * p) * rates
+        return change, self._gaps + rates + c * (p + change) - s
+
+    def target(self, change: tuple[np.ndarray, np.ndarray]) -> float:
+        """μ that the second solve aims at, from the solution of the first one."""
+        p, s = (
+            value + self._longest(value, step) * step
+            for value, step in zip((self.pressures, self.slacks), change, strict=True)
+        )
+        left = self._sum(self._weights * p * s) / self._sum(self._weights)
+        now = self.complementarity
+        return now * min(left / now, 1.0) ** 3
+
+    def length(self, change: tuple[np.ndarray, np.ndarray]) -> float:
+        """The longest step, at most one, after which p and s are positive."""
+        return min(self._longest(self.pressures, change[0]), self._longest(self.slacks, change[1]))
+
+    def advance(self, change: tuple[np.ndarray, np.ndarray], length: float) -> None:
+        """Takes a step of ``length``, whose displacements the fields hold."""
+        self.pressures = self.pressures + length * change[0]
+        self.slacks = self.slacks + length * change[1]
+        self.update()
+
+    @property
+    def _penalties(self) -> np.ndarray:
+        """⟨−g⟩ / c."""
+        return np.maximum(-self._gaps, 0.0) / self._compliances
+
+    def _joined(self, values) -> np.ndarray:
+        return np.concatenate([values(surface) for surface in self._surfaces])
+
+    def _each(self, values: np.ndarray) -> list[tuple[OneSided, np.ndarray]]:
+        return list(zip(self._surfaces, np.split(values, self._sections), strict=True))
+
+    def _longest(self, values: np.ndarray, step: np.ndarray) -> float:
+        falling = step < 0.0
+        own = float(np.min(-_TO_BOUNDARY * values[falling] / step[falling], initial=1.0))
+        return self._comm.allreduce(own, op=MPI.MIN)
+
+    def _sum(self, values: np.ndarray) -> float:
+        return self._comm.allreduce(float(values.sum()))
+
+    def _largest(self, values: np.ndarray) -> float:
+        return self._comm.allreduce(float(values.max(initial=-np.inf)), op=MPI.MAX)
