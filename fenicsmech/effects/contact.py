@@ -119,11 +119,18 @@ class Cylinder(Obstacle):
 
     @property
     def numbers(self):
-        return (*self.centre, self.radius)
+        distance = float(np.hypot(*self.centre))
+        e = tuple(-c / distance for c in self.centre) if distance else (1.0, 0.0)
+        return (*(c + self.radius * n for c, n in zip(self.centre, e, strict=True)), *e, self.radius)
 
     def gap(self, x, numbers, sqrt):
-        a, b, radius = numbers
-        return sqrt((x[0] - a) ** 2 + (x[1] - b) ** 2) - radius
+        # with r from b = c + R e, the point of the surface that is nearest to the origin,
+        #     |x − c|² − R² = r · (r + 2 R e),
+        # so that obstacles much larger than the links lose no digits
+        a, b, along, across, radius = numbers
+        r, s = x[0] - a, x[1] - b
+        beyond = r * (r + 2.0 * radius * along) + s * (s + 2.0 * radius * across)
+        return beyond / (sqrt(beyond + radius**2) + radius)
 
     @property
     def core(self):

@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import os
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -53,9 +54,10 @@ class InteriorPressures:
         self._factor, self._compliances = factor, self._joined(lambda surface: surface.compliances)
         self.update()
         area = self._sum(self._weights)
-        depth = self._largest(-self._gaps)
-        self.pressures = np.full(len(self._gaps), force / area)
-        self.slacks = np.maximum(self._gaps + self._compliances * self.pressures, depth)
+        import os
+        depth = self._largest(np.abs(self._gaps)) if os.environ.get("ABS") else self._largest(-self._gaps)
+        self.pressures = np.full(len(self._gaps), float(os.environ.get("P0", "1")) * force / area)
+        self.slacks = np.maximum(self._gaps + self._compliances * self.pressures, float(os.environ.get("S0", "1")) * depth)
         self.aim(0.0)
 
     def update(self) -> None:
@@ -68,6 +70,11 @@ class InteriorPressures:
     def complementarity(self) -> float:
         """μ, the mean of p s."""
         return self._sum(self._weights * self.pressures * self.slacks) / self._sum(self._weights)
+
+    @property
+    def settled(self) -> bool:
+        """Whether the same points touch by their gaps and by their pressures."""
+        return self._sum((self._gaps < 0.0) != (self._compliances * self.pressures > self.slacks)) == 0.0
 
     def aim(self, target: float, second_order: np.ndarray | float = 0.0) -> None:
         """Sets q for the ``target`` of p s and a ``second_order`` term e."""
@@ -100,9 +107,13 @@ class InteriorPressures:
             value + self._longest(value, step) * step
             for value, step in zip((self.pressures, self.slacks), change, strict=True)
         )
+        if os.environ.get("POW"):
+            self.tau = 0.99
+        self.a_aff = min(self._longest(self.pressures, change[0]), self._longest(self.slacks, change[1]))
         left = self._sum(self._weights * p * s) / self._sum(self._weights)
         now = self.complementarity
-        return now * min(left / now, 1.0) ** 3
+        self.sigma = min(left / now, 1.0) ** float(os.environ.get("SIG", "3"))
+        return now * self.sigma
 
     def length(self, change: tuple[np.ndarray, np.ndarray]) -> float:
         """The longest step, at most one, after which p and s are positive."""
@@ -110,7 +121,10 @@ class InteriorPressures:
 
     def advance(self, change: tuple[np.ndarray, np.ndarray], length: float) -> None:
         """Takes a step of ``length``, whose displacements the fields hold."""
-        self.pressures = self.pressures + length * change[0]
+        a = length
+        if os.environ.get("SEP"):
+            a = self._longest(self.pressures, change[0])
+        self.pressures = self.pressures + a * change[0]
         self.slacks = self.slacks + length * change[1]
         self.update()
 
@@ -127,7 +141,7 @@ class InteriorPressures:
 
     def _longest(self, values: np.ndarray, step: np.ndarray) -> float:
         falling = step < 0.0
-        own = float(np.min(-_TO_BOUNDARY * values[falling] / step[falling], initial=1.0))
+        own = float(np.min(-getattr(self, "tau", _TO_BOUNDARY) * values[falling] / step[falling], initial=1.0))
         return self._comm.allreduce(own, op=MPI.MIN)
 
     def _sum(self, values: np.ndarray) -> float:

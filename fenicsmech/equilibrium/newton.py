@@ -36,7 +36,7 @@ the watchdog (Mathematical Programming Studies 16, 1982); Deuflhard on the simpl
 
 from __future__ import annotations
 
-import math
+import math, os
 from dataclasses import dataclass
 
 import numpy as np
@@ -83,7 +83,7 @@ class PrimalDualNewton(EquilibriumMethod):
     largest_turn: float = 0.5
     reuse_factor: float = 1e-3
     path_iterations: int = 10
-    contact_changes: int = 3
+    contact_changes: int = 4
     divergence: float = 1e3
 
     def __post_init__(self) -> None:
@@ -109,15 +109,15 @@ class NewtonSolver(EquilibriumSolver):
         best, not_better, line_search, diverged = (state, residual), 0, False, None
         last: tuple[State, np.ndarray] | None = None  # where the last step began, and its motion of the nodes
         residuals, shift, any_stability, predicted, norm = [], least, True, False, math.inf
-        touching, changes = system.touching(), 0
+        touching, changed, interior = system.touching(), 0, 0
         for iteration in range(limit + 1):
             residuals.append(self.relative(residual))
             if self.converged(residual, norm) and iteration > 0:
                 if path:  # critical points are located by its tangent and inertia
                     return self.linearise(state, control, residual).point(residuals, iteration + 1)
                 if predicted or shift > least or options.reuse_factor == 0.0:  # stability is of the true matrix
-                    self.linearise(state, control, residual, iterations=iteration)
-                return self.accept(state, control, residual, residuals, iteration)
+                    self.linearise(state, control, residual, iterations=iteration + interior)
+                return self.accept(state, control, residual, residuals, iteration + interior)
             if iteration == limit:
                 break
             near = path or (any_stability and residuals[-1] < options.near)
@@ -148,16 +148,17 @@ class NewtonSolver(EquilibriumSolver):
                     residual = system.residual(state, control)
             elif near and shift == least and length == 1.0:
                 state, residual, norm = self._finish(state, control, residual, norm, step)
-            if len(system.one_sided) and changes >= 0:
+            if system.one_sided and not interior:
                 now = system.touching()
-                changes += system.differ(now, touching)
-                touching = now
+                changes, touching = system.count(now != touching), now
                 _log.debug("changes %d", changes)
-                if changes >= options.contact_changes:
-                    changes = -1
-                    found = self._interior(state, control, residual, residuals, limit - iteration - 1)
+                if iteration > 0 and (changes > max(0.25 * changed, options.contact_changes) or (changes and iteration > 6)):
+                    count = len(residuals)
+                    found = self._interior(start, control, residual, residuals, 40)
+                    interior = len(residuals) - count
                     if found is not None:
                         state, residual, last, any_stability = *found, None, True
+                changed = changes
             if residual.norm < best[1].norm:
                 best, not_better = (state, residual), 0
             else:
@@ -174,9 +175,12 @@ class NewtonSolver(EquilibriumSolver):
         """A state near the equilibrium, from iterations with the pressures of contact as unknowns; None in vain."""
         system, options, begin = self.system, self.options, state
         system.load(state)
-        force = residual.forces / system.unknowns.unit_u
+        force = system.residual(state, control).forces / system.unknowns.unit_u
         pressures = InteriorPressures(system.one_sided, state.load_factor, force, system.comm)
         shift, last = state.minimum_shift, None
+        attempted = False
+        first, norm = pressures.complementarity, math.inf
+        _log.debug("p0 %.3e, s0 %.3e..%.3e, gaps %.3e..%.3e force %.3e", pressures.pressures[0], pressures.slacks.min(), pressures.slacks.max(), pressures._gaps.min(), pressures._gaps.max(), force)
         for _ in range(limit):
             system.pressures = pressures
             try:
@@ -186,13 +190,18 @@ class NewtonSolver(EquilibriumSolver):
                 x, shift = self._direction(residual, state.minimum_shift, last=shift, any_stability=False)
                 motion = system.unknowns.apply(x)[system.numbering.rows.nodes.local]
                 change = pressures.solved(-motion)
-                pressures.aim(pressures.target(change), change[0] * change[1])
+                target = pressures.target(change)
+                floor = float(os.environ.get("FLOOR", "0")) if self.relative(residual) > 1.0 else 0.0
+                target = max(target, floor * pressures.complementarity)
+                e = {"full": 1.0, "a": pressures.a_aff, "a2": pressures.a_aff**2, "cut": float(pressures.a_aff > 0.1), "none": 0.0}[os.environ.get("E2", "full")]
+                pressures.aim(target, e * change[0] * change[1])
+                if os.environ.get("TAU"): pressures.tau = max(0.99, 1.0 - pressures.sigma)
                 residual = system.residual(state, control)
                 x = self.try_solve(residual.vector, self.step_accuracy(residual))
                 step = self.newton_step(x, state, control, residual)
                 motion = system.unknowns.apply(x)
                 change = pressures.solved(-motion[system.numbering.rows.nodes.local])
-                length = min(pressures.length(change), options.largest_turn / max(system.size(step), 1e-300))
+                length = min(pressures.length(change) if not os.environ.get("SEP") else pressures._longest(pressures.slacks, change[1]), options.largest_turn / max(system.size(step), 1e-300))
                 before = state
                 for _ in range(12):
                     state = system.moved(before, step.scaled(length))
@@ -205,9 +214,21 @@ class NewtonSolver(EquilibriumSolver):
                 system.pressures = None
             plain = system.residual(state, control)
             residuals.append(self.relative(plain))
-            _log.debug("interior: residual %.2e, plain %.2e, mu %.2e, length %.3f shift %.1e", self.relative(residual), residuals[-1], pressures.complementarity, length, shift)
-            if residuals[-1] < 1e-3:
+            _log.debug("interior: residual %.2e, plain %.2e, mu %.2e, length %.3f (%.2e, %.2e) shift %.1e", self.relative(residual), residuals[-1], pressures.complementarity, length, pressures.length(change), system.size(step), shift)
+            if self.converged(plain, norm) or (plain.norm > 0.5 * norm and pressures.complementarity < float(os.environ.get("MU","1e-12")) * first):
                 return state, plain
+            norm = plain.norm
+            if not attempted and residuals[-1] < float(os.environ.get("THR", "1e-2")) and pressures.settled:
+                attempted = True
+                system.linearise(state, control, plain)
+                x, shift = self._direction(plain, state.minimum_shift, last=shift, any_stability=False)
+                there = system.moved(state, self.newton_step(x, state, control, plain))
+                found = system.residual(there, control)
+                residuals.append(self.relative(found))
+                _log.debug("attempt: %.2e", residuals[-1])
+                if found.norm < 0.1 * plain.norm:
+                    return there, found
+                system.load(state)
         return None
 
     def _direction(
