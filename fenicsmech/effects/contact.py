@@ -28,6 +28,8 @@ from fenicsmech.symbolic import SmoothFunction, derive
 
 
 _RELATIVE_STIFFNESS = 0.1
+"""Default stiffness over that of the outermost layer of elements."""
+
 
 class Obstacle(ABC):
     """A rigid, fixed obstacle."""
@@ -42,7 +44,7 @@ class Obstacle(ABC):
         """g at the coordinates ``x``, two or three, with ``numbers`` and ``sqrt``: of NumPy, UFL or SymPy."""
 
     def smooth_gap(self, dim: int) -> SmoothFunction:
-        """g at many points in ``dim`` dimensions, with its derivatives."""
+        """g at many points in ``dim`` dimensions, of their coordinates and ``numbers``, with its derivatives."""
         x, numbers = sympy.symbols(f"x:{dim}"), sympy.symbols(f"c:{len(self.numbers)}")
         return derive([self.gap(x, numbers, sympy.sqrt)], x, numbers, many=True)
 
@@ -217,7 +219,6 @@ class Contact(Effect):
         if self.stiffness is not None:
             return fem.Constant(fields.mesh, self.stiffness)
         height = fields.dim * ufl.CellVolume(fields.mesh) / ufl.FacetArea(fields.mesh)
-        # ten times more costs slender links several times the iterations
         return fem.Constant(fields.mesh, _RELATIVE_STIFFNESS * link.material.law.E) / height
 
     def pose_potentials(self, linkage):

@@ -37,9 +37,9 @@ class OneSided(ABC):
         degree: of the quadrature.
 
     Attributes:
-        weights: areas that points stand for, on the present rest shape, (n,).
         compliances: c, (n,).
-        gaps: g at the last ``update``, (n,).
+        weights: areas that points stand for, of the links at rest, their depth included, (n,).
+        gaps: g, (n,), as ``weights`` of the last ``update``.
     """
 
     compliances: np.ndarray
@@ -54,7 +54,6 @@ class OneSided(ABC):
         self._motion = fem.Function(space)
         count = self._nodes.shape[1]
         self._global = space.dofmap.index_map.local_to_global(np.arange(count, dtype=np.int32)).astype(np.int64)
-        self.reshape()
 
     @abstractmethod
     def gap(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -73,22 +72,19 @@ class OneSided(ABC):
         area = np.linalg.norm(edges[:, 0] if dim == 2 else np.cross(edges[:, 0], edges[:, 1]), axis=1)
         return volume / area
 
-    def reshape(self) -> None:
-        """Takes the present rest shape. Local."""
+    def update(self) -> None:
+        """Takes the rest shape and the displacements that the fields hold. Local."""
         places, dim = self._boundary.places, self._body.model.dim
         shape = self._body.shape.x.array.reshape(-1, dim)
-        self._rest = (self._points @ places).reshape(-1, dim) + self._shape @ shape
+        rest = (self._points @ places).reshape(-1, dim) + self._shape @ shape
         edges = [np.repeat(places[:, k] - places[:, 0], len(self._points), axis=0) for k in range(1, dim)]
         edges = [edge + along @ shape for edge, along in zip(edges, self._along, strict=True)]
         area = edges[0] if dim == 2 else np.cross(*edges)
         depth = self._body.model.multiplier(self._body.depth.x.array[self._boundary.cells])
         weights = np.outer(depth * np.ones(len(places)), self._weights).ravel()
         self.weights = weights * np.linalg.norm(area, axis=1)
-
-    def update(self) -> None:
-        """Takes the displacements that the fields hold. Local."""
-        u = self._body.u.x.array.reshape(-1, self._body.model.dim)
-        self.gaps, self._normals, self._curvatures = self.gap(self._rest + self._nodes @ u)
+        moved = rest + self._nodes @ self._body.u.x.array.reshape(-1, dim)
+        self.gaps, self._normals, self._curvatures = self.gap(moved)
 
     def rates(self, motion: np.ndarray) -> np.ndarray:
         """∇g · δu at the points, (n,), from δu of this rank's owned nodes, flat."""
@@ -116,6 +112,8 @@ class OneSided(ABC):
         ``rows_of`` gives the matrix's rows of nodes, numbered over all ranks, ``stiffness`` is D, ``pressures`` p.
         """
         normals, count = self._normals, len(self.weights)
+        if not count:
+            return
         blocks = stiffness[:, None, None] * normals[:, :, None] * normals[:, None, :]
         blocks = self.weights[:, None, None] * (blocks - pressures[:, None, None] * self._curvatures)
         used = np.unique(self._nodes.indices)

@@ -8,9 +8,10 @@ and μ falls to zero. Newton's method in (u, p, s), with p and s eliminated,
 
     D = p / (s + c p),     δp = q − D ∇g · δu,     q = (μ − p s − e + p r_s) / (s + c p),     r_s = s − g − c p,
 
-adds ∫ D ∇g ⊗ ∇g − p ∇²g dA to the stiffness and has the residual of the pressures p + q. Every step is as long as p and
-s stay positive. The first solve, with μ = 0 and e = 0, shows how far that goes; the second one, with the same factor, aims
-at what it leaves, μ ← μ (μ_1 / μ)³, with its second-order term e = δp δs.
+adds ∫ D ∇g ⊗ ∇g − p ∇²g dA to the stiffness and has the residual of the pressures p + q. A step goes as far as s stays
+positive, and in p as far as p does. A first solve, with μ = 0 and e = 0, shows how far that is; the second one, with
+the same factor, aims at μ₁³ / μ² with the mean product μ₁ after the first step, and has its second-order term
+e = δp δs.
 
 Newton's method on p = ⟨−g⟩ / c itself adds or drops a few points in an iteration: as a slender link peels off an
 obstacle, the reaction stands in a layer whose width is that of the elements, and moves by as much. The steps of an
@@ -24,7 +25,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import os
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -32,44 +32,42 @@ from petsc4py import PETSc
 from fenicsmech.effects import OneSided
 from fenicsmech.equilibrium.unknowns import Numbering
 
-_TO_BOUNDARY = 0.99  # of the way to where a pressure or slack vanishes
+_TO_BOUNDARY = 0.99
+"""Least share of the way to where a pressure or slack vanishes that a step may go."""
 
 
 class InteriorPressures:
     """p and s at all points of some surfaces.
 
     Args:
-        surfaces: in the present shape; the displacements that fields hold are those of the first iterate.
+        surfaces: with the points; the displacements that fields hold are those of the first iterate.
         factor: of their energies.
-        force: scale of the forces that balance.
+        force: scale of the forces between surfaces and obstacles.
         comm: the processes.
     """
 
     def __init__(self, surfaces: Sequence[OneSided], factor: float, force: float, comm: MPI.Comm) -> None:
-        self._surfaces, self._comm = surfaces, comm
-        for surface in surfaces:
-            surface.reshape()
-        self._sections = np.cumsum([len(surface.weights) for surface in surfaces])[:-1]
-        self._weights = factor * self._joined(lambda surface: surface.weights)
-        self._factor, self._compliances = factor, self._joined(lambda surface: surface.compliances)
+        self._surfaces, self._comm, self._factor = surfaces, comm, factor
         self.update()
-        area = self._sum(self._weights)
-        import os
-        depth = self._largest(np.abs(self._gaps)) if os.environ.get("ABS") else self._largest(-self._gaps)
-        self.pressures = np.full(len(self._gaps), float(os.environ.get("P0", "1")) * force / area)
-        self.slacks = np.maximum(self._gaps + self._compliances * self.pressures, float(os.environ.get("S0", "1")) * depth)
+        self._sections = np.cumsum([len(surface.weights) for surface in surfaces])[:-1]
+        self._weights = self._joined(lambda surface: surface.weights)
+        self._compliances = self._joined(lambda surface: surface.compliances)
+        self._area, depth = self._sum(self._weights), self._largest(-self._gaps)
+        self.pressures = np.full(len(self._gaps), force / (factor * self._area))
+        self.slacks = np.maximum(self._gaps + self._compliances * self.pressures, depth)
+        self._shares = _TO_BOUNDARY
         self.aim(0.0)
 
     def update(self) -> None:
-        """Takes the displacements that the fields hold."""
+        """Takes the displacements that the fields hold. Local."""
         for surface in self._surfaces:
             surface.update()
         self._gaps = self._joined(lambda surface: surface.gaps)
 
     @property
-    def complementarity(self) -> float:
-        """μ, the mean of p s."""
-        return self._sum(self._weights * self.pressures * self.slacks) / self._sum(self._weights)
+    def mean_product(self) -> float:
+        """The mean of p s, by area."""
+        return self._sum(self._weights * self.pressures * self.slacks) / self._area
 
     @property
     def settled(self) -> bool:
@@ -77,9 +75,19 @@ class InteriorPressures:
         return self._sum((self._gaps < 0.0) != (self._compliances * self.pressures > self.slacks)) == 0.0
 
     def aim(self, target: float, second_order: np.ndarray | float = 0.0) -> None:
-        """Sets q for the ``target`` of p s and a ``second_order`` term e."""
+        """Sets q for the ``target`` μ and a ``second_order`` term e. Local."""
         p, s, c = self.pressures, self.slacks, self._compliances
         self._aimed = (target - p * s - second_order + p * (s - self._gaps - c * p)) / (s + c * p)
+
+    def aim_again(self, change: tuple[np.ndarray, np.ndarray]) -> None:
+        """Sets q for the second solve, from (δp, δs) of the first one."""
+        pairs = zip((self.pressures, self.slacks), change, strict=True)
+        p, s = (value + self._longest(value, step, self._shares) * step for value, step in pairs)
+        now = self.mean_product
+        centring = min(self._sum(self._weights * p * s) / self._area / now, 1.0) ** 3
+        # close to the solution steps may go nearly to the boundary: p s then falls faster than linearly
+        self._shares = max(_TO_BOUNDARY, 1.0 - centring)
+        self.aim(centring * now, change[0] * change[1])
 
     def forces(self) -> np.ndarray:
         """The gradient of the energy with p + q, minus that with ⟨−g⟩ / c, this rank's owned values, flat."""
@@ -101,30 +109,13 @@ class InteriorPressures:
         change = self._aimed - p / (s + c * p) * rates
         return change, self._gaps + rates + c * (p + change) - s
 
-    def target(self, change: tuple[np.ndarray, np.ndarray]) -> float:
-        """μ that the second solve aims at, from the solution of the first one."""
-        p, s = (
-            value + self._longest(value, step) * step
-            for value, step in zip((self.pressures, self.slacks), change, strict=True)
-        )
-        if os.environ.get("POW"):
-            self.tau = 0.99
-        self.a_aff = min(self._longest(self.pressures, change[0]), self._longest(self.slacks, change[1]))
-        left = self._sum(self._weights * p * s) / self._sum(self._weights)
-        now = self.complementarity
-        self.sigma = min(left / now, 1.0) ** float(os.environ.get("SIG", "3"))
-        return now * self.sigma
-
-    def length(self, change: tuple[np.ndarray, np.ndarray]) -> float:
-        """The longest step, at most one, after which p and s are positive."""
-        return min(self._longest(self.pressures, change[0]), self._longest(self.slacks, change[1]))
+    def longest(self, change: tuple[np.ndarray, np.ndarray]) -> float:
+        """The longest step of displacements, at most one, after which slacks are positive."""
+        return self._longest(self.slacks, change[1], self._shares)
 
     def advance(self, change: tuple[np.ndarray, np.ndarray], length: float) -> None:
-        """Takes a step of ``length``, whose displacements the fields hold."""
-        a = length
-        if os.environ.get("SEP"):
-            a = self._longest(self.pressures, change[0])
-        self.pressures = self.pressures + a * change[0]
+        """Takes a step, of ``length`` in displacements, which the fields hold, and slacks, as long as may be in p."""
+        self.pressures = self.pressures + self._longest(self.pressures, change[0], self._shares) * change[0]
         self.slacks = self.slacks + length * change[1]
         self.update()
 
@@ -139,9 +130,10 @@ class InteriorPressures:
     def _each(self, values: np.ndarray) -> list[tuple[OneSided, np.ndarray]]:
         return list(zip(self._surfaces, np.split(values, self._sections), strict=True))
 
-    def _longest(self, values: np.ndarray, step: np.ndarray) -> float:
+    def _longest(self, values: np.ndarray, step: np.ndarray, share: float) -> float:
+        """The longest step, at most one, that goes no farther than a ``share`` of the way to zero."""
         falling = step < 0.0
-        own = float(np.min(-getattr(self, "tau", _TO_BOUNDARY) * values[falling] / step[falling], initial=1.0))
+        own = float(np.min(-share * values[falling] / step[falling], initial=1.0))
         return self._comm.allreduce(own, op=MPI.MIN)
 
     def _sum(self, values: np.ndarray) -> float:

@@ -4,11 +4,11 @@ Each iteration solves
 
     [[∇²L + δ I, −Aᵀ], [−A, −1/ρ]] (ds, dλ) = −(∇L, −C),
 
-the Newton step of the augmented Lagrangian, which tends to the KKT step for large ρ and stays regular for
-redundant constraints. If the matrix has more negative eigenvalues than there are multipliers, the step need not
-descend, and δ grows until it does (every pressure of near-incompressible links counts as a multiplier: E has a maximum
-there); close to an equilibrium δ stays zero, so that unstable equilibria on the path are
-found and reported as such. Merit of a step: the augmented Lagrangian
+the Newton step of the augmented Lagrangian, which tends to the KKT step for large ρ and stays regular for redundant
+constraints. If the matrix has more negative eigenvalues than there are multipliers, the step need not descend, and δ
+grows until it does (every pressure of near-incompressible links counts as a multiplier: E has a maximum there); close
+to an equilibrium δ stays zero, so that unstable equilibria on the path are found and reported as such. Merit of a step:
+the augmented Lagrangian
 
     Φ(s) = E(s) − λᵀC + ½ ρ_m |C + cλ|²  at the new multipliers λ, with the compliance c of joints,
 
@@ -16,15 +16,17 @@ and at the new pressures p, with ½ ρ_m |∂E/∂p|² beside it.
 
 Slender links are far softer in bending than in tension, so a good step may raise every merit for a few iterations:
 steps are taken in full as long as a watchdog allows, then the iteration returns to its best state and searches the
-line. For the same reason ∇²L holds, far from equilibrium, the stress that the last step solved for
-instead of the one its displacements led to (``elasticity.PredictedStress``): fewer iterations, and longer
-steps converge.
+line. For the same reason ∇²L holds, far from equilibrium, the stress that the last step solved for instead of the one
+its displacements led to (``elasticity.PredictedStress``): fewer iterations, and longer steps converge.
 
 Close to convergence the factor of the KKT matrix K is reused (simplified Newton method),
 
     y ← y − K(y₁)⁻¹ r(y),
 
 as long as corrections contract by a factor of 1000 or more; otherwise, as next to a limit point, K is factored anew.
+
+Where many points come into contact or leave it in every iteration, the pressures of contact become unknowns for a
+while (see ``interior_point``).
 
 Across a path (see ``control``) equilibria of any stability are wanted and a good guess is near: steps are taken in
 full, led into the plane by bordering; where they diverge, a shorter step along the path is tried instead of descent.
@@ -36,7 +38,7 @@ the watchdog (Mathematical Programming Studies 16, 1982); Deuflhard on the simpl
 
 from __future__ import annotations
 
-import math, os
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,6 +69,9 @@ class PrimalDualNewton(EquilibriumMethod):
         predicted_stress: whether K_uu, as long as the residual is large, holds the stress that the last step solved
             for instead of the one it led to.
         largest_turn: largest rotation (rad), or displacement over the mechanism's length, of one step.
+        contact_changes: points of contact that may change from one iteration to the next, and most of the iterations
+            in which any do; beyond, pressures are unknowns. A few points, as of a facet, settle by themselves.
+        interior_iterations: most iterations with pressures as unknowns, which count beside the others.
         reuse_factor: largest contraction rate of corrections at which the last factor of K is reused, also for
             stability and the tangent of the path; 0: never.
         path_iterations: most iterations of an arc-length step, after which a shorter one is tried.
@@ -81,9 +86,10 @@ class PrimalDualNewton(EquilibriumMethod):
     watchdog: int = 12
     predicted_stress: bool = True
     largest_turn: float = 0.5
+    contact_changes: int = 4
+    interior_iterations: int = 40
     reuse_factor: float = 1e-3
     path_iterations: int = 10
-    contact_changes: int = 4
     divergence: float = 1e3
 
     def __post_init__(self) -> None:
@@ -109,7 +115,7 @@ class NewtonSolver(EquilibriumSolver):
         best, not_better, line_search, diverged = (state, residual), 0, False, None
         last: tuple[State, np.ndarray] | None = None  # where the last step began, and its motion of the nodes
         residuals, shift, any_stability, predicted, norm = [], least, True, False, math.inf
-        touching, changed, interior = system.touching(), 0, 0
+        touching, changes, interior = system.touching(), 0, 0  # iterations with pressures as unknowns
         for iteration in range(limit + 1):
             residuals.append(self.relative(residual))
             if self.converged(residual, norm) and iteration > 0:
@@ -136,8 +142,7 @@ class NewtonSolver(EquilibriumSolver):
                 state, residual, length = advance(state, control, step, residual, iteration)
             except NotConverged as failure:
                 return self.accept_best(*best, control, residuals, failure)
-            # pressures of mixed elements are stresses that the step solves for already
-            last = (before, -length * motion) if options.predicted_stress and not system.blocks.pressures.size else None
+            last = self._step_taken(before, -length * motion)
             if near and residual.norm > norm and not self.converged(residual, norm):
                 if diverged is None and self.relative(residual) < options.near:
                     diverged = before  # once may happen: just beyond a bifurcation small residuals hide large motions
@@ -149,16 +154,17 @@ class NewtonSolver(EquilibriumSolver):
             elif near and shift == least and length == 1.0:
                 state, residual, norm = self._finish(state, control, residual, norm, step)
             if system.one_sided and not interior:
-                now = system.touching()
-                changes, touching = system.count(now != touching), now
-                _log.debug("changes %d", changes)
-                if iteration > 0 and (changes > max(0.25 * changed, options.contact_changes) or (changes and iteration > 6)):
-                    count = len(residuals)
-                    found = self._interior(start, control, residual, residuals, 40)
-                    interior = len(residuals) - count
-                    if found is not None:
-                        state, residual, last, any_stability = *found, None, True
-                changed = changes
+                now, few = system.touching(), options.contact_changes
+                changes, last_changes, touching = system.count(now != touching), changes, now
+                lasting = changes > few and 4 * changes > last_changes and iteration > 0
+                if lasting or (changes and iteration > few + 2):
+                    found, interior = self._with_pressures(start, control, residuals)
+                    if found is None:
+                        system.load(state)
+                        residual = system.residual(state, control)
+                    else:
+                        state, residual = found
+                        last, any_stability = None, True
             if residual.norm < best[1].norm:
                 best, not_better = (state, residual), 0
             else:
@@ -167,69 +173,88 @@ class NewtonSolver(EquilibriumSolver):
                 state, line_search, last = best[0], True, None
                 system.load(state)
                 residual = system.residual(state, control)
-        return self.accept_best(*best, control, residuals, self.exhausted(residuals, limit))
+        return self.accept_best(*best, control, residuals, self.exhausted(residuals, limit + interior))
 
-    def _interior(
-        self, state: State, control: Control, residual: Residual, residuals: list[float], limit: int
-    ) -> tuple[State, Residual] | None:
-        """A state near the equilibrium, from iterations with the pressures of contact as unknowns; None in vain."""
-        system, options, begin = self.system, self.options, state
+    def _with_pressures(
+        self, state: State, control: Control, residuals: list[float]
+    ) -> tuple[tuple[State, Residual] | None, int]:
+        """Iterations from ``state`` with the pressures of contact as unknowns.
+
+        Returns a state near the equilibrium with its residual, or None if they fail, and their number; ``residuals``
+        grow by one for each.
+        """
+        system, options, count = self.system, self.options, len(residuals)
         system.load(state)
-        force = system.residual(state, control).forces / system.unknowns.unit_u
+        # the pressures that would carry ten times the loads, spread over the whole boundary; any would do
+        force = 10.0 * system.residual(state, control).forces / system.unknowns.unit_u
+        if not force * state.load_factor > 0.0:
+            return None, 0
         pressures = InteriorPressures(system.one_sided, state.load_factor, force, system.comm)
-        shift, last = state.minimum_shift, None
-        attempted = False
-        first, norm = pressures.complementarity, math.inf
-        _log.debug("p0 %.3e, s0 %.3e..%.3e, gaps %.3e..%.3e force %.3e", pressures.pressures[0], pressures.slacks.min(), pressures.slacks.max(), pressures._gaps.min(), pressures._gaps.max(), force)
-        for _ in range(limit):
-            system.pressures = pressures
+        first, norm, shift, last, tried = pressures.mean_product, math.inf, state.minimum_shift, None, False
+        for _ in range(options.interior_iterations):
             try:
-                pressures.aim(0.0)
-                residual = system.residual(state, control)
-                system.linearise(state, control, residual, last)
-                x, shift = self._direction(residual, state.minimum_shift, last=shift, any_stability=False)
-                motion = system.unknowns.apply(x)[system.numbering.rows.nodes.local]
-                change = pressures.solved(-motion)
-                target = pressures.target(change)
-                floor = float(os.environ.get("FLOOR", "0")) if self.relative(residual) > 1.0 else 0.0
-                target = max(target, floor * pressures.complementarity)
-                e = {"full": 1.0, "a": pressures.a_aff, "a2": pressures.a_aff**2, "cut": float(pressures.a_aff > 0.1), "none": 0.0}[os.environ.get("E2", "full")]
-                pressures.aim(target, e * change[0] * change[1])
-                if os.environ.get("TAU"): pressures.tau = max(0.99, 1.0 - pressures.sigma)
-                residual = system.residual(state, control)
-                x = self.try_solve(residual.vector, self.step_accuracy(residual))
-                step = self.newton_step(x, state, control, residual)
-                motion = system.unknowns.apply(x)
-                change = pressures.solved(-motion[system.numbering.rows.nodes.local])
-                length = min(pressures.length(change) if not os.environ.get("SEP") else pressures._longest(pressures.slacks, change[1]), options.largest_turn / max(system.size(step), 1e-300))
-                before = state
-                for _ in range(12):
-                    state = system.moved(before, step.scaled(length))
-                    if math.isfinite(system.elastic_energy()):
-                        break
-                    length *= 0.5
-                pressures.advance(change, length)
-                last = (before, -length * motion) if options.predicted_stress and not system.blocks.pressures.size else None
-            finally:
-                system.pressures = None
-            plain = system.residual(state, control)
-            residuals.append(self.relative(plain))
-            _log.debug("interior: residual %.2e, plain %.2e, mu %.2e, length %.3f (%.2e, %.2e) shift %.1e", self.relative(residual), residuals[-1], pressures.complementarity, length, pressures.length(change), system.size(step), shift)
-            if self.converged(plain, norm) or (plain.norm > 0.5 * norm and pressures.complementarity < float(os.environ.get("MU","1e-12")) * first):
-                return state, plain
-            norm = plain.norm
-            if not attempted and residuals[-1] < float(os.environ.get("THR", "1e-2")) and pressures.settled:
-                attempted = True
-                system.linearise(state, control, plain)
-                x, shift = self._direction(plain, state.minimum_shift, last=shift, any_stability=False)
-                there = system.moved(state, self.newton_step(x, state, control, plain))
-                found = system.residual(there, control)
-                residuals.append(self.relative(found))
-                _log.debug("attempt: %.2e", residuals[-1])
-                if found.norm < 0.1 * plain.norm:
-                    return there, found
-                system.load(state)
-        return None
+                following, shift, motion = self._pressure_step(state, control, pressures, shift, last)
+                plain = system.residual(following, control)
+                residuals.append(self.relative(plain))
+                _log.debug("pressures as unknowns: residual %.2e, shift %.1e", residuals[-1], shift)
+                state, last = following, self._step_taken(state, motion)
+                stalled = plain.norm > 0.5 * norm and pressures.mean_product < 1e-12 * first
+                if self.converged(plain, norm) or stalled:
+                    return (state, plain), len(residuals) - count
+                norm = plain.norm
+                if not tried and residuals[-1] < 0.1 * options.near and pressures.settled:
+                    tried, found = True, self._plain_step(state, control, plain)
+                    residuals.append(self.relative(found[1]))
+                    if found[1].norm < 0.1 * norm:
+                        return found, len(residuals) - count
+                    system.load(state)
+            except NotConverged:
+                break
+        return None, len(residuals) - count
+
+    def _pressure_step(
+        self,
+        state: State,
+        control: Control,
+        pressures: InteriorPressures,
+        shift: float,
+        last: tuple[State, np.ndarray] | None,
+    ) -> tuple[State, float, np.ndarray]:
+        """One iteration with ``pressures`` as unknowns: the state after it, the shift, and the motion of the nodes."""
+        system, nodes = self.system, self.system.numbering.rows.nodes.local
+        system.pressures = pressures
+        try:
+            pressures.aim(0.0)
+            residual = system.residual(state, control)
+            system.linearise(state, control, residual, last)
+            x, shift = self._direction(residual, state.minimum_shift, last=shift, any_stability=False)
+            pressures.aim_again(pressures.solved(-system.unknowns.apply(x)[nodes]))
+            residual = system.residual(state, control)
+            x = self.try_solve(residual.vector, self.step_accuracy(residual))
+            if x is None:
+                raise NotConverged("the linear solver stalled")
+            step, motion = self.newton_step(x, state, control, residual), system.unknowns.apply(x)
+            change = pressures.solved(-motion[nodes])
+            length = min(pressures.longest(change), self.options.largest_turn / max(system.size(step), 1e-300))
+            following, length = self._without_inversion(state, step, length)
+            pressures.advance(change, length)
+        finally:
+            system.pressures = None
+        return following, shift, -length * motion
+
+    def _plain_step(self, state: State, control: Control, residual: Residual) -> tuple[State, Residual]:
+        """The whole Newton step from the loaded ``state``."""
+        self.system.linearise(state, control, residual)
+        x, _ = self._direction(residual, state.minimum_shift, last=0.0, any_stability=False)
+        state = self.system.moved(state, self.newton_step(x, state, control, residual))
+        return state, self.system.residual(state, control)
+
+    def _step_taken(self, before: State, motion: np.ndarray) -> tuple[State, np.ndarray] | None:
+        """The last step, whose stress the next stiffness predicts, if it does.
+
+        Pressures of mixed elements are stresses that the step solves for already.
+        """
+        return (before, motion) if self.options.predicted_stress and not self.system.blocks.pressures.size else None
 
     def _direction(
         self, residual: Residual, least: float, *, last: float, any_stability: bool
@@ -292,14 +317,21 @@ class NewtonSolver(EquilibriumSolver):
         self, state: State, control: Control, step: Step, residual: Residual, iteration: int
     ) -> tuple[State, Residual, float]:
         """The whole step, shortened only where it turns too far or inverts elements."""
-        system = self.system
-        length = min(1.0, self.options.largest_turn / max(system.size(step), 1e-300))
+        length = min(1.0, self.options.largest_turn / max(self.system.size(step), 1e-300))
+        try:
+            trial, length = self._without_inversion(state, step, length)
+        except NotConverged as failure:
+            raise NotConverged(failure.reason, iteration + 1) from failure
+        return trial, self.system.residual(trial, control), length
+
+    def _without_inversion(self, state: State, step: Step, length: float) -> tuple[State, float]:
+        """The state after ``length`` of a step, halved until no element is inverted, and the length."""
         for _ in range(12):
-            trial = system.moved(state, step.scaled(length))
-            if math.isfinite(system.elastic_energy()):
-                return trial, system.residual(trial, control), length
+            trial = self.system.moved(state, step.scaled(length))
+            if math.isfinite(self.system.elastic_energy()):
+                return trial, length
             length *= 0.5
-        raise NotConverged("every step along the Newton direction inverts elements", iteration + 1)
+        raise NotConverged("every step along the Newton direction inverts elements")
 
     def _search(
         self, state: State, control: Control, step: Step, residual: Residual, iteration: int

@@ -260,12 +260,13 @@ class EquilibriumSystem:
             return Residual(vector, vector.norm(), float(np.sqrt(forces)), gap, motion, moments, nodal, poses.copy())
 
     def touching(self) -> np.ndarray:
-        """Whether each point of one-sided constraints on this rank is inside. Local."""
+        """Whether each of this rank's points of one-sided constraints touches, at the loaded state. Local."""
         for constraints in self.one_sided:
             constraints.update()
         return np.concatenate([np.zeros(0, bool), *(constraints.gaps < 0.0 for constraints in self.one_sided)])
 
     def count(self, points: np.ndarray) -> int:
+        """How many of all ranks' points are in a mask of those on this rank."""
         return self.comm.allreduce(int(points.sum()))
 
     # -- derivatives at the loaded state -------------------------------------------------------------------
