@@ -26,7 +26,6 @@ from fenicsmech.mechanism import Effect, FlexibleLink, Link, RigidLink, in_dimen
 from fenicsmech.multibody import Linkage, PosePotential
 from fenicsmech.symbolic import SmoothFunction, derive
 
-
 _RELATIVE_STIFFNESS = 0.1
 """Default stiffness over that of the outermost layer of elements."""
 
@@ -198,7 +197,7 @@ class Contact(Effect):
         return (Faces(self.link),) if isinstance(self.link, FlexibleLink) else ()
 
     def one_sided(self, fields):
-        return [_Surface(self, fields)] if isinstance(self.link, FlexibleLink) else []
+        return [_Surface(self, self.link, fields)] if isinstance(self.link, FlexibleLink) else []
 
     def link_energy(self, fields):
         if not isinstance(self.link, FlexibleLink):
@@ -228,13 +227,13 @@ class Contact(Effect):
 class _Surface(OneSided):
     """The surface of a flexible link, at the points of the quadrature of its energy."""
 
-    def __init__(self, contact: Contact, fields: LinkFields) -> None:
-        self._obstacle, boundary = contact.obstacle, fields.boundaries[Faces(contact.link)]
+    def __init__(self, contact: Contact, link: FlexibleLink, fields: LinkFields) -> None:
+        self._obstacle, boundary = contact.obstacle, fields.boundaries[Faces(link)]
         super().__init__(fields, boundary, degree=2 * fields.order)
         if contact.stiffness is not None:
             stiffness = np.full(len(boundary.cells), contact.stiffness)
         else:
-            stiffness = _RELATIVE_STIFFNESS * contact.link.material.law.E / self.heights()
+            stiffness = _RELATIVE_STIFFNESS * link.material.law.E / self.heights()
         self.compliances = self.at_points(1.0 / stiffness)
 
     @cached_property
@@ -244,7 +243,11 @@ class _Surface(OneSided):
     def gap(self, x):
         numbers = np.array([self._obstacle.numbers])
         weights = np.ones((len(x), 1))
-        return self._gap.value(x, numbers)[:, 0], self._gap.gradient(x, numbers)[:, 0], self._gap.hessian(x, numbers, weights)
+        return (
+            self._gap.value(x, numbers)[:, 0],
+            self._gap.gradient(x, numbers)[:, 0],
+            self._gap.hessian(x, numbers, weights),
+        )
 
 
 class _Points(PosePotential):

@@ -79,7 +79,7 @@ class OneSided(ABC):
         rest = (self._points @ places).reshape(-1, dim) + self._shape @ shape
         edges = [np.repeat(places[:, k] - places[:, 0], len(self._points), axis=0) for k in range(1, dim)]
         edges = [edge + along @ shape for edge, along in zip(edges, self._along, strict=True)]
-        area = edges[0] if dim == 2 else np.cross(*edges)
+        area = edges[0] if dim == 2 else np.cross(edges[0], edges[1])
         depth = self._body.model.multiplier(self._body.depth.x.array[self._boundary.cells])
         weights = np.outer(depth * np.ones(len(places)), self._weights).ravel()
         self.weights = weights * np.linalg.norm(area, axis=1)
@@ -121,9 +121,7 @@ class OneSided(ABC):
         diagonal = bsr_matrix((blocks, np.arange(count), np.arange(count + 1)), shape=2 * (nodes.shape[0],))
         found = (nodes.T @ diagonal @ nodes).tocsr()
         rows = rows_of(self._global[used]).astype(PETSc.IntType)
-        matrix.setValuesIJV(
-            found.indptr.astype(PETSc.IntType), rows[found.indices], found.data, addv=True, rowmap=rows
-        )
+        matrix.setValuesIJV(found.indptr.astype(PETSc.IntType), rows[found.indices], found.data, addv=True, rowmap=rows)
 
     def _tabulated(self, field: fem.Function, order: int) -> list[csr_matrix]:
         """The basis functions of a field's space at the points, (n, local nodes), and for ``order`` 1 their derivatives
@@ -144,11 +142,11 @@ class OneSided(ABC):
                 values[k, here] = np.einsum("d,dqn->qn", edge, table[1:])
         values[np.abs(values) < 1e-13] = 0.0
         columns = np.broadcast_to(dofs[:, None, :], values.shape[1:]).ravel()
-        size = len(field.x.array) // dim
         starts = np.arange(0, columns.size + 1, dofs.shape[1])
-        found = [csr_matrix((table.ravel(), columns, starts), shape=(len(starts) - 1, size)) for table in values]
-        for matrix in found:
-            matrix.eliminate_zeros()
+        shape, found = (len(starts) - 1, len(field.x.array) // dim), []
+        for table in values:
+            found.append(csr_matrix((table.ravel(), columns, starts), shape=shape, copy=True))
+            found[-1].eliminate_zeros()  # in its own arrays
         return found
 
     def _degree(self, nodes: int) -> int:

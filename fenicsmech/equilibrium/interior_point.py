@@ -92,7 +92,7 @@ class InteriorPressures:
     def forces(self) -> np.ndarray:
         """The gradient of the energy with p + q, minus that with ⟨−g⟩ / c, this rank's owned values, flat."""
         excess = self._factor * (self.pressures + self._aimed - self._penalties)
-        return sum(surface.forces(own) for surface, own in self._each(excess))
+        return np.sum([surface.forces(own) for surface, own in self._each(excess)], axis=0)
 
     def add_stiffness(self, matrix: PETSc.Mat, numbering: Numbering) -> None:
         """Adds the stiffness with p and D, minus that with ⟨−g⟩ / c, into ``matrix`` and leaves it unassembled."""

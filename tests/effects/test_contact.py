@@ -13,7 +13,7 @@ from fenicsmech.quantities import Sensitivity
 
 from ..design.in_plane import design_field
 from ..design.refusal import refused
-from .touching import block, cantilever, finger
+from .touching import block, cantilever, finger, wrapped, wrapped_tip, wrapping_force
 
 PULLS = [0.05, 0.1, 0.2, 0.4]
 
@@ -76,6 +76,47 @@ def test_an_obstacle_out_of_reach_changes_nothing(space):
     force, gap = far.measure(curves[0].frames[-1])
     assert not force.any()
     assert gap > 0.0
+
+
+@pytest.mark.parametrize("load", [0.03, 0.05])
+def test_a_cantilever_wraps_round_a_cylinder_in_few_iterations(load):
+    case = wrapped()
+    (frame,) = case.simulation.load_displacement(case.force, forces=[wrapping_force(load)]).frames
+    assert frame.displacement == pytest.approx(wrapped_tip(load), rel=1e-3)
+    assert frame.iterations <= 30
+    assert frame.stable
+    force, gap = case.measure(frame)
+    assert force[1] == pytest.approx(wrapping_force(load), rel=0.01)  # all of it where the beam leaves the cylinder
+    assert gap > -1e-4 * 0.5
+
+
+def test_wrapping_does_not_depend_on_units():
+    units = {"unit": 1e-3, "stress": 1e6}  # m, N, Pa
+    found = []
+    for given in ({}, units):
+        case = wrapped(**given)
+        (frame,) = case.simulation.load_displacement(case.force, forces=[wrapping_force(0.05, **given)]).frames
+        found.append(frame.displacement / given.get("unit", 1.0))
+    assert found[0] == pytest.approx(found[1], rel=1e-8)
+
+
+@pytest.mark.thorough
+@pytest.mark.parallel
+def test_wrapping_is_equal_on_all_ranks():
+    found = []
+    for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
+        case = wrapped(comm=comm)
+        (frame,) = case.simulation.load_displacement(case.force, forces=[wrapping_force(0.05)]).frames
+        found.append(frame.displacement)
+    assert found[0] == pytest.approx(found[1], rel=1e-8)
+
+
+@pytest.mark.thorough
+def test_first_touch_takes_few_iterations():
+    # the tip comes down on the plane, then the beam lies down on it: points of contact come and go by dozens
+    case = cantilever("plane-stress", gap=1.0)
+    frames = case.simulation.load_displacement(case.force, forces=[0.05, 0.12, 0.18, 0.3]).frames
+    assert max(frame.iterations for frame in frames) <= 20
 
 
 def test_without_contact_no_boundary_is_looked_for():

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 import ufl
 from dolfinx import fem
+from petsc4py import PETSc
 
 import fenicsmech as fm
-from fenicsmech.compat import compile_form
+from fenicsmech.compat import assemble_matrix, assemble_vector, compile_form
 from fenicsmech.effects import Contact, Cylinder, HalfPlane
 from fenicsmech.multibody import build_linkage
 
@@ -48,6 +49,34 @@ def test_energy_and_its_gradient_are_differentiated_by_state_and_design(space, o
             # is linear in u between them, and what remains is the rounding of values
             rounding = 1e-12 * max(abs(found.slope), abs(found.value))
             assert found.rates.with_gradient[-1] > 1.95 or found.rates.remainder[-1] < rounding
+
+
+@pytest.mark.parametrize("obstacle", OBSTACLES)
+@pytest.mark.parametrize("space, order", [("plane-stress", 1), ("plane-stress", 3), ("3d-symmetric", 2)])
+def test_points_of_surfaces_carry_the_forces_and_the_stiffness_of_the_energy(space, order, obstacle):
+    contact, fields = strip(space, OBSTACLES[obstacle], order)
+    residual = ufl.derivative(contact.link_energy(fields), fields.u)
+    (surface,) = contact.one_sided(fields)
+    surface.update()
+    pressures = np.maximum(-surface.gaps, 0.0) / surface.compliances
+    assert pressures.any()
+    work = fem.Function(fields.u.function_space)
+    forces = assemble_vector(compile_form(residual), work).copy()
+    size = np.abs(forces).max()
+    assert np.abs(surface.forces(pressures) - forces).max() < 1e-9 * size
+    rates = surface.rates(forces / size)
+    assert surface.forces(pressures) @ forces / size == pytest.approx(-(surface.weights * pressures) @ rates)
+    matrix = assemble_matrix(compile_form(ufl.derivative(residual, fields.u)), fields.mesh.comm)
+    whole = matrix.norm()
+    matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_LOCATION_ERR, True)
+    count = fields.dim
+
+    def rows(nodes):
+        return (count * nodes[:, None] + np.arange(count)).ravel()
+
+    surface.add_stiffness(matrix, rows, -1.0 * (surface.gaps < 0.0) / surface.compliances, -pressures)
+    matrix.assemble()
+    assert matrix.norm() < 1e-9 * whole
 
 
 @pytest.mark.parametrize("obstacle", OBSTACLES)

@@ -95,6 +95,41 @@ def finger(
     return Touching(_simulation(mechanism, [contact] if active else [], space, size, comm), pull, contact)
 
 
+def wrapped(*, unit: float = 1.0, stress: float = 1.0, comm: MPI.Comm = MPI.COMM_SELF) -> Touching:
+    """A slender cantilever, 100 × 0.5 × 10 of 2000 MPa, over a cylinder of 50 times its length that is tangent to it.
+
+    unit, stress: of a mm and a MPa in the units of the scene.
+    """
+    length, thickness = 100.0 * unit, 0.5 * unit
+    mechanism = fm.Mechanism("wrapped cantilever")
+    base = mechanism.rigid("base", fixed=True)
+    shape = fm.strip([(-thickness, 0), (length, 0)], thickness=thickness, depth=10.0 * unit)
+    beam = mechanism.flexible("beam", shape, fm.Material("nylon", 2000.0 * stress, 0.0))
+    mechanism.weld(base, beam, at=(-0.5 * thickness, 0), region=fm.Rectangle(thickness, 1.5 * thickness))
+    push = mechanism.force(on=beam, at=(length, 0), direction=(0, -1))
+    radius = 50.0 * length
+    contact = Contact(beam, Cylinder((0, -0.5 * thickness - radius), radius))
+    return Touching(_simulation(mechanism, [contact], "plane-stress", unit, comm), push, contact)
+
+
+def wrapped_tip(load: float) -> float:
+    """The tip's deflection in mm under P with P L² / EI = ``load``, by linear beam theory.
+
+    The beam lies on the cylinder up to a, where its moment is EI / R, and the rest b = L − a is free:
+
+        P b = EI / R,     w = a² / 2 R + a b / R + P b³ / 3 EI.
+    """
+    length, radius = 100.0, 50.0 * 100.0
+    free = min(length, length**2 / (load * radius))
+    lying = length - free
+    return (0.5 * lying**2 + lying * free) / radius + load * free**3 / (3.0 * length**2)
+
+
+def wrapping_force(load: float, *, unit: float = 1.0, stress: float = 1.0) -> float:
+    """P with P L² / EI = ``load``."""
+    return load * 2000.0 * stress * 10.0 * unit * (0.5 * unit) ** 3 / 12.0 / (100.0 * unit) ** 2
+
+
 def block(space: str, stiffness: float) -> Touching:
     """A block of 10 × 8 × 5 on a plane, pressed by a rigid plate on a slider."""
     mechanism = fm.Mechanism("block")
