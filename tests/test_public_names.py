@@ -35,6 +35,7 @@ INNER = {
     "Linearisation",
     "MechanismModel",
     "NewtonSolver",
+    "OneSided",
     "Panel",
     "ParametricShape",
     "PointLoad",

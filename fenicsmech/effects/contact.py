@@ -4,7 +4,8 @@
 
 g the signed gap, positive outside, 0 on the surface, negative inside an obstacle, and ⟨·⟩ the positive part. The
 pressure κ ⟨−g⟩ pushes a link out along ∇g. V is once continuously differentiable, its second derivative jumps where
-points come into contact: Newton's method is semismooth there.
+points come into contact: Newton's method is semismooth there. Where it does not settle, the pressures become unknowns
+of an interior-point iteration (``one_sided``), which ends at the same equilibrium.
 """
 
 from __future__ import annotations
@@ -41,11 +42,6 @@ class Obstacle(ABC):
     @abstractmethod
     def gap(self, x, numbers, sqrt):
         """g at the coordinates ``x``, two or three, with ``numbers`` and ``sqrt``: of NumPy, UFL or SymPy."""
-
-    def smooth_gap(self, dim: int) -> SmoothFunction:
-        """g at many points in ``dim`` dimensions, of their coordinates and ``numbers``, with its derivatives."""
-        x, numbers = sympy.symbols(f"x:{dim}"), sympy.symbols(f"c:{len(self.numbers)}")
-        return derive([self.gap(x, numbers, sympy.sqrt)], x, numbers, many=True)
 
     @property
     def core(self) -> float | None:
@@ -153,7 +149,7 @@ class Contact(Effect):
             rigid links force per penetration k of each point; must be given.
         points: of a rigid link as drawn.
 
-    Penetration falls as 1 / stiffness, while Newton's method takes more iterations where contact changes. Obstacles
+    Penetration falls as 1 / stiffness, on which the number of iterations hardly depends. Obstacles
     act once the motors have moved: a configuration whose rigid assembly is on the far side of an obstacle stays there.
     Afterwards flexible links cannot slip through a cylinder: states with a penetration of a quarter of its radius are
     rejected. In space a pressed edge is also pressed on its flat faces inside the obstacle, with an error of
@@ -238,7 +234,7 @@ class _Surface(OneSided):
 
     @cached_property
     def _gap(self) -> SmoothFunction:
-        return self._obstacle.smooth_gap(self._body.model.dim)
+        return _smooth_gap(self._obstacle, self._body.model.dim)
 
     def gap(self, x):
         numbers = np.array([self._obstacle.numbers])
@@ -278,7 +274,7 @@ class _Points(PosePotential):
 
     @cached_property
     def _gap(self) -> SmoothFunction:
-        return self._obstacle.smooth_gap(self._space.dim)
+        return _smooth_gap(self._obstacle, self._space.dim)
 
     def _touching(self, poses: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray, np.ndarray, np.ndarray]:
         """Of the points inside: arguments of g, −g, offsets from the body's centre, and ∂u/∂z."""
@@ -288,3 +284,9 @@ class _Points(PosePotential):
         inside = gap < 0.0
         offsets = self._offsets[inside]
         return (where[inside], numbers), -gap[inside], offsets, self._space.displacement_gradient(pose, offsets)
+
+
+def _smooth_gap(obstacle: Obstacle, dim: int) -> SmoothFunction:
+    """g at many points in ``dim`` dimensions, of their coordinates and the obstacle's numbers, with its derivatives."""
+    x, numbers = sympy.symbols(f"x:{dim}"), sympy.symbols(f"c:{len(obstacle.numbers)}")
+    return derive([obstacle.gap(x, numbers, sympy.sqrt)], x, numbers, many=True)
