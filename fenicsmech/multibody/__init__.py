@@ -18,7 +18,7 @@ from fenicsmech.multibody.assembly import (
     is_held,
     stiff_motions,
 )
-from fenicsmech.multibody.idle_spins import IdleSpin, idle_spins
+from fenicsmech.multibody.spins import IdleSpin, idle_spins
 from fenicsmech.multibody.linkage import (
     Body,
     Connection,

@@ -40,7 +40,7 @@ from scipy.sparse.csgraph import breadth_first_order
 
 from fenicsmech.errors import AssemblyError
 from fenicsmech.mechanism import Configuration
-from fenicsmech.multibody.idle_spins import IdleSpin
+from fenicsmech.multibody.spins import IdleSpin
 from fenicsmech.multibody.linkage import RANK, JointSystem, Linkage, PosePotential
 
 
