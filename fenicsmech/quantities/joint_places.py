@@ -221,23 +221,11 @@ class _Place(ModelNumber):
         if terms.adjoint is None:
             return total
         adjoint, state = terms.adjoint, terms.adjoint.at.state
-        at, size = (state.poses, state.motors, state.multipliers), self._joints.space.pose_size
+        at = state.poses, state.motors, state.multipliers
         for k, unit in self._changes.items():
             rate, forces = self._joints.place_rates(k, unit, *at)
             total += float(adjoint.multipliers @ rate)
-            total += sum(float(self._part(terms, body) @ force) for body, force in forces.items())
+            total += sum(float(terms.of_body(body) @ force) for body, force in forces.items())
         for potential in self._model.potentials:
-            factor = 1.0 if potential.holds else state.load_factor
-            rates = np.broadcast_to(
-                potential.gradient_by_places(self._changes, state.poses), len(potential.bodies) * size
-            ).reshape(-1, size)
-            for body, own in zip(potential.bodies, rates, strict=True):
-                total -= factor * float(self._part(terms, body) @ own)
+            total += terms.by_potential(potential, potential.gradient_by_places(self._changes, state.poses))
         return total
-
-    def _part(self, terms: NumberTerms, body: int) -> np.ndarray:
-        """ẑ of one body; zero of fixed ones."""
-        columns = self._joints.columns.get(body)
-        if columns is None or terms.adjoint is None:
-            return np.zeros(self._joints.space.pose_size)
-        return terms.adjoint.poses[columns]

@@ -7,7 +7,10 @@ quantity from its adjoint x, the same one that derivatives by the shape are made
     dQ/dp = ∂Q/∂p − xᵀ ∂F/∂p + dQ/dd · ∂d/∂p
 
 with the equations F and the design field d, which is linear in p if it depends on it. A new kind is one subclass of
-each.
+each. Numbers of effects have theirs, ``EffectNumber``: an effect enters F by the energy Π of links with û = ∂u/∂y · x,
+and by potentials V of poses, with the poses' part ẑ of x, which count with a factor σ,
+
+    xᵀ ∂F/∂p = ∂(∂Π/∂u · û)/∂p + ẑ · σ ∂²V/∂z∂p.
 """
 
 from __future__ import annotations
@@ -21,9 +24,9 @@ import numpy as np
 
 from fenicsmech.equilibrium import Adjoint
 from fenicsmech.errors import DescriptionError, positive
-from fenicsmech.mechanism import Configuration, FlexibleLink, Joint, Scene, Units
+from fenicsmech.mechanism import Configuration, Effect, FlexibleLink, Joint, Scene, Units
 from fenicsmech.model import MechanismModel
-from fenicsmech.multibody import JointChange
+from fenicsmech.multibody import JointChange, JointSystem, PosePotential
 from fenicsmech.quantities.quantity import Partial
 
 
@@ -36,11 +39,30 @@ class NumberTerms:
         adjoint: x; None if the component does not depend on the state.
         by_link: ∂Q/∂p − xᵀ ∂F/∂p of a number of every flexible link by its name among ``ElasticBody.numbers``,
             (links,); zeros of names that are not among them.
+        joints: of the model.
     """
 
     partial: Partial
     adjoint: Adjoint | None
     by_link: Callable[[str], np.ndarray]
+    joints: JointSystem
+
+    def of_body(self, body: int) -> np.ndarray:
+        """ẑ, the part of x of a body's pose, (pose_size,); zero of fixed bodies."""
+        columns = self.joints.columns.get(body)
+        if columns is None or self.adjoint is None:
+            return np.zeros(self.joints.space.pose_size)
+        return self.adjoint.poses[columns]
+
+    def by_potential(self, potential: PosePotential, rates: np.ndarray | float) -> float:
+        """−xᵀ ∂F/∂p of a potential V of poses, from ∂²V/∂z∂p, (n · pose_size,)."""
+        if self.adjoint is None:
+            return 0.0
+        factor = 1.0 if potential.holds else self.adjoint.at.state.load_factor
+        each = np.broadcast_to(rates, len(potential.bodies) * self.joints.space.pose_size).reshape(
+            len(potential.bodies), -1
+        )
+        return -factor * sum(float(self.of_body(body) @ own) for body, own in zip(potential.bodies, each, strict=True))
 
 
 class ModelNumber(ABC):
@@ -67,6 +89,55 @@ class ModelNumber(ABC):
     def through_field(self, design: np.ndarray) -> float:
         """dQ/dd · ∂d/∂p on this rank, from its owned values of dQ/dd, flat. Local."""
         return float(design @ self.rate[: len(design)]) if isinstance(self.rate, np.ndarray) else 0.0
+
+
+class EffectNumber(ModelNumber):
+    """A number of effects: one of their fields on links (``LinkFields.number``), of potentials (``numbers``), or both.
+
+    Args:
+        model: with the effects.
+        effects: of its scene.
+        name: of the number, in fields and potentials, and of the effects' attribute.
+
+    Raises:
+        DescriptionError: the effects' fields and potentials have no such number.
+    """
+
+    def __init__(self, model: MechanismModel, effects: Sequence[Effect], name: str) -> None:
+        self._elastic, self._link, self._name = model.elastic, model.mesh.link, name
+        self._potentials = [
+            own
+            for effect, found in model.effect_potentials
+            if effect in effects
+            for own in found
+            if name in own.numbers
+        ]
+        self._fields = [
+            fields.numbers[name]
+            for effect, fields in model.effect_fields
+            if effect in effects and name in fields.numbers
+        ]
+        if not self._potentials and not self._fields:
+            raise DescriptionError(
+                f"{name} of {effects[0]}",
+                "neither a field on links nor a potential has such a number",
+                "Make it one by fields.number(…) in link_energy, or name it in the potential's numbers",
+            )
+        self.drawn = self.value = getattr(effects[0], name)
+
+    def set(self, value):
+        self.value = value
+        for potential in self._potentials:
+            potential.numbers[self._name] = value
+        for known, chosen in self._fields:
+            self._elastic.numbers[known].x.array[np.flatnonzero(chosen[self._link])] = value
+
+    def slope(self, terms: NumberTerms) -> float:
+        total = sum(float(terms.by_link(known)[chosen].sum()) for known, chosen in self._fields)
+        if terms.adjoint is not None:
+            poses = terms.adjoint.at.state.poses
+            total += sum(terms.by_potential(own, own.gradient_by(self._name, poses)) for own in self._potentials)
+        return total
 
 
 @dataclass(frozen=True, init=False)
