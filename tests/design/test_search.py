@@ -276,6 +276,7 @@ def pulled_bar(pull: float, displacement: float, *, comm: MPI.Comm = MPI.COMM_SE
 
 
 @pytest.mark.parallel
+@pytest.mark.thorough
 def test_a_bar_may_bow_to_either_side_and_its_search_is_in_plane_stress_on_any_number_of_processes():
     found = pulled_bar(20.0, 0.5, comm=MPI.COMM_WORLD).search(fm.Scatter(starts=4))
     up, down = sorted(found.optima, key=lambda design: -design.links[0].controls[1][0][1])
