@@ -104,14 +104,11 @@ class _SpringNumber(ModelNumber):
     def slope(self, terms: NumberTerms) -> float:
         if terms.adjoint is None:
             return 0.0
-        state, total, size = terms.adjoint.at.state, 0.0, self._joints.space.pose_size
-        for potential in self._potentials:
-            factor = 1.0 if potential.holds else state.load_factor
-            rates = potential.gradient_by(self._name, state.poses).reshape(-1, size)
-            for body, rate in zip(potential.bodies, rates, strict=True):
-                if body in self._joints.columns:
-                    total += factor * float(terms.adjoint.poses[self._joints.columns[body]] @ rate)
-        return -total
+        state, total = terms.adjoint.at.state, 0.0
+        for own in self._potentials:
+            rates = own.gradient_by(self._name, state.poses)
+            total -= own.factor(state.load_factor) * terms.work(self._joints, own.bodies, rates)
+        return total
 
 
 @dataclass(frozen=True, init=False)

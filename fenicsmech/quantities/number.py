@@ -23,7 +23,7 @@ from fenicsmech.equilibrium import Adjoint
 from fenicsmech.errors import DescriptionError, positive
 from fenicsmech.mechanism import Configuration, FlexibleLink, Joint, Scene, Units
 from fenicsmech.model import MechanismModel
-from fenicsmech.multibody import JointChange
+from fenicsmech.multibody import JointChange, JointSystem
 from fenicsmech.quantities.quantity import Partial
 
 
@@ -41,6 +41,12 @@ class NumberTerms:
     partial: Partial
     adjoint: Adjoint | None
     by_link: Callable[[str], np.ndarray]
+
+    def work(self, joints: JointSystem, bodies: Sequence[int], rates: np.ndarray) -> float:
+        """ẑ · ``rates`` of forces on the poses of ``bodies``, (bodies · pose_size,); 0 of fixed ones."""
+        assert self.adjoint is not None, "the component depends on the state"
+        each = zip(bodies, rates.reshape(len(bodies), -1), strict=True)
+        return sum(float(self.adjoint.poses[joints.columns[k]] @ rate) for k, rate in each if k in joints.columns)
 
 
 class ModelNumber(ABC):

@@ -35,6 +35,7 @@ from fenicsmech.meshing import (
     LinkOutline,
     MechanismMesh,
     cell_measures,
+    edge_rows,
     image_of,
     node_ends,
     plan_of,
@@ -446,10 +447,6 @@ def _at_nodes(ends: np.ndarray, reach: np.ndarray, edges: EdgeWeights, handles: 
     """r_ij at nodes between the vertices ``ends`` (n, 2) of a link, from that at its vertices, (n, handles, 3)."""
     if np.array_equal(ends[:, 0], ends[:, 1]):
         return reach[ends[:, 0]]
-    found, count = 0.5 * (reach[ends[:, 0]] + reach[ends[:, 1]]), len(reach)
-    if len(edges.ends):
-        keys, wanted = edges.ends @ (count, 1), ends @ (count, 1)
-        place = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-        hit = np.flatnonzero(keys[place] == wanted)
-        found[hit] = _reach(edges.middles, edges.weights, handles)[place[hit]]
+    found, rows = 0.5 * (reach[ends[:, 0]] + reach[ends[:, 1]]), edge_rows(edges.ends, ends)
+    found[rows >= 0] = _reach(edges.middles, edges.weights, handles)[rows[rows >= 0]]
     return found
