@@ -181,8 +181,7 @@ class _Reaction(Observable):
 
     def __init__(self, model: MechanismModel, joint: Joint, *, force: bool) -> None:
         self._joints, self._force = model.linkage.joints, force
-        names = [connection.name for connection in self._joints.connections]
-        self._connection, dim = names.index(joint.name), self._joints.space.dim
+        self._connection, dim = model.linkage.connection_of(joint), self._joints.space.dim
         self.size = dim if force or dim == 3 else 1
 
     def values(self, state):

@@ -220,12 +220,12 @@ class _Place(ModelNumber):
         total = sum(factor * rate(self._changes) for factor, rate in terms.partial.by_places)
         if terms.adjoint is None:
             return total
-        adjoint, state = terms.adjoint, terms.adjoint.at.state
-        at = state.poses, state.motors, state.multipliers
+        adjoint, state, size = terms.adjoint, terms.adjoint.at.state, self._joints.space.pose_size
         for k, unit in self._changes.items():
-            rate, forces = self._joints.place_rates(k, unit, *at)
+            rate, forces = self._joints.place_rates(k, unit, state.poses, state.motors, state.multipliers)
             total += float(adjoint.multipliers @ rate)
-            total += sum(float(terms.of_body(body) @ force) for body, force in forces.items())
-        for potential in self._model.potentials:
-            total += terms.by_potential(potential, potential.gradient_by_places(self._changes, state.poses))
+            total += sum(terms.work(self._joints, [body], force) for body, force in forces.items())
+        for own in self._model.potentials:
+            rates = np.broadcast_to(own.gradient_by_places(self._changes, state.poses), len(own.bodies) * size)
+            total -= own.factor(state.load_factor) * terms.work(self._joints, own.bodies, rates)
         return total

@@ -131,7 +131,7 @@ class Rotation(Quantity):
     def _body(self, linkage: Linkage) -> int:
         if self.joint is None:
             return linkage.body_of(self.link)
-        (connection,) = (own for own in linkage.joints.connections if own.name == self.joint.name)
+        connection = linkage.joints.connections[linkage.connection_of(self.joint)]
         return next(i for i in (connection.a, connection.b) if linkage.bodies[i].link == self.link)
 
 

@@ -26,7 +26,7 @@ from fenicsmech.equilibrium import Adjoint
 from fenicsmech.errors import DescriptionError, positive
 from fenicsmech.mechanism import Configuration, Effect, FlexibleLink, Joint, Scene, Units
 from fenicsmech.model import MechanismModel
-from fenicsmech.multibody import JointChange, JointSystem, PosePotential
+from fenicsmech.multibody import JointChange, JointSystem
 from fenicsmech.quantities.quantity import Partial
 
 
@@ -39,30 +39,17 @@ class NumberTerms:
         adjoint: x; None if the component does not depend on the state.
         by_link: ∂Q/∂p − xᵀ ∂F/∂p of a number of every flexible link by its name among ``ElasticBody.numbers``,
             (links,); zeros of names that are not among them.
-        joints: of the model.
     """
 
     partial: Partial
     adjoint: Adjoint | None
     by_link: Callable[[str], np.ndarray]
-    joints: JointSystem
 
-    def of_body(self, body: int) -> np.ndarray:
-        """ẑ, the part of x of a body's pose, (pose_size,); zero of fixed bodies."""
-        columns = self.joints.columns.get(body)
-        if columns is None or self.adjoint is None:
-            return np.zeros(self.joints.space.pose_size)
-        return self.adjoint.poses[columns]
-
-    def by_potential(self, potential: PosePotential, rates: np.ndarray | float) -> float:
-        """−xᵀ ∂F/∂p of a potential V of poses, from ∂²V/∂z∂p, (n · pose_size,)."""
-        if self.adjoint is None:
-            return 0.0
-        factor = 1.0 if potential.holds else self.adjoint.at.state.load_factor
-        each = np.broadcast_to(rates, len(potential.bodies) * self.joints.space.pose_size).reshape(
-            len(potential.bodies), -1
-        )
-        return -factor * sum(float(self.of_body(body) @ own) for body, own in zip(potential.bodies, each, strict=True))
+    def work(self, joints: JointSystem, bodies: Sequence[int], rates: np.ndarray) -> float:
+        """ẑ · ``rates`` of forces on the poses of ``bodies``, (bodies · pose_size,); 0 of fixed ones."""
+        assert self.adjoint is not None, "the component depends on the state"
+        each = zip(bodies, rates.reshape(len(bodies), -1), strict=True)
+        return sum(float(self.adjoint.poses[joints.columns[k]] @ rate) for k, rate in each if k in joints.columns)
 
 
 class ModelNumber(ABC):
@@ -105,6 +92,7 @@ class EffectNumber(ModelNumber):
 
     def __init__(self, model: MechanismModel, effects: Sequence[Effect], name: str) -> None:
         self._elastic, self._link, self._name = model.elastic, model.mesh.link, name
+        self._joints = model.linkage.joints
         self._potentials = [
             own
             for effect, found in model.effect_potentials
@@ -135,8 +123,10 @@ class EffectNumber(ModelNumber):
     def slope(self, terms: NumberTerms) -> float:
         total = sum(float(terms.by_link(known)[chosen].sum()) for known, chosen in self._fields)
         if terms.adjoint is not None:
-            poses = terms.adjoint.at.state.poses
-            total += sum(terms.by_potential(own, own.gradient_by(self._name, poses)) for own in self._potentials)
+            state = terms.adjoint.at.state
+            for own in self._potentials:
+                rates = own.gradient_by(self._name, state.poses)
+                total -= own.factor(state.load_factor) * terms.work(self._joints, own.bodies, rates)
         return total
 
 

@@ -138,7 +138,7 @@ class Sensitivity:
             concerned = adjoint is not None and name in self._model.elastic.numbers
             return found - self._work.per_link(name) if concerned else found
 
-        terms = NumberTerms(partial, adjoint, by_link, self._model.linkage.joints)
+        terms = NumberTerms(partial, adjoint, by_link)
         own = np.array([number.through_field(design) for number in self._numbers])
         shares = self._model.mesh.comm.allreduce(own, op=MPI.SUM)
         return shares + [number.slope(terms) for number in self._numbers]
