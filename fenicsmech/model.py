@@ -30,7 +30,7 @@ from fenicsmech.elasticity import (
     Stretch,
 )
 from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State, load_fields
-from fenicsmech.errors import DescriptionError, positive
+from fenicsmech.errors import DescriptionError, expect, positive
 from fenicsmech.log import Clock
 from fenicsmech.mechanism import (
     Effect,
@@ -336,14 +336,14 @@ class MechanismModel:
     @property
     def design(self) -> Design:
         """The present design, with all numbers that were asked for, but those that contradict the ones given last."""
-        told: list[Any] = []
+        held: list[Any] = []
         for kind in (*self._given_last, *self._numbers):
-            if kind not in told and _contradicted(kind, told) is None:
-                told.append(kind)
-        return Design(self._shape.copy(), {kind: self._numbers[kind].value for kind in told})
+            if kind not in held and _contradicted(kind, held) is None:
+                held.append(kind)
+        return Design(self._shape.copy(), {kind: self._numbers[kind].value for kind in held})
 
     def number(self, kind):
-        """The ``ModelNumber`` of a ``NumberKind`` on this model; designs of the model tell it from now on."""
+        """The ``ModelNumber`` of a ``NumberKind`` on this model; designs of the model hold it from now on."""
         if kind not in self._numbers:
             with self.shaped(Design(self._shape)):  # the drawn value is read off the parts
                 self._numbers[kind] = kind.on(self)
@@ -523,8 +523,7 @@ def check_numbers(numbers: Sequence[tuple[Any, Sequence[float]]]) -> None:
         DescriptionError: something else than a kind is given, a value makes no sense, or two kinds change the same.
     """
     for k, (kind, values) in enumerate(numbers):
-        if not isinstance(kind, _Kind):
-            raise DescriptionError("number", f"{kind!r} is not a kind of number", "Give one, as Depth(link)")
+        expect("number", kind, _Kind, "a kind of number", "Give one, as Depth(link)")
         for value in values:
             kind.check_value(value)
         if (other := _contradicted(kind, [own for own, _ in numbers[:k]])) is not None:

@@ -19,7 +19,7 @@ from math import pi
 
 import numpy as np
 
-from fenicsmech.errors import DescriptionError, direction, finite, in_plane, point_text
+from fenicsmech.errors import DescriptionError, direction, finite, in_plane, point_text, set_fields
 from fenicsmech.mechanism import Configuration, FlexibleLink, Joint, Scene, in_dimension, same_place
 from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import JointChange
@@ -35,7 +35,7 @@ class _OfJoints(NumberKind):
 
     def __init__(self, *parts: Joint, vector: Sequence[float]) -> None:
         super().__init__(*parts)
-        object.__setattr__(self, "vector", direction(f"direction of the {self.what}", vector))
+        set_fields(self, vector=direction(f"direction of the {self.what}", vector))
 
     @staticmethod
     def candidates(scene: Scene) -> Sequence[Joint]:

@@ -23,7 +23,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fenicsmech.equilibrium import Adjoint
-from fenicsmech.errors import DescriptionError, positive
+from fenicsmech.errors import DescriptionError, positive, set_fields
 from fenicsmech.mechanism import Configuration, Effect, FlexibleLink, Joint, Scene, Units
 from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import JointChange, JointSystem
@@ -152,7 +152,7 @@ class NumberKind(ABC):
             raise DescriptionError(self.what, "no part is named", "Name one part, or several that share the number")
         if len(set(map(id, parts))) < len(parts):
             raise DescriptionError(self.what, f"{self.label(parts[0])!r} is given twice", "Give each part once")
-        object.__setattr__(self, "parts", tuple(parts))
+        set_fields(self, parts=tuple(parts))
 
     @staticmethod
     @abstractmethod

@@ -25,7 +25,7 @@ from mpi4py import MPI
 
 from fenicsmech.compat import assemble_vector, compile_form, owned_values
 from fenicsmech.equilibrium import EquilibriumSystem, State
-from fenicsmech.errors import DescriptionError, direction, point_text
+from fenicsmech.errors import DescriptionError, direction, point_text, set_fields
 from fenicsmech.mechanism import FlexibleLink, Force, Joint, Motor, Output, RigidLink, Scene, Units, in_dimension
 from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import JointChange
@@ -206,7 +206,7 @@ class Component(_OfVector):
     direction: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "direction", direction(f"direction of the {self.vector}", self.direction))
+        set_fields(self, direction=direction(f"direction of the {self.vector}", self.direction))
 
     @property
     def name(self):
