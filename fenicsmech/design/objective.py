@@ -131,7 +131,7 @@ class Objective:
         # decisions may depend on its last bit
         reached_merit = everyone.bcast(merit(value, inequalities, penalties), root=0)
         if reached_merit > below:
-            raise TooHigh(reached_merit)
+            raise TooHigh(reached_merit, residuals)
         with self._clock.phase("gradients"):
             try:
                 rows = self._gathered(

@@ -104,7 +104,7 @@ def _follow(comm: MPI.Comm, objective: Objective) -> None:
         raise failure
 
 
-_FORMAT = "fenicsmech checkpoint 3"
+_FORMAT = "fenicsmech checkpoint 4"
 
 
 @dataclass(frozen=True)

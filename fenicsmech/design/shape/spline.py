@@ -167,11 +167,11 @@ class SplineSamples:
     def curvature(self, p: np.ndarray) -> np.ndarray:
         """r, signed, at the inner samples, (count − 2,)."""
         a, b = self._segments(p, slice(None))
-        return _ratio(a, b)[0]
+        return _cross(a, b) * (1.0 / _length(a) + 1.0 / _length(b)) / _length(a + b)
 
     def curvature_gradient(self, p: np.ndarray, chosen: np.ndarray) -> np.ndarray:
         """∂r/∂p at some of the inner samples, a mask (count − 2,), (chosen, size)."""
-        _, *slopes = _ratio(*self._segments(p, chosen))
+        slopes = _ratio_gradient(*self._segments(p, chosen))
         moves = np.diff(self._gradient[:, :2], axis=0)
         pairs = zip(slopes, (moves[:-1][chosen], moves[1:][chosen]), strict=True)
         return sum(np.einsum("nc,ncp->np", slope, move) for slope, move in pairs)
@@ -182,15 +182,23 @@ class SplineSamples:
         return segments[:-1][chosen], segments[1:][chosen]
 
 
-def _ratio(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """r = g (a × b) with g = (1/|a| + 1/|b|) / |a + b|, (n,), and its derivatives by a and by b, both (n, 2)."""
-    c = a + b
-    A, B, C = (np.sqrt(np.sum(v * v, axis=1)) for v in (a, b, c))
-    cross, g = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (1.0 / A + 1.0 / B) / C
-    shared = (g / C**2)[:, None] * c  # −∂g/∂|c| ∂|c|/∂c
-    by_a = g[:, None] * np.stack([b[:, 1], -b[:, 0]], axis=1) - cross[:, None] * (a / (A**3 * C)[:, None] + shared)
-    by_b = g[:, None] * np.stack([-a[:, 1], a[:, 0]], axis=1) - cross[:, None] * (b / (B**3 * C)[:, None] + shared)
-    return g * cross, by_a, by_b
+def _length(a: np.ndarray) -> np.ndarray:
+    return np.hypot(a[:, 0], a[:, 1])
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+
+
+def _ratio_gradient(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Derivatives of r = g (a × b), g = (1/|a| + 1/|b|) / |a + b|, by a and by b, both (n, 2)."""
+    c, cross = a + b, _cross(a, b)[:, None]
+    A, B, C = (_length(v)[:, None] for v in (a, b, c))
+    g = (1.0 / A + 1.0 / B) / C
+    shared = g * c / C**2
+    by_a = g * np.stack([b[:, 1], -b[:, 0]], axis=1) - cross * (a / (A**3 * C) + shared)
+    by_b = g * np.stack([-a[:, 1], a[:, 0]], axis=1) - cross * (b / (B**3 * C) + shared)
+    return by_a, by_b
 
 
 @dataclass(frozen=True, eq=False)
