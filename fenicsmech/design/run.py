@@ -180,9 +180,8 @@ class Checkpoint:
             DescriptionError: the file does not exist, is not a checkpoint, or is one of another problem.
         """
         data = self.read()
-        start = Start(
-            np.array(data["parameters"]), data["number"], data["evaluations"], np.array(data["memory"], dtype=float)
-        )
+        memory = np.array(data["memory"], dtype=float)
+        start = Start(np.array(data["parameters"]), data["number"], data["evaluations"], memory, resumed=True)
         own: dict[str, Any] = {
             name: tuple(value) if isinstance(value, list) else value for name, value in data["round"].items()
         }

@@ -55,10 +55,6 @@ class LevenbergMarquardt(SQP):
     def least_reduction(self) -> float:
         return 5e-3 if self.tolerance is None else self.tolerance
 
-    def continued(self, memory: np.ndarray) -> None:
-        """Without memory: it is μ alone, and a start's makes the first step of a round cautious."""
-        return None
-
     def _minimum(self, here: Evaluation, lengths: np.ndarray) -> np.ndarray:
         """The minimum of the undamped model, (n,)."""
         return self._step(here, self._begin(here, lengths), self.least_damping, lengths).parameters

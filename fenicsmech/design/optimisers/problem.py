@@ -227,12 +227,14 @@ class Start:
         parameters: p, (n,).
         number, evaluations: iterations and objective evaluations so far.
         memory: state of the optimiser, from ``Iterate.memory``; None at the very start.
+        resumed: whether a minimisation was interrupted here.
     """
 
     parameters: np.ndarray
     number: int = 0
     evaluations: int = 0
     memory: np.ndarray | None = None
+    resumed: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -138,7 +138,7 @@ class SQP(Optimiser):
         memory = self._begin(here, lengths) if start.memory is None else Memory.unpacked(start.memory, here)
         last, ahead = self._iterate(start.number, start.evaluations + 1, here, memory, lengths)
         watch(last)
-        resolved = self._resolution(last, lengths, start.memory is not None)
+        resolved = self._resolution(last, lengths, start.resumed)
         while last.reason is None:
             if resolved(last):
                 last = replace(last, reason=Reason.RESOLVED)
