@@ -165,11 +165,11 @@ class Trial:
         return level.remainder * in_space * level.gain
 
     def __str__(self) -> str:
-        blocked = f" + {abs(self.plane_stress):.2%} for contraction that pins block"
+        left_out = f" + {abs(self.plane_stress):.2%} for plane stress"
         return (
             f"{self.level.name} ({self.unknowns} unknowns, {self.seconds:.2g} s): "
             f"error of about {abs(self.elements):.2%} for the elements"
-            f"{blocked if self.level.model is PLANE_STRESS else ''}; at most {self.error:.2%} once corrected"
+            f"{left_out if self.level.model is PLANE_STRESS else ''}; at most {self.error:.2%} once corrected"
         )
 
 
