@@ -267,8 +267,12 @@ class MechanismModel:
         faces = [part for effect in effects for part in effect.faces]
         boundaries = find_boundaries(mesh.mesh, links, mesh.link, faces, half=fidelity.model.half)
 
+        self._effect_fields: list[tuple[Effect, LinkFields]] = []
+
         def energy(effect: Effect, body: ElasticBody) -> ufl.Form | None:
-            return effect.link_energy(LinkFields(tuple(links), body, boundaries))
+            fields = LinkFields(tuple(links), body, boundaries)
+            self._effect_fields.append((effect, fields))
+            return effect.link_energy(fields)
 
         self.elastic = ElasticBody(
             mesh.mesh,
@@ -320,6 +324,12 @@ class MechanismModel:
     def rigid_dofs(self) -> int:
         """Coordinates of all rigid and interface bodies, fixed ones included."""
         return len(self.linkage.bodies) * self.linkage.joints.space.pose_size
+
+    @property
+    def effect_fields(self) -> list[tuple[Effect, LinkFields]]:
+        """The fields of each effect, with the numbers of its energy."""
+        _ = self.elastic.effects_ufl  # which names them
+        return self._effect_fields
 
     # -- shape, material and other numbers -----------------------------------------------------------------------
 

@@ -140,9 +140,9 @@ class _Energy(Observable):
     """A form in the fields of the links."""
 
     def __init__(self, model: MechanismModel, form: ufl.Form) -> None:
-        self._elastic = elastic = model.elastic
+        elastic, self._numbers = model.elastic, dict(model.elastic.numbers)
         self._states = {f"state {k}": own for k, own in enumerate(elastic.fields)}
-        self._form = FormValue(model, form, {"design": elastic.shape, **self._states, **elastic.numbers})
+        self._form = FormValue(model, form, {"design": elastic.shape, **self._states, **self._numbers})
 
     def values(self, state):
         return np.array([self._form.value()])
@@ -152,7 +152,7 @@ class _Energy(Observable):
             Partial(
                 links=np.concatenate([self._form.slope(name) for name in self._states]),
                 design=self._form.slope("design"),
-                per_link={name: self._form.per_link(name) for name in self._elastic.numbers},
+                per_link={name: self._form.per_link(name) for name in self._numbers},
             )
         ]
 

@@ -7,7 +7,10 @@ quantity from its adjoint x, the same one that derivatives by the shape are made
     dQ/dp = ∂Q/∂p − xᵀ ∂F/∂p + dQ/dd · ∂d/∂p
 
 with the equations F and the design field d, which is linear in p if it depends on it. A new kind is one subclass of
-each.
+each. Numbers of effects have theirs, ``EffectNumber``: an effect enters F by the energy Π of links with û = ∂u/∂y · x,
+and by potentials V of poses, with the poses' part ẑ of x, which count with a factor σ,
+
+    xᵀ ∂F/∂p = ∂(∂Π/∂u · û)/∂p + ẑ · σ ∂²V/∂z∂p.
 """
 
 from __future__ import annotations
@@ -21,7 +24,7 @@ import numpy as np
 
 from fenicsmech.equilibrium import Adjoint
 from fenicsmech.errors import DescriptionError, positive, set_fields
-from fenicsmech.mechanism import Configuration, FlexibleLink, Joint, Scene, Units
+from fenicsmech.mechanism import Configuration, Effect, FlexibleLink, Joint, Scene, Units
 from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import JointChange, JointSystem
 from fenicsmech.quantities.quantity import Partial
@@ -73,6 +76,58 @@ class ModelNumber(ABC):
     def through_field(self, design: np.ndarray) -> float:
         """dQ/dd · ∂d/∂p on this rank, from its owned values of dQ/dd, flat. Local."""
         return float(design @ self.rate[: len(design)]) if isinstance(self.rate, np.ndarray) else 0.0
+
+
+class EffectNumber(ModelNumber):
+    """A number of effects: one of their fields on links (``LinkFields.number``), of potentials (``numbers``), or both.
+
+    Args:
+        model: with the effects.
+        effects: of its scene.
+        name: of the number, in fields and potentials, and of the effects' attribute.
+
+    Raises:
+        DescriptionError: the effects' fields and potentials have no such number.
+    """
+
+    def __init__(self, model: MechanismModel, effects: Sequence[Effect], name: str) -> None:
+        self._elastic, self._link, self._name = model.elastic, model.mesh.link, name
+        self._joints = model.linkage.joints
+        self._potentials = [
+            own
+            for effect, found in model.effect_potentials
+            if effect in effects
+            for own in found
+            if name in own.numbers
+        ]
+        self._fields = [
+            fields.numbers[name]
+            for effect, fields in model.effect_fields
+            if effect in effects and name in fields.numbers
+        ]
+        if not self._potentials and not self._fields:
+            raise DescriptionError(
+                f"{name} of {effects[0]}",
+                "neither a field on links nor a potential has such a number",
+                "Make it one by fields.number(…) in link_energy, or name it in the potential's numbers",
+            )
+        self.drawn = self.value = getattr(effects[0], name)
+
+    def set(self, value):
+        self.value = value
+        for potential in self._potentials:
+            potential.numbers[self._name] = value
+        for known, chosen in self._fields:
+            self._elastic.numbers[known].x.array[np.flatnonzero(chosen[self._link])] = value
+
+    def slope(self, terms: NumberTerms) -> float:
+        total = sum(float(terms.by_link(known)[chosen].sum()) for known, chosen in self._fields)
+        if terms.adjoint is not None:
+            state = terms.adjoint.at.state
+            for own in self._potentials:
+                rates = own.gradient_by(self._name, state.poses)
+                total -= own.factor(state.load_factor) * terms.work(self._joints, own.bodies, rates)
+        return total
 
 
 @dataclass(frozen=True, init=False)
