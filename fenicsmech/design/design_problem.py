@@ -84,8 +84,8 @@ class DesignProblem:
     def rest_shape(self, design: DesignResult | np.ndarray) -> Design:
         """The design of a result or of parameters (parameters,), as ``Simulation.with_design`` takes it.
 
-        Parameters alone need not fix the shape: several positions of the
-        handles can be minima, and results hold those found.
+        Parameters alone need not fix the shape: several positions of the handles can be minima, and results hold those
+        found.
 
         Raises:
             DescriptionError: the design is one of other links.

@@ -105,8 +105,7 @@ class Calibration:
             1 (tests/estimates/test_element_error.py).
         mixed: the same of elements with a pressure (tests/estimates/test_mixed_error.py).
         decay: c of the contraction that pins block, so that estimates are near the difference between space and plane
-            stress
-            (tests/estimates/test_plane_stress_error.py).
+            stress (tests/estimates/test_plane_stress_error.py).
     """
 
     displacement: Mapping[int, float] = field(default_factory=lambda: {1: 1.3, 2: 1.6, 3: 2.6})

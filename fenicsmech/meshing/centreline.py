@@ -83,7 +83,6 @@ class LinkOutline:
         sites: its interfaces.
 
     Attributes:
-        sites: likewise.
         polygon: with its vertices on the outline, (m, 2).
         width: that of a long strip of the same area and perimeter.
     """
