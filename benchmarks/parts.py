@@ -36,6 +36,7 @@ SPACES = {
     "gripper": "plane-stress",
     "constant_force": "plane-stress",
     "switch": "plane-stress",
+    "suspension": "plane-stress",
 }
 FINER = {"3d": 2.0, "plane-stress": 4.0}  # width of the optimiser's elements over that of the part's
 
