@@ -7,7 +7,7 @@ from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import ufl
@@ -210,19 +210,15 @@ class Design:
         numbers: values of design numbers by their kind (``NumberKind``), in its unit; others are as drawn.
 
     Raises:
-        DescriptionError: two numbers change the same.
+        DescriptionError: it has something else than kinds of numbers, a value makes no sense, or two numbers change the
+            same.
     """
 
     field: np.ndarray
     numbers: Mapping[Any, float] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        kinds = list(self.numbers)
-        for k, kind in enumerate(kinds):
-            if (other := _contradicted(kind, kinds[:k])) is not None:
-                raise DescriptionError(
-                    str(kind), f"{other} is given too, and both change the same", "Give each number of a part once"
-                )
+        check_numbers([(kind, (value,)) for kind, value in self.numbers.items()])
 
     def halfway(self, other: Design) -> Design:
         """The mean of both."""
@@ -496,6 +492,34 @@ class MechanismModel:
             clock=self.clock,
             comm=self.mesh.comm,
         )
+
+
+@runtime_checkable
+class _Kind(Protocol):
+    """What a model needs of a kind of number (``fenicsmech.quantities.NumberKind``)."""
+
+    @property
+    def slots(self) -> Sequence[Hashable]: ...
+
+    def check_value(self, value: float) -> None: ...
+
+    def on(self, model: MechanismModel) -> Any: ...
+
+
+def check_numbers(numbers: Sequence[tuple[Any, Sequence[float]]]) -> None:
+    """Checks kinds of numbers that are given together, each with some values.
+
+    Raises:
+        DescriptionError: something else than a kind is given, a value makes no sense, or two kinds change the same.
+    """
+    for k, (kind, values) in enumerate(numbers):
+        if not isinstance(kind, _Kind):
+            raise DescriptionError("number", f"{kind!r} is not a kind of number", "Give one, as Depth(link)")
+        for value in values:
+            kind.check_value(value)
+        if (other := _contradicted(kind, [own for own, _ in numbers[:k]])) is not None:
+            twice = "it is given twice" if other == kind else f"{other} is given too, and both change the same"
+            raise DescriptionError(str(kind), twice, "Give each number of a part once")
 
 
 def _contradicted(kind: Any, others: Sequence[Any]) -> Any | None:

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenicsmech.collective import from_one
-from fenicsmech.design.numbers import Number, check_numbers
+from fenicsmech.design.numbers import Number
 from fenicsmech.design.shape.shape_map import ImageRequest, ShapeRequest
 from fenicsmech.design.shape.spline import lay_out
 from fenicsmech.errors import DescriptionError, finite, points, positive, set_fields
 from fenicsmech.mechanism import Centreline, FlexibleLink, Mechanism, Shape, Strip
 from fenicsmech.meshing import Figure, LinkOutline, find_centreline, link_outline, matches
-from fenicsmech.model import plan_sites
+from fenicsmech.model import check_numbers, plan_sites
 from fenicsmech.multibody import Linkage
 from fenicsmech.simulation import Simulation
 
@@ -276,13 +276,13 @@ def check_designs(designs: Sequence[SplineDesign | Number]) -> None:
             raise DescriptionError(
                 "design problem", f"{design!r} is not a design of a link or number", "Give SplineDesign(…) or Number(…)"
             )
-    check_numbers([design for design in designs if isinstance(design, Number)])
+    numbers = [design for design in designs if isinstance(design, Number)]
+    check_numbers([(own.kind, (own.least, own.most)) for own in numbers])
     shapes = [design for design in designs if isinstance(design, SplineDesign)]
     names = [link.name for design in shapes for link in design.links]
     for name in names:
         if names.count(name) > 1:
             raise DescriptionError(f"design of link {name!r}", "it is given twice", "Give each link once")
-    numbers = [design for design in designs if isinstance(design, Number)]
     for shape in (shape for shape in shapes if len(shape.links) > 1):
         for link in taken_along(numbers):
             if link in shape.links:
