@@ -30,7 +30,7 @@ from fenicsmech.elasticity import (
     Stretch,
 )
 from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State, load_fields
-from fenicsmech.errors import DescriptionError, positive
+from fenicsmech.errors import DescriptionError, expect, positive
 from fenicsmech.log import Clock
 from fenicsmech.mechanism import (
     Effect,
@@ -267,8 +267,12 @@ class MechanismModel:
         faces = [part for effect in effects for part in effect.faces]
         boundaries = find_boundaries(mesh.mesh, links, mesh.link, faces, half=fidelity.model.half)
 
+        self._effect_fields: list[tuple[Effect, LinkFields]] = []
+
         def energy(effect: Effect, body: ElasticBody) -> ufl.Form | None:
-            return effect.link_energy(LinkFields(tuple(links), body, boundaries))
+            fields = LinkFields(tuple(links), body, boundaries)
+            self._effect_fields.append((effect, fields))
+            return effect.link_energy(fields)
 
         self.elastic = ElasticBody(
             mesh.mesh,
@@ -321,19 +325,25 @@ class MechanismModel:
         """Coordinates of all rigid and interface bodies, fixed ones included."""
         return len(self.linkage.bodies) * self.linkage.joints.space.pose_size
 
+    @property
+    def effect_fields(self) -> list[tuple[Effect, LinkFields]]:
+        """The fields of each effect, with the numbers of its energy."""
+        _ = self.elastic.effects_ufl  # which names them
+        return self._effect_fields
+
     # -- shape, material and other numbers -----------------------------------------------------------------------
 
     @property
     def design(self) -> Design:
         """The present design, with all numbers that were asked for, but those that contradict the ones given last."""
-        told: list[Any] = []
+        held: list[Any] = []
         for kind in (*self._given_last, *self._numbers):
-            if kind not in told and _contradicted(kind, told) is None:
-                told.append(kind)
-        return Design(self._shape.copy(), {kind: self._numbers[kind].value for kind in told})
+            if kind not in held and _contradicted(kind, held) is None:
+                held.append(kind)
+        return Design(self._shape.copy(), {kind: self._numbers[kind].value for kind in held})
 
     def number(self, kind):
-        """The ``ModelNumber`` of a ``NumberKind`` on this model; designs of the model tell it from now on."""
+        """The ``ModelNumber`` of a ``NumberKind`` on this model; designs of the model hold it from now on."""
         if kind not in self._numbers:
             with self.shaped(Design(self._shape)):  # the drawn value is read off the parts
                 self._numbers[kind] = kind.on(self)
@@ -513,8 +523,7 @@ def check_numbers(numbers: Sequence[tuple[Any, Sequence[float]]]) -> None:
         DescriptionError: something else than a kind is given, a value makes no sense, or two kinds change the same.
     """
     for k, (kind, values) in enumerate(numbers):
-        if not isinstance(kind, _Kind):
-            raise DescriptionError("number", f"{kind!r} is not a kind of number", "Give one, as Depth(link)")
+        expect("number", kind, _Kind, "a kind of number", "Give one, as Depth(link)")
         for value in values:
             kind.check_value(value)
         if (other := _contradicted(kind, [own for own, _ in numbers[:k]])) is not None:

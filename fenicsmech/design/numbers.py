@@ -127,7 +127,7 @@ class ScaledNumbers:
         return np.array([own.numbers for own in gradients]).reshape(len(gradients), len(self.numbers)) * self.width
 
     def designs(self, q: np.ndarray, units: Units) -> tuple[NumberDesign, ...]:
-        """The numbers at q, as results tell them."""
+        """The numbers at q, as results hold them."""
         return tuple(
             NumberDesign(
                 name=str(own),

@@ -24,7 +24,7 @@ import ufl
 from dolfinx import fem
 
 from fenicsmech.effects.link_fields import Faces
-from fenicsmech.errors import DescriptionError, finite, point, set_fields
+from fenicsmech.errors import DescriptionError, expect, finite, point, set_fields
 from fenicsmech.mechanism import Effect, FlexibleLink, in_dimension
 
 
@@ -51,8 +51,7 @@ class Pressure(Effect):
     about: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.link, FlexibleLink):
-            raise DescriptionError("pressure", f"{self.link!r} is not a flexible link", "Give one")
+        expect("pressure", self.link, FlexibleLink, "a flexible link", "Give one")
         set_fields(self, pressure=finite(f"pressure on {self.link.name!r}", self.pressure))
         if self.about is not None:
             set_fields(self, about=point(f"centre of the pressure on {self.link.name!r}", self.about))

@@ -262,7 +262,7 @@ def constraint(kind: JointKind, dim: int, driven: bool) -> SmoothFunction:
 
 @cache
 def constraint_rate(kind: JointKind, dim: int, driven: bool) -> SmoothFunction:
-    """∂C/∂c · ċ of a ``constraint``, as the rates ċ of its constants, which follow these, say."""
+    """∂C/∂c · ċ of a ``constraint``; its constants are those c of that, then their rates ċ."""
     return _rate(*_equations(kind, dim, driven))
 
 

@@ -35,10 +35,12 @@ from fenicsmech.meshing import (
     LinkOutline,
     MechanismMesh,
     cell_measures,
+    edge_rows,
     image_of,
     node_ends,
     plan_of,
 )
+from fenicsmech.polygons import chord_lengths
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,7 +267,7 @@ def _place_handles(mesh: LinkMesh, fit: SplineFit, *, spacing: float, turns: Seq
     spline, plan = fit.spline, plan_of(mesh).mesh
     samples = np.linspace(0.0, spline.segments, 1000 * spline.segments + 1)
     curve = spline.evaluate(spline.initial, samples)[:, :2]
-    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
+    arc = chord_lengths(curve)
     held = plan.points[np.unique(plan.cells[plan.interface != FREE])][:, :2]
 
     stops = [(float(at), site) for at, site in zip(np.flatnonzero(spline.is_joint), fit.sites, strict=True)]
@@ -446,10 +448,6 @@ def _at_nodes(ends: np.ndarray, reach: np.ndarray, edges: EdgeWeights, handles: 
     """r_ij at nodes between the vertices ``ends`` (n, 2) of a link, from that at its vertices, (n, handles, 3)."""
     if np.array_equal(ends[:, 0], ends[:, 1]):
         return reach[ends[:, 0]]
-    found, count = 0.5 * (reach[ends[:, 0]] + reach[ends[:, 1]]), len(reach)
-    if len(edges.ends):
-        keys, wanted = edges.ends @ (count, 1), ends @ (count, 1)
-        place = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-        hit = np.flatnonzero(keys[place] == wanted)
-        found[hit] = _reach(edges.middles, edges.weights, handles)[place[hit]]
+    found, rows = 0.5 * (reach[ends[:, 0]] + reach[ends[:, 1]]), edge_rows(edges.ends, ends)
+    found[rows >= 0] = _reach(edges.middles, edges.weights, handles)[rows[rows >= 0]]
     return found
