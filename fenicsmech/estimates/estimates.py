@@ -196,7 +196,9 @@ def adjoint_at(solver: EquilibriumSolver, equilibrium: Equilibrium, output: Poin
     control = DisplacementControl(system.load_displacement(state)) if force else LoadControl(state.force)
     try:
         at = solver.linearise(state, control)
-        return Adjoint.of_force(at) if force and output is None else Adjoint.of_travel(at, output or system.controlled)
+        if force and output is None:
+            return Adjoint.of_force(at)
+        return Adjoint.of(at, at.travel_gradient(output or system.controlled))
     except NotConverged as failure:
         raise EquilibriumError(
             f"equilibrium under {system.controlled.name!r}",

@@ -66,8 +66,7 @@ class Curve:
         discretisation: of the scene, with which they were computed.
         unloaded: the configuration without any load or effect, from which displacements count.
         others: constant magnitudes of other forces.
-        unknown: of the curve: displacements, or forces where displacements were prescribed or the curve
-            was followed.
+        unknown: of the curve: displacements, or forces where displacements were prescribed or the curve was followed.
     """
 
     part: PrescribedPart

@@ -122,6 +122,6 @@ def test_optimal_handles_stretch_cells_less_than_naive_ones():
 def test_parts_of_the_switch_meet_their_targets_and_are_kept(tmp_path):
     options = ("switch", "--size", "2", "--results", str(tmp_path))
     first = printed("parts", *options)[2:]
-    assert [path.name for path in tmp_path.iterdir()] == ["switch.json"]
+    assert [path.name for path in tmp_path.iterdir()] == ["switch-2.json"]
     assert len(first) == 2 and all(row[0] == "switch" and abs(float(row[-1])) < 1.0 for row in first)
     assert printed("parts", *options)[2:] == first
