@@ -37,7 +37,6 @@ class DesignedSimulation:
         clock: of the phases.
 
     Attributes:
-        simulation, designs, targets, clock: likewise.
         shapes: the links whose shape may change, by parameters of their own or with their joints alone.
         numbers: those that may change.
         changed: the links whose solids change.

@@ -3,10 +3,9 @@
     O(p) = Σ ½ w_k r_k² + Σ w_k Q_k(p) / s_k + R(p),     r_k = (Q_k(p) − Q̄_k) / s_k,     c_k = ± (Q_k(p) − Q̄_k) / s_k
 
 (the paper's equation 5 and section V-A, relative to the targets and so free of units), where Q_k are the simulation's
-values plus a correction that is held fixed (``correction``). Each evaluation places the
-handles, reshapes the links, follows the equilibria of all samples from those of the best design so far, and takes
-the adjoint derivatives of all targets to p. Samples are spread over groups of processes, each with a communicator of
-its own.
+values plus a correction that is held fixed (``correction``). Each evaluation places the handles, reshapes the links,
+follows the equilibria of all samples from those of the best design so far, and takes the adjoint derivatives of all
+targets to p. Samples are spread over groups of processes, each with a communicator of its own.
 """
 
 from __future__ import annotations
@@ -52,7 +51,6 @@ class Objective:
 
     Attributes:
         lengths: typical change ℓ of each parameter, (parameters,).
-        comparison: of values with targets.
         correction: added to the simulation's values before they are compared, (components,).
         reached: the simulation's values at the last evaluation, (components,).
     """

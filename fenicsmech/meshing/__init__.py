@@ -38,6 +38,7 @@ from fenicsmech.meshing.link_mesh import (
     count_pieces,
     distribute,
     edge_corners,
+    edge_rows,
     extrude,
     face_of,
     least_stretches,

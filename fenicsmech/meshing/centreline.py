@@ -30,7 +30,7 @@ from fenicsmech.errors import DescriptionError, point_text
 from fenicsmech.mechanism import Centreline
 from fenicsmech.meshing.link_mesher import InterfaceSite
 from fenicsmech.meshing.outline import Curve, points_on, sample_parameters, sampled
-from fenicsmech.polygons import are_inside, distance_to, signed_area
+from fenicsmech.polygons import are_inside, chord_lengths, distance_to, divided, signed_area
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,6 @@ class LinkOutline:
         sites: its interfaces.
 
     Attributes:
-        sites: likewise.
         polygon: with its vertices on the outline, (m, 2).
         width: that of a long strip of the same area and perimeter.
     """
@@ -136,7 +135,7 @@ class LinkOutline:
         free = ~chords.fixed
         if not free.any():
             raise DescriptionError(part, "interfaces and eyes cover its centreline", "Make its interfaces smaller")
-        arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+        arc = chord_lengths(points)
         return np.interp(arc, arc[free], (chords.left + chords.right)[free])
 
     def _ray(self, points: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -207,7 +206,7 @@ def _halve_chords(
 ) -> np.ndarray:
     """Points of the line near ``path`` (n, 2) that halves its chords; ends that are not free stay."""
     width, far = outline.width, np.inf
-    points = _evenly(path, spacing * width)
+    points = divided(path, spacing * width, least=3)
     for _ in range(SEARCH.moves):
         curve = Centreline(points, part=f"centreline of {part}")
         tangents = curve.tangent(curve.knots)
@@ -233,13 +232,6 @@ def _halve_chords(
     if not far <= SEARCH.halved * width:
         raise DescriptionError(part, "no line halves the chords of its outline", "Give centreline=…, points along it")
     return points
-
-
-def _evenly(path: np.ndarray, spacing: float) -> np.ndarray:
-    """Points that divide a line through ``path`` (n, 2) evenly, about ``spacing`` apart."""
-    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-    at = np.linspace(0.0, arc[-1], max(3, math.ceil(arc[-1] / spacing)) + 1)
-    return np.column_stack([np.interp(at, arc, coordinate) for coordinate in path.T])
 
 
 def _medial_path(

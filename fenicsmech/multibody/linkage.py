@@ -366,6 +366,10 @@ class PosePotential(ABC):
     def hessian(self, poses: np.ndarray) -> np.ndarray:
         """∂²V/∂z², (n · pose_size, n · pose_size)."""
 
+    def factor(self, load_factor: float) -> float:
+        """The factor that V counts with."""
+        return 1.0 if self.holds else load_factor
+
     def gradient_by(self, name: str, poses: np.ndarray) -> np.ndarray:
         """∂²V/∂z∂p of one of ``numbers``, (n · pose_size,)."""
         raise NotImplementedError(f"{type(self).__name__} has no numbers")

@@ -288,13 +288,16 @@ class Simulation:
                 alone, this rank's values with ghosts, flat.
 
         Raises:
-            DescriptionError: the design is one of other links, or of another mesh.
+            DescriptionError: the design is one of other links, or of another mesh, or the scene has no parts with such
+                numbers.
             ShapeError: cells of the mesh are inverted in this shape.
         """
         if isinstance(design, np.ndarray):
             given = Design(design)
         else:
             given = design if isinstance(design, Design) else design.rest_shape(self)
+        for kind in given.numbers:
+            kind.check(self.scene, self.linkage.dim)
         size = len(self.model.elastic.shape.x.array)
         if self.comm.allreduce(int(given.field.shape != (size,))):
             raise DescriptionError(

@@ -129,7 +129,7 @@ class HandleOptimum:
                 total -= cho_solve(link.factor, slope[..., link.free].T).T @ (link.cross @ own.matrix)
             except np.linalg.LinAlgError:
                 raise ShapeError(
-                    f"shape of link {shape.name!r}",
+                    f"shape of link {shape.own.name!r}",
                     "its mesh does not determine the positions of all handles",
                     "Use smaller elements",
                 ) from None

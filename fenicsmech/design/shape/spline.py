@@ -27,6 +27,7 @@ from numpy.polynomial.polynomial import polyder
 
 from fenicsmech.errors import DescriptionError, counted
 from fenicsmech.mechanism import Centreline
+from fenicsmech.polygons import chord_lengths
 
 # h₀₀ (P_k), h₁₀ (M_k), h₀₁ (P_{k+1}), h₁₁ (M_{k+1}) in powers of τ, and their derivatives
 _HERMITE = np.array([[1.0, 0.0, -3.0, 2.0], [0.0, 1.0, -2.0, 1.0], [0.0, 0.0, 3.0, -2.0], [0.0, 0.0, -1.0, 1.0]])
@@ -348,8 +349,7 @@ class _ArcLength:
     def __init__(self, centreline: Centreline) -> None:
         self._curve = centreline
         self._s = centreline.samples(1000)
-        chords = np.linalg.norm(np.diff(centreline.evaluate(self._s), axis=0), axis=1)
-        self._a = np.concatenate([[0.0], np.cumsum(chords)])
+        self._a = chord_lengths(centreline.evaluate(self._s))
 
     @property
     def length(self) -> float:
