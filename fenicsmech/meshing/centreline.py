@@ -30,7 +30,7 @@ from fenicsmech.errors import DescriptionError, point_text
 from fenicsmech.mechanism import Centreline
 from fenicsmech.meshing.link_mesher import InterfaceSite
 from fenicsmech.meshing.outline import Curve, points_on, sample_parameters, sampled
-from fenicsmech.polygons import are_inside, chord_lengths, distance_to, divided, signed_area
+from fenicsmech.polygons import are_inside, chord_lengths, distance_to, divided, strip_width
 
 
 @dataclass(frozen=True)
@@ -89,9 +89,7 @@ class LinkOutline:
 
     def __init__(self, loop: Sequence[Curve], sites: Sequence[InterfaceSite]) -> None:
         self._loop, self.sites = tuple(loop), tuple(sites)
-        rough = sampled(loop, math.inf)
-        perimeter = float(np.linalg.norm(np.roll(rough, -1, axis=0) - rough, axis=1).sum())
-        self.width = 2.0 * abs(signed_area(rough)) / perimeter
+        self.width = strip_width(sampled(loop, math.inf))
         parameters = [sample_parameters(curve, SEARCH.sampled * self.width) for curve in loop]
         self._curve = np.repeat(np.arange(len(loop)), [len(own) - 1 for own in parameters])
         self._bent = np.array([not isinstance(curve, BSpline) or curve.k > 1 for curve in loop])[self._curve]
