@@ -14,9 +14,8 @@ coordinate x moves ever faster while the links are free of strain: close by, in 
 
 e the strain and b how far the motors are beyond the dead centre. Before it (b < 0) joints close by x alone, x = √(−2b)
 and λ = 0; beyond it x = 0 and λ = k b. Newton's method does not get from one to the other: as long as λ = 0 the energy
-is not curved along x, every step closes the joints by x alone, x ← ½ x − b / x, and for b > 0 these oscillate
-without end. From a state that strains instead it converges, λ being the curvature. Such states lie along the rate with
-x held:
+is not curved along x, every step closes the joints by x alone, x ← ½ x − b / x, and for b > 0 these oscillate without
+end. From a state that strains instead it converges, λ being the curvature. Such states lie along the rate with x held:
 
     K ẏ = r,     K w = n,     ẏ ← ẏ − w (n · ẏ) / (n · w),     n the motion in ẏ, which is all x near the dead centre.
 """

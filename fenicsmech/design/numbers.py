@@ -90,7 +90,6 @@ class ScaledNumbers:
         numbers: which of their numbers.
 
     Attributes:
-        numbers: likewise.
         on_model: the same on the model.
         initial: q of the drawn values, (numbers,).
         width: most − least, (numbers,).

@@ -37,8 +37,8 @@ class Pressure(Effect):
         pressure: into the link; negative for suction.
         where: predicate of points on the drawn boundary, (n, dim) → (n,) bool; a facet belongs to the part if it holds
             at all its corners. None: the whole boundary.
-        about: x₀; required for an open part, whose rim must be held or move as above. In space
-            two coordinates are an axis along z, which suits holes through extruded links, and their sides.
+        about: x₀; required for an open part, whose rim must be held or move as above. In space two coordinates are an
+            axis along z, which suits holes through extruded links, and their sides.
 
     Raises:
         DescriptionError: a number makes no sense, or the link is not flexible. Later, when it is meshed: the part is

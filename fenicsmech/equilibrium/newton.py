@@ -4,11 +4,11 @@ Each iteration solves
 
     [[∇²L + δ I, −Aᵀ], [−A, −1/ρ]] (ds, dλ) = −(∇L, −C),
 
-the Newton step of the augmented Lagrangian, which tends to the KKT step for large ρ and stays regular for
-redundant constraints. If the matrix has more negative eigenvalues than there are multipliers, the step need not
-descend, and δ grows until it does (every pressure of near-incompressible links counts as a multiplier: E has a maximum
-there); close to an equilibrium δ stays zero, so that unstable equilibria on the path are
-found and reported as such. Merit of a step: the augmented Lagrangian
+the Newton step of the augmented Lagrangian, which tends to the KKT step for large ρ and stays regular for redundant
+constraints. If the matrix has more negative eigenvalues than there are multipliers, the step need not descend, and δ
+grows until it does (every pressure of near-incompressible links counts as a multiplier: E has a maximum there); close
+to an equilibrium δ stays zero, so that unstable equilibria on the path are found and reported as such. Merit of a step:
+the augmented Lagrangian
 
     Φ(s) = E(s) − λᵀC + ½ ρ_m |C + cλ|²  at the new multipliers λ, with the compliance c of joints,
 
@@ -16,9 +16,8 @@ and at the new pressures p, with ½ ρ_m |∂E/∂p|² beside it.
 
 Slender links are far softer in bending than in tension, so a good step may raise every merit for a few iterations:
 steps are taken in full as long as a watchdog allows, then the iteration returns to its best state and searches the
-line. For the same reason ∇²L holds, far from equilibrium, the stress that the last step solved for
-instead of the one its displacements led to (``elasticity.PredictedStress``): fewer iterations, and longer
-steps converge.
+line. For the same reason ∇²L holds, far from equilibrium, the stress that the last step solved for instead of the one
+its displacements led to (``elasticity.PredictedStress``): fewer iterations, and longer steps converge.
 
 Close to convergence the factor of the KKT matrix K is reused (simplified Newton method),
 

@@ -68,15 +68,13 @@ class EquilibriumSystem:
         loads: constant ones, with their magnitudes.
         potentials: of body poses.
         compliances: c by constraint row; 0 where none is given.
-        idle: spins that nothing resists.
+        idle: spins that nothing resists, whose gauge K fixes.
         clock: of the phases.
         comm: the processes that share the links.
 
     Attributes:
         numbering: of rows and unknowns.
         blocks: of the unknowns.
-        compliances: c, (rows,).
-        idle: spins that nothing resists, whose gauge K fixes.
         unknowns: x and G, at the poses of the last ``residual``.
         kkt: the KKT matrix last linearised; take it before another ``residual``.
     """

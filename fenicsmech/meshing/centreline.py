@@ -31,7 +31,7 @@ from fenicsmech.errors import DescriptionError, MeshingError, point_text
 from fenicsmech.mechanism import Centreline, MeshPart, Shape, Strip
 from fenicsmech.meshing.link_mesher import InterfaceSite
 from fenicsmech.meshing.outline import Curve, link_outline, points_on, sample_parameters, sampled
-from fenicsmech.polygons import are_inside, distance_to, signed_area
+from fenicsmech.polygons import are_inside, chord_lengths, distance_to, divided, strip_width
 
 
 @dataclass(frozen=True)
@@ -84,16 +84,13 @@ class LinkOutline:
         sites: its interfaces.
 
     Attributes:
-        sites: likewise.
         polygon: with its vertices on the outline, (m, 2).
         width: that of a long strip of the same area and perimeter.
     """
 
     def __init__(self, loop: Sequence[Curve], sites: Sequence[InterfaceSite]) -> None:
         self._loop, self.sites = tuple(loop), tuple(sites)
-        rough = sampled(loop, math.inf)
-        perimeter = float(np.linalg.norm(np.roll(rough, -1, axis=0) - rough, axis=1).sum())
-        self.width = 2.0 * abs(signed_area(rough)) / perimeter
+        self.width = strip_width(sampled(loop, math.inf))
         parameters = [sample_parameters(curve, SEARCH.sampled * self.width) for curve in loop]
         self._curve = np.repeat(np.arange(len(loop)), [len(own) - 1 for own in parameters])
         self._bent = np.array([not isinstance(curve, BSpline) or curve.k > 1 for curve in loop])[self._curve]
@@ -137,7 +134,7 @@ class LinkOutline:
         free = ~chords.fixed
         if not free.any():
             raise DescriptionError(part, "interfaces and eyes cover its centreline", "Make its interfaces smaller")
-        arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+        arc = chord_lengths(points)
         return np.interp(arc, arc[free], (chords.left + chords.right)[free])
 
     def _ray(self, points: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -222,7 +219,7 @@ def thinnest_stretch(name: str, shape: Shape, sites: Sequence[InterfaceSite], *,
     points = curve.evaluate(stations)
     chords = outline.chords(points, curve.tangent(stations))
     thickness = np.where(chords.fixed, np.inf, chords.left + chords.right)
-    step = float(np.linalg.norm(np.diff(points, axis=0), axis=1).mean())
+    step = float(chord_lengths(points).mean())
     window = min(max(1, round(length / step)), len(thickness))
     return float(sliding_window_view(thickness, window).max(axis=1).min())
 
@@ -232,7 +229,7 @@ def _halve_chords(
 ) -> np.ndarray:
     """Points of the line near ``path`` (n, 2) that halves its chords; ends that are not free stay."""
     width, far = outline.width, np.inf
-    points = _evenly(path, spacing * width)
+    points = divided(path, spacing * width, least=3)
     for _ in range(SEARCH.moves):
         curve = Centreline(points, part=f"centreline of {part}")
         tangents = curve.tangent(curve.knots)
@@ -258,13 +255,6 @@ def _halve_chords(
     if not far <= SEARCH.halved * width:
         raise DescriptionError(part, "no line halves the chords of its outline", "Give centreline=…, points along it")
     return points
-
-
-def _evenly(path: np.ndarray, spacing: float) -> np.ndarray:
-    """Points that divide a line through ``path`` (n, 2) evenly, about ``spacing`` apart."""
-    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-    at = np.linspace(0.0, arc[-1], max(3, math.ceil(arc[-1] / spacing)) + 1)
-    return np.column_stack([np.interp(at, arc, coordinate) for coordinate in path.T])
 
 
 def _medial_path(

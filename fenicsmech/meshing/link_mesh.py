@@ -308,10 +308,10 @@ def extrude(plan: LinkMesh, depth: float, layers: int, *, half: bool = False) ->
     Fields that are the same all through the depth are fields on the plan: on tetrahedra whose vertices stand on the
     three corners of a triangle such a field has exactly no gradient along z.
 
-    A prism over the triangle a < b < c (numbers of its vertices in ``plan``), with a′, b′, c′ above them, is cut
-    into abcc′, abb′c′ and aa′b′c′. The diagonal of a side then joins the lower number below with the higher above,
-    in both of its neighbours. Layers above the middle are mirror images of those below, so with an
-    even number of layers the mesh is symmetric about z = 0, and plane loads cause no motion out of the plane.
+    A prism over the triangle a < b < c (numbers of its vertices in ``plan``), with a′, b′, c′ above them, is cut into
+    abcc′, abb′c′ and aa′b′c′. The diagonal of a side then joins the lower number below with the higher above, in both
+    of its neighbours. Layers above the middle are mirror images of those below, so with an even number of layers the
+    mesh is symmetric about z = 0, and plane loads cause no motion out of the plane.
 
     Args:
         plan: the triangulation; its ``interface`` numbers pass on to the cells above.

@@ -14,7 +14,7 @@ from fenicsmech.errors import DescriptionError, MeshingError, point_text, positi
 from fenicsmech.log import logger
 from fenicsmech.mechanism import Arc, Disc, Outline, Region, Shape, Strip
 from fenicsmech.meshing.link_mesh import FREE, LinkMesh, cell_measures, count_pieces
-from fenicsmech.polygons import signed_area
+from fenicsmech.polygons import strip_width
 
 LEAST_SEGMENTS = 8
 """Least number of segments of a circle."""
@@ -236,9 +236,7 @@ def typical_thickness(shape: Shape, part: str) -> float:
             corners = [shape.start]
             for segment in shape.segments:
                 corners += [segment.via, segment.end] if isinstance(segment, Arc) else [segment.end]
-            polygon = np.array(corners)
-            perimeter = np.hypot(*(np.roll(polygon, -1, axis=0) - polygon).T).sum()
-            return float(2.0 * abs(signed_area(polygon)) / perimeter)
+            return strip_width(np.array(corners))
     raise DescriptionError(part, "its shape comes from a file, so its thickness is not known", "Give size=… for it")
 
 

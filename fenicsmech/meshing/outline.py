@@ -29,7 +29,7 @@ from fenicsmech.meshing.link_mesher import (
     typical_thickness,
 )
 from fenicsmech.meshing.session import gmsh
-from fenicsmech.polygons import distance_to, first_crossing, is_inside, signed_area
+from fenicsmech.polygons import distance_to, first_crossing, is_inside, signed_area, strip_width
 
 _SAMPLED = 0.02  # of the element size: how far the polygons that checks look at deviate from the outline
 
@@ -212,9 +212,7 @@ def link_thickness(name: str, shape: Shape) -> float:
     if not isinstance(shape, StepPart):
         return typical_thickness(shape, f"link {name!r}")
     curves = link_outline(name, shape, dim=2)
-    polygon = sampled(curves, 1e-3 * float(np.ptp(sampled(curves, math.inf), axis=0).max()))
-    perimeter = np.linalg.norm(np.roll(polygon, -1, axis=0) - polygon, axis=1).sum()
-    return 2.0 * abs(signed_area(polygon)) / float(perimeter)
+    return strip_width(sampled(curves, 1e-3 * float(np.ptp(sampled(curves, math.inf), axis=0).max())))
 
 
 @mesh_shape.register

@@ -137,9 +137,6 @@ class NumberKind(ABC):
     Args:
         parts: of the scene; their numbers are drawn alike.
 
-    Attributes:
-        parts: likewise.
-
     Raises:
         DescriptionError: there are no parts, or one is given twice.
     """

@@ -40,6 +40,7 @@ from fenicsmech.meshing import (
     node_ends,
     plan_of,
 )
+from fenicsmech.polygons import chord_lengths
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,7 +267,7 @@ def _place_handles(mesh: LinkMesh, fit: SplineFit, *, spacing: float, turns: Seq
     spline, plan = fit.spline, plan_of(mesh).mesh
     samples = np.linspace(0.0, spline.segments, 1000 * spline.segments + 1)
     curve = spline.evaluate(spline.initial, samples)[:, :2]
-    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
+    arc = chord_lengths(curve)
     held = plan.points[np.unique(plan.cells[plan.interface != FREE])][:, :2]
 
     stops = [(float(at), site) for at, site in zip(np.flatnonzero(spline.is_joint), fit.sites, strict=True)]
