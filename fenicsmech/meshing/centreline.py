@@ -219,8 +219,8 @@ def thinnest_stretch(name: str, shape: Shape, sites: Sequence[InterfaceSite], *,
     points = curve.evaluate(stations)
     chords = outline.chords(points, curve.tangent(stations))
     thickness = np.where(chords.fixed, np.inf, chords.left + chords.right)
-    step = float(chord_lengths(points).mean())
-    window = min(max(1, round(length / step)), len(thickness))
+    step = chord_lengths(points)[-1] / (len(points) - 1)
+    window = min(max(1, round(length / step)), len(points))
     return float(sliding_window_view(thickness, window).max(axis=1).min())
 
 
