@@ -21,15 +21,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.interpolate import BSpline
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import Voronoi, cKDTree
 
-from fenicsmech.errors import DescriptionError, point_text
-from fenicsmech.mechanism import Centreline
+from fenicsmech.errors import DescriptionError, MeshingError, point_text
+from fenicsmech.mechanism import Centreline, MeshPart, Shape, Strip
 from fenicsmech.meshing.link_mesher import InterfaceSite
-from fenicsmech.meshing.outline import Curve, points_on, sample_parameters, sampled
+from fenicsmech.meshing.outline import Curve, link_outline, points_on, sample_parameters, sampled
 from fenicsmech.polygons import are_inside, chord_lengths, distance_to, divided, strip_width
 
 
@@ -197,6 +198,30 @@ def find_centreline(
         curve = Centreline(points)
         path = curve.evaluate(curve.samples(64))
     return points
+
+
+def thinnest_stretch(name: str, shape: Shape, sites: Sequence[InterfaceSite], *, dim: int, length: float) -> float:
+    """Thickness in the plane of the thinnest stretch of a link that is as long as ``length`` and in no interface.
+
+    That is the largest thickness along it; infinite if there is no such stretch, if a solid has no section or no
+    centreline in the plane, or if the link is a mesh, whose elements are given. Local.
+    """
+    if isinstance(shape, Strip):
+        return shape.thickness
+    if isinstance(shape, MeshPart):
+        return math.inf
+    try:
+        outline = LinkOutline(link_outline(name, shape, dim=dim), sites)
+        curve = Centreline(find_centreline(outline, [site.reach for site in sites], part=f"link {name!r}"))
+    except (DescriptionError, MeshingError):
+        return math.inf
+    stations = np.linspace(0.0, curve.end, 401)
+    points = curve.evaluate(stations)
+    chords = outline.chords(points, curve.tangent(stations))
+    thickness = np.where(chords.fixed, np.inf, chords.left + chords.right)
+    step = chord_lengths(points)[-1] / (len(points) - 1)
+    window = min(max(1, round(length / step)), len(points))
+    return float(sliding_window_view(thickness, window).max(axis=1).min())
 
 
 def _halve_chords(
