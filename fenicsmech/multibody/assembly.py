@@ -58,14 +58,14 @@ class Assembly:
 def assemble(linkage: Linkage, configuration: Configuration, springs: Sequence[PosePotential] = ()) -> Assembly:
     """The rigid assembly of ``configuration``; it stops at the last position free of strain of flexible links.
 
-    Without springs, each is found once for the present places of joints.
+    Without springs, each is found once for the present places of joints and offsets of motors.
 
     Raises:
         AssemblyError: a loop does not close even with freely deformable links.
     """
     if springs:
         return _assembled(linkage, configuration, springs)
-    key = configuration, linkage.joints.places.key
+    key = configuration, linkage.joints.key, linkage.rigid.key
     if key not in linkage.assembled:
         linkage.assembled[key] = _assembled(linkage, configuration, springs)
     return linkage.assembled[key]

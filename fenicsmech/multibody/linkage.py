@@ -127,6 +127,11 @@ class JointSystem:
         self.row_scale = 1.0 / np.where(norm > 0.0, norm, 1.0)
 
     @property
+    def key(self) -> Hashable:
+        """Equal where all equations are: places of joints and offsets of motors, which designs change."""
+        return self.places.key, self.offsets.tobytes()
+
+    @property
     def drawn(self) -> np.ndarray:
         """Poses of all bodies as drawn, (bodies, pose_size)."""
         return np.tile(self.space.identity, (len(self.bodies), 1))
