@@ -15,6 +15,12 @@ def signed_area(polygon: np.ndarray) -> float:
     return 0.5 * float(x @ np.roll(y, -1) - np.roll(x, -1) @ y)
 
 
+def strip_width(polygon: np.ndarray) -> float:
+    """2 A / P: the width of a long strip with the area A and the perimeter P of ``polygon``."""
+    perimeter = np.linalg.norm(np.roll(polygon, -1, axis=0) - polygon, axis=1).sum()
+    return 2.0 * abs(signed_area(polygon)) / float(perimeter)
+
+
 def is_inside(polygon: np.ndarray, point: np.ndarray) -> bool:
     """Whether ``point`` (2,) lies in ``polygon``."""
     return bool(are_inside(polygon, point[None])[0])

@@ -8,9 +8,10 @@ Fixed bodies carry no columns.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from scipy.linalg import qr
@@ -298,6 +299,7 @@ class Linkage:
         interfaces: indices of the interface bodies of each flexible link.
         joints: constraints of the mechanism itself: interfaces of a flexible link are independent.
         rigid: the same with every flexible link welded into one rigid body.
+        assembled: what ``assemble`` has found so far.
     """
 
     dim: int
@@ -306,6 +308,7 @@ class Linkage:
     interfaces: dict[FlexibleLink, tuple[int, ...]]
     joints: JointSystem
     rigid: JointSystem
+    assembled: dict[Hashable, Any] = field(default_factory=dict, compare=False, repr=False)
 
     def body_of(self, link: Link) -> int:
         """Index of the body that carries ``link``: itself if rigid, its first interface if flexible."""

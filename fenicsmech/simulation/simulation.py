@@ -16,7 +16,7 @@ from fenicsmech.elasticity import Formulation, MixedFormulation, Quadrature
 from fenicsmech.equilibrium import EquilibriumMethod, EquilibriumSolver, PrimalDualNewton, State
 from fenicsmech.errors import AssemblyError, DescriptionError
 from fenicsmech.estimates import AccuracyControl, Choice, Estimates, FidelityLevel, LevelErrors, cause_of_growth
-from fenicsmech.log import Clock, Progress
+from fenicsmech.log import Clock, Progress, logger
 from fenicsmech.mechanism import (
     DRAWN,
     Configuration,
@@ -40,7 +40,10 @@ from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.fields import rest_vertices
 from fenicsmech.simulation.following import CurveFollower, FollowedCurve, PathEvent, Until, branches, read_path
 from fenicsmech.simulation.frame import ModeShape
+from fenicsmech.simulation.omitted_effects import coarse_links
 from fenicsmech.simulation.stepping import CurveRequest, CurveStepper, read_request
+
+_log = logger(__name__)
 
 
 class RestShape(Protocol):
@@ -122,6 +125,8 @@ class Simulation:
             fidelity = self._control.fidelity(self._control.level)
         solver, predictor = solver or PrimalDualNewton(), predictor or HermitePredictor()
         self._discretisation = Discretisation(scene, fidelity, solver, predictor, self.clock, comm)
+        if accuracy is None and (text := coarse_links(self._discretisation, scene.units)):
+            _log.warning("%s", text)
         self._described = _description(scene.mechanism)
 
     def __repr__(self) -> str:
