@@ -84,10 +84,12 @@ class ElasticBody(BodyFields):
             found.append((density * self._volume, term.dx))
         return found
 
-    def contraction_energy(self, a, v, *, degree: int) -> ufl.Form:
-        """What links in plane stress store if they contract by a instead of F₃₃ − 1 = h, and curl across by v.
+    def contraction_energy(self, a, v, p, q, *, degree: int) -> ufl.Form:
+        """What links in plane stress store if they contract by a instead of h = F₃₃ − 1, and curl across by v.
 
-        ½ ∫ E (a − h)² + μ b²/12 |∇a − Fᵀv|² + b⁴/720 E/(1 − ν²) ((1 − ν) G : G + ν (tr G)²) dV,  G = sym Fᵀ∇v
+        ½ ∫ E ((a − p)² − 2 q h) + μ b²/12 |∇a − Fᵀv|² + b⁴/720 E/(1 − ν²) ((1 − ν) G : G + ν (tr G)²) dV
+
+        with G = sym Fᵀ∇v and p the projection of h, whose derivatives are those of the term in q, that of a − p.
         """
         assert isinstance(self.model, PlaneStress), "links contract freely in plane stress alone"
         H, b, terms = self.gradient(self.u), self.depth, []
@@ -95,7 +97,7 @@ class ElasticBody(BodyFields):
         shear, G = self.gradient(a) - ufl.dot(F.T, v), ufl.sym(ufl.dot(F.T, self.gradient(v)))
         for term in self.terms:
             E, nu, h = term.law.E, term.law.nu, self.model.contraction(term.law, self._elastic(H))
-            contraction = E * (a - h) ** 2
+            contraction = E * ((a - p) ** 2 - 2 * q * h)
             curling = b**2 / 12 * E / (2 * (1 + nu)) * ufl.inner(shear, shear)
             membrane = b**4 / 720 * E / (1 - nu**2) * ((1 - nu) * ufl.inner(G, G) + nu * ufl.tr(G) ** 2)
             density = 0.5 * (contraction + curling + membrane) * self._volume

@@ -85,11 +85,10 @@ class HandleOptimum:
     Args:
         shape_map: from design and handle positions to the field.
         quality: Σρ in this field.
-        options: of the search.
     """
 
-    def __init__(self, shape_map: ShapeMap, quality: QualitySum, options: HandleOptions | None = None) -> None:
-        self._map, self._quality, self._options = shape_map, quality, options or HandleOptions()
+    def __init__(self, shape_map: ShapeMap, quality: QualitySum) -> None:
+        self._map, self._quality, self._options = shape_map, quality, HandleOptions()
         self._handles = [shape.handles for shape in shape_map.shapes]
         self._reducer: _MomentHessian | None = None
         self._known: tuple[HandlePlacement | None, list[PositionDerivatives]] = (None, [])
