@@ -30,7 +30,7 @@ from fenicsmech.effects import Gravity
 from fenicsmech.equilibrium import EquilibriumSolver, Unknown
 from fenicsmech.errors import DescriptionError, positive, set_fields
 from fenicsmech.estimates import Equilibrium, adjoint_at, cause_of_growth, growth_by_halving
-from fenicsmech.mechanism import FlexibleLink, Joint, PrescribedPart, Shape, Strip, Units
+from fenicsmech.mechanism import FlexibleLink, Joint, PrescribedPart, Shape, Strip, Units, in_dimension
 from fenicsmech.meshing import thinnest_stretch
 from fenicsmech.model import MechanismModel, plan_sites
 from fenicsmech.multibody import JointCoordinate, Linkage
@@ -113,7 +113,7 @@ def explain(
         weight = options.weight
         change = None if weight is None else weight * float(np.linalg.norm(weight_influence(model, solver, at)))
         hints.append(_weight_hint(change, frame.displacement, units, options))
-    hints.append(_length_hint(discretisation, units, options))
+    hints += [_length_hint(discretisation, units, options), _spin_hint(model, solver)]
     hints += [_compressibility_hint(model, options.locking[model.elastic.order]), _touching_hint(model, frame)]
     if model.linkage.dim == 2:
         hints.append(_buckling_hint(model, frame, options.slender))
@@ -199,6 +199,27 @@ def _compressibility_hint(model: MechanismModel, limit: float) -> Hint | None:
         "pressure as an unknown",
         f"Poisson's ratio of {', '.join(stiff)} is above {limit:g}: elements of order {elastic.order} are too stiff "
         f"there; {remedy} formulation=MixedFormulation(above={limit:g}), or compare two sizes",
+        True,
+    )
+
+
+def _spin_hint(model: MechanismModel, solver: EquilibriumSolver) -> Hint | None:
+    """Outputs, and points of forces that do not act, on links that spin idly, away from the line of the spin."""
+    mechanism, linkage, names = model.mechanism, model.linkage, []
+    for spin in solver.system.idle:
+        start, along = spin.line(linkage.rigid.drawn)
+        for part in (*mechanism.outputs, *mechanism.forces):
+            arm = np.array(in_dimension(part.at, 3)) - start
+            away = np.linalg.norm(arm - (arm @ along) * along)
+            if linkage.body_of(part.on) in spin.bodies and away > 1e-9 * linkage.length:
+                names.append(repr(part.name))
+    if not names:
+        return None
+    return Hint(
+        "idle spins",
+        f"nothing keeps the links of {', '.join(names)} from turning about the line between their ball joints: how far "
+        "they turn is set by a gauge, and these points, away from the line, move with it; place them on the line, or "
+        "hold the spin, as by a universal joint in place of a ball",
         True,
     )
 
