@@ -17,7 +17,15 @@ from matplotlib.axes import Axes
 
 import fenicsmech as fm
 from fenicsmech.compat import cell_dofs, vector_space
-from fenicsmech.design import HandleOptimum, QualitySum, ShapeMap, follow_spline, shape_links, shape_request
+from fenicsmech.design import (
+    HandleOptimum,
+    LinkParameters,
+    QualitySum,
+    ShapeMap,
+    follow_spline,
+    shape_links,
+    shape_request,
+)
 from fenicsmech.report import format_table
 
 from .table import ROOT, command, publish
@@ -44,8 +52,10 @@ class Link:
         space = vector_space(model.mesh.mesh, 1)
         self.handles, self.cells, self.free = shape.handles, cell_dofs(space), model.mesh.interface < 0
         self.drawn, self.design = space.tabulate_dof_coordinates()[:, :2], fem.Function(space)
-        self.map, self.quality = ShapeMap(model.mesh, self.design, shapes), QualitySum(self.design)
-        spline = self.handles.spline
+        spline, size = self.handles.spline, self.handles.spline.size
+        own = LinkParameters(slice(0, size), np.zeros(size), np.eye(size))
+        self.map = ShapeMap(model.mesh, self.design, shapes, [own], spline.initial)
+        self.quality = QualitySum(self.design)
         drawn = spline.controls_at(spline.initial)
         wanted = drawn.copy()
         wanted[:, 1, :2] = START_TANGENT, MIDDLE_TANGENT, END_TANGENT

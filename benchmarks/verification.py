@@ -91,19 +91,34 @@ CASES = (
     ),
     Case("(mm, MPa) against (m, Pa)", "1e-8", "simulation/test_units.py"),
     Case(
-        "error estimates of displacements and forces against finer meshes, in the plane",
+        "error estimates of displacements against finer meshes, in the plane",
         "factor 2",
-        "estimates/test_element_error.py::test_effectivity",
+        "estimates/test_element_error.py::test_effectivity_in_the_plane_is_between_a_half_and_two",
+    ),
+    Case(
+        "error estimates of forces at prescribed displacements against finer meshes, in the plane",
+        "factor 2",
+        "estimates/test_element_error.py::test_effectivity_of_forces_at_prescribed_displacements_is_between_a_half_and_two",
     ),
     Case(
         "error estimates of designed links against their exported parts in finer elements, in the plane and in space",
         "factor 2",
-        "design/test_objective_error.py::test_errors_of_designs",
+        "design/test_objective_error.py::test_errors_of_designs_are_those_of_their_parts_in_finer_elements",
     ),
     Case(
         "estimate of the error of plane stress against space",
         "factor 2",
         "estimates/test_plane_stress_error.py::test_estimate_is_near_what_space_adds",
+    ),
+    Case(
+        "estimate of the error of plane stress of strips, 1 to 30 thicknesses deep, straight and curved, against space",
+        "factor 2",
+        "estimates/test_plane_stress_error.py::test_strips_of_all_depths_are_told_how_much_stiffer_they_are_in_space",
+    ),
+    Case(
+        "estimate of how much curved strips stiffen from beams to plates, against Lamb's closed form",
+        "0.95 to 1.3 times",
+        "estimates/test_plane_stress_error.py::test_curved_strips_stiffen_from_beams_to_plates_as_in_closed_form",
     ),
     Case("link exported as STEP, imported and simulated again", "0.5 %", "simulation/test_exported_links.py"),
 )

@@ -137,6 +137,7 @@ from fenicsmech.quantities import (
     Component,
     Depth,
     Displacement,
+    EffectNumber,
     ForceMagnitude,
     FormValue,
     JointAxis,
@@ -225,7 +226,7 @@ __all__ = [
     "fit_modulus", "Design",
     # numbers that designs change beside shapes; NumberKind for kinds of your own
     "Number", "Depth", "LawParameter", "SpringStiffness", "SpringRest", "MotorOffset", "JointPosition", "JointAxis",
-    "NumberBounds", "NumberDesign", "NumberKind", "ModelNumber", "NumberTerms",
+    "NumberBounds", "NumberDesign", "NumberKind", "ModelNumber", "EffectNumber", "NumberTerms",
     "JointChange",
     # errors
     "FenicsmechError", "DescriptionError", "MeshingError", "AssemblyError", "EquilibriumError",

@@ -57,6 +57,12 @@ class EquilibriumError(FenicsmechError):
         self.last, self.frames = last, tuple(frames)
 
 
+def expect(part: str, value: Any, kinds: Any, noun: str, remedy: str = "Give one of the mechanism's") -> None:
+    """Checks that ``value`` is an instance of ``kinds``, which messages call ``noun``."""
+    if not isinstance(value, kinds):
+        raise DescriptionError(part, f"{value!r} is not {noun}", remedy)
+
+
 def finite(part: str, value: Any) -> float:
     """``value`` as a float."""
     try:

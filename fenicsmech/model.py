@@ -7,7 +7,7 @@ from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import ufl
@@ -30,7 +30,7 @@ from fenicsmech.elasticity import (
     Stretch,
 )
 from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State, load_fields
-from fenicsmech.errors import DescriptionError, positive
+from fenicsmech.errors import DescriptionError, expect, positive
 from fenicsmech.log import Clock
 from fenicsmech.mechanism import (
     Effect,
@@ -210,19 +210,15 @@ class Design:
         numbers: values of design numbers by their kind (``NumberKind``), in its unit; others are as drawn.
 
     Raises:
-        DescriptionError: two numbers change the same.
+        DescriptionError: it has something else than kinds of numbers, a value makes no sense, or two numbers change the
+            same.
     """
 
     field: np.ndarray
     numbers: Mapping[Any, float] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        kinds = list(self.numbers)
-        for k, kind in enumerate(kinds):
-            if (other := _contradicted(kind, kinds[:k])) is not None:
-                raise DescriptionError(
-                    str(kind), f"{other} is given too, and both change the same", "Give each number of a part once"
-                )
+        check_numbers([(kind, (value,)) for kind, value in self.numbers.items()])
 
     def halfway(self, other: Design) -> Design:
         """The mean of both."""
@@ -271,8 +267,12 @@ class MechanismModel:
         faces = [part for effect in effects for part in effect.faces]
         boundaries = find_boundaries(mesh.mesh, links, mesh.link, faces, half=fidelity.model.half)
 
+        self._effect_fields: list[tuple[Effect, LinkFields]] = []
+
         def energy(effect: Effect, body: ElasticBody) -> ufl.Form | None:
-            return effect.link_energy(LinkFields(tuple(links), body, boundaries))
+            fields = LinkFields(tuple(links), body, boundaries)
+            self._effect_fields.append((effect, fields))
+            return effect.link_energy(fields)
 
         self.elastic = ElasticBody(
             mesh.mesh,
@@ -325,19 +325,25 @@ class MechanismModel:
         """Coordinates of all rigid and interface bodies, fixed ones included."""
         return len(self.linkage.bodies) * self.linkage.joints.space.pose_size
 
+    @property
+    def effect_fields(self) -> list[tuple[Effect, LinkFields]]:
+        """The fields of each effect, with the numbers of its energy."""
+        _ = self.elastic.effects_ufl  # which names them
+        return self._effect_fields
+
     # -- shape, material and other numbers -----------------------------------------------------------------------
 
     @property
     def design(self) -> Design:
         """The present design, with all numbers that were asked for, but those that contradict the ones given last."""
-        told: list[Any] = []
+        held: list[Any] = []
         for kind in (*self._given_last, *self._numbers):
-            if kind not in told and _contradicted(kind, told) is None:
-                told.append(kind)
-        return Design(self._shape.copy(), {kind: self._numbers[kind].value for kind in told})
+            if kind not in held and _contradicted(kind, held) is None:
+                held.append(kind)
+        return Design(self._shape.copy(), {kind: self._numbers[kind].value for kind in held})
 
     def number(self, kind):
-        """The ``ModelNumber`` of a ``NumberKind`` on this model; designs of the model tell it from now on."""
+        """The ``ModelNumber`` of a ``NumberKind`` on this model; designs of the model hold it from now on."""
         if kind not in self._numbers:
             with self.shaped(Design(self._shape)):  # the drawn value is read off the parts
                 self._numbers[kind] = kind.on(self)
@@ -497,6 +503,33 @@ class MechanismModel:
             clock=self.clock,
             comm=self.mesh.comm,
         )
+
+
+@runtime_checkable
+class _Kind(Protocol):
+    """What a model needs of a kind of number (``fenicsmech.quantities.NumberKind``)."""
+
+    @property
+    def slots(self) -> Sequence[Hashable]: ...
+
+    def check_value(self, value: float) -> None: ...
+
+    def on(self, model: MechanismModel) -> Any: ...
+
+
+def check_numbers(numbers: Sequence[tuple[Any, Sequence[float]]]) -> None:
+    """Checks kinds of numbers that are given together, each with some values.
+
+    Raises:
+        DescriptionError: something else than a kind is given, a value makes no sense, or two kinds change the same.
+    """
+    for k, (kind, values) in enumerate(numbers):
+        expect("number", kind, _Kind, "a kind of number", "Give one, as Depth(link)")
+        for value in values:
+            kind.check_value(value)
+        if (other := _contradicted(kind, [own for own, _ in numbers[:k]])) is not None:
+            twice = "it is given twice" if other == kind else f"{other} is given too, and both change the same"
+            raise DescriptionError(str(kind), twice, "Give each number of a part once")
 
 
 def _contradicted(kind: Any, others: Sequence[Any]) -> Any | None:

@@ -1,7 +1,9 @@
-"""Closed polygons in the plane, (n, 2) without a repeated corner, and the loops of edges that bound triangles."""
+"""Closed polygons in the plane, (n, 2) without a repeated corner, the loops of edges that bound triangles, and lines
+through points."""
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 
 import numpy as np
@@ -11,6 +13,12 @@ def signed_area(polygon: np.ndarray) -> float:
     """½ Σ (x_i y_{i+1} − x_{i+1} y_i), positive if ``polygon`` runs counter-clockwise."""
     x, y = polygon.T
     return 0.5 * float(x @ np.roll(y, -1) - np.roll(x, -1) @ y)
+
+
+def strip_width(polygon: np.ndarray) -> float:
+    """2 A / P: the width of a long strip with the area A and the perimeter P of ``polygon``."""
+    perimeter = np.linalg.norm(np.roll(polygon, -1, axis=0) - polygon, axis=1).sum()
+    return 2.0 * abs(signed_area(polygon)) / float(perimeter)
 
 
 def is_inside(polygon: np.ndarray, point: np.ndarray) -> bool:
@@ -87,6 +95,18 @@ def edge_loops(triangles: np.ndarray) -> list[np.ndarray]:
             vertex = other if one == vertex else one
         loops.append(np.roll(loop, -int(np.argmin(loop))))
     return sorted(loops, key=lambda loop: int(loop[0]))
+
+
+def chord_lengths(points: np.ndarray) -> np.ndarray:
+    """Length (n,) of the line through ``points`` (n, dim) up to each of them."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+
+
+def divided(points: np.ndarray, spacing: float, *, least: int = 1) -> np.ndarray:
+    """Points that divide the line through ``points`` (n, dim) evenly, at most ``spacing`` apart, in ``least`` parts."""
+    arc = chord_lengths(points)
+    at = np.linspace(0.0, arc[-1], max(least, math.ceil(arc[-1] / spacing)) + 1)
+    return np.column_stack([np.interp(at, arc, coordinate) for coordinate in points.T])
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -11,9 +11,9 @@ go until K is singular is a quadratic eigenvalue problem, linear in v = φ / Δ:
     (K + Δ K′ + ½ Δ² K″) φ = 0,      −K⁻¹ (K′ v + ½ K″ φ) = v / Δ,   v = φ / Δ.
 
 Slender links need K″: as a link bends, its modes must bend with it to stay free of strain, which costs them no energy
-only in second order. All use Newton's factor of K; derivatives are symmetric differences.
-Source: Wriggers, Nonlinear Finite Element Methods (doi:10.1007/978-3-540-71001-1), chapter 7, for the linear problem;
-Tisseur & Meerbergen (doi:10.1137/S0036144500381988) for the quadratic one.
+only in second order. All use Newton's factor of K; derivatives are symmetric differences. Source: Wriggers, Nonlinear
+Finite Element Methods (doi:10.1007/978-3-540-71001-1), chapter 7, for the linear problem; Tisseur & Meerbergen
+(doi:10.1137/S0036144500381988) for the quadratic one.
 """
 
 from __future__ import annotations

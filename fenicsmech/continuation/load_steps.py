@@ -14,9 +14,8 @@ coordinate x moves ever faster while the links are free of strain: close by, in 
 
 e the strain and b how far the motors are beyond the dead centre. Before it (b < 0) joints close by x alone, x = √(−2b)
 and λ = 0; beyond it x = 0 and λ = k b. Newton's method does not get from one to the other: as long as λ = 0 the energy
-is not curved along x, every step closes the joints by x alone, x ← ½ x − b / x, and for b > 0 these oscillate
-without end. From a state that strains instead it converges, λ being the curvature. Such states lie along the rate with
-x held:
+is not curved along x, every step closes the joints by x alone, x ← ½ x − b / x, and for b > 0 these oscillate without
+end. From a state that strains instead it converges, λ being the curvature. Such states lie along the rate with x held:
 
     K ẏ = r,     K w = n,     ẏ ← ẏ − w (n · ẏ) / (n · w),     n the motion in ẏ, which is all x near the dead centre.
 """
@@ -90,28 +89,18 @@ class LoadStepper(Stepper):
         start: a first guess at the control's value there.
         control: whose prescribed value changes.
         predictor: of the next equilibrium.
-        steps: options of the steps.
 
     Attributes:
         iterations: KKT systems factored and solved so far.
         snaps: number of times the path turned back and an equilibrium on another one was reached.
     """
 
-    def __init__(
-        self,
-        solver: EquilibriumSolver,
-        start: State,
-        control: Control,
-        *,
-        predictor: Predictor,
-        steps: LoadSteps = LoadSteps(),  # noqa: B008 (frozen)
-    ) -> None:
+    def __init__(self, solver: EquilibriumSolver, start: State, control: Control, *, predictor: Predictor) -> None:
         super().__init__(solver, predictor)
-        self._steps, self._start, self._value = steps, start, control.value(solver.system, start)
+        self._steps, self._start, self._value = LoadSteps(), start, control.value(solver.system, start)
         self._origin, self._covered = self._value, 0.0  # farthest from there so far
-        self._shifts = (
-            tuple(factor * start.minimum_shift for factor in steps.shift_factors) if start.minimum_shift else (0.0,)
-        )
+        factors = self._steps.shift_factors if start.minimum_shift else (0.0,)
+        self._shifts = tuple(factor * start.minimum_shift for factor in factors)
         self._rate: Step | None = None  # of the last step, by the control value
         self.iterations = self.snaps = 0
 

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenicsmech.collective import from_one
-from fenicsmech.design.numbers import Number, check_numbers
+from fenicsmech.design.numbers import Number
 from fenicsmech.design.shape.shape_map import ImageRequest, ShapeRequest
 from fenicsmech.design.shape.spline import lay_out
-from fenicsmech.errors import DescriptionError, finite, points, positive, set_fields
+from fenicsmech.errors import DescriptionError, expect, finite, points, positive, set_fields
 from fenicsmech.mechanism import Centreline, FlexibleLink, Mechanism, Shape, Strip
 from fenicsmech.meshing import Figure, LinkOutline, find_centreline, link_outline, matches
-from fenicsmech.model import plan_sites
+from fenicsmech.model import check_numbers, plan_sites
 from fenicsmech.multibody import Linkage
 from fenicsmech.simulation import Simulation
 
@@ -73,10 +73,7 @@ class SplineDesign:
     mirrored: FlexibleLink | Sequence[FlexibleLink] = ()
 
     def __post_init__(self) -> None:
-        if not isinstance(self.link, FlexibleLink):
-            raise DescriptionError(
-                "spline design", f"{self.link!r} is not a flexible link", "Name a flexible link of the mechanism"
-            )
+        expect("spline design", self.link, FlexibleLink, "a flexible link", "Name a flexible link of the mechanism")
         part = f"design of link {self.link.name!r}"
         for name in ("same", "mirrored"):
             given = getattr(self, name)
@@ -272,17 +269,15 @@ def check_designs(designs: Sequence[SplineDesign | Number]) -> None:
             "design problem", "no link or number may change", "Name them with SplineDesign(…) or Number(…)"
         )
     for design in designs:
-        if not isinstance(design, SplineDesign | Number):
-            raise DescriptionError(
-                "design problem", f"{design!r} is not a design of a link or number", "Give SplineDesign(…) or Number(…)"
-            )
-    check_numbers([design for design in designs if isinstance(design, Number)])
+        sorts, remedy = SplineDesign | Number, "Give SplineDesign(…) or Number(…)"
+        expect("design problem", design, sorts, "a design of a link or number", remedy)
+    numbers = [design for design in designs if isinstance(design, Number)]
+    check_numbers([(own.kind, (own.least, own.most)) for own in numbers])
     shapes = [design for design in designs if isinstance(design, SplineDesign)]
     names = [link.name for design in shapes for link in design.links]
     for name in names:
         if names.count(name) > 1:
             raise DescriptionError(f"design of link {name!r}", "it is given twice", "Give each link once")
-    numbers = [design for design in designs if isinstance(design, Number)]
     for shape in (shape for shape in shapes if len(shape.links) > 1):
         for link in taken_along(numbers):
             if link in shape.links:

@@ -26,7 +26,7 @@ from fenicsmech.design.run import Checkpoint, fingerprint
 from fenicsmech.design.search import Scatter, Search, SearchResult, cheapest
 from fenicsmech.design.shape.handle_optimum import HandlePlacement
 from fenicsmech.design.target import Target
-from fenicsmech.design.verification import part_simulation, verified_parts
+from fenicsmech.design.verification import part_simulations, verified_parts
 from fenicsmech.errors import DescriptionError
 from fenicsmech.log import Clock, logger
 from fenicsmech.mechanism import FlexibleLink, Joint
@@ -84,8 +84,8 @@ class DesignProblem:
     def rest_shape(self, design: DesignResult | np.ndarray) -> Design:
         """The design of a result or of parameters (parameters,), as ``Simulation.with_design`` takes it.
 
-        Parameters alone need not fix the shape: several positions of the
-        handles can be minima, and results hold those found.
+        Parameters alone need not fix the shape: several positions of the handles can be minima, and results hold those
+        found.
 
         Raises:
             DescriptionError: the design is one of other links.
@@ -248,7 +248,7 @@ class DesignProblem:
         """The result with the values of its targets in the parts to be made.
 
         The links that may change are written as STEP files without holes for pins; the same scene with links read from
-        these files is meshed anew with smaller elements, and every sample is loaded from zero.
+        these files is meshed anew with smaller elements, and every sample is loaded anew.
 
         Args:
             result: of this problem's targets.
@@ -270,8 +270,8 @@ class DesignProblem:
         solids = self._meshes(links, given)
         with TemporaryDirectory() as temporary:  # only the first process writes and reads
             folder, moved = Path(folder or temporary), self._moved(given[0])
-            part = part_simulation(self.simulation, links, *solids, folder, finer, moved)
-            verified = verified_parts(result, part, self.targets)
+            coarse, fine = part_simulations(self.simulation, links, *solids, folder, finer, moved)
+            verified = verified_parts(result, coarse, fine, self.targets)
         return self.simulation.comm.bcast(verified, root=0)
 
     @property

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from fenicsmech.design.description import SplineDesign, shape_requests, with_followers
-from fenicsmech.design.equilibria import SampleEquilibria
+from fenicsmech.design.equilibria import FollowOptions, SampleEquilibria
 from fenicsmech.design.numbers import Number
 from fenicsmech.design.objective import Group, Objective, sample_numbers, split
 from fenicsmech.design.regularisers import Regulariser
@@ -37,7 +37,6 @@ class DesignedSimulation:
         clock: of the phases.
 
     Attributes:
-        simulation, designs, targets, clock: likewise.
         shapes: the links whose shape may change, by parameters of their own or with their joints alone.
         numbers: those that may change.
         changed: the links whose solids change.
@@ -117,7 +116,8 @@ class DesignedSimulation:
                 simulation = simulation.on(group.comm)
                 rest = ParametricShape(simulation.model, self._shapes, self.shapes, self.numbers)
             mine = [self.targets[k] for k in group.mine]
-            equilibria = SampleEquilibria(simulation, mine, numbers=self._kinds)
+            # optimisers shorten steps that lose an equilibrium; to halve the way there costs more solves than that
+            equilibria = SampleEquilibria(simulation, mine, FollowOptions(halvings=0), numbers=self._kinds)
             comparison = Comparison(self.targets, simulation.scene.units)
             objective = Objective(
                 rest, equilibria, comparison=comparison, regulariser=self._regulariser, group=group, clock=self.clock

@@ -14,7 +14,7 @@ import numpy as np
 
 from fenicsmech.errors import DescriptionError, finite, set_fields
 from fenicsmech.mechanism import Units
-from fenicsmech.model import MechanismModel
+from fenicsmech.model import MechanismModel, check_numbers
 from fenicsmech.quantities import Gradient, NumberKind
 
 TYPICAL = 0.1
@@ -38,15 +38,12 @@ class Number:
     most: float
 
     def __post_init__(self) -> None:
-        if not isinstance(self.kind, NumberKind):
-            raise DescriptionError("number", f"{self.kind!r} is not a kind of number", "Give one, as Depth(link)")
         least, most = (finite(f"bound of the {self.kind}", value) for value in (self.least, self.most))
+        check_numbers([(self.kind, (least, most))])
         if not least < most:
             raise DescriptionError(
                 str(self.kind), f"bounds from {least:g} to {most:g}", "Give the smaller one first, then a larger one"
             )
-        for value in (least, most):
-            self.kind.check_value(value)
         set_fields(self, least=least, most=most)
 
     def __str__(self) -> str:
@@ -93,7 +90,6 @@ class ScaledNumbers:
         numbers: which of their numbers.
 
     Attributes:
-        numbers: likewise.
         on_model: the same on the model.
         initial: q of the drawn values, (numbers,).
         width: most − least, (numbers,).
@@ -130,7 +126,7 @@ class ScaledNumbers:
         return np.array([own.numbers for own in gradients]).reshape(len(gradients), len(self.numbers)) * self.width
 
     def designs(self, q: np.ndarray, units: Units) -> tuple[NumberDesign, ...]:
-        """The numbers at q, as results tell them."""
+        """The numbers at q, as results hold them."""
         return tuple(
             NumberDesign(
                 name=str(own),
@@ -143,11 +139,3 @@ class ScaledNumbers:
             )
             for own, there, value in zip(self.numbers, self.on_model, self.values(q).values(), strict=True)
         )
-
-
-def check_numbers(numbers: Sequence[Number]) -> None:
-    """Refuses a number of one part that is given twice with a DescriptionError."""
-    slots = [(own, slot) for own in numbers for slot in own.kind.slots]
-    for k, (own, slot) in enumerate(slots):
-        if slot in [other for _, other in slots[:k]]:
-            raise DescriptionError(str(own), "it is given twice", "Give each number of a part once")

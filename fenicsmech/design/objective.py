@@ -3,10 +3,9 @@
     O(p) = Σ ½ w_k r_k² + Σ w_k Q_k(p) / s_k + R(p),     r_k = (Q_k(p) − Q̄_k) / s_k,     c_k = ± (Q_k(p) − Q̄_k) / s_k
 
 (the paper's equation 5 and section V-A, relative to the targets and so free of units), where Q_k are the simulation's
-values plus a correction that is held fixed (``correction``). Each evaluation places the
-handles, reshapes the links, follows the equilibria of all samples from those of the best design so far, and takes
-the adjoint derivatives of all targets to p. Samples are spread over groups of processes, each with a communicator of
-its own.
+values plus a correction that is held fixed (``correction``). Each evaluation places the handles, reshapes the links,
+follows the equilibria of all samples from those of the best design so far, and takes the adjoint derivatives of all
+targets to p. Samples are spread over groups of processes, each with a communicator of its own.
 """
 
 from __future__ import annotations
@@ -52,7 +51,6 @@ class Objective:
 
     Attributes:
         lengths: typical change ℓ of each parameter, (parameters,).
-        comparison: of values with targets.
         correction: added to the simulation's values before they are compared, (components,).
         reached: the simulation's values at the last evaluation, (components,).
     """
@@ -97,14 +95,17 @@ class Objective:
         if drawn is not None:
             self.comparison = self.comparison.relative_to(drawn)
 
-    def loaded(self, parameters: np.ndarray) -> np.ndarray:
-        """The simulation's values at a design, its handles near the drawn ones, loaded from zero, (components,).
+    def loaded(self, parameters: np.ndarray, near: HandlePlacement | None = None) -> np.ndarray:
+        """The simulation's values at a design, loaded from zero, (components,).
+
+        Args:
+            parameters: p, (parameters,).
+            near: handle positions to start from; those drawn by default.
 
         Raises:
             Infeasible: cells invert, or a target's equilibrium is not found or is unstable.
         """
-        self.begin(None)
-        return self._values(on_all(self._group.everyone, lambda: self._solve(parameters, None))[2])
+        return self._values(on_all(self._group.everyone, lambda: self._solve(parameters, None, near))[2])
 
     def evaluate(
         self, parameters: np.ndarray, below: float = np.inf, penalties: np.ndarray | float = 0.0
@@ -121,7 +122,7 @@ class Objective:
             TooHigh: the merit is above ``below``; derivatives were not computed.
         """
         everyone = self._group.everyone
-        placement, model, solved = on_all(everyone, lambda: self._solve(parameters, self._base))
+        placement, model, solved = on_all(everyone, lambda: self._solve(parameters, self._base, self._near))
         reached = self._values(solved)
         if not self._scaled:
             self.comparison, self._scaled = self.comparison.relative_to(reached), True
@@ -131,7 +132,7 @@ class Objective:
         # decisions may depend on its last bit
         reached_merit = everyone.bcast(merit(value, inequalities, penalties), root=0)
         if reached_merit > below:
-            raise TooHigh(reached_merit)
+            raise TooHigh(reached_merit, residuals)
         with self._clock.phase("gradients"):
             try:
                 rows = self._gathered(
@@ -188,11 +189,13 @@ class Objective:
     def _values(self, solved: DesignEquilibria) -> np.ndarray:
         return self._gathered(self._equilibria.values(solved)[:, None])[:, 0]
 
-    def _solve(self, parameters: np.ndarray, base: _Base | None) -> tuple[HandlePlacement, Model, DesignEquilibria]:
-        """Handle placement, model of R and this group's equilibria, followed from those of ``base`` if there is one."""
+    def _solve(
+        self, parameters: np.ndarray, base: _Base | None, near: HandlePlacement | None
+    ) -> tuple[HandlePlacement, Model, DesignEquilibria]:
+        """Handle placement, model of R and this group's equilibria, from those of ``base``, else ``near`` and zero."""
         with self._clock.phase("handles"):
             try:
-                placement = self._rest.place(parameters, base.placement if base else self._near)
+                placement = self._rest.place(parameters, base.placement if base else near)
             except ShapeError as error:
                 raise Infeasible(str(error)) from error
         with self._clock.phase("regularisers"):

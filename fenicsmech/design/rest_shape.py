@@ -144,7 +144,7 @@ class ParametricShape:
         chosen = np.zeros(0, int) if shape.follows else np.flatnonzero(spline.of_shape)
         matrix[chosen, np.arange(first, first + len(chosen))] = 1.0
         fixed[chosen] = 0.0
-        link = self._model.mechanism.flexible_links[shape.link]
+        link = self._model.mechanism.flexible_links[shape.own.link]
         sites = shape.handles.site[shape.handles.site != BETWEEN].tolist()  # in order along the spline
         for column, number in enumerate(self.numbers.numbers, start=self.of_numbers.start):
             shifts = np.zeros((len(sites), 2))

@@ -24,7 +24,7 @@ from fenicsmech.mechanism import Disc, FlexibleLink, Scene, Units
 from fenicsmech.meshing import Isometry, LinkMesh, boundary_polygons, section_of
 from fenicsmech.model import Design
 from fenicsmech.multibody import Linkage
-from fenicsmech.plot import DesignShape, LinkOutline, draw_designs
+from fenicsmech.plot import DesignShape, OutlineShape, draw_designs
 from fenicsmech.quantities import NumberKind, read_kind
 from fenicsmech.simulation import MechanismPlotter, Simulation, rest_geometry
 
@@ -431,10 +431,10 @@ def rest_meshes(simulation: Simulation, links: Sequence[FlexibleLink]) -> list[L
     return on_one(simulation.comm, lambda: [section_of(mesh) for mesh in chosen] if halves else chosen) or []
 
 
-def _outline(link: DesignedLink, place: Isometry, mesh: LinkMesh, p: np.ndarray) -> LinkOutline:
+def _outline(link: DesignedLink, place: Isometry, mesh: LinkMesh, p: np.ndarray) -> OutlineShape:
     """The outline of a link, with centreline, thickness and control points of its parameters ``p``, in its place."""
     loops = boundary_polygons(f"link {link.name!r}", section_of(mesh))
-    return LinkOutline(
+    return OutlineShape(
         loops,
         centreline=place.points(link.spline.evaluate(p, link.samples.t)[:, :2]),
         thickness=link.thickness * link.samples.thickness(p),

@@ -104,7 +104,7 @@ def _follow(comm: MPI.Comm, objective: Objective) -> None:
         raise failure
 
 
-_FORMAT = "fenicsmech checkpoint 3"
+_FORMAT = "fenicsmech checkpoint 4"
 
 
 @dataclass(frozen=True)
@@ -180,9 +180,8 @@ class Checkpoint:
             DescriptionError: the file does not exist, is not a checkpoint, or is one of another problem.
         """
         data = self.read()
-        start = Start(
-            np.array(data["parameters"]), data["number"], data["evaluations"], np.array(data["memory"], dtype=float)
-        )
+        memory = np.array(data["memory"], dtype=float)
+        start = Start(np.array(data["parameters"]), data["number"], data["evaluations"], memory, resumed=True)
         own: dict[str, Any] = {
             name: tuple(value) if isinstance(value, list) else value for name, value in data["round"].items()
         }

@@ -9,7 +9,7 @@ import numpy as np
 
 from fenicsmech.design.description import SplineDesign
 from fenicsmech.design.numbers import Number
-from fenicsmech.errors import DescriptionError, counted, finite, positive
+from fenicsmech.errors import DescriptionError, counted, expect, finite, positive, set_fields
 from fenicsmech.mechanism import DRAWN, Configuration, Force, Units
 from fenicsmech.multibody import assemble
 from fenicsmech.quantities import Displacement, ForceMagnitude, Quantity, Sample
@@ -106,15 +106,15 @@ class Target:
                 f"its sample is {sample!r}",
                 "Give Sample(…)" if quantity.of_state else "Leave it out: links at rest have one shape",
             )
-        for name, value in (
-            ("quantity", quantity),
-            ("sample", sample),
-            ("relation", relation),
-            ("wanted", tuple(finite(f"wanted value of the {part}", value) for value in numbers)),
-            ("weight", positive(f"weight of a target for the {quantity}", weight)),
-            ("scale", None if scale is None else positive(f"scale of the {part}", scale)),
-        ):
-            object.__setattr__(self, name, value)
+        set_fields(
+            self,
+            quantity=quantity,
+            sample=sample,
+            relation=relation,
+            wanted=tuple(finite(f"wanted value of the {part}", value) for value in numbers),
+            weight=positive(f"weight of a target for the {quantity}", weight),
+            scale=None if scale is None else positive(f"scale of the {part}", scale),
+        )
 
     @property
     def size(self) -> int:
@@ -273,8 +273,7 @@ def check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
         raise DescriptionError("design problem", "there are no targets", "Give targets=[Target(…), …]")
     dim = simulation.linkage.dim
     for target in targets:
-        if not isinstance(target, Target):
-            raise DescriptionError("design problem", f"{target!r} is not a target", "Give Target(…)")
+        expect("design problem", target, Target, "a target", "Give Target(…)")
         part, size = f"target of the {target.quantity}", target.quantity.size(dim)
         if target.sample is not None:
             sample_request(simulation, target.sample, [target.sample.value])

@@ -1,4 +1,6 @@
-"""Verification of designs in the parts to be made: their STEP files are meshed anew and finer, and loaded from zero.
+"""Verification of designs in the parts to be made: their STEP files are meshed anew and finer, and loaded.
+
+The samples are loaded from zero in elements as large as the optimiser's; their equilibria in smaller ones start there.
 
 Values on the optimiser's mesh differ from those of the part by the elements, by the outline between the vertices of the
 mesh, and by the deformation of the mesh with the design. All three are in the difference of both values: the part
@@ -9,17 +11,19 @@ give the error of the part's own mesh.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from fenicsmech.collective import on_one
-from fenicsmech.design.equilibria import SampleEquilibria
+from fenicsmech.design.equilibria import DesignEquilibria, SampleEquilibria
 from fenicsmech.design.optimisers.problem import Infeasible
 from fenicsmech.design.result import DesignResult, PartValue, component_values, solid_path
 from fenicsmech.design.target import Comparison, Target
+from fenicsmech.design.transfer import WholeState
 from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, SPATIAL
 from fenicsmech.errors import DescriptionError, positive
 from fenicsmech.export import write_step
@@ -28,12 +32,13 @@ from fenicsmech.mechanism import FlexibleLink, Joint, step_file
 from fenicsmech.meshing import LinkMesh
 from fenicsmech.model import Design, Fidelity, fits
 from fenicsmech.multibody import JointChange
+from fenicsmech.quantities import Sample
 from fenicsmech.simulation import Simulation
 
 _log = logger(__name__)
 
 
-def part_simulation(
+def part_simulations(
     simulation: Simulation,
     links: Sequence[FlexibleLink],
     meshes: Sequence[LinkMesh],
@@ -41,11 +46,14 @@ def part_simulation(
     folder: Path,
     finer: float,
     moved: Mapping[Joint, JointChange],
-) -> Simulation:
+) -> tuple[Simulation, Simulation]:
     """The scene with ``links`` read from the STEP files of their ``meshes``, which this writes to ``folder``.
 
     Joints are drawn where they are ``moved`` to. In space half the depth is meshed where the scene allows it: exported
     links are symmetric.
+
+    Returns:
+        Simulations with elements as large as those of ``simulation``, and with ``finer`` ones.
 
     Raises:
         DescriptionError: a point of a force or an output is on one of the links, so that its place in the part is not
@@ -63,7 +71,10 @@ def part_simulation(
     on_one(simulation.comm, lambda: _write(folder, links, meshes, depths))
     files = zip(links, depths, strict=True)
     shapes = {link: step_file(solid_path(folder, link, ".step"), depth=depth) for link, depth in files}
-    return simulation.with_shapes(shapes, fidelity=_finer(simulation, finer), moved=moved)
+    coarse, fine = (
+        simulation.with_shapes(shapes, fidelity=_finer(simulation, factor), moved=moved) for factor in (1.0, finer)
+    )
+    return coarse, fine
 
 
 def _write(folder: Path, links: Sequence[FlexibleLink], meshes: Sequence[LinkMesh], depths: Sequence[float]) -> None:
@@ -82,23 +93,26 @@ def _finer(simulation: Simulation, factor: float) -> Fidelity:
     return replace(fidelity, sizes=sizes, layers=layers)
 
 
-def verified_parts(result: DesignResult, part: Simulation, targets: Sequence[Target]) -> DesignResult:
+def verified_parts(
+    result: DesignResult, coarse: Simulation, fine: Simulation, targets: Sequence[Target]
+) -> DesignResult:
     """The result with the values of its targets in the parts; without them, and a warning, where loads are not carried.
 
     Args:
         result: of ``targets``, in their order.
-        part: the scene with the links from the exported files.
+        coarse: the scene with the links from the exported files.
+        fine: the same with the elements whose values count.
         targets: of the design problem.
     """
-    comparison, measured = Comparison(targets, part.scene.units), [t for t in targets if t.quantity.of_part]
-    # places of joints are those of the part already
-    known = {kind: v for kind, v in result.values(part.scene).items() if not kind.changes(part.linkage.dim)}
-    numbers = Design(np.zeros_like(part.model.elastic.shape.x.array), known)
-    designed = part.with_design(numbers)
-    with part.model.shaped(numbers):
-        equilibria = SampleEquilibria(designed, measured)
+    comparison, measured = Comparison(targets, fine.scene.units), [t for t in targets if t.quantity.of_part]
+    with _equilibria(coarse, result, measured) as equilibria:
         try:
-            solved = equilibria.from_zero()
+            guesses = equilibria.whole(equilibria.from_zero())
+        except Infeasible:
+            guesses = None  # finer elements may carry what these do not
+    with _equilibria(fine, result, measured) as equilibria:
+        try:
+            solved = _in_finer_elements(equilibria, guesses)
         except Infeasible as failure:
             _log.warning("the exported parts do not reach all targets: %s", failure)
             return result
@@ -110,5 +124,26 @@ def verified_parts(result: DesignResult, part: Simulation, targets: Sequence[Tar
     for own, target, place, error in zip(result.targets, targets, comparison.places, errors, strict=True):
         pair = component_values(values[place]), component_values(adds[place])
         found.append(replace(own, part=PartValue(*pair, float(error)) if target.quantity.of_part else None))
-    fidelity = f"{part.fidelity.model.name}, elements of {part.fidelity.size_text} {part.scene.units.length}"
+    fidelity = f"{fine.fidelity.model.name}, elements of {fine.fidelity.size_text} {fine.scene.units.length}"
     return replace(result, targets=tuple(found), part_fidelity=fidelity)
+
+
+@contextmanager
+def _equilibria(part: Simulation, result: DesignResult, targets: Sequence[Target]) -> Iterator[SampleEquilibria]:
+    """The equilibria of the samples in the parts, whose numbers are those of the result meanwhile."""
+    # places of joints are those of the part already
+    known = {kind: v for kind, v in result.values(part.scene).items() if not kind.changes(part.linkage.dim)}
+    numbers = Design(np.zeros_like(part.model.elastic.shape.x.array), known)
+    designed = part.with_design(numbers)
+    with part.model.shaped(numbers):
+        yield SampleEquilibria(designed, targets)
+
+
+def _in_finer_elements(equilibria: SampleEquilibria, guesses: Mapping[Sample, WholeState] | None) -> DesignEquilibria:
+    """Equilibria from those of coarser elements, or from zero load."""
+    if guesses is not None:
+        try:
+            return equilibria.from_other(guesses)
+        except Infeasible as failure:
+            _log.info("equilibria in larger elements do not lead to those in smaller ones: %s", failure)
+    return equilibria.from_zero()

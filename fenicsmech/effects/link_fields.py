@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations
 
 import numpy as np
@@ -80,17 +80,20 @@ class Boundary:
 
 @dataclass(frozen=True, eq=False)
 class LinkFields:
-    """Fields that link energies are written in.
+    """Fields that the link energy of one effect is written in.
 
     Attributes:
         links: all flexible links.
         body: the links as one body.
         boundaries: the parts of links' boundaries that effects list.
+        numbers: that designs may change, by name: the name in ``ElasticBody.numbers``, and which links have it,
+            (links,).
     """
 
     links: tuple[FlexibleLink, ...]
     body: ElasticBody
     boundaries: Mapping[Faces, Boundary]
+    numbers: dict[str, tuple[str, np.ndarray]] = field(default_factory=dict)
 
     @property
     def u(self) -> fem.Function:
@@ -117,9 +120,17 @@ class LinkFields:
         """x = X + u, the positions of material points."""
         return self.body.rest + self.u
 
-    def cellwise(self, per_link: Sequence[float]) -> fem.Function:
+    def cellwise(self, per_link: Sequence[float] | np.ndarray) -> fem.Function:
         """A field with one value per cell from one value per link, (links,)."""
         return self.body.cellwise(per_link)
+
+    def number(self, name: str, value: float, links: Sequence[FlexibleLink] | None = None) -> fem.Function:
+        """A field with a value on some links, all by default, and zero elsewhere, which designs may change by name."""
+        chosen = np.array([links is None or link in links for link in self.links])
+        known = f"{name}, number {len(self.body.numbers)}"  # other effects may use the same name
+        self.numbers[name] = known, chosen
+        self.body.numbers[known] = self.cellwise(value * chosen)
+        return self.body.numbers[known]
 
     def integral(self, density, *, degree: int) -> ufl.Form:
         """∫ density dV over the links at rest, their depth included; ``degree`` of ``density``.

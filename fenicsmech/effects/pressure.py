@@ -24,7 +24,7 @@ import ufl
 from dolfinx import fem
 
 from fenicsmech.effects.link_fields import Faces
-from fenicsmech.errors import DescriptionError, finite, point, set_fields
+from fenicsmech.errors import DescriptionError, expect, finite, point, set_fields
 from fenicsmech.mechanism import Effect, FlexibleLink, in_dimension
 
 
@@ -37,8 +37,8 @@ class Pressure(Effect):
         pressure: into the link; negative for suction.
         where: predicate of points on the drawn boundary, (n, dim) → (n,) bool; a facet belongs to the part if it holds
             at all its corners. None: the whole boundary.
-        about: x₀; required for an open part, whose rim must be held or move as above. In space
-            two coordinates are an axis along z, which suits holes through extruded links, and their sides.
+        about: x₀; required for an open part, whose rim must be held or move as above. In space two coordinates are an
+            axis along z, which suits holes through extruded links, and their sides.
 
     Raises:
         DescriptionError: a number makes no sense, or the link is not flexible. Later, when it is meshed: the part is
@@ -51,8 +51,7 @@ class Pressure(Effect):
     about: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.link, FlexibleLink):
-            raise DescriptionError("pressure", f"{self.link!r} is not a flexible link", "Give one")
+        expect("pressure", self.link, FlexibleLink, "a flexible link", "Give one")
         set_fields(self, pressure=finite(f"pressure on {self.link.name!r}", self.pressure))
         if self.about is not None:
             set_fields(self, about=point(f"centre of the pressure on {self.link.name!r}", self.about))

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fenicsmech.elasticity import PLANE_STRAIN, Stretch
-from fenicsmech.errors import DescriptionError, direction, in_plane, positive, set_fields
+from fenicsmech.errors import DescriptionError, direction, expect, in_plane, positive, set_fields
 from fenicsmech.mechanism import Effect, FlexibleLink, in_dimension
 
 
@@ -32,8 +32,7 @@ class Prestrain(Effect):
     along: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.link, FlexibleLink):
-            raise DescriptionError("prestrain", f"{self.link!r} is not a flexible link", "Give one")
+        expect("prestrain", self.link, FlexibleLink, "a flexible link", "Give one")
         set_fields(self, stretch=positive(f"prestrain of {self.link.name!r}", self.stretch))
         if self.along is not None:
             set_fields(self, along=direction(f"direction of prestrain of {self.link.name!r}", self.along))

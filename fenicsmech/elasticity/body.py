@@ -84,13 +84,24 @@ class ElasticBody(BodyFields):
             found.append((density * self._volume, term.dx))
         return found
 
-    def contraction_energy(self, weight, *, degree: int) -> ufl.Form:
-        """½ ∫ w E (F₃₃ − 1)² dV with a scalar field w, of links in plane stress."""
+    def contraction_energy(self, a, v, p, q, *, degree: int) -> ufl.Form:
+        """What links in plane stress store if they contract by a instead of h = F₃₃ − 1, and curl across by v.
+
+        ½ ∫ E ((a − p)² − 2 q h) + μ b²/12 |∇a − Fᵀv|² + b⁴/720 E/(1 − ν²) ((1 − ν) G : G + ν (tr G)²) dV
+
+        with G = sym Fᵀ∇v and p the projection of h, whose derivatives are those of the term in q, that of a − p.
+        """
         assert isinstance(self.model, PlaneStress), "links contract freely in plane stress alone"
-        H, terms = self._elastic(self.gradient(self.u)), []
+        H, b, terms = self.gradient(self.u), self.depth, []
+        F = ufl.Identity(self.model.dim) + H
+        shear, G = self.gradient(a) - ufl.dot(F.T, v), ufl.sym(ufl.dot(F.T, self.gradient(v)))
         for term in self.terms:
-            density = 0.5 * weight * term.law.E * self.model.contraction(term.law, H) ** 2
-            terms.append(density * self._volume * term.dx(metadata={"quadrature_degree": degree}))
+            E, nu, h = term.law.E, term.law.nu, self.model.contraction(term.law, self._elastic(H))
+            contraction = E * ((a - p) ** 2 - 2 * q * h)
+            curling = b**2 / 12 * E / (2 * (1 + nu)) * ufl.inner(shear, shear)
+            membrane = b**4 / 720 * E / (1 - nu**2) * ((1 - nu) * ufl.inner(G, G) + nu * ufl.tr(G) ** 2)
+            density = 0.5 * (contraction + curling + membrane) * self._volume
+            terms.append(density * term.dx(metadata={"quadrature_degree": degree}))
         return _sum(terms)
 
     def curvature(self, A, B, *, degree: int) -> ufl.Form:

@@ -136,7 +136,8 @@ class BodyFields:
         pressure: of the links in the u–p formulation, P_(order − 1); None if no link is.
         parameters: of the links' laws by name, each with one value per cell; changing them needs no compiling.
         depth: one value per cell.
-        numbers: what energies depend on of the numbers of links: ``parameters``, and in the plane ``depth``.
+        numbers: what energies depend on of the numbers of links: ``parameters``, in the plane ``depth``, and what
+            effects add.
         load_factor: of the effects.
         growth: of the strain-free state; None if all links are as drawn.
         dx: measure of all cells, interfaces included.

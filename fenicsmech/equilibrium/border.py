@@ -80,7 +80,7 @@ class BorderTerms:
 
     def pose_potential(self, state: State) -> float:
         """V. Local."""
-        return sum(_factor(potential, state) * potential.value(state.poses) for potential, _ in self._potentials)
+        return sum(own.factor(state.load_factor) * own.value(state.poses) for own, _ in self._potentials)
 
     # -- gradients: by this rank's (u, p), (owned dofs,), and by (z, λ, f), (border,) --------------------------
 
@@ -106,7 +106,7 @@ class BorderTerms:
 
     def pose_gradient(self, state: State) -> np.ndarray:
         """∂V/∂z, (poses,). Local."""
-        return self._pose_gradient(state, lambda potential: _factor(potential, state))
+        return self._pose_gradient(state, lambda potential: potential.factor(state.load_factor))
 
     def load_factor_rate(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """−∂²L_b/∂(u, z)∂σ. Local."""
@@ -146,7 +146,7 @@ class BorderTerms:
                     columns = z + joints.columns[point.body]
                     yield columns, columns, -point.hessian(state.poses, magnitude * direction)
         for potential, places in self._potentials:
-            curvature = _factor(potential, state) * potential.hessian(state.poses)
+            curvature = potential.factor(state.load_factor) * potential.hessian(state.poses)
             for one, columns in places:
                 for other, other_columns in places:
                     yield z + columns, z + other_columns, curvature[one, other]
@@ -198,8 +198,3 @@ class BorderTerms:
             for k, body in enumerate(potential.bodies)
             if body in self._joints.columns
         ]
-
-
-def _factor(potential: PosePotential, state: State) -> float:
-    """The load factor that a potential counts with."""
-    return 1.0 if potential.holds else state.load_factor

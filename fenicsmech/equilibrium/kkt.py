@@ -8,10 +8,9 @@ total energy of links and effects,
          [0       , −A   , −ε−c, 0   ],
          [−a_uᵀ   , −a_zᵀ, 0   , 0   ]]
 
-and G the map from the scaled unknowns. K̂ is stored by blocks of one node each, which speeds
-assembly up; products of sparse matrices need a copy by entries. The product over all unknowns is formed on
-demand. Two-level solvers need only its stiffness by blocks of nodes, its columns of the border, and
-Pᵀ K P = (G P)ᵀ K̂ (G P) for a narrow P.
+and G the map from the scaled unknowns. K̂ is stored by blocks of one node each, which speeds assembly up; products of
+sparse matrices need a copy by entries. The product over all unknowns is formed on demand. Two-level solvers need only
+its stiffness by blocks of nodes, its columns of the border, and Pᵀ K P = (G P)ᵀ K̂ (G P) for a narrow P.
 """
 
 from __future__ import annotations
@@ -211,8 +210,8 @@ def create_extended_matrix(
 class EntryCopy:
     """A matrix by entries that follows one ``blocked`` by nodes, whose pattern does not change any more.
 
-    PETSc's conversion finds the place of each entry anew, which is slow beside the assembly. Here it
-    is asked once, with the numbers of the entries for values; from then on values are copied in that order.
+    PETSc's conversion finds the place of each entry anew, which is slow beside the assembly. Here it is asked once,
+    with the numbers of the entries for values; from then on values are copied in that order.
 
     Attributes:
         matrix: its copy by entries, valid after an ``update``.

@@ -346,11 +346,6 @@ class Adjoint:
         return self.x.dot(self.at.motor_rate(direction))
 
     @staticmethod
-    def of_travel(at: Linearisation, load: PointLoad) -> Adjoint:
-        """The adjoint of the travel of a load's point."""
-        return Adjoint.of(at, at.travel_gradient(load))
-
-    @staticmethod
     def of_force(at: Linearisation) -> Adjoint:
         """The adjoint of the controlled force under displacement control."""
         # ∂f/∂y is the right-hand side of the rate with the prescribed displacement, but for its sign

@@ -70,18 +70,15 @@ class EquilibriumSystem:
         loads: constant ones, with their magnitudes.
         potentials: of body poses.
         compliances: c by constraint row; 0 where none is given.
-        idle: spins that nothing resists.
-        one_sided: constraints whose energy is in that of the links.
+        idle: spins that nothing resists, whose gauge K fixes.
+        one_sided: constraints on links whose energy is in that of the links; their pressures may be unknowns.
         clock: of the phases.
         comm: the processes that share the links.
 
     Attributes:
         numbering: of rows and unknowns.
         blocks: of the unknowns.
-        compliances: c, (rows,).
-        one_sided: constraints on links, whose pressures may be unknowns.
-        pressures: these, while they are; None otherwise.
-        idle: spins that nothing resists, whose gauge K fixes.
+        pressures: those of one-sided constraints while they are unknowns; None otherwise.
         unknowns: x and G, at the poses of the last ``residual``.
         kkt: the KKT matrix last linearised; take it before another ``residual``.
     """

@@ -14,8 +14,8 @@ elements are too stiff to show. Conjugate gradients stay in W if the smoother S 
 
     x ← P K₁⁻¹ Pᵀ b,     then with the preconditioner  (I − P K₁⁻¹ Pᵀ K) S.
 
-S is a polynomial of the stiffness A of free nodes that damps short waves, PETSc's Chebyshev
-iteration: with D the 3 × 3 (2 × 2 in the plane) diagonal blocks of A and λ the largest eigenvalue of D⁻¹A,
+S is a polynomial of the stiffness A of free nodes that damps short waves, PETSc's Chebyshev iteration: with D the 3 × 3
+(2 × 2 in the plane) diagonal blocks of A and λ the largest eigenvalue of D⁻¹A,
 
     S = q(D⁻¹A) D⁻¹,     1 − t q(t) = T_m((θ − t)/δ) / T_m(θ/δ),     θ, δ = (b ± a)/2,  a = ratio · b,  b ≥ λ:
 

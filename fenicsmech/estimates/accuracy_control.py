@@ -2,8 +2,8 @@
 
 Fidelity levels are climbed from a coarse pilot. Errors of elements and of plane stress are estimated after each
 (``estimates``), and the next level is the first whose expected error suffices, by the gains of the levels of a model
-over each other. Gains and work of levels were measured on claw, truss and Klann leg;
-they only guide the choice: the estimate on the level itself decides.
+over each other. Gains and work of levels were measured on claw, truss and Klann leg; they only guide the choice: the
+estimate on the level itself decides.
 
 Estimates are signed, and so they are added to the results (``Curve.corrected``). The error required to be small
 is the one they may leave,
@@ -11,8 +11,8 @@ is the one they may leave,
     |error| ≤ r |elements| + r_s |plane stress|,
 
 with r by level (``FidelityLevel.remainder``) and r_s = ``AccuracyOptions.plane_stress_remainder``: measured on
-cantilever, arch, truss, claw and Klann leg, by finer elements and by space. Source
-for corrections by adjoints: Pierce & Giles (doi:10.1137/S0036144598349423).
+cantilever, arch, truss, claw and Klann leg, by finer elements and by space. Source for corrections by adjoints: Pierce
+& Giles (doi:10.1137/S0036144598349423).
 """
 
 from __future__ import annotations
@@ -165,11 +165,11 @@ class Trial:
         return level.remainder * in_space * level.gain
 
     def __str__(self) -> str:
-        blocked = f" + {abs(self.plane_stress):.2%} for contraction that pins block"
+        left_out = f" + {abs(self.plane_stress):.2%} for plane stress"
         return (
             f"{self.level.name} ({self.unknowns} unknowns, {self.seconds:.2g} s): "
             f"error of about {abs(self.elements):.2%} for the elements"
-            f"{blocked if self.level.model is PLANE_STRESS else ''}; at most {self.error:.2%} once corrected"
+            f"{left_out if self.level.model is PLANE_STRESS else ''}; at most {self.error:.2%} once corrected"
         )
 
 

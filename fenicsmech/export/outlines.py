@@ -15,6 +15,7 @@ import numpy as np
 from scipy.interpolate import BSpline, CubicSpline, make_interp_spline
 
 from fenicsmech.meshing import CircleArc, Curve, straight_line
+from fenicsmech.polygons import chord_lengths
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,7 @@ def _halves(polygon: np.ndarray, breaks: list[int]) -> dict[int, np.ndarray]:
     """Vertices at which a curve with at most one break is divided, and its derivatives there."""
     start, count = (breaks or [0])[0], len(polygon)
     around = polygon[np.arange(start, start + count + 1) % count]
-    curve = CubicSpline(_chord_lengths(around), around, bc_type="not-a-knot" if breaks else "periodic")
+    curve = CubicSpline(chord_lengths(around), around, bc_type="not-a-knot" if breaks else "periodic")
     return {(start + k) % count: curve(curve.x[k], 1) for k in ([count // 2] if breaks else [0, count // 2])}
 
 
@@ -141,18 +142,13 @@ def _interpolant(points: np.ndarray, start: np.ndarray | None = None, end: np.nd
 
     At an end without derivative the first two pieces are one polynomial ("not a knot").
     """
-    x = _chord_lengths(points)
+    x = chord_lengths(points)
     slopes = [None if slope is None else [(1, slope)] for slope in (start, end)]
     conditions = len(x) + sum(slope is not None for slope in slopes)
     degree = min(3, conditions - 1)
     inner = x[1:-1][start is None : len(x) - 2 - (end is None)] if conditions > 4 else x[:0]
     knots = np.concatenate([np.full(degree + 1, x[0]), inner, np.full(degree + 1, x[-1])])
     return make_interp_spline(x, points, k=degree, t=knots, bc_type=tuple(slopes) if conditions > len(x) else None)
-
-
-def _chord_lengths(points: np.ndarray) -> np.ndarray:
-    """The length (n,) of the polygon through ``points`` ((n, 2)) up to each of them."""
-    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
 
 
 def corners_of(polygon: np.ndarray) -> np.ndarray:

@@ -257,23 +257,13 @@ def constraint(kind: JointKind, dim: int, driven: bool) -> SmoothFunction:
     Variables are the poses z_a and z_b and, if ``driven``, φ, (2 pose_size,) or (2 pose_size + 1,). Constants are the
     joint's position minus the centres of both bodies and the rows of its triad, all as drawn, (2 dim + dim²,).
     """
-    poses, constants, a, b = _markers(dim)
-    equations = kind.equations(a, b) if dim == 3 else kind.planar_equations(a, b)
-    if not driven:
-        return derive(equations, poses, constants)
-    value = sympy.Symbol("phi", real=True)
-    return derive([*equations, kind.motor(a, b, value)], (*poses, value), constants)
+    return derive(*_equations(kind, dim, driven))
 
 
 @cache
 def constraint_rate(kind: JointKind, dim: int, driven: bool) -> SmoothFunction:
-    """∂C/∂c · ċ of a ``constraint``, as the rates ċ of its constants, which follow these, say."""
-    poses, constants, a, b = _markers(dim)
-    variables, equations = poses, kind.equations(a, b) if dim == 3 else kind.planar_equations(a, b)
-    if driven:
-        value = sympy.Symbol("phi", real=True)
-        variables, equations = (*poses, value), [*equations, kind.motor(a, b, value)]
-    return _rate(equations, variables, constants)
+    """∂C/∂c · ċ of a ``constraint``; its constants are those c of that, then their rates ċ."""
+    return _rate(*_equations(kind, dim, driven))
 
 
 @cache
@@ -281,6 +271,16 @@ def coordinate_rate(kind: JointKind, dim: int) -> SmoothFunction:
     """∂φ/∂c · ċ of a ``free_coordinate``, (1,); arguments as of a ``constraint_rate``."""
     poses, constants, a, b = _markers(dim)
     return _rate([kind.coordinate(a, b)], poses, constants)
+
+
+def _equations(kind: JointKind, dim: int, driven: bool):
+    """The equations of a ``constraint``, its variables and its constants."""
+    poses, constants, a, b = _markers(dim)
+    equations = kind.equations(a, b) if dim == 3 else kind.planar_equations(a, b)
+    if not driven:
+        return equations, poses, constants
+    value = sympy.Symbol("phi", real=True)
+    return [*equations, kind.motor(a, b, value)], (*poses, value), constants
 
 
 def _rate(formulae, variables, constants) -> SmoothFunction:

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import TypeVar
 
-from fenicsmech.errors import DescriptionError, finite, point, positive
+from fenicsmech.errors import DescriptionError, expect, finite, point, positive
 from fenicsmech.errors import direction as unit
 from fenicsmech.joints import CYLINDRICAL, PLANAR_JOINT, PRISMATIC, REVOLUTE, SPHERICAL, UNIVERSAL, WELD, JointKind
 from fenicsmech.mechanism.parts import (
@@ -117,8 +117,7 @@ class Mechanism:
                 flexible link lacks an interface, the interface is not a region or given twice, numbers are not
                 finite, or the name is taken.
         """
-        if not isinstance(kind, JointKind):
-            raise DescriptionError("joint", f"{kind!r} is not a joint kind", "Give an instance of a JointKind")
+        expect("joint", kind, JointKind, "a joint kind", "Give an instance of a JointKind")
         for link in (a, b):
             self._check_member(f"{name or f'{kind.name} joint'!r}", link)
         given, name = name, name or f"{kind.name} joint {a.name}–{b.name}"

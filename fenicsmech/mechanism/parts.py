@@ -226,7 +226,7 @@ class ForceGroup:
         if not all(isinstance(force, Force) for force, _ in pairs):
             raise DescriptionError(part, f"its ratios are {given!r}", "Give forces with their ratios")
         checked = tuple((force, finite(f"ratio of {force.name!r} in {part}", ratio)) for force, ratio in pairs)
-        object.__setattr__(self, "ratios", checked)
+        set_fields(self, ratios=checked)
 
     def __repr__(self) -> str:
         return f"ForceGroup({self.name!r}: {', '.join(f'{ratio:g} × {force.name!r}' for force, ratio in self.ratios)})"

@@ -14,7 +14,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 
-from fenicsmech.errors import DescriptionError, finite, set_fields
+from fenicsmech.errors import DescriptionError, expect, finite, set_fields
 from fenicsmech.mechanism.mechanism import Mechanism
 from fenicsmech.mechanism.parts import FlexibleLink, Joint, Link, Motor, RigidLink, same_place
 from fenicsmech.mechanism.shapes import Region
@@ -137,11 +137,9 @@ class Scene:
 
     def __post_init__(self) -> None:
         set_fields(self, effects=tuple(self.effects))
-        if not isinstance(self.mechanism, Mechanism):
-            raise DescriptionError("scene", f"{self.mechanism!r} is not a mechanism", "Pass a Mechanism")
+        expect("scene", self.mechanism, Mechanism, "a mechanism", "Pass a Mechanism")
         for effect in self.effects:
-            if not isinstance(effect, Effect):
-                raise DescriptionError("scene", f"{effect!r} is not an effect", "List effects only, as Gravity(…)")
+            expect("scene", effect, Effect, "an effect", "List effects only, as Gravity(…)")
 
     def __repr__(self) -> str:
         effects = "; ".join(effect.explain() for effect in self.effects)

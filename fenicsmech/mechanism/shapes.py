@@ -13,7 +13,7 @@ from scipy.integrate import fixed_quad
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from fenicsmech.errors import DescriptionError, finite, point, point_text, points, positive
+from fenicsmech.errors import DescriptionError, expect, finite, point, point_text, points, positive
 
 Point = tuple[float, ...]
 
@@ -143,8 +143,7 @@ def outline(start: Sequence[float], segments: Sequence[Line | Arc], *, depth: fl
     """The closed outline that runs from ``start`` along ``segments`` and back, extruded by ``depth``."""
     checked: list[Line | Arc] = []
     for segment in segments:
-        if not isinstance(segment, Line | Arc):
-            raise DescriptionError("outline", f"{segment!r} is not a segment", "Give Line(…) or Arc(…)")
+        expect("outline", segment, Line | Arc, "a segment", "Give Line(…) or Arc(…)")
         end = point("outline segment end", segment.end, dimensions=(2,))
         via = point("outline arc", segment.via, dimensions=(2,)) if isinstance(segment, Arc) else None
         checked.append(Line(end) if via is None else Arc(via, end))

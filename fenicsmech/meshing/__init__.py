@@ -23,7 +23,7 @@ and makes dolfinx meshes of them, over parallel ranks.
 """
 
 from fenicsmech.meshing import outline, part_files, strip  # each registers its shapes
-from fenicsmech.meshing.centreline import LinkOutline, find_centreline
+from fenicsmech.meshing.centreline import LinkOutline, find_centreline, thinnest_stretch
 from fenicsmech.meshing.cutting import circle_segments
 from fenicsmech.meshing.images import Figure, Isometry, Match, has_plain_outline, image_of, matches, same_mesh
 from fenicsmech.meshing.link_mesh import (
@@ -38,6 +38,7 @@ from fenicsmech.meshing.link_mesh import (
     count_pieces,
     distribute,
     edge_corners,
+    edge_rows,
     extrude,
     face_of,
     least_stretches,

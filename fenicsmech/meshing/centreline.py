@@ -21,16 +21,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.interpolate import BSpline
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import Voronoi, cKDTree
 
-from fenicsmech.errors import DescriptionError, point_text
-from fenicsmech.mechanism import Centreline
+from fenicsmech.errors import DescriptionError, MeshingError, point_text
+from fenicsmech.mechanism import Centreline, MeshPart, Shape, Strip
 from fenicsmech.meshing.link_mesher import InterfaceSite
-from fenicsmech.meshing.outline import Curve, points_on, sample_parameters, sampled
-from fenicsmech.polygons import are_inside, distance_to, signed_area
+from fenicsmech.meshing.outline import Curve, link_outline, points_on, sample_parameters, sampled
+from fenicsmech.polygons import are_inside, chord_lengths, distance_to, divided, strip_width
 
 
 @dataclass(frozen=True)
@@ -83,16 +84,13 @@ class LinkOutline:
         sites: its interfaces.
 
     Attributes:
-        sites: likewise.
         polygon: with its vertices on the outline, (m, 2).
         width: that of a long strip of the same area and perimeter.
     """
 
     def __init__(self, loop: Sequence[Curve], sites: Sequence[InterfaceSite]) -> None:
         self._loop, self.sites = tuple(loop), tuple(sites)
-        rough = sampled(loop, math.inf)
-        perimeter = float(np.linalg.norm(np.roll(rough, -1, axis=0) - rough, axis=1).sum())
-        self.width = 2.0 * abs(signed_area(rough)) / perimeter
+        self.width = strip_width(sampled(loop, math.inf))
         parameters = [sample_parameters(curve, SEARCH.sampled * self.width) for curve in loop]
         self._curve = np.repeat(np.arange(len(loop)), [len(own) - 1 for own in parameters])
         self._bent = np.array([not isinstance(curve, BSpline) or curve.k > 1 for curve in loop])[self._curve]
@@ -136,7 +134,7 @@ class LinkOutline:
         free = ~chords.fixed
         if not free.any():
             raise DescriptionError(part, "interfaces and eyes cover its centreline", "Make its interfaces smaller")
-        arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+        arc = chord_lengths(points)
         return np.interp(arc, arc[free], (chords.left + chords.right)[free])
 
     def _ray(self, points: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -202,12 +200,36 @@ def find_centreline(
     return points
 
 
+def thinnest_stretch(name: str, shape: Shape, sites: Sequence[InterfaceSite], *, dim: int, length: float) -> float:
+    """Thickness in the plane of the thinnest stretch of a link that is as long as ``length`` and in no interface.
+
+    That is the largest thickness along it; infinite if there is no such stretch, if a solid has no section or no
+    centreline in the plane, or if the link is a mesh, whose elements are given. Local.
+    """
+    if isinstance(shape, Strip):
+        return shape.thickness
+    if isinstance(shape, MeshPart):
+        return math.inf
+    try:
+        outline = LinkOutline(link_outline(name, shape, dim=dim), sites)
+        curve = Centreline(find_centreline(outline, [site.reach for site in sites], part=f"link {name!r}"))
+    except (DescriptionError, MeshingError):
+        return math.inf
+    stations = np.linspace(0.0, curve.end, 401)
+    points = curve.evaluate(stations)
+    chords = outline.chords(points, curve.tangent(stations))
+    thickness = np.where(chords.fixed, np.inf, chords.left + chords.right)
+    step = chord_lengths(points)[-1] / (len(points) - 1)
+    window = min(max(1, round(length / step)), len(points))
+    return float(sliding_window_view(thickness, window).max(axis=1).min())
+
+
 def _halve_chords(
     outline: LinkOutline, path: np.ndarray, open_ends: tuple[bool, bool], spacing: float, *, part: str
 ) -> np.ndarray:
     """Points of the line near ``path`` (n, 2) that halves its chords; ends that are not free stay."""
     width, far = outline.width, np.inf
-    points = _evenly(path, spacing * width)
+    points = divided(path, spacing * width, least=3)
     for _ in range(SEARCH.moves):
         curve = Centreline(points, part=f"centreline of {part}")
         tangents = curve.tangent(curve.knots)
@@ -233,13 +255,6 @@ def _halve_chords(
     if not far <= SEARCH.halved * width:
         raise DescriptionError(part, "no line halves the chords of its outline", "Give centreline=…, points along it")
     return points
-
-
-def _evenly(path: np.ndarray, spacing: float) -> np.ndarray:
-    """Points that divide a line through ``path`` (n, 2) evenly, about ``spacing`` apart."""
-    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-    at = np.linspace(0.0, arc[-1], max(3, math.ceil(arc[-1] / spacing)) + 1)
-    return np.column_stack([np.interp(at, arc, coordinate) for coordinate in path.T])
 
 
 def _medial_path(

@@ -123,15 +123,9 @@ class CurvedEdges:
 
     def of_cells(self, cells: np.ndarray) -> np.ndarray:
         """Bulges of the edges of ``cells`` (m, n), pairs of corners in lexical order, (m, n (n − 1) / 2, dim)."""
-        pairs = _edges(cells)
-        found = np.zeros((*pairs.shape[:2], self.bulges.shape[1]))
-        if len(self.ends):
-            count = int(max(cells.max(initial=0), self.ends.max())) + 1
-            keys, wanted = self.ends @ (count, 1), pairs @ (count, 1)
-            order = np.argsort(keys)
-            place = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)]
-            hit = keys[place] == wanted
-            found[hit] = self.bulges[place[hit]]
+        rows = edge_rows(self.ends, _edges(cells))
+        found = np.zeros((*rows.shape, self.bulges.shape[1]))
+        found[rows >= 0] = self.bulges[rows[rows >= 0]]
         return found
 
     def limited(self, points: np.ndarray, cells: np.ndarray) -> CurvedEdges:
@@ -150,14 +144,27 @@ class CurvedEdges:
 
     def _scaled(self, cells: np.ndarray, factor: float) -> CurvedEdges:
         """The bulges of the edges of ``cells`` times ``factor``."""
-        count = int(max(cells.max(initial=0), self.ends.max(initial=0))) + 1
-        touched = np.isin(self.ends @ (count, 1), _edges(cells) @ (count, 1))
+        touched = edge_rows(_edges(cells).reshape(-1, 2), self.ends) >= 0
         return CurvedEdges(self.ends, np.where(touched[:, None], factor, 1.0) * self.bulges)
 
 
 def _edges(cells: np.ndarray) -> np.ndarray:
     """Edges of ``cells`` (m, n), pairs of corners in lexical order, the lower vertex first, (m, n (n − 1) / 2, 2)."""
     return np.sort(cells[:, list(combinations(range(cells.shape[1]), 2))], axis=2)
+
+
+def edge_rows(known: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """The first row of ``known`` edges (k, 2) that each of the ``wanted`` (…, 2) is, −1 where none is, (…,).
+
+    Edges are pairs of vertex numbers, the lower one first.
+    """
+    if not len(known):
+        return np.full(wanted.shape[:-1], -1)
+    count = int(max(known.max(), wanted.max(initial=0))) + 1
+    keys, sought = known @ (count, 1), wanted @ (count, 1)
+    order = np.argsort(keys, kind="stable")
+    rows = order[np.minimum(np.searchsorted(keys, sought, sorter=order), len(keys) - 1)]
+    return np.where(keys[rows] == sought, rows, -1)
 
 
 def edge_corners(corners: int) -> np.ndarray:
@@ -301,10 +308,10 @@ def extrude(plan: LinkMesh, depth: float, layers: int, *, half: bool = False) ->
     Fields that are the same all through the depth are fields on the plan: on tetrahedra whose vertices stand on the
     three corners of a triangle such a field has exactly no gradient along z.
 
-    A prism over the triangle a < b < c (numbers of its vertices in ``plan``), with a′, b′, c′ above them, is cut
-    into abcc′, abb′c′ and aa′b′c′. The diagonal of a side then joins the lower number below with the higher above,
-    in both of its neighbours. Layers above the middle are mirror images of those below, so with an
-    even number of layers the mesh is symmetric about z = 0, and plane loads cause no motion out of the plane.
+    A prism over the triangle a < b < c (numbers of its vertices in ``plan``), with a′, b′, c′ above them, is cut into
+    abcc′, abb′c′ and aa′b′c′. The diagonal of a side then joins the lower number below with the higher above, in both
+    of its neighbours. Layers above the middle are mirror images of those below, so with an even number of layers the
+    mesh is symmetric about z = 0, and plane loads cause no motion out of the plane.
 
     Args:
         plan: the triangulation; its ``interface`` numbers pass on to the cells above.

@@ -12,9 +12,8 @@ import numpy as np
 
 from fenicsmech.errors import DescriptionError, MeshingError, point_text, positive, set_fields
 from fenicsmech.log import logger
-from fenicsmech.mechanism import Arc, Disc, Outline, Region, Shape, Strip
+from fenicsmech.mechanism import Disc, Region, Shape
 from fenicsmech.meshing.link_mesh import FREE, LinkMesh, cell_measures, count_pieces
-from fenicsmech.polygons import signed_area
 
 LEAST_SEGMENTS = 8
 """Least number of segments of a circle."""
@@ -220,26 +219,6 @@ def check_link(
         if not holds(shape, request, tuple(at)):
             problem = f"the point {point_text(at)} is not on {request.part}"
             raise MeshingError(f"{part!r}", problem, "Move it onto the link")
-
-
-def typical_thickness(shape: Shape, part: str) -> float:
-    """The thickness of a strip, or 2 A / P of an outline, as described; ``part`` names the link.
-
-    Raises:
-        DescriptionError: the shape is that of a file.
-    """
-    match shape:
-        case Strip():
-            return shape.thickness
-        case Outline():
-            # arcs count as the two chords that they are given by
-            corners = [shape.start]
-            for segment in shape.segments:
-                corners += [segment.via, segment.end] if isinstance(segment, Arc) else [segment.end]
-            polygon = np.array(corners)
-            perimeter = np.hypot(*(np.roll(polygon, -1, axis=0) - polygon).T).sum()
-            return float(2.0 * abs(signed_area(polygon)) / perimeter)
-    raise DescriptionError(part, "its shape comes from a file, so its thickness is not known", "Give size=… for it")
 
 
 def _check_cells(mesh: LinkMesh, request: MeshRequest) -> None:

@@ -15,21 +15,13 @@ from typing import TypeAlias
 import numpy as np
 from scipy.interpolate import BSpline
 
-from fenicsmech.errors import MeshingError, counted, point_text
-from fenicsmech.mechanism import Arc, Line, Outline, Shape, StepPart
+from fenicsmech.errors import DescriptionError, MeshingError, counted, point_text
+from fenicsmech.mechanism import Arc, Line, Outline, Shape, StepPart, Strip
 from fenicsmech.meshing.cutting import PlaneDrawing, in_units_of, mesh_planar
 from fenicsmech.meshing.link_mesh import LinkMesh
-from fenicsmech.meshing.link_mesher import (
-    LEAST_SEGMENTS,
-    InterfaceSite,
-    MeshRequest,
-    check_shape,
-    holds,
-    mesh_shape,
-    typical_thickness,
-)
+from fenicsmech.meshing.link_mesher import LEAST_SEGMENTS, InterfaceSite, MeshRequest, check_shape, holds, mesh_shape
 from fenicsmech.meshing.session import gmsh
-from fenicsmech.polygons import distance_to, first_crossing, is_inside, signed_area
+from fenicsmech.polygons import distance_to, first_crossing, is_inside, signed_area, strip_width
 
 _SAMPLED = 0.02  # of the element size: how far the polygons that checks look at deviate from the outline
 
@@ -196,7 +188,7 @@ def link_outline(name: str, shape: Shape, *, dim: int) -> list[Curve]:
     Raises:
         MeshingError: a file cannot be read, or has no such section.
     """
-    size = typical_thickness(shape, name) if isinstance(shape, Outline) else 1.0
+    size = strip_width(_corners(shape)) if isinstance(shape, Outline) else 1.0
     request = MeshRequest(name, (), dim, size)
     check_shape(shape, request)
     return outer_loop(shape, request)
@@ -209,12 +201,24 @@ def link_thickness(name: str, shape: Shape) -> float:
         DescriptionError: the link is a mesh, whose elements are given.
         MeshingError: a file cannot be read, or has no such section.
     """
-    if not isinstance(shape, StepPart):
-        return typical_thickness(shape, f"link {name!r}")
-    curves = link_outline(name, shape, dim=2)
-    polygon = sampled(curves, 1e-3 * float(np.ptp(sampled(curves, math.inf), axis=0).max()))
-    perimeter = np.linalg.norm(np.roll(polygon, -1, axis=0) - polygon, axis=1).sum()
-    return 2.0 * abs(signed_area(polygon)) / float(perimeter)
+    match shape:
+        case Strip():
+            return shape.thickness
+        case Outline():
+            return strip_width(_corners(shape))
+        case StepPart():
+            curves = link_outline(name, shape, dim=2)
+            return strip_width(sampled(curves, 1e-3 * float(np.ptp(sampled(curves, math.inf), axis=0).max())))
+    problem = "its shape comes from a file, so its thickness is not known"
+    raise DescriptionError(f"link {name!r}", problem, "Give size=… for it")
+
+
+def _corners(outline: Outline) -> np.ndarray:
+    """The polygon of an outline, (n, 2); arcs count as the two chords that they are given by."""
+    corners = [outline.start]
+    for segment in outline.segments:
+        corners += [segment.via, segment.end] if isinstance(segment, Arc) else [segment.end]
+    return np.array(corners)
 
 
 @mesh_shape.register

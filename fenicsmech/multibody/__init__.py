@@ -18,7 +18,6 @@ from fenicsmech.multibody.assembly import (
     is_held,
     stiff_motions,
 )
-from fenicsmech.multibody.idle_spins import IdleSpin, idle_spins
 from fenicsmech.multibody.linkage import (
     Body,
     Connection,
@@ -31,3 +30,4 @@ from fenicsmech.multibody.linkage import (
 )
 from fenicsmech.multibody.places import JointChange, JointPlaces
 from fenicsmech.multibody.points import BodyPoint, DesignAtNodes, InterfaceMap, LinkPoint, link_point, shape_functions
+from fenicsmech.multibody.spins import IdleSpin, idle_spins

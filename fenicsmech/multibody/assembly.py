@@ -40,8 +40,8 @@ from scipy.sparse.csgraph import breadth_first_order
 
 from fenicsmech.errors import AssemblyError
 from fenicsmech.mechanism import Configuration
-from fenicsmech.multibody.idle_spins import IdleSpin
 from fenicsmech.multibody.linkage import RANK, JointSystem, Linkage, PosePotential
+from fenicsmech.multibody.spins import IdleSpin
 
 
 @dataclass(frozen=True)
@@ -58,9 +58,20 @@ class Assembly:
 def assemble(linkage: Linkage, configuration: Configuration, springs: Sequence[PosePotential] = ()) -> Assembly:
     """The rigid assembly of ``configuration``; it stops at the last position free of strain of flexible links.
 
+    Without springs, each is found once for the present places of joints and offsets of motors.
+
     Raises:
         AssemblyError: a loop does not close even with freely deformable links.
     """
+    if springs:
+        return _assembled(linkage, configuration, springs)
+    key = configuration, linkage.joints.key, linkage.rigid.key
+    if key not in linkage.assembled:
+        linkage.assembled[key] = _assembled(linkage, configuration, springs)
+    return linkage.assembled[key]
+
+
+def _assembled(linkage: Linkage, configuration: Configuration, springs: Sequence[PosePotential]) -> Assembly:
     poses, fraction, _ = _Assembler(linkage.rigid, springs).move(configuration)
     if fraction < 1.0:
         _, closing, worst = _Assembler(linkage.joints).move(configuration)
@@ -71,6 +82,7 @@ def assemble(linkage: Linkage, configuration: Configuration, springs: Sequence[P
                 f"the motors get {math.floor(1e3 * closing) / 10:.1f}% of the way",  # rounded down
                 "Check motor positions and link lengths",
             )
+    poses.setflags(write=False)  # shared
     return Assembly(poses, fraction)
 
 

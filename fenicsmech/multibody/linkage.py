@@ -8,9 +8,10 @@ Fixed bodies carry no columns.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from scipy.linalg import qr
@@ -124,6 +125,11 @@ class JointSystem:
         as_drawn = self.gradient(self.drawn, np.zeros(len(self.connections))) * self.pose_scale
         norm = np.linalg.norm(as_drawn, axis=1)
         self.row_scale = 1.0 / np.where(norm > 0.0, norm, 1.0)
+
+    @property
+    def key(self) -> Hashable:
+        """Equal where all equations are: places of joints and offsets of motors, which designs change."""
+        return self.places.key, self.offsets.tobytes()
 
     @property
     def drawn(self) -> np.ndarray:
@@ -298,6 +304,7 @@ class Linkage:
         interfaces: indices of the interface bodies of each flexible link.
         joints: constraints of the mechanism itself: interfaces of a flexible link are independent.
         rigid: the same with every flexible link welded into one rigid body.
+        assembled: what ``assemble`` has found so far.
     """
 
     dim: int
@@ -306,6 +313,7 @@ class Linkage:
     interfaces: dict[FlexibleLink, tuple[int, ...]]
     joints: JointSystem
     rigid: JointSystem
+    assembled: dict[Hashable, Any] = field(default_factory=dict, compare=False, repr=False)
 
     def body_of(self, link: Link) -> int:
         """Index of the body that carries ``link``: itself if rigid, its first interface if flexible."""
@@ -365,6 +373,10 @@ class PosePotential(ABC):
     @abstractmethod
     def hessian(self, poses: np.ndarray) -> np.ndarray:
         """∂²V/∂z², (n · pose_size, n · pose_size)."""
+
+    def factor(self, load_factor: float) -> float:
+        """The factor that V counts with."""
+        return 1.0 if self.holds else load_factor
 
     def gradient_by(self, name: str, poses: np.ndarray) -> np.ndarray:
         """∂²V/∂z∂p of one of ``numbers``, (n · pose_size,)."""

@@ -66,6 +66,11 @@ class JointPlaces:
         return self._present[k]
 
     @property
+    def key(self) -> Hashable:
+        """Equal where all constants are."""
+        return b"".join(own.tobytes() for own in self._present)
+
+    @property
     def nothing(self) -> JointChange:
         """No change."""
         return JointChange(np.zeros(self.dim), np.zeros(1 if self.dim == 2 else 3))

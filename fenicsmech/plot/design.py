@@ -38,7 +38,7 @@ from fenicsmech.plot.page import (
     save_png,
     text_size,
 )
-from fenicsmech.plot.shapes import DesignShape, LinkOutline, Reals, RigidShape
+from fenicsmech.plot.shapes import DesignShape, OutlineShape, Reals, RigidShape
 from fenicsmech.polygons import signed_area
 
 _BEFORE, _BEFORE_RIM = "#dfe2e6", "#6b7078"
@@ -142,7 +142,7 @@ def _draw_links(stage: Stage, designs: Sequence[DesignShape], *, detailed: bool)
     return Labels(axes, loops)
 
 
-def _path(outline: LinkOutline, view: View) -> Outline:
+def _path(outline: OutlineShape, view: View) -> Outline:
     """The loops as one path; holes run against the outer rim, so that they stay empty."""
     wrong = [(signed_area(loop) > 0.0) != (index == 0) for index, loop in enumerate(outline.loops)]
     return path_of(view(loop[::-1] if turn else loop) for loop, turn in zip(outline.loops, wrong, strict=True))
@@ -204,7 +204,7 @@ def _thickness_line(design: DesignShape, unit: str) -> str:
     return after and f"{after} {unit} thick" + (f", before {before} {unit}" if before else "")
 
 
-def _span(outline: LinkOutline) -> str:
+def _span(outline: OutlineShape) -> str:
     if outline.thickness is None:
         return ""
     numbers = (f"{number:.3g}" for number in (outline.thickness.min(), outline.thickness.max()))

@@ -27,6 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fenicsmech.errors import DescriptionError
 from fenicsmech.files import atomic_write
+from fenicsmech.polygons import divided
 
 Reals = NDArray[np.float64]
 Handle: TypeAlias = Artist | tuple[Artist, ...]
@@ -210,7 +211,8 @@ class Labels:
         self._point = axes.figure.dpi / 72.0  # pixels
         self._frame = axes.get_window_extent(self._renderer)
         self._shapes = [Outline(axes.transData.transform(shape)) for shape in shapes]
-        dense = [_dense(path.vertices, 3.0 * self._point) for path in self._shapes]
+        closed = [np.vstack((path.vertices, path.vertices[:1])) for path in self._shapes]
+        dense = [divided(loop, 3.0 * self._point) for loop in closed]
         self._lines = np.concatenate(dense) if dense else np.empty((0, 2))
         self._taken: list[Bbox] = []
 
@@ -250,11 +252,3 @@ class Labels:
         cost += _COSTS.line * float(((self._lines > low) & (self._lines < high)).all(axis=1).sum())
         leaves = (low < self._frame.min).any() or (high > self._frame.max).any()
         return cost + _COSTS.outside * bool(leaves)
-
-
-def _dense(loop: Reals, step: float) -> Reals:
-    """Points on the polygon ``loop`` (n, 2), at most ``step`` apart."""
-    closed = np.vstack((loop, loop[:1]))
-    arc = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))))
-    at = np.linspace(0.0, arc[-1], max(2, int(np.ceil(arc[-1] / step)) + 1))
-    return np.column_stack([np.interp(at, arc, closed[:, k]) for k in range(2)])

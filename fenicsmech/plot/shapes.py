@@ -134,8 +134,8 @@ class Panel:
 
 
 @dataclass(frozen=True, eq=False)
-class LinkOutline:
-    """The rest shape of a link as seen from above.
+class OutlineShape:
+    """The rest shape of a link as seen from above, by its outline.
 
     Args:
         loops: (n, 2) polygons, closed by themselves, in any orientation: the outer rim, then its holes.
@@ -169,8 +169,8 @@ class DesignShape:
     """A link before and after an optimisation; ``joints`` (m, 2) stay where they are."""
 
     name: str
-    before: LinkOutline
-    after: LinkOutline
+    before: OutlineShape
+    after: OutlineShape
     joints: Reals = field(default_factory=_no_points)
 
     def __post_init__(self) -> None:

@@ -18,7 +18,7 @@ from fenicsmech.quantities.joint_places import JointAxis, JointPosition
 from fenicsmech.quantities.link_numbers import Depth, LawParameter
 from fenicsmech.quantities.links import CentrelineLength, LinkMass, LinkVolume, StrainEnergy
 from fenicsmech.quantities.motion import Displacement, Rotation
-from fenicsmech.quantities.number import ModelNumber, NumberKind, NumberTerms, joint_changes, read_kind
+from fenicsmech.quantities.number import EffectNumber, ModelNumber, NumberKind, NumberTerms, joint_changes, read_kind
 from fenicsmech.quantities.quantity import (
     Component,
     FormValue,

@@ -17,7 +17,7 @@ from functools import partial
 import numpy as np
 
 from fenicsmech.equilibrium import State, joint_reaction, joint_reaction_rate, joint_reaction_slopes
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, expect
 from fenicsmech.mechanism import Drive, Force, Joint, Motor
 from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import JointChange
@@ -38,10 +38,7 @@ class ForceMagnitude(Quantity):
     force: Force
 
     def __post_init__(self) -> None:
-        if not isinstance(self.force, Force):
-            raise DescriptionError(
-                "magnitude of a force", f"{self.force!r} is not a force", "Give one of the mechanism's"
-            )
+        expect("magnitude of a force", self.force, Force, "a force")
 
     @property
     def name(self):
@@ -78,8 +75,7 @@ class MotorTorque(Quantity):
     motor: Motor | Drive
 
     def __post_init__(self) -> None:
-        if not isinstance(self.motor, Motor | Drive):
-            raise DescriptionError("torque of a motor", f"{self.motor!r} is not a motor", "Give one of the mechanism's")
+        expect("torque of a motor", self.motor, Motor | Drive, "a motor")
 
     @property
     def name(self):
@@ -127,10 +123,7 @@ class JointForce(Quantity):
     joint: Joint
 
     def __post_init__(self) -> None:
-        if not isinstance(self.joint, Joint):
-            raise DescriptionError(
-                "reaction of a joint", f"{self.joint!r} is not a joint", "Give one of the mechanism's"
-            )
+        expect("reaction of a joint", self.joint, Joint, "a joint")
 
     @property
     def name(self):
@@ -181,8 +174,7 @@ class _Reaction(Observable):
 
     def __init__(self, model: MechanismModel, joint: Joint, *, force: bool) -> None:
         self._joints, self._force = model.linkage.joints, force
-        names = [connection.name for connection in self._joints.connections]
-        self._connection, dim = names.index(joint.name), self._joints.space.dim
+        self._connection, dim = model.linkage.connection_of(joint), self._joints.space.dim
         self.size = dim if force or dim == 3 else 1
 
     def values(self, state):

@@ -1,11 +1,7 @@
 """Numbers of joints: stiffness and rest position of springs, and offsets of motors.
 
-A spring is a potential V(z; k, φ₀) of poses z, which counts with a factor σ. With ẑ the poses' part of the adjoint,
-
-    xᵀ ∂F/∂p = ẑ · σ ∂²V/∂z∂p.
-
 A motor at the prescribed position φ stands at φ + φ₀ with the offset φ₀. Configurations are assembled with it,
-C(z, φ + φ₀) = 0, and with the multipliers' part λ̂ of the adjoint
+C(z, φ + φ₀) = 0, and with the parts ẑ and λ̂ of the adjoint that belong to poses and multipliers
 
     −xᵀ ∂F/∂φ₀ = ẑ · ∂(Aᵀλ)/∂φ + λ̂ · ∂C/∂φ.
 """
@@ -21,7 +17,7 @@ from fenicsmech.effects import JointSpring
 from fenicsmech.errors import finite
 from fenicsmech.mechanism import Configuration, Motor, Scene
 from fenicsmech.model import MechanismModel
-from fenicsmech.quantities.number import ModelNumber, NumberKind, NumberTerms
+from fenicsmech.quantities.number import EffectNumber, ModelNumber, NumberKind, NumberTerms
 
 
 class _OfSprings(NumberKind):
@@ -42,7 +38,7 @@ class _OfSprings(NumberKind):
         return getattr(part, self.number)
 
     def on(self, model):
-        return _SpringNumber(model, self.parts, self.number)
+        return EffectNumber(model, self.parts, self.number)
 
 
 @dataclass(frozen=True, init=False)
@@ -86,32 +82,6 @@ class SpringRest(_OfSprings):
 
     def check_value(self, value):
         finite(self.name, value)
-
-
-class _SpringNumber(ModelNumber):
-    """A number of the potentials of some springs."""
-
-    def __init__(self, model: MechanismModel, springs: Sequence[JointSpring], name: str) -> None:
-        self._joints, self._name = model.linkage.joints, name
-        self._potentials = [own for effect, found in model.effect_potentials if effect in springs for own in found]
-        self.drawn = self.value = self._potentials[0].numbers[name]
-
-    def set(self, value):
-        self.value = value
-        for potential in self._potentials:
-            potential.numbers[self._name] = value
-
-    def slope(self, terms: NumberTerms) -> float:
-        if terms.adjoint is None:
-            return 0.0
-        state, total, size = terms.adjoint.at.state, 0.0, self._joints.space.pose_size
-        for potential in self._potentials:
-            factor = 1.0 if potential.holds else state.load_factor
-            rates = potential.gradient_by(self._name, state.poses).reshape(-1, size)
-            for body, rate in zip(potential.bodies, rates, strict=True):
-                if body in self._joints.columns:
-                    total += factor * float(terms.adjoint.poses[self._joints.columns[body]] @ rate)
-        return -total
 
 
 @dataclass(frozen=True, init=False)

@@ -19,7 +19,7 @@ from math import pi
 
 import numpy as np
 
-from fenicsmech.errors import DescriptionError, direction, finite, in_plane, point_text
+from fenicsmech.errors import DescriptionError, direction, finite, in_plane, point_text, set_fields
 from fenicsmech.mechanism import Configuration, FlexibleLink, Joint, Scene, in_dimension, same_place
 from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import JointChange
@@ -35,7 +35,7 @@ class _OfJoints(NumberKind):
 
     def __init__(self, *parts: Joint, vector: Sequence[float]) -> None:
         super().__init__(*parts)
-        object.__setattr__(self, "vector", direction(f"direction of the {self.what}", vector))
+        set_fields(self, vector=direction(f"direction of the {self.what}", vector))
 
     @staticmethod
     def candidates(scene: Scene) -> Sequence[Joint]:
@@ -220,24 +220,12 @@ class _Place(ModelNumber):
         total = sum(factor * rate(self._changes) for factor, rate in terms.partial.by_places)
         if terms.adjoint is None:
             return total
-        adjoint, state = terms.adjoint, terms.adjoint.at.state
-        at, size = (state.poses, state.motors, state.multipliers), self._joints.space.pose_size
+        adjoint, state, size = terms.adjoint, terms.adjoint.at.state, self._joints.space.pose_size
         for k, unit in self._changes.items():
-            rate, forces = self._joints.place_rates(k, unit, *at)
+            rate, forces = self._joints.place_rates(k, unit, state.poses, state.motors, state.multipliers)
             total += float(adjoint.multipliers @ rate)
-            total += sum(float(self._part(terms, body) @ force) for body, force in forces.items())
-        for potential in self._model.potentials:
-            factor = 1.0 if potential.holds else state.load_factor
-            rates = np.broadcast_to(
-                potential.gradient_by_places(self._changes, state.poses), len(potential.bodies) * size
-            ).reshape(-1, size)
-            for body, own in zip(potential.bodies, rates, strict=True):
-                total -= factor * float(self._part(terms, body) @ own)
+            total += sum(terms.work(self._joints, [body], force) for body, force in forces.items())
+        for own in self._model.potentials:
+            rates = np.broadcast_to(own.gradient_by_places(self._changes, state.poses), len(own.bodies) * size)
+            total -= own.factor(state.load_factor) * terms.work(self._joints, own.bodies, rates)
         return total
-
-    def _part(self, terms: NumberTerms, body: int) -> np.ndarray:
-        """ẑ of one body; zero of fixed ones."""
-        columns = self._joints.columns.get(body)
-        if columns is None or terms.adjoint is None:
-            return np.zeros(self._joints.space.pose_size)
-        return terms.adjoint.poses[columns]

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fenicsmech.compat import cell_dofs
-from fenicsmech.errors import DescriptionError, finite
+from fenicsmech.errors import DescriptionError, finite, set_fields
 from fenicsmech.mechanism import FlexibleLink, Scene, Units
 from fenicsmech.model import MechanismModel
 from fenicsmech.quantities.number import ModelNumber, NumberKind
@@ -84,7 +84,7 @@ class LawParameter(_OfLinks):
             raise DescriptionError(
                 self.what, f"{parameter!r} is not the name of a number", "Name it first, as in (“E”, link)"
             )
-        object.__setattr__(self, "parameter", parameter)
+        set_fields(self, parameter=parameter)
         super().__init__(*parts)
 
     @property

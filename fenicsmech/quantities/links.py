@@ -16,7 +16,7 @@ import numpy as np
 import ufl
 
 from fenicsmech.collective import from_one
-from fenicsmech.errors import DescriptionError, points, positive
+from fenicsmech.errors import DescriptionError, expect, points, positive, set_fields
 from fenicsmech.mechanism import Centreline, FlexibleLink, Strip
 from fenicsmech.meshing import LinkOutline, find_centreline, link_outline
 from fenicsmech.model import MechanismModel, plan_sites
@@ -38,7 +38,7 @@ class _OfLinks(Quantity):
         chosen = (self.links,) if isinstance(self.links, FlexibleLink) else self.links
         if not isinstance(chosen, Sequence) or not chosen or not all(isinstance(c, FlexibleLink) for c in chosen):
             raise DescriptionError(self.what, f"{self.links!r} are not flexible links", "Give flexible links, or none")
-        object.__setattr__(self, "links", tuple(chosen))
+        set_fields(self, links=tuple(chosen))
 
     @property
     def name(self):
@@ -116,7 +116,7 @@ class LinkMass(LinkVolume):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.density is not None:
-            object.__setattr__(self, "density", positive(f"density of the {self.name}", self.density))
+            set_fields(self, density=positive(f"density of the {self.name}", self.density))
 
     def unit(self, units):
         return f"{units.force} s²/{units.length}"
@@ -140,9 +140,9 @@ class _Energy(Observable):
     """A form in the fields of the links."""
 
     def __init__(self, model: MechanismModel, form: ufl.Form) -> None:
-        self._elastic = elastic = model.elastic
+        elastic, self._numbers = model.elastic, dict(model.elastic.numbers)
         self._states = {f"state {k}": own for k, own in enumerate(elastic.fields)}
-        self._form = FormValue(model, form, {"design": elastic.shape, **self._states, **elastic.numbers})
+        self._form = FormValue(model, form, {"design": elastic.shape, **self._states, **self._numbers})
 
     def values(self, state):
         return np.array([self._form.value()])
@@ -152,7 +152,7 @@ class _Energy(Observable):
             Partial(
                 links=np.concatenate([self._form.slope(name) for name in self._states]),
                 design=self._form.slope("design"),
-                per_link={name: self._form.per_link(name) for name in self._elastic.numbers},
+                per_link={name: self._form.per_link(name) for name in self._numbers},
             )
         ]
 
@@ -195,13 +195,12 @@ class CentrelineLength(Quantity):
         return self.centreline is None  # a given one is that of the drawn link
 
     def __post_init__(self) -> None:
-        if not isinstance(self.link, FlexibleLink):
-            raise DescriptionError("length of a link", f"{self.link!r} is not a flexible link", "Give one")
+        expect("length of a link", self.link, FlexibleLink, "a flexible link", "Give one")
         given = self.centreline
         if given is None and isinstance(self.link.shape, Strip):
             given = self.link.shape.centreline
         if given is not None:
-            object.__setattr__(self, "centreline", points(self.name, given, least=2, dimensions=(2,)))
+            set_fields(self, centreline=points(self.name, given, least=2, dimensions=(2,)))
 
     @property
     def name(self):

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenicsmech.equilibrium import PointLoad
-from fenicsmech.errors import DescriptionError, direction, point, point_text
+from fenicsmech.errors import DescriptionError, direction, expect, point, point_text, set_fields
 from fenicsmech.mechanism import FlexibleLink, Force, Joint, Link, Output, RigidLink, in_dimension
 from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import Linkage, LinkPoint
@@ -49,7 +49,7 @@ class Displacement(Quantity):
         elif self.at is None:
             raise DescriptionError(f"displacement of {self.part.name!r}", "no point is given", "Give at=(x, y)")
         else:
-            object.__setattr__(self, "at", point(f"point of {self.part.name!r}", self.at))
+            set_fields(self, at=point(f"point of {self.part.name!r}", self.at))
 
     @property
     def name(self):
@@ -103,13 +103,12 @@ class Rotation(Quantity):
     from_unloaded = True
 
     def __post_init__(self) -> None:
-        if not isinstance(self.link, RigidLink | FlexibleLink):
-            raise DescriptionError("rotation", f"{self.link!r} is not a link", "Give a link")
+        expect("rotation", self.link, RigidLink | FlexibleLink, "a link", "Give a link")
         if isinstance(self.link, FlexibleLink) and self.joint is None:
             raise DescriptionError(
                 f"rotation of {self.link.name!r}", "the link bends", "Give joint=…, at which it is to be known"
             )
-        object.__setattr__(self, "about", direction(f"axis of the {self}", self.about))
+        set_fields(self, about=direction(f"axis of the {self}", self.about))
 
     @property
     def name(self):
@@ -131,7 +130,7 @@ class Rotation(Quantity):
     def _body(self, linkage: Linkage) -> int:
         if self.joint is None:
             return linkage.body_of(self.link)
-        (connection,) = (own for own in linkage.joints.connections if own.name == self.joint.name)
+        connection = linkage.joints.connections[linkage.connection_of(self.joint)]
         return next(i for i in (connection.a, connection.b) if linkage.bodies[i].link == self.link)
 
 

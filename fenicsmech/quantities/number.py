@@ -7,7 +7,10 @@ quantity from its adjoint x, the same one that derivatives by the shape are made
     dQ/dp = ∂Q/∂p − xᵀ ∂F/∂p + dQ/dd · ∂d/∂p
 
 with the equations F and the design field d, which is linear in p if it depends on it. A new kind is one subclass of
-each.
+each. Numbers of effects have theirs, ``EffectNumber``: an effect enters F by the energy Π of links with û = ∂u/∂y · x,
+and by potentials V of poses, with the poses' part ẑ of x, which count with a factor σ,
+
+    xᵀ ∂F/∂p = ∂(∂Π/∂u · û)/∂p + ẑ · σ ∂²V/∂z∂p.
 """
 
 from __future__ import annotations
@@ -20,10 +23,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fenicsmech.equilibrium import Adjoint
-from fenicsmech.errors import DescriptionError, positive
-from fenicsmech.mechanism import Configuration, FlexibleLink, Joint, Scene, Units
+from fenicsmech.errors import DescriptionError, positive, set_fields
+from fenicsmech.mechanism import Configuration, Effect, FlexibleLink, Joint, Scene, Units
 from fenicsmech.model import MechanismModel
-from fenicsmech.multibody import JointChange
+from fenicsmech.multibody import JointChange, JointSystem
 from fenicsmech.quantities.quantity import Partial
 
 
@@ -41,6 +44,12 @@ class NumberTerms:
     partial: Partial
     adjoint: Adjoint | None
     by_link: Callable[[str], np.ndarray]
+
+    def work(self, joints: JointSystem, bodies: Sequence[int], rates: np.ndarray) -> float:
+        """ẑ · ``rates`` of forces on the poses of ``bodies``, (bodies · pose_size,); 0 of fixed ones."""
+        assert self.adjoint is not None, "the component depends on the state"
+        each = zip(bodies, rates.reshape(len(bodies), -1), strict=True)
+        return sum(float(self.adjoint.poses[joints.columns[k]] @ rate) for k, rate in each if k in joints.columns)
 
 
 class ModelNumber(ABC):
@@ -69,15 +78,64 @@ class ModelNumber(ABC):
         return float(design @ self.rate[: len(design)]) if isinstance(self.rate, np.ndarray) else 0.0
 
 
+class EffectNumber(ModelNumber):
+    """A number of effects: one of their fields on links (``LinkFields.number``), of potentials (``numbers``), or both.
+
+    Args:
+        model: with the effects.
+        effects: of its scene.
+        name: of the number, in fields and potentials, and of the effects' attribute.
+
+    Raises:
+        DescriptionError: the effects' fields and potentials have no such number.
+    """
+
+    def __init__(self, model: MechanismModel, effects: Sequence[Effect], name: str) -> None:
+        self._elastic, self._link, self._name = model.elastic, model.mesh.link, name
+        self._joints = model.linkage.joints
+        self._potentials = [
+            own
+            for effect, found in model.effect_potentials
+            if effect in effects
+            for own in found
+            if name in own.numbers
+        ]
+        self._fields = [
+            fields.numbers[name]
+            for effect, fields in model.effect_fields
+            if effect in effects and name in fields.numbers
+        ]
+        if not self._potentials and not self._fields:
+            raise DescriptionError(
+                f"{name} of {effects[0]}",
+                "neither a field on links nor a potential has such a number",
+                "Make it one by fields.number(…) in link_energy, or name it in the potential's numbers",
+            )
+        self.drawn = self.value = getattr(effects[0], name)
+
+    def set(self, value):
+        self.value = value
+        for potential in self._potentials:
+            potential.numbers[self._name] = value
+        for known, chosen in self._fields:
+            self._elastic.numbers[known].x.array[np.flatnonzero(chosen[self._link])] = value
+
+    def slope(self, terms: NumberTerms) -> float:
+        total = sum(float(terms.by_link(known)[chosen].sum()) for known, chosen in self._fields)
+        if terms.adjoint is not None:
+            state = terms.adjoint.at.state
+            for own in self._potentials:
+                rates = own.gradient_by(self._name, state.poses)
+                total -= own.factor(state.load_factor) * terms.work(self._joints, own.bodies, rates)
+        return total
+
+
 @dataclass(frozen=True, init=False)
 class NumberKind(ABC):
     """A kind of number, of one part or of several that share its value; a frozen dataclass.
 
     Args:
         parts: of the scene; their numbers are drawn alike.
-
-    Attributes:
-        parts: likewise.
 
     Raises:
         DescriptionError: there are no parts, or one is given twice.
@@ -91,7 +149,7 @@ class NumberKind(ABC):
             raise DescriptionError(self.what, "no part is named", "Name one part, or several that share the number")
         if len(set(map(id, parts))) < len(parts):
             raise DescriptionError(self.what, f"{self.label(parts[0])!r} is given twice", "Give each part once")
-        object.__setattr__(self, "parts", tuple(parts))
+        set_fields(self, parts=tuple(parts))
 
     @staticmethod
     @abstractmethod

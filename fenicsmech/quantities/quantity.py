@@ -23,9 +23,9 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from fenicsmech.compat import assemble_vector, compile_form
+from fenicsmech.compat import assemble_vector, compile_form, owned_values
 from fenicsmech.equilibrium import EquilibriumSystem, State
-from fenicsmech.errors import DescriptionError, direction, point_text
+from fenicsmech.errors import DescriptionError, direction, point_text, set_fields
 from fenicsmech.mechanism import FlexibleLink, Force, Joint, Motor, Output, RigidLink, Scene, Units, in_dimension
 from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import JointChange
@@ -206,7 +206,7 @@ class Component(_OfVector):
     direction: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "direction", direction(f"direction of the {self.vector}", self.direction))
+        set_fields(self, direction=direction(f"direction of the {self.vector}", self.direction))
 
     @property
     def name(self):
@@ -263,7 +263,9 @@ class FormValue:
         return float(self._model.mesh.comm.allreduce(fem.assemble_scalar(self._compiled)))
 
     def slope(self, name: str) -> np.ndarray:
-        """The derivative by a field, this rank's owned values, flat."""
+        """The derivative by a field, this rank's owned values, flat; zeros if the form does not depend on it."""
+        if self._fields[name] not in self._form.coefficients():
+            return np.zeros(len(owned_values(self._fields[name])))
         if name not in self._slopes:
             field = self._fields[name]
             with self._model.clock.phase("compile"):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from fenicsmech.errors import DescriptionError, finite
+from fenicsmech.errors import DescriptionError, expect, finite, set_fields
 from fenicsmech.mechanism import DRAWN, Configuration, Force, ForceGroup, Motor
 
 
@@ -63,10 +63,7 @@ class Sample:
     ) -> None:
         forces: list[tuple[Force, float | PrescribedDisplacement]] = []
         positions: list[tuple[Motor, float]] = []
-        if not isinstance(configuration, Configuration):
-            raise DescriptionError(
-                "sample", f"{configuration!r} is not a configuration", "Make one with scene.configuration()"
-            )
+        expect("sample", configuration, Configuration, "a configuration", "Make one with scene.configuration()")
         for part, value in dict(loads or {}).items():
             if isinstance(part, Motor):
                 positions.append((part, finite(f"position of {part.name!r} in a sample", value)))
@@ -86,8 +83,7 @@ class Sample:
             configuration = Configuration(", ".join(names), (*configuration.positions, *positions))
         if sum(isinstance(value, PrescribedDisplacement) for _, value in forces) > 1:
             raise DescriptionError("sample", "two displacements are prescribed", "Prescribe one, with at(…)")
-        object.__setattr__(self, "forces", tuple(forces))
-        object.__setattr__(self, "configuration", configuration)
+        set_fields(self, forces=tuple(forces), configuration=configuration)
 
     def __str__(self) -> str:
         shown = [

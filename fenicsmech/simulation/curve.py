@@ -66,8 +66,7 @@ class Curve:
         discretisation: of the scene, with which they were computed.
         unloaded: the configuration without any load or effect, from which displacements count.
         others: constant magnitudes of other forces.
-        unknown: of the curve: displacements, or forces where displacements were prescribed or the curve
-            was followed.
+        unknown: of the curve: displacements, or forces where displacements were prescribed or the curve was followed.
     """
 
     part: PrescribedPart
@@ -162,6 +161,9 @@ class Curve:
     def modelling_errors(self, *, output: Output | None = None) -> np.ndarray:
         """Estimated errors of plane stress, (frames,), to be added; arguments as those of ``error_estimates``.
 
+        What space adds: contraction that interfaces hold, and wide thin links that curl across their depth as they
+        bend. Not motion out of the plane.
+
         Raises:
             DescriptionError: motors move along the curve, or it is not in plane stress.
             EquilibriumError: the KKT matrix of a frame is singular.
@@ -177,7 +179,7 @@ class Curve:
 
     @cached_property
     def corrections(self) -> np.ndarray:
-        """Sums of the estimated errors, to be added to ``values``, (frames,); 0 where they are too large.
+        """Sums of the estimated errors, to be added to ``values``, (frames,); 0 and a warning where they are too large.
 
         They lead to infinitely fine elements in space, from plane stress too. Targets of designs are corrected by the
         errors of elements alone, ``error_estimates``: they stay in the model of their simulation.
@@ -185,7 +187,16 @@ class Curve:
         Raises as ``error_estimates``.
         """
         elements, plane_stress = self.errors_by_kind()
-        return AccuracyOptions().corrections(elements + plane_stress, self.values)
+        options, errors = AccuracyOptions(), elements + plane_stress
+        found = options.corrections(errors, self.values)
+        if left := np.count_nonzero(found != errors):
+            model = self.discretisation.fidelity.model
+            _log.warning(
+                "%d of %d estimated errors of %r are above %g of the largest %s and not added: use finer elements%s",
+                *(left, len(found), self.part.name, options.first_order, self.unknown.value),
+                " or space='3d'" if model is PLANE_STRESS else "",
+            )
+        return found
 
     @property
     def corrected(self) -> np.ndarray:

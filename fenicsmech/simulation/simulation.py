@@ -16,7 +16,7 @@ from fenicsmech.elasticity import Formulation, MixedFormulation, Quadrature
 from fenicsmech.equilibrium import EquilibriumMethod, EquilibriumSolver, PrimalDualNewton, State
 from fenicsmech.errors import AssemblyError, DescriptionError
 from fenicsmech.estimates import AccuracyControl, Choice, Estimates, FidelityLevel, LevelErrors, cause_of_growth
-from fenicsmech.log import Clock, Progress
+from fenicsmech.log import Clock, Progress, logger
 from fenicsmech.mechanism import (
     DRAWN,
     Configuration,
@@ -40,7 +40,10 @@ from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.fields import rest_vertices
 from fenicsmech.simulation.following import CurveFollower, FollowedCurve, PathEvent, Until, branches, read_path
 from fenicsmech.simulation.frame import ModeShape
+from fenicsmech.simulation.omitted_effects import coarse_links
 from fenicsmech.simulation.stepping import CurveRequest, CurveStepper, read_request
+
+_log = logger(__name__)
 
 
 class RestShape(Protocol):
@@ -122,6 +125,8 @@ class Simulation:
             fidelity = self._control.fidelity(self._control.level)
         solver, predictor = solver or PrimalDualNewton(), predictor or HermitePredictor()
         self._discretisation = Discretisation(scene, fidelity, solver, predictor, self.clock, comm)
+        if accuracy is None and (text := coarse_links(self._discretisation, scene.units)):
+            _log.warning("%s", text)
         self._described = _description(scene.mechanism)
 
     def __repr__(self) -> str:
@@ -288,13 +293,16 @@ class Simulation:
                 alone, this rank's values with ghosts, flat.
 
         Raises:
-            DescriptionError: the design is one of other links, or of another mesh.
+            DescriptionError: the design is one of other links, or of another mesh, or the scene has no parts with such
+                numbers.
             ShapeError: cells of the mesh are inverted in this shape.
         """
         if isinstance(design, np.ndarray):
             given = Design(design)
         else:
             given = design if isinstance(design, Design) else design.rest_shape(self)
+        for kind in given.numbers:
+            kind.check(self.scene, self.linkage.dim)
         size = len(self.model.elastic.shape.x.array)
         if self.comm.allreduce(int(given.field.shape != (size,))):
             raise DescriptionError(

@@ -4,9 +4,8 @@ A curve starts in the assembled configuration, under constant loads. The prescri
 a curve of force (or torque) over displacement (or position).
 
 Rounding of the nodal forces of stiff links may exceed small loads, so that a residual of the size of rounding does not
-fix the rest position of a zero-energy mode. The forces inside an element cancel along motions that deform no
-link, and so do their errors: the work along these is precise, and equilibria whose loads do not balance along them
-are refused.
+fix the rest position of a zero-energy mode. The forces inside an element cancel along motions that deform no link, and
+so do their errors: the work along these is precise, and equilibria whose loads do not balance along them are refused.
 """
 
 from __future__ import annotations

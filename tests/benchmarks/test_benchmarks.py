@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.table import publish
+from benchmarks.verification import CASES
 from fenicsmech.report import format_table
 
 ROOT = Path(__file__).parents[2]
@@ -26,6 +27,13 @@ def printed(name: str, *options: str) -> list[list[str]]:
 def test_a_written_table_is_what_was_printed(tmp_path, capsys):
     publish("sizes", format_table(["h", "n"], [[1.0, 2]]), write=True, folder=tmp_path)
     assert (tmp_path / "sizes.md").read_text() == capsys.readouterr().out.rstrip("\n") + "\n"
+
+
+@pytest.mark.parametrize("test", [case.test for case in CASES])
+def test_lines_of_the_verification_name_tests_that_exist(test):
+    file, _, function = test.partition("::")
+    text = (ROOT / "tests" / file).read_text()
+    assert f"def {function}(" in text if function else "def test_" in text
 
 
 @pytest.mark.thorough
@@ -114,6 +122,6 @@ def test_optimal_handles_stretch_cells_less_than_naive_ones():
 def test_parts_of_the_switch_meet_their_targets_and_are_kept(tmp_path):
     options = ("switch", "--size", "2", "--results", str(tmp_path))
     first = printed("parts", *options)[2:]
-    assert [path.name for path in tmp_path.iterdir()] == ["switch.json"]
+    assert [path.name for path in tmp_path.iterdir()] == ["switch-2.json"]
     assert len(first) == 2 and all(row[0] == "switch" and abs(float(row[-1])) < 1.0 for row in first)
     assert printed("parts", *options)[2:] == first

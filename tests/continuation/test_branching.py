@@ -134,6 +134,7 @@ def test_two_columns_that_buckle_at_once_each_have_their_branches():
 
 
 @pytest.mark.parallel
+@pytest.mark.thorough
 def test_bifurcation_and_branch_are_the_same_on_any_number_of_ranks():
     case = column(comm=MPI.COMM_WORLD)
     curve = straight(case)

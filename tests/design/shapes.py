@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -11,7 +12,7 @@ from mpi4py import MPI
 
 import fenicsmech as fm
 from fenicsmech.compat import vector_space
-from fenicsmech.design import HandleOptimum, QualitySum, ShapeMap, ShapeRequest, shape_links
+from fenicsmech.design import HandleOptimum, LinkParameters, LinkSpline, QualitySum, ShapeMap, ShapeRequest, shape_links
 from fenicsmech.mechanism import Centreline
 from fenicsmech.meshing import InterfaceSite, LinkMesh, MechanismMesh, distribute, mesh_link
 
@@ -22,10 +23,12 @@ CENTRELINES = (ARCH, ROD)
 JOINTS = ((ARCH[2], ARCH[0]), (ROD[1], ROD[0], ROD[2]))  # not in order along the links
 
 
-def strip_mesh(link: int, dim: int, *, unit: float = 1.0, axis: tuple[float, float, float] = (0, 0, 1)) -> LinkMesh:
+def strip_mesh(
+    link: int, dim: int, *, unit: float = 1.0, width: float = THICKNESS, axis: tuple[float, float, float] = (0, 0, 1)
+) -> LinkMesh:
     """One of the links, in a unit of length ``unit`` mm long; an ``axis`` that is not along z makes it a solid."""
     points, joints = (np.array(a) / unit for a in (CENTRELINES[link], JOINTS[link]))
-    shape = fm.strip(points, thickness=THICKNESS / unit, depth=DEPTH / unit)
+    shape = fm.strip(points, thickness=width / unit, depth=DEPTH / unit)
     axes = [axis] + [(0.0, 0.0, 1.0)] * (len(joints) - 1)
     sites = [
         InterfaceSite((*at, 0.0)[:dim], fm.Disc(RADIUS / unit), direction)
@@ -34,7 +37,7 @@ def strip_mesh(link: int, dim: int, *, unit: float = 1.0, axis: tuple[float, flo
     return mesh_link(str(link), shape, sites, dim=dim, size=SIZE / unit)
 
 
-def request(link: int, *, unit: float = 1.0, turns: bool = True, spacing: float | None = None) -> ShapeRequest:
+def request(link: int, *, unit: float = 1.0, turns: bool = True) -> ShapeRequest:
     """The shape request of one of the links."""
     joints = tuple(tuple(c / unit for c in at) for at in JOINTS[link])
     return ShapeRequest(
@@ -46,8 +49,25 @@ def request(link: int, *, unit: float = 1.0, turns: bool = True, spacing: float 
         reach=(RADIUS / unit,) * len(joints),
         segments=3,
         thickness=THICKNESS / unit,
-        spacing=spacing,
     )
+
+
+def own_parameters(splines: Sequence[LinkSpline]) -> list[LinkParameters]:
+    """The parameters of splines, where those of one after the other are the design."""
+    sizes = [spline.size for spline in splines]
+    ends, matrix = np.cumsum(sizes).tolist(), np.eye(sum(sizes))
+    places = [slice(end - size, end) for size, end in zip(sizes, ends, strict=True)]
+    return [LinkParameters(own, np.zeros(own.stop - own.start), matrix[own]) for own in places]
+
+
+def shape_map(dim: int, order: int, comm: MPI.Comm, *, unit: float = 1.0, turns: bool = True) -> ShapeMap:
+    """The map from all parameters of both links to a design field of this order on their mesh."""
+    meshes = [strip_mesh(link, dim, unit=unit) for link in range(2)] if comm.rank == 0 else None
+    mesh = distribute(comm, meshes)
+    shapes = shape_links(mesh, [request(link, unit=unit, turns=turns) for link in range(2)])
+    splines = [shape.handles.spline for shape in shapes]
+    initial = np.concatenate([spline.initial for spline in splines])
+    return ShapeMap(mesh, fem.Function(vector_space(mesh.mesh, order)), shapes, own_parameters(splines), initial)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,10 +103,6 @@ class Bench:
 @cache
 def bench(dim: int, *, shared: bool = False, unit: float = 1.0, turns: bool = True) -> Bench:
     """The bench in 2D or 3D; if ``shared`` on all ranks together, else on each alone (collective)."""
-    comm = MPI.COMM_WORLD if shared else MPI.COMM_SELF
-    meshes = [strip_mesh(link, dim, unit=unit) for link in range(2)] if comm.rank == 0 else None
-    mesh = distribute(comm, meshes)
-    design = fem.Function(vector_space(mesh.mesh, 1))
-    shapes = shape_links(mesh, [request(link, unit=unit, turns=turns) for link in range(2)])
-    shape, quality = ShapeMap(mesh, design, shapes), QualitySum(design)
-    return Bench(mesh, shape, quality, HandleOptimum(shape, quality))
+    shape = shape_map(dim, 1, MPI.COMM_WORLD if shared else MPI.COMM_SELF, unit=unit, turns=turns)
+    quality = QualitySum(shape.design)
+    return Bench(shape.mesh, shape, quality, HandleOptimum(shape, quality))

@@ -143,6 +143,7 @@ def test_a_run_killed_between_two_rounds_ends_as_if_nothing_had_happened(tmp_pat
 
 
 @pytest.mark.parallel
+@pytest.mark.thorough
 def test_two_ranks_correct_as_one_does():
     alone, together = (
         truss(*WANTED).problem(comm=comm, **COARSE).optimise() for comm in (MPI.COMM_SELF, MPI.COMM_WORLD)

@@ -2,19 +2,17 @@
 
 import numpy as np
 import pytest
-from dolfinx import fem
 from mpi4py import MPI
 from numpy.polynomial import polynomial
 
 import fenicsmech as fm
-from fenicsmech.compat import vector_space
-from fenicsmech.design import BETWEEN, MidEdgeNodes, ShapeError, ShapeMap, edge_weights, shape_links
+from fenicsmech.design import BETWEEN, MidEdgeNodes, ShapeError, ShapeMap, edge_weights
 from fenicsmech.mechanism import Force
-from fenicsmech.meshing import InterfaceSite, LinkMesh, boundary_loops, distribute, mesh_link, node_ends
+from fenicsmech.meshing import InterfaceSite, LinkMesh, boundary_loops, mesh_link, node_ends
 
 from ..simulation.demo_scenes import describe
 from .mechanisms import bench, truss
-from .shapes import RADIUS, request, strip_mesh
+from .shapes import RADIUS, shape_map, strip_mesh
 
 # the truss of the demo, optimised in plane stress
 OPTIMUM = [
@@ -27,9 +25,7 @@ each_dim = pytest.mark.parametrize("dim", [2, 3])
 
 def quadratic_map(dim: int, comm: MPI.Comm = MPI.COMM_SELF) -> ShapeMap:
     """The map of both links to the vertices and edges of a mesh."""
-    mesh = distribute(comm, [strip_mesh(link, dim) for link in range(2)] if comm.rank == 0 else None)
-    shapes = shape_links(mesh, [request(link) for link in range(2)])
-    return ShapeMap(mesh, fem.Function(vector_space(mesh.mesh, 2)), shapes)
+    return shape_map(dim, 2, comm)
 
 
 def drawn(shape: ShapeMap) -> np.ndarray:
@@ -41,14 +37,14 @@ def drawn(shape: ShapeMap) -> np.ndarray:
 @each_dim
 def test_weights_of_edges_add_up_to_one_and_those_around_an_interface_are_its_own(dim):
     shape = quadratic_map(dim)
-    for index, own in enumerate(shape.shapes):
-        mesh = strip_mesh(index, dim)
+    for index, one in enumerate(shape.shapes):
+        mesh, own, handles = strip_mesh(index, dim), one.own, one.handles
         assert own.edges.weights.sum(axis=1) == pytest.approx(1.0, abs=1e-9)
-        for handle, site in enumerate(own.handles.site):
+        for handle, site in enumerate(handles.site):
             if site == BETWEEN:
                 continue
             around = np.isin(own.edges.ends, mesh.cells_of(site)).all(axis=1)
-            radii = np.linalg.norm(own.edges.middles[around] - own.handles.centre[handle], axis=1)
+            radii = np.linalg.norm(own.edges.middles[around] - handles.centre[handle], axis=1)
             assert np.sum(around) >= 8
             assert np.any(np.abs(radii - RADIUS) < 1e-3 * RADIUS)  # on the circle, off its chords
             assert own.edges.weights[around, handle] == pytest.approx(1.0, abs=1e-12)

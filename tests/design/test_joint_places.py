@@ -289,6 +289,7 @@ def test_gradients_by_shapes_and_shifts_agree_with_central_differences(space, si
 
 
 @pytest.mark.parallel
+@pytest.mark.thorough
 def test_any_number_of_processes_finds_the_same_derivatives_by_shifts():
     seen = []
     for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):

@@ -202,6 +202,32 @@ def test_numbers_that_make_no_sense_are_refused():
     )
 
 
+def test_numbers_of_a_design_are_refused_as_those_of_a_problem_are():
+    scene, strip, _ = cantilever()
+    _, other, _ = cantilever(depth=4.0)
+    sim = fm.Simulation(scene, space="plane-stress", size=3.0)
+    weld = scene.mechanism.joints[0]
+
+    def given(*numbers: tuple[object, float]) -> fm.Simulation:
+        return sim.with_design(fm.Design(np.zeros_like(sim.model.elastic.shape.x.array), dict(numbers)))
+
+    for number, words in (
+        (("depth", 3.0), ("number", "not a kind", "Depth(link)")),
+        ((fm.Depth(strip), -1.0), ("depth of 'strip'", "-1", "greater than zero")),
+        ((fm.Depth(strip), float("nan")), ("depth of 'strip'", "nan", "finite number")),
+        ((fm.LawParameter("nu", strip), 0.6), ("NeoHookean", "0.6", "0.5, both")),
+        ((fm.LawParameter("mu", strip), 2.0), ("mu", "no such", "E, nu")),
+        ((fm.Depth(other), 3.0), ("depth", "has none", "'strip'")),
+        ((fm.JointAxis(weld), 4.0), ("axis", "4 rad", "half a turn")),
+        ((fm.JointAxis(weld, about=(1, 0, 0)), 0.1), ("axis", "no axis in the plane", "sliders")),
+        ((fm.JointPosition(weld, direction=(0, 0, 1)), 1.0), ("position", "leaves the plane", "two coordinates")),
+    ):
+        part, problem, remedy = words
+        refused(lambda number=number: given(number), part=part, problem=problem, remedy=remedy)
+    both = (fm.Depth(strip), 3.0), (fm.Depth(other, strip), 3.0)
+    refused(lambda: given(*both), part="depth", problem="both change the same", remedy="once")
+
+
 def test_springs_are_as_stiff_as_the_moment_of_the_force_asks_for():
     rest, angle, force = -0.2, 0.5, 1.5
     case = lever(lambda hinge: [fm.JointSpring(hinge, 60.0, rest=rest)])

@@ -12,7 +12,6 @@ from fenicsmech.design import (
     Barrier,
     Bounds,
     DesignedLink,
-    LinkParameters,
     LinkSpline,
     MeshQuality,
     Model,
@@ -25,6 +24,7 @@ from fenicsmech.design import (
 
 from ..oracles.dense import hessian, taylor_rates
 from .mechanisms import bench, pinned_links
+from .shapes import own_parameters
 
 THICKNESS = 3.0
 STEPS = [0.02, 0.01, 0.005, 0.0025]
@@ -42,7 +42,7 @@ def rest_of(link: LinkSpline, bounds: Bounds, *, count: int = 500, thickness: fl
     """The part of a rest shape that regularisers of the spline alone read."""
     lengths = np.where(link.is_thickness, 1.0, thickness)
     samples = SplineSamples(link, count=count)
-    own, controls = LinkParameters.own(0, link, link.size), link.controls[:, 0, :2]
+    (own,), controls = own_parameters([link]), link.controls[:, 0, :2]
     arch = DesignedLink("arch", own, link, samples, thickness, bounds, controls)
     none = slice(len(lengths), len(lengths))
     return SimpleNamespace(links=(arch,), initial=link.initial, lengths=lengths, of_numbers=none)

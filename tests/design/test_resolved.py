@@ -39,6 +39,7 @@ def test_targets_move_by_less_than_the_error_of_the_elements_when_it_goes_on():
 
 
 @pytest.mark.parallel
+@pytest.mark.thorough
 def test_errors_of_the_objective_are_those_of_its_simulation():
     case = truss(*TARGETS)
     whole, parts = objective(case, ShapeBounds() + 1e-4 * StayClose(), comm=MPI.COMM_WORLD, **COARSE)

@@ -17,7 +17,6 @@ from fenicsmech.design import (
     Checkpoint,
     DesignedLink,
     Evaluation,
-    LinkParameters,
     LinkSpline,
     Quadratic,
     ScaledNumbers,
@@ -30,6 +29,7 @@ from fenicsmech.design import (
 
 from ..effects.levers import lever
 from .mechanisms import PLASTIC, Case
+from .shapes import own_parameters
 
 H = 3.0  # thickness of the link
 SCATTER = fm.Scatter(starts=8, trial=4, distinct=0.3)
@@ -50,7 +50,7 @@ class TwoValleys:
         controls = np.zeros((3, 2, 3))
         controls[:, 0, 0], controls[:, 1, 0], controls[:, 0, 2] = (0.0, 30.0, 60.0), 30.0, 1.0
         spline = LinkSpline(controls, np.array([True, False, True]))
-        own, samples = LinkParameters.own(0, spline, spline.size), SplineSamples(spline)
+        (own,), samples = own_parameters([spline]), SplineSamples(spline)
         link = DesignedLink("bar", own, spline, samples, H, Bounds((1.0, 6.0), 0.08), controls[:, 0, :2])
         self.lengths = np.where(spline.is_thickness, 1.0, H)
         size = len(spline.initial)
@@ -276,6 +276,7 @@ def pulled_bar(pull: float, displacement: float, *, comm: MPI.Comm = MPI.COMM_SE
 
 
 @pytest.mark.parallel
+@pytest.mark.thorough
 def test_a_bar_may_bow_to_either_side_and_its_search_is_in_plane_stress_on_any_number_of_processes():
     found = pulled_bar(20.0, 0.5, comm=MPI.COMM_WORLD).search(fm.Scatter(starts=4))
     up, down = sorted(found.optima, key=lambda design: -design.links[0].controls[1][0][1])

@@ -133,6 +133,7 @@ def test_derivatives_of_quantities_by_shared_shapes_pass_taylor_tests(space, siz
 
 
 @pytest.mark.parallel
+@pytest.mark.thorough
 def test_any_number_of_processes_finds_the_same_derivatives_by_shared_shapes():
     seen = []
     for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):

@@ -76,6 +76,7 @@ def test_meshes_may_differ():
 
 
 @pytest.mark.parallel
+@pytest.mark.thorough
 def test_two_ranks_transfer_equilibria_of_one_and_of_both():
     case = CASES["turned by 135°"]()
     found = [

@@ -20,7 +20,7 @@ def shaped(kind: str, link: int):
     dim, axis = KINDS[kind]
     mesh = strip_mesh(link, dim, axis=axis)
     shape = shape_link(mesh, request(link))
-    return mesh, shape.handles, shape.weights
+    return mesh, shape.handles, shape.own.weights
 
 
 @each_link
@@ -67,7 +67,7 @@ def test_weights_of_a_solid_change_little_through_its_depth():
 
 def test_weights_do_not_depend_on_the_unit_of_length():
     _, _, weights = shaped("plane", 1)
-    metres = shape_link(strip_mesh(1, 2, unit=1000.0), request(1, unit=1000.0)).weights
+    metres = shape_link(strip_mesh(1, 2, unit=1000.0), request(1, unit=1000.0)).own.weights
     assert metres == pytest.approx(weights, abs=1e-8)
 
 

@@ -20,7 +20,7 @@ class Foundation(fm.Effect):
         return f"an elastic foundation under {self.link.name}"
 
     def link_energy(self, fields):
-        stiffness = fields.cellwise([self.stiffness * (link is self.link) for link in fields.links])
+        stiffness = fields.number("stiffness", self.stiffness, [self.link])
         return fields.integral(0.5 * stiffness * ufl.dot(fields.u, fields.u), degree=2 * fields.order)
 
 

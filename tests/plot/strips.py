@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fenicsmech.plot import DesignShape, LinkOutline
+from fenicsmech.plot import DesignShape, OutlineShape
 
 
 def strip(points, thickness):
@@ -11,7 +11,7 @@ def strip(points, thickness):
     along = np.gradient(points, axis=0)
     across = np.column_stack((-along[:, 1], along[:, 0])) / np.hypot(*along.T)[:, None]
     sides = [points + side * 0.5 * thickness[:, None] * across for side in (-1.0, 1.0)]
-    return LinkOutline([np.vstack((sides[0], sides[1][::-1]))], points, thickness, points[::20])
+    return OutlineShape([np.vstack((sides[0], sides[1][::-1]))], points, thickness, points[::20])
 
 
 def bow(start, end, rise, *, count=61):

@@ -3,7 +3,7 @@ import pytest
 from matplotlib.colors import to_rgb
 
 from fenicsmech.errors import DescriptionError
-from fenicsmech.plot import FLEXIBLE, INK, DesignShape, LinkOutline, RigidShape, draw_designs
+from fenicsmech.plot import FLEXIBLE, INK, DesignShape, OutlineShape, RigidShape, draw_designs
 
 from .png import colour_fraction, png_size
 from .strips import design, four_bar, strip
@@ -15,7 +15,7 @@ HOLE = 10.0 + 0.5 * SQUARE
 
 
 def bare(outline):
-    return LinkOutline(outline.loops)
+    return OutlineShape(outline.loops)
 
 
 @pytest.mark.parametrize("links", [1, 3])
@@ -44,7 +44,7 @@ def test_an_unchanged_link_hides_the_one_before(tmp_path):
 @pytest.mark.parametrize("turned", [slice(None), slice(None, None, -1)])
 def test_holes_stay_empty_in_whatever_direction_they_run(tmp_path, turned):
     for name, loops in (("full.png", [SQUARE]), ("hole.png", [SQUARE, HOLE[turned]])):
-        shape = LinkOutline(loops)
+        shape = OutlineShape(loops)
         draw_designs(tmp_path / name, [DesignShape("plate", shape, shape)])
     full, hole = (colour_fraction(tmp_path / name, ORANGE) for name in ("full.png", "hole.png"))
     assert hole == pytest.approx(0.75 * full, rel=0.03)
@@ -54,7 +54,7 @@ def test_thicknesses_are_dimensioned_where_they_are_known(tmp_path):
     link = design("leaf", (0, 0), (60, 0), bulge=-1.5)
     ink = []
     for name, thickness in (("known.png", link.after.thickness), ("unknown.png", None)):
-        after = LinkOutline(link.after.loops, link.after.centreline, thickness)
+        after = OutlineShape(link.after.loops, link.after.centreline, thickness)
         draw_designs(tmp_path / name, [DesignShape(link.name, bare(link.before), after, link.joints)])
         ink.append(colour_fraction(tmp_path / name, DARK))
     assert ink[0] > 1.05 * ink[1]
@@ -83,7 +83,7 @@ def test_the_picture_of_a_design_does_not_depend_on_the_unit_of_length(tmp_path)
 def test_points_that_coincide_are_drawn(tmp_path):
     points = np.array([(0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (20.0, 0.0), (40.0, 0.0), (40.0, 0.0)])
     loop = np.repeat([(0.0, -2.0), (40.0, -2.0), (40.0, 2.0), (0.0, 2.0)], 3, axis=0)
-    shape = LinkOutline([loop], points, [1.0, 1.0, 1.0, 4.0, 4.0, 4.0])
+    shape = OutlineShape([loop], points, [1.0, 1.0, 1.0, 4.0, 4.0, 4.0])
     for links in (1, 2):
         draw_designs(tmp_path / "link.png", [DesignShape("leaf", shape, shape)] * links)
         assert colour_fraction(tmp_path / "link.png", ORANGE) > 0.005
@@ -92,15 +92,18 @@ def test_points_that_coincide_are_drawn(tmp_path):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: LinkOutline([]), "there are no loops"),
-        (lambda: LinkOutline([SQUARE[:2]]), "2 point"),
-        (lambda: LinkOutline([SQUARE * np.nan]), "Give finite numbers"),
-        (lambda: LinkOutline([SQUARE], thickness=[1.0]), "thickness along a link's centreline"),
-        (lambda: LinkOutline([SQUARE], SQUARE, thickness=[1.0, 2.0, 3.0]), r"shape \(4\)"),
-        (lambda: LinkOutline([SQUARE], SQUARE, thickness=[1.0, 2.0, 0.0, 1.0]), "not positive"),
-        (lambda: LinkOutline([SQUARE], SQUARE[:1], thickness=[1.0]), "two points or more"),
-        (lambda: LinkOutline([SQUARE], controls=[1.0, 2.0]), "control points"),
-        (lambda: DesignShape("rod", LinkOutline([SQUARE]), LinkOutline([SQUARE]), [(0, 0, 0)]), "joints of link 'rod'"),
+        (lambda: OutlineShape([]), "there are no loops"),
+        (lambda: OutlineShape([SQUARE[:2]]), "2 point"),
+        (lambda: OutlineShape([SQUARE * np.nan]), "Give finite numbers"),
+        (lambda: OutlineShape([SQUARE], thickness=[1.0]), "thickness along a link's centreline"),
+        (lambda: OutlineShape([SQUARE], SQUARE, thickness=[1.0, 2.0, 3.0]), r"shape \(4\)"),
+        (lambda: OutlineShape([SQUARE], SQUARE, thickness=[1.0, 2.0, 0.0, 1.0]), "not positive"),
+        (lambda: OutlineShape([SQUARE], SQUARE[:1], thickness=[1.0]), "two points or more"),
+        (lambda: OutlineShape([SQUARE], controls=[1.0, 2.0]), "control points"),
+        (
+            lambda: DesignShape("rod", OutlineShape([SQUARE]), OutlineShape([SQUARE]), [(0, 0, 0)]),
+            "joints of link 'rod'",
+        ),
     ],
 )
 def test_invalid_outlines_are_refused(make, message):

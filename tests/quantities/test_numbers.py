@@ -58,7 +58,9 @@ def bench(request) -> Bench:
     return Bench(space, COMMS[comm], formulation, moved="moved" in more, springs=True)
 
 
-@pytest.mark.parametrize("name", NUMBERS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.thorough if " of both" in name else ()) for name in NUMBERS]
+)
 def test_derivatives_by_a_number(bench, name):
     describe, steps = NUMBERS[name]
     assert_derivatives(bench, describe(bench), steps)

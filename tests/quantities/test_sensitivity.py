@@ -37,6 +37,7 @@ class Bench:
         *,
         moved: bool = False,
         springs: bool = False,
+        effects: Callable[[fm.Mechanism], Sequence[fm.Effect]] = lambda mechanism: (),
     ) -> None:
         mechanism = fm.Mechanism("four-bar")
         ground, coupler = mechanism.rigid("ground", fixed=True), mechanism.rigid("coupler")
@@ -49,7 +50,8 @@ class Bench:
         motor = mechanism.motor(shaft)
         self.force = mechanism.force(on=coupler, at=(20, 35), direction=(1, 0.3))
         lift = mechanism.output(on=coupler, at=(0, 40), direction=(0, 1), name="lift")
-        scene = fm.Scene(mechanism, [fm.JointSpring(end, 300.0, rest=0.4)] if springs else [])
+        sprung = [fm.JointSpring(end, 300.0, rest=0.4)] if springs else []
+        scene = fm.Scene(mechanism, [*sprung, *effects(mechanism)])
         self.turned = scene.configuration("turned", {motor: 0.3})
         self.simulation = fm.Simulation(scene, space=space, size=4.0, formulation=formulation, comm=comm)
         self.model, self.moved = self.simulation.model, moved

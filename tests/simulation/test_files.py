@@ -89,7 +89,9 @@ def test_files_of_an_earlier_run_are_replaced(shared_tmp_path):
     assert names(shared_tmp_path) == {"claw.xdmf", "claw.h5"}
 
 
-@pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", pytest.param("3d", marks=pytest.mark.thorough)])
+@pytest.mark.parametrize(
+    "space", ["plane-stress", *(pytest.param(name, marks=pytest.mark.thorough) for name in ("3d-symmetric", "3d"))]
+)
 def test_picture_shows_links_rigid_and_flexible(space, shared_tmp_path):
     simulation, curve = claw(space)
     (motor,) = simulation.scene.mechanism.motors

@@ -63,3 +63,15 @@ def test_a_load_on_the_link_stops_it_from_spinning_idly():
     pull = m.force(on=arm, at=(60, -5, 0), direction=(0, -1, 0), name="pull")
     frame = fm.Simulation(fm.Scene(m), space="3d", size=3.0).load_displacement(pull, forces=[0.1]).frames[-1]
     assert (frame.unstable_modes, frame.snapped_through) == (0, False)
+
+
+def test_points_away_from_the_line_of_an_idle_spin_are_told_by_explanations():
+    for at, told in (((50, 0, 0), False), ((50, 1.0, 0), True)):
+        simulation, push, _ = rssr()
+        mechanism = simulation.scene.mechanism
+        (coupler,) = mechanism.flexible_links
+        mechanism.output(on=coupler, at=at, direction=(0, 1, 0), name="side")
+        explanation = simulation.load_displacement(push, forces=[5.0]).explain()
+        hints = [hint.text for hint in explanation.left_out if hint.what == "idle spins"]
+        assert bool(hints) is told
+        assert not told or "'side'" in hints[0]

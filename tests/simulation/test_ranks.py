@@ -30,7 +30,7 @@ def assert_alike(alone: fm.Curve, together: fm.Curve, *, digits: float = 1e-9) -
             assert in_plane == pytest.approx(reaction.force[:2], abs=10 * digits * max(largest, 1e-12)), name
 
 
-@pytest.mark.parametrize("space", ["plane-stress", "plane-strain"])
+@pytest.mark.parametrize("space", ["plane-stress", pytest.param("plane-strain", marks=pytest.mark.thorough)])
 def test_claw(space):
     curves = []
     for comm in COMMS:
@@ -42,7 +42,7 @@ def test_claw(space):
     assert_alike(*curves)
 
 
-@pytest.mark.parametrize("space", ["3d-symmetric", "3d"])
+@pytest.mark.parametrize("space", [pytest.param("3d-symmetric", marks=pytest.mark.thorough), "3d"])
 def test_truss_in_space(space):
     curves = []
     for comm in COMMS:

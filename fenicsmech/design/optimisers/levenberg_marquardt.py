@@ -1,8 +1,9 @@
 """Levenberg–Marquardt for least squares with a regulariser of negligible cost.
 
-Only the residuals r are linearised; the regulariser R, barriers included, enters each step exactly:
+Residuals r enter each step by their Jacobian J and what steps so far tell of their Hessians H, the regulariser R,
+barriers included, exactly:
 
-    s = argmin ½ |r + J s|² + R(p + s) + ½ μ |s / ℓ|²,     ℓ the lengths of the parameters.
+    s = argmin ½ |r + J s + ½ sᵀ H s|² + R(p + s) + ½ μ |s / ℓ|²,     ℓ the lengths of the parameters.
 
 A step is accepted if it lowers O by a part of the predicted reduction; μ falls after good steps and grows after bad or
 infeasible ones. This is sequential quadratic programming (``sqp``) without inequalities. Sources: Nocedal & Wright,
@@ -53,10 +54,6 @@ class LevenbergMarquardt(SQP):
     @property
     def least_reduction(self) -> float:
         return 5e-3 if self.tolerance is None else self.tolerance
-
-    def continued(self, memory: np.ndarray) -> None:
-        """Without memory: it is μ alone, and a start's makes the first step of a round cautious."""
-        return None
 
     def _minimum(self, here: Evaluation, lengths: np.ndarray) -> np.ndarray:
         """The minimum of the undamped model, (n,)."""

@@ -29,11 +29,12 @@ class TooHigh(Infeasible):
 
     Attributes:
         merit: O + Σ ν_k (x_k + ½ x_k²), x = max(c, 0).
+        residuals: r there, (m,), which tell how they bend; None if they are not given.
     """
 
-    def __init__(self, merit: float) -> None:
+    def __init__(self, merit: float, residuals: np.ndarray | None = None) -> None:
         super().__init__(merit)
-        self.merit = merit
+        self.merit, self.residuals = merit, residuals
 
     def __str__(self) -> str:
         return f"the merit is {self.merit:.3g}"
@@ -139,15 +140,33 @@ class Evaluation:
         """∂O/∂p = Jᵀ r + ∂f/∂p + ∂R/∂p, (n,)."""
         return self.jacobian.T @ self.residuals + self.plain.gradient + self.penalty.gradient
 
-    def model(self, parameters: np.ndarray) -> Quadratic:
-        """½ |r + J s|² + f + ∂f/∂p s + R(p + s), the objective with r and f made linear, at ``parameters`` p + s."""
+    def model(self, parameters: np.ndarray, hessians: np.ndarray, bend: np.ndarray) -> Quadratic:
+        """½ |r̃|² + f + ∂f/∂p s + ½ sᵀ B s + R(p + s), r̃ = r + J s + ½ sᵀ H s, at ``parameters`` p + s.
+
+        Args:
+            parameters: p + s, (n,).
+            hessians: H, second derivatives of the residuals, (m, n, n).
+            bend: B, positive semidefinite, (n, n).
+        """
         step, penalty = parameters - self.parameters, self.regulariser(parameters)
-        r = self.residuals + self.jacobian @ step
+        turned, bent = hessians @ step, bend @ step
+        r, jacobian = self.residuals + (self.jacobian + 0.5 * turned) @ step, self.jacobian + turned
+        smooth = self.plain.value + float(np.sum(self.plain.gradient * step)) + 0.5 * float(bent @ step)
+        curvature = jacobian.T @ jacobian + bend + penalty.curvature
         return Quadratic(
-            0.5 * float(r @ r) + self.plain.value + float(np.sum(self.plain.gradient * step)) + penalty.value,
-            self.jacobian.T @ r + self.plain.gradient + penalty.gradient,
-            self.jacobian.T @ self.jacobian + penalty.curvature,
+            0.5 * float(r @ r) + smooth + penalty.value,
+            jacobian.T @ r + self.plain.gradient + bent + penalty.gradient,
+            _positive(curvature + np.tensordot(r, hessians, 1), curvature),
         )
+
+
+def _positive(matrix: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
+    """The symmetric ``matrix`` if it is positive definite."""
+    try:
+        np.linalg.cholesky(matrix)
+    except np.linalg.LinAlgError:
+        return otherwise
+    return matrix
 
 
 def refuse_inequalities(optimiser: str, here: Evaluation) -> None:
@@ -208,12 +227,14 @@ class Start:
         parameters: p, (n,).
         number, evaluations: iterations and objective evaluations so far.
         memory: state of the optimiser, from ``Iterate.memory``; None at the very start.
+        resumed: whether a minimisation was interrupted here.
     """
 
     parameters: np.ndarray
     number: int = 0
     evaluations: int = 0
     memory: np.ndarray | None = None
+    resumed: bool = False
 
 
 @dataclass(frozen=True, eq=False)

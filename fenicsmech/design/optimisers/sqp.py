@@ -2,17 +2,21 @@
 
     min O(p)   subject to   c(p) ≤ 0,     O = ½ |r|² + f + R
 
-Each step s minimises a convex model under linearised inequalities (``step``),
+Each step s minimises a model under linearised inequalities (``step``),
 
-    ½ |r + J s|² + f + ∂f/∂p s + ½ sᵀ B s + R(p + s) + ½ μ |s / ℓ|² + Σ ν_k β(c_k + C_k s),
+    ½ |r + J s + ½ sᵀ H s|² + f + ∂f/∂p s + ½ sᵀ B s + R(p + s) + ½ μ |s / ℓ|² + Σ ν_k β(c_k + C_k s),
 
-with the residuals r linearised (Gauss–Newton), the regulariser R exact, and in B the curvature of f + λᵀ c that its
-gradients show (BFGS, damped as Powell proposes). A step is accepted if it lowers the merit O + Σ ν_k β(c_k) by a part
-of the predicted reduction; μ falls after good steps and grows after bad or infeasible ones. The penalties ν exceed the
-multipliers λ of the undamped step, follow them slowly where they fall, and grow where that step leaves inequalities
-violated: the method is Fletcher's Sℓ₁QP (Practical Methods of Optimization, doi:10.1002/9781118723203, section 14.4)
-with Levenberg's damping in place of a trust region and Powell's rule for ν (Nocedal & Wright, Numerical Optimization,
-doi:10.1007/978-0-387-40065-5, chapter 18).
+with the regulariser R exact, in B the curvature of f + λᵀ c that its gradients show (BFGS, damped as Powell proposes),
+and in H that of the residuals along the steps so far, refused ones included (``step``). Where residuals are steep and R
+is flat, the minimum lies at the end of a curved valley, along which R falls. Without H (Gauss–Newton) steps leave the
+valley and are refused until μ makes them short, and it takes R for all the curvature along the valley, where
+Σ r_k H_k outweighs it. The end is judged by the undamped step without H, which may bend too much.
+
+A step is accepted if it lowers the merit O + Σ ν_k β(c_k) by a part of the predicted reduction; μ falls after good
+steps and grows after bad or infeasible ones. The penalties ν exceed the multipliers λ of the undamped step, follow them
+slowly where they fall, and grow where that step leaves inequalities violated: the method is Fletcher's Sℓ₁QP (Practical
+Methods of Optimization, doi:10.1002/9781118723203, section 14.4) with Levenberg's damping in place of a trust region
+and Powell's rule for ν (Nocedal & Wright, Numerical Optimization, doi:10.1007/978-0-387-40065-5, chapter 18).
 
 Libraries' methods (SLSQP, MMA, CCSA, trust-constr) see O as one function: they know nothing of residuals, take the
 barriers of R for curvature, and end or diverge at infeasible points. ``python3 -m benchmarks.constrained`` compares
@@ -32,13 +36,12 @@ from fenicsmech.design.optimisers.problem import (
     Iterate,
     Optimiser,
     Problem,
-    Quadratic,
     Reason,
     Start,
     TooHigh,
     merit,
 )
-from fenicsmech.design.optimisers.step import Step, minimum, updated
+from fenicsmech.design.optimisers.step import Step, bent, minimum, turned, updated
 from fenicsmech.errors import positive
 
 
@@ -52,6 +55,7 @@ class Memory:
         scale: typical change of O, the unit of μ.
         penalties: ν, (k,).
         curvature: B, (n, n).
+        hessians: H, (m, n, n).
     """
 
     damping: float
@@ -59,18 +63,25 @@ class Memory:
     scale: float
     penalties: np.ndarray
     curvature: np.ndarray
+    hessians: np.ndarray
 
     @staticmethod
     def unpacked(numbers: np.ndarray, here: Evaluation) -> Memory:
         """The memory from the numbers of ``packed``."""
-        k, n = len(here.inequalities.values), len(here.parameters)
-        curvature = numbers[3 + k :].reshape(n, n) if len(numbers) > 3 + k else np.zeros((n, n))
-        return Memory(numbers[0], int(numbers[1]), numbers[2], numbers[3 : 3 + k], curvature)
+        k, (m, n) = len(here.inequalities.values), here.jacobian.shape
+        rows, columns = np.tril_indices(n)
+        penalties, halves, rest = np.split(numbers[3:], [k, k + m * len(rows)])
+        curvature, hessians = rest.reshape(n, n) if len(rest) else np.zeros((n, n)), np.zeros((m, n, n))
+        hessians[:, rows, columns] = hessians[:, columns, rows] = halves.reshape(m, len(rows))
+        return Memory(numbers[0], int(numbers[1]), numbers[2], penalties, curvature, hessians)
 
     def packed(self) -> np.ndarray:
         """The memory as numbers; without B where it is zero."""
         curvature = self.curvature if self.curvature.any() else np.zeros(0)
-        return np.concatenate([[self.damping, self.stalls, self.scale], self.penalties, curvature.ravel()])
+        halves = self.hessians[:, *np.tril_indices(len(self.curvature))]
+        return np.concatenate(
+            [[self.damping, self.stalls, self.scale], self.penalties, halves.ravel(), curvature.ravel()]
+        )
 
 
 @dataclass(frozen=True)
@@ -119,17 +130,20 @@ class SQP(Optimiser):
         return self.tolerance
 
     def continued(self, memory: np.ndarray) -> np.ndarray | None:
-        """B and ν as they are, for shifts leave derivatives alone; no stalls, and μ not above that of a start."""
+        """H, B and ν as they are, for shifts leave derivatives alone; no stalls, and μ not above that of a start."""
         return np.concatenate([[min(memory[0], self.damping), 0.0], memory[2:]])
 
     def minimise(self, problem: Problem, start: Start, *, watch: Callable[[Iterate], None]) -> Iterate:
         here, lengths = problem.evaluate(start.parameters), problem.lengths
         memory = self._begin(here, lengths) if start.memory is None else Memory.unpacked(start.memory, here)
-        last = self._iterate(start.number, start.evaluations + 1, here, memory, lengths)
+        last, ahead = self._iterate(start.number, start.evaluations + 1, here, memory, lengths)
         watch(last)
-        resolved = self._resolution(last, lengths, start.memory is not None)
+        resolved = self._resolution(last, lengths, start.resumed)
         while last.reason is None:
-            last = replace(last, reason=Reason.RESOLVED) if resolved(last) else self._advance(problem, last, lengths)
+            if resolved(last):
+                last = replace(last, reason=Reason.RESOLVED)
+            else:
+                last, ahead = self._advance(problem, last, ahead, lengths)
             watch(last)
         return last
 
@@ -137,20 +151,23 @@ class SQP(Optimiser):
         """Memory at the start: O changes by the scale, and f's gradient by itself, when p changes by its lengths."""
         scale = max(_magnitude(here, 0.0), float(np.linalg.norm(lengths * here.gradient)))
         bend = float(np.linalg.norm(lengths * here.plain.gradient))
-        return Memory(self.damping, 0, scale, _sizes(here, lengths, scale), bend * np.diag(lengths**-2))
+        penalties, curvature = _sizes(here, lengths, scale), bend * np.diag(lengths**-2)
+        return Memory(self.damping, 0, scale, penalties, curvature, np.zeros((*here.jacobian.shape, len(lengths))))
 
     def _resolution(self, first: Iterate, lengths: np.ndarray, resumed: bool) -> Callable[[Iterate], bool]:
         """A test of whether errors exceed the remaining reduction; here none, as errors of f and c are not known."""
         return lambda last: False
 
-    def _advance(self, problem: Problem, last: Iterate, lengths: np.ndarray) -> Iterate:
-        here, evaluations = last.evaluation, last.evaluations
+    def _advance(
+        self, problem: Problem, last: Iterate, ahead: tuple[Step, Memory], lengths: np.ndarray
+    ) -> tuple[Iterate, tuple[Step, Memory]]:
+        """The next iterate from the last one, both with their undamped steps."""
+        here, evaluations, (step, eased) = last.evaluation, last.evaluations, ahead
         memory = Memory.unpacked(last.memory, here)
         violated = np.any(here.inequalities.values > self.violation)
-        step, eased = self._undamped(here, memory, lengths)
         little, stalled = last.reduction <= self.least_reduction, memory.stalls >= self.stalls
         if (little and (stalled or self._stationary(here, memory, step, lengths))) or (stalled and not violated):
-            return replace(last, reason=Reason.VIOLATED if violated else Reason.CONVERGED)
+            return replace(last, reason=Reason.VIOLATED if violated else Reason.CONVERGED), ahead
         memory = eased
         merit_here, damping = here.merit(memory.penalties), memory.damping
         for _ in range(self.refusals):
@@ -161,8 +178,12 @@ class SQP(Optimiser):
             evaluations += 1
             try:
                 new = problem.evaluate(step.parameters, merit_here - self.poor * predicted, memory.penalties)
-            except TooHigh:
+            except TooHigh as failure:
                 damping *= 4.0
+                if failure.residuals is not None:
+                    s = step.parameters - here.parameters
+                    second = 2.0 * (failure.residuals - here.residuals - here.jacobian @ s)
+                    memory = replace(memory, hessians=bent(memory.hessians, s, second, lengths))
                 continue
             except Infeasible:
                 damping *= 10.0
@@ -171,14 +192,15 @@ class SQP(Optimiser):
             if gain > self.good * predicted:
                 damping = max(damping / 5.0, self.least_damping)
             stalls = memory.stalls + 1 if gain < self.least_reduction * _magnitude(here, memory.penalties) else 0
-            bent = new.inequalities.jacobian - here.inequalities.jacobian
-            y = new.plain.gradient - here.plain.gradient + bent.reshape(-1, len(lengths)).T @ step.multipliers
+            tilted = new.inequalities.jacobian - here.inequalities.jacobian
+            y = new.plain.gradient - here.plain.gradient + tilted.reshape(-1, len(lengths)).T @ step.multipliers
             s = new.parameters - here.parameters
             curvature = updated(memory.curvature, s, y, lengths, first=last.number == 0)
-            memory = replace(memory, damping=damping, stalls=stalls, curvature=curvature)
+            hessians = turned(memory.hessians, s, new.jacobian - here.jacobian, lengths)
+            memory = replace(memory, damping=damping, stalls=stalls, curvature=curvature, hessians=hessians)
             reason = Reason.ITERATIONS if number >= self.iterations else None
             return self._iterate(number, evaluations, new, memory, lengths, reason)
-        return replace(last, evaluations=evaluations, reason=Reason.VIOLATED if violated else Reason.NO_DESCENT)
+        return replace(last, evaluations=evaluations, reason=Reason.VIOLATED if violated else Reason.NO_DESCENT), ahead
 
     def _iterate(
         self,
@@ -188,14 +210,15 @@ class SQP(Optimiser):
         memory: Memory,
         lengths: np.ndarray,
         reason: Reason | None = None,
-    ) -> Iterate:
-        """The iterate with the reduction predicted for the undamped step: of the merit, or of violations."""
+    ) -> tuple[Iterate, tuple[Step, Memory]]:
+        """The iterate with the reduction that the undamped step predicts, of the merit or of violations; that step."""
         step, eased = self._undamped(here, memory, lengths)
-        reduction = here.merit(eased.penalties) - _predicted(here, eased, step)
+        straight = replace(eased, hessians=np.zeros_like(memory.hessians))
+        reduction = here.merit(eased.penalties) - _predicted(here, straight, step)
         reduction /= _magnitude(here, eased.penalties)
         removed = np.maximum(here.inequalities.values, 0.0) - np.maximum(_ahead(here, step), 0.0)
         reduction = max(reduction, self.least_reduction * float(np.max(removed, initial=0.0)) / self.violation)
-        return Iterate(number, evaluations, here, memory.packed(), reduction, reason)
+        return Iterate(number, evaluations, here, memory.packed(), reduction, reason), (step, eased)
 
     def _stationary(self, here: Evaluation, memory: Memory, step: Step, lengths: np.ndarray) -> bool:
         """Whether the Lagrangian's gradient is small. Where B is too stiff, the predicted reduction is small before."""
@@ -207,8 +230,9 @@ class SQP(Optimiser):
     def _undamped(self, here: Evaluation, memory: Memory, lengths: np.ndarray) -> tuple[Step, Memory]:
         """The undamped step, and the memory with penalties for which it satisfies the inequalities if any step does."""
         violated, penalties = np.maximum(here.inequalities.values, 0.0), memory.penalties
+        straight = replace(memory, hessians=np.zeros_like(memory.hessians))
         for _ in range(4):
-            step = self._step(here, replace(memory, penalties=penalties), self.least_damping, lengths)
+            step = self._step(here, replace(straight, penalties=penalties), self.least_damping, lengths)
             missed = _ahead(here, step) > 1e-3 * violated + 1e-9
             if not missed.any():
                 break
@@ -219,14 +243,9 @@ class SQP(Optimiser):
 
     def _step(self, here: Evaluation, memory: Memory, damping: float, lengths: np.ndarray) -> Step:
         curvature = memory.curvature + np.diag(damping * memory.scale / lengths**2)
-        return minimum(lambda p: _model(here, curvature, p), here.parameters, here.inequalities, memory.penalties)
-
-
-def _model(here: Evaluation, curvature: np.ndarray, p: np.ndarray) -> Quadratic:
-    """The model of O at ``p`` with the curvature B."""
-    model, bend = here.model(p), curvature @ (p - here.parameters)
-    half = 0.5 * float(bend @ (p - here.parameters))
-    return Quadratic(model.value + half, model.gradient + bend, model.curvature + curvature)
+        return minimum(
+            lambda p: here.model(p, memory.hessians, curvature), here.parameters, here.inequalities, memory.penalties
+        )
 
 
 def _ahead(here: Evaluation, step: Step) -> np.ndarray:
@@ -237,7 +256,8 @@ def _ahead(here: Evaluation, step: Step) -> np.ndarray:
 
 def _predicted(here: Evaluation, memory: Memory, step: Step) -> float:
     """The merit after a step, as predicted without damping."""
-    return merit(_model(here, memory.curvature, step.parameters).value, _ahead(here, step), memory.penalties)
+    model = here.model(step.parameters, memory.hessians, memory.curvature)
+    return merit(model.value, _ahead(here, step), memory.penalties)
 
 
 def _magnitude(here: Evaluation, penalties: np.ndarray | float) -> float:

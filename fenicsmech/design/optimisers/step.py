@@ -1,4 +1,4 @@
-"""The minimum of a convex model of the objective under linearised inequalities: the step of every optimiser here.
+"""Steps of every optimiser here, to the minimum of a model of the objective under linearised inequalities.
 
     min over d   m(p + d) + Σ ν_k β(c_k + C_k d),     β(x) = x + ½ x² where x > 0, else 0
 
@@ -10,6 +10,14 @@ and Hessian H = L Lᵀ, and slacks t ≥ 0 of the inequalities, each step solves
 which always has a solution. In x = (Lᵀ d + L⁻¹ g, √ν (t + 1)) it is to find the x of least length with G x ≥ h, which
 scipy's non-negative least squares do (Lawson & Hanson, Solving Least Squares Problems, doi:10.1137/1.9781611971217,
 section 23.4). Its multipliers are those of the inequalities.
+
+Models learn second derivatives from what steps have found: of a sum by BFGS, of each residual r_k by the update that
+changes H_k least (Powell's symmetric Broyden update, in parameters over their lengths), with
+
+    H s = J(p + s) − J(p)  after a step,     sᵀ H s = 2 (r(p + s) − r − J s)  where only values are known.
+
+H learnt along earlier steps may bend too much here; before the update it is shrunk to what fits along s. Dennis, Gay &
+Welsch found this sizing indispensable (An adaptive nonlinear least-squares algorithm, doi:10.1145/355958.355965).
 """
 
 from __future__ import annotations
@@ -100,3 +108,25 @@ def updated(
     if y @ s < 0.2 * known:
         y = bs + 0.8 * known / (known - y @ s) * (y - bs)
     return curvature + np.outer(y, y) / float(y @ s) - np.outer(bs, bs) / known
+
+
+def turned(hessians: np.ndarray, s: np.ndarray, change: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """Hessians of residuals (m, n, n) after a step ``s`` (n,) that has changed their Jacobian by ``change`` (m, n)."""
+    known, found = hessians @ s @ s, change @ s
+    if known.any():
+        hessians = min(max(float(known @ found) / float(known @ known), 0.0), 1.0) * hessians
+    w, off = _dual(s, lengths), change - hessians @ s
+    sides = off[:, :, None] * w
+    return hessians + (sides + sides.transpose(0, 2, 1)) - (off @ s)[:, None, None] * np.outer(w, w)
+
+
+def bent(hessians: np.ndarray, s: np.ndarray, second: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """Hessians of residuals (m, n, n) with ``second`` derivatives sᵀ H s (m,) along a step ``s`` (n,)."""
+    w = _dual(s, lengths)
+    return hessians + (second - hessians @ s @ s)[:, None, None] * np.outer(w, w)
+
+
+def _dual(s: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """w ∝ s / ℓ² with w · s = 1, (n,)."""
+    w = s / lengths**2
+    return w / float(w @ s)

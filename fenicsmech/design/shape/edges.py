@@ -24,7 +24,7 @@ from itertools import combinations
 
 import numpy as np
 
-from fenicsmech.meshing import LinkMesh, boundary_loops, plan_of
+from fenicsmech.meshing import LinkMesh, boundary_loops, edge_rows, plan_of
 
 _CORNER = 0.3  # rad between the tangents of two edges: less is the error of edges on a curve
 
@@ -55,24 +55,15 @@ def edge_weights(mesh: LinkMesh, weights: np.ndarray) -> EdgeWeights:
     if plan.mesh.dim == 2:
         held = np.zeros(len(plan.mesh.points), dtype=bool)
         held[plan.mesh.cells[plan.mesh.interface >= 0]] = True
-        # vertex of the link at the foot of each column, and the edges of the plan with one edge above each
+        # vertex of the link at the foot of each column, and the edge of the plan below each edge
         vertex = np.unique(plan.column, return_index=True)[1]
         columns = np.sort(plan.column[ends], axis=1)
-        above = {tuple(pair): k for k, pair in reversed(list(enumerate(columns.tolist())))}
-        count = len(vertex)
-        keys = columns @ (count, 1)
         for loop in boundary_loops("link", plan.mesh):
             edges = np.sort(np.column_stack([loop, np.roll(loop, -1)]), axis=1)
-            rows = [above[tuple(edge)] for edge in edges.tolist()]
-            outline = _Outline(plan.mesh.points[loop], middles[rows], held[loop])
-            smooth = outline.at_middles(weights[vertex[loop]])
-            # every edge above one of the outline
-            wanted = edges @ (count, 1)
-            order = np.argsort(wanted)
-            place = order[np.minimum(np.searchsorted(wanted, keys, sorter=order), len(order) - 1)]
-            on = wanted[place] == keys
-            found[on] = smooth[place[on]]
-            follows |= on
+            outline = _Outline(plan.mesh.points[loop], middles[edge_rows(columns, edges)], held[loop])
+            below = edge_rows(edges, columns)
+            found[below >= 0] = outline.at_middles(weights[vertex[loop]])[below[below >= 0]]
+            follows |= below >= 0
     return EdgeWeights(ends[follows], middles[follows], found[follows])
 
 

@@ -85,11 +85,10 @@ class HandleOptimum:
     Args:
         shape_map: from design and handle positions to the field.
         quality: Σρ in this field.
-        options: of the search.
     """
 
-    def __init__(self, shape_map: ShapeMap, quality: QualitySum, options: HandleOptions | None = None) -> None:
-        self._map, self._quality, self._options = shape_map, quality, options or HandleOptions()
+    def __init__(self, shape_map: ShapeMap, quality: QualitySum) -> None:
+        self._map, self._quality, self._options = shape_map, quality, HandleOptions()
         self._handles = [shape.handles for shape in shape_map.shapes]
         self._reducer: _MomentHessian | None = None
         self._known: tuple[HandlePlacement | None, list[PositionDerivatives]] = (None, [])
@@ -129,7 +128,7 @@ class HandleOptimum:
                 total -= cho_solve(link.factor, slope[..., link.free].T).T @ (link.cross @ own.matrix)
             except np.linalg.LinAlgError:
                 raise ShapeError(
-                    f"shape of link {shape.name!r}",
+                    f"shape of link {shape.own.name!r}",
                     "its mesh does not determine the positions of all handles",
                     "Use smaller elements",
                 ) from None

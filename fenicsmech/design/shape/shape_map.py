@@ -35,10 +35,12 @@ from fenicsmech.meshing import (
     LinkOutline,
     MechanismMesh,
     cell_measures,
+    edge_rows,
     image_of,
     node_ends,
     plan_of,
 )
+from fenicsmech.polygons import chord_lengths
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +59,6 @@ class ShapeRequest:
         ends_move: whether free ends may move.
         joints_move: whether joints may.
         follows: whether the shape has no parameters of its own, and follows joints alone.
-        spacing: arc length between handles; None: the mean width of the link.
         images: links that share the shape.
     """
 
@@ -72,7 +73,6 @@ class ShapeRequest:
     ends_move: bool = False
     joints_move: bool = False
     follows: bool = False
-    spacing: float | None = None
     images: tuple[ImageRequest, ...] = ()
 
 
@@ -114,25 +114,19 @@ class LinkImage:
 
 @dataclass(frozen=True, eq=False)
 class LinkShape:
-    """The handles of one link and their weights.
+    """The handles of one link, and all links that they move.
 
     Attributes:
-        link: index of the flexible link.
-        name: its name, for messages.
+        own: the link.
         handles: its handles.
-        weights: of each handle at each vertex of the link, (n, handles).
-        edges: weights at the midpoints of edges that follow the design.
         thickness: in the plane, where δ = 1; at the samples of the spline where it is not the same everywhere.
         centreline: points that the drawn centreline runs through, (k, 2).
-        follows: whether it has no parameters of its own, and follows joints alone.
         images: links that share the shape.
+        follows: whether it has no parameters of its own, and follows joints alone.
     """
 
-    link: int
-    name: str
+    own: LinkImage
     handles: LinkHandles
-    weights: np.ndarray
-    edges: EdgeWeights
     thickness: float | np.ndarray
     centreline: np.ndarray
     images: tuple[LinkImage, ...] = ()
@@ -140,8 +134,8 @@ class LinkShape:
 
     @property
     def every(self) -> tuple[LinkImage, ...]:
-        """All links with this shape, this one first."""
-        return (LinkImage(self.link, self.name, Isometry.identity(), self.weights, self.edges), *self.images)
+        """All links with this shape, its own first."""
+        return (self.own, *self.images)
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,14 +151,6 @@ class LinkParameters:
     place: slice
     fixed: np.ndarray
     matrix: np.ndarray
-
-    @staticmethod
-    def own(first: int, spline: LinkSpline, count: int) -> LinkParameters:
-        """All parameters of a spline as entries of the ``count`` of the design, from the entry ``first`` on."""
-        matrix = np.zeros((spline.size, count))
-        place = slice(first, first + spline.size)
-        matrix[:, place] = np.eye(spline.size)
-        return LinkParameters(place, np.zeros(spline.size), matrix)
 
     def of(self, p: np.ndarray) -> np.ndarray:
         """s (size,) of the design ``p``."""
@@ -186,19 +172,19 @@ def shape_link(mesh: LinkMesh, request: ShapeRequest, others: Sequence[LinkMesh]
     layout = lay_out(request.centreline, joints, request.reach, request.segments, part=f"design of {part}")
     moves = {"ends_move": request.ends_move, "joints_move": request.joints_move}
     fit = fit_spline(request.centreline, joints, layout, **moves, part=f"spline of {part}")
-    spacing = request.spacing or _mean_width(mesh, request.centreline.length)
+    spacing = _mean_width(mesh, request.centreline.length)
     handles = _place_handles(mesh, fit, spacing=spacing, turns=request.turns, part=part)
     weights, edges = _weights(mesh, handles, part=part)
     images = []
     for image, other in zip(request.images, others, strict=True):
         here = image_of(other, image.isometry.inverse, np.argsort(image.sites))
-        own = (weights, edges) if _is_same(here, mesh) else _weights(here, handles, part=f"link {image.name!r}")
-        images.append(LinkImage(image.link, image.name, image.isometry, *own))
+        same = (weights, edges) if _is_same(here, mesh) else _weights(here, handles, part=f"link {image.name!r}")
+        images.append(LinkImage(image.link, image.name, image.isometry, *same))
     drawn = request.thickness
     thickness = _measured(drawn, fit.spline, part=f"design of {part}") if isinstance(drawn, LinkOutline) else drawn
     centreline = request.centreline.evaluate(request.centreline.knots)
-    drawn_on = centreline, tuple(images), request.follows
-    return LinkShape(request.link, request.name, handles, weights, edges, thickness, *drawn_on)
+    own = LinkImage(request.link, request.name, Isometry.identity(), weights, edges)
+    return LinkShape(own, handles, thickness, centreline, tuple(images), request.follows)
 
 
 def _weights(mesh: LinkMesh, handles: LinkHandles, *, part: str) -> tuple[np.ndarray, EdgeWeights]:
@@ -281,7 +267,7 @@ def _place_handles(mesh: LinkMesh, fit: SplineFit, *, spacing: float, turns: Seq
     spline, plan = fit.spline, plan_of(mesh).mesh
     samples = np.linspace(0.0, spline.segments, 1000 * spline.segments + 1)
     curve = spline.evaluate(spline.initial, samples)[:, :2]
-    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
+    arc = chord_lengths(curve)
     held = plan.points[np.unique(plan.cells[plan.interface != FREE])][:, :2]
 
     stops = [(float(at), site) for at, site in zip(np.flatnonzero(spline.is_joint), fit.sites, strict=True)]
@@ -353,15 +339,15 @@ class ShapeMap:
         mesh: the mechanism's mesh.
         design: the design field d, vector P1, or P2 to bend edges too.
         shapes: the links that change, the same on all ranks.
-        parameters: of their splines as functions of p; those of one link after the other by default.
-        initial: p of the initial design; that of the splines by default.
+        parameters: of their splines as functions of p.
+        initial: p of the initial design, (parameters,).
 
     Attributes:
         owned: number of owned nodes.
         original: vertex of the whole mesh of every local node, of an edge's midpoint its lower end, (nodes,).
         pieces: all links with these shapes.
         of_link: parameters of the spline of each shape as functions of p.
-        initial, initial_theta: p (parameters,) and θ (handles,) of the initial design.
+        initial, initial_theta: p and θ (handles,) of the initial design.
     """
 
     def __init__(
@@ -369,8 +355,8 @@ class ShapeMap:
         mesh: MechanismMesh,
         design: fem.Function,
         shapes: Sequence[LinkShape],
-        parameters: Sequence[LinkParameters] | None = None,
-        initial: np.ndarray | None = None,
+        parameters: Sequence[LinkParameters],
+        initial: np.ndarray,
     ) -> None:
         self.mesh, self.design, self.shapes = mesh, design, tuple(shapes)
         ends = node_ends(design.function_space)
@@ -382,11 +368,7 @@ class ShapeMap:
             for image in shape.every
         ]
         handles = [shape.handles for shape in shapes]
-        splines = [h.spline for h in handles]
-        firsts, count = np.cumsum([0, *(own.size for own in splines)]), sum(own.size for own in splines)
-        own = [LinkParameters.own(int(k), spline, count) for k, spline in zip(firsts, splines, strict=False)]
-        self.of_link = tuple(own if parameters is None else parameters)
-        self.initial = np.concatenate([np.zeros(0), *(s.initial for s in splines)]) if initial is None else initial
+        self.of_link, self.initial = tuple(parameters), initial
         self.initial_theta = np.concatenate([np.zeros(0), *(h.initial for h in handles)])
         self._theta_ends = np.cumsum([len(h) for h in handles], dtype=int)[:-1]
 
@@ -466,10 +448,6 @@ def _at_nodes(ends: np.ndarray, reach: np.ndarray, edges: EdgeWeights, handles: 
     """r_ij at nodes between the vertices ``ends`` (n, 2) of a link, from that at its vertices, (n, handles, 3)."""
     if np.array_equal(ends[:, 0], ends[:, 1]):
         return reach[ends[:, 0]]
-    found, count = 0.5 * (reach[ends[:, 0]] + reach[ends[:, 1]]), len(reach)
-    if len(edges.ends):
-        keys, wanted = edges.ends @ (count, 1), ends @ (count, 1)
-        place = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-        hit = np.flatnonzero(keys[place] == wanted)
-        found[hit] = _reach(edges.middles, edges.weights, handles)[place[hit]]
+    found, rows = 0.5 * (reach[ends[:, 0]] + reach[ends[:, 1]]), edge_rows(edges.ends, ends)
+    found[rows >= 0] = _reach(edges.middles, edges.weights, handles)[rows[rows >= 0]]
     return found

@@ -20,15 +20,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
-import sympy
 from numpy.polynomial.polynomial import polyder
 
 from fenicsmech.errors import DescriptionError, counted
 from fenicsmech.mechanism import Centreline
-from fenicsmech.symbolic import SmoothFunction, derive
+from fenicsmech.polygons import chord_lengths
 
 # h₀₀ (P_k), h₁₀ (M_k), h₀₁ (P_{k+1}), h₁₁ (M_{k+1}) in powers of τ, and their derivatives
 _HERMITE = np.array([[1.0, 0.0, -3.0, 2.0], [0.0, 1.0, -2.0, 1.0], [0.0, 0.0, 3.0, -2.0], [0.0, 0.0, -1.0, 1.0]])
@@ -168,29 +167,39 @@ class SplineSamples:
 
     def curvature(self, p: np.ndarray) -> np.ndarray:
         """r, signed, at the inner samples, (count − 2,)."""
-        return _ratio().value(*self._triples(p, slice(None)))[:, 0]
+        a, b = self._segments(p, slice(None))
+        return _cross(a, b) * (1.0 / _length(a) + 1.0 / _length(b)) / _length(a + b)
 
     def curvature_gradient(self, p: np.ndarray, chosen: np.ndarray) -> np.ndarray:
         """∂r/∂p at some of the inner samples, a mask (count − 2,), (chosen, size)."""
-        moves = np.concatenate([self._gradient[k : len(self.t) - 2 + k, :2][chosen] for k in range(3)], axis=1)
-        return np.einsum("nc,ncp->np", _ratio().gradient(*self._triples(p, chosen))[:, 0], moves)
+        slopes = _ratio_gradient(*self._segments(p, chosen))
+        moves = np.diff(self._gradient[:, :2], axis=0)
+        pairs = zip(slopes, (moves[:-1][chosen], moves[1:][chosen]), strict=True)
+        return sum(np.einsum("nc,ncp->np", slope, move) for slope, move in pairs)
 
-    def _triples(self, p: np.ndarray, chosen: np.ndarray | slice) -> tuple[np.ndarray, np.ndarray]:
-        """Three consecutive points around the chosen inner samples, (chosen, 6), and no constants."""
-        points = self._fixed[:, :2] + self._gradient[:, :2] @ p
-        triples = np.concatenate([points[k : len(points) - 2 + k][chosen] for k in range(3)], axis=1)
-        return triples, np.empty((len(triples), 0))
+    def _segments(self, p: np.ndarray, chosen: np.ndarray | slice) -> tuple[np.ndarray, np.ndarray]:
+        """The segments a and b before and after the chosen inner samples, both (chosen, 2)."""
+        segments = np.diff(self._fixed[:, :2] + self._gradient[:, :2] @ p, axis=0)
+        return segments[:-1][chosen], segments[1:][chosen]
 
 
-@cache
-def _ratio() -> SmoothFunction:
-    """r by the coordinates of three points."""
-    coordinates = sympy.symbols("px py qx qy sx sy", real=True)
-    p, q, s = (sympy.Matrix(coordinates[k : k + 2]) for k in (0, 2, 4))
-    a, b = q - p, s - q
-    lengths = [sympy.sqrt(v.dot(v)) for v in (a, b, a + b)]
-    ratio = (lengths[0] + lengths[1]) * (a[0] * b[1] - a[1] * b[0]) / (lengths[0] * lengths[1] * lengths[2])
-    return derive([ratio], coordinates, [], many=True)
+def _length(a: np.ndarray) -> np.ndarray:
+    return np.hypot(a[:, 0], a[:, 1])
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+
+
+def _ratio_gradient(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Derivatives of r = g (a × b), g = (1/|a| + 1/|b|) / |a + b|, by a and by b, both (n, 2)."""
+    c, cross = a + b, _cross(a, b)[:, None]
+    A, B, C = (_length(v)[:, None] for v in (a, b, c))
+    g = (1.0 / A + 1.0 / B) / C
+    shared = g * c / C**2
+    by_a = g * np.stack([b[:, 1], -b[:, 0]], axis=1) - cross * (a / (A**3 * C) + shared)
+    by_b = g * np.stack([-a[:, 1], a[:, 0]], axis=1) - cross * (b / (B**3 * C) + shared)
+    return by_a, by_b
 
 
 @dataclass(frozen=True, eq=False)
@@ -340,8 +349,7 @@ class _ArcLength:
     def __init__(self, centreline: Centreline) -> None:
         self._curve = centreline
         self._s = centreline.samples(1000)
-        chords = np.linalg.norm(np.diff(centreline.evaluate(self._s), axis=0), axis=1)
-        self._a = np.concatenate([[0.0], np.cumsum(chords)])
+        self._a = chord_lengths(centreline.evaluate(self._s))
 
     @property
     def length(self) -> float:

@@ -45,7 +45,7 @@ class Problem:
         evaluation = Evaluation(parameters, *self.residuals(parameters), self.regulariser)
         if (height := evaluation.merit(penalties)) > below:
             self.refused += 1
-            raise TooHigh(height)
+            raise TooHigh(height, evaluation.residuals)
         return evaluation
 
     def check(self, parameters: np.ndarray) -> None:
@@ -203,6 +203,26 @@ def test_least_squares_structure_pays():
     assert fast < slow
 
 
+class Bent(Problem):
+    """r = x + x² − 2, which a first step from 0 overshoots."""
+
+    def __init__(self) -> None:
+        super().__init__(np.zeros(1), np.ones(1))
+
+    def residuals(self, parameters):
+        return parameters + parameters**2 - 2.0, np.diag(1.0 + 2.0 * parameters)
+
+
+@pytest.mark.parametrize("poor", [-np.inf, 0.1], ids=["accepted", "refused"])
+def test_residuals_of_second_degree_along_a_step_are_met_by_the_next_one(poor):
+    bent = Bent()
+    last, _ = watched(LevenbergMarquardt(tolerance=1e-14, damping=1e-12, poor=poor), bent)
+    assert bent.refused == (poor > 0.0)
+    assert bent.asked[1] == pytest.approx([2.0], abs=1e-6)
+    assert bent.asked[2] == pytest.approx([1.0], abs=1e-6)
+    assert last.evaluation.parameters == pytest.approx([1.0], abs=1e-9)
+
+
 def test_barriers_are_not_run_through_where_the_residual_would():
     exact, parabola = Wall(), Wall(quadratic=True)
     optimiser = LevenbergMarquardt(tolerance=1e-6)
@@ -228,13 +248,13 @@ def test_bfgs_takes_walls_of_the_regulariser_exactly():
 
 @each_optimiser
 def test_going_on_from_any_iterate_repeats_what_would_have_come(optimiser):
-    _, history = watched(optimiser, Rosenbrock(spring=0.01))
+    _, history = watched(optimiser, Rosenbrock(spring=1e-3))
     assert len(history) > 8
     for index, iterate in enumerate(history[:-1]):
         # as it comes back from a file
         numbers = json.loads(json.dumps([iterate.evaluation.parameters.tolist(), iterate.memory.tolist()]))
         start = Start(np.array(numbers[0]), iterate.number, iterate.evaluations, np.array(numbers[1]))
-        _, again = watched(optimiser, Rosenbrock(spring=0.01), start)
+        _, again = watched(optimiser, Rosenbrock(spring=1e-3), start)
         rest = history[index:]
         assert len(again) == len(rest)
         for ours, theirs in zip(again, rest, strict=True):

@@ -1,0 +1,129 @@
+"""Derivatives of every quantity by every parameter of a design pass Taylor tests, in parallel too."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import fenicsmech as fm
+
+from .mechanisms import Case, bench
+
+PLASTIC = fm.Material("plastic", 2000.0, 0.35)
+
+
+class Frame:
+    """A coupler on two bowed legs, one on a motor, with a sprung lever on it whose end is pulled by a given way.
+
+    Args:
+        shapes: how the legs change: "mirrored" or "same", with one shape, or "shifted", one with a shape of its own
+            and one that follows its joints.
+    """
+
+    def __init__(self, shapes: str, space: str) -> None:
+        rig = fm.Mechanism("frame")
+        ground, coupler, lever = rig.rigid("ground", fixed=True), rig.rigid("coupler"), rig.rigid("lever")
+        out = -4.0 if shapes == "same" else 4.0
+        leg, other = (
+            rig.flexible(name, fm.strip([(x, 0), (x + bow, 15), (x, 30)], thickness=3.0, depth=6.0), PLASTIC)
+            for name, x, bow in (("leg", 0.0, -4.0), ("other leg", 40.0, out))
+        )
+        shaft = rig.revolute(ground, leg, at=(0, 0), interface_radius=2.0, name="shaft")
+        pin = rig.revolute(leg, coupler, at=(0, 30), interface_radius=2.0, name="pin")
+        foot = rig.revolute(ground, other, at=(40, 0), interface_radius=2.0, name="foot")
+        end = rig.revolute(other, coupler, at=(40, 30), interface_radius=2.0, name="end")
+        hinge = rig.revolute(coupler, lever, at=(20, 32), name="hinge")
+        motor = rig.motor(shaft)
+        spring = fm.JointSpring(hinge, 900.0, rest=-0.1)
+        self.pull = rig.force(on=lever, at=(22, 50), direction=(1, 0.3))
+        lift = rig.output(on=coupler, at=(5, 40), direction=(0, 1), name="lift")
+        scene = fm.Scene(rig, [spring])
+        sample = fm.Sample({self.pull: fm.at(4.0)}, configuration=scene.configuration("turned", {motor: 0.2}))
+        quantities = [
+            fm.ForceMagnitude(self.pull),
+            fm.Displacement(lift),
+            fm.Displacement(other, at=(40.0 + out, 15)),
+            fm.Rotation(lever),
+            fm.Rotation(leg, pin),
+            fm.MotorTorque(motor),
+            fm.JointForce(pin),
+            fm.JointMoment(shaft),
+            fm.JointMoment(end),
+            fm.StrainEnergy(),
+            fm.StrainEnergy(other),
+        ]
+        at_rest = [fm.LinkVolume(), fm.LinkMass(leg, density=3.0), fm.CentrelineLength(other)]
+        dim = 3 if space == "3d" else 2
+        targets = [fm.Target(own, sample, equals=_zero(own.size(dim)), scale=1.0) for own in quantities]
+        targets += [fm.Target(own, equals=0.0, scale=1.0) for own in at_rest]
+        self.numbers = {
+            "offset": fm.Number(fm.MotorOffset(motor), -0.1, 0.12),
+            "modulus": fm.Number(fm.LawParameter("E", leg), 1000.0, 3500.0),
+            "depth": fm.Number(fm.Depth(leg, other), 4.0, 9.0),
+            "stiffness": fm.Number(fm.SpringStiffness(spring), 400.0, 2000.0),
+            "rest": fm.Number(fm.SpringRest(spring), -0.25, 0.1),
+            "position": fm.Number(fm.JointPosition(hinge, direction=(1, 0.5)), -3.0, 4.0),
+        }
+        if dim == 3:
+            self.numbers["axis"] = fm.Number(fm.JointAxis(hinge, about=(1, 0.4, 0)), -0.1, 0.12)
+        if shapes == "shifted":
+            designs = [fm.SplineDesign(leg, 2)]
+            for name, joint in (("shaft", shaft), ("end", end), ("foot", foot)):
+                self.numbers[name] = fm.Number(fm.JointPosition(joint, direction=(1, -0.5)), -3.0, 4.0)
+        else:
+            designs = [fm.SplineDesign(leg, 2, **{shapes: other})]
+        self.case = Case(scene, [*designs, *self.numbers.values()], targets)
+
+
+def _zero(size: int) -> float | tuple[float, ...]:
+    return 0.0 if size == 1 else (0.0,) * size
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize(
+    ("space", "shapes", "formulation"),
+    [
+        pytest.param("plane-stress", "mirrored", None),
+        pytest.param("plane-strain", "shifted", fm.MixedFormulation(above=0.3), marks=pytest.mark.thorough),
+        pytest.param("3d-symmetric", "same", None, marks=pytest.mark.thorough),
+        pytest.param("3d-symmetric", "shifted", fm.MixedFormulation(above=0.3), marks=pytest.mark.thorough),
+        pytest.param("3d", "mirrored", None, marks=pytest.mark.thorough),
+        pytest.param("3d", "shifted", None, marks=pytest.mark.thorough),
+    ],
+)
+def test_derivatives_of_all_quantities_by_all_parameters(space, shapes, formulation):
+    frame = Frame(shapes, space)
+    sim = frame.case.simulate(
+        space, size=8.0 if space.startswith("3d") else 6.0, formulation=formulation, comm=MPI.COMM_WORLD
+    )
+    own = bench(frame.case, sim)
+    assert bool(sim.model.pressure_dofs) == (formulation is not None)
+    p, initial = own.rest.initial.copy(), own.rest.initial
+    p[: own.rest.of_numbers.start] += (0.05 * own.direction(1))[: own.rest.of_numbers.start]
+    placed = own.rest.place(initial, None)
+    solved = own.equilibria.from_zero()
+    placed = own.rest.place(p, placed)
+    solved = own.equilibria.from_design(solved)
+    values = own.equilibria.values(solved)
+    slopes = own.rest.slopes(placed, own.equilibria.gradients(solved))
+
+    def changed(direction: np.ndarray) -> np.ndarray:
+        own.rest.place(p + direction, placed)
+        return own.equilibria.values(own.equilibria.from_design(solved))
+
+    directions = {"shape": np.where(np.arange(len(p)) < own.rest.of_numbers.start, own.direction(2), 0.0)}
+    for row, name in enumerate(frame.numbers, start=own.rest.of_numbers.start):
+        directions[name] = np.eye(len(p))[row]
+    failed = {}
+    for name, direction in directions.items():
+        steps = (0.02, 0.01, 0.005)
+        changes = np.array([changed(h * direction) - values for h in steps])
+        remainders = np.abs(changes - np.outer(steps, slopes @ direction))
+        for k, (first, rest) in enumerate(zip(np.abs(changes).max(axis=0), remainders.T, strict=True)):
+            if rest.max() <= 1e-7 * max(first, 1e-2 * abs(values[k]), 1e-3):  # linear, or independent
+                continue
+            rates = np.log2(rest[:-1] / np.maximum(rest[1:], 1e-300))
+            if not rates.max() >= 1.95:
+                failed[name, k] = rates, rest, first, values[k]
+    assert not failed
