@@ -149,7 +149,10 @@ class Contact(Effect):
             rigid links force per penetration k of each point; must be given.
         points: of a rigid link as drawn.
 
-    Penetration falls as 1 / stiffness, on which the number of iterations hardly depends. Obstacles
+    κ is the stiffness of a thin soft layer on the obstacle, not a numerical remedy: under the pressure p links sink in
+    by p / κ, and obstacles come out the harder the larger κ is. The number of iterations hardly depends on it. Points
+    of rigid links stay springs: few, they settle within a few iterations, and their forces enter as those of a
+    ``PosePotential``. Obstacles
     act once the motors have moved: a configuration whose rigid assembly is on the far side of an obstacle stays there.
     Afterwards flexible links cannot slip through a cylinder: states with a penetration of a quarter of its radius are
     rejected. In space a pressed edge is also pressed on its flat faces inside the obstacle, with an error of

@@ -79,8 +79,14 @@ class InteriorPressures:
         p, s, c = self.pressures, self.slacks, self._compliances
         self._aimed = (target - p * s - second_order + p * (s - self._gaps - c * p)) / (s + c * p)
 
-    def aim_again(self, change: tuple[np.ndarray, np.ndarray]) -> None:
-        """Sets q for the second solve, from (δp, δs) of the first one."""
+    def aim_again(self, change: tuple[np.ndarray, np.ndarray], *, damped: bool) -> None:
+        """Sets q for the second solve, from (δp, δs) of the first one.
+
+        Where the stiffness is ``damped`` μ stays: short steps would look good, and μ fall far ahead of the forces.
+        """
+        if damped:
+            self.aim(self.mean_product)
+            return
         pairs = zip((self.pressures, self.slacks), change, strict=True)
         p, s = (value + self._longest(value, step, self._shares) * step for value, step in pairs)
         now = self.mean_product
@@ -113,9 +119,10 @@ class InteriorPressures:
         """The longest step of displacements, at most one, after which slacks are positive."""
         return self._longest(self.slacks, change[1], self._shares)
 
-    def advance(self, change: tuple[np.ndarray, np.ndarray], length: float) -> None:
-        """Takes a step, of ``length`` in displacements, which the fields hold, and slacks, as long as may be in p."""
-        self.pressures = self.pressures + self._longest(self.pressures, change[0], self._shares) * change[0]
+    def advance(self, change: tuple[np.ndarray, np.ndarray], length: float, share: float) -> None:
+        """Takes a step, of ``length`` in displacements, which the fields hold, and slacks, and a ``share`` of the
+        longest one in p."""
+        self.pressures = self.pressures + share * self._longest(self.pressures, change[0], self._shares) * change[0]
         self.slacks = self.slacks + length * change[1]
         self.update()
 

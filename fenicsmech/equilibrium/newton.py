@@ -69,9 +69,12 @@ class PrimalDualNewton(EquilibriumMethod):
         predicted_stress: whether K_uu, as long as the residual is large, holds the stress that the last step solved
             for instead of the one it led to.
         largest_turn: largest rotation (rad), or displacement over the mechanism's length, of one step.
-        contact_changes: points of contact that may change from one iteration to the next, and most of the iterations
-            in which any do; beyond, pressures are unknowns. A few points, as of a facet, settle by themselves.
+        contact_settling: share of the last iteration's changes of contact up to which they settle by themselves, as do
+            those of no more than one facet; beyond, and after as many iterations as ``watchdog``, pressures are
+            unknowns. Half: the points that change are then found by halving.
         interior_iterations: most iterations with pressures as unknowns, which count beside the others.
+        start_pressure: first pressures as unknowns, over those that would carry the loads, spread over the whole
+            boundary. Counts hardly depend on it: between 0.1 and 10 they change by a tenth or two.
         reuse_factor: largest contraction rate of corrections at which the last factor of K is reused, also for
             stability and the tangent of the path; 0: never.
         path_iterations: most iterations of an arc-length step, after which a shorter one is tried.
@@ -86,15 +89,16 @@ class PrimalDualNewton(EquilibriumMethod):
     watchdog: int = 12
     predicted_stress: bool = True
     largest_turn: float = 0.5
-    contact_changes: int = 4
+    contact_settling: float = 0.5
     interior_iterations: int = 40
+    start_pressure: float = 10.0
     reuse_factor: float = 1e-3
     path_iterations: int = 10
     divergence: float = 1e3
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for limit in ("near", "largest_turn", "divergence"):
+        for limit in ("near", "largest_turn", "divergence", "contact_settling", "start_pressure"):
             positive(f"Newton's {limit}", getattr(self, limit))
         if self.reuse_factor != 0.0:
             positive("Newton's reuse_factor", self.reuse_factor)
@@ -116,6 +120,7 @@ class NewtonSolver(EquilibriumSolver):
         last: tuple[State, np.ndarray] | None = None  # where the last step began, and its motion of the nodes
         residuals, shift, any_stability, predicted, norm = [], least, True, False, math.inf
         touching, changes, interior = system.touching(), 0, 0  # iterations with pressures as unknowns
+        loaded = residual.forces * start.load_factor > 0.0  # or pressures have no scale
         for iteration in range(limit + 1):
             residuals.append(self.relative(residual))
             if self.converged(residual, norm) and iteration > 0:
@@ -141,6 +146,7 @@ class NewtonSolver(EquilibriumSolver):
             try:
                 state, residual, length = advance(state, control, step, residual, iteration)
             except NotConverged as failure:
+                failure = NotConverged(failure.reason, failure.iterations + interior)
                 return self.accept_best(*best, control, residuals, failure)
             last = self._step_taken(before, -length * motion)
             if near and residual.norm > norm and not self.converged(residual, norm):
@@ -153,18 +159,13 @@ class NewtonSolver(EquilibriumSolver):
                     residual = system.residual(state, control)
             elif near and shift == least and length == 1.0:
                 state, residual, norm = self._finish(state, control, residual, norm, step)
-            if system.one_sided and not interior:
-                now, few = system.touching(), options.contact_changes
+            if system.one_sided and loaded and not interior:
+                now = system.touching()
                 changes, last_changes, touching = system.count(now != touching), changes, now
-                lasting = changes > few and 4 * changes > last_changes and iteration > 0
-                if lasting or (changes and iteration > few + 2):
-                    found, interior = self._with_pressures(start, control, residuals)
-                    if found is None:
-                        system.load(state)
-                        residual = system.residual(state, control)
-                    else:
-                        state, residual = found
-                        last, any_stability = None, True
+                lasting = changes > options.contact_settling * last_changes and iteration > 0
+                if (lasting and changes > system.points_of_facets) or (changes and iteration >= options.watchdog):
+                    (state, residual), interior = self._with_pressures(start, control, residuals)
+                    last, any_stability = None, True
             if residual.norm < best[1].norm:
                 best, not_better = (state, residual), 0
             else:
@@ -177,40 +178,39 @@ class NewtonSolver(EquilibriumSolver):
 
     def _with_pressures(
         self, state: State, control: Control, residuals: list[float]
-    ) -> tuple[tuple[State, Residual] | None, int]:
+    ) -> tuple[tuple[State, Residual], int]:
         """Iterations from ``state`` with the pressures of contact as unknowns.
 
-        Returns a state near the equilibrium with its residual, or None if they fail, and their number; ``residuals``
-        grow by one for each.
+        Returns a state near the equilibrium with its residual, and their number; ``residuals`` grow by one for each.
+
+        Raises:
+            NotConverged: they fail. Where contact does not settle the plain law would not do better: a smaller step
+                of the load is due.
         """
         system, options, count = self.system, self.options, len(residuals)
         system.load(state)
-        # the pressures that would carry ten times the loads, spread over the whole boundary; any would do
-        force = 10.0 * system.residual(state, control).forces / system.unknowns.unit_u
-        if not force * state.load_factor > 0.0:
-            return None, 0
-        pressures = InteriorPressures(system.one_sided, state.load_factor, force, system.comm)
-        first, norm, shift, last, tried = pressures.mean_product, math.inf, state.minimum_shift, None, False
+        forces = system.residual(state, control).forces / system.unknowns.unit_u
+        pressures = InteriorPressures(system.one_sided, state.load_factor, options.start_pressure * forces, system.comm)
+        norm, shift, last, tried = math.inf, state.minimum_shift, None, False
         for _ in range(options.interior_iterations):
             try:
                 following, shift, motion = self._pressure_step(state, control, pressures, shift, last)
-                plain = system.residual(following, control)
-                residuals.append(self.relative(plain))
-                _log.debug("pressures as unknowns: residual %.2e, shift %.1e", residuals[-1], shift)
-                state, last = following, self._step_taken(state, motion)
-                stalled = plain.norm > 0.5 * norm and pressures.mean_product < 1e-12 * first
-                if self.converged(plain, norm) or stalled:
-                    return (state, plain), len(residuals) - count
-                norm = plain.norm
-                if not tried and residuals[-1] < 0.1 * options.near and pressures.settled:
-                    tried, found = True, self._plain_step(state, control, plain)
-                    residuals.append(self.relative(found[1]))
-                    if found[1].norm < 0.1 * norm:
-                        return found, len(residuals) - count
-                    system.load(state)
-            except NotConverged:
-                break
-        return None, len(residuals) - count
+            except NotConverged as failure:
+                raise NotConverged(failure.reason, len(residuals)) from failure
+            plain = system.residual(following, control)
+            residuals.append(self.relative(plain))
+            _log.debug("pressures as unknowns: residual %.2e, shift %.1e", residuals[-1], shift)
+            state, last = following, self._step_taken(state, motion)
+            if self.converged(plain, norm):
+                return (state, plain), len(residuals) - count
+            norm = plain.norm
+            if not tried and residuals[-1] < 0.1 * options.near and pressures.settled:
+                tried, found = True, self._plain_step(state, control, plain)
+                residuals.append(self.relative(found[1]))
+                if found[1].norm < 0.1 * norm:
+                    return found, len(residuals) - count
+                system.load(state)
+        raise self.exhausted(residuals, len(residuals))
 
     def _pressure_step(
         self,
@@ -228,16 +228,17 @@ class NewtonSolver(EquilibriumSolver):
             residual = system.residual(state, control)
             system.linearise(state, control, residual, last)
             x, shift = self._direction(residual, state.minimum_shift, last=shift, any_stability=False)
-            pressures.aim_again(pressures.solved(-system.unknowns.apply(x)[nodes]))
+            pressures.aim_again(pressures.solved(-system.unknowns.apply(x)[nodes]), damped=shift > state.minimum_shift)
             residual = system.residual(state, control)
             x = self.try_solve(residual.vector, self.step_accuracy(residual))
             if x is None:
                 raise NotConverged("the linear solver stalled")
             step, motion = self.newton_step(x, state, control, residual), system.unknowns.apply(x)
             change = pressures.solved(-motion[nodes])
-            length = min(pressures.longest(change), self.options.largest_turn / max(system.size(step), 1e-300))
+            longest = pressures.longest(change)
+            length = min(longest, self.options.largest_turn / max(system.size(step), 1e-300))
             following, length = self._without_inversion(state, step, length)
-            pressures.advance(change, length)
+            pressures.advance(change, length, length / longest)
         finally:
             system.pressures = None
         return following, shift, -length * motion

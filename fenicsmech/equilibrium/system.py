@@ -262,6 +262,11 @@ class EquilibriumSystem:
             constraints.update()
         return np.concatenate([np.zeros(0, bool), *(constraints.gaps < 0.0 for constraints in self.one_sided)])
 
+    @property
+    def points_of_facets(self) -> int:
+        """How many points of one-sided constraints are on one facet."""
+        return max((constraints.points_of_facets for constraints in self.one_sided), default=0)
+
     def count(self, points: np.ndarray) -> int:
         """How many of all ranks' points are in a mask of those on this rank."""
         return self.comm.allreduce(int(points.sum()))
