@@ -85,6 +85,7 @@ class InteriorPressures:
         Where the stiffness is ``damped`` μ stays: short steps would look good, and μ fall far ahead of the forces.
         """
         if damped:
+            self._shares = _TO_BOUNDARY
             self.aim(self.mean_product)
             return
         pairs = zip((self.pressures, self.slacks), change, strict=True)
