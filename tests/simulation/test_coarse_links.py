@@ -38,7 +38,7 @@ def moved(kind: str, size: float, order: int, long: float) -> float:
     return float(sim.load_displacement(push, forces=[0.5 * (LONG / long) ** 2]).displacements[0])
 
 
-def told_by(caplog) -> list[str]:
+def warnings_of(caplog) -> list[str]:
     """The warnings of elements that are too long."""
     return [record.message for record in caplog.records if "bend too little" in record.message]
 
@@ -46,64 +46,68 @@ def told_by(caplog) -> list[str]:
 @pytest.mark.parametrize(
     ("order", "longest", "longer", "long"),
     # elements grow from those at joints: longer ones need a longer leaf
-    [(2, 3.0, 6.0, LONG), (3, 8.0, 10.0, 2.0 * LONG), pytest.param(1, 0.1, 0.2, LONG, marks=pytest.mark.thorough)],
+    [
+        (2, 3.0, 6.0, LONG),
+        pytest.param(3, 8.0, 10.0, 2.0 * LONG, marks=pytest.mark.thorough),
+        pytest.param(1, 0.1, 0.2, LONG, marks=pytest.mark.thorough),
+    ],
 )
-def test_elements_that_are_not_told_bend_with_a_leaf_and_longer_ones_may_not(order, longest, longer, long, caplog):
+def test_elements_without_a_warning_bend_with_a_leaf_and_longer_ones_may_not(order, longest, longer, long, caplog):
     for kind in ("straight", "bow"):
         exact = moved(kind, 0.5, 3, long)
         with caplog.at_level(logging.WARNING, "fenicsmech"):
             assert abs(moved(kind, longest, order, long) / exact - 1.0) < 0.015
-    assert not told_by(caplog)
+    assert not warnings_of(caplog)
     with caplog.at_level(logging.WARNING, "fenicsmech"):
         assert abs(moved("bow", longer, order, long) / exact - 1.0) > 0.03
-    assert len(told_by(caplog)) == 1
+    assert len(warnings_of(caplog)) == 1
 
 
 @pytest.mark.parametrize("kind", ["straight", "straight polygon", "bow"])
-def test_links_that_are_thinner_than_their_elements_are_told_once(kind, caplog):
+def test_links_that_are_thinner_than_their_elements_are_warned_of_once(kind, caplog):
     scene, push = leaf(kind)
     with caplog.at_level(logging.WARNING, "fenicsmech"):
         sim = fm.Simulation(scene, space="plane-stress", size=4.0)
         curve = sim.load_displacement(push, forces=[0.1])
-    told = told_by(caplog)
+    told = warnings_of(caplog)
     assert len(told) == 1
     assert "'leaf' is drawn 1 mm thick at its thinnest, its elements 4 mm long" in told[0] and "size=3 " in told[0]
     hints = {hint.what: hint for hint in curve.explain().left_out}
     assert hints["length of elements"].text == told[0] and hints["length of elements"].matters
 
 
-def test_the_size_that_is_told_is_not_told_again(caplog):
+def test_the_size_that_a_warning_advises_gives_none(caplog):
     scene, _ = leaf("straight", thick=1.25)
     with caplog.at_level(logging.WARNING, "fenicsmech"):
         fm.Simulation(scene, space="plane-stress", size=4.0)
-        (told,) = told_by(caplog)
+        (told,) = warnings_of(caplog)
         size = float(told.split("size=")[1].split()[0])
         assert 3.5 < size <= 3.0 * 1.25
         fm.Simulation(scene, space="plane-stress", size=size)
-    assert len(told_by(caplog)) == 1
+    assert len(warnings_of(caplog)) == 1
 
 
-def test_rounding_of_a_thickness_is_not_told(caplog):
+def test_rounding_of_a_thickness_gives_no_warning(caplog):
     scene, _ = leaf("straight", thick=7.9999999997)
     with caplog.at_level(logging.WARNING, "fenicsmech"):
         fm.Simulation(scene, space="plane-stress", size=24.0)
-    assert not told_by(caplog)
+    assert not warnings_of(caplog)
 
 
-def test_thin_shapes_given_later_are_told(caplog):
+def test_thin_shapes_given_later_are_warned_of(caplog):
     scene, _ = leaf("straight", thick=2.0)
     thin, _ = leaf("straight polygon", thick=1.0)
     (link,), (other,) = scene.mechanism.flexible_links, thin.mechanism.flexible_links
     with caplog.at_level(logging.WARNING, "fenicsmech"):
         sim = fm.Simulation(scene, space="plane-stress", size=4.0)
         sim.with_shapes({})
-        assert not told_by(caplog)
+        assert not warnings_of(caplog)
         sim.with_shapes({link: other.shape})
-    (told,) = told_by(caplog)
+    (told,) = warnings_of(caplog)
     assert "drawn 1 mm thick" in told
 
 
-def test_links_with_elements_short_enough_are_not_told(caplog):
+def test_links_with_elements_short_enough_give_no_warning(caplog):
     scene, push = leaf("straight polygon")
     with caplog.at_level(logging.WARNING, "fenicsmech"):
         sim = fm.Simulation(scene, space="plane-stress", size=2.0)
@@ -121,7 +125,7 @@ def test_a_notch_shorter_than_the_elements_is_no_stretch_of_them(caplog):
     rig.weld(hand, hinge, at=(40, 0), region=fm.Rectangle(6.0, 10.0))
     with caplog.at_level(logging.WARNING, "fenicsmech"):
         fm.Simulation(fm.Scene(rig), space="plane-stress", size=4.0)
-    assert not told_by(caplog)
+    assert not warnings_of(caplog)
 
 
 def test_a_link_with_a_neck_that_cuts_its_medial_axis_is_simulated():
