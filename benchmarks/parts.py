@@ -59,7 +59,7 @@ def rows(name: str, result: fm.DesignResult) -> Iterator[tuple]:
 
 def main():
     parser = command(__doc__)
-    parser.add_argument("demos", nargs="*", default=SPACES, help="which (default: those that design links alone)")
+    parser.add_argument("demos", nargs="*", default=SPACES, help="which (default: all that design)")
     parser.add_argument("--results", type=Path, default=Path("results/parts"), metavar="DIR", help="verified designs")
     parser.add_argument("--size", type=float, metavar="MM", help="element size (default: that of each demo)")
     options = parser.parse_args()
