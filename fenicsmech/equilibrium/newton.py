@@ -165,7 +165,7 @@ class NewtonSolver(EquilibriumSolver):
                 lasting = changes > options.contact_settling * last_changes and iteration > 0
                 if (lasting and changes > system.points_of_facets) or (changes and iteration >= options.watchdog):
                     (state, residual), interior = self._with_pressures(start, control, residuals)
-                    last, any_stability = None, True
+                    last, any_stability, predicted = None, True, True  # the last factor is not of the true matrix
             if residual.norm < best[1].norm:
                 best, not_better = (state, residual), 0
             else:
