@@ -26,7 +26,8 @@ Close to convergence the factor of the KKT matrix K is reused (simplified Newton
 as long as corrections contract by a factor of 1000 or more; otherwise, as next to a limit point, K is factored anew.
 
 Where many points come into contact or leave it in every iteration, the pressures of contact become unknowns for a
-while (see ``interior_point``).
+while (see ``interior_point``). Steps are taken as long as the inertia guarantees descent; where it does not, a smaller
+step of the load is due.
 
 Across a path (see ``control``) equilibria of any stability are wanted and a good guess is near: steps are taken in
 full, led into the plane by bordering; where they diverge, a shorter step along the path is tried instead of descent.
@@ -70,8 +71,8 @@ class PrimalDualNewton(EquilibriumMethod):
             for instead of the one it led to.
         largest_turn: largest rotation (rad), or displacement over the mechanism's length, of one step.
         contact_settling: share of the last iteration's changes of contact up to which they settle by themselves, as do
-            those of no more than one facet; beyond, and after as many iterations as ``watchdog``, pressures are
-            unknowns. Half: the points that change are then found by halving.
+            those of no more than one facet, and a first touch at which the residual falls; beyond, and after as many
+            iterations as ``watchdog``, pressures are unknowns. Half: the points that change are then found by halving.
         interior_iterations: most iterations with pressures as unknowns, which count beside the others.
         start_pressure: first pressures as unknowns, over those that would carry the loads, spread over the whole
             boundary. Counts hardly depend on it: between 0.1 and 10 they change by a tenth or two.
@@ -162,7 +163,8 @@ class NewtonSolver(EquilibriumSolver):
             if system.one_sided and loaded and not interior:
                 now = system.touching()
                 changes, last_changes, touching = system.count(now != touching), changes, now
-                lasting = changes > options.contact_settling * last_changes and iteration > 0
+                lasting = changes > options.contact_settling * last_changes
+                lasting &= iteration > 0 and (last_changes > 0 or residual.norm > norm)
                 if (lasting and changes > system.points_of_facets) or (changes and iteration >= options.watchdog):
                     (state, residual), interior = self._with_pressures(start, control, residuals)
                     last, any_stability, predicted = None, True, True  # the last factor is not of the true matrix
@@ -191,15 +193,15 @@ class NewtonSolver(EquilibriumSolver):
         system.load(state)
         forces = system.residual(state, control).forces / system.unknowns.unit_u
         pressures = InteriorPressures(system.one_sided, state.load_factor, options.start_pressure * forces, system.comm)
-        norm, shift, last, tried = math.inf, state.minimum_shift, None, False
+        norm, last, tried = math.inf, None, False
         for _ in range(options.interior_iterations):
             try:
-                following, shift, motion = self._pressure_step(state, control, pressures, shift, last)
+                following, motion = self._pressure_step(state, control, pressures, last)
             except NotConverged as failure:
-                raise NotConverged(failure.reason, len(residuals)) from failure
+                raise NotConverged(failure.reason, len(residuals) + 1) from failure
             plain = system.residual(following, control)
             residuals.append(self.relative(plain))
-            _log.debug("pressures as unknowns: residual %.2e, shift %.1e", residuals[-1], shift)
+            _log.debug("pressures as unknowns: residual %.2e", residuals[-1])
             state, last = following, self._step_taken(state, motion)
             if self.converged(plain, norm):
                 return (state, plain), len(residuals) - count
@@ -213,26 +215,27 @@ class NewtonSolver(EquilibriumSolver):
         raise self.exhausted(residuals, len(residuals))
 
     def _pressure_step(
-        self,
-        state: State,
-        control: Control,
-        pressures: InteriorPressures,
-        shift: float,
-        last: tuple[State, np.ndarray] | None,
-    ) -> tuple[State, float, np.ndarray]:
-        """One iteration with ``pressures`` as unknowns: the state after it, the shift, and the motion of the nodes."""
+        self, state: State, control: Control, pressures: InteriorPressures, last: tuple[State, np.ndarray] | None
+    ) -> tuple[State, np.ndarray]:
+        """One iteration with ``pressures`` as unknowns: the state after it, and the motion of the nodes.
+
+        Raises:
+            NotConverged: the step need not descend; a shift would make it short beside the steps of the pressures.
+        """
         system, nodes = self.system, self.system.numbering.rows.nodes.local
         system.pressures = pressures
         try:
             pressures.aim(0.0)
             residual = system.residual(state, control)
             system.linearise(state, control, residual, last)
-            x, shift = self._direction(residual, state.minimum_shift, last=shift, any_stability=False)
-            pressures.aim_again(pressures.solved(-system.unknowns.apply(x)[nodes]), damped=shift > state.minimum_shift)
+            if not self.factor(state.minimum_shift):
+                raise NotConverged("the KKT matrix with pressures of contact cannot be factored")
+            x = self._solved(residual)
+            if not self.descends():
+                raise NotConverged("with pressures of contact as unknowns the step need not descend")
+            pressures.aim_again(pressures.solved(-system.unknowns.apply(x)[nodes]))
             residual = system.residual(state, control)
-            x = self.try_solve(residual.vector, self.step_accuracy(residual))
-            if x is None:
-                raise NotConverged("the linear solver stalled")
+            x = self._solved(residual)
             step, motion = self.newton_step(x, state, control, residual), system.unknowns.apply(x)
             change = pressures.solved(-motion[nodes])
             longest = pressures.longest(change)
@@ -241,7 +244,14 @@ class NewtonSolver(EquilibriumSolver):
             pressures.advance(change, length, length / longest)
         finally:
             system.pressures = None
-        return following, shift, -length * motion
+        return following, -length * motion
+
+    def _solved(self, residual: Residual) -> PETSc.Vec:
+        """x with K x the residual and K as last factored."""
+        x = self.try_solve(residual.vector, self.step_accuracy(residual))
+        if x is None:
+            raise NotConverged("the linear solver stalled")
+        return x
 
     def _plain_step(self, state: State, control: Control, residual: Residual) -> tuple[State, Residual]:
         """The whole Newton step from the loaded ``state``."""
