@@ -16,8 +16,8 @@ e = δp δs.
 Newton's method on p = ⟨−g⟩ / c itself adds or drops a few points in an iteration: as a slender link peels off an
 obstacle, the reaction stands in a layer whose width is that of the elements, and moves by as much. The augmented
 Lagrangian of Alart and Curnier, whose pressures are unknowns too, changes the same points: a cantilever that wraps
-round a cylinder takes ten times as many of its iterations. The steps of an interior-point method move the whole border of
-contact; their number hardly depends on the elements or on c.
+round a cylinder takes ten times as many of its iterations. The steps of an interior-point method move the whole border
+of contact; their number hardly depends on the elements or on c.
 
 Source: Mehrotra, On the implementation of a primal–dual interior point method (SIAM Journal on Optimization 2, 1992,
 doi:10.1137/0802028); Nocedal & Wright, Numerical Optimization (doi:10.1007/978-0-387-40065-5), chapters 14 and 19.
