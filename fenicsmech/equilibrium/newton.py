@@ -25,9 +25,9 @@ Close to convergence the factor of the KKT matrix K is reused (simplified Newton
 
 as long as corrections contract by a factor of 1000 or more; otherwise, as next to a limit point, K is factored anew.
 
-Where many points come into contact or leave it in every iteration, the pressures of contact become unknowns for a
-while (see ``interior_point``). Steps are taken as long as the inertia guarantees descent; where it does not, a smaller
-step of the load is due.
+Where contact changes at more points than in the iteration before and at more than those of a facet (at a first touch:
+and the residual grows), the pressures of contact become unknowns for a while (see ``interior_point``). Steps are taken
+as long as the inertia guarantees descent; where it does not, a smaller step of the load is due.
 
 Across a path (see ``control``) equilibria of any stability are wanted and a good guess is near: steps are taken in
 full, led into the plane by bordering; where they diverge, a shorter step along the path is tried instead of descent.
@@ -70,9 +70,6 @@ class PrimalDualNewton(EquilibriumMethod):
         predicted_stress: whether K_uu, as long as the residual is large, holds the stress that the last step solved
             for instead of the one it led to.
         largest_turn: largest rotation (rad), or displacement over the mechanism's length, of one step.
-        contact_settling: share of the last iteration's changes of contact up to which they settle by themselves, as do
-            those of no more than one facet, and a first touch at which the residual falls; beyond, and after as many
-            iterations as ``watchdog``, pressures are unknowns. Half: the points that change are then found by halving.
         interior_iterations: most iterations with pressures as unknowns, which count beside the others.
         start_pressure: first pressures as unknowns, over those that would carry the loads, spread over the whole
             boundary. Counts hardly depend on it: between 0.1 and 10 they change by a tenth or two.
@@ -90,7 +87,6 @@ class PrimalDualNewton(EquilibriumMethod):
     watchdog: int = 12
     predicted_stress: bool = True
     largest_turn: float = 0.5
-    contact_settling: float = 0.5
     interior_iterations: int = 40
     start_pressure: float = 10.0
     reuse_factor: float = 1e-3
@@ -99,7 +95,7 @@ class PrimalDualNewton(EquilibriumMethod):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for limit in ("near", "largest_turn", "divergence", "contact_settling", "start_pressure"):
+        for limit in ("near", "largest_turn", "divergence", "start_pressure"):
             positive(f"Newton's {limit}", getattr(self, limit))
         if self.reuse_factor != 0.0:
             positive("Newton's reuse_factor", self.reuse_factor)
@@ -163,9 +159,8 @@ class NewtonSolver(EquilibriumSolver):
             if system.one_sided and loaded and not interior:
                 now = system.touching()
                 changes, last_changes, touching = system.count(now != touching), changes, now
-                lasting = changes > options.contact_settling * last_changes
-                lasting &= iteration > 0 and (last_changes > 0 or residual.norm > norm)
-                if (lasting and changes > system.points_of_facets) or (changes and iteration >= options.watchdog):
+                growing = iteration > 0 and changes > last_changes and (last_changes > 0 or residual.norm > norm)
+                if (growing and changes > system.points_of_facets) or (changes and iteration >= options.watchdog):
                     (state, residual), interior = self._with_pressures(start, control, residuals)
                     last, any_stability, predicted = None, True, True  # the last factor is not of the true matrix
             if residual.norm < best[1].norm:
