@@ -130,6 +130,7 @@ class _Path:
         self.solver: EquilibriumSolver = simulation.solver(sample.part, sample.others)
         self.moved = None if sample.moved is None else Displacement(sample.moved[0]).on(simulation.model)
         strained = assemble(simulation.linkage, sample.configuration).fraction < 1.0
+        strained = strained or simulation.model.winds_springs(sample.configuration)
         own = observables if self.moved is None else (*observables, self.moved)
         moved = any(observable.on_link for observable in own)
         self.moves = strained or moved or any(kind.moves_unloaded(sample.configuration) for kind in numbers)

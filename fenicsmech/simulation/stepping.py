@@ -240,7 +240,10 @@ class CurveStepper:
             )
 
     def _unloaded(self, assembly: Assembly) -> State:
-        """The configuration without force or effect: the rigid assembly, or the equilibrium with strained links."""
+        """The equilibrium without force, effects at load factor 0: the rigid assembly, or that with strained links.
+
+        Motors strain them beyond a part of their way, or by the springs that they wind up.
+        """
         configuration, fraction = self.request.configuration, assembly.fraction
         drawn, here, there = (self._joints.on_the_way(configuration.position, part) for part in (0.0, fraction, 1.0))
         state = replace(
@@ -248,12 +251,12 @@ class CurveStepper:
             load_factor=0.0 if self.request.others or self._model.effects else 1.0,
             minimum_shift=LoadSteps().minimum_shift if self.freedom.zero_energy else 0.0,
         )
-        if fraction == 1.0:
+        if fraction == 1.0 and not self._model.winds_springs(configuration):
             return state
         control = MotorControl(fraction, there - drawn, origin=drawn)
         stepper = MotorStepper(self.solver, state, control, predictor=self.discretisation.predictor)
         # a quarter of a radian, or of the mechanism's length: in space a motor's equation is periodic
-        steps = int(np.ceil((1.0 - fraction) * self._joints.travel(there - drawn) / 0.25))
+        steps = max(int(np.ceil((1.0 - fraction) * self._joints.travel(there - drawn) / 0.25)), 1)
         try:
             for value in np.linspace(fraction, 1.0, steps + 1)[1:]:
                 state = stepper.advance(control.at(float(value))).state
