@@ -418,7 +418,7 @@ class MechanismModel:
         return replace(state, u=np.concatenate([carried[: len(displacements)], *pressures]))
 
     def winds_springs(self, configuration: Configuration) -> bool:
-        """Whether the motors of a configuration may wind up springs, which then strain links without any load."""
+        """Whether motors move in a configuration and there are springs, which may strain links without any load."""
         drawn, there = (self.linkage.joints.on_the_way(configuration.position, part) for part in (0.0, 1.0))
         return bool(self.spring_potentials) and not np.array_equal(drawn, there)
 

@@ -13,8 +13,8 @@ R(y₀). These are removed in one step. The same check applies, with R(y; d₀) 
 second one to the distance of y from y₀.
 
 Displacements q count from the unloaded configuration y°. Where that moves with the design (a point lies on a flexible
-link, or motors strain the links), it is an equilibrium that is followed too. A prescribed displacement v = v̄ + q_v(y°)
-moves with it:
+link, or motors strain links or wind up springs), it is an equilibrium that is followed too. A prescribed displacement
+v = v̄ + q_v(y°) moves with it:
 
     Q = g(q(y) − q(y°)),     dQ/dp = ∂g/∂q (dq/dp + dq/dv dq_v°/dp − dq°/dp).
 
@@ -129,11 +129,12 @@ class _Path:
         self.sample, self._model = sample, simulation.model
         self.solver: EquilibriumSolver = simulation.solver(sample.part, sample.others)
         self.moved = None if sample.moved is None else Displacement(sample.moved[0]).on(simulation.model)
-        strained = assemble(simulation.linkage, sample.configuration).fraction < 1.0
-        strained = strained or simulation.model.winds_springs(sample.configuration)
+        configuration = sample.configuration
+        strained = assemble(simulation.linkage, configuration).fraction < 1.0
+        strained = strained or simulation.model.winds_springs(configuration)
         own = observables if self.moved is None else (*observables, self.moved)
         moved = any(observable.on_link for observable in own)
-        self.moves = strained or moved or any(kind.moves_unloaded(sample.configuration) for kind in numbers)
+        self.moves = strained or moved or any(kind.moves_unloaded(configuration) for kind in numbers)
 
     def control(self, unloaded: State) -> Control:
         """The sample's control at the design that the model holds."""

@@ -3,7 +3,8 @@
     V = ½ k (φ − φ₀)² = ½ k φ² − k φ₀ φ + const.
 
 The first term holds the mechanism from the start, the second grows with the load factor of constant
-loads, which takes the rest position from 0 to φ₀.
+loads, which takes the rest position from 0 to φ₀. Displacements count from the equilibrium with the first term alone,
+in which the links are strained where motors have wound the spring up.
 """
 
 from __future__ import annotations

@@ -59,9 +59,6 @@ class SpringStiffness(_OfSprings):
         sliding = self.parts[0].joint.kind.sliding
         return f"{units.force}/{units.length}" if sliding else f"{units.force} {units.length}/rad"
 
-    def moves_unloaded(self, configuration: Configuration) -> bool:
-        return any(position for _, position in configuration.positions)
-
 
 @dataclass(frozen=True, init=False)
 class SpringRest(_OfSprings):

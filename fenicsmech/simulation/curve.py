@@ -64,7 +64,7 @@ class Curve:
         freedom: mobility and redundancy of the assembled configuration.
         frames: one per prescribed value, in their order.
         discretisation: of the scene, with which they were computed.
-        unloaded: the configuration without any load or effect, from which displacements count.
+        unloaded: the equilibrium without forces, effects at load factor 0, from which displacements count.
         others: constant magnitudes of other forces.
         unknown: of the curve: displacements, or forces where displacements were prescribed or the curve was followed.
     """

@@ -258,7 +258,7 @@ class Simulation:
         return branches(curve, event, until, steps or ArcSteps(), mode)
 
     def path(self, part: Force | Output, configurations: Sequence[Configuration]) -> np.ndarray:
-        """Unloaded position of the point of a force or output in each configuration, (configurations, dim).
+        """Position of the point of a force or output in each rigid assembly, (configurations, dim).
 
         Raises:
             AssemblyError: one of the configurations does not assemble, or its motors strain the links.
@@ -423,10 +423,10 @@ class Simulation:
             return CurveStepper(self._discretisation, request).curve(watch)
 
     def unloaded(self, request: CurveRequest) -> State:
-        """The configuration of a checked request without any force or effect.
+        """The equilibrium of a checked request without forces, effects at load factor 0.
 
         Raises:
-            EquilibriumError: motors strain the links, and no equilibrium was found.
+            EquilibriumError: motors strain the links or wind up springs, and no equilibrium was found.
         """
         with self._shaped():
             return CurveStepper(self._discretisation, request).unloaded

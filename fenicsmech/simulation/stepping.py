@@ -136,7 +136,7 @@ class CurveStepper:
         frames: those of the curve so far.
         solver: for the request's forces.
         freedom: mobility of the configuration.
-        unloaded: the configuration without any force or effect.
+        unloaded: the equilibrium without forces, effects at load factor 0.
         followed: the control whose value changes along the curve.
         origin: zero of displacements: that of the force's point in the unloaded configuration.
     """
@@ -240,9 +240,9 @@ class CurveStepper:
             )
 
     def _unloaded(self, assembly: Assembly) -> State:
-        """The equilibrium without force, effects at load factor 0: the rigid assembly, or that with strained links.
+        """The equilibrium without forces, effects at load factor 0.
 
-        Motors strain them beyond a part of their way, or by the springs that they wind up.
+        It is the rigid assembly unless motors strain links, or wind up springs that do.
         """
         configuration, fraction = self.request.configuration, assembly.fraction
         drawn, here, there = (self._joints.on_the_way(configuration.position, part) for part in (0.0, fraction, 1.0))
@@ -262,11 +262,11 @@ class CurveStepper:
                 state = stepper.advance(control.at(float(value))).state
             self._snaps += stepper.snaps
         except LoadStepsFailed as failure:
+            beyond = "there" if fraction == 1.0 else f"beyond {failure.reached:.1%} of their way"
             raise EquilibriumError(
                 f"configuration {configuration.name!r}",
-                f"the motors strain the links, and no equilibrium was found beyond {failure.reached:.1%} of their way "
-                f"({failure.reason})",
-                "Choose motor positions nearer to the drawn ones, or a softer link",
+                f"the motors strain the links, and no equilibrium was found {beyond} ({failure.reason})",
+                "Choose motor positions nearer to the drawn ones, or a softer link or spring",
                 last=self._last(failure),
             ) from failure
         return state
