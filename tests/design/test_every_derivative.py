@@ -124,7 +124,7 @@ def test_derivatives_of_all_quantities_by_all_parameters(space, shapes, formulat
         directions[name] = np.eye(len(p))[row]
     failed = {}
     for name, direction in directions.items():
-        steps = (0.02, 0.01, 0.005)
+        steps = (0.008, 0.004, 0.002)
         changes = np.array([changed(h * direction) - values for h in steps])
         remainders = np.abs(changes - np.outer(steps, slopes @ direction))
         for k, (first, rest) in enumerate(zip(np.abs(changes).max(axis=0), remainders.T, strict=True)):
