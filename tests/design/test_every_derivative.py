@@ -126,13 +126,16 @@ def test_derivatives_of_all_quantities_by_all_parameters(space, shapes, formulat
     for name, direction in directions.items():
         steps = (0.008, 0.004, 0.002)
         changes = np.array([changed(h * direction) - values for h in steps])
-        remainders = np.abs(changes - np.outer(steps, slopes @ direction))
+        remainders = changes - np.outer(steps, slopes @ direction)
         for k, (first, rest) in enumerate(zip(np.abs(changes).max(axis=0), remainders.T, strict=True)):
-            if rest.max() <= 1e-7 * max(first, 1e-2 * abs(values[k]), 1e-3):  # linear, or independent
+            largest = np.abs(rest).max()
+            if largest <= 1e-7 * max(first, 1e-2 * abs(values[k]), 1e-3):  # linear, or independent
                 continue
-            rates = np.log2(rest[:-1] / np.maximum(rest[1:], 1e-300))
-            if not rates.max() >= 1.95:
-                failed[name, k] = rates, rest, first, values[k]
+            rates = np.log2(np.abs(rest[:-1]) / np.maximum(np.abs(rest[1:]), 1e-300))
+            # where terms of second and third order cancel: their first-order term, exact but for the fourth
+            linear = abs(np.dot((1.0, -12.0, 32.0), rest)) / 12.0
+            if not (rates.max() >= 1.95 or linear <= 0.035 * largest):  # a share of 0.035 lowers the rate to 1.95
+                failed[name, k] = rates, linear, rest, first, values[k]
     assert not failed
 
 
