@@ -33,7 +33,6 @@ from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State, load_fie
 from fenicsmech.errors import DescriptionError, expect, positive
 from fenicsmech.log import Clock
 from fenicsmech.mechanism import (
-    Configuration,
     Effect,
     FlexibleLink,
     Force,
@@ -416,11 +415,6 @@ class MechanismModel:
         self.reshape(given)
         displacements, *pressures = self.elastic.split(state.u)
         return replace(state, u=np.concatenate([carried[: len(displacements)], *pressures]))
-
-    def winds_springs(self, configuration: Configuration) -> bool:
-        """Whether motors move in a configuration and there are springs, which may strain links without any load."""
-        drawn, there = (self.linkage.joints.on_the_way(configuration.position, part) for part in (0.0, 1.0))
-        return bool(self.spring_potentials) and not np.array_equal(drawn, there)
 
     def assembled_state(self, poses: np.ndarray, motors: np.ndarray) -> State:
         """The state of a rigid assembly: every flexible link carried along by its first interface."""

@@ -46,7 +46,6 @@ from fenicsmech.equilibrium import (
 )
 from fenicsmech.errors import EquilibriumError
 from fenicsmech.model import Design
-from fenicsmech.multibody import assemble
 from fenicsmech.quantities import (
     Displacement,
     Gradient,
@@ -120,7 +119,6 @@ class _Path:
     Attributes:
         sample: its description.
         solver: of its equilibria.
-        moves: whether its unloaded configuration moves with the design.
     """
 
     def __init__(
@@ -129,12 +127,13 @@ class _Path:
         self.sample, self._model = sample, simulation.model
         self.solver: EquilibriumSolver = simulation.solver(sample.part, sample.others)
         self.moved = None if sample.moved is None else Displacement(sample.moved[0]).on(simulation.model)
-        configuration = sample.configuration
-        strained = assemble(simulation.linkage, configuration).fraction < 1.0
-        strained = strained or simulation.model.winds_springs(configuration)
         own = observables if self.moved is None else (*observables, self.moved)
         moved = any(observable.on_link for observable in own)
-        self.moves = strained or moved or any(kind.moves_unloaded(configuration) for kind in numbers)
+        self._moves = moved or any(kind.moves_unloaded(sample.configuration) for kind in numbers)
+
+    def moves(self, unloaded: State) -> bool:
+        """Whether the sample's unloaded configuration, or a point there, moves with the design."""
+        return self._moves or unloaded.has_reactions
 
     def control(self, unloaded: State) -> Control:
         """The sample's control at the design that the model holds."""
@@ -233,7 +232,7 @@ class SampleEquilibria:
             at = solved.samples[path.sample]
             places, partials = self._partials(solved, path, at.state, own)
             loaded = self._sensitivity.of(path.solver, at.state, at.control, partials)
-            if path.moves:
+            if path.moves(at.unloaded):
                 loaded = self._less_unloaded(solved, path, places, loaded)
             for k, gradient in zip(places, loaded, strict=True):
                 found.setdefault(k, []).append(gradient)
@@ -248,11 +247,10 @@ class SampleEquilibria:
                 places, partials = self._partials(solved, path, at.state, self._of(path.sample))
                 adjoints = self._sensitivity.adjoints(path.solver, at.state, at.control, partials)
                 errors, slopes = self._estimated(adjoints), [own.by_control() if own else 0.0 for own in adjoints]
-                if path.moves:
+                if path.moves(at.unloaded):
                     from_there, counted, prescribed = self._unloaded_partials(solved, path, places)
-                    origin = solved.samples[path.sample].unloaded
                     unloaded = self._estimated(
-                        self._sensitivity.adjoints(path.solver, origin, LoadControl(0.0), from_there)
+                        self._sensitivity.adjoints(path.solver, at.unloaded, LoadControl(0.0), from_there)
                     )
                     for place, error in zip(counted, unloaded, strict=False):
                         errors[place] -= error
@@ -392,7 +390,7 @@ class SampleEquilibria:
 
     def _followed(self, path: _Path, at: SampleState, before: Design, after: Design) -> SampleState:
         unloaded, halvings, nothing = at.unloaded, self._options.halvings, LoadControl(0.0)
-        if path.moves:
+        if path.moves(unloaded):
             unloaded = self._moved(path, unloaded, _Prescribed(before, nothing), _Prescribed(after, nothing), halvings)
         self._model.reshape(after)
         control = path.control(unloaded)

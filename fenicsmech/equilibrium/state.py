@@ -35,6 +35,11 @@ class State:
     load_factor: float = 1.0
     minimum_shift: float = 0.0
 
+    @property
+    def has_reactions(self) -> bool:
+        """Whether joints carry forces or moments, which they do not in a rigid assembly."""
+        return bool(np.any(self.multipliers))
+
 
 @dataclass(frozen=True, eq=False)
 class Step:

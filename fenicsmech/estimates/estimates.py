@@ -156,17 +156,23 @@ class Estimates:
         equilibrium: Equilibrium,
         kinds: Sequence[ErrorKind] = (ErrorKind.ELEMENTS,),
         output: PointLoad | None = None,
+        *,
+        origin: Sequence[float] = (),
     ) -> list[float]:
         """Corrections of the quantity of an equilibrium, by kinds of error, from one adjoint.
 
-        With an ``output``, those of the displacement of that point, under the same control.
+        With an ``output``, those of the displacement of that point, under the same control. Displacements count from
+        the drawing. Where the place that a prescribed one counts from has corrections, ``origin``, it moves with them.
 
         Raises:
             DescriptionError: ``kinds`` hold the error of plane stress and the model is another one.
             EquilibriumError: the KKT matrix is singular.
         """
         with self._model.clock.phase("estimate"), self._model.shaped(equilibrium.design):
-            return self.of(adjoint_at(solver, equilibrium, output), kinds)
+            adjoint = adjoint_at(solver, equilibrium, output)
+            slope = adjoint.by_control() if origin and equilibrium.unknown is Unknown.FORCE else 0.0
+            found = self.of(adjoint, kinds)
+            return [own + slope * moved for own, moved in zip(found, origin or [0.0] * len(found), strict=True)]
 
     def of(self, adjoint: Adjoint, kinds: Sequence[ErrorKind] = (ErrorKind.ELEMENTS,)) -> list[float]:
         """Corrections of a quantity from its adjoint, at the state and design that the model holds.

@@ -12,7 +12,7 @@ import numpy as np
 from fenicsmech.collective import on_one
 from fenicsmech.continuation import Mode, critical_changes, softest_modes
 from fenicsmech.elasticity import PLANE_STRESS
-from fenicsmech.equilibrium import EquilibriumSolver, LoadControl, MotorControl, NotConverged, State, Unknown
+from fenicsmech.equilibrium import EquilibriumSolver, LoadControl, MotorControl, NotConverged, PointLoad, State, Unknown
 from fenicsmech.errors import DescriptionError, EquilibriumError, counted
 from fenicsmech.estimates import AccuracyOptions, Equilibrium, ErrorKind, cause_of_growth, growth_by_halving
 from fenicsmech.files import write_csv
@@ -440,10 +440,24 @@ class Curve:
         if missing:
             estimates, model = self.discretisation.estimates, self.discretisation.model
             point = None if output is None else model.point_load(output)
-            rows = [estimates.at(self._solver, self.equilibrium(frame), missing, point) for frame in self.frames]
-            for kind, column in zip(missing, np.array(rows).T, strict=True):
-                self._errors[kind, output] = column
+            origin, zero = self._unloaded_errors(missing, point)
+            at = map(self.equilibrium, self.frames)
+            rows = [estimates.at(self._solver, own, missing, point, origin=origin) for own in at]
+            for kind, column, less in zip(missing, np.array(rows).T, zero, strict=True):
+                self._errors[kind, output] = column - less
             growth, largest = np.abs(self.growth_by_halving).max(), np.abs(self.values).max()
             if output is None and growth > ExplanationOptions().tolerance * largest:
                 _log.warning("%s (each halving adds %.2g of it)", cause_of_growth(self.part), growth / largest)
         return [self._errors[kind, output] for kind in kinds]
+
+    def _unloaded_errors(self, kinds: Sequence[ErrorKind], output: PointLoad | None) -> tuple[list[float], list[float]]:
+        """Estimated errors of each kind in the unloaded configuration: of the force's displacement, and of the quantity
+        in question where it counts from there; 0 in a rigid assembly."""
+        estimates, nothing = self.discretisation.estimates, [0.0] * len(kinds)
+        if not self.unloaded.has_reactions:
+            return nothing, nothing
+        at = Equilibrium(self.unloaded, self.frames[0].design, Unknown.DISPLACEMENT)
+        origin = estimates.at(self._solver, at, kinds)
+        if output is not None:
+            return origin, estimates.at(self._solver, at, kinds, output)
+        return origin, nothing if self.unknown is Unknown.FORCE else origin

@@ -18,7 +18,7 @@ class Frame:
 
     Attributes:
         force: magnitude of the prescribed force, or torque or force of the prescribed motors.
-        displacement: of the force's point along it, from the assembled configuration, or the motors' position, from
+        displacement: of the force's point along it, from the unloaded configuration, or the motors' position, from
             the drawing.
         snapped_through: whether the mechanism snapped on the way from the frame before: the path turns back there, and
             this equilibrium lies on another one, perhaps not the one that dynamics would lead to.
@@ -26,7 +26,7 @@ class Frame:
         stable_under_control: whether it is stable while its control is held.
         strain_energy: elastic energy of all links.
         max_stress: largest von Mises stress at cell midpoints.
-        outputs: displacement of each output of the mechanism, from the assembled configuration.
+        outputs: displacement of each output of the mechanism, from the unloaded configuration.
         reactions: force and moment of each joint on its second link, by joint name.
         motors: torque or force of each motor.
         iterations: Newton iterations, load steps on the way included.

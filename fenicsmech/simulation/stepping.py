@@ -1,7 +1,7 @@
 """Curves at prescribed values: the request, checked before anything is meshed, and the load steps through all values.
 
-A curve starts in the assembled configuration, under constant loads. The prescribed part is a force or motors; both give
-a curve of force (or torque) over displacement (or position).
+A curve starts from the unloaded configuration, under constant loads. The prescribed part is a force or motors; both
+give a curve of force (or torque) over displacement (or position).
 
 Rounding of the nodal forces of stiff links may exceed small loads, so that a residual of the size of rounding does not
 fix the rest position of a zero-energy mode. The forces inside an element cancel along motions that deform no link, and
@@ -251,7 +251,8 @@ class CurveStepper:
             load_factor=0.0 if self.request.others or self._model.effects else 1.0,
             minimum_shift=LoadSteps().minimum_shift if self.freedom.zero_energy else 0.0,
         )
-        if fraction == 1.0 and not self._model.winds_springs(configuration):
+        wound = bool(self._model.spring_potentials) and not np.array_equal(drawn, there)
+        if fraction == 1.0 and not wound:
             return state
         control = MotorControl(fraction, there - drawn, origin=drawn)
         stepper = MotorStepper(self.solver, state, control, predictor=self.discretisation.predictor)
@@ -262,10 +263,11 @@ class CurveStepper:
                 state = stepper.advance(control.at(float(value))).state
             self._snaps += stepper.snaps
         except LoadStepsFailed as failure:
+            strained = "links and springs" if wound else "the links"
             beyond = "there" if fraction == 1.0 else f"beyond {failure.reached:.1%} of their way"
             raise EquilibriumError(
                 f"configuration {configuration.name!r}",
-                f"the motors strain the links, and no equilibrium was found {beyond} ({failure.reason})",
+                f"the motors strain {strained}, and no equilibrium was found {beyond} ({failure.reason})",
                 "Choose motor positions nearer to the drawn ones, or a softer link or spring",
                 last=self._last(failure),
             ) from failure

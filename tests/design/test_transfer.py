@@ -13,12 +13,13 @@ from fenicsmech.joints import RIGID_SPACES
 
 from ..equilibrium.arch import RISE, arch, lowered
 from .alike import assert_alike
-from .mechanisms import Case, bench, bow, objective, strained, truss, turned_beam
+from .mechanisms import Case, bench, bow, objective, sprung, strained, truss, turned_beam
 
 CASES = {
     "truss": lambda: truss((0.1, 1.0), (0.4, 2.0)),
     "force on a link": lambda: bow(20.0, 60.0),
     "strained by motors": lambda: strained(1.0, 3.0),
+    "springs wound up by motors": lambda: sprung(1.0, 3.0),
     "turned by 135°": lambda: turned_beam(1.0, 3.0, -2.0),
     "held": lambda: held(),
 }
