@@ -90,6 +90,7 @@ def test_errors_of_curves_are_those_of_designs_where_links_are_strained_without_
     assert found == pytest.approx(equilibria.errors(equilibria.from_zero()), rel=1e-5)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("described", [strained, sprung])
 def test_effectivity_where_links_are_strained_without_loads_is_between_a_half_and_two(described, monkeypatch):
     scene, push, place = _strained(described)
