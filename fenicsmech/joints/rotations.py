@@ -17,7 +17,7 @@ rotations, and its second derivative is constant.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterable
 
 import numpy as np
 import sympy
@@ -148,7 +148,7 @@ class PlanarSpace(RigidSpace):
         return np.column_stack([poses[:, :2], 2.0 * np.arctan2(poses[:, 6], poses[:, 3])])
 
 
-def cross_matrix(vector: Sequence) -> list[list]:
+def cross_matrix(vector: Iterable) -> list[list]:
     """[v]×, rows of three numbers or symbols: [v]× a = v × a."""
     x, y, z = vector
     return [[0, -z, y], [z, 0, -x], [-y, x, 0]]
