@@ -59,7 +59,8 @@ class EquilibriumError(FenicsmechError):
 
 def expect(part: str, value: Any, kinds: Any, noun: str, remedy: str = "Give one of the mechanism's") -> None:
     """Checks that ``value`` is an instance of ``kinds``, which messages call ``noun``."""
-    if not isinstance(value, kinds):
+    # classes have the attributes of a protocol, but are no instances
+    if isinstance(value, type) or not isinstance(value, kinds):
         raise DescriptionError(part, f"{value!r} is not {noun}", remedy)
 
 

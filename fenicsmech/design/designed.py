@@ -116,7 +116,8 @@ class DesignedSimulation:
                 simulation = simulation.on(group.comm)
                 rest = ParametricShape(simulation.model, self._shapes, self.shapes, self.numbers)
             mine = [self.targets[k] for k in group.mine]
-            # optimisers shorten steps that lose an equilibrium; to halve the way there costs more solves than that
+            # optimisers shorten steps that lose an equilibrium; the halves of the way there are solves for a step that
+            # mostly is refused
             equilibria = SampleEquilibria(simulation, mine, FollowOptions(halvings=0), numbers=self._kinds)
             comparison = Comparison(self.targets, simulation.scene.units)
             objective = Objective(

@@ -1,6 +1,7 @@
 """Verification of designs in the parts to be made: their STEP files are meshed anew and finer, and loaded.
 
-The samples are loaded from zero in elements as large as the optimiser's; their equilibria in smaller ones start there.
+The samples are loaded from zero in elements as large as the optimiser's, where a snap on the way is found; their
+equilibria in smaller elements start from those.
 
 Values on the optimiser's mesh differ from those of the part by the elements, by the outline between the vertices of the
 mesh, and by the deformation of the mesh with the design. All three are in the difference of both values: the part
@@ -25,7 +26,7 @@ from fenicsmech.design.result import DesignResult, PartValue, component_values, 
 from fenicsmech.design.target import Comparison, Target
 from fenicsmech.design.transfer import WholeState
 from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, SPATIAL
-from fenicsmech.errors import DescriptionError, positive
+from fenicsmech.errors import DescriptionError, MeshingError, positive
 from fenicsmech.export import write_step
 from fenicsmech.log import logger
 from fenicsmech.mechanism import FlexibleLink, Joint, step_file
@@ -46,19 +47,20 @@ def part_simulations(
     folder: Path,
     finer: float,
     moved: Mapping[Joint, JointChange],
-) -> tuple[Simulation, Simulation]:
+) -> tuple[Simulation | None, Simulation]:
     """The scene with ``links`` read from the STEP files of their ``meshes``, which this writes to ``folder``.
 
     Joints are drawn where they are ``moved`` to. In space half the depth is meshed where the scene allows it: exported
     links are symmetric.
 
     Returns:
-        Simulations with elements as large as those of ``simulation``, and with ``finer`` ones.
+        Simulations with elements as large as those of ``simulation``, None if that cannot be meshed, and with ``finer``
+        ones.
 
     Raises:
         DescriptionError: a point of a force or an output is on one of the links, so that its place in the part is not
             known; or ``finer`` is not positive.
-        MeshingError: a part cannot be written or meshed.
+        MeshingError: a part cannot be written or meshed in the finer elements.
     """
     scene, finer = simulation.scene, positive("refinement of the part's mesh", finer)
     for point in (*scene.mechanism.forces, *scene.mechanism.outputs):
@@ -71,10 +73,12 @@ def part_simulations(
     on_one(simulation.comm, lambda: _write(folder, links, meshes, depths))
     files = zip(links, depths, strict=True)
     shapes = {link: step_file(solid_path(folder, link, ".step"), depth=depth) for link, depth in files}
-    coarse, fine = (
-        simulation.with_shapes(shapes, fidelity=_finer(simulation, factor), moved=moved) for factor in (1.0, finer)
-    )
-    return coarse, fine
+    fine = simulation.with_shapes(shapes, fidelity=_finer(simulation, finer), moved=moved)
+    try:
+        return simulation.with_shapes(shapes, fidelity=_finer(simulation, 1.0), moved=moved), fine
+    except MeshingError as failure:
+        _log.info("the exported parts are not meshed in elements of the optimiser's size: %s", failure)
+        return None, fine
 
 
 def _write(folder: Path, links: Sequence[FlexibleLink], meshes: Sequence[LinkMesh], depths: Sequence[float]) -> None:
@@ -94,22 +98,18 @@ def _finer(simulation: Simulation, factor: float) -> Fidelity:
 
 
 def verified_parts(
-    result: DesignResult, coarse: Simulation, fine: Simulation, targets: Sequence[Target]
+    result: DesignResult, coarse: Simulation | None, fine: Simulation, targets: Sequence[Target]
 ) -> DesignResult:
     """The result with the values of its targets in the parts; without them, and a warning, where loads are not carried.
 
     Args:
         result: of ``targets``, in their order.
-        coarse: the scene with the links from the exported files.
+        coarse: the scene with the links from the exported files, whose equilibria are guesses; None: there are none.
         fine: the same with the elements whose values count.
         targets: of the design problem.
     """
     comparison, measured = Comparison(targets, fine.scene.units), [t for t in targets if t.quantity.of_part]
-    with _equilibria(coarse, result, measured) as equilibria:
-        try:
-            guesses = equilibria.whole(equilibria.from_zero())
-        except Infeasible:
-            guesses = None  # finer elements may carry what these do not
+    guesses = None if coarse is None else _guesses(coarse, result, measured)
     with _equilibria(fine, result, measured) as equilibria:
         try:
             solved = _in_finer_elements(equilibria, guesses)
@@ -137,6 +137,16 @@ def _equilibria(part: Simulation, result: DesignResult, targets: Sequence[Target
     designed = part.with_design(numbers)
     with part.model.shaped(numbers):
         yield SampleEquilibria(designed, targets)
+
+
+def _guesses(coarse: Simulation, result: DesignResult, targets: Sequence[Target]) -> dict[Sample, WholeState] | None:
+    """Equilibria in the parts, loaded from zero; None where that fails, since finer elements may carry the loads."""
+    with _equilibria(coarse, result, targets) as equilibria:
+        try:
+            return equilibria.whole(equilibria.from_zero())
+        except Infeasible as failure:
+            _log.info("the exported parts do not reach all targets in elements of the optimiser's size: %s", failure)
+            return None
 
 
 def _in_finer_elements(equilibria: SampleEquilibria, guesses: Mapping[Sample, WholeState] | None) -> DesignEquilibria:

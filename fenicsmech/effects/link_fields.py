@@ -86,14 +86,14 @@ class LinkFields:
         links: all flexible links.
         body: the links as one body.
         boundaries: the parts of links' boundaries that effects list.
-        numbers: that designs may change, by name: the name in ``ElasticBody.numbers``, and which links have it,
-            (links,).
+        numbers: that designs may change, by name: the name in ``ElasticBody.numbers``, which links have it, (links,),
+            and its drawn value.
     """
 
     links: tuple[FlexibleLink, ...]
     body: ElasticBody
     boundaries: Mapping[Faces, Boundary]
-    numbers: dict[str, tuple[str, np.ndarray]] = field(default_factory=dict)
+    numbers: dict[str, tuple[str, np.ndarray, float]] = field(default_factory=dict)
 
     @property
     def u(self) -> fem.Function:
@@ -125,10 +125,25 @@ class LinkFields:
         return self.body.cellwise(per_link)
 
     def number(self, name: str, value: float, links: Sequence[FlexibleLink] | None = None) -> fem.Function:
-        """A field with a value on some links, all by default, and zero elsewhere, which designs may change by name."""
+        """A field with a value on some links, all by default, and zero elsewhere, which designs may change by name.
+
+        Args:
+            name: of the effect's attribute.
+            value: of that attribute; factors belong beside the field.
+            links: that have it.
+
+        Raises:
+            DescriptionError: the energy has such a field already.
+        """
+        if name in self.numbers:
+            raise DescriptionError(
+                f"number {name!r} of an effect",
+                "its energy asks for the field twice",
+                "Ask once, for all links that have it, and use the field again",
+            )
         chosen = np.array([links is None or link in links for link in self.links])
         known = f"{name}, number {len(self.body.numbers)}"  # other effects may use the same name
-        self.numbers[name] = known, chosen
+        self.numbers[name] = known, chosen, value
         self.body.numbers[known] = self.cellwise(value * chosen)
         return self.body.numbers[known]
 

@@ -51,7 +51,7 @@ class Pressure(Effect):
     about: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
-        expect("pressure", self.link, FlexibleLink, "a flexible link", "Give one")
+        expect("pressure", self.link, FlexibleLink, "a flexible link", "Give a flexible link of the mechanism")
         set_fields(self, pressure=finite(f"pressure on {self.link.name!r}", self.pressure))
         if self.about is not None:
             set_fields(self, about=point(f"centre of the pressure on {self.link.name!r}", self.about))

@@ -32,7 +32,7 @@ class Prestrain(Effect):
     along: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
-        expect("prestrain", self.link, FlexibleLink, "a flexible link", "Give one")
+        expect("prestrain", self.link, FlexibleLink, "a flexible link", "Give a flexible link of the mechanism")
         set_fields(self, stretch=positive(f"prestrain of {self.link.name!r}", self.stretch))
         if self.along is not None:
             set_fields(self, along=direction(f"direction of prestrain of {self.link.name!r}", self.along))

@@ -189,8 +189,8 @@ def find_centreline(
         part: the link, for messages.
 
     Raises:
-        DescriptionError: the link branches off between its joints, is no longer than it is wide, or no line halves its
-            chords.
+        DescriptionError: the link branches off between its joints, is no longer than it is wide, has a neck too narrow
+            for the search, or no line halves its chords.
     """
     path, open_ends = _medial_path(outline, reach, ends, part=part)
     for spacing in SEARCH.spacings:
@@ -265,7 +265,7 @@ def _medial_path(
     if ends is not None:
         given = np.array(ends, dtype=float)
         first, last = axis.nearest(given)
-        return np.vstack([given[:1], axis.path(first, last), given[1:]]), (False, False)
+        return np.vstack([given[:1], axis.path(first, last, part=part), given[1:]]), (False, False)
     at = axis.nearest(joints)
     distance = axis.distances(at)
     outer = divmod(int(np.argmax(np.triu(distance[:, at]))), len(at))  # the joints farthest apart
@@ -284,7 +284,7 @@ def _medial_path(
         tip = int(beyond[np.argmax(own[beyond])]) if len(beyond) else terminals[end]
         if own[tip] + axis.radius[tip] > 2.0 * max(2.0 * eye, reach[outer[end]]):
             terminals[end], free[end] = tip, True
-    path = axis.path(*terminals)
+    path = axis.path(*terminals, part=part)
     for end in (0, 1):
         if not free[end]:
             path[-end] = joints[outer[end]]
@@ -354,12 +354,18 @@ class MedialAxis:
         """Distances along the axis from the nodes ``starts`` (k,) to all nodes, (k, n)."""
         return dijkstra(self.graph, directed=False, indices=starts)
 
-    def path(self, start: int, end: int) -> np.ndarray:
-        """The nodes on the way from one to another, (k, 2)."""
+    def path(self, start: int, end: int, *, part: str) -> np.ndarray:
+        """The nodes on the way from one to another, (k, 2).
+
+        Raises:
+            DescriptionError: there is no way: in a narrow neck the points on the outline are too far apart.
+        """
         _, before = dijkstra(self.graph, directed=False, indices=start, return_predecessors=True)
         way = [end]
         while way[-1] != start:
             way.append(int(before[way[-1]]))
+            if way[-1] < 0:
+                raise DescriptionError(part, "its medial axis is cut at a narrow neck", "Give centreline=…, through it")
         return self.nodes[way[::-1]].copy()
 
 

@@ -65,10 +65,14 @@ def assemble(linkage: Linkage, configuration: Configuration, springs: Sequence[P
     """
     if springs:
         return _assembled(linkage, configuration, springs)
-    key = configuration, linkage.joints.key, linkage.rigid.key
-    if key not in linkage.assembled:
-        linkage.assembled[key] = _assembled(linkage, configuration, springs)
-    return linkage.assembled[key]
+    places = linkage.joints.key, linkage.rigid.key
+    if places not in linkage.assembled:
+        linkage.assembled.clear()
+        linkage.assembled[places] = {}
+    found = linkage.assembled[places]
+    if configuration not in found:
+        found[configuration] = _assembled(linkage, configuration, springs)
+    return found[configuration]
 
 
 def _assembled(linkage: Linkage, configuration: Configuration, springs: Sequence[PosePotential]) -> Assembly:

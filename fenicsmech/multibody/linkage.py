@@ -25,7 +25,18 @@ from fenicsmech.joints import (
     coordinate_rate,
     free_coordinate,
 )
-from fenicsmech.mechanism import Effect, FlexibleLink, Joint, Link, Mechanism, Motor, Region, in_dimension, same_place
+from fenicsmech.mechanism import (
+    Configuration,
+    Effect,
+    FlexibleLink,
+    Joint,
+    Link,
+    Mechanism,
+    Motor,
+    Region,
+    in_dimension,
+    same_place,
+)
 from fenicsmech.multibody.places import JointChange, JointPlaces
 from fenicsmech.multibody.points import BodyPoint
 
@@ -304,7 +315,7 @@ class Linkage:
         interfaces: indices of the interface bodies of each flexible link.
         joints: constraints of the mechanism itself: interfaces of a flexible link are independent.
         rigid: the same with every flexible link welded into one rigid body.
-        assembled: what ``assemble`` has found so far.
+        assembled: what ``assemble`` has found at the last places of joints and offsets of motors, by configuration.
     """
 
     dim: int
@@ -313,7 +324,7 @@ class Linkage:
     interfaces: dict[FlexibleLink, tuple[int, ...]]
     joints: JointSystem
     rigid: JointSystem
-    assembled: dict[Hashable, Any] = field(default_factory=dict, compare=False, repr=False)
+    assembled: dict[Hashable, dict[Configuration, Any]] = field(default_factory=dict, compare=False, repr=False)
 
     def body_of(self, link: Link) -> int:
         """Index of the body that carries ``link``: itself if rigid, its first interface if flexible."""

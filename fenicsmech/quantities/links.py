@@ -195,7 +195,7 @@ class CentrelineLength(Quantity):
         return self.centreline is None  # a given one is that of the drawn link
 
     def __post_init__(self) -> None:
-        expect("length of a link", self.link, FlexibleLink, "a flexible link", "Give one")
+        expect("length of a link", self.link, FlexibleLink, "a flexible link", "Give a flexible link of the mechanism")
         given = self.centreline
         if given is None and isinstance(self.link.shape, Strip):
             given = self.link.shape.centreline

@@ -87,7 +87,8 @@ class EffectNumber(ModelNumber):
         name: of the number, in fields and potentials, and of the effects' attribute.
 
     Raises:
-        DescriptionError: the effects' fields and potentials have no such number.
+        DescriptionError: the effects' fields and potentials have no such number, or a field another value than the
+            attribute.
     """
 
     def __init__(self, model: MechanismModel, effects: Sequence[Effect], name: str) -> None:
@@ -100,11 +101,17 @@ class EffectNumber(ModelNumber):
             for own in found
             if name in own.numbers
         ]
-        self._fields = [
-            fields.numbers[name]
-            for effect, fields in model.effect_fields
-            if effect in effects and name in fields.numbers
-        ]
+        self._fields: list[tuple[str, np.ndarray]] = []
+        for effect, fields in model.effect_fields:
+            if effect in effects and name in fields.numbers:
+                known, chosen, value = fields.numbers[name]
+                if value != getattr(effect, name):
+                    raise DescriptionError(
+                        f"{name} of {effect}",
+                        f"its field on links has the value {value:g}, and the effect {getattr(effect, name):g}",
+                        "Give fields.number(…) the attribute, and write factors beside the field",
+                    )
+                self._fields.append((known, chosen))
         if not self._potentials and not self._fields:
             raise DescriptionError(
                 f"{name} of {effects[0]}",

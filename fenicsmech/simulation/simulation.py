@@ -125,8 +125,8 @@ class Simulation:
             fidelity = self._control.fidelity(self._control.level)
         solver, predictor = solver or PrimalDualNewton(), predictor or HermitePredictor()
         self._discretisation = Discretisation(scene, fidelity, solver, predictor, self.clock, comm)
-        if accuracy is None and (text := coarse_links(self._discretisation, scene.units)):
-            _log.warning("%s", text)
+        if accuracy is None:
+            self._warn_of_coarse_links()
         self._described = _description(scene.mechanism)
 
     def __repr__(self) -> str:
@@ -360,6 +360,8 @@ class Simulation:
         other.clock, other.choice, other._control, other._design = Clock(), None, None, None
         fidelity = fidelity or self.fidelity
         other._discretisation = self._discretisation.at(fidelity, other.clock, self.comm, shapes, moved)
+        if shapes:
+            other._warn_of_coarse_links()
         return other
 
     def on(self, comm: MPI.Comm) -> Simulation:
@@ -452,6 +454,11 @@ class Simulation:
         else:
             with self.model.shaped(self._design):
                 yield
+
+    def _warn_of_coarse_links(self) -> None:
+        """Tells links whose elements are too long to bend with them."""
+        if text := coarse_links(self._discretisation, self.scene.units):
+            _log.warning("%s", text)
 
     def _check_description(self) -> None:
         """Refuses a mechanism that is not the one this simulation was made for."""

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.design import Correction, MeshQuality, NumberBounds, StayClose
+from fenicsmech.design import Correction, MeshQuality, NumberBounds, SampleEquilibria, StayClose
 from fenicsmech.mechanism import Configuration, Force, Motor
 
 from . import mechanisms
@@ -71,6 +71,23 @@ def test_an_offset_is_the_same_as_another_position_of_the_motor(describe, space)
     assert np.max(np.abs(measured(sim, push, here) / wanted - 1.0)) > 1e-2
     if describe is crank:
         assert shifted.path(push, [here]) == pytest.approx(sim.path(push, [there]), abs=1e-10)
+
+
+def test_values_of_designs_with_other_offsets_are_those_of_a_scene_whose_motor_stands_there():
+    def equilibria(position: float) -> tuple[fm.Simulation, fm.MotorOffset, SampleEquilibria]:
+        scene, motor, push = crank()
+        sim, sample = fm.Simulation(scene, space="plane-stress", size=4.0), fm.Sample({push: 1.0, motor: position})
+        quantities = fm.Displacement(push), fm.MotorTorque(motor), fm.StrainEnergy()
+        targets = [fm.Target(quantity, sample, equals=0.0, scale=1.0) for quantity in quantities]
+        return sim, fm.MotorOffset(motor), SampleEquilibria(sim, targets)
+
+    sim, kind, designed = equilibria(0.12)
+    for offset in (0.0, 0.3):
+        sim.model.reshape(fm.Design(sim.model.design.field, {kind: offset}))
+        _, _, there = equilibria(0.12 + offset)
+        wanted = there.values(there.from_zero())
+        assert designed.values(designed.from_zero()) == pytest.approx(wanted, rel=1e-10)
+        assert len(sim.linkage.assembled) == 1  # the last one
 
 
 def test_materials_do_not_share_offsets():

@@ -178,6 +178,7 @@ def test_numbers_that_make_no_sense_are_refused():
         return fm.DesignProblem(sim, numbers, targets=targets)
 
     refused(lambda: fm.Number(strip, 2.0, 3.0), part="number", problem="not a kind", remedy="Depth(link)")
+    refused(lambda: fm.Number(fm.Depth, 2.0, 3.0), part="number", problem="Depth'> is not a kind", remedy="Depth(link)")
     refused(lambda: fm.Number(depth, 6.0, 2.0), part="depth of 'strip'", problem="6 to 2", remedy="smaller one first")
     refused(lambda: fm.Number(depth, -1.0, 2.0), part="depth of 'strip'", problem="-1", remedy="greater than zero")
     refused(
@@ -213,6 +214,7 @@ def test_numbers_of_a_design_are_refused_as_those_of_a_problem_are():
 
     for number, words in (
         (("depth", 3.0), ("number", "not a kind", "Depth(link)")),
+        ((fm.Depth, 3.0), ("number", "not a kind", "Depth(link)")),
         ((fm.Depth(strip), -1.0), ("depth of 'strip'", "-1", "greater than zero")),
         ((fm.Depth(strip), float("nan")), ("depth of 'strip'", "nan", "finite number")),
         ((fm.LawParameter("nu", strip), 0.6), ("NeoHookean", "0.6", "0.5, both")),

@@ -104,3 +104,31 @@ def test_points_on_links_that_change_are_refused():
     problem = bow(10.0).problem()
     result = problem.optimise(optimiser=fm.LevenbergMarquardt(iterations=1))
     refused(lambda: problem.verify(result), part="bow", problem="place in the part", remedy="rigid link")
+
+
+def flexure(size: float, shape: fm.Shape | None = None) -> tuple[fm.Simulation, fm.FlexibleLink, fm.Force]:
+    """A slanting leaf whose end is pushed across on a rail; it snaps, under more in larger elements of degree one."""
+    rig = fm.Mechanism("flexure")
+    ground, hub = rig.rigid("ground", fixed=True), rig.rigid("hub")
+    shape = shape or fm.strip([(0, 0), (40, 6)], thickness=2.0, depth=5.0)
+    leaf = rig.flexible("leaf", shape, fm.Material("plastic", 2000.0, 0.35))
+    rig.weld(ground, leaf, at=(2, 0), region=fm.Rectangle(4, 6))
+    rig.weld(leaf, hub, at=(38, 6), region=fm.Rectangle(4, 6))
+    rig.prismatic(ground, hub, at=(40, 6), axis=(0, 1))
+    push = rig.force(on=hub, at=(40, 6), direction=(0, -1))
+    return fm.Simulation(fm.Scene(rig), space="plane-stress", order=1, size=size), leaf, push
+
+
+def test_parts_that_elements_of_the_optimiser_do_not_carry_are_loaded_from_zero(tmp_path):
+    def problem(size: float) -> fm.DesignProblem:
+        sim, leaf, push = flexure(size)
+        target = fm.Target(push, force=20.0, displacement=2.0)
+        return fm.DesignProblem(sim, [fm.Number(fm.Depth(leaf), 4.5, 5.5)], targets=[target])
+
+    result = problem(2.0).optimise(optimiser=fm.LevenbergMarquardt(iterations=1))
+    softer = problem(1.0)
+    assert softer.verify(result).worst_part_error is None  # not carried
+    found = softer.verify(result, tmp_path, finer=0.5)
+    again, _, push = flexure(2.0, fm.step_file(tmp_path / "leaf.step", depth=result.numbers[0].value))
+    curve = again.load_displacement(push, forces=[20.0])
+    assert parts(found)[:, 0] == pytest.approx(curve.displacements, rel=1e-8)

@@ -24,7 +24,7 @@ class Foundation(fm.Effect):
         return fields.integral(0.5 * stiffness * ufl.dot(fields.u, fields.u), degree=2 * fields.order)
 
 
-def simulation(stiffness: float | None) -> tuple[fm.Simulation, object]:
+def simulation(stiffness: float | None, foundation: type[Foundation] = Foundation) -> tuple[fm.Simulation, object]:
     """A nearly rigid block on rails along x, the link between them, pushed along x."""
     mechanism = fm.Mechanism("sled")
     base, front, back = mechanism.rigid("base", fixed=True), mechanism.rigid("front"), mechanism.rigid("back")
@@ -37,7 +37,7 @@ def simulation(stiffness: float | None) -> tuple[fm.Simulation, object]:
     rail = mechanism.prismatic(base, front, at=(28, 0), axis=(1, 0))
     effects = [fm.JointSpring(rail, 1.0)]
     if stiffness is not None:
-        effects.append(Foundation(block, stiffness))
+        effects.append(foundation(block, stiffness))
     push = mechanism.force(on=front, at=(28, 0), direction=(1, 0))
     return fm.Simulation(fm.Scene(mechanism, effects), space="plane-stress", size=4.0), push
 

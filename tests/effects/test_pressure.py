@@ -154,7 +154,8 @@ def test_displacements_under_pressure_are_differentiated_by_the_design_field(spa
 def test_pressure_without_sense_is_refused():
     _, push = beam("plane-stress", 1.0)
     link, stranger = push.on, fm.Mechanism("other").rigid("stranger")
-    refused(lambda: Pressure(stranger, 1.0), part="pressure", problem="not a flexible link", remedy="Give one")
+    remedy = "a flexible link of the mechanism"
+    refused(lambda: Pressure(stranger, 1.0), part="pressure", problem="not a flexible link", remedy=remedy)
     refused(lambda: Pressure(link, np.nan), part="'beam'", problem="nan", remedy="finite")
     refused(lambda: Pressure(link, 1.0, about=(0,)), part="centre", problem="coordinates", remedy="2 or 3")
     other, _ = beam("plane-stress", 1.0)

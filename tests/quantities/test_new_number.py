@@ -181,3 +181,27 @@ def test_a_number_that_an_effect_does_not_have_is_refused():
     sled, _ = simulation(None)
     with pytest.raises(fm.DescriptionError, match="neither a field on links nor a potential"):
         fm.EffectNumber(sled.model, sled.scene.effects, "length")
+
+
+class Twice(Foundation):
+    """Asks for its stiffness on each use."""
+
+    def link_energy(self, fields):
+        return super().link_energy(fields) + super().link_energy(fields)
+
+
+class Doubled(Foundation):
+    """Has twice its stiffness in the field."""
+
+    def link_energy(self, fields):
+        stiffness = fields.number("stiffness", 2.0 * self.stiffness, [self.link])
+        return fields.integral(stiffness * fields.u[0] ** 2, degree=2 * fields.order)
+
+
+def test_fields_that_a_design_would_change_in_part_or_by_a_jump_are_refused():
+    twice, push = simulation(0.05, Twice)
+    with pytest.raises(fm.DescriptionError, match=r"'stiffness'.* twice"):
+        twice.load_displacement(push, forces=[0.5])
+    doubled, _ = simulation(0.05, Doubled)
+    with pytest.raises(fm.DescriptionError, match=r"has the value 0\.1, and the effect 0\.05"):
+        doubled.model.number(FoundationStiffness(doubled.scene.effects[1]))

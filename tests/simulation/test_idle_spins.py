@@ -65,13 +65,43 @@ def test_a_load_on_the_link_stops_it_from_spinning_idly():
     assert (frame.unstable_modes, frame.snapped_through) == (0, False)
 
 
-def test_points_away_from_the_line_of_an_idle_spin_are_told_by_explanations():
+def idle_hint(simulation, push) -> str:
+    """The hint on idle spins, empty if there is none."""
+    explanation = simulation.load_displacement(push, forces=[5.0]).explain()
+    return next((hint.text for hint in explanation.left_out if hint.what == "idle spins"), "")
+
+
+@pytest.mark.parametrize("kind", ["output", "force"])
+def test_points_away_from_the_line_of_an_idle_spin_are_told_by_explanations(kind):
     for at, told in (((50, 0, 0), False), ((50, 1.0, 0), True)):
         simulation, push, _ = rssr()
         mechanism = simulation.scene.mechanism
         (coupler,) = mechanism.flexible_links
-        mechanism.output(on=coupler, at=at, direction=(0, 1, 0), name="side")
-        explanation = simulation.load_displacement(push, forces=[5.0]).explain()
-        hints = [hint.text for hint in explanation.left_out if hint.what == "idle spins"]
-        assert bool(hints) is told
-        assert not told or "'side'" in hints[0]
+        getattr(mechanism, kind)(on=coupler, at=at, direction=(0, 1, 0), name="side")
+        assert ("'side'" in idle_hint(simulation, push)) is told
+
+
+def test_points_on_the_line_between_joints_of_a_design_are_not_told():
+    simulation, push, _ = rssr(rod=True)
+    mechanism = simulation.scene.mechanism
+    rod, ball = mechanism.links[-1], mechanism.joints[-2]
+    for name, y in (("drawn", 0.0), ("designed", 2.0)):  # the ball at x = 80 goes to y = 2.4, that at x = 20 stays
+        mechanism.output(on=rod, at=(70, y, 0), direction=(0, 1, 0), name=name)
+    text = idle_hint(simulation, push)
+    assert "'designed'" in text and "'drawn'" not in text
+    numbers = {fm.JointPosition(ball, direction=(0, 1, 0)): 2.4}
+    shifted = simulation.with_design(fm.Design(np.zeros_like(simulation.model.design.field), numbers))
+    text = idle_hint(shifted, push)
+    assert "'drawn'" in text and "'designed'" not in text
+
+
+def test_points_of_a_link_follow_its_design_to_the_line():
+    simulation, push, _ = rssr()
+    mechanism = simulation.scene.mechanism
+    (coupler,), balls = mechanism.flexible_links, mechanism.joints[1:3]
+    mechanism.output(on=coupler, at=(50, 0, 0), direction=(0, 1, 0), name="on the line")
+    assert not idle_hint(simulation, push)
+    field = np.zeros_like(simulation.model.design.field).reshape(-1, 3)
+    field[:, 1] = 2.0
+    design = fm.Design(field.ravel(), {fm.JointPosition(*balls, direction=(0, 1, 0)): 2.0})
+    assert not idle_hint(simulation.with_design(design), push)

@@ -60,7 +60,9 @@ def edge_weights(mesh: LinkMesh, weights: np.ndarray) -> EdgeWeights:
         columns = np.sort(plan.column[ends], axis=1)
         for loop in boundary_loops("link", plan.mesh):
             edges = np.sort(np.column_stack([loop, np.roll(loop, -1)]), axis=1)
-            outline = _Outline(plan.mesh.points[loop], middles[edge_rows(columns, edges)], held[loop])
+            above = edge_rows(columns, edges)
+            assert np.all(above >= 0), "every edge of the outline is below one of the link"
+            outline = _Outline(plan.mesh.points[loop], middles[above], held[loop])
             below = edge_rows(edges, columns)
             found[below >= 0] = outline.at_middles(weights[vertex[loop]])[below[below >= 0]]
             follows |= below >= 0
