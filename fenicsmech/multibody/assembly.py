@@ -40,7 +40,8 @@ from scipy.sparse.csgraph import breadth_first_order
 
 from fenicsmech.errors import AssemblyError
 from fenicsmech.mechanism import Configuration
-from fenicsmech.multibody.linkage import RANK, JointSystem, Linkage, PosePotential
+from fenicsmech.multibody.linkage import RANK, JointSystem, Linkage
+from fenicsmech.multibody.potentials import PosePotential
 from fenicsmech.multibody.spins import IdleSpin
 
 
