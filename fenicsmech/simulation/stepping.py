@@ -147,7 +147,7 @@ class CurveStepper:
         model, rigid = self._model, self._model.linkage.rigid
         assembly = assemble_before_strain(model.linkage, request.configuration, model.spring_potentials)
         motors = rigid.on_the_way(request.configuration.position, assembly.fraction)
-        self.solver = discretisation.solver(request.part, request.others)
+        self.solver = discretisation.solver(request.part, [other for other, _ in request.others])
         self._system, self._joints = self.solver.system, model.linkage.joints
         self.freedom = count_freedom(rigid, assembly.poses, motors, model.spring_potentials, self._system.idle)
         self.followed = discretisation.followed_control(request.part)
@@ -246,6 +246,7 @@ class CurveStepper:
         state = replace(
             self._model.assembled_state(assembly.poses, here),
             load_factor=0.0 if self.request.others or self._model.effects else 1.0,
+            constant=np.array([magnitude for _, magnitude in self.request.others]),
             minimum_shift=LoadSteps().minimum_shift if self.freedom.zero_energy else 0.0,
         )
         if fraction == 1.0:
@@ -357,7 +358,7 @@ class CurveStepper:
         nothing moves.
         """
         model, joints, residual = self._model, self._joints, self._system.residual(state, control)
-        loads = abs(state.force) + sum(abs(state.load_factor * magnitude) for _, magnitude in self.request.others)
+        loads = abs(state.force) + abs(state.load_factor) * float(np.abs(state.constant).sum())
         loads, worst = loads + self._effect_forces(state), 0.0
         reactions = np.abs(state.multipliers) @ np.abs(joints.gradient(state.poses, state.motors))
         for motion in stiff_motions(model.linkage, state.poses, state.motors):
