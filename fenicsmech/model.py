@@ -38,6 +38,7 @@ from fenicsmech.mechanism import (
     Force,
     Material,
     Mechanism,
+    MeshPart,
     Output,
     Scene,
     Shape,
@@ -116,12 +117,39 @@ def read_fidelity(
         raise DescriptionError("order", f"{order!r} is not 1, 2 or 3", "Choose 1 for speed, 2 for accuracy")
     if size is None:
         raise DescriptionError("size", "it is missing", "Give an element size, or accuracy=… to have one chosen")
-    model, links = SPACES[space], scene.mechanism.flexible_links
-    per_link = size if isinstance(size, Mapping) else dict.fromkeys(links, size)
-    sizes = {link: positive(f"element size of {link.name!r}", per_link.get(link)) for link in links}
+    model, shapes = SPACES[space], [link.shape for link in scene.mechanism.flexible_links]
+    sizes = {
+        link: positive(f"element size of {link.name!r}", own) for link, own in per_link(scene.mechanism, size).items()
+    }
     rule = quadrature or Quadrature.for_order(order, model.dim)
     check_scene(scene, model)
+    layered = model.dim == 3 and any(map(has_plain_outline, shapes))
+    meshed = not all(isinstance(shape, MeshPart) for shape in shapes)
+    for name, value, counts, reason in (
+        ("layers", layers, layered, "only strips and outlines in space have layers"),
+        ("segments", segments, meshed, "links from mesh files have the elements of the file"),
+    ):
+        if value is not None and not counts:
+            raise DescriptionError(name, f"{name}={value!r} would change nothing: {reason}", f"Leave out {name}")
     return Fidelity(model, order, sizes, rule, formulation, layers, LEAST_SEGMENTS if segments is None else segments)
+
+
+def per_link(
+    mechanism: Mechanism, given: float | Mapping[FlexibleLink, float] | None
+) -> dict[FlexibleLink, float | None]:
+    """A number of each flexible link, from one of all or some of each; None where there is none.
+
+    Raises:
+        DescriptionError: it names something else than flexible links of ``mechanism``.
+    """
+    links = mechanism.flexible_links
+    if not isinstance(given, Mapping):
+        return dict.fromkeys(links, given)
+    for link in given:
+        if link not in links:
+            problem = f"{link!r} is not a flexible link of {mechanism.name!r}"
+            raise DescriptionError("size", problem, "Give {link: size, …} of its flexible links")
+    return {link: given.get(link) for link in links}
 
 
 def check_scene(scene: Scene, model: ElasticModel) -> None:

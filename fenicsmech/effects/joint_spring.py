@@ -13,7 +13,7 @@ from math import pi
 
 import numpy as np
 
-from fenicsmech.errors import DescriptionError, finite, positive, set_fields
+from fenicsmech.errors import DescriptionError, expect, finite, positive, set_fields
 from fenicsmech.mechanism import Effect, Joint
 from fenicsmech.multibody import JointCoordinate, PosePotential
 
@@ -31,7 +31,7 @@ class JointSpring(Effect):
         rest: φ₀, where the spring is relaxed; rad or length.
 
     Raises:
-        DescriptionError: a number makes no sense.
+        DescriptionError: this is not a joint, or a number makes no sense.
     """
 
     joint: Joint
@@ -39,6 +39,7 @@ class JointSpring(Effect):
     rest: float = 0.0
 
     def __post_init__(self) -> None:
+        expect("joint spring", self.joint, Joint, "a joint")
         set_fields(self, stiffness=positive(f"stiffness of {self._name}", self.stiffness))
         set_fields(self, rest=finite(f"rest position of {self._name}", self.rest))
 

@@ -130,10 +130,12 @@ def _simulated(model: MechanismModel) -> tuple[str, ...]:
         for link, material in zip(mechanism.flexible_links, model.materials, strict=True)
     )
     mixed = [link.name for link, is_mixed in zip(mechanism.flexible_links, model.mixed, strict=True) if is_mixed]
+    softened = any(effect.soften(model.linkage) for effect in model.effects)
+    compliance = "other compliance than listed below" if softened else "compliance"
     items = [
         f"flexible links in large deformation ({elastic.model.name}, order {elastic.order}): {links}",
         f"rigid links: {', '.join(link.name for link in mechanism.rigid_links)}",
-        f"ideal joints, without play, friction or compliance: {', '.join(kinds)}",
+        f"ideal joints, without play, friction or {compliance}: {', '.join(kinds)}",
         "forces that keep their direction, applied without inertia",
     ]
     if mixed:

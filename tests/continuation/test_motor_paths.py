@@ -179,7 +179,14 @@ def test_clamps_that_turn_together_lead_the_bow_over_the_fold_of_the_beam_and_ba
 def test_drives_that_make_no_sense_are_refused():
     simulation, _, (left, right) = bow()
     slide = driven_toggle()[1]
-    for ratios in ({}, {left: 0.0}, {left: float("nan")}, {"left": 1.0}, {left: 1.0, slide: 1.0}):
+    for ratios in (
+        {},
+        {left: 0.0},
+        {left: float("nan")},
+        {"left": 1.0},
+        {left: 1.0, slide: 1.0},
+        [(left, 1), (left, 2)],
+    ):
         with pytest.raises(fm.DescriptionError, match="drive 'both'"):
             fm.Drive("both", ratios)
     with pytest.raises(fm.DescriptionError, match="not a motor"):

@@ -257,6 +257,9 @@ def test_springs_that_make_no_sense_are_refused():
     hinge, ball = mechanism.revolute(a, b, at=(0, 0)), mechanism.spherical(a, b, at=(0, 0), name="ball")
     with pytest.raises(fm.DescriptionError, match="not positive"):
         JointSpring(hinge, 0.0)
+    for other in (mechanism.motor(hinge), "hinge"):
+        with pytest.raises(fm.DescriptionError, match="joint spring: .* is not a joint"):
+            JointSpring(other, 1.0)
     with pytest.raises(fm.DescriptionError, match="no single free coordinate"):
         JointSpring(ball, 1.0).check(mechanism, 3)
     with pytest.raises(fm.DescriptionError, match="is not a joint of 'other'"):

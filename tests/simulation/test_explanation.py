@@ -72,6 +72,16 @@ def test_effects_that_are_listed_are_named_and_not_hinted_at():
     assert "Left out:" in str(explanation)
 
 
+def test_joints_are_ideal_but_for_the_compliance_that_is_listed():
+    scene, push = describe("truss")
+    pin = scene.mechanism.joints[0]
+    for effects, others in (([], ""), ([fm.JointCompliance(pin, 0.1)], "other ")):
+        simulation = fm.Simulation(fm.Scene(scene.mechanism, effects=effects), space="plane-stress", size=4.0)
+        simulated = simulation.load_displacement(push, forces=[0.1]).explain().simulated
+        assert any(f"without play, friction or {others}compliance" in text for text in simulated)
+        assert ("compliance 0.1 of" in simulated[-1]) == bool(effects)
+
+
 def pinned(material: fm.Material, *, depth: float = 4.0, space: str = "plane-stress", order: int = 2, formulation=None):
     """A straight link on a slider, compressed along its axis."""
     rig = fm.Mechanism("strut")

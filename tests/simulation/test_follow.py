@@ -17,8 +17,8 @@ STIFF = 200.0
         ({"displacement": float("nan")}, "nan"),
         ({"force": (1.0, "much")}, "not a number"),
         ({"displacement": 1.0, "position": 2.0}, "a displacement and a position"),
-        ({"force": 1.0, "frames": 1}, "1 frames"),
-        ({"force": 1.0, "frames": 2.5}, "2.5 frames"),
+        ({"force": 1.0, "frames": 1}, "the value is 1"),
+        ({"force": 1.0, "frames": 2.5}, "the value is 2.5"),
     ],
 )
 def test_ends_that_make_no_sense_are_refused(given, message):
