@@ -272,7 +272,7 @@ class Simulation:
         springs = self.model.spring_potentials if designed else spring_potentials(self.scene.effects, linkage)
         with self._shaped():
             rest = self.model.rest_position(part) if designed else np.array(in_dimension(part.at, linkage.dim))
-        point, positions = linkage.point(part.on, rest), []
+        point, positions = linkage.point(part.on, rest.tolist()), []
         for configuration in configurations:
             with self._shaped():
                 assembly = assemble(linkage, configuration, springs)
