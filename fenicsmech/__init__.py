@@ -80,7 +80,14 @@ from fenicsmech.equilibrium import (
     TwoLevel,
     Unknown,
 )
-from fenicsmech.errors import AssemblyError, DescriptionError, EquilibriumError, FenicsmechError, MeshingError
+from fenicsmech.errors import (
+    AssemblyError,
+    DescriptionError,
+    EquilibriumError,
+    FenicsmechError,
+    MeshingError,
+    OutOfMemoryError,
+)
 from fenicsmech.estimates import Choice
 from fenicsmech.files import read_csv
 from fenicsmech.joints import JointKind, PlanarMarker, SpatialMarker
@@ -229,5 +236,6 @@ __all__ = [
     "JointChange",
     # errors
     "FenicsmechError", "DescriptionError", "MeshingError", "AssemblyError", "EquilibriumError",
+    "OutOfMemoryError",
 ]
 # fmt: on

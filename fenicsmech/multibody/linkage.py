@@ -7,6 +7,7 @@ Fixed bodies carry no columns.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,6 +17,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import qr
 
+from fenicsmech.errors import EquilibriumError
 from fenicsmech.joints import (
     RIGID_SPACES,
     WELD,
@@ -389,6 +391,14 @@ class PosePotential(ABC):
         """The factor that V counts with."""
         return 1.0 if self.holds else load_factor
 
+    def check_step(self, before: np.ndarray, after: np.ndarray) -> None:
+        """Checks that V is continuous between the poses (bodies, pose_size) of two points of a path, a step apart.
+
+        Raises:
+            EquilibriumError: the path leaves the poses that V holds for.
+        """
+        return
+
     def gradient_by(self, name: str, poses: np.ndarray) -> np.ndarray:
         """∂²V/∂z∂p of one of ``numbers``, (n · pose_size,)."""
         raise NotImplementedError(f"{type(self).__name__} has no numbers")
@@ -423,11 +433,26 @@ class JointCoordinate:
         self._k, self._places = linkage.connection_of(joint), linkage.joints.places
         connection = linkage.joints.connections[self._k]
         self.bodies = (connection.a, connection.b)
-        self._kind, self._formula = joint.kind, free_coordinate(joint.kind, linkage.dim)
+        self._joint, self._formula = joint, free_coordinate(joint.kind, linkage.dim)
 
     def value(self, poses: np.ndarray) -> float:
         """φ, zero as drawn, from the ``poses`` of all bodies, (bodies, pose_size)."""
         return float(self._formula.value(*self._point(poses))[0])
+
+    def check_step(self, before: np.ndarray, after: np.ndarray) -> None:
+        """Checks that φ does not jump between the poses (bodies, pose_size) of two points of a path, a step apart.
+
+        Raises:
+            EquilibriumError: an angle in space passes 2π or −2π, where its formula jumps by 4π.
+        """
+        start, end = self.value(before), self.value(after)
+        if self._places.dim == 3 and not self._joint.kind.sliding and abs(end - start) > 2.0 * math.pi:
+            limit = "2π" if start > 0.0 else "−2π"
+            raise EquilibriumError(
+                f"angle of {self._joint.name!r}",
+                f"it passes {limit} rad, and in space angles stay within a full turn",
+                "Turn the joint less far, or simulate in the plane, or with mid-plane symmetry",
+            )
 
     def gradient(self, poses: np.ndarray) -> np.ndarray:
         """∂φ/∂z of ``bodies``, one after the other, (2 pose_size,)."""
@@ -441,7 +466,7 @@ class JointCoordinate:
         """Derivatives of φ, and of ∂φ/∂z (2 pose_size,), as the places of some connections change."""
         if self._k not in changes:
             return 0.0, 0.0
-        formula, (variables, constants) = coordinate_rate(self._kind, self._places.dim), self._point(poses)
+        formula, (variables, constants) = coordinate_rate(self._joint.kind, self._places.dim), self._point(poses)
         arguments = variables, np.concatenate([constants, self._places.rate(self._k, changes[self._k])])
         return float(formula.value(*arguments)[0]), formula.gradient(*arguments)[0]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import copy
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -266,6 +267,7 @@ class Simulation:
 
         Raises:
             AssemblyError: one of the configurations does not assemble, or its motors strain the links.
+            EquilibriumError: its motors turn a spring in space by more than a full turn.
         """
         linkage, designed = self.linkage, self._design is not None
         # designs change the model's springs; those drawn need no mesh
@@ -275,7 +277,7 @@ class Simulation:
         point, positions = linkage.point(part.on, rest.tolist()), []
         for configuration in configurations:
             with self._shaped():
-                assembly = assemble(linkage, configuration, springs)
+                assembly = from_one(self.comm, partial(assemble, linkage, configuration, springs))
             if assembly.fraction < 1.0:
                 raise AssemblyError(
                     f"configuration {configuration.name!r}",
