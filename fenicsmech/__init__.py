@@ -176,8 +176,7 @@ from fenicsmech.quantities import (
 from fenicsmech.report import Optimisation, Report, design_study, write_report
 from fenicsmech.simulation import (
     Axis,
-    BucklingLoad,
-    BucklingPosition,
+    BucklingPoint,
     Curve,
     Explanation,
     FollowedCurve,
@@ -220,8 +219,8 @@ __all__ = [
     "JointForce", "JointMoment", "StrainEnergy", "LinkMass", "LinkVolume", "CentrelineLength", "Component", "Magnitude",
     "Observable", "RestObservable", "Partial", "FormValue", "border_of",
     # path following, stability and buckling
-    "FollowedCurve", "ArcSteps", "Critical", "Until", "PathEvent", "CriticalPoint", "BucklingLoad", "BucklingPosition",
-    "SoftMode", "ModeShape",
+    "FollowedCurve", "ArcSteps", "Critical", "Until", "PathEvent", "CriticalPoint", "BucklingPoint", "SoftMode",
+    "ModeShape",
     # formulations and solvers; those from EquilibriumMethod on for solvers of your own
     "Formulation", "DisplacementFormulation", "MixedFormulation", "PrimalDualNewton", "LinearMethod", "BySize",
     "Direct", "TwoLevel", "EquilibriumMethod", "EquilibriumSystem", "EquilibriumPoint", "Control", "State",

@@ -128,7 +128,7 @@ class _Path:
         self, simulation: Simulation, sample: Sample, observables: Iterable[Observable], numbers: Sequence[NumberKind]
     ) -> None:
         self.sample, self._model = sample, simulation.model
-        self.solver: EquilibriumSolver = simulation.solver(sample.part, sample.others)
+        self.solver: EquilibriumSolver = simulation.solver(sample.part, [force for force, _ in sample.others])
         self.moved = None if sample.moved is None else Displacement(sample.moved[0]).on(simulation.model)
         strained = from_one(simulation.comm, lambda: assemble(simulation.linkage, sample.configuration)).fraction < 1.0
         own = observables if self.moved is None else (*observables, self.moved)

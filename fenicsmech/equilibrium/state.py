@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +26,7 @@ class State:
         motors: motor value per connection.
         load_factor: σ of the constant loads and effects, 0 … 1.
         minimum_shift: least shift δ of the KKT matrix, which zero-energy modes need, in units of the mean stiffness.
+        constant: magnitudes f_k of the constant loads, which act times σ.
     """
 
     u: np.ndarray
@@ -35,6 +36,7 @@ class State:
     motors: np.ndarray
     load_factor: float = 1.0
     minimum_shift: float = 0.0
+    constant: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -66,7 +66,7 @@ class EquilibriumSystem:
         interfaces: interface nodes as functions of poses.
         joints: the constraints.
         controlled: the load whose magnitude f is controlled.
-        loads: constant ones, with their magnitudes.
+        loads: constant ones, whose magnitudes states hold.
         potentials: of body poses.
         compliances: c by constraint row; 0 where none is given.
         idle: spins that nothing resists, whose gauge K fixes.
@@ -87,7 +87,7 @@ class EquilibriumSystem:
         joints: JointSystem,
         *,
         controlled: PointLoad,
-        loads: tuple[tuple[PointLoad, float], ...] = (),
+        loads: Sequence[PointLoad] = (),
         potentials: Sequence[PosePotential] = (),
         compliances: Mapping[int, float] = MappingProxyType({}),
         idle: Sequence[IdleSpin] = (),

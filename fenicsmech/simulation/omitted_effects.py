@@ -31,7 +31,7 @@ from fenicsmech.effects import Gravity
 from fenicsmech.equilibrium import EquilibriumSolver, Unknown
 from fenicsmech.errors import DescriptionError, positive, set_fields
 from fenicsmech.estimates import Equilibrium, adjoint_at, cause_of_growth, growth_by_halving
-from fenicsmech.mechanism import FlexibleLink, Force, Joint, Output, PrescribedPart, Shape, Strip, Units, in_dimension
+from fenicsmech.mechanism import FlexibleLink, Force, Joint, Output, PrescribedPart, Shape, Strip, Units
 from fenicsmech.meshing import thinnest_stretch
 from fenicsmech.model import MechanismModel, plan_sites
 from fenicsmech.multibody import JointCoordinate, Linkage
@@ -210,20 +210,17 @@ def _compressibility_hint(model: MechanismModel, limit: float) -> Hint | None:
 
 def _spin_hint(model: MechanismModel, solver: EquilibriumSolver, at: Equilibrium) -> Hint | None:
     """Outputs, and points of forces that do not act, on links that spin idly, away from the line of the spin."""
-    mechanism, linkage, elastic, names = model.mechanism, model.linkage, model.elastic, []
+    mechanism, linkage, names = model.mechanism, model.linkage, list[str]()
     if not solver.system.idle:
         return None
     parts: tuple[Force | Output, ...] = (*mechanism.outputs, *mechanism.forces)
     with model.shaped(at.design):
-        shift = fem.Function(elastic.u.function_space)
-        shift.x.array[:] = model.design_nodes.values(elastic.design).ravel()
-        unloaded = linkage.rigid.drawn
         for spin in solver.system.idle:
-            start, along = spin.line(unloaded)
+            start, along = spin.line(linkage.rigid.drawn)
             for part in parts:
                 if linkage.body_of(part.on) not in spin.bodies:
                     continue
-                arm = np.array(in_dimension(part.at, 3)) + model.point(part).displacement(shift, unloaded) - start
+                arm = model.rest_position(part) - start
                 if np.linalg.norm(arm - (arm @ along) * along) > 1e-9 * linkage.length:
                     names.append(repr(part.name))
     if not names:

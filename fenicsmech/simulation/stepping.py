@@ -151,7 +151,7 @@ class CurveStepper:
         comm, configuration = discretisation.comm, request.configuration
         assembly = from_one(comm, lambda: assemble_before_strain(model.linkage, configuration, springs))
         motors = rigid.on_the_way(configuration.position, assembly.fraction)
-        self.solver = discretisation.solver(request.part, request.others)
+        self.solver = discretisation.solver(request.part, [other for other, _ in request.others])
         self._system, self._joints = self.solver.system, model.linkage.joints
         idle = self._system.idle
         self.freedom = from_one(comm, lambda: count_freedom(rigid, assembly.poses, motors, springs, idle))
@@ -261,6 +261,7 @@ class CurveStepper:
         state = replace(
             self._model.assembled_state(assembly.poses, here),
             load_factor=0.0 if self.request.others or self._model.effects else 1.0,
+            constant=np.array([magnitude for _, magnitude in self.request.others]),
             minimum_shift=LoadSteps().minimum_shift if self.freedom.zero_energy else 0.0,
         )
         if fraction == 1.0:
@@ -372,7 +373,7 @@ class CurveStepper:
         nothing moves.
         """
         model, joints, residual = self._model, self._joints, self._system.residual(state, control)
-        loads = abs(state.force) + sum(abs(state.load_factor * magnitude) for _, magnitude in self.request.others)
+        loads = abs(state.force) + abs(state.load_factor) * float(np.abs(state.constant).sum())
         loads, worst = loads + self._effect_forces(state), 0.0
         reactions = np.abs(state.multipliers) @ np.abs(joints.gradient(state.poses, state.motors))
         # all processes take the same basis of the motions
