@@ -25,7 +25,7 @@ from fenicsmech.design.rest_shape import DesignedLink, ParametricShape
 from fenicsmech.design.result import DesignResult, read_result
 from fenicsmech.design.run import Checkpoint
 from fenicsmech.design.shape.handle_optimum import HandlePlacement, ShapeError
-from fenicsmech.errors import DescriptionError, EquilibriumError, counted, positive
+from fenicsmech.errors import EquilibriumError, counted, positive, whole
 from fenicsmech.log import Progress
 from fenicsmech.model import Design
 from fenicsmech.polygons import first_crossing
@@ -58,9 +58,7 @@ class Scatter:
 
     def __post_init__(self) -> None:
         for name, least in (("starts", 1), ("seed", 0), ("attempts", 1), ("trial", 1)):
-            value = getattr(self, name)
-            if not isinstance(value, int) or value < least:
-                raise DescriptionError("search", f"{name} is {value!r}", f"Give a whole number of at least {least}")
+            whole(f"{name} of a search", getattr(self, name), least=least)
         for name in ("spread", "distinct"):
             positive(f"{name} of a search", getattr(self, name))
 
