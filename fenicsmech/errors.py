@@ -45,6 +45,10 @@ class MeshingError(FenicsmechError):
     """A link cannot be meshed as described."""
 
 
+class OutOfMemoryError(FenicsmechError, MemoryError):
+    """A matrix and its factor do not fit into memory."""
+
+
 class EquilibriumError(FenicsmechError):
     """No equilibrium was found at the requested load.
 

@@ -23,7 +23,7 @@ class JointSpring(Effect):
     """A torsion spring on a revolute joint, or a spring along a prismatic one.
 
     The coordinate φ is that of a motor: the angle (rad) or travel of the joint's second link, zero as drawn. In the
-    plane angles count full turns; in space they hold for |φ| < 2π.
+    plane angles count full turns; in space they hold for |φ| < 2π, and paths that go beyond end with an error.
 
     Attributes:
         joint: a revolute or prismatic joint.
@@ -84,6 +84,9 @@ class _Stiffness(PosePotential):
 
     def gradient(self, poses):
         return self.numbers["stiffness"] * self.gradient_by("stiffness", poses)
+
+    def check_step(self, before, after):
+        self._coordinate.check_step(before, after)
 
     def hessian(self, poses):
         slope, hessian = self._coordinate.gradient(poses), self._coordinate.hessian(poses)

@@ -240,8 +240,9 @@ class CurveFollower:
         while True:
             began, seconds = perf_counter(), dict(clock.seconds)
             try:
-                if (ends := next(steps, None)) is None:
-                    break
+                with stepper.keeping_frames():
+                    if (ends := next(steps, None)) is None:
+                        break
                 for critical in locate(path, *ends):
                     self._record_event(path, critical)
             except NotConverged as failure:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import copy
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -266,22 +267,24 @@ class Simulation:
 
         Raises:
             AssemblyError: one of the configurations does not assemble, or its motors strain the links.
+            EquilibriumError: its motors turn a spring in space by more than a full turn.
         """
         linkage, designed = self.linkage, self._design is not None
         # designs change the model's springs; those drawn need no mesh
         springs = self.model.spring_potentials if designed else spring_potentials(self.scene.effects, linkage)
-        point, drawn = linkage.point(part.on, part.at), np.array(in_dimension(part.at, linkage.dim))
-        positions = []
+        with self._shaped():
+            rest = self.model.rest_position(part) if designed else np.array(in_dimension(part.at, linkage.dim))
+        point, positions = linkage.point(part.on, rest.tolist()), []
         for configuration in configurations:
             with self._shaped():
-                assembly = assemble(linkage, configuration, springs)
+                assembly = from_one(self.comm, partial(assemble, linkage, configuration, springs))
             if assembly.fraction < 1.0:
                 raise AssemblyError(
                     f"configuration {configuration.name!r}",
                     f"its motors strain the links beyond {assembly.fraction:.1%} of their way",
                     "Use load_displacement with an output at the point",
                 )
-            positions.append(drawn + point.displacement(None, assembly.poses))
+            positions.append(rest + point.displacement(None, assembly.poses))
         return np.array(positions)
 
     # -- simulations derived from this one ------------------------------------------------------------------------
@@ -315,7 +318,7 @@ class Simulation:
                 f"it has values of shape {given.field.shape}, and the mesh has {size}",
                 "Give the design field of this simulation",
             )
-        other._design = Design(given.field.copy(), dict(given.numbers))
+        other._design = Design(given.field, dict(given.numbers))
         return other
 
     def with_material(self, drawn: Material, other: Material) -> Simulation:
@@ -426,8 +429,8 @@ class Simulation:
             rest, cells, dim = rest_vertices(self.model), self.model.mesh.cells, self.fidelity.model.dim
         return from_one(self.comm, lambda: 1.0 if rest is None else dim / float(radius_ratios(rest, cells).min()))
 
-    def solver(self, part: PrescribedPart, others: tuple[tuple[Force, float], ...] = ()) -> EquilibriumSolver:
-        """The solver for a force or motors that change and some constant forces, kept for all configurations."""
+    def solver(self, part: PrescribedPart, others: Sequence[Force] = ()) -> EquilibriumSolver:
+        """The solver for a force or motors that change and some constant forces, whose magnitudes states hold."""
         return self._discretisation.solver(part, others)
 
     def compute(self, request: CurveRequest, *, watch: Callable[[int], None] = lambda done: None) -> Curve:
