@@ -72,10 +72,11 @@ class DesignProblem:
         targets: Sequence[Target],
         regulariser: Regulariser = DEFAULT_REGULARISER,
     ) -> None:
-        self.simulation, self.designs, self.targets = simulation, tuple(designs), tuple(targets)
+        self.designs, self.targets = tuple(designs), tuple(targets)
         self.regulariser, self._clock = regulariser, Clock()
         check_designs(self.designs)
         self._own = DesignedSimulation(simulation, self.designs, self.targets, regulariser, self._clock)
+        self.simulation = self._own.simulation
 
     @property
     def initial(self) -> np.ndarray:

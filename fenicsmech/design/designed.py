@@ -58,7 +58,7 @@ class DesignedSimulation:
         regulariser: Regulariser,
         clock: Clock,
     ) -> None:
-        simulation.check_drawn("design problem")
+        simulation = simulation.check_drawn("design problem")
         check_targets(simulation, targets)
         self.simulation, self.designs, self.targets = simulation, tuple(designs), tuple(targets)
         self._regulariser, self.clock = regulariser, clock
