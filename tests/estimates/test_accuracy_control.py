@@ -124,6 +124,7 @@ def test_curve_that_fails_on_a_finer_level_leaves_no_answers_of_a_coarser_one(mo
     assert computed and simulation.choice is None
 
 
+@pytest.mark.thorough
 def test_forces_are_as_accurate_as_asked_for_where_displacements_are_prescribed():
     scene, push, load = cantilever()
     finest = fm.Simulation(scene, space="3d-symmetric", order=3, size=3.0, layers=2, segments=16)
