@@ -96,6 +96,7 @@ def test_plane_stress_with_corrections_ends_at_the_targets_in_space(loads):
     assert corrected(result) == pytest.approx(corrected(direct), rel=5e-3)
 
 
+@pytest.mark.thorough
 def test_equilibria_in_space_that_plane_stress_does_not_lead_to_are_loaded_from_zero(loads, monkeypatch, caplog):
     problem = truss(*WANTED).problem(**COARSE)
     guessed = problem.optimise()

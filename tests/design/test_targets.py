@@ -119,6 +119,7 @@ def test_samples_say_what_a_user_computes():
     assert values[10] == pytest.approx(curve.frames[0].strain_energy, rel=1e-7)
 
 
+@pytest.mark.thorough
 def test_equilibria_at_a_prescribed_displacement_may_be_unstable_under_the_force():
     simulation, push = arch()
     path = simulation.follow(push, until=fm.Until(displacement=1.2 * RISE))

@@ -51,6 +51,7 @@ def test_parts_have_the_values_of_a_scene_drawn_with_the_files(tmp_path):
     assert parts(result)[:, 1] == pytest.approx(curve.error_estimates(), rel=1e-6)
 
 
+@pytest.mark.thorough
 def test_errors_in_the_part_are_those_of_still_finer_elements(verified):
     problem, result, half = verified
     assert [target.part for target in result.targets] == [None, None]
@@ -120,6 +121,7 @@ def flexure(size: float, shape: fm.Shape | None = None) -> tuple[fm.Simulation, 
     return fm.Simulation(fm.Scene(rig), space="plane-stress", order=1, size=size), leaf, push
 
 
+@pytest.mark.thorough
 def test_parts_that_elements_of_the_optimiser_do_not_carry_are_loaded_from_zero(tmp_path):
     def problem(size: float) -> fm.DesignProblem:
         sim, leaf, push = flexure(size)

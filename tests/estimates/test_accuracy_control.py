@@ -155,6 +155,7 @@ def test_design_problems_keep_the_fidelity_chosen_before():
     assert problem.simulation.with_design(drawn).fidelity == chosen
 
 
+@pytest.mark.thorough
 def test_forces_are_as_accurate_as_asked_for_where_displacements_are_prescribed():
     scene, push, load = cantilever()
     finest = fm.Simulation(scene, space="3d-symmetric", order=3, size=3.0, layers=2, segments=16)
