@@ -126,7 +126,7 @@ class ArcLengthStepper(Stepper):
             reach = 0.01 / motion  # of the mechanism's length, or rad: of interest if nothing else is said
         self.metric = ArcMetric(system, followed, reach * motion, reach, reach * speed or math.inf)
         self.start = point.scaled(1.0 / self.metric.norm(point.tangent))
-        super().__init__(solver, ParabolaPredictor(self.metric, steps.turn))
+        super().__init__(solver, ParabolaPredictor(self.metric, steps.turn), state)
 
     # -- points ------------------------------------------------------------------------------------------------
 

@@ -44,7 +44,7 @@ from fenicsmech.equilibrium import (
     NotConverged,
     State,
 )
-from fenicsmech.errors import EquilibriumError
+from fenicsmech.errors import AssemblyError, EquilibriumError
 from fenicsmech.model import Design
 from fenicsmech.quantities import (
     Displacement,
@@ -125,7 +125,7 @@ class _Path:
         self, simulation: Simulation, sample: Sample, observables: Iterable[Observable], numbers: Sequence[NumberKind]
     ) -> None:
         self.sample, self._model = sample, simulation.model
-        self.solver: EquilibriumSolver = simulation.solver(sample.part, sample.others)
+        self.solver: EquilibriumSolver = simulation.solver(sample.part, [force for force, _ in sample.others])
         self.moved = None if sample.moved is None else Displacement(sample.moved[0]).on(simulation.model)
         own = observables if self.moved is None else (*observables, self.moved)
         moved = any(observable.on_link for observable in own)
@@ -347,7 +347,7 @@ class SampleEquilibria:
             before = sample.value
         try:
             curve = self._simulation.compute(sample_request(self._simulation, ordered[0], loads))
-        except EquilibriumError as error:
+        except (EquilibriumError, AssemblyError) as error:
             raise Infeasible(str(error)) from error
         found, snapped = dict[Sample, SampleState](), False
         for load, frame in zip(loads, curve.frames, strict=True):
@@ -368,7 +368,7 @@ class SampleEquilibria:
     def _unloaded(self, sample: Sample) -> State:
         try:
             return self._simulation.unloaded(sample_request(self._simulation, sample, [sample.value]))
-        except EquilibriumError as error:
+        except (EquilibriumError, AssemblyError) as error:
             raise Infeasible(str(error)) from error
 
     def _from_guess(self, path: _Path, other: WholeState, unloaded: State) -> SampleState:

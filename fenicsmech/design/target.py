@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from fenicsmech.collective import on_one
 from fenicsmech.design.description import SplineDesign
 from fenicsmech.design.numbers import Number
 from fenicsmech.errors import DescriptionError, counted, expect, finite, positive, set_fields
@@ -127,14 +129,14 @@ class Target:
         return f"{self.quantity}{'' if self.sample is None else f' under {self.sample}'}"
 
     @property
-    def on_curve(self) -> tuple[float, float, Configuration] | None:
-        """Force, displacement and configuration of a point of a load–displacement curve, if it is one."""
+    def on_curve(self) -> tuple[Force, float, float, Configuration] | None:
+        """Force, magnitude, displacement and configuration of a point of a load–displacement curve, if it is one."""
         if self.sample is None or self.sample.moved or self.relation != "equals" or len(self.sample.forces) != 1:
             return None
         (force, magnitude), *_ = self.sample.forces
         if self.quantity != Displacement(force) or not isinstance(magnitude, float):
             return None
-        return magnitude, self.wanted[0], self.sample.configuration
+        return force, magnitude, self.wanted[0], self.sample.configuration
 
 
 class Comparison:
@@ -277,7 +279,7 @@ def check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
         part, size = f"target of the {target.quantity}", target.quantity.size(dim)
         if target.sample is not None:
             sample_request(simulation, target.sample, [target.sample.value])
-            assemble(simulation.linkage, target.sample.configuration)
+            on_one(simulation.comm, partial(assemble, simulation.linkage, target.sample.configuration))
         target.quantity.check(simulation.scene, dim)
         if len(target.wanted) > size or target.size == 1 < size:
             raise DescriptionError(

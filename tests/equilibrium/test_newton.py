@@ -11,7 +11,7 @@ from fenicsmech.equilibrium import LoadControl
 from ..simulation.clamped import cantilever
 from .finger import RUBBER, finger
 
-SPACES = ["plane-stress", "plane-strain", "3d"]
+SPACES = ["plane-stress", "plane-strain", pytest.param("3d", marks=pytest.mark.thorough)]
 OUT_OF_REACH = 200.0  # the legs are 60 long
 LOADS = {"plane-stress": [2.0, 4.0, 8.0, 16.0], "plane-strain": [2.0, 4.0, 8.0, 16.0], "3d": [2.0, 4.0, 8.0]}
 
@@ -101,6 +101,20 @@ def test_slender_link_takes_a_load_that_rolls_it_up_in_one_solve():
     solver.system.load(solution.state)
     assert solver.system.load_displacement(solution.state) == pytest.approx(0.81061 * length, rel=2e-3)  # elastica
     assert solution.iterations <= 16
+
+
+@pytest.mark.parametrize(
+    ("limit", "value"),
+    [("iterations", -1), ("iterations", 2.5), ("watchdog", "x"), ("watchdog", -1), ("path_iterations", 0)],
+)
+def test_numbers_of_iterations_that_make_no_sense_are_refused(limit, value):
+    with pytest.raises(fm.DescriptionError, match=f"Newton's {limit}: the value is {value!r}.*whole number"):
+        fm.PrimalDualNewton(**{limit: value})
+
+
+def test_a_method_for_linear_systems_that_is_none_is_refused():
+    with pytest.raises(fm.DescriptionError, match="linear systems: 'direct' is not a method"):
+        fm.PrimalDualNewton(linear="direct")
 
 
 def test_too_few_iterations_are_told_as_the_reason():
