@@ -13,7 +13,9 @@
 ``optimisers``        Levenberg–Marquardt beside BFGS
 ``constrained``       SQP beside optimisers of scipy and NLopt, under inequalities
 ``closeness``         targets missed where designs stay close to the drawing; designs given by parameters alone
-``frames``            seconds per load step of the demos' mechanisms
+``handles``           quality of the mesh with optimal and with naive handles
+``parts``             targets in the exported parts of the demos
+``frames``            seconds per load step of the demos' mechanisms; whole designs
 ``verification``      the tests that compare with exact solutions and other programs, as one table
 ``walk``              two calls whose files are counted
 ====================  ==========================================================================================

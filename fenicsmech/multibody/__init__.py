@@ -3,7 +3,7 @@
 - ``points``: interface nodes of the mesh as functions of body poses, the design field at nodes, material points
 - ``places``: the places of joints in the drawn configuration, which designs change
 - ``linkage``: bodies, constraints between them and potentials of their poses
-- ``idle_spins``: turns of bodies about the line through two ball joints, which nothing resists
+- ``spins``: idle spins, turns of bodies about the line through two ball joints, which nothing resists
 - ``assembly``: the rigid assembly of a configuration, and the motions that joints, motors and springs leave
 """
 

@@ -397,8 +397,8 @@ class PosePotential(ABC):
         """∂²V/∂z∂p of a number p that changes the places of joints, (n · pose_size,).
 
         Zero by default, which is right where V refers to no joint. A potential that does overrides it, and reads
-        places from ``JointSystem.places``, as ``JointCoordinate`` does; otherwise derivatives by ``JointPosition`` and
-        ``JointAxis`` are wrong.
+        places from ``JointSystem.places``, as ``JointCoordinate`` does; otherwise derivatives with respect to
+        ``JointPosition`` and ``JointAxis`` are wrong.
 
         Args:
             changes: by a unit of p, by index of the connection (``Linkage.connection_of``).

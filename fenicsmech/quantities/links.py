@@ -192,7 +192,7 @@ class CentrelineLength(Quantity):
 
     @property
     def of_part(self):  # type: ignore[override]
-        return self.centreline is None  # a given one is that of the drawn link
+        return self.centreline is None  # one that is given belongs to the drawn link
 
     def __post_init__(self) -> None:
         expect("length of a link", self.link, FlexibleLink, "a flexible link", "Give a flexible link of the mechanism")

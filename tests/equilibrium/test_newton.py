@@ -103,7 +103,7 @@ def test_slender_link_takes_a_load_that_rolls_it_up_in_one_solve():
     assert solution.iterations <= 16
 
 
-def test_too_few_iterations_are_told_as_the_reason():
+def test_too_few_iterations_are_given_as_the_reason():
     simulation, push = finger("plane-stress", solver=fm.PrimalDualNewton(iterations=1))
     with pytest.raises(fm.EquilibriumError, match="after 1 iteration"):
         simulation.load_displacement(push, forces=[5.0])

@@ -148,7 +148,7 @@ def test_motor_on_a_joint_without_a_free_coordinate_is_refused():
         lambda: p.mechanism.motor(ball),
         "motor 'motor of ball'",
         "a spherical joint takes no motor",
-        "Use a joint with one free coordinate, as a revolute or a prismatic one",
+        "Use a joint with one free coordinate, such as a revolute or a prismatic one",
     )
 
 

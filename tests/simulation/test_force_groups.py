@@ -44,7 +44,7 @@ def test_displacement_of_a_group_can_be_prescribed():
     assert moved.forces == pytest.approx([3.0], rel=1e-8)
 
 
-def test_groups_that_make_no_sense_are_refused():
+def test_invalid_groups_are_refused():
     scene, push, _ = arm()
     simulation = fm.Simulation(scene, space="plane-stress", size=4.0, comm=MPI.COMM_SELF)
     other = fm.Mechanism("other")
