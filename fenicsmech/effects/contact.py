@@ -3,7 +3,7 @@
     V = Σ_links ∫ ½ κ ⟨−g(x)⟩² dA + Σ_points ½ k ⟨−g(x)⟩²,     x = X + u,
 
 g the signed gap, positive outside, 0 on the surface, negative inside an obstacle, and ⟨·⟩ the positive part. The
-pressure κ ⟨−g⟩ pushes a link out along ∇g. V is once continuously differentiable, its second derivative jumps where
+pressure κ ⟨−g⟩ pushes a link out along ∇g. V is once continuously differentiable; its second derivative jumps where
 points come into contact: Newton's method is semismooth there.
 """
 
