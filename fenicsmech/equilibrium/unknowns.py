@@ -200,7 +200,7 @@ class UnknownMap:
         rows, unknowns, free = numbering.rows, numbering.unknowns, numbering.free
         counts = np.zeros(rows.local, dtype=int)
         counts[free] = counts[rows.border.local] = 1
-        moved = {}  # rows of interface nodes
+        moved: dict[int, np.ndarray] = {}  # rows of interface nodes
         for body, nodes in interfaces.nodes.items():
             moved[body] = self._rows_of(nodes[nodes < interfaces.owned])
             counts[moved[body]] = len(joints.columns[body])
@@ -214,24 +214,25 @@ class UnknownMap:
         border = starts[:-1][rows.border.local]
         columns[border] = unknowns.border.first + np.arange(len(border))
         values[border] = scale[: len(border)]
+        # ∂u/∂z by rows, of all bodies: starts, columns, units of the columns, rows
+        turned = np.concatenate([np.zeros(0, int), *(np.tile(joints.columns[b], len(own)) for b, own in moved.items())])
+        turned_rows = rows.links.first + np.concatenate([np.zeros(0, int), *moved.values()])
+        self._turning = (
+            np.arange(0, len(turned) + 1, joints.space.pose_size, dtype=PETSc.IntType),
+            (unknowns.poses.first + turned).astype(PETSc.IntType),
+            scale[turned],
+            turned_rows.astype(PETSc.IntType),
+        )
         size = [(rows.local, rows.size), (unknowns.local, unknowns.size)]
         self.map = PETSc.Mat().createAIJ(size, csr=(starts.astype(PETSc.IntType), columns, values), comm=rows.comm)
 
     def turn(self, poses: np.ndarray) -> None:
         """Brings ∂u/∂z to ``poses``."""
         self.poses = poses
-        numbering, joints = self.numbering, self._joints
-        for body in self._interfaces.nodes:
-            nodes, gradient = self._interfaces.gradient_rows(poses, body)
-            if not len(nodes):
-                continue
-            columns, rows = joints.columns[body], self._rows_of(nodes)
-            self.map.setValuesIJV(
-                np.arange(0, len(columns) * len(rows) + 1, len(columns), dtype=PETSc.IntType),
-                np.tile(numbering.unknowns.poses.first + columns, len(rows)).astype(PETSc.IntType),
-                (gradient * self.scale[columns]).ravel(),
-                rowmap=(numbering.rows.links.first + rows).astype(PETSc.IntType),
-            )
+        values = [self._interfaces.gradient_rows(poses, body)[1].ravel() for body in self._interfaces.nodes]
+        starts, columns, units, rows = self._turning
+        if len(rows):
+            self.map.setValuesIJV(starts, columns, np.concatenate(values) * units, rowmap=rows)
         self.map.assemble()
 
     def _rows_of(self, nodes: np.ndarray) -> np.ndarray:

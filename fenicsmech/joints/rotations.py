@@ -100,7 +100,7 @@ class RigidSpace(ABC):
         """∂u/∂z for points X − c = ``offsets`` (n, dim), shape (n, dim, pose_size)."""
         gradient = np.zeros((len(offsets), self.dim, self.pose_size))
         gradient[:, :, : self.dim] = np.eye(self.dim)
-        gradient[:, :, self.dim :] = np.einsum("aij,nj->nia", self.rotation_gradient(pose), offsets)
+        gradient[:, :, self.dim :] = (self.rotation_gradient(pose) @ offsets.T).T
         return gradient
 
     def displacement_hessian(self, pose: np.ndarray, moment: np.ndarray) -> np.ndarray:
@@ -118,18 +118,18 @@ class PlanarSpace(RigidSpace):
     freedoms = 3
     identity = np.zeros(3)
     identity.setflags(write=False)
-    _quarter_turn = np.array([[0.0, -1.0], [1.0, 0.0]])
+    _identity, _quarter_turn = np.eye(2), np.array([[0.0, -1.0], [1.0, 0.0]])
 
     def rotation_increment(self, pose):
         # cos θ − 1 = −2 sin²(θ/2) keeps the digits of small rotations
         half = np.sin(0.5 * pose[2])
-        return np.sin(pose[2]) * self._quarter_turn - 2.0 * half * half * np.eye(2)
+        return np.sin(pose[2]) * self._quarter_turn - 2.0 * half * half * self._identity
 
     def rotation_gradient(self, pose):
-        return (np.cos(pose[2]) * self._quarter_turn - np.sin(pose[2]) * np.eye(2))[None]
+        return (np.cos(pose[2]) * self._quarter_turn - np.sin(pose[2]) * self._identity)[None]
 
     def rotation_hessian(self, pose):
-        return -(np.eye(2) + self.rotation_increment(pose))[None, None]
+        return -(self._identity + self.rotation_increment(pose))[None, None]
 
     def symbolic_rotation(self, parameters):
         (angle,) = parameters

@@ -190,7 +190,7 @@ class JointSystem:
         """A, (rows, size)."""
         matrix = np.zeros((self.rows, self.size))
         for rows, columns, block in self.gradient_blocks(poses, motors):
-            matrix[np.ix_(rows, columns)] += block
+            matrix[rows[:, None], columns] += block
         return matrix
 
     def scaled_gradient(self, poses: np.ndarray, motors: np.ndarray) -> np.ndarray:
