@@ -207,7 +207,7 @@ class Curve:
     def growth_by_halving(self) -> np.ndarray:
         """Growth of ``values`` with each halving of the elements, (frames,): a bound in the plane, approximate in 3D.
 
-        They grow without limit if the force acts at a point of a flexible link; 0 if it does not, and where motors move.
+        They grow without limit if the force is at a point of a flexible link; 0 if it does not, and where motors move.
         """
         found = self.discretisation
         growth = growth_by_halving(self.part, found.model, found.fidelity.sizes) * self.forces
