@@ -74,12 +74,13 @@ def _options() -> dict:
 def compiling(folder: Path = _KERNELS) -> Iterator[None]:
     """A context for code that may compile into ``folder``; the build tools' commands on the root logger are muted."""
     _remove_unfinished(folder)
-    logging.disable(logging.INFO)
+    muted = logging.root.manager.disable  # by the application
+    logging.disable(max(muted, logging.INFO))
     try:
         with _lock(folder, fcntl.LOCK_SH):
             yield
     finally:
-        logging.disable(logging.NOTSET)
+        logging.disable(muted)
 
 
 @contextmanager

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,10 @@ class AssemblyError(FenicsmechError):
 
 class MeshingError(FenicsmechError):
     """A link cannot be meshed as described."""
+
+
+class OutOfMemoryError(FenicsmechError, MemoryError):
+    """A matrix and its factor do not fit into memory."""
 
 
 class EquilibriumError(FenicsmechError):
@@ -81,6 +86,13 @@ def positive(part: str, value: Any) -> float:
     if number <= 0.0:
         raise DescriptionError(part, f"{number:g} is not positive", "Give a number greater than zero")
     return number
+
+
+def whole(part: str, value: Any, *, least: int) -> int:
+    """``value`` as an int of at least ``least``."""
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < least:
+        raise DescriptionError(part, f"the value is {value!r}", f"Give a whole number of at least {least}")
+    return int(value)
 
 
 def point(part: str, values: Sequence[float], *, dimensions: tuple[int, ...] = (2, 3)) -> tuple[float, ...]:

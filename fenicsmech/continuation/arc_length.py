@@ -127,7 +127,7 @@ class ArcLengthStepper(Stepper):
             reach = 0.01 / motion  # neither sets a unit: a motion of 1 % of the mechanism's length, or 0.01 rad, does
         self.metric = ArcMetric(system, followed, reach * motion, reach, reach * speed or math.inf)
         self.start = point.scaled(1.0 / self.metric.norm(point.tangent))
-        super().__init__(solver, ParabolaPredictor(self.metric, steps.turn))
+        super().__init__(solver, ParabolaPredictor(self.metric, steps.turn), state)
 
     # -- points ------------------------------------------------------------------------------------------------
 

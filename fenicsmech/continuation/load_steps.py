@@ -97,8 +97,8 @@ class LoadStepper(Stepper):
     """
 
     def __init__(self, solver: EquilibriumSolver, start: State, control: Control, *, predictor: Predictor) -> None:
-        super().__init__(solver, predictor)
-        self._steps, self._start, self._value = LoadSteps(), start, control.value(solver.system, start)
+        super().__init__(solver, predictor, start)
+        self._steps, self._value = LoadSteps(), control.value(solver.system, start)
         self._origin, self._covered = self._value, 0.0  # farthest from there so far
         factors = self._steps.shift_factors if start.minimum_shift else (0.0,)
         self._shifts = tuple(factor * start.minimum_shift for factor in factors)
@@ -110,6 +110,7 @@ class LoadStepper(Stepper):
 
         Raises:
             LoadStepsFailed: the smallest step failed.
+            EquilibriumError: a potential does not hold for a step.
         """
         if not self._points:
             self._settle(control.at(self._value))
@@ -262,7 +263,7 @@ class MotorStepper(LoadStepper):
                 step *= 0.5
                 continue
             _log.info("links strain beyond a dead centre near %g", self._value)
-            self._rate, self._points = None, []
+            self._rate, self._points, self._start = None, [], last.state
             self._accept_at(point)
             return True
         return False

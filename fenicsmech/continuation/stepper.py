@@ -96,10 +96,11 @@ class Stepper:
     Args:
         solver: for the equilibria.
         predictor: of the next one.
+        start: near the first of them.
     """
 
-    def __init__(self, solver: EquilibriumSolver, predictor: Predictor) -> None:
-        self.solver, self.system, self.predictor = solver, solver.system, predictor
+    def __init__(self, solver: EquilibriumSolver, predictor: Predictor, start: State) -> None:
+        self.solver, self.system, self.predictor, self._start = solver, solver.system, predictor, start
         self._points: list[EquilibriumPoint] = []
         self._width = 0.0  # by which the two are apart
 
@@ -108,5 +109,12 @@ class Stepper:
         return self.predictor.predict(self.system, self._points, self._width, ahead)
 
     def _accept(self, point: EquilibriumPoint, width: float) -> None:
-        """Keeps ``point``, ``width`` ahead of the last one, and that one unless they are in the same place."""
+        """Keeps ``point``, ``width`` ahead of the last one, and that one unless they are in the same place.
+
+        Raises:
+            EquilibriumError: a potential does not hold for the step.
+        """
+        before = self._points[-1].state if self._points else self._start
+        for potential in self.system.potentials:
+            potential.check_step(before.poses, point.state.poses)
         self._points, self._width = [*(self._points[-1:] if width else []), point], width

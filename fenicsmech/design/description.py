@@ -11,7 +11,7 @@ from fenicsmech.collective import from_one
 from fenicsmech.design.numbers import Number
 from fenicsmech.design.shape.shape_map import ImageRequest, ShapeRequest
 from fenicsmech.design.shape.spline import lay_out
-from fenicsmech.errors import DescriptionError, expect, finite, points, positive, set_fields
+from fenicsmech.errors import DescriptionError, expect, finite, points, positive, set_fields, whole
 from fenicsmech.mechanism import Centreline, FlexibleLink, Mechanism, Shape, Strip
 from fenicsmech.meshing import Figure, LinkOutline, find_centreline, link_outline, matches
 from fenicsmech.model import check_numbers, plan_sites
@@ -85,8 +85,7 @@ class SplineDesign:
         if len(set(names)) < len(names):
             twice = next(name for name in names if names.count(name) > 1)
             raise DescriptionError(part, f"link {twice!r} is named twice", "Name each link once")
-        if not isinstance(self.segments, int) or self.segments < 1:
-            raise DescriptionError(part, f"{self.segments!r} segments", "Give a whole number of at least 1")
+        whole(f"number of segments of the {part}", self.segments, least=1)
         positive(f"curvature bound of the {part}", self.bend)
         if self.ends is not None:
             if self.centreline is not None:

@@ -31,6 +31,7 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
+from fenicsmech.collective import from_one
 from fenicsmech.design.optimisers.problem import Infeasible
 from fenicsmech.design.target import Target, sample_request
 from fenicsmech.design.transfer import WholeState, guess, whole_state
@@ -127,9 +128,9 @@ class _Path:
         self, simulation: Simulation, sample: Sample, observables: Iterable[Observable], numbers: Sequence[NumberKind]
     ) -> None:
         self.sample, self._model = sample, simulation.model
-        self.solver: EquilibriumSolver = simulation.solver(sample.part, sample.others)
+        self.solver: EquilibriumSolver = simulation.solver(sample.part, [force for force, _ in sample.others])
         self.moved = None if sample.moved is None else Displacement(sample.moved[0]).on(simulation.model)
-        strained = assemble(simulation.linkage, sample.configuration).fraction < 1.0
+        strained = from_one(simulation.comm, lambda: assemble(simulation.linkage, sample.configuration)).fraction < 1.0
         own = observables if self.moved is None else (*observables, self.moved)
         moved = any(observable.on_link for observable in own)
         self.moves = strained or moved or any(kind.moves_unloaded(sample.configuration) for kind in numbers)

@@ -28,7 +28,7 @@ from fenicsmech.design.run import Checkpoint
 from fenicsmech.design.shape.handle_optimum import HandlePlacement, ShapeError
 from fenicsmech.design.target import Target, check_targets
 from fenicsmech.elasticity import PLANE_STRESS, ElasticModel
-from fenicsmech.errors import DescriptionError, EquilibriumError, counted, positive
+from fenicsmech.errors import DescriptionError, EquilibriumError, counted, positive, whole
 from fenicsmech.log import Progress
 from fenicsmech.mechanism import Strip
 from fenicsmech.model import Design, fits
@@ -63,9 +63,7 @@ class Scatter:
 
     def __post_init__(self) -> None:
         for name, least in (("starts", 1), ("seed", 0), ("attempts", 1), ("trial", 1)):
-            value = getattr(self, name)
-            if not isinstance(value, int) or value < least:
-                raise DescriptionError("search", f"{name} is {value!r}", f"Give a whole number of at least {least}")
+            whole(f"{name} of a search", getattr(self, name), least=least)
         for name in ("spread", "distinct"):
             positive(f"{name} of a search", getattr(self, name))
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from fenicsmech.collective import on_one
 from fenicsmech.design.description import SplineDesign
 from fenicsmech.design.numbers import Number
 from fenicsmech.errors import DescriptionError, counted, expect, finite, positive, set_fields
@@ -277,7 +279,7 @@ def check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
         part, size = f"target of the {target.quantity}", target.quantity.size(dim)
         if target.sample is not None:
             sample_request(simulation, target.sample, [target.sample.value])
-            assemble(simulation.linkage, target.sample.configuration)
+            on_one(simulation.comm, partial(assemble, simulation.linkage, target.sample.configuration))
         target.quantity.check(simulation.scene, dim)
         if len(target.wanted) > size or target.size == 1 < size:
             raise DescriptionError(

@@ -13,7 +13,7 @@ from math import pi
 
 import numpy as np
 
-from fenicsmech.errors import DescriptionError, finite, positive, set_fields
+from fenicsmech.errors import DescriptionError, expect, finite, positive, set_fields
 from fenicsmech.mechanism import Effect, Joint
 from fenicsmech.multibody import JointCoordinate, PosePotential
 
@@ -23,7 +23,7 @@ class JointSpring(Effect):
     """A torsion spring on a revolute joint, or a spring along a prismatic one.
 
     The coordinate φ is that of a motor: the angle (rad) or travel of the joint's second link, zero as drawn. In the
-    plane angles count full turns; in space they hold for |φ| < 2π.
+    plane angles count full turns; in space they hold for |φ| < 2π, and paths that go beyond end with an error.
 
     Attributes:
         joint: a revolute or prismatic joint.
@@ -31,7 +31,7 @@ class JointSpring(Effect):
         rest: φ₀, where the spring is relaxed; rad or length.
 
     Raises:
-        DescriptionError: a number is invalid.
+        DescriptionError: this is not a joint, or a number is invalid.
     """
 
     joint: Joint
@@ -39,6 +39,7 @@ class JointSpring(Effect):
     rest: float = 0.0
 
     def __post_init__(self) -> None:
+        expect("joint spring", self.joint, Joint, "a joint")
         set_fields(self, stiffness=positive(f"stiffness of {self._name}", self.stiffness))
         set_fields(self, rest=finite(f"rest position of {self._name}", self.rest))
 
@@ -83,6 +84,9 @@ class _Stiffness(PosePotential):
 
     def gradient(self, poses):
         return self.numbers["stiffness"] * self.gradient_by("stiffness", poses)
+
+    def check_step(self, before, after):
+        self._coordinate.check_step(before, after)
 
     def hessian(self, poses):
         slope, hessian = self._coordinate.gradient(poses), self._coordinate.hessian(poses)

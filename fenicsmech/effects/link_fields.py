@@ -219,7 +219,7 @@ def find_boundaries(
         of_link = owner == links.index(part.link)
         within[:, k] = of_link
         if part.where is not None:
-            inside = _on_all_ranks(mesh.comm, part.where, every.places[of_link].reshape(-1, dim))
+            inside = _on_all_ranks(mesh.comm, part, every.places[of_link].reshape(-1, dim))
             within[of_link, k] &= inside.reshape(-1, dim).all(axis=1)
     kinds = sorted(set().union(*mesh.comm.allgather({tuple(row) for row in within.tolist() if any(row)})))
     tag = {kind: number for number, kind in enumerate(kinds, start=1)}
@@ -240,11 +240,23 @@ def find_boundaries(
     return boundaries
 
 
-def _on_all_ranks(comm: MPI.Comm, where: Callable[[np.ndarray], np.ndarray], places: np.ndarray) -> np.ndarray:
-    """``where`` at this rank's ``places``, called with those of all ranks, as it may compare them."""
+def _on_all_ranks(comm: MPI.Comm, faces: Faces, places: np.ndarray) -> np.ndarray:
+    """The predicate of ``faces`` at this rank's ``places``, called with those of all ranks, as it may compare them.
+
+    All ranks refuse it alike where it is not one of rows.
+    """
+    assert faces.where is not None
     everywhere = comm.allgather(places)
+    points = np.concatenate(everywhere)
+    inside = np.asarray(faces.where(points))
+    if inside.shape != points.shape[:1] or inside.dtype != bool:
+        raise DescriptionError(
+            f"boundary of link {faces.link.name!r}",
+            f"the predicate gives {inside.dtype} of shape {inside.shape} for points of shape {points.shape}",
+            "Points are rows, unlike those of dolfinx, and a boolean is wanted for each: lambda x: x[:, 0] > 5",
+        )
     before = sum(len(others) for others in everywhere[: comm.rank])
-    return np.asarray(where(np.concatenate(everywhere)), dtype=bool)[before : before + len(places)]
+    return inside[before : before + len(places)]
 
 
 def exterior_facets(mesh: dmesh.Mesh, *, half: bool) -> Boundary:

@@ -19,12 +19,11 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from numbers import Integral
 
 from ufl import Identity, as_matrix, det, diff, dot, inner, tr, variable
 from ufl.core.expr import Expr
 
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, whole
 from fenicsmech.laws import Law, NeoHookean, Strain, spatial_strain
 from fenicsmech.mechanism import Material
 
@@ -216,8 +215,7 @@ class Quadrature:
     degree: int
 
     def __post_init__(self) -> None:
-        if not isinstance(self.degree, Integral) or self.degree < 1:
-            raise DescriptionError("quadrature", f"degree {self.degree!r}", "Give a whole number of at least 1")
+        whole("degree of the quadrature", self.degree, least=1)
 
     @staticmethod
     def for_order(order: int, dim: int) -> Quadrature:

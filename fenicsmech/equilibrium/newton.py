@@ -47,7 +47,7 @@ from fenicsmech.equilibrium.linearisation import EquilibriumPoint, NotConverged
 from fenicsmech.equilibrium.solver import EquilibriumMethod, EquilibriumSolver
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
-from fenicsmech.errors import positive
+from fenicsmech.errors import positive, whole
 from fenicsmech.log import logger
 
 _log = logger(__name__)
@@ -72,7 +72,8 @@ class PrimalDualNewton(EquilibriumMethod):
         divergence: growth of the residual, over its least value or ``near``, at which a shorter step is tried too.
 
     Raises:
-        DescriptionError: a limit is not a positive number, or ``reuse_factor`` is negative.
+        DescriptionError: a limit is not a positive number, a number of iterations not a whole one, or ``reuse_factor``
+            is negative.
     """
 
     near: float = 1e-2
@@ -88,6 +89,8 @@ class PrimalDualNewton(EquilibriumMethod):
         super().__post_init__()
         for limit in ("near", "largest_turn", "divergence"):
             positive(f"Newton's {limit}", getattr(self, limit))
+        for limit, least in (("iterations", 1), ("watchdog", 0), ("path_iterations", 1)):
+            whole(f"Newton's {limit}", getattr(self, limit), least=least)
         if self.reuse_factor != 0.0:
             positive("Newton's reuse_factor", self.reuse_factor)
 

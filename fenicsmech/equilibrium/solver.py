@@ -21,7 +21,7 @@ from fenicsmech.equilibrium.linearisation import (
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 from fenicsmech.equilibrium.two_level import BySize
-from fenicsmech.errors import counted, positive
+from fenicsmech.errors import counted, expect, positive
 
 _STEP = 1e-6  # relative error that iterative solvers may leave in steps and tangents: the next iteration corrects it
 
@@ -37,7 +37,7 @@ class EquilibriumMethod(ABC):
         linear: method for the linear systems; by default chosen by their size.
 
     Raises:
-        DescriptionError: a limit is not a positive number.
+        DescriptionError: a limit is not a positive number, or ``linear`` is not a method.
     """
 
     tolerance: float = 1e-9
@@ -47,6 +47,7 @@ class EquilibriumMethod(ABC):
     def __post_init__(self) -> None:
         for limit in ("tolerance", "roundoff"):
             positive(f"Newton's {limit}", getattr(self, limit))
+        expect("linear systems", self.linear, LinearMethod, "a method", "Give BySize(…), Direct() or TwoLevel(…)")
 
     @abstractmethod
     def solver(self, system: EquilibriumSystem) -> EquilibriumSolver:

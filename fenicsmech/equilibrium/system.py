@@ -19,6 +19,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from fenicsmech.collective import from_one
 from fenicsmech.compat import destroy_garbage
 from fenicsmech.elasticity import ElasticBody, PredictedStress
 from fenicsmech.equilibrium.border import BorderTerms, PointLoad
@@ -65,7 +66,7 @@ class EquilibriumSystem:
         interfaces: interface nodes as functions of poses.
         joints: the constraints.
         controlled: the load whose magnitude f is controlled.
-        loads: constant ones, with their magnitudes.
+        loads: constant ones, whose magnitudes states hold.
         potentials: of body poses.
         compliances: c by constraint row; 0 where none is given.
         idle: spins that nothing resists, whose gauge K fixes.
@@ -86,7 +87,7 @@ class EquilibriumSystem:
         joints: JointSystem,
         *,
         controlled: PointLoad,
-        loads: tuple[tuple[PointLoad, float], ...] = (),
+        loads: Sequence[PointLoad] = (),
         potentials: Sequence[PosePotential] = (),
         compliances: Mapping[int, float] = MappingProxyType({}),
         idle: Sequence[IdleSpin] = (),
@@ -98,7 +99,7 @@ class EquilibriumSystem:
         self.controlled, self.clock, self.comm = controlled, clock, comm
         self.numbering = numbering = Numbering(comm, interfaces, joints, elastic.pressure)
         self.blocks = numbering.unknowns
-        self.idle = tuple(idle)
+        self.idle, self.potentials = tuple(idle), tuple(potentials)
         self.compliances = np.array([compliances.get(row, 0.0) for row in range(joints.rows)])
         self._border = BorderTerms(
             elastic,
@@ -206,8 +207,10 @@ class EquilibriumSystem:
         return float(np.sqrt(self.comm.allreduce(float(missed @ missed))))
 
     def without_self_stress(self, state: State) -> State:
-        """``state`` with the least of all multipliers that balance the same forces. Local."""
-        least = self.joints.without_self_stress(state.multipliers, state.poses, state.motors, self.compliances)
+        """``state`` with the least of all multipliers that balance the same forces."""
+        on_joints = state.multipliers, state.poses, state.motors, self.compliances
+        # of one process: their number of self-stresses is a decision that depends on rounding
+        least = from_one(self.comm, lambda: self.joints.without_self_stress(*on_joints))
         return replace(state, multipliers=least)
 
     def constraints(self, state: State, multipliers: np.ndarray) -> np.ndarray:

@@ -32,7 +32,7 @@ from fenicsmech.errors import counted, positive
 from fenicsmech.log import logger
 from fenicsmech.mechanism import FlexibleLink, MeshPart, Scene, StepPart
 from fenicsmech.meshing import link_thickness
-from fenicsmech.model import Fidelity, check_scene, fits
+from fenicsmech.model import Fidelity, check_scene, fits, per_link
 
 _log = logger(__name__)
 
@@ -228,12 +228,11 @@ class AccuracyControl:
         self._accuracy, self._formulation = positive("accuracy", accuracy), formulation
         self.options = options or AccuracyOptions()
         links = scene.mechanism.flexible_links
-        given = thickness if isinstance(thickness, Mapping) else dict.fromkeys(links, thickness)
         self._thickness = {
             link: from_one(comm, partial(link_thickness, link.name, link.shape))
-            if given.get(link) is None
-            else positive(f"thickness of {link.name!r}", given[link])
-            for link in links
+            if given is None
+            else positive(f"thickness of {link.name!r}", given)
+            for link, given in per_link(scene.mechanism, thickness).items()
         }
         self._planar = fidelity_levels(PLANE_STRESS) if fits(scene, PLANE_STRESS) else []
         # files hold whole links

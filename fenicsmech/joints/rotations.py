@@ -17,6 +17,7 @@ rotations, and its second derivative is constant.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 
 import numpy as np
 import sympy
@@ -147,6 +148,12 @@ class PlanarSpace(RigidSpace):
         return np.column_stack([poses[:, :2], 2.0 * np.arctan2(poses[:, 6], poses[:, 3])])
 
 
+def cross_matrix(vector: Iterable) -> list[list]:
+    """[v]×, rows of three numbers or symbols: [v]× a = v × a."""
+    x, y, z = vector
+    return [[0, -z, y], [z, 0, -x], [-y, x, 0]]
+
+
 def _quaternion_hessian() -> np.ndarray:
     """∂²R/∂q_a∂q_b of the quadratic R(q), (4, 4, 3, 3)."""
     hessian, unit = np.zeros((4, 4, 3, 3)), np.eye(3)
@@ -180,16 +187,14 @@ class SpatialSpace(RigidSpace):
         return self._hessian
 
     def symbolic_rotation(self, parameters):
-        w, x, y, z = parameters
-        v = sympy.Matrix([x, y, z])
-        cross = sympy.Matrix([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-        return sympy.eye(3) + 2 * (w * cross + v * v.T - v.dot(v) * sympy.eye(3))
+        w, *vector = parameters
+        v = sympy.Matrix(vector)
+        return sympy.eye(3) + 2 * (w * sympy.Matrix(cross_matrix(v)) + v * v.T - v.dot(v) * sympy.eye(3))
 
     def rotation_rates(self, pose):
         # dq = ½ (0, ω) ∘ q
         w, v = pose[3], pose[4:]
-        cross = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
-        return 0.5 * np.vstack([-v, w * np.eye(3) - cross])
+        return 0.5 * np.vstack([-v, w * np.eye(3) - cross_matrix(v)])
 
     def rotation_rates_gradient(self, pose):
         # linear in q

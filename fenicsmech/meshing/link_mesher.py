@@ -10,7 +10,7 @@ from itertools import combinations
 
 import numpy as np
 
-from fenicsmech.errors import DescriptionError, MeshingError, point_text, positive, set_fields
+from fenicsmech.errors import DescriptionError, MeshingError, point_text, positive, set_fields, whole
 from fenicsmech.log import logger
 from fenicsmech.mechanism import Disc, Region, Shape
 from fenicsmech.meshing.link_mesh import FREE, LinkMesh, cell_measures, count_pieces
@@ -116,15 +116,13 @@ class MeshRequest:
     half: bool = False
 
     def __post_init__(self) -> None:
-        part, layers, segments = f"mesh of {self.part}", self.layers, self.segments
+        part = f"mesh of {self.part}"
         set_fields(self, size=positive(f"element size, {part}", self.size))
         if self.dim not in (2, 3):
             raise DescriptionError(part, f"dim is {self.dim!r}", "Give 2 or 3")
-        if layers is not None and not (isinstance(layers, int) and layers > 0):
-            raise DescriptionError(part, f"the number of layers is {layers!r}", "Give a whole number from 1 up")
-        if not (isinstance(segments, int) and segments >= LEAST_SEGMENTS):
-            remedy = f"Give a whole number from {LEAST_SEGMENTS} up"
-            raise DescriptionError(part, f"the number of segments around pins is {segments!r}", remedy)
+        if self.layers is not None:
+            whole(f"number of layers, {part}", self.layers, least=1)
+        whole(f"number of segments around pins, {part}", self.segments, least=LEAST_SEGMENTS)
         if self.dim == 2 or self.half:
             # in the plane every region is swept along z, whatever the joint's own axis, such as that of a slider
             set_fields(self, sites=tuple(replace(site, axis=(0.0, 0.0, 1.0)) for site in self.sites))

@@ -41,7 +41,8 @@ from scipy.sparse.csgraph import breadth_first_order
 
 from fenicsmech.errors import AssemblyError
 from fenicsmech.mechanism import Configuration
-from fenicsmech.multibody.linkage import RANK, JointSystem, Linkage, PosePotential
+from fenicsmech.multibody.linkage import RANK, JointSystem, Linkage
+from fenicsmech.multibody.potentials import PosePotential
 from fenicsmech.multibody.spins import IdleSpin
 
 
@@ -63,6 +64,7 @@ def assemble(linkage: Linkage, configuration: Configuration, springs: Sequence[P
 
     Raises:
         AssemblyError: a loop does not close even with freely deformable links.
+        EquilibriumError: the motors take a spring beyond the poses that it holds for.
     """
     if springs:
         return _assembled(linkage, configuration, springs)
@@ -159,6 +161,8 @@ class _Assembler:
             elif last_step > 0.0 and missed > self.deviation * moved and not shortest:
                 step *= 0.5
             else:
+                for spring in self.springs:
+                    spring.check_step(poses, trial)
                 before, poses, last_step = poses, trial, step
                 fraction = 1.0 if fraction + step >= 1.0 - 1e-12 else fraction + step
                 step = min(largest, 2.0 * step)

@@ -20,6 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from fenicsmech.joints import cross_matrix
+
 
 @dataclass(frozen=True, eq=False)
 class JointChange:
@@ -106,8 +108,7 @@ class JointPlaces:
 
 def _mean_turn(vector: np.ndarray) -> np.ndarray:
     """J, the mean of exp(s [ω]×) over 0 ≤ s ≤ 1, (3, 3)."""
-    x, y, z = vector
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    cross = np.array(cross_matrix(vector))
     angle = float(np.linalg.norm(vector))
     # (1 − cos |ω|) / |ω|² and (|ω| − sin |ω|) / |ω|³, of which the limit is good to rounding where the second cancels
     first = 0.5 * np.sinc(0.5 * angle / np.pi) ** 2

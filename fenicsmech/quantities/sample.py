@@ -32,6 +32,16 @@ def at(displacement: float) -> PrescribedDisplacement:
     return PrescribedDisplacement(finite("displacement of a sample", displacement))
 
 
+class _NoForce(ForceGroup):
+    """The part prescribed where nothing but motors and effects acts; groups that users make have forces."""
+
+    def __init__(self) -> None:
+        set_fields(self, name="no force", ratios=())
+
+
+_NO_FORCE = _NoForce()
+
+
 @dataclass(frozen=True, init=False)
 class Sample:
     """An equilibrium: ``Sample({thumb: 4.0, finger: 6.0}, configuration=closed)``, ``Sample({push: at(5.0)})``.
@@ -108,9 +118,11 @@ class Sample:
         if self.moved:
             return self.moved[0]
         acting = self._acting or self.forces[:1]
+        if not acting:
+            return _NO_FORCE
         if len(acting) == 1:
             return acting[0][0]
-        name = " and ".join(force.name for force, _ in acting) or "no force"
+        name = " and ".join(force.name for force, _ in acting)
         return ForceGroup(name, tuple((force, magnitude / self.magnitude) for force, magnitude in self._acting))
 
     @property

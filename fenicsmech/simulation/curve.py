@@ -19,10 +19,10 @@ from fenicsmech.files import write_csv
 from fenicsmech.log import logger
 from fenicsmech.mechanism import Configuration, Force, ForceGroup, Joint, Output, PrescribedPart, Units
 from fenicsmech.multibody import Freedom
-from fenicsmech.plot import CurveSeries, Panel, Trace, draw_configurations, plot_curve
+from fenicsmech.plot import Arrow, CurveSeries, Panel, Trace, draw_configurations, plot_curve
 from fenicsmech.simulation.discretisation import Discretisation
-from fenicsmech.simulation.fields import MechanismPlotter, gather, write_xdmf
-from fenicsmech.simulation.frame import BucklingLoad, BucklingPosition, Frame, ModeShape, SoftMode, mode_shape
+from fenicsmech.simulation.fields import MechanismPlotter, gather, position, write_xdmf
+from fenicsmech.simulation.frame import BucklingPoint, Frame, ModeShape, SoftMode, mode_shape
 from fenicsmech.simulation.omitted_effects import Explanation, ExplanationOptions, PinFriction, explain, friction_band
 
 _log = logger(__name__)
@@ -218,45 +218,29 @@ class Curve:
 
     # -- stability, friction, assumptions ------------------------------------------------------------------------
 
-    def buckling_loads(self, *, frame: Frame | None = None, count: int = 3) -> tuple[BucklingLoad, ...]:
-        """Forces at which the equilibrium would stop being unique, from the KKT matrix and its rate.
+    def buckling_points(self, *, frame: Frame | None = None, count: int = 3) -> tuple[BucklingPoint, ...]:
+        """Forces, or positions of the motors, at which the equilibrium would stop being unique.
 
-        Exact for columns and other mechanisms that hardly move before they buckle; otherwise more accurate from closer
-        frames.
+        From the KKT matrix and its rate: exact for columns and other mechanisms that hardly move before they buckle;
+            otherwise more accurate from closer frames.
 
         Args:
             frame: one of the curve's; the last one by default.
-            count: how many, those nearest to the force of the frame, in both senses, nearest first.
+            count: how many, those nearest to the force or position of the frame, in both directions, nearest first.
 
         Raises:
-            DescriptionError: motors move along the curve, or the frame is of another curve.
-            EquilibriumError: the force moves nothing, or the KKT matrix is singular.
+            DescriptionError: the frame is of another curve.
+            EquilibriumError: the force or the motors move nothing, or the KKT matrix is singular.
         """
-        self._need_force()
-        at, found = self._modes(LoadControl(), critical_changes, frame, count)
-        return tuple(BucklingLoad(at.force + value, mode) for value, mode in found)
-
-    def buckling_positions(self, *, frame: Frame | None = None, count: int = 3) -> tuple[BucklingPosition, ...]:
-        """Positions of the curve's motors at which the equilibrium would stop being unique.
-
-        Accuracy and arguments as for ``buckling_loads``.
-
-        Raises:
-            DescriptionError: a force changes along the curve, or the frame is of another curve.
-            EquilibriumError: the motors move nothing, or the KKT matrix is singular.
-        """
-        if isinstance(self.part, Force | ForceGroup):
-            raise DescriptionError(
-                f"curve of {self.part.name!r}", "no motor moves along it", "Call this on a curve that follows a motor"
-            )
         control = self.discretisation.followed_control(self.part)
         at, found = self._modes(control, critical_changes, frame, count)
-        return tuple(BucklingPosition(at.displacement + value, mode) for value, mode in found)
+        start = at.displacement if control.displaces else at.force
+        return tuple(BucklingPoint(start + change, mode) for change, mode in found)
 
     def soft_modes(self, *, frame: Frame | None = None, count: int = 3) -> tuple[SoftMode, ...]:
         """The directions in which an equilibrium is softest under dead loads, softest first.
 
-        Arguments and errors as those of ``buckling_loads``.
+        Arguments and errors as those of ``buckling_points``.
         """
         _, found = self._modes(LoadControl(), softest_modes, frame, count)
         return tuple(SoftMode(value, mode) for value, mode in found)
@@ -342,22 +326,26 @@ class Curve:
 
     def panel(self, *, stress: bool = True, traces: Sequence[Trace] = ()) -> Panel | None:
         """The picture of the first and the last frame, on rank 0; None elsewhere."""
-        model = self.discretisation.model
+        model, (across, up), end = self.discretisation.model, self.axes, self.frames[-1]
         first, last = (gather(model, self.frames[k]) for k in (0, -1))
-        if first is None or last is None:
-            return None
-        plotter = MechanismPlotter(model)
-        (across, up), end, arrows = self.axes, self.frames[-1], []
-        if isinstance(self.part, Force | ForceGroup):
-            for force, ratio in self.part.ratios:
-                arrows.append(plotter.arrow(force, ratio * end.force, last, label=f"{ratio * end.force:g} {up.unit}"))
-        return Panel(
-            plotter.shape(first, stress=False),
-            (plotter.shape(last, stress=stress),),
-            tuple(arrows),
-            tuple(traces),
-            f"{self.configuration.name}: {up(end.force)}, {across(end.displacement)}",
-        )
+        forces = self.part.ratios if isinstance(self.part, Force | ForceGroup) else ()
+        places = [position(model, force, end)[:2] for force, _ in forces]
+
+        def draw() -> Panel:
+            assert first is not None and last is not None  # on rank 0
+            plotter, arrows = MechanismPlotter(model), []
+            for (force, ratio), place in zip(forces, places, strict=True):
+                size = ratio * end.force
+                arrows.append(Arrow(place, size * np.array(force.direction[:2]), label=f"{size:g} {up.unit}"))
+            return Panel(
+                plotter.shape(first, stress=False),
+                (plotter.shape(last, stress=stress),),
+                tuple(arrows),
+                tuple(traces),
+                f"{self.configuration.name}: {up(end.force)}, {across(end.displacement)}",
+            )
+
+        return on_one(self.discretisation.comm, draw)
 
     def write(self, path: str | Path) -> None:
         """Writes displacement, stress and pressure fields of all frames as XDMF for ParaView.
@@ -402,7 +390,7 @@ class Curve:
 
     @property
     def _solver(self) -> EquilibriumSolver:
-        return self.discretisation.solver(self.part, self.others)
+        return self.discretisation.solver(self.part, [other for other, _ in self.others])
 
     def _need_force(self) -> None:
         if not isinstance(self.part, Force | ForceGroup):

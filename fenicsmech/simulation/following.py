@@ -18,7 +18,7 @@ from fenicsmech.continuation import (
     null_space,
 )
 from fenicsmech.equilibrium import EquilibriumPoint, LoadControl, NotConverged, State, Unknown
-from fenicsmech.errors import DescriptionError, EquilibriumError, finite, set_fields
+from fenicsmech.errors import DescriptionError, EquilibriumError, finite, set_fields, whole
 from fenicsmech.mechanism import Configuration, Drive, Force, ForceGroup, Mechanism, Motor, PrescribedPart
 from fenicsmech.plot import CurveMark, CurveSeries
 from fenicsmech.simulation.curve import Curve, axes
@@ -55,8 +55,7 @@ class Until:
         if self.displacement and self.position:
             remedy = "Give displacement for a force, position for a motor"
             raise DescriptionError("end of a path", "a displacement and a position are given", remedy)
-        if isinstance(self.frames, bool) or not isinstance(self.frames, int) or self.frames < 2:
-            raise DescriptionError("end of a path", f"{self.frames!r} frames", "Give a whole number of at least 2")
+        whole("frames until the end of a path", self.frames, least=2)
 
     @property
     def displacements(self) -> tuple[float, ...]:
@@ -241,8 +240,9 @@ class CurveFollower:
         while True:
             began, seconds = perf_counter(), dict(clock.seconds)
             try:
-                if (ends := next(steps, None)) is None:
-                    break
+                with stepper.keeping_frames():
+                    if (ends := next(steps, None)) is None:
+                        break
                 for critical in locate(path, *ends):
                     self._record_event(path, critical)
             except NotConverged as failure:

@@ -88,18 +88,10 @@ class ModeShape:
 
 
 @dataclass(frozen=True)
-class BucklingLoad:
-    """A magnitude of the force that changes at which the KKT matrix is singular, and the mode."""
+class BucklingPoint:
+    """A force, or a position of the motors that move, at which the KKT matrix is singular; and the mode."""
 
-    force: float
-    mode: ModeShape
-
-
-@dataclass(frozen=True)
-class BucklingPosition:
-    """A position of the motors that move at which the KKT matrix is singular while they are held, and the mode."""
-
-    position: float
+    value: float
     mode: ModeShape
 
 

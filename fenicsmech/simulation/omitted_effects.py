@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import ROUND_FLOOR, Context
 from itertools import combinations
-from math import hypot, pi
+from math import pi
 from typing import Literal
 
 import numpy as np
@@ -31,7 +31,7 @@ from fenicsmech.effects import Gravity
 from fenicsmech.equilibrium import EquilibriumSolver, Unknown
 from fenicsmech.errors import DescriptionError, positive, set_fields
 from fenicsmech.estimates import Equilibrium, adjoint_at, cause_of_growth, growth_by_halving
-from fenicsmech.mechanism import FlexibleLink, Force, Joint, Output, PrescribedPart, Shape, Strip, Units, in_dimension
+from fenicsmech.mechanism import FlexibleLink, Force, Joint, Output, PrescribedPart, Shape, Strip, Units
 from fenicsmech.meshing import thinnest_stretch
 from fenicsmech.model import MechanismModel, plan_sites
 from fenicsmech.multibody import JointCoordinate, Linkage
@@ -118,7 +118,8 @@ def explain(
     hints += [_length_hint(discretisation, units, options), _spin_hint(model, solver, at)]
     hints += [_compressibility_hint(model, options.locking[model.elastic.order]), _touching_hint(model, frame)]
     if model.linkage.dim == 2:
-        hints.append(_buckling_hint(model, frame, options.slender))
+        with model.shaped(at.design):
+            hints.append(_buckling_hint(model, frame, options.slender))
     return Explanation(_simulated(model), tuple(hint for hint in hints if hint is not None))
 
 
@@ -130,10 +131,12 @@ def _simulated(model: MechanismModel) -> tuple[str, ...]:
         for link, material in zip(mechanism.flexible_links, model.materials, strict=True)
     )
     mixed = [link.name for link, is_mixed in zip(mechanism.flexible_links, model.mixed, strict=True) if is_mixed]
+    softened = any(effect.soften(model.linkage) for effect in model.effects)
+    compliance = "other compliance than listed below" if softened else "compliance"
     items = [
         f"flexible links in large deformation ({elastic.model.name}, order {elastic.order}): {links}",
         f"rigid links: {', '.join(link.name for link in mechanism.rigid_links)}",
-        f"ideal joints, without play, friction or compliance: {', '.join(kinds)}",
+        f"ideal joints, without play, friction or {compliance}: {', '.join(kinds)}",
         "forces that keep their direction, applied without inertia",
     ]
     if mixed:
@@ -207,20 +210,17 @@ def _compressibility_hint(model: MechanismModel, limit: float) -> Hint | None:
 
 def _spin_hint(model: MechanismModel, solver: EquilibriumSolver, at: Equilibrium) -> Hint | None:
     """Outputs, and points of forces that do not act, on links that spin idly, away from the line of the spin."""
-    mechanism, linkage, elastic, names = model.mechanism, model.linkage, model.elastic, []
+    mechanism, linkage, names = model.mechanism, model.linkage, list[str]()
     if not solver.system.idle:
         return None
     parts: tuple[Force | Output, ...] = (*mechanism.outputs, *mechanism.forces)
     with model.shaped(at.design):
-        shift = fem.Function(elastic.u.function_space)
-        shift.x.array[:] = model.design_nodes.values(elastic.design).ravel()
-        unloaded = linkage.rigid.drawn
         for spin in solver.system.idle:
-            start, along = spin.line(unloaded)
+            start, along = spin.line(linkage.rigid.drawn)
             for part in parts:
                 if linkage.body_of(part.on) not in spin.bodies:
                     continue
-                arm = np.array(in_dimension(part.at, 3)) + model.point(part).displacement(shift, unloaded) - start
+                arm = model.rest_position(part) - start
                 if np.linalg.norm(arm - (arm @ along) * along) > 1e-9 * linkage.length:
                     names.append(repr(part.name))
     if not names:
@@ -296,24 +296,50 @@ def _touching_hint(model: MechanismModel, frame: Frame) -> Hint:
 
 
 def _buckling_hint(model: MechanismModel, frame: Frame, slender: float) -> Hint | None:
-    """The largest compression of a strip between two joints over its Euler load out of the plane.
+    """The largest compression of a strip between its joints over its Euler load out of the plane.
 
     N_cr = π² E I / L²,     I = h b³ / 12,     h in the plane, b the depth
     """
     fraction, name = 0.0, ""
-    for link, material, depth in zip(model.mechanism.flexible_links, model.materials, model.depths, strict=True):
-        joints = [joint for joint in model.mechanism.joints if link in (joint.a, joint.b)]
-        if isinstance(link.shape, Strip) and len(joints) > 1:
-            length = hypot(*np.subtract(joints[-1].at[:2], joints[0].at[:2]))
-            forces = [frame.reactions[joint.name].force[:2] for joint in joints if joint.name in frame.reactions]
-            load = max((float(np.linalg.norm(force)) for force in forces), default=0.0)
-            critical = pi**2 * material.law.E * link.shape.thickness * depth**3 / 12.0 / length**2
-            fraction, name = max((fraction, name), (load / critical, link.name))
+    links = zip(model.mechanism.flexible_links, model.shapes, model.materials, model.depths, strict=True)
+    for link, shape, material, depth in links:
+        compression, length = _compression(model, frame, link)
+        if isinstance(shape, Strip) and length:
+            critical = pi**2 * material.law.E * shape.thickness * depth**3 / 12.0 / length**2
+            fraction, name = max((fraction, name), (compression / critical, link.name))
     if not name:
         return None
     text = f"the compression of {name} is about {fraction:.2g} of its buckling load out of the plane"
     remedy = "; use space='3d'" if fraction > slender else ""
     return Hint("bending out of the plane", text + remedy, fraction > slender)
+
+
+def _compression(model: MechanismModel, frame: Frame, link: FlexibleLink) -> tuple[float, float]:
+    """The largest compression of a link along the line between its joints farthest apart, and their distance at rest.
+
+    Between two joints it is the sum of the reactions along the line on one side of them, or on the other side where
+    forces act between.
+    """
+    linkage, drawn, ends = model.linkage, model.linkage.joints.drawn, []
+    for joint in model.mechanism.joints:
+        if link in (joint.a, joint.b):
+            k = linkage.connection_of(joint)
+            connection = linkage.joints.connections[k]
+            body, sign = (connection.b, 1.0) if joint.b == link else (connection.a, -1.0)
+            at_rest, here = (linkage.joints.place(k, body, poses) for poses in (drawn, frame.state.poses))
+            ends.append((at_rest, here, sign * frame.reactions[joint.name].force))
+    if not ends:
+        return 0.0, 0.0
+    at_rest, here, forces = (np.array(each) for each in zip(*ends, strict=True))
+    distances = np.linalg.norm(at_rest[:, None] - at_rest, axis=2)
+    first, last = np.unravel_index(np.argmax(distances), distances.shape)
+    length = float(distances[first, last])
+    if length <= 1e-9 * linkage.length:
+        return 0.0, 0.0
+    line = (here[last] - here[first]) / np.linalg.norm(here[last] - here[first])
+    pushing = np.cumsum((forces @ line)[np.argsort(at_rest @ (at_rest[last] - at_rest[first]))])
+    before, after = pushing[:-1], pushing[:-1] - pushing[-1]
+    return max(0.0, float(before.max()), float(after.max())), length
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import copy
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -14,7 +15,7 @@ from fenicsmech.collective import from_one
 from fenicsmech.continuation import ArcSteps, HermitePredictor, Predictor
 from fenicsmech.elasticity import Formulation, MixedFormulation, Quadrature
 from fenicsmech.equilibrium import EquilibriumMethod, EquilibriumSolver, PrimalDualNewton, State
-from fenicsmech.errors import AssemblyError, DescriptionError
+from fenicsmech.errors import AssemblyError, DescriptionError, expect
 from fenicsmech.estimates import AccuracyControl, Choice, Estimates, FidelityLevel, LevelErrors, cause_of_growth
 from fenicsmech.log import Clock, Progress, logger
 from fenicsmech.mechanism import (
@@ -30,6 +31,7 @@ from fenicsmech.mechanism import (
     PrescribedPart,
     Scene,
     Shape,
+    check_loads,
     in_dimension,
 )
 from fenicsmech.meshing import radius_ratios
@@ -63,14 +65,16 @@ class Simulation:
         space: "3d", the default; "3d-symmetric", which meshes half the depth of links that joints and forces move in
             the plane; "plane-stress" or "plane-strain".
         order: degree of the displacement field, 1, 2 or 3; 2 by default.
-        size: element size in the plane of the links, or one per flexible link.
+        size: element size in the plane of the links, or one per flexible link; that of a mesh file's elements serves
+            warnings and estimates.
         accuracy: instead of space, order, layers, segments and quadrature: relative error allowed in the largest
             displacement of every curve, or in the largest force where displacements are prescribed, once the estimates
             of its errors are added (``Curve.corrected``). ``load_displacement`` finds the cheapest fidelity that is
-            good enough, see ``choice``; ``follow`` and ``branches`` use the one chosen last, and raise an error if
-            there is none yet. Links from STEP files are measured; for those from mesh files ``size`` gives the
-            thickness.
-        layers: of elements through the depth, or half of it where half is meshed; by default from depth and size.
+            good enough, see ``choice``; ``follow``, ``branches``, simulations derived from this one and design problems
+            use the one chosen last, and raise an error if there is none yet. Links from STEP files are measured; for
+            those from mesh files ``size`` gives the thickness.
+        layers: of elements through the depth of strips and outlines in space, or half of it where half is meshed; by
+            default from depth and size.
         segments: of elements around pins, at least; 8 by default.
         quadrature: quadrature degree; the measured optimum by default.
         formulation: ``MixedFormulation()``: pressures are unknowns in nearly incompressible links;
@@ -102,10 +106,15 @@ class Simulation:
         predictor: Predictor | None = None,
         comm: MPI.Comm = MPI.COMM_WORLD,
     ) -> None:
-        if formulation is not None and not isinstance(formulation, Formulation):
-            raise DescriptionError(
-                "formulation", f"it is {formulation!r}", "Give MixedFormulation() or DisplacementFormulation()"
-            )
+        expect("simulation", scene, Scene, "a scene", "Give Scene(mechanism, effects=[…])")
+        for name, value, kind, remedy in (
+            ("formulation", formulation, Formulation, "MixedFormulation() or DisplacementFormulation()"),
+            ("quadrature", quadrature, Quadrature, "Quadrature(degree)"),
+            ("solver", solver, EquilibriumMethod, "PrimalDualNewton(…)"),
+            ("predictor", predictor, Predictor, "HermitePredictor(), TangentPredictor() or ConstantPredictor()"),
+        ):
+            if value is not None:
+                expect(name, value, kind, f"a {name}", f"Give {remedy}")
         formulation = formulation or MixedFormulation()
         self.scene, self.comm, self.clock = scene, comm, Clock()
         self.choice: Choice | None = None
@@ -115,12 +124,12 @@ class Simulation:
         if accuracy is None:
             fidelity = read_fidelity(scene, size=size, formulation=formulation, **given)
         else:
-            name = next((name for name, value in given.items() if value is not None), None)
-            if name:
+            both = next((name for name, value in given.items() if value is not None), None)
+            if both:
                 raise DescriptionError(
-                    f"accuracy and {name}",
-                    f"both are given, and {name}={given[name]!r} would decide what accuracy is to choose",
-                    f"Leave out {name}, or give {name} and size=… instead of an accuracy",
+                    f"accuracy and {both}",
+                    f"both are given, and {both}={given[both]!r} would decide what accuracy is to choose",
+                    f"Leave out {both}, or give {both} and size=… instead of an accuracy",
                 )
             self._control = AccuracyControl(scene, accuracy, size, formulation, comm=comm)
             fidelity = self._control.fidelity(self._control.level)
@@ -216,12 +225,7 @@ class Simulation:
             EquilibriumError: the curve ends early; carries the frames before that.
         """
         self._check_description()
-        if self._control is not None and self.choice is None:
-            raise DescriptionError(
-                f"curve of {part.name!r}",
-                "no fidelity has been chosen for the required accuracy yet",
-                "Call load_displacement() first, up to such forces, or give space, order and size instead of accuracy",
-            )
+        self._check_chosen(f"curve of {part.name!r}")
         request = read_path(self.scene.mechanism, part, until, configuration, others)
         with Progress(until.frames, configuration.name, shown=self.comm.rank == 0) as progress, self._shaped():
             return CurveFollower(self._discretisation, request, until, steps or ArcSteps()).from_rest(progress.update)
@@ -264,22 +268,24 @@ class Simulation:
 
         Raises:
             AssemblyError: one of the configurations does not assemble, or its motors strain the links.
+            EquilibriumError: its motors turn a spring in space by more than a full turn.
         """
         linkage, designed = self.linkage, self._design is not None
         # designs change the model's springs; those drawn need no mesh
         springs = self.model.spring_potentials if designed else spring_potentials(self.scene.effects, linkage)
-        point, drawn = linkage.point(part.on, part.at), np.array(in_dimension(part.at, linkage.dim))
-        positions = []
+        with self._shaped():
+            rest = self.model.rest_position(part) if designed else np.array(in_dimension(part.at, linkage.dim))
+        point, positions = linkage.point(part.on, rest.tolist()), []
         for configuration in configurations:
             with self._shaped():
-                assembly = assemble(linkage, configuration, springs)
+                assembly = from_one(self.comm, partial(assemble, linkage, configuration, springs))
             if assembly.fraction < 1.0:
                 raise AssemblyError(
                     f"configuration {configuration.name!r}",
                     f"its motors strain the links beyond {assembly.fraction:.1%} of their way",
                     "Use load_displacement with an output at the point",
                 )
-            positions.append(drawn + point.displacement(None, assembly.poses))
+            positions.append(rest + point.displacement(None, assembly.poses))
         return np.array(positions)
 
     # -- simulations derived from this one ------------------------------------------------------------------------
@@ -296,9 +302,10 @@ class Simulation:
 
         Raises:
             DescriptionError: the design belongs to other links or another mesh, or the scene has no parts with such
-                numbers.
+                numbers; or no fidelity was chosen for an accuracy yet.
             ShapeError: cells of the mesh are inverted in this shape.
         """
+        other = self._derived()
         if isinstance(design, np.ndarray):
             given = Design(design)
         else:
@@ -312,8 +319,7 @@ class Simulation:
                 f"it has values of shape {given.field.shape}, and the mesh has {size}",
                 "Give the design field of this simulation",
             )
-        other = copy(self)
-        other._design, other._control = Design(given.field.copy(), dict(given.numbers)), None
+        other._design = Design(given.field, dict(given.numbers))
         return other
 
     def with_material(self, drawn: Material, other: Material) -> Simulation:
@@ -324,10 +330,10 @@ class Simulation:
             other: their new material; effects keep the drawn one, such as its density in ``Gravity``.
 
         Raises:
-            DescriptionError: no link is made of ``drawn``.
+            DescriptionError: no link is made of ``drawn``, or no fidelity was chosen for an accuracy yet.
         """
-        simulation = copy(self)
-        simulation._discretisation, simulation._control = self._discretisation.with_material(drawn, other), None
+        simulation = self._derived()
+        simulation._discretisation = self._discretisation.with_material(drawn, other)
         return simulation
 
     def with_shapes(
@@ -348,7 +354,8 @@ class Simulation:
             moved: joints that are placed otherwise than drawn, such as those of a designed part.
 
         Raises:
-            DescriptionError: these are not shapes of links of the mechanism, or it does not fit the fidelity.
+            DescriptionError: these are not shapes of links of the mechanism, or it does not fit the fidelity; or none
+                was chosen for an accuracy yet.
             MeshingError: a file cannot be read, or a joint is not on its link.
         """
         for link, shape in shapes.items():
@@ -358,8 +365,8 @@ class Simulation:
                     f"{shape!r} is given as the shape of {link!r}",
                     "Give {link: shape, …} of flexible links of the mechanism",
                 )
-        other = copy(self)
-        other.clock, other.choice, other._control, other._design = Clock(), None, None, None
+        other = self._derived()
+        other.clock, other.choice, other._design = Clock(), None, None
         fidelity = fidelity or self.fidelity
         other._discretisation = self._discretisation.at(fidelity, other.clock, self.comm, shapes, moved)
         if shapes:
@@ -367,10 +374,21 @@ class Simulation:
         return other
 
     def on(self, comm: MPI.Comm) -> Simulation:
-        """The same scene at the same fidelity for other processes, as drawn."""
-        other = copy(self)
-        other.comm, other.clock, other._control, other._design = comm, Clock(), None, None
+        """The same scene at the same fidelity for other processes, as drawn.
+
+        Raises:
+            DescriptionError: no fidelity was chosen for an accuracy yet.
+        """
+        other = self._derived()
+        other.comm, other.clock, other._design = comm, Clock(), None
         other._discretisation = self._discretisation.at(self.fidelity, other.clock, comm)
+        return other
+
+    def _derived(self) -> Simulation:
+        """A copy of the fidelity that was given or chosen."""
+        self._check_chosen(f"simulation of {self.scene.mechanism.name!r}")
+        other = copy(self)
+        other._control = None
         return other
 
     # -- parts ------------------------------------------------------------------------------------------------------
@@ -412,8 +430,8 @@ class Simulation:
             rest, cells, dim = rest_vertices(self.model), self.model.mesh.cells, self.fidelity.model.dim
         return from_one(self.comm, lambda: 1.0 if rest is None else dim / float(radius_ratios(rest, cells).min()))
 
-    def solver(self, part: PrescribedPart, others: tuple[tuple[Force, float], ...] = ()) -> EquilibriumSolver:
-        """The solver for a force or motors that change and some constant forces, kept for all configurations."""
+    def solver(self, part: PrescribedPart, others: Sequence[Force] = ()) -> EquilibriumSolver:
+        """The solver for a force or motors that change and some constant forces, whose magnitudes states hold."""
         return self._discretisation.solver(part, others)
 
     def compute(self, request: CurveRequest, *, watch: Callable[[int], None] = lambda done: None) -> Curve:
@@ -439,8 +457,11 @@ class Simulation:
         """Refuses a simulation ``with_design`` for a ``part`` that changes the design itself.
 
         Raises:
-            DescriptionError: this is one.
+            DescriptionError: this is one, its mechanism changed since it was made, or no fidelity was chosen for an
+                accuracy yet.
         """
+        self._check_description()
+        self._check_chosen(part)
         if self._design is not None:
             raise DescriptionError(
                 part,
@@ -462,14 +483,27 @@ class Simulation:
         if text := coarse_links(self._discretisation, self.scene.units):
             _log.warning("%s", text)
 
+    def _check_chosen(self, part: str) -> None:
+        """Refuses, for a ``part``, the pilot mesh of an accuracy for which no fidelity was chosen yet."""
+        if self._control is not None and self.choice is None:
+            raise DescriptionError(
+                part,
+                "no fidelity has been chosen for the required accuracy yet",
+                "Call load_displacement() first, up to such forces, or give space, order and size instead of accuracy",
+            )
+
     def _check_description(self) -> None:
-        """Refuses a mechanism that is not the one this simulation was made for."""
+        """Refuses a mechanism that is not the one this simulation was made for, and forces and outputs it cannot have.
+
+        These may have been added since.
+        """
         if _description(self.scene.mechanism) != self._described:
             raise DescriptionError(
                 f"mechanism {self.scene.mechanism.name!r}",
                 "links, joints or motors were added after the simulation was made",
                 "Make a new Simulation",
             )
+        check_loads(self.scene.mechanism, self.linkage.dim)
 
 
 def _errors(curve: Curve) -> LevelErrors:

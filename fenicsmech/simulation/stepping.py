@@ -10,7 +10,8 @@ so do their errors: the work along these is precise, and equilibria whose loads 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
@@ -18,6 +19,7 @@ from time import perf_counter
 import numpy as np
 from mpi4py import MPI
 
+from fenicsmech.collective import from_one
 from fenicsmech.continuation import LoadStepper, LoadSteps, LoadStepsFailed, MotorStepper
 from fenicsmech.equilibrium import (
     Control,
@@ -144,12 +146,15 @@ class CurveStepper:
     def __init__(self, discretisation: Discretisation, request: CurveRequest) -> None:
         self.discretisation, self.request, self._model = discretisation, request, discretisation.model
         self.frames: list[Frame] = []
-        model, rigid = self._model, self._model.linkage.rigid
-        assembly = assemble_before_strain(model.linkage, request.configuration, model.spring_potentials)
-        motors = rigid.on_the_way(request.configuration.position, assembly.fraction)
-        self.solver = discretisation.solver(request.part, request.others)
+        model, rigid, springs = self._model, self._model.linkage.rigid, self._model.spring_potentials
+        # of one process: decisions that depend on rounding are the same on all
+        comm, configuration = discretisation.comm, request.configuration
+        assembly = from_one(comm, lambda: assemble_before_strain(model.linkage, configuration, springs))
+        motors = rigid.on_the_way(configuration.position, assembly.fraction)
+        self.solver = discretisation.solver(request.part, [other for other, _ in request.others])
         self._system, self._joints = self.solver.system, model.linkage.joints
-        self.freedom = count_freedom(rigid, assembly.poses, motors, model.spring_potentials, self._system.idle)
+        idle = self._system.idle
+        self.freedom = from_one(comm, lambda: count_freedom(rigid, assembly.poses, motors, springs, idle))
         self.followed = discretisation.followed_control(request.part)
         self.origin, self._origins = 0.0, dict.fromkeys(model.mechanism.outputs, 0.0)
         self._snaps = 0  # so far, which no frame reports yet
@@ -197,7 +202,8 @@ class CurveStepper:
         if control.constrained:
             control = control.at(control.prescribed + self.origin)
         try:
-            point = stepper.advance(control)
+            with self.keeping_frames():
+                point = stepper.advance(control)
         except LoadStepsFailed as failure:
             raise self._unreached(control, failure) from failure
         record = self.record(point)
@@ -211,6 +217,15 @@ class CurveStepper:
         spent, phases = perf_counter() - start, clock.since(seconds)
         iterations = stepper.iterations - iterations
         return replace(record, snapped_through=snapped_through, iterations=iterations, seconds=spent, phases=phases)
+
+    @contextmanager
+    def keeping_frames(self) -> Iterator[None]:
+        """A context in which errors of potentials, which know no frames, get those so far."""
+        try:
+            yield
+        except EquilibriumError as error:
+            error.last, error.frames = self.frames[-1] if self.frames else None, tuple(self.frames)
+            raise
 
     def record(self, point: EquilibriumPoint) -> Frame:
         """The measured quantities of an equilibrium; the caller adds iterations and times."""
@@ -246,6 +261,7 @@ class CurveStepper:
         state = replace(
             self._model.assembled_state(assembly.poses, here),
             load_factor=0.0 if self.request.others or self._model.effects else 1.0,
+            constant=np.array([magnitude for _, magnitude in self.request.others]),
             minimum_shift=LoadSteps().minimum_shift if self.freedom.zero_energy else 0.0,
         )
         if fraction == 1.0:
@@ -357,10 +373,12 @@ class CurveStepper:
         nothing moves.
         """
         model, joints, residual = self._model, self._joints, self._system.residual(state, control)
-        loads = abs(state.force) + sum(abs(state.load_factor * magnitude) for _, magnitude in self.request.others)
+        loads = abs(state.force) + abs(state.load_factor) * float(np.abs(state.constant).sum())
         loads, worst = loads + self._effect_forces(state), 0.0
         reactions = np.abs(state.multipliers) @ np.abs(joints.gradient(state.poses, state.motors))
-        for motion in stiff_motions(model.linkage, state.poses, state.motors):
+        # all processes take the same basis of the motions
+        comm = self.discretisation.comm
+        for motion in from_one(comm, lambda: stiff_motions(model.linkage, state.poses, state.motors)):
             rounding = 1e-12 * float(reactions @ np.abs(motion.z))
             worst = max(worst, (self._work(residual, state, motion) - rounding) / motion.fastest(model.linkage.length))
         return worst / loads if loads > 0.0 else 0.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
+from mpi4py import MPI
 
 import fenicsmech as fm
 from fenicsmech import model
@@ -44,6 +45,29 @@ def test_a_link_is_given_twice():
         part="'diagonal'",
         problem="twice",
         remedy="once",
+    )
+
+
+def test_an_accuracy_that_has_chosen_nothing_yet():
+    case = truss(*REACHABLE)
+    simulation = fm.Simulation(case.scene, accuracy=0.01, comm=MPI.COMM_SELF)
+    refused(
+        lambda: fm.DesignProblem(simulation, case.designs, targets=case.targets),
+        part="design problem",
+        problem="no fidelity has been chosen",
+        remedy="load_displacement",
+    )
+
+
+def test_a_force_added_later_that_leaves_the_plane():
+    case = truss(*REACHABLE)
+    simulation, push = case.simulate(), case.targets[0].quantity.part
+    late = case.scene.mechanism.force(on=push.on, at=push.at, direction=(1, 0, 1), name="late")
+    refused(
+        lambda: fm.DesignProblem(simulation, case.designs, targets=[fm.Target(late, force=0.1, displacement=2.0)]),
+        part="'late'",
+        problem="leaves the plane",
+        remedy="space",
     )
 
 

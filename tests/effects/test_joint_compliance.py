@@ -160,6 +160,9 @@ def test_invalid_compliances_are_refused():
     hinge, slider = mechanism.revolute(a, b, at=(0, 0)), mechanism.prismatic(a, b, at=(0, 0), axis=(1, 0))
     with pytest.raises(fm.DescriptionError, match="not positive"):
         JointCompliance(hinge, -1.0)
+    for other in (mechanism.motor(hinge), "hinge"):
+        with pytest.raises(fm.DescriptionError, match="joint compliance: .* is not a joint"):
+            JointCompliance(other, 1.0)
     with pytest.raises(fm.DescriptionError, match="share no point"):
         JointCompliance(slider, 1.0).check(mechanism, 2)
     with pytest.raises(fm.DescriptionError, match="is not a joint of 'other'"):

@@ -124,6 +124,23 @@ def test_curve_that_fails_on_a_finer_level_leaves_no_answers_of_a_coarser_one(mo
     assert computed and simulation.choice is None
 
 
+def test_simulations_derived_from_a_choice_have_its_fidelity():
+    scene, push, load = cantilever()
+    (link,) = scene.mechanism.flexible_links
+    simulation = fm.Simulation(scene, accuracy=0.02)
+    curve = simulation.load_displacement(push, forces=[load])
+    assert len(simulation.choice.trials) > 1  # not the pilot's
+    nothing = np.zeros_like(simulation.model.elastic.shape.x.array)
+    for derived in (
+        simulation.with_design(nothing),
+        simulation.with_material(link.material, link.material),
+        simulation.with_shapes({link: link.shape}),
+    ):
+        assert derived.fidelity == simulation.fidelity
+        again = derived.load_displacement(push, forces=[load])
+        assert again.displacements == pytest.approx(curve.displacements, rel=1e-8)
+
+
 def test_forces_are_as_accurate_as_requested_where_displacements_are_prescribed():
     scene, push, load = cantilever()
     finest = fm.Simulation(scene, space="3d-symmetric", order=3, size=3.0, layers=2, segments=16)

@@ -77,6 +77,22 @@ def test_folders_that_cannot_be_written_are_refused_on_all_ranks(shared_tmp_path
         curve.write(shared_tmp_path / "no folder" / "claw.xdmf")
 
 
+def test_errors_of_one_rank_are_raised_on_all_and_leave_no_file(shared_tmp_path, monkeypatch):
+    _, curve = claw("plane-stress")
+
+    def failing(*arguments):
+        if COMM.rank == 0:
+            raise OSError("no space left")
+
+    monkeypatch.setattr("fenicsmech.simulation.fields.write_series", failing)
+    with pytest.raises(OSError, match="no space left"):
+        curve.write(shared_tmp_path / "claw.xdmf")
+    monkeypatch.setattr("fenicsmech.simulation.curve.MechanismPlotter", failing)
+    with pytest.raises(OSError, match="no space left"):
+        curve.picture(shared_tmp_path / "claw.png")
+    assert names(shared_tmp_path) == set()
+
+
 def test_files_of_an_earlier_run_are_replaced(shared_tmp_path):
     simulation, curve = claw("plane-stress")
     other = simulation.load_displacement(curve.part, forces=[1.0])

@@ -51,6 +51,11 @@ def test_invalid_groups_are_refused():
     stranger = other.force(on=other.rigid("body"), at=(0, 0), direction=(1, 0), name="stranger")
     with pytest.raises(fm.DescriptionError, match="'push' in forces 'both'"):
         fm.ForceGroup("both", {push: "much"})
+    for none in ({}, ()):
+        with pytest.raises(fm.DescriptionError, match="forces 'none': there are none"):
+            fm.ForceGroup("none", none)
+    with pytest.raises(fm.DescriptionError, match="'push' is given twice"):
+        fm.ForceGroup("twice", [(push, 1.0), (push, 2.0)])
     with pytest.raises(fm.DescriptionError, match="'stranger'.*not a force of 'arm'"):
         simulation.load_displacement(fm.ForceGroup("both", {push: 1.0, stranger: 1.0}), forces=[1.0])
     with pytest.raises(fm.DescriptionError, match="constant at once"):
