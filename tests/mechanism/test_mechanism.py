@@ -204,7 +204,7 @@ def test_positions_are_pairs_or_a_mapping_with_each_motor_once():
         "Give each motor once",
     )
     assert_refused(
-        lambda: Configuration("up", {p.shaft: 0.2}), part, f"{p.shaft!r} is not a motor", "Give one of the mechanism's"
+        lambda: Configuration("up", {p.shaft: 0.2}), part, f"{p.shaft!r} is not a motor", "Give one from this mechanism"
     )
     for given in (0.2, [p.motor], p.motor):
         assert_refused(
