@@ -30,7 +30,7 @@ from fenicsmech.elasticity import (
     Stretch,
 )
 from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State, load_fields
-from fenicsmech.errors import DescriptionError, expect, positive, set_fields
+from fenicsmech.errors import DescriptionError, expect, positive, set_fields, whole
 from fenicsmech.log import Clock
 from fenicsmech.mechanism import (
     Effect,
@@ -113,7 +113,7 @@ def read_fidelity(
     space, order = "3d" if space is None else space, 2 if order is None else order
     if space not in SPACES:
         raise DescriptionError("space", f"{space!r} is not known", f"Choose one of {', '.join(SPACES)}")
-    if order not in (1, 2, 3):
+    if whole("order", order, least=1) > 3:
         raise DescriptionError("order", f"{order!r} is not 1, 2 or 3", "Choose 1 for speed, 2 for accuracy")
     if size is None:
         raise DescriptionError("size", "it is missing", "Give an element size, or accuracy=… to have one chosen")

@@ -229,10 +229,8 @@ def _plot(path: Path, name: str, curves: Sequence[Curve], optimisation: Optimisa
     for curve in curves:
         label = "optimised" if optimisation is not None and len(curves) == 1 else curve.configuration.name
         series.append(curve.series(label, colour=colours[curve.configuration]))
-    if not isinstance(curves[0].part, Force | ForceGroup):
-        targets = ()  # they lie on curves of forces
-    points = [point for target in targets if (point := target.on_curve)]
-    wanted = [CurveTarget(displacement, force, colours.get(place)) for force, displacement, place in points]
+    points, parts = [point for target in targets if (point := target.on_curve)], [curve.part for curve in curves]
+    wanted = [CurveTarget(u, magnitude, colours.get(place)) for force, magnitude, u, place in points if force in parts]
     across, up = curves[0].axes
     title = name if optimisation else f"{name}: initial design"
     labels = {"xlabel": across.label, "ylabel": up.label, "title": title}

@@ -155,6 +155,8 @@ def correct(
 ) -> Corrected:
     """Rounds of minimisation and correction, until corrections have settled, do not contract, or iterations run out.
 
+    Where a later round has no value, the outcome is that of the one before.
+
     Args:
         objective: the one that is minimised.
         begin: where the first round starts.
@@ -165,12 +167,19 @@ def correct(
         continued: the optimiser's memory at the start of the next round, from that at the end of the last.
 
     Raises:
-        Infeasible: there is no value at the start, or the simulation that counts has none at an optimum.
+        Infeasible: there is no value at the start, or the simulation that counts has none at the first optimum.
     """
     round = first
+    last: Corrected | None = None
     while True:
-        optimum, round = minimise(begin, round)
-        reached = truth(optimum)
+        try:
+            optimum, round = minimise(begin, round)
+            reached = truth(optimum)
+        except Infeasible as failure:
+            if last is None:
+                raise
+            _log.warning("round %d has no value, that before it stands: %s", len(round.changes) + 1, failure)
+            return last
         needed, scales = reached.compared - objective.reached, objective.comparison.scale_of
         off = np.abs(needed - round.correction)
         change = float(np.max(off / np.maximum(options.change * scales, options.resolved * np.abs(reached.errors))))
@@ -181,8 +190,9 @@ def correct(
             largest=(*round.largest, float(np.max(off / scales))),
         )
         settled = change <= 1.0 or optimum.reason is Reason.ITERATIONS
+        last = Corrected(optimum, round, reached, settled)
         if settled or len(round.changes) >= options.rounds or (round.surrogate and _stalls(round.changes, options)):
-            return Corrected(optimum, round, reached, settled)
+            return last
         begin = Start(optimum.parameters, optimum.number, optimum.evaluations, continued(optimum.memory))
 
 
@@ -240,8 +250,8 @@ class CorrectedRun:
 
     def from_surrogate(self, cheaper: DesignedSimulation | None) -> Outcome | None:
         """The optimum by a surrogate; None if there is none or its corrections do not settle."""
-        problem, found = self._problem, self._found
-        if cheaper is None or (found is not None and not found.round.surrogate):
+        problem = self._problem
+        if cheaper is None:
             return None
         placement: HandlePlacement | None = None
         solved: DesignEquilibria | None = None
@@ -252,11 +262,11 @@ class CorrectedRun:
             with problem.clock.phase("verification"):
                 try:
                     near = problem.rest.placement_from(optimum.parameters, theta) or placement
-                    placement = problem.rest.place(optimum.parameters, near)
+                    here = problem.rest.place(optimum.parameters, near)
                 except ShapeError as failure:
                     raise Infeasible(str(failure)) from failure
                 solved = carried(problem.loaded, solved, cheaper.team[1].equilibria)
-                values, errors = problem.loaded.values(solved), problem.loaded.errors(solved)
+                values, errors, placement = problem.loaded.values(solved), problem.loaded.errors(solved), here
             return Reached(values, errors, values + errors if self._options.estimates else values)
 
         try:
@@ -326,7 +336,10 @@ class CorrectedRun:
     ) -> Corrected:
         _, objective = low.team
         if objective.comparison.relative and not first.drawn and self._start is not None:
-            first = replace(first, drawn=tuple(objective.loaded(low.rest.initial).tolist()))
+            try:
+                first = replace(first, drawn=tuple(objective.loaded(low.rest.initial).tolist()))
+            except Infeasible as failure:
+                _log.info("the least quantities are relative to those at the start, not as drawn: %s", failure)
         objective.begin(near, np.array(first.drawn) if first.drawn else None)
         return correct(
             objective,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -23,7 +24,7 @@ from fenicsmech.design.optimisers.sqp import SQP
 from fenicsmech.design.regularisers import MeshQuality, NumberBounds, Regulariser, ShapeBounds, StayClose
 from fenicsmech.design.result import DesignResult, draw_links, link_designs, rest_meshes, target_results, write_solids
 from fenicsmech.design.run import Checkpoint, fingerprint
-from fenicsmech.design.search import Scatter, Search, SearchResult, cheapest
+from fenicsmech.design.search import Scatter, Search, SearchResult
 from fenicsmech.design.shape.handle_optimum import HandlePlacement
 from fenicsmech.design.target import Target
 from fenicsmech.design.verification import part_simulations, verified_parts
@@ -72,10 +73,11 @@ class DesignProblem:
         targets: Sequence[Target],
         regulariser: Regulariser = DEFAULT_REGULARISER,
     ) -> None:
-        self.simulation, self.designs, self.targets = simulation, tuple(designs), tuple(targets)
+        self.designs, self.targets = tuple(designs), tuple(targets)
         self.regulariser, self._clock = regulariser, Clock()
         check_designs(self.designs)
         self._own = DesignedSimulation(simulation, self.designs, self.targets, regulariser, self._clock)
+        self.simulation = self._own.simulation
 
     @property
     def initial(self) -> np.ndarray:
@@ -126,7 +128,7 @@ class DesignProblem:
                 the point of a target.
             EquilibriumError: the initial design does not carry its loads.
         """
-        began, clock, model = perf_counter(), dict(self._clock.seconds), self.simulation.model
+        began, clock = perf_counter(), dict(self._clock.seconds)
         comm, cheaper = self.simulation.comm, self._surrogate(surrogate)
         optimiser = optimiser or self._default_optimiser
         saved = found = None
@@ -135,7 +137,11 @@ class DesignProblem:
             problem = fingerprint(self.simulation, self._own.rest, self.targets, self.regulariser, optimiser, other)
             saved = Checkpoint(Path(checkpoint), problem)
             found = saved.load_together(comm) if resume else None
-        with model.shaped(model.design):
+        if found is not None and not found.round.surrogate:
+            cheaper = None  # it was given up before
+        with ExitStack() as held:
+            for model in (own.simulation.model for own in (self._own, cheaper) if own is not None):
+                held.enter_context(model.shaped(model.design))
             run = CorrectedRun(self._own, optimiser, correction, start, saved, found)
             end = run.from_surrogate(cheaper) or run.directly()
             reached, round, (group, objective) = end.reached, end.round, end.of.team
@@ -195,10 +201,7 @@ class DesignProblem:
         """
         scatter, comm = scatter or Scatter(), self.simulation.comm
         alone = DesignProblem(
-            cheapest(self.simulation, self.targets, self._own.numbers).on(MPI.COMM_SELF),
-            self.designs,
-            targets=self.targets,
-            regulariser=self.regulariser,
+            self._own.cheapest.on(MPI.COMM_SELF), self.designs, targets=self.targets, regulariser=self.regulariser
         )
         optimiser, saved = optimiser or self._default_optimiser, None
         if checkpoint is not None:
@@ -229,7 +232,9 @@ class DesignProblem:
     def export(
         self, folder: str | Path, design: DesignResult | np.ndarray, *, pin_diameter: float | None = None
     ) -> None:
-        """Writes ``NAME.step`` and ``NAME.stl`` of every link whose shape or depth may change.
+        """Writes ``NAME.step`` and ``NAME.stl`` of every link whose shape or depth may change, in mm.
+
+        Lengths in another unit are written as they are, with a warning.
 
         Args:
             folder: where to; it is created.
@@ -240,6 +245,9 @@ class DesignProblem:
             DescriptionError: the design belongs to other links.
             MeshingError: no solid can be made of a link.
         """
+        unit = self.simulation.scene.units.length
+        if unit != "mm":
+            _log.warning("STEP and STL files are in mm, and lengths of those in %s in %s: scale them", folder, unit)
         links, given = self._own.changed, self._own.given(design)
         solids, mechanism = self._meshes(links, given), self.simulation.scene.mechanism
         linkage = build_linkage(mechanism, self.simulation.linkage.dim, self._moved(given[0]))
@@ -272,7 +280,7 @@ class DesignProblem:
         with TemporaryDirectory() as temporary:  # only the first process writes and reads
             folder, moved = Path(folder or temporary), self._moved(given[0])
             coarse, fine = part_simulations(self.simulation, links, *solids, folder, finer, moved)
-            verified = verified_parts(result, coarse, fine, self.targets)
+            verified = verified_parts(result, coarse, fine, self.targets, links)
         return self.simulation.comm.bcast(verified, root=0)
 
     @property
@@ -285,7 +293,9 @@ class DesignProblem:
         """The same problem in a surrogate."""
         if isinstance(given, Simulation):
             return self._own.on(given)
-        return None if given is None or self.simulation.fidelity.model.dim < 3 else self._own.in_plane_stress
+        if given not in (None, "plane-stress"):
+            raise DescriptionError("surrogate", f"it is {given!r}", 'Give a Simulation, "plane-stress" or None')
+        return None if given is None else self._own.in_plane_stress
 
     def _moved(self, parameters: np.ndarray) -> dict[Joint, JointChange]:
         """Where a design places joints otherwise than drawn."""

@@ -45,7 +45,7 @@ from fenicsmech.equilibrium import (
     NotConverged,
     State,
 )
-from fenicsmech.errors import EquilibriumError
+from fenicsmech.errors import AssemblyError, EquilibriumError
 from fenicsmech.model import Design
 from fenicsmech.multibody import assemble
 from fenicsmech.quantities import (
@@ -348,7 +348,7 @@ class SampleEquilibria:
             before = sample.value
         try:
             curve = self._simulation.compute(sample_request(self._simulation, ordered[0], loads))
-        except EquilibriumError as error:
+        except (EquilibriumError, AssemblyError) as error:
             raise Infeasible(str(error)) from error
         found, snapped = dict[Sample, SampleState](), False
         for load, frame in zip(loads, curve.frames, strict=True):
@@ -369,7 +369,7 @@ class SampleEquilibria:
     def _unloaded(self, sample: Sample) -> State:
         try:
             return self._simulation.unloaded(sample_request(self._simulation, sample, [sample.value]))
-        except EquilibriumError as error:
+        except (EquilibriumError, AssemblyError) as error:
             raise Infeasible(str(error)) from error
 
     def _from_guess(self, path: _Path, other: WholeState, unloaded: State) -> SampleState:

@@ -19,7 +19,7 @@ from fenicsmech.design.shape.shape_map import gather_links
 from fenicsmech.design.target import Comparison
 from fenicsmech.errors import DescriptionError, counted, point_text
 from fenicsmech.export import PinHole, write_step, write_stl
-from fenicsmech.files import atomic_write
+from fenicsmech.files import atomic_write, read_json
 from fenicsmech.mechanism import Disc, FlexibleLink, Scene, Units
 from fenicsmech.meshing import Isometry, LinkMesh, boundary_polygons, section_of
 from fenicsmech.model import Design
@@ -109,7 +109,7 @@ class TargetResult:
         error: of the corrected value, relative to the target's scale; for a bound how far it is missed, for a vector
             the length of its error.
         part: the same in the exported parts; None before ``DesignProblem.verify``, and of quantities that parts do not
-            have, such as the length of a given centreline.
+            have, such as displacements of points on them.
     """
 
     name: str
@@ -298,18 +298,11 @@ class DesignResult:
         Raises:
             DescriptionError: the file does not exist, or does not hold a design.
         """
-        part = f"design {str(path)!r}"
+        data = read_json(path, "design", form=_FORMAT, remedy="Give a file written by DesignResult.save")
         try:
-            data = json.loads(Path(path).read_text(encoding="utf-8"))
-        except FileNotFoundError:
-            raise DescriptionError(part, "there is no such file", "Check its name") from None
-        except (UnicodeDecodeError, json.JSONDecodeError):
-            data = None
-        if not isinstance(data, dict) or data.pop("format", None) != _FORMAT:
-            raise DescriptionError(part, "it does not hold a design", "Give a file written by DesignResult.save")
-        try:
-            return read_result(data)
+            return read_result({key: value for key, value in data.items() if key != "format"})
         except (KeyError, TypeError) as error:
+            part = f"design {str(path)!r}"
             raise DescriptionError(part, f"it is incomplete ({error})", "Give an unchanged file") from None
 
 

@@ -129,14 +129,14 @@ class Target:
         return f"{self.quantity}{'' if self.sample is None else f' under {self.sample}'}"
 
     @property
-    def on_curve(self) -> tuple[float, float, Configuration] | None:
-        """Force, displacement and configuration of a point of a load–displacement curve, if it is one."""
+    def on_curve(self) -> tuple[Force, float, float, Configuration] | None:
+        """Force, magnitude, displacement and configuration of a point of a load–displacement curve, if it is one."""
         if self.sample is None or self.sample.moved or self.relation != "equals" or len(self.sample.forces) != 1:
             return None
         (force, magnitude), *_ = self.sample.forces
         if self.quantity != Displacement(force) or not isinstance(magnitude, float):
             return None
-        return magnitude, self.wanted[0], self.sample.configuration
+        return force, magnitude, self.wanted[0], self.sample.configuration
 
 
 class Comparison:

@@ -16,7 +16,7 @@ and by potentials V of poses, with the poses' part ẑ of x, which count with a 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -231,7 +231,8 @@ class NumberKind(ABC):
         """Checks that the number exists in ``scene`` in ``dim`` dimensions.
 
         Raises:
-            DescriptionError: a part is not one of the scene, or they are drawn with different numbers.
+            DescriptionError: a part is not one of the scene or not the only one of its name there, or they are drawn
+                with different numbers.
         """
         candidates = self.candidates(scene)
         for part in self.parts:
@@ -240,13 +241,26 @@ class NumberKind(ABC):
                 raise DescriptionError(
                     self.name, f"{part!r} of {scene.mechanism.name!r} has none", f"The scene has {has}"
                 )
-        values = sorted({self.described(part) for part in self.parts})
-        if len(values) > 1:
+            # results find parts by their labels
+            alike = [self.label(other) for other in candidates].count(self.label(part))
+            if alike > 1:
+                raise DescriptionError(self.name, f"the scene has {alike} parts of that name", "Describe them as one")
+        self.shared([self.described(part) for part in self.parts])
+
+    def shared(self, values: Iterable[float]) -> float:
+        """The one of ``values`` of the parts, which are drawn alike.
+
+        Raises:
+            DescriptionError: they are not.
+        """
+        first, *others = sorted(set(values))
+        if others:
             raise DescriptionError(
                 self.name,
-                f"they are drawn with {', '.join(f'{v:g}' for v in values)}",
+                f"they are drawn with {', '.join(f'{v:g}' for v in (first, *others))}",
                 "Draw parts alike that share it",
             )
+        return first
 
     @classmethod
     def _part(cls, scene: Scene, word: str) -> Any:

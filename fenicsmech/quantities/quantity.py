@@ -12,7 +12,7 @@ Derived quantities follow by the chain rule: ``Component`` of a vector along a d
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from types import MappingProxyType
@@ -25,7 +25,7 @@ from mpi4py import MPI
 
 from fenicsmech.compat import assemble_vector, compile_form, owned_values
 from fenicsmech.equilibrium import EquilibriumSystem, State
-from fenicsmech.errors import DescriptionError, direction, point_text, set_fields
+from fenicsmech.errors import DescriptionError, direction, in_plane, point_text, set_fields
 from fenicsmech.mechanism import FlexibleLink, Force, Joint, Motor, Output, RigidLink, Scene, Units, in_dimension
 from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import JointChange
@@ -115,11 +115,9 @@ class Quantity(ABC):
     Attributes:
         of_state: whether it depends on an equilibrium; those that do not need no sample.
         from_unloaded: whether it counts from the unloaded configuration.
-        of_part: whether exported parts, known by their outline alone, have it.
     """
 
     of_state: ClassVar[bool] = True
-    of_part: ClassVar[bool] = True
     from_unloaded: ClassVar[bool] = False
 
     @property
@@ -134,6 +132,10 @@ class Quantity(ABC):
     @abstractmethod
     def on(self, model: MechanismModel) -> Observable:
         """The quantity of one model."""
+
+    def of_part(self, links: Collection[FlexibleLink]) -> bool:
+        """Whether parts that are known by their outline alone, in place of ``links``, have it; by default they do."""
+        return True
 
     def size(self, dim: int) -> int:
         """Number of its components in ``dim`` dimensions; 1 by default."""
@@ -178,6 +180,9 @@ class _OfVector(Quantity):
     def from_unloaded(self):  # type: ignore[override]
         return self.vector.from_unloaded
 
+    def of_part(self, links):
+        return self.vector.of_part(links)
+
     def unit(self, units):
         return self.vector.unit(units)
 
@@ -211,6 +216,10 @@ class Component(_OfVector):
     @property
     def name(self):
         return f"{self.vector} along {point_text(self.direction)}"
+
+    def check(self, scene, dim):
+        super().check(scene, dim)
+        in_plane(f"direction of the {self.vector}", self.direction, dim)
 
     def reduce(self, values):
         along = np.array(in_dimension(self.direction, len(values)))

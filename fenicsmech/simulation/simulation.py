@@ -453,12 +453,12 @@ class Simulation:
         with self._shaped():
             return CurveStepper(self._discretisation, request).unloaded
 
-    def check_drawn(self, part: str) -> None:
-        """Refuses a simulation ``with_design`` for a ``part`` that changes the design itself.
+    def check_drawn(self, part: str) -> Simulation:
+        """This simulation for a ``part`` that changes the design itself; its fidelity stays, whatever curves follow.
 
         Raises:
-            DescriptionError: this is one, its mechanism changed since it was made, or no fidelity was chosen for an
-                accuracy yet.
+            DescriptionError: it is one ``with_design``, its mechanism changed since it was made, or no fidelity was
+                chosen for an accuracy yet.
         """
         self._check_description()
         self._check_chosen(part)
@@ -468,6 +468,7 @@ class Simulation:
                 f"its simulation of {self.scene.mechanism.name!r} has another design than the drawn one",
                 "Give it as drawn, before with_design(); problem.optimise(start=result) starts from a result",
             )
+        return self._derived()
 
     @contextmanager
     def _shaped(self) -> Iterator[None]:

@@ -234,6 +234,7 @@ def test_strips_follow_shifted_joints_as_if_drawn_there(space, shift):
     assert abs(before - wanted.displacements[0]) > 0.02 * abs(wanted.displacements[0])
 
 
+@pytest.mark.thorough
 def test_position_is_found_at_which_a_strip_drawn_there_moves_as_wanted_and_is_exported(tmp_path):
     there, _, other = prop((0.0, 8.0), size=2.0)
     wanted = float(there.load_displacement(other, forces=[1.5]).corrected[0])

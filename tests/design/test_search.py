@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -43,7 +44,6 @@ class TwoValleys:
         asked: parameters of all starts.
     """
 
-    targets = (SimpleNamespace(relation="equals"),)
     BARRIER = Barrier(1.5, 0.01)
 
     def __init__(self, *, wanted: float = 1.0, broken: Sequence[int] = (), inverted: float = np.inf) -> None:
@@ -147,6 +147,21 @@ def test_starts_are_the_drawn_design_and_feasible_shapes_spread_evenly():
         assert np.all(np.abs(p - drawn)[link.spline.is_thickness] <= 1.0 / 3.0 + 1e-12)  # half of the way to 1 mm
     q = np.array([problem.q(p) for p in scattered])
     assert q.min() < -1.2 and q.max() > 1.2
+
+
+def test_designs_are_in_the_order_of_their_objectives_wherever_they_started():
+    class Least(TwoValleys):
+        """With another quantity, as small as possible, that is relative to its value as drawn in all starts."""
+
+        def optimise(self, **given) -> fm.DesignResult:
+            result = super().optimise(**given)
+            started = float(10 ** (len(self.asked) % 3))
+            mass = fm.TargetResult("mass", "", None, "t", "least", None, started, 1.0, 0.0, 1.0, 0.0)
+            return replace(result, targets=(*result.targets, mass))
+
+    found = searched(problem := Least())
+    assert middles(problem, found) == pytest.approx([1.0, -1.0], abs=0.05)
+    assert [design.objective[1] for design in found.optima] == sorted(design.objective[1] for design in found.optima)
 
 
 def test_other_seeds_give_other_starts_and_the_same_seed_the_same():
@@ -308,3 +323,22 @@ def test_bounds_that_hold_a_bar_back_are_reported():
     found = pulled_bar(20.0, 5.0, thickness=(2.8, 3.2), bend=0.01).search(fm.Scatter(starts=3, spread=0.5))
     (sentence,) = found.evidence
     assert "pull" in sentence and "curvature 0.01 of 'bar'" in sentence
+
+
+def test_searches_keep_materials_and_shapes_that_the_simulation_was_given():
+    case = pulled_bar(20.0, 0.5)
+    (bar,), (target,) = case.simulation.scene.mechanism.flexible_links, case.targets
+    flat = fm.Simulation(case.simulation.scene, space="plane-stress", size=3.0)
+    for change in (
+        lambda sim: sim.with_material(PLASTIC, fm.Material("soft", 1000.0, 0.35)),
+        lambda sim: sim.with_shapes({bar: fm.strip([(0, 0), (60, 0)], thickness=3.0, depth=4.0)}),
+    ):
+        problem = fm.DesignProblem(change(case.simulation), case.designs, targets=case.targets)
+        once = fm.Scatter(starts=1, trial=1)
+        best = problem.search(once, optimiser=fm.LevenbergMarquardt(iterations=1)).best
+        wanted, other = (
+            sim.with_design(best).load_displacement(target.quantity.part, forces=[20.0]).displacements[0]
+            for sim in (change(flat), flat)
+        )
+        assert best.targets[0].reached == pytest.approx(wanted, rel=1e-6)
+        assert best.targets[0].reached != pytest.approx(other, rel=0.1)

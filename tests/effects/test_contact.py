@@ -67,7 +67,9 @@ def test_a_finger_closes_on_a_cylinder_and_penetrates_the_less_the_stiffer_it_is
     assert depths[-1] < 0.05
 
 
-@pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
+@pytest.mark.parametrize(
+    "space", ["plane-stress", *(pytest.param(s, marks=pytest.mark.thorough) for s in ("3d-symmetric", "3d"))]
+)
 def test_an_obstacle_out_of_reach_changes_nothing(space):
     far, without = finger(space, centre=(-100.0, 38.0)), finger(space, active=False)
     curves = [case.simulation.load_displacement(case.force, forces=PULLS) for case in (far, without)]

@@ -11,7 +11,7 @@ from fenicsmech.equilibrium import LoadControl
 from ..simulation.clamped import cantilever
 from .finger import RUBBER, finger
 
-SPACES = ["plane-stress", "plane-strain", "3d"]
+SPACES = ["plane-stress", "plane-strain", pytest.param("3d", marks=pytest.mark.thorough)]
 OUT_OF_REACH = 200.0  # the legs are 60 long
 LOADS = {"plane-stress": [2.0, 4.0, 8.0, 16.0], "plane-strain": [2.0, 4.0, 8.0, 16.0], "3d": [2.0, 4.0, 8.0]}
 

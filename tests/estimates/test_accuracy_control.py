@@ -141,6 +141,21 @@ def test_simulations_derived_from_a_choice_have_its_fidelity():
         assert again.displacements == pytest.approx(curve.displacements, rel=1e-8)
 
 
+def test_design_problems_keep_the_fidelity_chosen_before():
+    scene, push, load = arch()
+    (link,) = scene.mechanism.flexible_links
+    simulation = fm.Simulation(scene, accuracy=0.02)
+    simulation.load_displacement(push, forces=[0.01 * load])
+    chosen = simulation.fidelity
+    target = fm.Target(push, force=0.01 * load, displacement=0.01)
+    problem = fm.DesignProblem(simulation, [fm.SplineDesign(link, 2)], targets=[target])
+    drawn = problem.rest_shape(problem.initial)
+    simulation.load_displacement(push, forces=[load])
+    assert simulation.fidelity != chosen == problem.simulation.fidelity
+    assert problem.simulation.with_design(drawn).fidelity == chosen
+
+
+@pytest.mark.thorough
 def test_forces_are_as_accurate_as_requested_where_displacements_are_prescribed():
     scene, push, load = cantilever()
     finest = fm.Simulation(scene, space="3d-symmetric", order=3, size=3.0, layers=2, segments=16)

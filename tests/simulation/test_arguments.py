@@ -41,7 +41,7 @@ def test_unknown_space(space):
     refused("space", lambda: simulate(scene, space=space))
 
 
-@pytest.mark.parametrize("order", [0, 4, -1, 1.5, "2"])
+@pytest.mark.parametrize("order", [0, 4, -1, 1.5, 2.0, "2"])
 def test_order_that_is_not_1_2_or_3(order):
     scene, _ = describe("truss")
     refused("order", lambda: simulate(scene, order=order))

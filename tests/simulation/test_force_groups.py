@@ -58,5 +58,5 @@ def test_invalid_groups_are_refused():
         fm.ForceGroup("twice", [(push, 1.0), (push, 2.0)])
     with pytest.raises(fm.DescriptionError, match="'stranger'.*not a force of 'arm'"):
         simulation.load_displacement(fm.ForceGroup("both", {push: 1.0, stranger: 1.0}), forces=[1.0])
-    with pytest.raises(fm.DescriptionError, match="constant at once"):
+    with pytest.raises(fm.DescriptionError, match="to be held constant"):
         simulation.load_displacement(fm.ForceGroup("one", {push: 1.0}), forces=[1.0], others={push: 1.0})

@@ -60,8 +60,8 @@ REGIONS = {
 }
 
 
-@pytest.mark.parametrize("order", [1, 2, 3])
-@pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric"])
+@pytest.mark.parametrize("order", [1, 2, pytest.param(3, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("space", ["plane-stress", pytest.param("3d-symmetric", marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("name", REGIONS)
 @pytest.mark.parallel
 def test_averages_of_polynomials_of_the_elements_degree_are_exact(name, space, order):
