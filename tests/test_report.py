@@ -115,6 +115,21 @@ def test_curve_with_a_singular_frame_is_reported_without_estimates(tmp_path, mon
     assert "displacement [mm]" in fm.read_csv(tmp_path / "curve.csv")
 
 
+def test_targets_are_marked_on_curves_of_their_own_force(tmp_path, monkeypatch):
+    case, marked = truss((0.1, WANTED)), []
+    (push,) = case.scene.mechanism.forces
+    drag = case.scene.mechanism.force(on=push.on, at=(20, 70), direction=(-1, 0), name="drag")
+    targets = [*case.targets, fm.Target(drag, force=0.05, displacement=1.0)]
+    problem = fm.DesignProblem(case.simulate(), case.designs, targets=targets)
+    result = problem.optimise(optimiser=fm.LevenbergMarquardt(iterations=1))
+    monkeypatch.setattr("fenicsmech.report.plot_curve", lambda *_, targets, **__: marked.extend(targets))
+    for part, expected in ((push, (WANTED, 0.1)), (drag, (1.0, 0.05))):
+        marked.clear()
+        curve = problem.simulation.load_displacement(part, forces=[0.02])
+        fm.write_report(tmp_path, problem.simulation, [curve], optimisation=fm.Optimisation(problem, result))
+        assert [(own.displacement, own.force) for own in marked] == [expected]
+
+
 @pytest.mark.parallel
 def test_reports_of_several_processes_are_those_of_one(shared_tmp_path):
     simulation = truss().simulate(comm=MPI.COMM_WORLD)
