@@ -272,7 +272,7 @@ class DesignProblem:
         if [target.name for target in result.targets] != [target.name for target in self.targets]:
             raise DescriptionError(
                 f"verification of {result.mechanism!r}",
-                "the result is one of other targets",
+                "the result belongs to other targets",
                 "Give a result of this problem",
             )
         links, given = self._own.changed, self._own.given(result)
