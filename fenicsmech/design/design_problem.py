@@ -185,7 +185,9 @@ class DesignProblem:
 
         That is plane stress where the scene can be simulated so, with elements not smaller than the links are thick.
         ``optimise(start=found.best)`` takes an optimum to this problem's fidelity. Each process works on a start of
-        its own; starts without an equilibrium stand in the result.
+        its own; starts without an equilibrium stand in the result. Where the drawn design does not carry its loads,
+        least quantities are relative to those of each start, and designs compare only if these targets have a
+        ``scale``.
 
         Args:
             scatter: how many starts, how far apart, and other numbers; 16 by default.
