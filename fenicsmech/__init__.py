@@ -230,7 +230,7 @@ __all__ = [
     "LevenbergMarquardt", "BFGS", "SQP", "Optimiser", "Correction", "DesignResult", "LinkDesign", "TargetResult",
     "PartValue", "Scatter", "SearchResult", "StartResult", "Optimisation", "design_study", "Experiment", "ModulusFit",
     "fit_modulus", "Design",
-    # numbers that designs change beside shapes; NumberKind for kinds of your own
+    # numbers that designs change in addition to shapes; NumberKind for kinds of your own
     "Number", "Depth", "LawParameter", "SpringStiffness", "SpringRest", "MotorOffset", "JointPosition", "JointAxis",
     "NumberBounds", "NumberDesign", "NumberKind", "ModelNumber", "EffectNumber", "NumberTerms",
     "JointChange",

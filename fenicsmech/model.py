@@ -230,8 +230,8 @@ def _mesh_options(link: FlexibleLink, linkage: Linkage, fidelity: Fidelity) -> d
 class Design:
     """What designs change in a model.
 
-    Numbers that shift joints do not reshape flexible links: ``field`` has to take these along, as that of
-    ``DesignProblem.rest_shape`` and of results does. Numbers of depth stretch links beside ``field``.
+    Numbers that shift joints do not reshape flexible links: ``field`` has to take these along, like that of
+    ``DesignProblem.rest_shape`` and of results does. Numbers of depth stretch links in addition to ``field``.
 
     Attributes:
         field: the design field of the links' shapes, this rank's values with ghosts, flat; read-only, since all
@@ -239,8 +239,8 @@ class Design:
         numbers: values of design numbers by their kind (``NumberKind``), in its unit; others are as drawn.
 
     Raises:
-        DescriptionError: it has something else than kinds of numbers, a value makes no sense, or two numbers change the
-            same.
+        DescriptionError: it has something other than kinds of numbers, a value is invalid, or two numbers change the
+            same thing.
     """
 
     field: np.ndarray
@@ -361,14 +361,14 @@ class MechanismModel:
     @property
     def effect_fields(self) -> list[tuple[Effect, LinkFields]]:
         """The fields of each effect, with the numbers of its energy."""
-        _ = self.elastic.effects_ufl  # which names them
+        _ = self.elastic.effects_ufl  # names the numbers
         return self._effect_fields
 
     # -- shape, material and other numbers -----------------------------------------------------------------------
 
     @property
     def design(self) -> Design:
-        """The present design, with all numbers that were asked for, but those that contradict the ones given last."""
+        """The present design, with all numbers requested so far, except those that contradict the ones given last."""
         held: list[Any] = []
         for kind in (*self._given_last, *self._numbers):
             if kind not in held and _contradicted(kind, held) is None:
@@ -567,24 +567,24 @@ def check_numbers(numbers: Sequence[tuple[Any, Sequence[float]]]) -> None:
     """Checks kinds of numbers that are given together, each with some values.
 
     Raises:
-        DescriptionError: something else than a kind is given, a value makes no sense, or two kinds change the same.
+        DescriptionError: something other than a kind is given, a value is invalid, or two kinds change the same thing.
     """
     for k, (kind, values) in enumerate(numbers):
-        expect("number", kind, _Kind, "a kind of number", "Give one, as Depth(link)")
+        expect("number", kind, _Kind, "a kind of number", "Give one, such as Depth(link)")
         for value in values:
             kind.check_value(value)
         if (other := _contradicted(kind, [own for own, _ in numbers[:k]])) is not None:
-            twice = "it is given twice" if other == kind else f"{other} is given too, and both change the same"
+            twice = "it is given twice" if other == kind else f"{other} is given too, and both change the same thing"
             raise DescriptionError(str(kind), twice, "Give each number of a part once")
 
 
 def _contradicted(kind: Any, others: Sequence[Any]) -> Any | None:
-    """The first of some kinds of numbers that changes the same as ``kind``."""
+    """The first of some kinds of numbers that changes the same thing as ``kind``."""
     return next((other for other in others if not set(other.slots).isdisjoint(kind.slots)), None)
 
 
 def _stretches(links: Sequence[FlexibleLink], model: ElasticModel, effects: Sequence[Effect]) -> list[Stretch | None]:
-    """The stretch of the strain-free state of each link, of which it has one at most."""
+    """The stretch of the strain-free state of each link, which has at most one."""
     found: dict[FlexibleLink, Stretch] = {}
     for effect in effects:
         for link, stretch in effect.growth(model).items():

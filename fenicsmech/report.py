@@ -2,7 +2,7 @@
 
 =====================  ===========================================================================================
 ``mechanism.png``      the mechanism in its first and last equilibrium, one panel per configuration
-``curve.png``          the curves; those of the drawn design and the targets beside them after an optimisation
+``curve.png``          the curves; after an optimisation also those of the drawn design, and the targets
 ``curve.csv``          displacement, force, stability, energy, stress and estimated error of every equilibrium
 ``deformed.xdmf``      displacements and stresses of every equilibrium, for ParaView
 ``links.png``          the links before and after an optimisation
@@ -401,7 +401,7 @@ def _design_text(summary: dict) -> list[str]:
         f"{counted(summary['parameters'], 'parameter')}, {counted(summary['iterations'], 'iteration')}, "
         f"{counted(summary['evaluations'], 'evaluation')}: "
         f"objective {objective['initial']:.3g} -> {objective['final']:.3g} "
-        f"(corrections make {error:.2g} of it; {summary['ended']})",
+        f"(corrections contribute {error:.2g}; {summary['ended']})",
         f"corrections changed by {', '.join(f'{change:.2%}' for change in summary['corrections'])} in as many rounds"
         + (f" of a surrogate in {summary['surrogate']}" if summary["surrogate"] else ""),
         *([format_table(["number", "unit", "value", "drawn", "least", "largest"], numbers)] if numbers else []),

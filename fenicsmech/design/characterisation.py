@@ -36,12 +36,12 @@ class Experiment:
         simulation: of the specimen in its test rig.
         part: the force that was applied.
         forces: its magnitudes, (n,).
-        displacements: of its point along it, (n,).
+        displacements: of the force's point along its direction, (n,).
         configuration: motor positions.
 
     Raises:
         DescriptionError: there are not as many forces as displacements, a number is not finite, no force moves
-            anything, or the simulation is one of another design.
+            anything, or the simulation belongs to another design.
     """
 
     simulation: Simulation

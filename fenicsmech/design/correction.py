@@ -3,16 +3,17 @@
     p_k = argmin O(Q(p) + c_k),     c_{k+1} = Q̂(p_k) + e(p_k) − Q(p_k),     c_0 = 0
 
 Q are the values of the simulation that is minimised, Q̂ those of the simulation that counts, and e the goal-oriented
-estimates of the discretisation error of Q̂. Only Q is differentiated. It is
+estimates of the discretisation error of Q̂. Only Q is differentiated. It belongs to
 
-- that of the same simulation (deferred correction): c = e,
-- or that of a surrogate, plane stress for space (space mapping): a few equilibria in space, and no gradient there.
+- the same simulation (deferred correction): c = e,
+- or a surrogate, plane stress for 3D (space mapping): a few equilibria in 3D, and no gradient there.
   Those of the first round are found from the surrogate's at the same design and followed from round to round; the
-  surrogate's at the optimum are loaded from zero again. Equilibria in space that are not found so are loaded from zero.
+  surrogate's at the optimum are loaded from zero again. Equilibria in 3D that are not found in this way are loaded from
+  zero.
 
-c changes from round to round by the part by which the derivatives of Q and Q̂ + e differ. At the end the corrected
-values are the true ones to within the last change. Where a surrogate does not contract, the simulation that counts is
-minimised itself.
+c changes from round to round because the derivatives of Q and of Q̂ + e differ. At the end the corrected
+values are the true ones to within the last change. Where changes of a surrogate's corrections do not contract, the
+simulation that counts is minimised itself.
 
 Sources: J. W. Bandler et al., Space mapping: the state of the art (doi:10.1109/TMTT.2003.820904); for deferred
 correction V. Pereyra, Iterated deferred corrections for nonlinear operator equations (doi:10.1007/BF02165406).
@@ -50,11 +51,12 @@ class Correction:
         estimates: whether error estimates are added; without, targets are met on the mesh of the simulation alone.
         change: largest change of a correction in the last round, over the target's scale: a tenth of the per cent
             within which targets count as met.
-        resolved: the same over the component's error estimate, which is not more certain than that.
-        contraction: change of corrections over that of the round before, above which a surrogate is given up if that
-            happens in two rounds in a row, for the gradient of the simulation itself leads there faster: one round may
-            end at another design, where corrections differ. Where changes grow it is given up at once.
-        rounds: most of them.
+        resolved: the same over the component's error estimate, which is itself uncertain by as much.
+        contraction: change of corrections over that of the round before. A surrogate whose ratio is larger in two
+            rounds in a row is given up, since the gradient of the simulation itself leads to the optimum faster; a
+            single round may exceed it, by ending at another design. Where changes grow, the surrogate is given up
+            immediately.
+        rounds: maximum number of rounds.
 
     Raises:
         DescriptionError: a number is not positive.
@@ -76,10 +78,10 @@ class Corrected:
     """The outcome of some rounds.
 
     Attributes:
-        optimum: of the last one.
+        optimum: of the last round.
         round: the last one, with the correction found there.
-        reached: at the optimum.
-        settled: whether there is nothing that other rounds would change.
+        reached: values at the optimum.
+        settled: whether further rounds would change nothing.
     """
 
     optimum: Optimum
@@ -113,7 +115,7 @@ def verified(
 ) -> tuple[Reached, bool]:
     """Values loaded from zero at the design that the model holds, and whether they are those that were followed.
 
-    Where loading fails, the values followed from design to design stand; the log names the targets.
+    Where loading fails, the values followed from design to design are kept; the log names the targets.
     """
     try:
         solved = equilibria.from_zero()
@@ -156,7 +158,7 @@ def correct(
     Where a later round has no value, the outcome is that of the one before.
 
     Args:
-        objective: that is minimised.
+        objective: the one that is minimised.
         begin: where the first round starts.
         first: the first round.
         options: of the correction.
@@ -206,7 +208,7 @@ class Outcome:
 
     Attributes:
         of: the simulation that was minimised.
-        optimum, round, reached: as of ``Corrected``.
+        optimum, round, reached: as in ``Corrected``.
         placement: of the handles in the simulation that counts.
         verified: whether loading from zero leads there.
     """
@@ -224,11 +226,11 @@ class CorrectedRun:
 
     Args:
         problem: the simulation that counts.
-        optimiser: by which.
+        optimiser: of the objective.
         correction: of the values.
         start: initial design.
         saved: the checkpoint, if one is written.
-        found: its content, saved by the run that this one continues.
+        found: content of the checkpoint, saved by the run that this one continues.
     """
 
     def __init__(

@@ -53,14 +53,15 @@ class DesignProblem:
     description is checked at once.
 
     Args:
-        simulation: of the equilibria, as drawn; it stays so. ``simulation.with_design`` gives one of a result.
+        simulation: of the scene as drawn, which it stays; ``simulation.with_design`` gives one of a result.
         designs: the links and the numbers that may change.
         targets: requirements on the mechanism.
         regulariser: R; by default mesh quality, bounds of fabrication, and closeness to the drawing with weight 1e-4,
             where the paper has 1: with 1 the demos miss their targets (benchmarks/closeness.py).
 
     Raises:
-        DescriptionError: the problem contradicts itself or the simulation's scene, or that is one of another design.
+        DescriptionError: the problem contradicts itself or the simulation's scene, or the simulation belongs to another
+            design.
         AssemblyError: a target's configuration does not assemble.
     """
 
@@ -90,7 +91,7 @@ class DesignProblem:
         found.
 
         Raises:
-            DescriptionError: the design is one of other links.
+            DescriptionError: the design belongs to other links.
             ShapeError: cells of the mesh are inverted in this shape, or a number is out of its bounds.
         """
         return self._own.rest.design(*self._own.given(design))
@@ -113,17 +114,17 @@ class DesignProblem:
         Args:
             optimiser: by default Levenberg–Marquardt where every target equals something, else sequential quadratic
                 programming.
-            start: initial design, as the result of a cheaper simulation, or parameters (parameters,); the drawn shapes
-                by default.
+            start: initial design, such as the result of a cheaper simulation, or parameters (parameters,); the drawn
+                shapes by default.
             surrogate: a cheaper simulation of the same scene that is minimised in place of this one, with corrections
-                to the values of this one. By default one in plane stress for a simulation in 3D of a scene that can be
-                simulated so; None: this simulation itself is minimised.
+                to the values of this one. By default, for a simulation in 3D, one in plane stress if the scene allows
+                it; None: this simulation itself is minimised.
             correction: of the values that are compared with targets.
             checkpoint: file updated after each iteration.
             resume: whether to continue from ``checkpoint`` if it exists.
 
         Raises:
-            DescriptionError: the checkpoint or the start is one of another problem, or no shape that may change moves
+            DescriptionError: the checkpoint or the start belongs to another problem, or no shape that may change moves
                 the point of a target.
             EquilibriumError: the initial design does not carry its loads.
         """
@@ -183,20 +184,20 @@ class DesignProblem:
     ) -> SearchResult:
         """Distinct optima from scattered starts, best first, at the cheapest fidelity.
 
-        That is plane stress where the scene can be simulated so, with elements not smaller than the links are thick.
+        That is plane stress where the scene allows it, with elements not smaller than the links are thick.
         ``optimise(start=found.best)`` takes an optimum to this problem's fidelity. Each process works on a start of
-        its own; starts without an equilibrium stand in the result. Where the drawn design does not carry its loads,
-        least quantities are relative to those of each start, and designs compare only if these targets have a
-        ``scale``.
+        its own; starts without an equilibrium are listed in the result. Where the drawn design does not carry its
+        loads, minimised quantities are relative to those of each start, and designs compare only if these targets have
+        a ``scale``.
 
         Args:
-            scatter: how many starts, how far apart, and other numbers; 16 by default.
+            scatter: number of starts (16 by default), how far apart they are, and other options.
             optimiser: of each start; by default that of ``optimise``.
             checkpoint: folder with files for each start, written as it ends.
             resume: whether to continue from the files in ``checkpoint``.
 
         Raises:
-            DescriptionError: a checkpoint is one of another search, or no shape that may change moves the point of a
+            DescriptionError: a checkpoint belongs to another search, or no shape that may change moves the point of a
                 target.
             EquilibriumError: no start carries its loads.
         """
@@ -217,7 +218,7 @@ class DesignProblem:
         """Draws the links as drawn and as in ``design``, as a PNG.
 
         Raises:
-            DescriptionError: the design is one of other links.
+            DescriptionError: the design belongs to other links.
         """
         links = [link for own in self._own.shapes for link in own.links]
         both = (self.initial, None), self._own.given(design)
@@ -243,7 +244,7 @@ class DesignProblem:
             pin_diameter: of the holes left for the pins of round interfaces; none are left by default.
 
         Raises:
-            DescriptionError: the design is one of other links.
+            DescriptionError: the design belongs to other links.
             MeshingError: no solid can be made of a link.
         """
         unit = self.simulation.scene.units.length
@@ -258,7 +259,7 @@ class DesignProblem:
         """The result with the values of its targets in the parts to be made.
 
         The links that may change are written as STEP files without holes for pins; the same scene with links read from
-        these files is meshed anew with smaller elements, and every sample is loaded anew.
+        these files is remeshed with smaller elements, and every sample is loaded again.
 
         Args:
             result: of this problem's targets.
@@ -266,7 +267,7 @@ class DesignProblem:
             finer: ratio of the simulation's element size to that of the parts.
 
         Raises:
-            DescriptionError: the result is one of other links or targets, or a force or an output is at a point of a
+            DescriptionError: the result belongs to other links or targets, or a force or an output is at a point of a
                 link that may change.
             MeshingError: a part cannot be written or meshed.
         """

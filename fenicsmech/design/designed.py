@@ -33,7 +33,7 @@ class DesignedSimulation:
     """The links of one simulation that may change, and the objective of all targets there, built on first use.
 
     Args:
-        simulation: of the equilibria.
+        simulation: in which equilibria are computed.
         designs: what may change.
         targets: requirements on the mechanism.
         regulariser: R.
@@ -45,8 +45,8 @@ class DesignedSimulation:
         changed: the links whose solids change.
 
     Raises:
-        DescriptionError: designs or targets name parts that the simulation does not have, or it is one of another
-            design.
+        DescriptionError: designs or targets name parts that the simulation does not have, or the simulation belongs to
+            another design.
         AssemblyError: a target's configuration does not assemble.
     """
 
@@ -153,7 +153,7 @@ class DesignedSimulation:
         """Parameters of a design, and its handle positions if it is a result.
 
         Raises:
-            DescriptionError: the result is one of other links, or the parameters are not as many finite numbers.
+            DescriptionError: the result belongs to other links, or the parameters are not as many finite numbers.
         """
         if not isinstance(design, DesignResult):
             parameters = np.array(design, dtype=float)

@@ -66,13 +66,13 @@ class FollowOptions:
     """Criteria for an equilibrium at one design to continue the one at another.
 
     Attributes:
-        load_steps: least number to the largest load from zero; larger ones fail more often than they save a step.
+        load_steps: minimum number of steps from zero to the largest load; with fewer, failures cost more than is saved.
         halvings: of a change of design whose equilibrium is not found, or lies elsewhere.
-        largest_miss: of the prediction, over |δ|; larger misses are those of equilibria across a fold.
-        largest_transfer_miss: the same from another simulation: up to 2.9 on one branch, as δ holds the stress of links
-            that were at rest in a slightly different shape; 30 and more across folds.
+        largest_miss: of the prediction, over |δ|; a larger miss means an equilibrium across a fold.
+        largest_transfer_miss: the same from another simulation: up to 2.9 on one branch, as δ includes the stress of
+            links that were at rest in a slightly different shape; 30 and more across folds.
         farthest_transfer: distance from the equilibrium of another simulation, over its motion from the unloaded
-            configuration: up to 0.3 between plane stress and space, more where motors strain links, 2.8 and more across
+            configuration: up to 0.3 between plane stress and 3D, more where motors strain links, 2.8 and more across
             folds.
         rounding: misses below this part of the mechanism's length, or rad, are rounding.
     """
@@ -92,7 +92,7 @@ class SampleState:
     Attributes:
         state: the equilibrium.
         control: under which it was found.
-        unloaded: without loads, from which displacements count.
+        unloaded: the state without loads, from which displacements count.
     """
 
     state: State
@@ -121,7 +121,7 @@ class _Path:
     Attributes:
         sample: its description.
         solver: of its equilibria.
-        moves: whether its unloaded configuration moves with the design.
+        moves: whether the unloaded configuration moves with the design.
     """
 
     def __init__(
@@ -147,10 +147,10 @@ class SampleEquilibria:
     """The equilibria of the samples of ``targets`` in one simulation, and the values of their quantities.
 
     Args:
-        simulation: of the equilibria.
-        targets: whose samples they are.
+        simulation: in which equilibria are computed.
+        targets: whose samples these are.
         options: of following them from design to design.
-        numbers: derivatives by which are wanted beside those by the design field.
+        numbers: with respect to which derivatives are wanted, in addition to those by the design field.
     """
 
     def __init__(
@@ -264,7 +264,7 @@ class SampleEquilibria:
     # -- values and derivatives of one sample --------------------------------------------------------------------
 
     def _of(self, sample: Sample) -> list[tuple[Observable, int]]:
-        """The observables asked of a sample, with the places of their targets."""
+        """The observables evaluated at a sample, with the places of their targets."""
         pairs = enumerate(zip(self.targets, self._observables, strict=True))
         return [(observable, k) for k, (target, observable) in pairs if target.sample == sample]
 
@@ -313,7 +313,7 @@ class SampleEquilibria:
     def _less_unloaded(
         self, solved: DesignEquilibria, path: _Path, places: Sequence[int], loaded: Sequence[Gradient]
     ) -> list[Gradient]:
-        """Derivatives of components with those of the unloaded configuration."""
+        """Derivatives of components less those in the unloaded configuration."""
         partials, counted, prescribed = self._unloaded_partials(solved, path, places)
         origin = solved.samples[path.sample].unloaded
         unloaded = self._sensitivity.of(path.solver, origin, LoadControl(0.0), partials)

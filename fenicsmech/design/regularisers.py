@@ -27,8 +27,8 @@ class Regulariser(ABC):
     def around(self, rest: ParametricShape, placement: HandlePlacement) -> Model:
         """R near the design that ``rest`` holds, placed as in ``placement``.
 
-        The model needs no mesh: it is R itself where R is a function of the splines alone, and else agrees with R and
-        its gradient at the design.
+        The model needs no mesh: it is R itself where R is a function of the splines alone, otherwise it agrees with R
+        and its gradient at the design.
         """
 
     def active(self, rest: ParametricShape, placement: HandlePlacement) -> tuple[str, ...]:
@@ -72,14 +72,14 @@ class Weighted(Regulariser):
 class StayClose(Regulariser):
     """R_init = ½ Σ ((p − p₀) / h)², h the thickness of each link (the paper's equation 7, made free of units).
 
-    The sum runs over parameters of shapes, numbers are free. Thickness parameters δ are relative to h already.
-    Design problems weight it 1e-4 by default where the paper's equation has 1: with 1 the designs stay so close to the
-    drawing that the demos miss their targets (benchmarks/closeness.py).
+    The sum runs over parameters of shapes only. Thickness parameters δ are relative to h already.
+    Design problems weight it 1e-4 by default where the paper's equation has 1: with weight 1 the designs stay so close
+    to the drawing that the demos miss their targets (benchmarks/closeness.py).
     """
 
     def around(self, rest, placement):
         scale = 1.0 / rest.lengths**2
-        scale[rest.of_numbers] = 0.0  # what is identified is not drawn back
+        scale[rest.of_numbers] = 0.0  # numbers to be identified are not drawn back to their start
 
         def model(p: np.ndarray) -> Quadratic:
             away = p - rest.initial
@@ -90,7 +90,7 @@ class StayClose(Regulariser):
 
 @dataclass(frozen=True)
 class NumberBounds(Regulariser):
-    """Barriers on numbers, which begin 2 % of the interval between their bounds before these.
+    """Barriers on numbers; each begins at a distance of 2 % of the interval between both bounds from its bound.
 
     No design leaves the bounds themselves.
     """

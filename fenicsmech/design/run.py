@@ -115,10 +115,10 @@ class Round:
         surrogate: whether the simulation is a surrogate.
         correction: of its values, (components,).
         changes: of the corrections so far, over the allowed ones.
-        largest: the same over the scales of the targets.
+        largest: the changes over the scales of the targets.
         started, initial: components at the start of the optimisation, (components,), and the objective there; empty
             and None before.
-        drawn: components to which the least quantities are relative, (components,); empty before the start.
+        drawn: components to which minimised quantities are relative, (components,); empty before the start.
     """
 
     surrogate: bool
@@ -137,7 +137,7 @@ class Saved:
     Attributes:
         start: of the next run.
         handles: positions θ there.
-        round: that was going on.
+        round: the one in progress.
         ended: reason for the end of its minimisation, and the optimiser; None if it was interrupted.
     """
 
@@ -177,7 +177,7 @@ class Checkpoint:
         """Local. The start saved in the file.
 
         Raises:
-            DescriptionError: the file does not exist, is not a checkpoint, or is one of another problem.
+            DescriptionError: the file does not exist, is not a checkpoint, or belongs to another problem.
         """
         data = self.read()
         memory = np.array(data["memory"], dtype=float)
@@ -209,7 +209,7 @@ class Checkpoint:
             raise DescriptionError(
                 f"checkpoint {str(self.path)!r}",
                 f"it belongs to another problem, with other {', '.join(other)}",
-                "Resume with the options of the first run, or start anew",
+                "Resume with the options of the first run, or start without resuming",
             )
         return data
 

@@ -1,9 +1,9 @@
 """Search from scattered starts: distinct optima, best first, and evidence where targets are out of reach.
 
 The starts are the drawn design and designs scattered evenly around it, by Latin hypercubes in units of typical lengths
-(McKay, Beckman & Conover 1979, doi:10.2307/1268522). Each is optimised for a few iterations; then the better half goes
-on and those that meet their targets, and the rest is given up unless it has ended before. A start depends on its number
-alone, so that results are the same however many processes share the starts.
+(McKay, Beckman & Conover 1979, doi:10.2307/1268522). Each is optimised for a few iterations; then the better half and
+the designs that meet their targets continue; the rest is given up unless it has already ended. A start depends on its
+number alone, so that results are the same however many processes share the starts.
 """
 
 from __future__ import annotations
@@ -33,20 +33,20 @@ from fenicsmech.polygons import first_crossing
 
 @dataclass(frozen=True)
 class Scatter:
-    """Numbers of a search from scattered starts.
+    """Options of a search from scattered starts.
 
     Attributes:
         starts: their number, the drawn design included.
         spread: largest change of a parameter, in typical lengths: a link's thickness, and for numbers a tenth of the
-            interval between their bounds. Thicknesses and numbers change by half of the way to the nearer bound at
-            most.
+            interval between their bounds. Thicknesses and numbers change by at most half of the way to the nearer
+            bound.
         seed: other seeds give other starts.
-        attempts: most shapes tried for a start until one is feasible.
-        trial: iterations after which the worse half is given up, but for designs that meet their targets.
-        distinct: designs are one if no parameter differs by more typical lengths.
+        attempts: maximum number of shapes tried for a start until one is feasible.
+        trial: iterations after which the worse half is given up, except for designs that meet their targets.
+        distinct: two designs count as the same if no parameter differs by more typical lengths.
 
     Raises:
-        DescriptionError: a number makes no sense.
+        DescriptionError: a number is out of its range.
     """
 
     starts: int = 16
@@ -71,7 +71,7 @@ class StartResult:
         number: 0 is the drawn design.
         rejected: shapes tried before it that were not feasible.
         failure: the reason why it has no value; None if it has.
-        given_up: whether it was ended early, for others were better.
+        given_up: whether it was ended early because others were better.
         result: the design it led to; None if it has no value.
     """
 
@@ -225,7 +225,7 @@ class Search:
         return self._optimised(tried.number, tried.rejected, self._optimiser, tried.result)
 
     def _optimised(self, k: int, rejected: int, optimiser: Optimiser, start: DesignResult | np.ndarray) -> StartResult:
-        plain = Correction(estimates=False)  # which optimum is near does not depend on the last per cent
+        plain = Correction(estimates=False)  # the last per cent does not change which optimum is near
         try:
             result = self._problem.optimise(optimiser=optimiser, start=start, correction=plain)
             return StartResult(k, rejected, None, False, result)
@@ -344,7 +344,7 @@ def _distance(one: DesignResult, other: DesignResult, lengths: np.ndarray) -> fl
 
 
 def evidence(ended: Sequence[DesignResult], starts: int) -> tuple[str, ...]:
-    """A sentence for each target that no design meets, or one if none meets all at once; none if one does.
+    """A sentence for each target that no design meets, or one if no design meets all of them; none if one does.
 
     Bounds are named at which all designs end that miss the target by at most twice the least miss.
     """
@@ -365,14 +365,14 @@ def evidence(ended: Sequence[DesignResult], starts: int) -> tuple[str, ...]:
         )
         if common:
             best = "all" if len(near) == len(ended) else f"the {len(near)} nearest"
-            sentences.append(f"{missed}; {best} end at {', '.join(common)}: widen that, or want less")
+            sentences.append(f"{missed}; {best} end at {', '.join(common)}: widen that, or relax the target")
         else:
             most = "".join(f", {number} of {len(near)} end at {bound}" for bound, number in held.most_common(1))
             sentences.append(f"{missed}; no bound is common to them{most}: scatter more starts, or farther")
     if not sentences:
         worst = max(ended[0].targets, key=lambda target: abs(target.error))
         sentences.append(
-            f"each target is met by some design, but none meets all at once: the best misses {worst.name} by "
+            f"each target is met by some design, but no design meets all of them: the best misses {worst.name} by "
             f"{worst.error:+.2%}"
         )
     return tuple(sentences)

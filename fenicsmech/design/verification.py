@@ -1,12 +1,12 @@
-"""Verification of designs in the parts to be made: their STEP files are meshed anew and finer, and loaded.
+"""Verification of designs in the parts to be made: their STEP files are remeshed with finer elements, and loaded.
 
 The samples are loaded from zero in elements as large as the optimiser's, where a snap on the way is found; their
 equilibria in smaller elements start from those.
 
-Values on the optimiser's mesh differ from those of the part by the elements, by the outline between the vertices of the
-mesh, and by the deformation of the mesh with the design. All three are in the difference of both values: the part
-has the outline of the exported file, its mesh has nothing in common with the optimiser's, and goal-oriented estimates
-give the error of the part's own mesh.
+Values on the optimiser's mesh differ from those of the part because of the elements, of the outline between the
+vertices of the mesh, and of the deformation of the mesh with the design. The difference of both values contains all
+three: the part has the outline of the exported file, its mesh has nothing in common with the optimiser's, and
+goal-oriented estimates give the error of the part's own mesh.
 """
 
 from __future__ import annotations

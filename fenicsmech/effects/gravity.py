@@ -47,8 +47,8 @@ class Gravity(Effect):
         masses: of rigid links.
 
     Raises:
-        DescriptionError: the acceleration is not a vector, or a mass is none; when it is simulated: nothing has weight,
-            or the mass of a link is given that is not a rigid link of the mechanism.
+        DescriptionError: the acceleration is not a vector, or a mass is not a ``Mass``; when it is simulated: nothing
+            has weight, or a mass is given for something that is not a rigid link of the mechanism.
     """
 
     acceleration: tuple[float, ...]

@@ -31,7 +31,7 @@ class JointSpring(Effect):
         rest: φ₀, where the spring is relaxed; rad or length.
 
     Raises:
-        DescriptionError: this is not a joint, or a number makes no sense.
+        DescriptionError: this is not a joint, or a number is invalid.
     """
 
     joint: Joint
@@ -54,7 +54,7 @@ class JointSpring(Effect):
         if dim == 3 and not self.joint.kind.sliding and abs(self.rest) >= 2.0 * pi:
             raise DescriptionError(
                 self._name,
-                f"in space angles stay within a full turn, the rest angle is {self.rest:g} rad",
+                f"in 3D angles stay within a full turn, and the rest angle is {self.rest:g} rad",
                 "Wind the spring up by less than 2π, or simulate in the plane",
             )
 

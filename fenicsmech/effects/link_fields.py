@@ -48,7 +48,7 @@ class Boundary:
         sides: which corners of their cells are theirs, (facets, dim).
         corners: numbers of these in the whole mesh, the same on all ranks, (facets, dim).
         places: of these, (facets, dim, dim).
-        joined: whether these lie on a mid-plane, where the boundary goes on in its mirror image, (facets, dim).
+        joined: whether these lie on a mid-plane, where the boundary continues in its mirror image, (facets, dim).
         measures: ufl measures whose sum covers them.
     """
 
@@ -129,7 +129,7 @@ class LinkFields:
 
         Args:
             name: of the effect's attribute.
-            value: of that attribute; factors belong beside the field.
+            value: of that attribute; factors belong outside the field.
             links: that have it.
 
         Raises:
@@ -138,8 +138,8 @@ class LinkFields:
         if name in self.numbers:
             raise DescriptionError(
                 f"number {name!r} of an effect",
-                "its energy asks for the field twice",
-                "Ask once, for all links that have it, and use the field again",
+                "its energy makes this field twice",
+                "Make it once, for all links that have it, and use the field again",
             )
         chosen = np.array([links is None or link in links for link in self.links])
         known = f"{name}, number {len(self.body.numbers)}"  # other effects may use the same name

@@ -197,7 +197,7 @@ class MixedFormulation(Formulation):
             if mixed and not material.law.has_mixed_energy:
                 raise DescriptionError(
                     f"material {material.name!r}",
-                    f"ν = {material.law.nu:g} asks for the u–p formulation, and its law "
+                    f"ν = {material.law.nu:g} requires the u–p formulation, and its law "
                     f"{type(material.law).__name__} has no mixed_energy",
                     "Derive the law from SplitLaw, or use formulation=DisplacementFormulation()",
                 )

@@ -285,7 +285,7 @@ class Linearisation:
     def point(self, residuals: Sequence[float], iterations: int, *, tolerance: float = _ACCURACY) -> EquilibriumPoint:
         """The equilibrium at this state, with its tangent and stability, from one solve; raises as ``solve``.
 
-        Its multipliers are without self-stress, which is of rounding, and which predictions would amplify.
+        Its multipliers contain no self-stress: that is due to rounding, and predictions would amplify it.
         """
         self._check()
         self._turn()
@@ -312,7 +312,7 @@ class Linearisation:
         return self._system.travel_slopes(self._system.controlled, self.state)[0]
 
     def transpose(self, links: np.ndarray, border: np.ndarray) -> PETSc.Vec:
-        """Gᵀ of a gradient by this rank's (u, p), (owned dofs,), and by (z, λ, f), (border,)."""
+        """Gᵀ of a gradient with respect to this rank's (u, p), (owned dofs,), and to (z, λ, f), (border,)."""
         self._turn()
         return self._system.unknowns.apply_transpose(links, border)
 
@@ -350,7 +350,7 @@ class Adjoint:
         at: the linearisation it was solved with.
         x: in the scaled unknowns of the system.
         nodal: ∂u/∂y x, so that forces δF on the links change Q by nodal · δF: this rank's owned values at the nodes of
-            u, and of pressures behind them, flat.
+            u, then those of pressures, flat.
         poses: ∂z/∂y x of the bodies' poses z, (size,).
         multipliers: the part of the multipliers λ, (rows,).
         load: the part of the controlled force.

@@ -12,21 +12,22 @@ the augmented Lagrangian
 
     Φ(s) = E(s) − λᵀC + ½ ρ_m |C + cλ|²  at the new multipliers λ, with the compliance c of joints,
 
-and at the new pressures p, with ½ ρ_m |∂E/∂p|² beside it.
+and at the new pressures p, with the additional term ½ ρ_m |∂E/∂p|².
 
 Slender links are far softer in bending than in tension, so a good step may raise every merit for a few iterations:
-steps are taken in full as long as a watchdog allows, then the iteration returns to its best state and searches the
-line. For the same reason ∇²L holds, far from equilibrium, the stress that the last step solved for instead of the one
+steps are taken in full as long as a watchdog allows, then the iteration returns to its best state and applies a line
+search. For the same reason ∇²L holds, far from equilibrium, the stress that the last step solved for instead of the one
 its displacements led to (``elasticity.PredictedStress``): fewer iterations, and longer steps converge.
 
 Close to convergence the factor of the KKT matrix K is reused (simplified Newton method),
 
     y ← y − K(y₁)⁻¹ r(y),
 
-as long as corrections contract by a factor of 1000 or more; otherwise, as next to a limit point, K is factored anew.
+as long as corrections contract by a factor of 1000 or more; otherwise, for example near a limit point, K is factored
+again.
 
 Across a path (see ``control``) equilibria of any stability are wanted and a good guess is near: steps are taken in
-full, led into the plane by bordering; where they diverge, a shorter step along the path is tried instead of descent.
+full, moved into the plane by bordering; where they diverge, a shorter step along the path is tried instead of descent.
 
 Sources: Nocedal & Wright, Numerical Optimization (doi:10.1007/978-0-387-40065-5), chapters 17–19; Chamberlain et al. on
 the watchdog (Mathematical Programming Studies 16, 1982); Deuflhard on the simplified Newton method
@@ -60,14 +61,14 @@ class PrimalDualNewton(EquilibriumMethod):
     Attributes:
         near: residual over the forces below which any equilibrium, unstable ones too, is converged to; farther
             off, steps descend.
-        iterations: most iterations.
+        iterations: maximum number of iterations.
         watchdog: iterations in a row that may fail to improve on the best residual.
         predicted_stress: whether K_uu, as long as the residual is large, holds the stress that the last step solved
             for instead of the one it led to.
         largest_turn: largest rotation (rad), or displacement over the mechanism's length, of one step.
         reuse_factor: largest contraction rate of corrections at which the last factor of K is reused, also for
             stability and the tangent of the path; 0: never.
-        path_iterations: most iterations of an arc-length step, after which a shorter one is tried.
+        path_iterations: maximum number of iterations of an arc-length step, after which a shorter one is tried.
         divergence: growth of the residual, over its least value or ``near``, at which a shorter step is tried too.
 
     Raises:
@@ -139,9 +140,9 @@ class NewtonSolver(EquilibriumSolver):
             last = (before, -length * motion) if options.predicted_stress and not system.blocks.pressures.size else None
             if near and residual.norm > norm and not self.converged(residual, norm):
                 if diverged is None and self.relative(residual) < options.near:
-                    diverged = before  # once may happen: just beyond a bifurcation small residuals hide large motions
+                    diverged = before  # may happen once: just beyond a bifurcation small residuals hide large motions
                 else:
-                    # no contraction: near a limit or bifurcation point, where only descent leads on
+                    # no contraction: near a limit or bifurcation point, where only descent makes progress
                     state, any_stability, line_search, last = diverged or before, False, True, None
                     system.load(state)
                     residual = system.residual(state, control)

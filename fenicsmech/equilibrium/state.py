@@ -18,8 +18,8 @@ class State:
     """A point (s, λ, f) of the equilibrium equations.
 
     Attributes:
-        u: displacements of this rank's owned nodes, then its owned pressures where links have some of their own, flat
-            (owned dofs,).
+        u: displacements of this rank's owned nodes, then its owned pressures where links are in u–p form, flat (owned
+            dofs,).
         poses: poses of all bodies, on every rank, (bodies, pose_size).
         multipliers: λ, one per constraint row, on every rank.
         force: magnitude f of the controlled force.
@@ -61,7 +61,7 @@ class Step:
         return Step(*(a + b for a, b in zip(vars(self).values(), vars(other).values(), strict=True)))
 
     def slower(self, other: Step) -> Step:
-        """This step with the smaller change of the two for every displacement and pose."""
+        """This step; for every displacement and pose the smaller change of this step and ``other``."""
 
         pairs = ((self.u, other.u), (self.z, other.z))
         u, z = (np.where(np.abs(one) < np.abs(two), one, two) for one, two in pairs)

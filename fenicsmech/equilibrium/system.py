@@ -4,8 +4,8 @@
 
     residual   Gᵀ ∇L,     KKT matrix   Gᵀ ∇²L G,     x ↦ (u, z, λ, f) = G x
 
-E is the energy of links and effects; where links are in u–p form, u stands for (u, p) and E is a saddle. The terms of
-L beside E are those of ``border``, the blocks of the equations those of ``unknowns``, their matrix that of ``kkt``.
+E is the energy of links and effects; where links are in u–p form, u stands for (u, p) and E is a saddle. The other
+terms of L are those of ``border``, the blocks of the equations those of ``unknowns``, their matrix that of ``kkt``.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ class EquilibriumSystem:
         clock: Clock,
         comm: MPI.Comm,
     ) -> None:
-        destroy_garbage(comm)  # of systems before this one
+        destroy_garbage(comm)  # objects of earlier systems
         self.elastic, self.interfaces, self.joints = elastic, interfaces, joints
         self.controlled, self.clock, self.comm = controlled, clock, comm
         self.numbering = numbering = Numbering(comm, interfaces, joints, elastic.pressure)

@@ -14,8 +14,8 @@ It is 2 × 2 blocks: links (thousands of unknowns, sparse, distributed) and the 
 on interfaces are functions of the poses of their bodies, which couples both: K_zu, K_pz and a part of B come from the
 links. Where the load is given instead of the displacement of its point, the load's row is −f alone.
 
-All blocks stand in one matrix, factored as LDLᵀ: by Sylvester's law its pivots have the signs of the eigenvalues, and
-at a stable equilibrium as many of these are negative as there are pressures, multipliers and the load (Gould,
+All blocks are parts of one matrix, factored as LDLᵀ: by Sylvester's law its pivots have the signs of the eigenvalues,
+and at a stable equilibrium as many of these are negative as there are pressures, multipliers and the load (Gould,
 doi:10.1007/BF02592103). The factor that solves for a step decides on stability at no extra cost. Elimination of the
 nodes would leave a Schur complement of the border, in which small stiffnesses are differences of large ones.
 
@@ -171,7 +171,7 @@ class Numbering:
         padding = -(sum(border.values()) + 1) % self.block
         self.rows = Blocks(comm, nodes=nodes, pressures=pressures, **border, padding=padding)
         self.unknowns = Blocks(comm, nodes=displacements, pressures=len(self.free) - displacements, **border)
-        # first node of every rank, and the pressures that stand before its displacements
+        # first node of every rank, and the pressures that precede its displacements
         ends = np.cumsum(comm.allgather(interfaces.owned))
         self.first_node, self._starts = int(ends[comm.rank] - interfaces.owned), ends[:-1]
         self._before = np.concatenate([[0], np.cumsum(comm.allgather(pressures))[:-1]])
@@ -273,7 +273,7 @@ class ScaledUnknowns(UnknownMap):
         self._rows = self.map.createVecLeft()
 
     def apply_transpose(self, links: np.ndarray, border: np.ndarray) -> PETSc.Vec:
-        """Gᵀ of a gradient by this rank's (u, p), (owned dofs,), and by (z, λ, f), (border,)."""
+        """Gᵀ of a gradient with respect to this rank's (u, p), (owned dofs,), and to (z, λ, f), (border,)."""
         self._rows.array_w[:] = self.numbering.rows.join(links, border)
         vector = self.zeros()
         self.map.multTranspose(self._rows, vector)

@@ -54,7 +54,7 @@ class Material:
                 part, "both a law and numbers are given", f"Give the numbers to the law, {type(law).__name__}(…)"
             )
         if not isinstance(law, Law):
-            raise DescriptionError(part, f"its law is {law!r}", "Give a law with its numbers, as NeoHookean(E, nu)")
+            raise DescriptionError(part, f"its law is {law!r}", "Give a law with its numbers: NeoHookean(E, nu)")
         if density is not None:
             density = positive(f"density of {part}", density)
         set_fields(self, name=name, law=law, density=density)
@@ -168,7 +168,7 @@ def read_pairs(part: str, given: Any, sort: type[Single], number: str) -> tuple[
 
 @dataclass(frozen=True)
 class Drive:
-    """Motors that move together, as geared to each other: at its position p each stands at ratio · p.
+    """Motors that move together, as if geared to each other: when the drive is at p, each motor is at ratio · p.
 
     Attributes:
         name: for messages, plots and tables.

@@ -4,8 +4,9 @@ Effects add to the potential energy
 
     Π = E_int + σ · (Σ link energies + Σ pose potentials) + Σ potentials that hold − loads.
 
-The load factor σ grows from 0 to 1 before the controlled force does, as that of the constant loads. What holds the
-mechanism, as the stiffness of a spring does, acts from the start: without it equilibria on the way need not exist.
+The load factor σ, which also multiplies constant loads, grows from 0 to 1 before the controlled force does. Potentials
+that hold the mechanism, such as the stiffness of a spring, act from the start: without them equilibria on the way need
+not exist.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ from fenicsmech.mechanism.shapes import Region
 class Effect(ABC):
     """An effect on a mechanism: a frozen dataclass derived from this one, in a file of its own.
 
-    It overrides the hooks that it needs. Each is nothing by default and then adds no form, no unknown and no entry of a
-    matrix. The arguments of hooks are objects of the layers above.
+    It overrides the hooks that it needs. By default each hook returns nothing, and adds no form, no unknown and no
+    entry of a matrix. The arguments of hooks are objects of the layers above.
     """
 
     @property
@@ -66,7 +67,7 @@ class Effect(ABC):
         return {}
 
     def growth(self, model):
-        """The ``Stretch`` by flexible link by which it is longer or shorter without strain than drawn.
+        """The ``Stretch`` of each flexible link whose strain-free length differs from the drawn one.
 
         Raises:
             DescriptionError: the ``ElasticModel`` does not support it.
@@ -130,7 +131,7 @@ class Scene:
         set_fields(self, effects=tuple(self.effects))
         expect("scene", self.mechanism, Mechanism, "a mechanism", "Pass a Mechanism")
         for effect in self.effects:
-            expect("scene", effect, Effect, "an effect", "List effects only, as Gravity(…)")
+            expect("scene", effect, Effect, "an effect", "List effects only, such as Gravity(…)")
 
     def __repr__(self) -> str:
         effects = "; ".join(effect.explain() for effect in self.effects)

@@ -124,7 +124,7 @@ class MeshRequest:
             whole(f"number of layers, {part}", self.layers, least=1)
         whole(f"number of segments around pins, {part}", self.segments, least=LEAST_SEGMENTS)
         if self.dim == 2 or self.half:
-            # in the plane every region is swept along z, whatever the joint's own axis (of a slider, say)
+            # in the plane every region is swept along z, whatever the joint's own axis, such as that of a slider
             set_fields(self, sites=tuple(replace(site, axis=(0.0, 0.0, 1.0)) for site in self.sites))
 
     @property
@@ -175,7 +175,7 @@ def clamp_defect(shape: object, site: InterfaceSite) -> tuple[str, str] | None:
 def mesh_link(name: str, shape: Shape, sites: Sequence[InterfaceSite] = (), **options) -> LinkMesh:
     """Meshes one link so that the cells of each interface fill the region where its joint holds the link.
 
-    The same input gives the same arrays. Lengths have no preferred unit, except that STEP files are read in mm.
+    The same input gives the same arrays. No unit of length is preferred, except that STEP files are read in mm.
 
     Args:
         name: the link's name, for messages.
@@ -201,7 +201,7 @@ def mesh_link(name: str, shape: Shape, sites: Sequence[InterfaceSite] = (), **op
 def check_link(
     name: str, shape: Shape, sites: Sequence[InterfaceSite], points: Mapping[str, Sequence[float]], **options
 ) -> None:
-    """Checks a link before it is meshed; arguments and errors as of ``mesh_link``.
+    """Checks a link before it is meshed; arguments and errors as for ``mesh_link``.
 
     A warning is logged for rectangles that do not hold a strip as a clamp across it would.
 

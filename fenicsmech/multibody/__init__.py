@@ -4,7 +4,7 @@
 - ``places``: the places of joints in the drawn configuration, which designs change
 - ``linkage``: bodies and the constraints between them
 - ``potentials``: potentials of poses, and the free coordinate of a joint
-- ``spins``: turns of bodies about the line through two ball joints, which nothing resists
+- ``spins``: idle spins, turns of bodies about the line through two ball joints, which nothing resists
 - ``assembly``: the rigid assembly of a configuration, and the motions that joints, motors and springs leave
 """
 

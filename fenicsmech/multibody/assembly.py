@@ -19,8 +19,9 @@ Springs are potentials V(z). Along the null space N of A they have the slope and
 
     Nᵀ ∂V/∂z,     Nᵀ (∂²V/∂z² − Σ λ_k ∂²C_k/∂z²) N,     Aᵀλ = ∂V/∂z,
 
-and hold the motions along which this curvature is not zero. The others are the zero-energy modes. In an assembly
-the energy of springs is least, by Newton steps with the absolute eigenvalues of the curvature, which descend.
+and hold the motions along which this curvature is not zero. The others are the zero-energy modes. In an assembly the
+energy of springs is least. It is found by Newton steps with the absolute eigenvalues of the curvature, which always
+descend.
 
 Where flexible links are bent, but move as rigid bodies, a link with the velocity v of a point x₀ and the spin ω takes
 its bodies along:
@@ -286,7 +287,7 @@ def count_freedom(
     dependent = _null_space(system.scaled_gradient(poses, motors).T)
     free = free_motions(system, poses, motors, springs)
     curvatures, modes = np.linalg.eigh(free.curvature)
-    # along these the curvature is that of rounding, beside that of the stiffest motion
+    # along these the curvature is rounding, relative to that of the stiffest motion
     flat = np.abs(curvatures) <= 1e-12 * np.max(np.abs(curvatures), initial=0.0)
 
     def moving(motions: np.ndarray) -> tuple[str, ...]:

@@ -3,8 +3,9 @@
     c = (P + δ − c_a, P + δ − c_b, E Qᵀ(ω)),     Q = exp [ω]×
 
 are the constants of a joint's equations, with its drawn place P, the centres c_a and c_b of its bodies and the rows E
-of its triad. Both bodies attach at the same point, along the same axes. So the poses of the drawn configuration close
-all joints at any δ and ω, as the unloaded, assembled ones. The derivative Q′ of Q as ω changes by a is given by
+of its triad. Both bodies attach at the same point, along the same axes. So at any δ and ω the poses of the drawn
+configuration close all joints: they stay the unloaded, assembled ones. The derivative Q′ of Q as ω changes by a is
+given by
 
     Q′ Qᵀ = [J a]×,     J = ∫₀¹ exp(s [ω]×) ds,
 

@@ -1,6 +1,7 @@
 """Numbers of flexible links: numbers of their law, and their depth.
 
-Both are fields with one value per cell in the energy E, whose derivative by the value on one link is a form,
+Both are fields with one value per cell in the energy E, whose derivative with respect to the value on one link is a
+form,
 
     xᵀ ∂F/∂p = ∂(r · û)/∂p,     r = ∂E/∂u,     û = ∂u/∂y · x.
 

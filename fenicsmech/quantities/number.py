@@ -1,4 +1,4 @@
-"""Numbers p of parts, which designs change beside shapes.
+"""Numbers p of parts, which designs change in addition to shapes.
 
 A ``NumberKind`` is described as plain data: ``Depth(finger)``, or ``Depth(left, right)`` for parts that share a value.
 ``on`` a model it is a ``ModelNumber``, which sets the value there and gives the derivative of a component Q of a
@@ -109,7 +109,7 @@ class EffectNumber(ModelNumber):
                     raise DescriptionError(
                         f"{name} of {effect}",
                         f"its field on links has the value {value:g}, and the effect {getattr(effect, name):g}",
-                        "Give fields.number(…) the attribute, and write factors beside the field",
+                        "Give fields.number(…) the attribute, and keep factors outside the field",
                     )
                 self._fields.append((known, chosen))
         if not self._potentials and not self._fields:
@@ -224,7 +224,7 @@ class NumberKind(ABC):
         return False
 
     def check_value(self, value: float) -> None:
-        """Refuses a value that makes no sense with a DescriptionError; by default one that is not positive."""
+        """Refuses an invalid value with a DescriptionError; by default one that is not positive."""
         positive(self.name, value)
 
     def check(self, scene: Scene, dim: int) -> None:

@@ -3,10 +3,10 @@
     y = (u, p, z, λ, f) the unknowns of the equilibrium,      p the design field d and numbers of parts
 
 A ``Quantity`` is described as plain data. ``on`` a model it is an ``Observable``, which gives the values of a state
-and the partial derivatives of each component; the adjoint in ``sensitivity`` makes total ones of them. A new quantity
-is one subclass of each.
+and the partial derivatives of each component; the adjoint in ``sensitivity`` turns them into total derivatives. A new
+quantity is one subclass of each.
 
-Quantities of quantities follow by the chain rule: ``Component`` of a vector along a direction, and its ``Magnitude``.
+Derived quantities follow by the chain rule: ``Component`` of a vector along a direction, and its ``Magnitude``.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ class RestObservable(Observable):
 
     @abstractmethod
     def slope(self) -> Partial:
-        """The derivatives by the design."""
+        """The derivatives with respect to the design."""
 
     def values(self, state):
         return np.array([self.value()])
@@ -255,12 +255,12 @@ def border_of(system: EquilibriumSystem, **blocks: tuple[Sequence[int] | np.ndar
 
 
 class FormValue:
-    """A form at the fields that the model holds and its derivatives by them, compiled when they are first needed.
+    """A form at the fields that the model holds, and its derivatives with respect to them, compiled when first needed.
 
     Args:
         model: whose links it is integrated over.
         form: a scalar.
-        fields: by which it is derived, by name.
+        fields: by name, with respect to which it is differentiated.
     """
 
     def __init__(self, model: MechanismModel, form: ufl.Form, fields: Mapping[str, fem.Function]) -> None:
@@ -272,7 +272,7 @@ class FormValue:
         return float(self._model.mesh.comm.allreduce(fem.assemble_scalar(self._compiled)))
 
     def slope(self, name: str) -> np.ndarray:
-        """The derivative by a field, this rank's owned values, flat; zeros if the form does not depend on it."""
+        """The derivative with respect to a field, this rank's owned values, flat; zeros if there is none."""
         if self._fields[name] not in self._form.coefficients():
             return np.zeros(len(owned_values(self._fields[name])))
         if name not in self._slopes:
@@ -284,7 +284,7 @@ class FormValue:
             return assemble_vector(*self._slopes[name]).copy()
 
     def per_link(self, name: str) -> np.ndarray:
-        """The derivative by the value of a field of cells on each flexible link, (links,)."""
+        """The derivative with respect to the value of a field of cells on each flexible link, (links,)."""
         cells, links = self.slope(name), len(self._model.mechanism.flexible_links)
         sums = np.bincount(self._model.mesh.link[: len(cells)], weights=cells, minlength=links)
         return self._model.mesh.comm.allreduce(sums, op=MPI.SUM)

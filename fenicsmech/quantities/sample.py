@@ -14,7 +14,7 @@ class PrescribedDisplacement:
     """A prescribed displacement of a force's point in place of the force's magnitude; ``at`` makes it.
 
     Attributes:
-        value: the displacement along the force, from the unloaded configuration, length.
+        value: the displacement along the force, from the unloaded configuration; a length.
     """
 
     value: float
@@ -24,7 +24,7 @@ def at(displacement: float) -> PrescribedDisplacement:
     """A prescribed displacement as a value of a ``Sample``; the force follows.
 
     Args:
-        displacement: of the force's point along it, from the unloaded configuration, length.
+        displacement: of the force's point along its direction, from the unloaded configuration; a length.
 
     Raises:
         DescriptionError: it is not a finite number.
@@ -78,7 +78,9 @@ class Sample:
             if isinstance(part, Motor):
                 positions.append((part, finite(f"position of {part.name!r} in a sample", value)))
             elif not isinstance(part, Force):
-                raise DescriptionError("sample", f"{part!r} is neither a force nor a motor", "Give the mechanism's")
+                raise DescriptionError(
+                    "sample", f"{part!r} is neither a force nor a motor", "Give forces and motors of the mechanism"
+                )
             elif isinstance(value, PrescribedDisplacement):
                 forces.append((part, value))
             else:
@@ -140,5 +142,5 @@ class Sample:
 
     @property
     def _acting(self) -> tuple[tuple[Force, float], ...]:
-        """Forces of given magnitude, without those of none."""
+        """Forces of given magnitude, except those of magnitude zero."""
         return tuple((force, value) for force, value in self.forces if isinstance(value, float) and value)

@@ -146,8 +146,8 @@ class Curve:
     def error_estimates(self, *, output: Output | None = None) -> np.ndarray:
         """Estimated discretisation errors of ``values``, (frames,), to be added to them; computed once.
 
-        A warning is logged where ``growth_by_halving`` is more than a hundredth of the largest value: then there is no
-        limit that they could lead to.
+        A warning is logged where ``growth_by_halving`` is more than a hundredth of the largest value: then the values
+        have no limit as elements shrink.
 
         Args:
             output: whose displacement is estimated instead, under the same control.
@@ -161,8 +161,8 @@ class Curve:
     def modelling_errors(self, *, output: Output | None = None) -> np.ndarray:
         """Estimated errors of plane stress, (frames,), to be added; arguments as those of ``error_estimates``.
 
-        What space adds: contraction that interfaces hold, and wide thin links that curl across their depth as they
-        bend. Not motion out of the plane.
+        They include contraction that interfaces prevent, and wide thin links that curl across their depth as they bend,
+        but not motion out of the plane.
 
         Raises:
             DescriptionError: motors move along the curve, or it is not in plane stress.
@@ -181,8 +181,8 @@ class Curve:
     def corrections(self) -> np.ndarray:
         """Sums of the estimated errors, to be added to ``values``, (frames,); 0 and a warning where they are too large.
 
-        They lead to infinitely fine elements in space, from plane stress too. Targets of designs are corrected by the
-        errors of elements alone, ``error_estimates``: they stay in the model of their simulation.
+        Corrected values are those of infinitely fine elements in 3D, from plane stress too. Targets of designs are
+        corrected by the errors of elements alone, ``error_estimates``: they stay in the model of their simulation.
 
         Raises as ``error_estimates``.
         """
@@ -205,15 +205,15 @@ class Curve:
 
     @property
     def growth_by_halving(self) -> np.ndarray:
-        """Growth of ``values`` by each halving of the elements: a bound in the plane, about so in space, (frames,).
+        """Growth of ``values`` with each halving of the elements, (frames,): a bound in the plane, approximate in 3D.
 
-        Without end, as its force acts at a point of a flexible link; 0 if it does not, and where motors move.
+        They grow without limit if the force is at a point of a flexible link; 0 if it does not, and where motors move.
         """
         found = self.discretisation
         growth = growth_by_halving(self.part, found.model, found.fidelity.sizes) * self.forces
         if self.unknown is Unknown.DISPLACEMENT:
             return growth
-        # at a given displacement the force is smaller by as much as its displacement would be larger
+        # at a given displacement the force is smaller in proportion as its displacement would be larger
         return -growth * np.divide(self.forces, self.displacements, out=0.0 * growth, where=self.displacements != 0.0)
 
     # -- stability, friction, assumptions ------------------------------------------------------------------------
@@ -221,12 +221,12 @@ class Curve:
     def buckling_points(self, *, frame: Frame | None = None, count: int = 3) -> tuple[BucklingPoint, ...]:
         """Forces, or positions of the motors, at which the equilibrium would stop being unique.
 
-        From the KKT matrix and its rate: exact for columns and others that hardly move before they buckle; otherwise
-        more accurate from closer frames.
+        From the KKT matrix and its rate: exact for columns and other mechanisms that hardly move before they buckle;
+            otherwise more accurate from closer frames.
 
         Args:
             frame: one of the curve's; the last one by default.
-            count: how many, those nearest to the force or position of the frame, in both senses, nearest first.
+            count: how many, those nearest to the force or position of the frame, in both directions, nearest first.
 
         Raises:
             DescriptionError: the frame is of another curve.
@@ -266,7 +266,7 @@ class Curve:
         """The assumptions of the simulation as text, with figures of the last frame where these may matter.
 
         Args:
-            tolerance: relative change of the displacement from which an omitted effect matters.
+            tolerance: relative change of the displacement above which an omitted effect matters.
             weight: of the flexible links per volume, in units of the scene; in mm and N that of plastics and silicones,
                 1.2 g/cm³, by default.
 
@@ -400,7 +400,7 @@ class Curve:
     def _chosen(self, frame: Frame | None) -> Frame:
         if frame is not None and frame not in self.frames:
             raise DescriptionError(
-                f"curve of {self.part.name!r}", "the frame is one of another curve", "Choose from its frames"
+                f"curve of {self.part.name!r}", "the frame belongs to another curve", "Choose from its frames"
             )
         return frame or self.frames[-1]
 

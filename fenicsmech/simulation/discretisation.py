@@ -133,7 +133,7 @@ class Discretisation:
         return MotorControl(0.0, self.linkage.joints.motor_values(lambda motor: ratios.get(motor, 0.0)))
 
     def _controlled_load(self, part: PrescribedPart) -> PointLoad:
-        """The load whose magnitude is unknown; for motors one that acts nowhere."""
+        """The load whose magnitude is unknown; for motors, a load that acts nowhere."""
         forces = part.ratios if isinstance(part, Force | ForceGroup) else ()
         loads = [(self.model.point_load(force), ratio) for force, ratio in forces]
         acting = tuple((point, ratio * way) for load, ratio in loads for point, way in load.acting)

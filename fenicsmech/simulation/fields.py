@@ -175,7 +175,7 @@ class MechanismPlotter:
 def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame]) -> None:
     """Writes vertex displacements, von Mises stress and pressure of ``frames`` of one design; time is the force.
 
-    There are pressures where elements are mixed, zero in all other links. The files appear when they are complete.
+    Pressures are written where links are in u–p form, with zero in all others. The files appear when they are complete.
     """
     target = Path(path)
     if target.suffix != ".xdmf":

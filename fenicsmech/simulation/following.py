@@ -29,16 +29,16 @@ from fenicsmech.simulation.stepping import CurveRequest, CurveStepper, check_for
 
 @dataclass(frozen=True)
 class Until:
-    """A path ends as soon as it passes one of these values, exactly there, or after so many frames.
+    """A path ends exactly at the first of these values that it passes, or after a number of frames.
 
     Args:
-        displacement: of the point of the prescribed force, along it, counted as on curves; one value or several.
+        displacement: of the prescribed force's point along its direction, counted as on curves; one value or several.
         position: of the prescribed motors, rad or length, counted from the drawing; one value or several.
         force: magnitude of the prescribed force, or torque or force of the motors; one value or several.
-        frames: most frames, critical points aside; the path ends there without error.
+        frames: maximum number of frames, not counting critical points; the path ends there without error.
 
     Raises:
-        DescriptionError: nothing to end at, displacement and position at once, or numbers that make no sense.
+        DescriptionError: no end is given, both a displacement and a position are given, or a number is invalid.
     """
 
     displacement: float | tuple[float, ...] = ()
@@ -106,7 +106,7 @@ class PathEvent:
 
     Attributes:
         kind: limit point of the force, turning point of the displacement or of a motor, or bifurcation.
-        frame: the equilibrium; also one of the curve's frames.
+        frame: the equilibrium, which is also one of the curve's frames.
         index: of that frame.
         null_space: at a bifurcation a basis of the KKT matrix's null space, one direction for each of the modes that
             change; else the direction of the path.
@@ -150,12 +150,12 @@ class FollowedCurve(Curve):
 
     @property
     def limit_points(self) -> tuple[PathEvent, ...]:
-        """Limit points: a dead load snaps there."""
+        """Limit points: under a dead load the mechanism snaps there."""
         return self._of(Critical.LIMIT)
 
     @property
     def turning_points(self) -> tuple[PathEvent, ...]:
-        """Turning points: a held displacement snaps there."""
+        """Turning points: under a prescribed displacement the mechanism snaps there."""
         return self._of(Critical.TURNING)
 
     @property
@@ -175,7 +175,7 @@ class FollowedCurve(Curve):
 def branches(
     curve: FollowedCurve, event: PathEvent, until: Until, steps: ArcSteps, mode: ModeShape | None
 ) -> tuple[FollowedCurve, FollowedCurve]:
-    """The curve that crosses another one, in both senses, as ``Simulation.branches``."""
+    """The curve that crosses another one, in both directions, like ``Simulation.branches``."""
     check_until(until, curve.part)
     if event not in curve.bifurcations:
         raise DescriptionError(
@@ -249,7 +249,7 @@ class CurveFollower:
                 raise self._ended(failure) from failure
             frame = stepper.record(ends[1])
             self._frames.append(replace(frame, seconds=perf_counter() - began, phases=clock.since(seconds)))
-            watch(min(len(self._frames), self._until.frames))  # critical points come on top
+            watch(min(len(self._frames), self._until.frames))  # critical points are additional frames
         return FollowedCurve(
             request.part,
             request.configuration,

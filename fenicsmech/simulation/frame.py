@@ -18,8 +18,8 @@ class Frame:
 
     Attributes:
         force: magnitude of the prescribed force, or torque or force of the prescribed motors.
-        displacement: of the force's point along it, from the assembled configuration, or the motors' position, from
-            the drawing.
+        displacement: of the force's point along its direction, from the assembled configuration, or the motors'
+            position, from the drawing.
         snapped_through: whether the mechanism snapped on the way from the frame before: the path turns back there, and
             this equilibrium lies on another one, perhaps not the one that dynamics would lead to.
         unstable_modes: directions in which the energy has a maximum, under dead loads.
@@ -32,7 +32,7 @@ class Frame:
         iterations: Newton iterations, load steps on the way included.
         residuals: relative residual before each iteration of the last step, and at the end.
         seconds: wall-clock time.
-        phases: the same, by phase.
+        phases: wall-clock time by phase.
         state: the equilibrium itself.
         design: that it belongs to.
     """
@@ -106,7 +106,7 @@ class SoftMode:
 def mode_shape(model: MechanismModel, step: Step) -> ModeShape:
     """The direction ``step`` and its characteristics."""
     comm, links = model.mesh.mesh.comm, model.mechanism.flexible_links
-    # where half is meshed, nodes move in space and bodies in the plane; pressures come behind
+    # where half is meshed, nodes move in space and bodies in the plane; pressures come last
     dim = model.interfaces.block
     squares = model.elastic.split(step.u)[0].reshape(-1, dim) ** 2
     owners = model.node_link[: len(squares)]

@@ -42,16 +42,16 @@ from fenicsmech.simulation.frame import Frame
 
 @dataclass(frozen=True)
 class ExplanationOptions:
-    """Thresholds from which an omitted effect matters.
+    """Thresholds above which an omitted effect matters.
 
     Attributes:
         tolerance: relative change of the displacement.
         weight: per volume, of the flexible links, in the units of the scene; None is unknown.
-        locking: Poisson's ratio from which displacement elements of an order lose accuracy.
-        slender: fraction of the out-of-plane buckling load from which a link needs a simulation in space.
-        longest: elements of an order over the thickness of the thinnest stretch of their link, longer than which they
-            bend it too little. Displacements of straight leaves and quarter circles, 40 times as long as thick, change
-            by 1 % to elements of length zero; of order 1 by 8 % at 0.25, 30 % at 0.5 and 67 % at 1; of order 2
+        locking: Poisson's ratio above which displacement elements of an order lose accuracy.
+        slender: fraction of the out-of-plane buckling load above which a link needs a simulation in 3D.
+        longest: element length of each order, over the thickness of the thinnest stretch of the link, above which
+            elements bend too little. Displacements of straight leaves and quarter circles, 40 times as long as thick,
+            change by 1 % to elements of length zero; of order 1 by 8 % at 0.25, 30 % at 0.5 and 67 % at 1; of order 2
             by 0.2 % at 2, 2 % at 4, and 7 % at 6, where the error estimates are of no use. Of order 3, in quarter
             circles 80 times as long as thick, by 0.03 % up to 8, and from 9 on by 6 % to 11 % on some meshes.
     """
@@ -73,7 +73,7 @@ class Hint:
     """A hint on an omitted effect.
 
     Attributes:
-        what: its name.
+        what: name of the effect.
         text: the consequence of omitting it.
         matters: whether it changes the displacement by more than the tolerance, or may change it altogether.
     """
@@ -148,7 +148,7 @@ def _weight_hint(change: float | None, displacement: float, units: Units, option
     """The hint on weight, whose ``change`` of the displacement is None where the weight is unknown."""
     per_volume = f"{units.force}/{units.length}³"
     if change is None:
-        return Hint("weight", f"its influence needs explain(weight=…), the weight per volume in {per_volume}", False)
+        return Hint("weight", f"call explain(weight=…) with the weight per volume in {per_volume}", False)
     part = change / max(abs(displacement), 1e-300)
     return Hint(
         "weight",
@@ -229,7 +229,7 @@ def _spin_hint(model: MechanismModel, solver: EquilibriumSolver, at: Equilibrium
         "idle spins",
         f"nothing keeps the links of {', '.join(names)} from turning about the line between their ball joints: how far "
         "they turn is set by a gauge, and these points, away from the line, move with it; place them on the line, or "
-        "hold the spin, as by a universal joint in place of a ball",
+        "hold the spin, for example by a universal joint in place of a ball",
         True,
     )
 
@@ -273,7 +273,7 @@ def coarse_links(discretisation: Discretisation, units: Units, options: Explanat
 
 
 def _touching_hint(model: MechanismModel, frame: Frame) -> Hint:
-    """Links that come closer than half an element, those that share a joint apart."""
+    """Links that come closer to each other than half an element, except those that share a joint."""
     mesh, links = model.mesh, model.mechanism.flexible_links
     snapshot, joined = gather(model, frame), [{joint.a, joint.b} for joint in model.mechanism.joints]
 
@@ -365,7 +365,7 @@ class PinFriction:
 def friction_band(
     frames: Sequence[Frame], pins: Mapping[Joint, PinFriction], linkage: Linkage
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds of the force between which friction holds the mechanism, as ``Curve.friction_band``."""
+    """Bounds of the force between which friction holds the mechanism, see ``Curve.friction_band``."""
     poses = [frame.state.poses for frame in frames]
     if len(poses) < 2:
         raise DescriptionError("friction band", "the curve has one frame only", "Give two values or more")

@@ -71,8 +71,8 @@ class Simulation:
             displacement of every curve, or in the largest force where displacements are prescribed, once the estimates
             of its errors are added (``Curve.corrected``). ``load_displacement`` finds the cheapest fidelity that is
             good enough, see ``choice``; ``follow``, ``branches``, simulations derived from this one and design problems
-            use the one chosen last and raise an error before. Links from STEP files are measured; ``size`` stands for
-            the thickness of those from mesh files.
+            use the one chosen last, and raise an error if there is none yet. Links from STEP files are measured; for
+            those from mesh files ``size`` gives the thickness.
         layers: of elements through the depth of strips and outlines in space, or half of it where half is meshed; by
             default from depth and size.
         segments: of elements around pins, at least; 8 by default.
@@ -162,12 +162,12 @@ class Simulation:
         Args:
             part: the force that changes, or a ``ForceGroup`` of several.
             forces: its magnitudes (load control), or
-            displacements: of its point along it, for a group Σ ratio · displacement (displacement control).
+            displacements: of its point along its direction, for a group Σ ratio · displacement (displacement control).
             configuration: motor positions.
             others: constant magnitudes of other forces.
 
         Raises:
-            DescriptionError: the request makes no sense.
+            DescriptionError: the request contradicts itself or the mechanism.
             AssemblyError: the configuration does not assemble.
             EquilibriumError: a prescribed value was not reached; carries the frames before it.
         """
@@ -208,8 +208,8 @@ class Simulation:
         """The whole curve under a changing force or a moving motor, past limit points and folds.
 
         Starts in the configuration, without the force that changes, and goes towards the first displacement or
-        position, or else the first force, of ``until``. Across the curve of a motor lies its position, up its torque or
-        force.
+        position, or else the first force, of ``until``. The abscissa of a motor's curve is its position, the ordinate
+        its torque or force.
 
         Args:
             part: the force that changes, or the motor that moves, or a ``Drive`` of several.
@@ -219,7 +219,8 @@ class Simulation:
             steps: how finely it is followed.
 
         Raises:
-            DescriptionError: the request makes no sense, or no fidelity was chosen for an accuracy yet.
+            DescriptionError: the request contradicts itself or the mechanism, or no fidelity was chosen for an accuracy
+                yet.
             AssemblyError: the configuration does not assemble.
             EquilibriumError: the curve ends early; carries the frames before that.
         """
@@ -238,7 +239,7 @@ class Simulation:
         steps: ArcSteps | None = None,
         mode: ModeShape | None = None,
     ) -> tuple[FollowedCurve, FollowedCurve]:
-        """The curve that crosses ``curve`` at a bifurcation, from there in both senses, at the design of ``curve``.
+        """The curve that crosses ``curve`` at a bifurcation, from there in both directions, at the design of ``curve``.
 
         Args:
             curve: a followed curve.
@@ -300,7 +301,7 @@ class Simulation:
                 alone, this rank's values with ghosts, flat.
 
         Raises:
-            DescriptionError: the design is one of other links, or of another mesh, or the scene has no parts with such
+            DescriptionError: the design belongs to other links or another mesh, or the scene has no parts with such
                 numbers; or no fidelity was chosen for an accuracy yet.
             ShapeError: cells of the mesh are inverted in this shape.
         """
@@ -326,7 +327,7 @@ class Simulation:
 
         Args:
             drawn: the material of some links.
-            other: their new material; effects, as ``Gravity`` by its density, keep the drawn one.
+            other: their new material; effects keep the drawn one, such as its density in ``Gravity``.
 
         Raises:
             DescriptionError: no link is made of ``drawn``, or no fidelity was chosen for an accuracy yet.
@@ -342,15 +343,15 @@ class Simulation:
         fidelity: Fidelity | None = None,
         moved: Mapping[Joint, JointChange] | None = None,
     ) -> Simulation:
-        """The same scene with links of other shapes, meshed anew; joints keep their interfaces.
+        """The same scene with links of other shapes, remeshed; joints keep their interfaces.
 
-        Quantities, samples, targets and effects that name these links mean those of other shapes. Links keep the
+        Quantities, samples, targets and effects that name these links apply to them in their new shapes. Links keep the
         centreline they were described with.
 
         Args:
-            shapes: of some flexible links, as ``step_file`` of a designed part.
+            shapes: of some flexible links, such as ``step_file`` of a designed part.
             fidelity: by default that of this simulation.
-            moved: joints that are placed otherwise than drawn, as those of a designed part.
+            moved: joints that are placed otherwise than drawn, such as those of a designed part.
 
         Raises:
             DescriptionError: these are not shapes of links of the mechanism, or it does not fit the fidelity; or none
@@ -434,7 +435,7 @@ class Simulation:
         return self._discretisation.solver(part, others)
 
     def compute(self, request: CurveRequest, *, watch: Callable[[int], None] = lambda done: None) -> Curve:
-        """The curve of a checked request, as ``load_displacement`` without showing progress.
+        """The curve of a checked request, like ``load_displacement`` but without showing progress.
 
         Args:
             request: of the curve.
@@ -479,7 +480,7 @@ class Simulation:
                 yield
 
     def _warn_of_coarse_links(self) -> None:
-        """Tells links whose elements are too long to bend with them."""
+        """Logs a warning for links whose elements are too long to resolve their bending."""
         if text := coarse_links(self._discretisation, self.scene.units):
             _log.warning("%s", text)
 

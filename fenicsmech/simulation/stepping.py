@@ -101,12 +101,12 @@ def read_request(
 def read_others(
     mechanism: Mechanism, part: PrescribedPart, configuration: Configuration, others: Mapping[Force, float] | None
 ) -> tuple[tuple[Force, float], ...]:
-    """The constant forces beside ``part``, if they and the configuration are of ``mechanism``."""
+    """The constant forces in addition to ``part``, if they and the configuration are of ``mechanism``."""
     others = dict(others or {})
     for other in others:
         check_force(mechanism, other)
     if isinstance(part, Force | ForceGroup) and not others.keys().isdisjoint(dict(part.ratios)):
-        raise DescriptionError(f"{part.name!r}", "it changes and is held constant at once", "Leave it out of others")
+        raise DescriptionError(f"{part.name!r}", "it is to change and to be held constant", "Leave it out of others")
     if not isinstance(configuration, Configuration):
         raise DescriptionError(
             f"configuration {configuration!r}", "it is not a configuration", "Make one with scene.configuration()"
@@ -157,7 +157,7 @@ class CurveStepper:
         self.freedom = from_one(comm, lambda: count_freedom(rigid, assembly.poses, motors, springs, idle))
         self.followed = discretisation.followed_control(request.part)
         self.origin, self._origins = 0.0, dict.fromkeys(model.mechanism.outputs, 0.0)
-        self._snaps = 0  # so far, that no frame reports
+        self._snaps = 0  # so far, which no frame reports yet
         self._poses = assembly.poses
         state = self.unloaded = self._unloaded(assembly)
         self._system.load(state)

@@ -29,7 +29,7 @@ def test_higher_modes_and_redundant_joints(slides):
     assert [load.value / first for load in found] == pytest.approx([1.0, 4.0, 9.0], rel=1e-3)
 
 
-def test_buckling_load_hardly_depends_on_the_load_it_is_asked_at():
+def test_buckling_load_hardly_depends_on_the_load_it_is_computed_at():
     case = strut(Hold.CLAMPED_CLAMPED)
     loads = [-0.5 * case.euler, 0.9 * case.euler, 1.1 * case.euler]
     curve = case.simulation.load_displacement(case.push, forces=loads)

@@ -86,7 +86,7 @@ def pulled():
 
 
 @pytest.mark.thorough
-def test_steps_of_a_led_force_and_of_constant_loads_do_not_depend_on_what_is_out_of_reach(pulled, caplog):
+def test_steps_of_a_prescribed_force_and_of_constant_loads_do_not_depend_on_what_is_out_of_reach(pulled, caplog):
     simulation, push, other = pulled
     reached = []
     for load in (80.0, 8e4):

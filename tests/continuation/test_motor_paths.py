@@ -143,7 +143,7 @@ def test_curve_of_a_motor_is_labelled_with_its_own_units(tmp_path):
     assert [axis.label for axis in turned.axes] == ["angle [rad]", "torque [N mm]"]
 
 
-def test_ends_and_questions_that_do_not_fit_a_motor_are_refused():
+def test_ends_and_methods_that_do_not_fit_a_motor_are_refused():
     simulation, motor, _ = driven_toggle()
     push = simulation.scene.mechanism.forces[0]
     with pytest.raises(fm.DescriptionError, match="which has no displacement"):
@@ -176,7 +176,7 @@ def test_clamps_that_turn_together_lead_the_bow_over_the_fold_of_the_beam_and_ba
     assert [axis.label for axis in curve.axes] == ["angle [rad]", "torque [N mm]"]
 
 
-def test_drives_that_make_no_sense_are_refused():
+def test_invalid_drives_are_refused():
     simulation, _, (left, right) = bow()
     slide = driven_toggle()[1]
     for ratios in (

@@ -42,7 +42,7 @@ def test_arch_under_more_than_its_limit_load_snaps_through(snapping, loads):
     assert np.all(curve.displacements[:first] < limit.displacement) and curve.displacements[first] > 1.8 * RISE
 
 
-def test_arch_below_its_limit_load_or_led_by_its_displacement_does_not_snap_through(snapping):
+def test_arch_below_its_limit_load_or_under_prescribed_displacement_does_not_snap_through(snapping):
     simulation, push, limit = snapping
     for loads in ([0.9999], [0.5, 0.97, 0.9999, 0.5], [-5.0]):
         curve = simulation.load_displacement(push, forces=np.array(loads) * limit.force)

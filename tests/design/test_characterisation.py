@@ -62,7 +62,7 @@ def test_a_fit_leaves_simulations_and_their_curves_as_they_are():
     assert fit.curves[0].error_estimates() == pytest.approx(wanted, rel=1e-4)
 
 
-def test_a_simulation_goes_on_with_the_fitted_material():
+def test_a_simulation_continues_with_the_fitted_material():
     simulation, push = bench(GUESS)
     fit = fit_modulus([Experiment(simulation, push, FORCES, exact())], GUESS)
     fitted = simulation.with_material(GUESS, fit.material)
@@ -76,7 +76,7 @@ def test_all_links_of_the_material_change_together():
 
 
 @pytest.mark.thorough
-def test_interval_covers_the_truth_as_often_as_it_says():
+def test_interval_covers_the_truth_as_often_as_stated():
     random, covered, rounds = np.random.default_rng(3), 0, 20
     true = exact()
     simulation, push = bench(GUESS)
@@ -105,7 +105,7 @@ def test_interval_shrinks_with_the_noise():
         ((0.0, 0.0), (0.0, 1.0), "no force moves anything"),
     ],
 )
-def test_data_that_tell_nothing_are_refused(forces, displacements, message):
+def test_invalid_measurements_are_refused(forces, displacements, message):
     simulation, push = bench(GUESS)
     with pytest.raises(DescriptionError, match=message):
         Experiment(simulation, push, forces, displacements)

@@ -189,7 +189,7 @@ def test_two_ranks_correct_as_one_does():
     assert (together.iterations, together.reason) == (alone.iterations, alone.reason)
 
 
-def test_corrections_that_make_no_sense_are_refused():
+def test_invalid_corrections_are_refused():
     for name in ("change", "resolved", "contraction", "rounds"):
         with pytest.raises(fm.DescriptionError, match=name):
             fm.Correction(**{name: 0.0})

@@ -23,7 +23,7 @@ def test_resuming_without_a_checkpoint_starts_from_the_beginning(tmp_path):
     assert file.exists()
 
 
-def test_going_on_from_a_checkpoint_ends_where_one_run_does(tmp_path):
+def test_resuming_from_a_checkpoint_ends_where_one_run_does(tmp_path):
     file = tmp_path / "checkpoint.json"
     direct = truss(*REACHABLE).problem().optimise()
     first = truss(*REACHABLE).problem().optimise(optimiser=fm.LevenbergMarquardt(iterations=3), checkpoint=file)
@@ -35,7 +35,7 @@ def test_going_on_from_a_checkpoint_ends_where_one_run_does(tmp_path):
     assert resumed.links[0].parameters == pytest.approx(direct.links[0].parameters, abs=1e-5)
 
 
-def test_a_checkpoint_is_not_used_unless_asked_for(tmp_path):
+def test_a_checkpoint_is_not_used_unless_requested(tmp_path):
     file = tmp_path / "checkpoint.json"
     first = truss((0.4, 1.8)).problem().optimise(checkpoint=file)
     again = truss((0.4, 1.8)).problem().optimise(checkpoint=file)

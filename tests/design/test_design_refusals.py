@@ -146,7 +146,7 @@ def test_motors_of_another_mechanism():
 
 @pytest.mark.parametrize("number", [math.nan, math.inf, "two", None])
 @pytest.mark.parametrize("name", ["force", "displacement", "weight"])
-def test_targets_that_are_no_numbers(name, number):
+def test_targets_that_are_not_numbers(name, number):
     push = truss(*REACHABLE).targets[0].quantity.part
     numbers = {"force": 0.1, "displacement": 2.0, "weight": 1.0, name: number}
     refused(lambda: fm.Target(push, **numbers), part=f"{name} of a target for", problem="", remedy="finite")
@@ -185,7 +185,7 @@ def test_fewer_segments_than_gaps_between_joints():
 
 
 @pytest.mark.parametrize("segments", [0, -1, 2.5, None])
-def test_numbers_of_segments_that_make_no_sense(segments):
+def test_invalid_numbers_of_segments(segments):
     link = truss().designs[0].link
     refused(lambda: fm.SplineDesign(link, segments), part="'diagonal'", problem="segments", remedy="whole number")
 
@@ -202,7 +202,7 @@ def test_numbers_of_segments_that_make_no_sense(segments):
         ({"bend": math.inf}, "inf"),
     ],
 )
-def test_bounds_that_make_no_sense(bounds, problem):
+def test_invalid_bounds(bounds, problem):
     link = truss().designs[0].link
     with pytest.raises(fm.DescriptionError, match=problem) as caught:
         fm.SplineDesign(link, 3, **bounds)

@@ -73,7 +73,7 @@ def test_an_offset_is_the_same_as_another_position_of_the_motor(describe, space)
         assert shifted.path(push, [here]) == pytest.approx(sim.path(push, [there]), abs=1e-10)
 
 
-def test_values_of_designs_with_other_offsets_are_those_of_a_scene_whose_motor_stands_there():
+def test_values_of_designs_with_other_offsets_are_those_of_a_scene_whose_motor_is_there():
     def equilibria(position: float) -> tuple[fm.Simulation, fm.MotorOffset, SampleEquilibria]:
         scene, motor, push = crank()
         sim, sample = fm.Simulation(scene, space="plane-stress", size=4.0), fm.Sample({push: 1.0, motor: position})
@@ -133,7 +133,7 @@ def test_gradients_of_the_objective_by_shapes_and_offsets_agree_with_central_dif
     assert here.gradient[-1] != 0.0
 
 
-def test_offsets_that_make_no_sense_are_refused():
+def test_invalid_offsets_are_refused():
     scene, motor, push = crank()
     sim = fm.Simulation(scene, space="plane-stress", size=4.0)
     targets = [fm.Target(push, force=1.0, displacement=1.0)]

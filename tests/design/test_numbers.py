@@ -49,7 +49,7 @@ def test_a_modulus_is_recovered_from_a_curve_computed_with_it():
 
 
 @pytest.mark.parametrize("space", ["plane-stress", pytest.param("3d", marks=pytest.mark.thorough)])
-def test_depth_is_found_with_which_a_link_so_drawn_moves_as_wanted(space):
+def test_depth_is_found_with_which_a_link_drawn_as_deep_moves_as_wanted(space):
     scene, strip, push = cantilever(depth=5.0)
     sim = fm.Simulation(scene, space=space, size=3.0)
     (moved,) = curve(sim, push, [2.0])
@@ -83,7 +83,7 @@ def test_depths_change_the_solid_that_is_exported_and_verified(tmp_path):
     assert np.ptp(heights) == pytest.approx(6.5, rel=1e-6)
 
 
-def test_results_tell_their_numbers_and_keep_them_in_files(tmp_path):
+def test_results_print_their_numbers_and_keep_them_in_files(tmp_path):
     scene, strip, push = cantilever()
     sim = fm.Simulation(scene, space="plane-stress", size=3.0)
     numbers = [fm.Number(fm.Depth(strip), 3.0, 9.0), fm.Number(fm.LawParameter("E", strip), 500.0, 4000.0)]
@@ -168,7 +168,7 @@ def test_any_number_of_processes_finds_the_same_derivatives_by_numbers():
         assert together == pytest.approx(one, rel=1e-7, abs=1e-7 * np.abs(one).max())
 
 
-def test_numbers_that_make_no_sense_are_refused():
+def test_invalid_numbers_are_refused():
     scene, strip, push = cantilever()
     sim = fm.Simulation(scene, space="plane-stress", size=3.0)
     targets, depth = [fm.Target(push, force=2.0, displacement=1.0)], fm.Depth(strip)
@@ -230,7 +230,7 @@ def test_numbers_of_a_design_are_refused_as_those_of_a_problem_are():
     refused(lambda: given(*both), part="depth", problem="both change the same", remedy="once")
 
 
-def test_springs_are_as_stiff_as_the_moment_of_the_force_asks_for():
+def test_springs_are_as_stiff_as_the_moment_of_the_force_requires():
     rest, angle, force = -0.2, 0.5, 1.5
     case = lever(lambda hinge: [fm.JointSpring(hinge, 60.0, rest=rest)])
     (spring,) = case.simulation.scene.effects

@@ -172,20 +172,20 @@ def test_other_seeds_give_other_starts_and_the_same_seed_the_same():
     assert not np.allclose(first.asked[1], other.asked[1])
 
 
-def test_shapes_with_inverted_cells_are_drawn_anew():
+def test_shapes_with_inverted_cells_are_drawn_again():
     found = searched(problem := TwoValleys(inverted=0.0))
     assert all(problem.q(p) <= 0.0 for p in problem.asked[: SCATTER.starts])
     assert sum(start.rejected for start in found.starts) > 0
     assert all(start.result is not None for start in found.starts)
 
 
-def test_starts_for_which_no_feasible_shape_is_drawn_are_told():
+def test_starts_for_which_no_feasible_shape_is_drawn_are_reported():
     found = searched(TwoValleys(inverted=-np.inf), fm.Scatter(starts=3, attempts=5))
     assert [start.result is None for start in found.starts] == [False, True, True]
     assert str(found.starts[1]) == "start 1: no feasible shape was found, 5 shapes rejected before"
 
 
-def test_infeasible_starts_are_survived_and_told():
+def test_infeasible_starts_do_not_end_a_search_and_are_reported():
     found = searched(TwoValleys(broken=(0, 3)))
     assert [start.number for start in found.starts if start.result is None] == [0, 3]
     assert "it has no value" in str(found.starts[3])
@@ -206,7 +206,7 @@ def test_the_worse_half_is_given_up_unless_it_has_ended():
     assert not {start.number for start in given_up} & set(sum(found.sources, ()))
 
 
-def test_targets_out_of_reach_are_told_with_the_bound_at_which_all_designs_end():
+def test_targets_out_of_reach_are_reported_with_the_bound_at_which_all_designs_end():
     found = searched(TwoValleys(wanted=9.0))
     (sentence,) = found.evidence
     reached = [1.0 - start.result.targets[0].reached / 9.0 for start in found.starts if start.result]
@@ -216,7 +216,7 @@ def test_targets_out_of_reach_are_told_with_the_bound_at_which_all_designs_end()
     assert sentence in str(found)
 
 
-def test_a_missed_target_without_a_common_bound_is_no_fault_of_bounds():
+def test_a_missed_target_without_a_common_bound_is_not_attributed_to_bounds():
     found = searched(TwoValleys(wanted=-0.5))
     (sentence,) = found.evidence
     assert "no bound is common to them" in sentence and "widen" not in sentence
@@ -231,7 +231,7 @@ class Killed(Exception):
 
 
 @pytest.mark.parametrize("after", [1, 5, 9, 14])
-def test_a_search_that_was_killed_goes_on_and_gives_the_same_list(tmp_path, after):
+def test_a_search_that_was_killed_continues_and_gives_the_same_list(tmp_path, after):
     whole = searched(undisturbed := TwoValleys())
 
     class Mortal(Checkpoint):
@@ -319,7 +319,7 @@ def test_numbers_that_leave_the_plane_are_searched_in_space():
     assert [own.name for own in found.best.numbers] == [str(own) for own in numbers]
 
 
-def test_a_bar_whose_bounds_hold_it_back_says_so():
+def test_bounds_that_hold_a_bar_back_are_reported():
     found = pulled_bar(20.0, 5.0, thickness=(2.8, 3.2), bend=0.01).search(fm.Scatter(starts=3, spread=0.5))
     (sentence,) = found.evidence
     assert "pull" in sentence and "curvature 0.01 of 'bar'" in sentence

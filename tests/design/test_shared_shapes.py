@@ -246,7 +246,7 @@ def test_checkpoints_of_shapes_that_are_shared_in_another_way_are_refused(tmp_pa
         problem(mirrored=other).optimise(**once, resume=True)
 
 
-def test_links_that_are_no_images_are_refused():
+def test_links_that_are_not_images_are_refused():
     def problem(scene, design, push) -> Callable[[], fm.DesignProblem]:
         sim = fm.Simulation(scene, space="plane-stress", size=3.0)
         targets = [fm.Target(push, force=1.0, displacement=1.0)]

@@ -103,7 +103,7 @@ def test_following_ends_where_tracing_does():
     assert followed == pytest.approx(both.equilibria.values(both.equilibria.from_zero()), rel=1e-7, abs=1e-7)
 
 
-def test_samples_say_what_a_user_computes():
+def test_values_at_samples_are_those_that_a_user_computes():
     both = every()
     both.rest.place(both.rest.initial, None)
     values = both.equilibria.values(both.equilibria.from_zero())
@@ -196,16 +196,16 @@ def test_comparison_makes_residuals_bounds_and_objective_of_values():
         assert slopes @ step == pytest.approx(function(values + rows @ step) - function(values), rel=1e-9, abs=1e-12)
 
 
-def test_targets_without_sense_are_refused():
+def test_invalid_targets_are_refused():
     push, energy, sample = arm().push, fm.StrainEnergy(), fm.Sample({arm().push: 1.0})
     upward = fm.Component(fm.JointForce(arm().clamp), (0, 0, 1))
     for make, problem, remedy in (
-        (lambda: fm.Target(energy, sample), "says 0 things", "Give one of"),
-        (lambda: fm.Target(energy, sample, equals=1.0, at_most=2.0), "says 2 things", "Give one of"),
+        (lambda: fm.Target(energy, sample), "has 0 relations", "Give one of"),
+        (lambda: fm.Target(energy, sample, equals=1.0, at_most=2.0), "has 2 relations", "Give one of"),
         (lambda: fm.Target(energy, equals=1.0), "its sample is None", "Sample"),
         (lambda: fm.Target(fm.LinkVolume(), sample, equals=1.0), "its sample is", "Leave it out"),
         (lambda: fm.Target(push, sample, equals=1.0), "not a quantity", "Displacement"),
-        (lambda: fm.Target(energy, sample, equals=1.0, force=1.0), "are its sample's|stand in its sample", "Sample"),
+        (lambda: fm.Target(energy, sample, equals=1.0, force=1.0), "belong in its sample", "Sample"),
         (lambda: fm.Target(energy, sample, equals="much"), "not a number", "finite"),
         (lambda: fm.Target(energy, sample, equals=1.0, scale=0.0), "not positive", "greater"),
         (lambda: fm.Sample({push: fm.at(1.0), arm().pull: fm.at(2.0)}), "two displacements", "at"),

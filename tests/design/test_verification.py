@@ -63,7 +63,7 @@ def test_errors_in_the_part_are_those_of_still_finer_elements(verified):
     assert result.worst_part_error is None
 
 
-def test_results_tell_both_numbers_and_keep_them_in_files(verified, tmp_path):
+def test_results_print_both_numbers_and_keep_them_in_files(verified, tmp_path):
     _, result, half = verified
     assert "in the part" in str(half) and "in the part" not in str(result)
     assert half.part_fidelity == "plane-stress, elements of 1.5 mm"
@@ -73,7 +73,7 @@ def test_results_tell_both_numbers_and_keep_them_in_files(verified, tmp_path):
     assert data["targets"][0]["part"]["value"] == half.targets[0].part.value
 
 
-def test_other_shapes_bend_as_if_drawn_so():
+def test_other_shapes_bend_as_if_drawn_in_these_shapes():
     def link(thickness: float):
         rig = fm.Mechanism("cantilever")
         wall, hand = rig.rigid("wall", fixed=True), rig.rigid("hand")

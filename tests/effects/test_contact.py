@@ -137,7 +137,7 @@ def test_a_rigid_link_rests_on_its_points(space):
     assert frame.stable
 
 
-def test_descriptions_without_sense_are_refused():
+def test_invalid_descriptions_are_refused():
     mechanism = fm.Mechanism("finger")
     base = mechanism.rigid("base", fixed=True)
     link = mechanism.flexible("link", fm.strip([(0, 0), (20, 0)], thickness=2.0, depth=2.0), fm.ONYX)

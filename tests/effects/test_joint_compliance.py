@@ -154,7 +154,7 @@ def test_turn_of_a_soft_hinge_is_that_about_its_axis():
     assert STIFFNESS * angle == pytest.approx(ARM * np.cos(angle), rel=1e-7)
 
 
-def test_compliances_that_make_no_sense_are_refused():
+def test_invalid_compliances_are_refused():
     mechanism = fm.Mechanism("pair")
     a, b = mechanism.rigid("a", fixed=True), mechanism.rigid("b")
     hinge, slider = mechanism.revolute(a, b, at=(0, 0)), mechanism.prismatic(a, b, at=(0, 0), axis=(1, 0))

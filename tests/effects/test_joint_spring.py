@@ -284,7 +284,7 @@ def test_ranks_agree_on_a_mechanism_with_a_spring():
     assert curves[1].stable.tolist() == curves[0].stable.tolist()
 
 
-def test_springs_that_make_no_sense_are_refused():
+def test_invalid_springs_are_refused():
     mechanism = fm.Mechanism("pair")
     a, b = mechanism.rigid("a", fixed=True), mechanism.rigid("b")
     hinge, ball = mechanism.revolute(a, b, at=(0, 0)), mechanism.spherical(a, b, at=(0, 0), name="ball")

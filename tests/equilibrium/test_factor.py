@@ -41,7 +41,7 @@ def test_negative_pivots_are_counted(negative):
 
 
 @pytest.mark.parallel
-def test_new_values_of_the_same_matrix_are_factored_anew():
+def test_new_values_of_the_same_matrix_are_factored_again():
     values = np.linspace(0.5, 2.0, SIZE)
     matrix = distributed(with_eigenvalues(values), MPI.COMM_WORLD)
     factor = Factor(matrix)

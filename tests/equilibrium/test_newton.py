@@ -107,17 +107,17 @@ def test_slender_link_takes_a_load_that_rolls_it_up_in_one_solve():
     ("limit", "value"),
     [("iterations", -1), ("iterations", 2.5), ("watchdog", "x"), ("watchdog", -1), ("path_iterations", 0)],
 )
-def test_numbers_of_iterations_that_make_no_sense_are_refused(limit, value):
+def test_invalid_numbers_of_iterations_are_refused(limit, value):
     with pytest.raises(fm.DescriptionError, match=f"Newton's {limit}: the value is {value!r}.*whole number"):
         fm.PrimalDualNewton(**{limit: value})
 
 
-def test_a_method_for_linear_systems_that_is_none_is_refused():
+def test_something_other_than_a_method_for_linear_systems_is_refused():
     with pytest.raises(fm.DescriptionError, match="linear systems: 'direct' is not a method"):
         fm.PrimalDualNewton(linear="direct")
 
 
-def test_too_few_iterations_are_told_as_the_reason():
+def test_too_few_iterations_are_given_as_the_reason():
     simulation, push = finger("plane-stress", solver=fm.PrimalDualNewton(iterations=1))
     with pytest.raises(fm.EquilibriumError, match="after 1 iteration"):
         simulation.load_displacement(push, forces=[5.0])

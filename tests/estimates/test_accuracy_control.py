@@ -90,7 +90,7 @@ def test_choice_prints_what_was_tried_and_what_ten_times_the_accuracy_would_cost
 
 
 @pytest.mark.thorough
-def test_curves_are_as_accurate_as_asked_for_with_their_corrections(tmp_path):
+def test_corrected_curves_are_as_accurate_as_requested(tmp_path):
     scene, push = describe("truss")[:2]
     forces = [0.2, LOADS["truss"]]
     finest = fm.Simulation(scene, space="3d-symmetric", order=3, size=3.6, layers=2, segments=16)
@@ -156,7 +156,7 @@ def test_design_problems_keep_the_fidelity_chosen_before():
 
 
 @pytest.mark.thorough
-def test_forces_are_as_accurate_as_asked_for_where_displacements_are_prescribed():
+def test_forces_are_as_accurate_as_requested_where_displacements_are_prescribed():
     scene, push, load = cantilever()
     finest = fm.Simulation(scene, space="3d-symmetric", order=3, size=3.0, layers=2, segments=16)
     reference = finest.load_displacement(push, displacements=[5.0, 10.0]).forces[-1]
@@ -167,7 +167,7 @@ def test_forces_are_as_accurate_as_asked_for_where_displacements_are_prescribed(
     assert curve.corrected[-1] != curve.forces[-1] == curve.frames[-1].force
 
 
-def test_estimates_beyond_first_order_are_no_corrections():
+def test_estimates_beyond_first_order_are_not_used_as_corrections():
     found = AccuracyOptions().corrections(np.array([0.01, -0.5, 0.02]), np.array([0.1, 0.5, 1.0]))
     assert found.tolist() == [0.01, 0.0, 0.02]
 
@@ -235,7 +235,7 @@ def test_all_accuracies_are_kept_on_the_demos(name):
         assert abs(reached / reference - 1.0) < accuracy
 
 
-def test_nonsense_is_refused():
+def test_invalid_accuracies_are_refused():
     scene = cantilever()[0]
     with pytest.raises(fm.DescriptionError, match="accuracy"):
         fm.Simulation(scene, accuracy=0.0)

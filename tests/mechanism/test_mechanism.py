@@ -148,7 +148,7 @@ def test_motor_on_a_joint_without_a_free_coordinate_is_refused():
         lambda: p.mechanism.motor(ball),
         "motor 'motor of ball'",
         "a spherical joint takes no motor",
-        "Use a joint with one free coordinate, as a revolute or a prismatic one",
+        "Use a joint with one free coordinate, such as a revolute or a prismatic one",
     )
 
 
@@ -204,7 +204,7 @@ def test_positions_are_pairs_or_a_mapping_with_each_motor_once():
         "Give each motor once",
     )
     assert_refused(
-        lambda: Configuration("up", {p.shaft: 0.2}), part, f"{p.shaft!r} is not a motor", "Give one of the mechanism's"
+        lambda: Configuration("up", {p.shaft: 0.2}), part, f"{p.shaft!r} is not a motor", "Give one from this mechanism"
     )
     for given in (0.2, [p.motor], p.motor):
         assert_refused(

@@ -108,7 +108,7 @@ def test_options_that_would_change_nothing(name, space, option):
 
 
 @pytest.mark.parametrize("formulation", ["mixed", 0.49, fm.MixedFormulation])
-def test_formulation_that_is_none(formulation):
+def test_formulation_that_is_not_one(formulation):
     scene, _ = describe("truss")
     refused("formulation", lambda: simulate(scene, formulation=formulation))
 
@@ -119,7 +119,7 @@ def test_mixed_formulation_without_a_sensible_limit(above):
 
 
 @pytest.mark.parametrize("size", [0.0, -2.0, math.nan, math.inf, "fine"])
-def test_element_size_that_is_no_positive_number(size):
+def test_element_size_that_is_not_a_positive_number(size):
     scene, _ = describe("truss")
     refused("'diagonal'", lambda: simulate(scene, size=size))
     (diagonal,) = scene.mechanism.flexible_links
@@ -153,7 +153,7 @@ def test_neither_or_both_of_forces_and_displacements(truss):
 
 @pytest.mark.parametrize("kind", ["forces", "displacements"])
 @pytest.mark.parametrize("samples", [[0.0, math.nan], [math.inf], ["much"], [None]])
-def test_samples_that_are_no_finite_numbers(truss, kind, samples):
+def test_samples_that_are_not_finite_numbers(truss, kind, samples):
     simulation, push, _ = truss
     refused("'push on tip'", lambda: simulation.load_displacement(push, **{kind: samples}), simulation=simulation)
 
@@ -185,7 +185,7 @@ def test_other_force_without_a_finite_magnitude(truss):
         )
 
 
-def test_force_that_is_led_and_constant_at_once(truss):
+def test_force_that_is_to_change_and_to_be_constant(truss):
     simulation, push, _ = truss
     refused(
         "'push on tip'",

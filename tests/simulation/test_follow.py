@@ -21,7 +21,7 @@ STIFF = 200.0
         ({"force": 1.0, "frames": 2.5}, "the value is 2.5"),
     ],
 )
-def test_ends_that_make_no_sense_are_refused(given, message):
+def test_invalid_ends_are_refused(given, message):
     with pytest.raises(fm.DescriptionError, match=message):
         fm.Until(**given)
 
@@ -29,7 +29,7 @@ def test_ends_that_make_no_sense_are_refused(given, message):
 @pytest.mark.parametrize(
     "given", [{"first": 0.0}, {"largest": -1.0}, {"smallest": float("nan")}, {"motion": 0.0}, {"tolerance": 2.0}]
 )
-def test_steps_that_make_no_sense_are_refused(given):
+def test_invalid_steps_are_refused(given):
     with pytest.raises(fm.DescriptionError):
         fm.ArcSteps(**given)
 

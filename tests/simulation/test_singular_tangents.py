@@ -25,7 +25,7 @@ def failing(*arguments, **options):
 
 
 @pytest.mark.parametrize("ask", ASKED.values(), ids=ASKED)
-def test_questions_about_a_singular_equilibrium_are_answered_in_words(ask, monkeypatch):
+def test_evaluations_at_a_singular_equilibrium_raise_errors(ask, monkeypatch):
     case = column()
     curve = case.simulation.load_displacement(case.push, forces=[0.1 * EULER])
     design = case.simulation.model.elastic.design

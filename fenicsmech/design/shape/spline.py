@@ -4,8 +4,8 @@ With control points C_k (position P_k and tangent M_k, three components each) an
 
     (x, y, δ)(p, t) = h₀₀(τ) P_k + h₁₀(τ) M_k + h₀₁(τ) P_{k+1} + h₁₁(τ) M_{k+1}.
 
-The parameters p are the tangents at joints, and position and tangent at all other control points: a joint keeps its
-thickness, and stays where it is unless joints move. Free ends change their thickness; they stay where they are drawn
+The parameters p are the tangents at joints, and position and tangent at all other control points: the thickness at a
+joint stays, and so does its place unless joints move. Free ends change their thickness; they stay where they are drawn
 unless they may move. The curve is linear in p.
 
 Where joints move, their places are parameters too. Shifts δ_j of joints shift the curve between two of them to
