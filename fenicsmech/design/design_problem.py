@@ -186,7 +186,9 @@ class DesignProblem:
 
         That is plane stress where the scene allows it, with elements not smaller than the links are thick.
         ``optimise(start=found.best)`` takes an optimum to this problem's fidelity. Each process works on a start of
-        its own; starts without an equilibrium are listed in the result.
+        its own; starts without an equilibrium are listed in the result. Where the drawn design does not carry its
+        loads, minimised quantities are relative to those of each start, and designs compare only if these targets have
+        a ``scale``.
 
         Args:
             scatter: number of starts (16 by default), how far apart they are, and other options.
@@ -272,7 +274,7 @@ class DesignProblem:
         if [target.name for target in result.targets] != [target.name for target in self.targets]:
             raise DescriptionError(
                 f"verification of {result.mechanism!r}",
-                "the result is one of other targets",
+                "the result belongs to other targets",
                 "Give a result of this problem",
             )
         links, given = self._own.changed, self._own.given(result)

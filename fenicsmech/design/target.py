@@ -41,7 +41,7 @@ class Target:
         weight: of its squared relative error, or of the minimised quantity, in the objective.
         scale: to which errors are relative, in the unit of the quantity. By default the wanted value's size |ū|, or a
             tenth of the largest one wanted of quantities in the same unit where that is more; for a minimised quantity
-            its value as drawn.
+            its value as drawn, or at the start where the drawn design does not carry its loads.
         force, displacement, configuration: of the short form.
 
     Attributes:

@@ -1,4 +1,4 @@
-"""Potentials V(z) of the poses of a few bodies, as those of springs and weights, and the free coordinate of a joint.
+"""Potentials V(z) of the poses of a few bodies, such as springs and weights, and the free coordinate of a joint.
 
 Equilibrium needs ∂V/∂z and ∂²V/∂z², designs the derivatives of ∂V/∂z by numbers of V and by the places of joints.
 """

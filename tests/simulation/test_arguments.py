@@ -79,7 +79,7 @@ def test_simulation_derived_before_the_accuracy_has_chosen_anything(derive):
     refused("simulation of", lambda: derive(simulation, link), simulation=simulation)
 
 
-def test_scene_that_is_none():
+def test_scene_that_is_not_one():
     scene, _ = describe("truss")
     refused("simulation", lambda: simulate(scene.mechanism))
 
