@@ -143,7 +143,7 @@ def direction(part: str, values: Sequence[float]) -> tuple[float, ...]:
 def in_plane(part: str, vector: Sequence[float], dim: int) -> None:
     """Checks that a vector of two or three coordinates stays in the plane, where ``dim`` is 2."""
     if dim == 2 and any(vector[2:]):
-        raise DescriptionError(part, f"{vector} leaves the plane", "Simulate in 3D, or give two coordinates")
+        raise DescriptionError(part, f"{vector} leaves the plane", "Use space='3d', or give two coordinates")
 
 
 def real_array(part: str, values: ArrayLike, *shape: int | None) -> NDArray[np.float64]:

@@ -156,7 +156,7 @@ def test_shift_raises_the_curvature_of_displacements_and_poses_alone(space):
 @pytest.mark.parallel
 @pytest.mark.parametrize("kind", CONTROLS)
 @pytest.mark.parametrize("where", ["on_rigid", "on_flexible"])
-@pytest.mark.parametrize("space", SPACES)
+@pytest.mark.parametrize("space", [*SPACES[:2], pytest.param("3d", marks=pytest.mark.thorough)])
 def test_kkt_matrix_times_a_direction_is_the_change_of_the_residual_on_any_number_of_ranks(space, where, kind):
     case = crowded(space, MPI.COMM_WORLD)
     system = system_of(case, controlled=getattr(case, where))

@@ -39,7 +39,9 @@ def names(folder: Path) -> set[str]:
     return found
 
 
-@pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", pytest.param("3d", marks=pytest.mark.thorough)])
+@pytest.mark.parametrize(
+    "space", ["plane-stress", *(pytest.param(s, marks=pytest.mark.thorough) for s in ("3d-symmetric", "3d"))]
+)
 def test_fields_are_written_as_a_time_series_over_the_force(space, shared_tmp_path):
     simulation, curve = claw(space)
     path = shared_tmp_path / "new folder" / "claw.xdmf"
@@ -139,7 +141,9 @@ def test_curve_is_drawn_and_tabulated(shared_tmp_path):
     assert table["max von Mises [MPa]"] == pytest.approx([frame.max_stress for frame in curve.frames], abs=0.0)
 
 
-@pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", pytest.param("3d", marks=pytest.mark.thorough)])
+@pytest.mark.parametrize(
+    "space", ["plane-stress", *(pytest.param(s, marks=pytest.mark.thorough) for s in ("3d-symmetric", "3d"))]
+)
 def test_stress_field_peaks_at_the_largest_stress_of_the_frame_and_vanishes_in_interfaces(space):
     simulation, curve = claw(space)
     stress = curve.von_mises(curve.frames[-1])
