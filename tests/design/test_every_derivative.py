@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 import fenicsmech as fm
 
+from ..oracles.dense import linear_term
 from .mechanisms import Case, bench
 
 PLASTIC = fm.Material("plastic", 2000.0, 0.35)
@@ -133,10 +134,7 @@ def test_derivatives_of_all_quantities_by_all_parameters(space, shapes, formulat
             if largest <= rounding:  # linear, or independent
                 continue
             rates = np.log2(np.abs(rest[:-1]) / np.maximum(np.abs(rest[1:]), 1e-300))
-            # A remainder r = b h + c h² has the rate 2 − log₂(1 + b h / r) from the largest step h to its half. A rate
-            # of 1.95 says that b, the error of the derivative, makes up b h / r = 0.035. Terms of third order spoil the
-            # rate where they nearly cancel c h², but not this sum, which is b h but for terms of fourth order.
-            linear = abs(np.dot((1.0, -12.0, 32.0), rest)) / 3.0
+            linear = linear_term(rest)
             if not (rates.max() >= 1.95 or linear <= max(0.035 * largest, rounding)):
                 failed[name, k] = rates, linear, rest, first, values[k]
     assert not failed
