@@ -222,7 +222,7 @@ class Curve:
         """Forces, or positions of the motors, at which the equilibrium would stop being unique.
 
         From the KKT matrix and its rate: exact for columns and other mechanisms that hardly move before they buckle;
-            otherwise more accurate from closer frames.
+        otherwise more accurate from closer frames.
 
         Args:
             frame: one of the curve's; the last one by default.
