@@ -147,7 +147,7 @@ def _guesses(coarse: Simulation, result: DesignResult, targets: Sequence[Target]
         with _equilibria(coarse, result, targets) as equilibria:
             return equilibria.whole(equilibria.from_zero())
     except (Infeasible, MeshingError) as failure:
-        _log.info("the exported parts do not reach all targets in elements of the optimiser's size: %s", failure)
+        _log.info("the exported parts have no equilibria in elements of the optimiser's size: %s", failure)
         return None
 
 
