@@ -1,4 +1,4 @@
-"""Accuracy control beside an exhaustive search: errors kept, and seconds spent.
+"""Accuracy control against an exhaustive search: errors that remain, and seconds spent.
 
     OPENBLAS_NUM_THREADS=1 python3 -m benchmarks.accuracy_control [truss|claw|klann …] [--accuracy A …] [--repeats N]
 

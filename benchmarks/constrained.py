@@ -1,11 +1,11 @@
-"""Constrained optimisers beside each other: this package's SQP, scipy's SLSQP and trust-constr, NLopt's MMA and CCSA.
+"""Constrained optimisers compared: this package's SQP, scipy's SLSQP and trust-constr, NLopt's MMA and CCSA.
 
     OPENBLAS_NUM_THREADS=1 python3 -m benchmarks.constrained [--limit EVALUATIONS]
 
 Two tables: evaluations until each method ends by itself, on formulas with known optima and on designs of the truss
-finger in plane stress. In brackets the relative error of the objective, of designs beside the best that a method found,
-or "no" where that is above 1 % or inequalities of formulas are violated by more than 0.001; of designs, by how much
-they are. NLopt takes part if it is installed (python3-nlopt).
+finger in plane stress. In brackets the relative error of the objective, of designs against the best that a method
+found, or "no" where that is above 1 % or inequalities of formulas are violated by more than 0.001; of designs, by how
+much they are. NLopt takes part if it is installed (python3-nlopt).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Optimal handle positions beside naive ones: quality of the mesh of one link on the same target spline.
+"""Optimal and naive handle positions: quality of the mesh of one link on the same target spline.
 
     python3 -m benchmarks.handles [--size MM] [--write]
 

@@ -1,14 +1,14 @@
-"""Larger than one factor can hold: conjugate gradients over linear displacements beside the factor, on finer and finer
+"""Larger than one factor can hold: conjugate gradients over linear displacements against the factor, on ever finer
 meshes of the claw.
 
     OPENBLAS_NUM_THREADS=1 python3 -m benchmarks.large [--sizes MM …] [--factor-up-to UNKNOWNS] [--compare]
     mpirun -n 2 python3 -m benchmarks.large
 
-One row per mesh, of a whole curve with its stability: conjugate gradients in the last solve, Newton iterations, seconds
-of the processor for each of them (assembly and all else included) and gigabytes with either solver, and the largest
-relative difference between the two curves; then the exponents of time by unknowns. With --compare another table, at the
-last equilibrium: one system on two levels beside algebraic multigrid (PETSc's GAMG, hypre's BoomerAMG) on the finite
-elements and the Schur complement on all else, see ``schur``.
+One row per mesh, of a whole curve with its stability: conjugate gradients in the last solve, Newton iterations,
+processor seconds for each of them (assembly and everything else included) and gigabytes with either solver, and the
+largest relative difference between the two curves; then the exponents of time by unknowns. With --compare another
+table, at the last equilibrium: one system on two levels against algebraic multigrid (PETSc's GAMG, hypre's BoomerAMG)
+on the finite elements and the Schur complement on all else, see ``schur``.
 """
 
 import gc

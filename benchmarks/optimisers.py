@@ -1,4 +1,4 @@
-"""Levenberg–Marquardt beside BFGS, from the drawn design, on all three mechanisms.
+"""Levenberg–Marquardt against BFGS, from the drawn design, on all three mechanisms.
 
     python3 -m benchmarks.optimisers [MECHANISM …] [--size MM] [--limit ITERATIONS]
 

@@ -1,10 +1,10 @@
-"""Designs of the demos in the parts to be made: exported as STEP, meshed anew and finer, loaded from zero.
+"""Designs of the demos in the parts to be made: exported as STEP, remeshed with finer elements, loaded from zero.
 
     python3 -m benchmarks.parts [DEMO …] [--size MM] [--results DIR] [--write]
 
 The design problem of each demo at its full size, in the space that it uses by default. Elements of the part are a
 quarter as wide as the optimiser's in the plane, half as wide in space, where half the depth is meshed. Verified designs
-are kept as DIR/DEMO.json, so that the same command goes on after an interruption.
+are kept as DIR/DEMO.json, so that the same command continues after an interruption.
 """
 
 from __future__ import annotations

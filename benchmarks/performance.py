@@ -2,7 +2,7 @@
 
     OPENBLAS_NUM_THREADS=1 python3 -m benchmarks.performance [--space SPACE] [--size MM]
 
-Prints a table of variants, each beside the default: seconds per frame, Newton iterations, and how far the last
+Prints a table of variants, each compared with the default: seconds per frame, Newton iterations, and how far the last
 displacement moves. Medians over the frames of one curve.
 """
 

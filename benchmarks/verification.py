@@ -113,7 +113,7 @@ CASES = (
     Case(
         "estimate of the error of plane stress of strips, 1 to 30 thicknesses deep, straight and curved, against space",
         "factor 2",
-        "estimates/test_plane_stress_error.py::test_strips_of_all_depths_are_told_how_much_stiffer_they_are_in_space",
+        "estimates/test_plane_stress_error.py::test_estimate_finds_how_much_stiffer_strips_of_all_depths_are_in_space",
     ),
     Case(
         "estimate of how much curved strips stiffen from beams to plates, against Lamb's closed form",

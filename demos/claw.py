@@ -2,8 +2,8 @@
 
 The finger pushes on the object at its tip; the object pushes back across the finger. The motor holds the closed
 configuration while the force grows to 10 N. The links are shaped until the finger gives way by 5 mm at 4 N and by
-20 mm at 10 N; or they become as light as these bounds allow. The targets are the paper's, the geometry is this
-project's own.
+20 mm at 10 N; with --least-mass they become as light as these displacements, as bounds, allow. The targets are the
+paper's, the geometry is this project's own.
 
     python3 demos/claw.py [--space SPACE] [--quick] [--simulate-only] [--least-mass] [--resume] [--out DIR]
     mpirun -n 2 python3 demos/claw.py
@@ -63,7 +63,7 @@ def main():
     parser.add_argument("--quick", action="store_true", help=f"elements of {QUICK} mm instead of {SIZE} mm")
     parser.add_argument("--simulate-only", action="store_true", help="simulate the drawn design only")
     parser.add_argument("--least-mass", action="store_true", help="as light as possible, displacements as bounds")
-    parser.add_argument("--resume", action="store_true", help="go on with an optimisation that was interrupted")
+    parser.add_argument("--resume", action="store_true", help="continue an interrupted optimisation")
     parser.add_argument("--out", type=Path, default=Path("results/claw"), metavar="DIR", help="folder for files")
     options = parser.parse_args()
 

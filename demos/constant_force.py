@@ -1,4 +1,4 @@
-"""Constant-force spring: a slender strut pushes a shuttle back with the same force wherever the shuttle stands.
+"""Constant-force spring: a slender strut pushes a shuttle back with the same force wherever the shuttle is.
 
 The strut is pinned to a wall and to a shuttle on a straight guide. Pressed down, it buckles: its thrust hardly grows,
 and more and more of it points across the guide. The shape of the strut is optimised until both effects cancel, and the

@@ -67,7 +67,7 @@ def main():
     sim = fm.Simulation(scene, space="plane-stress", size=options.size)
     turned = sim.follow(motor, until=fm.Until(position=OVER))
     turned.plot(options.out / "crank.png")
-    fm.print_once(f"the motor in the crank needs up to {abs(turned.forces).max():.3g} N mm, and snaps nowhere")
+    fm.print_once(f"the motor in the crank needs up to {abs(turned.forces).max():.3g} N mm, and does not snap")
 
 
 if __name__ == "__main__":

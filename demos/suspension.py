@@ -1,4 +1,4 @@
-"""Double wishbone suspension, seen from the front: the upper arm is placed for the camber of the wheel.
+"""Double wishbone suspension, seen from the front: the place of the upper arm is optimised for the camber of the wheel.
 
 The upper arm is a leaf of steel, clamped to the body; the lower arm is rigid, with a spring at the body. Targets are a
 force of 900 N in bump, 30 mm up, and the camber of the wheel: 0.4° inwards in bump, 0.1° outwards in rebound. Three

@@ -1,8 +1,8 @@
 """Bistable switch with a given snap force and a given second position.
 
 A rigid crank and coupler press against a flexible follower; a torsion spring in the crank's hinge turns it back. The
-follower is shaped until the finger needs 1 N to make the switch snap, and the switch then rests 15 mm from where it
-began: two forces at prescribed displacements, the second of them zero. The whole curve is then followed, and its limit
+follower is shaped until the switch snaps at a force of 1 N on the finger, and then rests 15 mm from where it began: two
+targets for forces at prescribed displacements, the second of them zero. The whole curve is then followed, and its limit
 point and rest are read from it. Geometry and targets are this project's own.
 
     python3 demos/switch.py [--quick] [--out DIR]

@@ -51,7 +51,7 @@ def main():
     parser.add_argument("--space", choices=list(fm.SPACES), default="3d")
     parser.add_argument("--quick", action="store_true", help=f"elements of {QUICK} mm instead of {SIZE} mm")
     parser.add_argument("--simulate-only", action="store_true", help="simulate the drawn design only")
-    parser.add_argument("--resume", action="store_true", help="go on with an optimisation that was interrupted")
+    parser.add_argument("--resume", action="store_true", help="continue an interrupted optimisation")
     parser.add_argument("--part", type=Path, metavar="STEP", help="file of the diagonal, instead of a strip")
     parser.add_argument("--out", type=Path, default=Path("results/truss"), metavar="DIR", help="folder for files")
     options = parser.parse_args()

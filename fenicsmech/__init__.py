@@ -80,7 +80,14 @@ from fenicsmech.equilibrium import (
     TwoLevel,
     Unknown,
 )
-from fenicsmech.errors import AssemblyError, DescriptionError, EquilibriumError, FenicsmechError, MeshingError
+from fenicsmech.errors import (
+    AssemblyError,
+    DescriptionError,
+    EquilibriumError,
+    FenicsmechError,
+    MeshingError,
+    OutOfMemoryError,
+)
 from fenicsmech.estimates import Choice
 from fenicsmech.files import read_csv
 from fenicsmech.joints import JointKind, PlanarMarker, SpatialMarker
@@ -169,8 +176,7 @@ from fenicsmech.quantities import (
 from fenicsmech.report import Optimisation, Report, design_study, write_report
 from fenicsmech.simulation import (
     Axis,
-    BucklingLoad,
-    BucklingPosition,
+    BucklingPoint,
     Curve,
     Explanation,
     FollowedCurve,
@@ -213,8 +219,8 @@ __all__ = [
     "JointForce", "JointMoment", "StrainEnergy", "LinkMass", "LinkVolume", "CentrelineLength", "Component", "Magnitude",
     "Observable", "RestObservable", "Partial", "FormValue", "border_of",
     # path following, stability and buckling
-    "FollowedCurve", "ArcSteps", "Critical", "Until", "PathEvent", "CriticalPoint", "BucklingLoad", "BucklingPosition",
-    "SoftMode", "ModeShape",
+    "FollowedCurve", "ArcSteps", "Critical", "Until", "PathEvent", "CriticalPoint", "BucklingPoint", "SoftMode",
+    "ModeShape",
     # formulations and solvers; those from EquilibriumMethod on for solvers of your own
     "Formulation", "DisplacementFormulation", "MixedFormulation", "PrimalDualNewton", "LinearMethod", "BySize",
     "Direct", "TwoLevel", "EquilibriumMethod", "EquilibriumSystem", "EquilibriumPoint", "Control", "State",
@@ -224,11 +230,12 @@ __all__ = [
     "LevenbergMarquardt", "BFGS", "SQP", "Optimiser", "Correction", "DesignResult", "LinkDesign", "TargetResult",
     "PartValue", "Scatter", "SearchResult", "StartResult", "Optimisation", "design_study", "Experiment", "ModulusFit",
     "fit_modulus", "Design",
-    # numbers that designs change beside shapes; NumberKind for kinds of your own
+    # numbers that designs change in addition to shapes; NumberKind for kinds of your own
     "Number", "Depth", "LawParameter", "SpringStiffness", "SpringRest", "MotorOffset", "JointPosition", "JointAxis",
     "NumberBounds", "NumberDesign", "NumberKind", "ModelNumber", "EffectNumber", "NumberTerms",
     "JointChange",
     # errors
     "FenicsmechError", "DescriptionError", "MeshingError", "AssemblyError", "EquilibriumError",
+    "OutOfMemoryError",
 ]
 # fmt: on

@@ -1,4 +1,4 @@
-"""Work of one process for all, and errors raised on all processes, so that none waits for one that has failed."""
+"""Work of one process for all, and errors raised on all processes: none waits for a process that has failed."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ _FLAGS = "-O3 -march=native -fno-math-errno -fno-trapping-math -fno-schedule-ins
 
 
 def _processor() -> str:
-    """A short name for the instruction set of this processor: compiled kernels run on their own only."""
+    """A short name for this processor's instruction set; kernels run only on the one they were compiled for."""
     try:
         text = Path("/proc/cpuinfo").read_text()
     except OSError:
@@ -74,12 +74,13 @@ def _options() -> dict:
 def compiling(folder: Path = _KERNELS) -> Iterator[None]:
     """A context for code that may compile into ``folder``; the build tools' commands on the root logger are muted."""
     _remove_unfinished(folder)
-    logging.disable(logging.INFO)
+    muted = logging.root.manager.disable  # by the application
+    logging.disable(max(muted, logging.INFO))
     try:
         with _lock(folder, fcntl.LOCK_SH):
             yield
     finally:
-        logging.disable(logging.NOTSET)
+        logging.disable(muted)
 
 
 @contextmanager
@@ -101,7 +102,7 @@ def _remove_unfinished(folder: Path) -> None:
     with _lock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB) as alone:
         for source in folder.glob("libffcx_*.c") if alone else ():
             if not source.with_suffix(".c.cached").exists():
-                _log.warning("%s was left unfinished by a process that was stopped; it is compiled anew", source.name)
+                _log.warning("%s was left unfinished by a process that was stopped; it is compiled again", source.name)
                 source.unlink(missing_ok=True)
 
 
@@ -254,7 +255,7 @@ def add_blocks(matrix: PETSc.Mat, forms) -> None:
     assemble(matrix, forms)
 
 
-# petsc4py shows the arrays of values of neither format, hence functions of PETSc's library, to which it is linked
+# petsc4py exposes the values of neither format, so functions of PETSc's library, to which it is linked, are called
 _LIBRARY = ctypes.CDLL(PETSc.__file__)
 
 
@@ -265,7 +266,7 @@ def stored_values(matrix: PETSc.Mat) -> list[np.ndarray]:
     parts = [pointer(matrix.handle)]
     if matrix.comm.size > 1:
         parts = [pointer(), pointer()]
-        # the columns' numbers are of no interest
+        # column numbers are not needed
         _call_petsc(f"MatMPI{kind}GetSeq{kind}", pointer(matrix.handle), *map(ctypes.byref, parts), None)
     found = []
     for part in parts:
@@ -303,7 +304,7 @@ def destroy_garbage(comm: MPI.Comm) -> None:
 def write_series(path, mesh: dmesh.Mesh, functions: Mapping[str, fem.Function], steps, update, comm: MPI.Comm) -> None:
     """Writes an XDMF time series of named functions, P1 or cellwise, for ParaView.
 
-    ``steps`` holds the time of each step; ``update`` is called with its index before it is written, sets the functions.
+    ``steps`` holds the time of each step. ``update`` sets the functions to a step; it is called with the index of each.
     """
     with io.XDMFFile(comm, str(path), "w") as file:
         file.write_mesh(mesh)

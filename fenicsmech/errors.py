@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ class FenicsmechError(Exception):
     Args:
         part: the part concerned, in the user's words ("strip of link 'diagonal'").
         problem: the problem, with the offending value.
-        remedy: the way to mend it.
+        remedy: how to correct it.
     """
 
     def __init__(self, part: str, problem: str, remedy: str) -> None:
@@ -44,6 +45,10 @@ class MeshingError(FenicsmechError):
     """A link cannot be meshed as described."""
 
 
+class OutOfMemoryError(FenicsmechError, MemoryError):
+    """A matrix and its factor do not fit into memory."""
+
+
 class EquilibriumError(FenicsmechError):
     """No equilibrium was found at the requested load.
 
@@ -57,9 +62,9 @@ class EquilibriumError(FenicsmechError):
         self.last, self.frames = last, tuple(frames)
 
 
-def expect(part: str, value: Any, kinds: Any, noun: str, remedy: str = "Give one of the mechanism's") -> None:
+def expect(part: str, value: Any, kinds: Any, noun: str, remedy: str = "Give one from this mechanism") -> None:
     """Checks that ``value`` is an instance of ``kinds``, which messages call ``noun``."""
-    # classes have the attributes of a protocol, but are no instances
+    # a class has the attributes of a protocol without being an instance
     if isinstance(value, type) or not isinstance(value, kinds):
         raise DescriptionError(part, f"{value!r} is not {noun}", remedy)
 
@@ -81,6 +86,13 @@ def positive(part: str, value: Any) -> float:
     if number <= 0.0:
         raise DescriptionError(part, f"{number:g} is not positive", "Give a number greater than zero")
     return number
+
+
+def whole(part: str, value: Any, *, least: int) -> int:
+    """``value`` as an int of at least ``least``."""
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < least:
+        raise DescriptionError(part, f"the value is {value!r}", f"Give a whole number of at least {least}")
+    return int(value)
 
 
 def point(part: str, values: Sequence[float], *, dimensions: tuple[int, ...] = (2, 3)) -> tuple[float, ...]:
@@ -131,7 +143,7 @@ def direction(part: str, values: Sequence[float]) -> tuple[float, ...]:
 def in_plane(part: str, vector: Sequence[float], dim: int) -> None:
     """Checks that a vector of two or three coordinates stays in the plane, where ``dim`` is 2."""
     if dim == 2 and any(vector[2:]):
-        raise DescriptionError(part, f"{vector} leaves the plane", "Simulate in space, or give two coordinates")
+        raise DescriptionError(part, f"{vector} leaves the plane", "Use space='3d', or give two coordinates")
 
 
 def real_array(part: str, values: ArrayLike, *shape: int | None) -> NDArray[np.float64]:

@@ -49,6 +49,24 @@ def write_json(path: str | Path, data: Mapping[str, object]) -> None:
         file.write(text + "\n")
 
 
+def read_json(path: str | Path, noun: str, *, form: str, remedy: str) -> dict:
+    """The mapping in a JSON file whose entry "format" is ``form``.
+
+    Raises:
+        DescriptionError: there is no such file, or it is not the ``noun`` that it should be; with this ``remedy``.
+    """
+    part = f"{noun} {str(path)!r}"
+    try:
+        data = json.loads(Path(path).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise DescriptionError(part, "there is no such file", remedy) from None
+    except (UnicodeDecodeError, json.JSONDecodeError):
+        data = None
+    if not isinstance(data, dict) or data.get("format") != form:
+        raise DescriptionError(part, f"it does not hold a {noun} of this program", remedy)
+    return data
+
+
 def _plain(key: str, value: object) -> object:
     """``value`` in the types of JSON; ``key`` is its path, for messages."""
     if isinstance(value, np.ndarray | np.generic):

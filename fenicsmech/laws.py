@@ -16,15 +16,15 @@ written in them as in a textbook:
         E = property(lambda self: 18 * self.C1 * self.bulk / (3 * self.bulk + 2 * self.C1))
         nu = property(lambda self: (3 * self.bulk - 4 * self.C1) / (6 * self.bulk + 4 * self.C1))
 
-That is all: stress and stiffness follow by differentiation, plane stress by a local solve. A law may add
+Nothing else is needed: stress and stiffness follow by differentiation, plane stress by a local solve. A law may add
 closed forms: ``mixed_energy``, the u–p (mixed) form for nearly incompressible materials, and ``contraction``, the
 thickness in plane stress.
 
-In forms the parameters are fields with one value per cell, so that links of one law share compiled code and numbers
-change without compiling: there ``energy`` is that of a copy whose parameters are UFL expressions.
+In forms the parameters are fields with one value per cell, so that links of one law share compiled code, and parameters
+change without compiling. There ``energy`` is called on a copy of the law whose parameters are UFL expressions.
 
-The neo-Hookean laws differ in how the resistance to shear, μ, and that to changes of volume, λ or κ, go together at
-large strain:
+The neo-Hookean laws differ in how the resistance to shear, μ, and that to changes of volume, λ or κ, combine at large
+strain:
 
     μ = E / 2(1 + ν),     λ = E ν / (1 + ν)(1 − 2ν),     κ = λ + 2 μ / 3.
 
@@ -130,7 +130,7 @@ class Law(ABC):
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Every number of the law by name; those of a tuple are counted: alpha0, alpha1, …"""
+        """Every number of the law by name; those of a tuple are numbered: alpha0, alpha1, …"""
         found: dict[str, float] = {}
         for field in fields(self):
             value = getattr(self, field.name)
@@ -318,20 +318,20 @@ class NeoHookean(_Compressible):
 
 @dataclass(frozen=True)
 class LogarithmicNeoHookean(_Compressible):
-    """W = μ/2 (tr FᵀF − 3 − 2 ln J) + λ/2 (ln J)²; E, ν as of ``NeoHookean``."""
+    """W = μ/2 (tr FᵀF − 3 − 2 ln J) + λ/2 (ln J)²; E, ν as for ``NeoHookean``."""
 
     volumetric = LOGARITHMIC
 
 
 @dataclass(frozen=True)
 class IsochoricNeoHookean(_Isochoric):
-    """W = μ/2 (J^(−2/3) tr FᵀF − 3) + κ/2 (J − 1)² (CalculiX and others); E, ν as of ``NeoHookean``."""
+    """W = μ/2 (J^(−2/3) tr FᵀF − 3) + κ/2 (J − 1)² (CalculiX and others); E, ν as for ``NeoHookean``."""
 
     volumetric = QUADRATIC
 
 
 @dataclass(frozen=True)
 class IsochoricSimoNeoHookean(_Isochoric):
-    """W = μ/2 (J^(−2/3) tr FᵀF − 3) + κ/4 (J² − 1 − 2 ln J) (deal.II and others); E, ν as of ``NeoHookean``."""
+    """W = μ/2 (J^(−2/3) tr FᵀF − 3) + κ/4 (J² − 1 − 2 ln J) (deal.II and others); E, ν as for ``NeoHookean``."""
 
     volumetric = SIMO

@@ -8,6 +8,7 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from time import monotonic, perf_counter
 from typing import TextIO
 
@@ -72,7 +73,9 @@ _TERMINAL_PAUSE = 0.5  # s between redrawn lines
 _LOG_PAUSE = 5.0  # s between lines in a file or pipe
 
 
-_outer: list[Progress] = []  # contexts that are open
+# The task whose context was entered first, of those that are open in this thread. A task knows nothing of the ones that
+# it is a part of, so that it cannot be given them; tasks of other threads are no part of it.
+_outermost: ContextVar[Progress | None] = ContextVar("outermost", default=None)
 
 
 class Progress:
@@ -111,7 +114,7 @@ class Progress:
 
     def update(self, done: float, note: str = "") -> None:
         """Reports that ``done`` of the total is finished; ``note`` is a remark on the latest step."""
-        if not self._shows or any(other is not self for other in _outer[:1]):
+        if not self._shows or _outermost.get() not in (None, self):
             return
         now = self._clock()
         self._pending = self._describe(done, note, now - self._start)
@@ -129,11 +132,11 @@ class Progress:
             self._open_line = False
 
     def __enter__(self) -> Progress:
-        _outer.append(self)
+        self._entered = _outermost.set(_outermost.get() or self)
         return self
 
     def __exit__(self, *error: object) -> None:
-        _outer.remove(self)
+        _outermost.reset(self._entered)
         self.close()
 
     def _describe(self, done: float, note: str, elapsed: float) -> str:

@@ -30,7 +30,7 @@ from fenicsmech.elasticity import (
     Stretch,
 )
 from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State, load_fields
-from fenicsmech.errors import DescriptionError, expect, positive
+from fenicsmech.errors import DescriptionError, expect, positive, set_fields, whole
 from fenicsmech.log import Clock
 from fenicsmech.mechanism import (
     Effect,
@@ -38,6 +38,7 @@ from fenicsmech.mechanism import (
     Force,
     Material,
     Mechanism,
+    MeshPart,
     Output,
     Scene,
     Shape,
@@ -112,16 +113,43 @@ def read_fidelity(
     space, order = "3d" if space is None else space, 2 if order is None else order
     if space not in SPACES:
         raise DescriptionError("space", f"{space!r} is not known", f"Choose one of {', '.join(SPACES)}")
-    if order not in (1, 2, 3):
+    if whole("order", order, least=1) > 3:
         raise DescriptionError("order", f"{order!r} is not 1, 2 or 3", "Choose 1 for speed, 2 for accuracy")
     if size is None:
         raise DescriptionError("size", "it is missing", "Give an element size, or accuracy=… to have one chosen")
-    model, links = SPACES[space], scene.mechanism.flexible_links
-    per_link = size if isinstance(size, Mapping) else dict.fromkeys(links, size)
-    sizes = {link: positive(f"element size of {link.name!r}", per_link.get(link)) for link in links}
+    model, shapes = SPACES[space], [link.shape for link in scene.mechanism.flexible_links]
+    sizes = {
+        link: positive(f"element size of {link.name!r}", own) for link, own in per_link(scene.mechanism, size).items()
+    }
     rule = quadrature or Quadrature.for_order(order, model.dim)
     check_scene(scene, model)
+    layered = model.dim == 3 and any(map(has_plain_outline, shapes))
+    meshed = not all(isinstance(shape, MeshPart) for shape in shapes)
+    for name, value, counts, reason in (
+        ("layers", layers, layered, "only strips and outlines in space have layers"),
+        ("segments", segments, meshed, "links from mesh files have the elements of the file"),
+    ):
+        if value is not None and not counts:
+            raise DescriptionError(name, f"{name}={value!r} would change nothing: {reason}", f"Leave out {name}")
     return Fidelity(model, order, sizes, rule, formulation, layers, LEAST_SEGMENTS if segments is None else segments)
+
+
+def per_link(
+    mechanism: Mechanism, given: float | Mapping[FlexibleLink, float] | None
+) -> dict[FlexibleLink, float | None]:
+    """A number of each flexible link, from one of all or some of each; None where there is none.
+
+    Raises:
+        DescriptionError: it names something else than flexible links of ``mechanism``.
+    """
+    links = mechanism.flexible_links
+    if not isinstance(given, Mapping):
+        return dict.fromkeys(links, given)
+    for link in given:
+        if link not in links:
+            problem = f"{link!r} is not a flexible link of {mechanism.name!r}"
+            raise DescriptionError("size", problem, "Give {link: size, …} of its flexible links")
+    return {link: given.get(link) for link in links}
 
 
 def check_scene(scene: Scene, model: ElasticModel) -> None:
@@ -202,16 +230,17 @@ def _mesh_options(link: FlexibleLink, linkage: Linkage, fidelity: Fidelity) -> d
 class Design:
     """What designs change in a model.
 
-    Numbers that shift joints do not reshape flexible links: ``field`` has to take these along, as that of
-    ``DesignProblem.rest_shape`` and of results does. Numbers of depth stretch links beside ``field``.
+    Numbers that shift joints do not reshape flexible links: ``field`` has to take these along, like that of
+    ``DesignProblem.rest_shape`` and of results does. Numbers of depth stretch links in addition to ``field``.
 
     Attributes:
-        field: the design field of the links' shapes, this rank's values with ghosts, flat.
+        field: the design field of the links' shapes, this rank's values with ghosts, flat; read-only, since all
+            frames of one design share it.
         numbers: values of design numbers by their kind (``NumberKind``), in its unit; others are as drawn.
 
     Raises:
-        DescriptionError: it has something else than kinds of numbers, a value makes no sense, or two numbers change the
-            same.
+        DescriptionError: it has something other than kinds of numbers, a value is invalid, or two numbers change the
+            same thing.
     """
 
     field: np.ndarray
@@ -219,6 +248,10 @@ class Design:
 
     def __post_init__(self) -> None:
         check_numbers([(kind, (value,)) for kind, value in self.numbers.items()])
+        if self.field.flags.writeable or not self.field.flags.owndata:
+            field = np.array(self.field)
+            field.setflags(write=False)
+            set_fields(self, field=field)
 
     def halfway(self, other: Design) -> Design:
         """The mean of both."""
@@ -308,7 +341,7 @@ class MechanismModel:
         self._point_loads: dict[Force | Output, PointLoad] = {}
         self._numbers: dict[Hashable, Any] = {}
         self._given_last: tuple[Hashable, ...] = ()
-        self._shape = self.elastic.design
+        self._shape = Design(self.elastic.design).field
 
     @property
     def flexible_dofs(self) -> int:
@@ -328,19 +361,19 @@ class MechanismModel:
     @property
     def effect_fields(self) -> list[tuple[Effect, LinkFields]]:
         """The fields of each effect, with the numbers of its energy."""
-        _ = self.elastic.effects_ufl  # which names them
+        _ = self.elastic.effects_ufl  # names the numbers
         return self._effect_fields
 
     # -- shape, material and other numbers -----------------------------------------------------------------------
 
     @property
     def design(self) -> Design:
-        """The present design, with all numbers that were asked for, but those that contradict the ones given last."""
+        """The present design, with all numbers requested so far, except those that contradict the ones given last."""
         held: list[Any] = []
         for kind in (*self._given_last, *self._numbers):
             if kind not in held and _contradicted(kind, held) is None:
                 held.append(kind)
-        return Design(self._shape.copy(), {kind: self._numbers[kind].value for kind in held})
+        return Design(self._shape, {kind: self._numbers[kind].value for kind in held})
 
     def number(self, kind):
         """The ``ModelNumber`` of a ``NumberKind`` on this model; designs of the model hold it from now on."""
@@ -362,7 +395,7 @@ class MechanismModel:
         for kind in sorted(self._numbers, key=lambda kind: kind in given.numbers):
             own = self._numbers[kind]
             own.set(given.numbers.get(kind, own.drawn))
-        self._given_last, self._shape = tuple(given.numbers), np.array(given.field)
+        self._given_last, self._shape = tuple(given.numbers), given.field
         design = self._field(given)
         self.elastic.reshape(design)
         self.interfaces.reshape(self.design_nodes.values(design))
@@ -440,6 +473,20 @@ class MechanismModel:
         (point,) = self._link_points(f"{part.name!r}", part.on, [part.at], self.elastic.u)
         return point
 
+    def rest_position(self, part: Force | Output) -> np.ndarray:
+        """Position of the point of a force or output at the present rest shape, (dim,); its mean over a region."""
+        drawn = np.array(in_dimension(part.at, self.linkage.dim))
+        if not isinstance(part.on, FlexibleLink):
+            return drawn
+        design = fem.Function(self.elastic.u.function_space)
+        design.x.array[:] = self.design_nodes.values(self.elastic.design).ravel()
+        return drawn + self.point(part).displacement(design, self.linkage.joints.drawn)[: self.linkage.dim]
+
+    def position(self, part: Force | Output, state: State) -> np.ndarray:
+        """Position of the point of a force or output in the loaded ``state``, (dim,)."""
+        moved = self.point(part).displacement(self.elastic.u, state.poses)
+        return self.rest_position(part) + moved[: self.linkage.dim]
+
     def design_weights(self, part: str, link: FlexibleLink, positions: np.ndarray) -> csr_matrix:
         """Weights of this rank's owned nodes of the design field in it at drawn points of a link, (points, nodes)."""
         shape = self.elastic.shape
@@ -488,8 +535,8 @@ class MechanismModel:
         """Travel of the point of a force or output in the loaded ``state``."""
         return self.point_load(part).travel(self.elastic.u, state.poses)
 
-    def system(self, controlled: PointLoad, loads: tuple[tuple[PointLoad, float], ...]) -> EquilibriumSystem:
-        """The equilibrium equations with one controlled and several fixed loads."""
+    def system(self, controlled: PointLoad, loads: Sequence[PointLoad]) -> EquilibriumSystem:
+        """The equilibrium equations with one controlled load and some constant ones."""
         return EquilibriumSystem(
             self.elastic,
             self.interfaces,
@@ -499,7 +546,7 @@ class MechanismModel:
             potentials=self.potentials,
             compliances=self._compliances,
             one_sided=[constraint for effect in self.effects for constraint in effect.one_sided(self.fields)],
-            idle=idle_spins(self.linkage, self._acted_on([controlled, *(load for load, _ in loads)])),
+            idle=idle_spins(self.linkage, self._acted_on([controlled, *loads])),
             clock=self.clock,
             comm=self.mesh.comm,
         )
@@ -521,24 +568,24 @@ def check_numbers(numbers: Sequence[tuple[Any, Sequence[float]]]) -> None:
     """Checks kinds of numbers that are given together, each with some values.
 
     Raises:
-        DescriptionError: something else than a kind is given, a value makes no sense, or two kinds change the same.
+        DescriptionError: something other than a kind is given, a value is invalid, or two kinds change the same thing.
     """
     for k, (kind, values) in enumerate(numbers):
-        expect("number", kind, _Kind, "a kind of number", "Give one, as Depth(link)")
+        expect("number", kind, _Kind, "a kind of number", "Give one, such as Depth(link)")
         for value in values:
             kind.check_value(value)
         if (other := _contradicted(kind, [own for own, _ in numbers[:k]])) is not None:
-            twice = "it is given twice" if other == kind else f"{other} is given too, and both change the same"
+            twice = "it is given twice" if other == kind else f"{other} is given too, and both change the same thing"
             raise DescriptionError(str(kind), twice, "Give each number of a part once")
 
 
 def _contradicted(kind: Any, others: Sequence[Any]) -> Any | None:
-    """The first of some kinds of numbers that changes the same as ``kind``."""
+    """The first of some kinds of numbers that changes the same thing as ``kind``."""
     return next((other for other in others if not set(other.slots).isdisjoint(kind.slots)), None)
 
 
 def _stretches(links: Sequence[FlexibleLink], model: ElasticModel, effects: Sequence[Effect]) -> list[Stretch | None]:
-    """The stretch of the strain-free state of each link, of which it has one at most."""
+    """The stretch of the strain-free state of each link, which has at most one."""
     found: dict[FlexibleLink, Stretch] = {}
     for effect in effects:
         for link, stretch in effect.growth(model).items():

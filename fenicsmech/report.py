@@ -2,7 +2,7 @@
 
 =====================  ===========================================================================================
 ``mechanism.png``      the mechanism in its first and last equilibrium, one panel per configuration
-``curve.png``          the curves; those of the drawn design and the targets beside them after an optimisation
+``curve.png``          the curves; after an optimisation also those of the drawn design, and the targets
 ``curve.csv``          displacement, force, stability, energy, stress and estimated error of every equilibrium
 ``deformed.xdmf``      displacements and stresses of every equilibrium, for ParaView
 ``links.png``          the links before and after an optimisation
@@ -18,7 +18,7 @@ With several configurations there is one CSV and one XDMF file for each.
 from __future__ import annotations
 
 import resource
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from numbers import Integral, Real
 from pathlib import Path
@@ -30,12 +30,14 @@ from mpi4py import MPI
 from fenicsmech.collective import on_one
 from fenicsmech.design import DesignProblem, DesignResult
 from fenicsmech.equilibrium import Unknown
-from fenicsmech.errors import DescriptionError, counted
+from fenicsmech.errors import DescriptionError, EquilibriumError, counted
 from fenicsmech.files import write_json
-from fenicsmech.log import print_once
-from fenicsmech.mechanism import Force
+from fenicsmech.log import logger, print_once
+from fenicsmech.mechanism import Force, ForceGroup, Mechanism
 from fenicsmech.plot import PALETTE, CurveTarget, draw_configurations, plot_curve
-from fenicsmech.simulation import Curve, Frame, Simulation
+from fenicsmech.simulation import Axis, Curve, Frame, Simulation, read_request
+
+_log = logger(__name__)
 
 
 @dataclass(frozen=True)
@@ -80,36 +82,36 @@ class Optimisation:
 def write_report(
     folder: str | Path, simulation: Simulation, curves: Sequence[Curve], *, optimisation: Optimisation | None = None
 ) -> Report:
-    """Writes the files listed above.
+    """Writes the files listed above, the design first.
+
+    Estimated errors are left out along curves of motors and, with a warning, where the KKT matrix of a frame is
+    singular.
 
     Args:
         folder: created if it does not exist.
         simulation: of the curves, with the optimised shapes after an optimisation.
-        curves: one per configuration, at least one of them with a loaded equilibrium.
+        curves: one per configuration, all of forces or all of motors of one kind.
         optimisation: the one that the simulation's shapes are of, if there was one.
 
     Returns:
         the figures.
 
     Raises:
-        DescriptionError: there are no curves.
+        DescriptionError: there are no curves, or two of one configuration or of other axes.
+        MeshingError: no solid can be made of a link, as where the holes for pins are too large; all else is written.
         OSError: the folder or a file cannot be written.
     """
     folder, name, comm = Path(folder), simulation.scene.mechanism.name, simulation.comm
-    if not curves:
-        raise DescriptionError(f"report on {name!r}", "there are no curves", "Give at least one")
-    units = simulation.scene.units
-    panels = [panel for curve in curves if (panel := curve.panel()) is not None]  # on rank 0
-    for curve in curves:
-        suffix = f"-{curve.configuration.name.replace(' ', '-')}" if len(curves) > 1 else ""
-        curve.write(folder / f"deformed{suffix}.xdmf")
-        curve.write_csv(folder / f"curve{suffix}.csv", errors=True)
+    _check_curves(f"report on {name!r}", curves)
     if optimisation is not None:
-        if optimisation.result.links:
-            optimisation.problem.picture(folder / "links.png", optimisation.result)
-        optimisation.problem.export(folder / "links", optimisation.result, pin_diameter=optimisation.pin_diameter)
         optimisation.result.save(folder / "design.json", comm=comm)
-    summary = _summarise(simulation, curves, optimisation)
+    units, errors = simulation.scene.units, [_errors(curve) for curve in curves]
+    panels = [panel for curve in curves if (panel := curve.panel()) is not None]  # on rank 0
+    for curve, known in zip(curves, errors, strict=True):
+        suffix = f"-{_file_name(curve)}" if len(curves) > 1 else ""
+        curve.write(folder / f"deformed{suffix}.xdmf")
+        curve.write_csv(folder / f"curve{suffix}.csv", errors=known is not None)
+    summary = _summarise(simulation, curves, errors, optimisation)
 
     def write() -> None:
         label = f"von Mises stress [{units.stress}]"
@@ -118,6 +120,10 @@ def write_report(
         write_json(folder / "summary.json", summary)
 
     on_one(comm, write)
+    if optimisation is not None:
+        if optimisation.result.links:
+            optimisation.problem.picture(folder / "links.png", optimisation.result)
+        optimisation.problem.export(folder / "links", optimisation.result, pin_diameter=optimisation.pin_diameter)
     return Report(folder, summary, tuple(curves))
 
 
@@ -131,10 +137,12 @@ def design_study(
 ) -> Report:
     """Optimises the links, verifies them in the exported parts, computes the curves of the optimum, and reports.
 
+    Once it is found, ``design.json`` holds the design, whatever fails afterwards.
+
     Args:
         folder: of the files; created if it does not exist.
         problem: the design problem.
-        curves: of the drawn design, by ``load_displacement``; at least one.
+        curves: of the drawn design, by ``load_displacement``, one per configuration.
         resume: whether to continue an optimisation that was interrupted.
         pin_diameter: of the holes for pins in the exported links; there are none by default.
 
@@ -142,45 +150,87 @@ def design_study(
         the figures and the curves of the optimum.
 
     Raises:
-        DescriptionError: there are no curves, or a checkpoint in the folder belongs to another problem.
-        EquilibriumError: the drawn design does not carry its loads.
+        DescriptionError: there are no curves, two of one configuration or one of motors, a checkpoint in the folder
+            belongs to another problem, or a force or an output is at a point of a link that may change.
+        EquilibriumError: the drawn design does not carry its loads, or the optimum not those of a curve.
+        MeshingError: a part cannot be written or meshed.
         OSError: the folder or a file cannot be written.
     """
-    result = problem.verify(problem.optimise(checkpoint=Path(folder) / "checkpoint.json", resume=resume))
-    sim = problem.simulation.with_design(result)
-    after = [_again(sim, curve) for curve in curves]
+    folder, simulation = Path(folder), problem.simulation
+    mechanism, comm = simulation.scene.mechanism, simulation.comm
+    _check_curves(f"design study of {mechanism.name!r}", curves)
+    again = [_again(mechanism, curve) for curve in curves]
+    optimum = problem.optimise(checkpoint=folder / "checkpoint.json", resume=resume)
+    optimum.save(folder / "design.json", comm=comm)
+    result = problem.verify(optimum)
+    result.save(folder / "design.json", comm=comm)
+    designed = simulation.with_design(result)
+    after = [compute(designed) for compute in again]
     found = Optimisation(problem, result, before=curves, pin_diameter=pin_diameter)
-    return write_report(folder, sim, after, optimisation=found)
+    return write_report(folder, designed, after, optimisation=found)
 
 
-def _again(sim: Simulation, curve: Curve) -> Curve:
-    """The curve with the same prescribed values in another simulation."""
-    if not isinstance(curve.part, Force):
+def _check_curves(where: str, curves: Sequence[Curve]) -> None:
+    """Refuses curves that do not make one report."""
+    if not curves:
+        raise DescriptionError(where, "there are no curves", "Give at least one")
+    names = [_file_name(curve) for curve in curves]
+    for curve, name in zip(curves, names, strict=True):
+        if names.count(name) > 1:
+            raise DescriptionError(
+                where,
+                f"two curves are of configuration {curve.configuration.name!r}, by which their files are named",
+                "Give one curve per configuration, or write a report on each",
+            )
+        if curve.axes != curves[0].axes:
+            first, other = (f"{own.part.name!r} ({own.axes[0].label})" for own in (curves[0], curve))
+            raise DescriptionError(
+                where, f"the curves of {first} and {other} have no axes in common", "Write a report on each"
+            )
+
+
+def _file_name(curve: Curve) -> str:
+    """What the names of the curve's files end in where there are several curves."""
+    return curve.configuration.name.replace(" ", "-")
+
+
+def _again(mechanism: Mechanism, curve: Curve) -> Callable[[Simulation], Curve]:
+    """Computes the curve with the same prescribed values in another simulation of the mechanism."""
+    if not isinstance(part := curve.part, Force | ForceGroup):
         raise DescriptionError(
-            f"design study of {sim.scene.mechanism.name!r}",
-            f"the curve of {curve.part.name!r} has no prescribed forces or displacements",
+            f"design study of {mechanism.name!r}",
+            f"the curve of {part.name!r} has no prescribed forces or displacements",
             "Give curves of load_displacement",
         )
-    held = curve.unknown is Unknown.FORCE
-    return sim.load_displacement(
-        curve.part,
-        forces=None if held else curve.forces.tolist(),
-        displacements=curve.displacements.tolist() if held else None,
-        configuration=curve.configuration,
-        others=dict(curve.others),
-    )
+    held, configuration, others = curve.unknown is Unknown.FORCE, curve.configuration, dict(curve.others)
+    forces, displacements = (None, curve.displacements.tolist()) if held else (curve.forces.tolist(), None)
+    given = {"forces": forces, "displacements": displacements}
+    read_request(mechanism, part, **given, configuration=configuration, others=others)
+    return lambda sim: sim.load_displacement(part, **given, configuration=configuration, others=others)
+
+
+def _errors(curve: Curve) -> np.ndarray | None:
+    """Estimated errors of the curve's values, (frames,); None where there are none."""
+    if not isinstance(curve.part, Force | ForceGroup):
+        return None
+    try:
+        return curve.errors_by_kind()[0]
+    except EquilibriumError as failure:
+        _log.warning("no errors are estimated of the curve of %r: %s", curve.part.name, failure)
+        return None
 
 
 def _plot(path: Path, name: str, curves: Sequence[Curve], optimisation: Optimisation | None) -> None:
     """The curves, with those of the drawn design and the targets if there was an optimisation."""
-    colours = dict(zip([curve.configuration for curve in curves], PALETTE * len(curves), strict=False))
     before, targets = (optimisation.before, optimisation.problem.targets) if optimisation else ((), ())
+    configurations = dict.fromkeys(curve.configuration for curve in (*curves, *before))
+    colours = dict(zip(configurations, PALETTE * len(configurations), strict=False))
     series = [curve.series("initial design", colour=colours[curve.configuration], faint=True) for curve in before]
     for curve in curves:
         label = "optimised" if optimisation is not None and len(curves) == 1 else curve.configuration.name
         series.append(curve.series(label, colour=colours[curve.configuration]))
-    points = [point for target in targets if (point := target.on_curve)]
-    wanted = [CurveTarget(displacement, force, colours.get(place)) for force, displacement, place in points]
+    points, parts = [point for target in targets if (point := target.on_curve)], [curve.part for curve in curves]
+    wanted = [CurveTarget(u, magnitude, colours.get(place)) for force, magnitude, u, place in points if force in parts]
     across, up = curves[0].axes
     title = name if optimisation else f"{name}: initial design"
     labels = {"xlabel": across.label, "ylabel": up.label, "title": title}
@@ -190,9 +240,15 @@ def _plot(path: Path, name: str, curves: Sequence[Curve], optimisation: Optimisa
 # -- figures ---------------------------------------------------------------------------------------------------------
 
 
-def _summarise(sim: Simulation, curves: Sequence[Curve], optimisation: Optimisation | None) -> dict:
+def _summarise(
+    sim: Simulation, curves: Sequence[Curve], errors: Sequence[np.ndarray | None], optimisation: Optimisation | None
+) -> dict:
     result = None if optimisation is None else optimisation.result
-    errors = np.concatenate([curve.error_estimates() for curve in curves])
+    estimated = [
+        error
+        for curve, known in zip(curves, errors, strict=True)
+        for error in ([None] * len(curve.frames) if known is None else known.tolist())
+    ]
     summary = {
         "mechanism": sim.scene.mechanism.name,
         "space": sim.fidelity.model.name,
@@ -202,7 +258,8 @@ def _summarise(sim: Simulation, curves: Sequence[Curve], optimisation: Optimisat
         "dofs": {"rigid": sim.model.rigid_dofs, "flexible": sim.model.flexible_dofs},
         "parameters": result and result.parameters,
         "targets": [],
-        "frames": [f | {f"{f['unknown']}_error": float(e)} for f, e in zip(_frames(curves), errors, strict=True)],
+        "axes": {name: asdict(axis) for name, axis in zip(("displacement", "force"), curves[0].axes, strict=True)},
+        "frames": [f | {f"{f['unknown']}_error": e} for f, e in zip(_frames(curves), estimated, strict=True)],
         "seconds": {
             "setup": sim.setup_seconds,
             "frame_median": median(frame.seconds for frame in _loaded(curves)),
@@ -289,10 +346,9 @@ def _loaded(curves: Sequence[Curve]) -> list[Frame]:
 
 def _text(summary: dict, folder: Path) -> str:
     """Equilibria, targets, size of the problem and times, for the console."""
-    length, force = summary["units"]["length"], summary["units"]["force"]
-    units = {"displacement": length, "force": force}
-    added = ", ".join(units[unknown] for unknown in dict.fromkeys(frame["unknown"] for frame in summary["frames"]))
-    headers = ["configuration", f"force [{force}]", f"displacement [{length}]", f"finer elements add [{added}]"]
+    axes = {name: Axis(**own) for name, own in summary["axes"].items()}
+    added = ", ".join(axes[unknown].unit for unknown in dict.fromkeys(frame["unknown"] for frame in summary["frames"]))
+    headers = ["configuration", axes["force"].label, axes["displacement"].label, f"finer elements add [{added}]"]
     headers += ["stable", "iterations", "seconds"]
     rows = [
         [
@@ -345,7 +401,7 @@ def _design_text(summary: dict) -> list[str]:
         f"{counted(summary['parameters'], 'parameter')}, {counted(summary['iterations'], 'iteration')}, "
         f"{counted(summary['evaluations'], 'evaluation')}: "
         f"objective {objective['initial']:.3g} -> {objective['final']:.3g} "
-        f"(corrections make {error:.2g} of it; {summary['ended']})",
+        f"(corrections contribute {error:.2g}; {summary['ended']})",
         f"corrections changed by {', '.join(f'{change:.2%}' for change in summary['corrections'])} in as many rounds"
         + (f" of a surrogate in {summary['surrogate']}" if summary["surrogate"] else ""),
         *([format_table(["number", "unit", "value", "drawn", "least", "largest"], numbers)] if numbers else []),

@@ -31,7 +31,7 @@ def test_only_the_first_process_works():
     assert from_one(COMM, lambda: COMM.rank) == 0
 
 
-def test_no_process_goes_on_before_it_is_done(shared_tmp_path):
+def test_no_process_continues_before_the_work_is_done(shared_tmp_path):
     def write() -> None:
         time.sleep(0.05)
         (shared_tmp_path / "done").touch()

@@ -1,5 +1,6 @@
 """Unfinished files of a killed process in the cache of compiled forms do not block later processes."""
 
+import logging
 import signal
 import subprocess
 import sys
@@ -63,3 +64,14 @@ def test_compiling_works_without_a_lock(tmp_path):
     with compiling(tmp_path / "file"):
         entered = True
     assert entered
+
+
+@pytest.mark.parametrize("muted", [logging.NOTSET, logging.ERROR])
+def test_messages_that_an_application_mutes_stay_muted(muted, tmp_path):
+    logging.disable(muted)
+    try:
+        with compiling(tmp_path):
+            assert not logging.getLogger().isEnabledFor(max(muted, logging.INFO))
+        assert logging.root.manager.disable == muted
+    finally:
+        logging.disable(logging.NOTSET)

@@ -1,4 +1,5 @@
 import io
+from threading import Thread
 
 import pytest
 
@@ -85,6 +86,16 @@ def test_tasks_within_another_one_are_not_shown():
         assert inner.getvalue() == ""
         design.update(1)
     assert "search: 2/2" in outer.getvalue() and inner.getvalue().count("design: 1/1") == 1
+
+
+def test_tasks_of_other_threads_are_shown():
+    here, there = io.StringIO(), io.StringIO()
+    with Progress(2, "search", here) as search:
+        thread = Thread(target=run, args=(there, 3, 0.2))
+        thread.start()
+        thread.join()
+        search.update(2)
+    assert "load steps: 3/3" in there.getvalue() and "search: 2/2" in here.getvalue()
 
 
 def test_the_error_stream_is_the_default(capsys):

@@ -1,5 +1,7 @@
 """Scripts run on two ranks as they are: each file is written once, each line printed once, an error ends all."""
 
+import pytest
+
 import fenicsmech as fm
 
 RANKS = 2
@@ -44,6 +46,7 @@ def test_files_are_written_and_lines_printed_once(mpirun, tmp_path, monkeypatch)
     assert {len(column) for column in fm.read_csv("curve.csv").values()} == {3}
 
 
+@pytest.mark.thorough
 def test_a_file_that_cannot_be_written_is_an_error_on_all_ranks(mpirun, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").write_text("no folder")

@@ -5,7 +5,7 @@ from fenicsmech.errors import DescriptionError
 from fenicsmech.report import format_table
 
 
-def test_numbers_stand_right_and_words_left():
+def test_numbers_are_aligned_right_and_words_left():
     rows = [["claw", 16608, 0.614159, True], ["truss | finger", np.int64(42), np.float64(1234567.0), np.bool_(False)]]
     assert format_table(["demo", "DOFs", "seconds", "stable"], rows, digits=3).splitlines() == [
         "| demo            |  DOFs |  seconds | stable |",

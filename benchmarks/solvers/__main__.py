@@ -1,4 +1,4 @@
-"""Solvers on hard cases: the default beside the augmented Lagrangian, plain Newton and PETSc's SNES.
+"""Solvers on hard cases: the default against the augmented Lagrangian, plain Newton and PETSc's SNES.
 
     OPENBLAS_NUM_THREADS=1 python3 -m benchmarks.solvers [CASE …] [--limit SECONDS]
 

@@ -45,7 +45,7 @@ _LEAST_SHIFT = 1e-9  # in units of the mean stiffness
 _LARGEST_PENALTY = 1e8
 _DECREASE = 1e-4
 _HALVINGS = 30
-_ROUNDING = 1e-10  # of L_A: a change below this says nothing
+_ROUNDING = 1e-10  # of L_A: a change below this is meaningless
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,7 +53,7 @@ class AugmentedLagrangian(EquilibriumMethod):
     """Minimisation of augmented Lagrangians by Newton's method, multipliers updated between.
 
     Attributes:
-        iterations: most Newton iterations, over all updates.
+        iterations: maximum number of Newton iterations, over all updates.
         penalty: first penalty μ, in units of mean stiffness.
         growth: of the penalty where constraints are not met well enough.
     """

@@ -33,7 +33,7 @@ class KKTNewton(EquilibriumMethod):
     """Newton's method on the KKT equations, nothing else.
 
     Attributes:
-        iterations: most iterations.
+        iterations: maximum number of iterations.
         backtracking: whether steps are shortened until the residual falls.
     """
 

@@ -47,7 +47,7 @@ class SNES(EquilibriumMethod):
     """Newton's method of PETSc's SNES on the KKT equations.
 
     Attributes:
-        iterations: most iterations.
+        iterations: maximum number of iterations.
         globalisation: one of SNES's line searches, or its trust region.
     """
 

@@ -1,4 +1,4 @@
-"""The price of accuracy in time: fidelity levels of one scene, measured beside the limit of the finest in space.
+"""The price of accuracy in time: fidelity levels of one scene, measured against the limit of the finest in space.
 
 - ``levels``: a fidelity, and all of them for a scene
 - ``measurement``: value and seconds of a level

@@ -91,8 +91,8 @@ def fidelity_levels(
         scene: the mechanism and its effects.
         planar: size factors of every order in the plane.
         spatial: the same in space.
-        quadratures: degrees beside the default one.
-        tolerances: of Newton's method beside the default one.
+        quadratures: degrees in addition to the default one.
+        tolerances: of Newton's method in addition to the default one.
 
     Raises:
         DescriptionError: the scene cannot be simulated in space.

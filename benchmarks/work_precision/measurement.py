@@ -96,7 +96,7 @@ def measure(
         quantity: of which the value is measured.
         level: the fidelity.
         size: element size at factor 1, or one per flexible link.
-        repeats: most curves to time; fewer once they took five seconds.
+        repeats: maximum number of curves to time; fewer once they took five seconds.
         comm: processes that share the work.
     """
     try:

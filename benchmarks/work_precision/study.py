@@ -1,4 +1,4 @@
-"""A work–precision study: every level of a levels, beside the limit of the finest in space.
+"""A work–precision study: every level of a list, compared with the limit of the finest in space.
 
 With v the value of the level, v* that of the same level with Newton's tolerance at its tightest, f₀ the limit of its
 model as meshes are refined, and r the reference, the limit in space:
@@ -59,7 +59,7 @@ def split_error(
 
     Args:
         measurement: the level, with a value.
-        measurements: the levels, where the same level with a tighter tolerance is looked for.
+        measurements: the levels, among which the same level with a tighter tolerance is sought.
         own: limit of the level's model.
         reference: limit in space.
     """
@@ -147,12 +147,12 @@ def run_study(
         levels: the levels, sequences from coarse to fine.
         size: element size at factor 1, or one per flexible link. Where depths are even multiples of it, layers
             through the depth double as it halves, and sequences are even.
-        repeats: most curves to time per level; the median counts.
+        repeats: maximum number of curves to time per level; the median counts.
         longest: seconds that a curve may be expected to take.
         comm: processes that share the work.
 
     Raises:
-        DescriptionError: ``repeats`` is not positive, or the levels is empty.
+        DescriptionError: ``repeats`` is not positive, or there are no levels.
     """
     if repeats < 1 or not levels:
         raise DescriptionError(

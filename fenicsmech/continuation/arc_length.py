@@ -38,12 +38,13 @@ class ArcSteps:
     Attributes:
         first: length of the first step; 1 reaches ``until`` if the mechanism is linear.
         largest: the longest step, likewise, in force and in the displacement of its point.
-        smallest: the shortest step, likewise; where even that fails the path ends with an error.
+        smallest: the shortest step, likewise; if even that fails, the path ends with an error.
         motion: largest motion of a step, in lengths of the mechanism or rad.
         tolerance: of the location of limit points and bifurcations, over the step they lie in.
-        turn: aimed angle between the tangents at both ends of a step, rad.
-        largest_turn: angle from which on a step is repeated shorter: it jumps to another branch, or cuts off a bend.
-        iterations: aimed number per step; the last one only judges the stability.
+        turn: angle between the tangents at both ends of a step that step sizes aim at, rad.
+        largest_turn: angle above which a step is repeated with a smaller length: it jumps to another branch, or cuts
+            off a bend.
+        iterations: number per step that step sizes aim at; the last one only determines the stability.
 
     Raises:
         DescriptionError: a length is not positive, or the tolerance not between 0 and 1.
@@ -88,12 +89,12 @@ class ArcLengthStepper(Stepper):
     Distances are in units of the arc on which a linear mechanism reaches ``value`` or ``conjugate``.
 
     Args:
-        solver: of the equilibria.
+        solver: for the equilibria.
         followed: the control whose value the path is followed by.
         state: an equilibrium that sets the units.
         steps: options of the steps.
-        value, conjugate: changes of the followed value and of its conjugate that set the unit of distance: of two, the
-            one that is reached first.
+        value, conjugate: changes of the followed value and of its conjugate that set the unit of distance; if both are
+            given, the one reached first does.
 
     Attributes:
         start: the point at ``state``; the followed value grows along its tangent.
@@ -123,10 +124,10 @@ class ArcLengthStepper(Stepper):
             raise NotConverged("it moves nothing")
         reach = min(abs(value) if value else math.inf, abs(conjugate) / speed if conjugate and speed else math.inf)
         if math.isinf(reach):
-            reach = 0.01 / motion  # of the mechanism's length, or rad: of interest if nothing else is said
+            reach = 0.01 / motion  # neither sets a unit: a motion of 1 % of the mechanism's length, or 0.01 rad, does
         self.metric = ArcMetric(system, followed, reach * motion, reach, reach * speed or math.inf)
         self.start = point.scaled(1.0 / self.metric.norm(point.tangent))
-        super().__init__(solver, ParabolaPredictor(self.metric, steps.turn))
+        super().__init__(solver, ParabolaPredictor(self.metric, steps.turn), state)
 
     # -- points ------------------------------------------------------------------------------------------------
 

@@ -3,8 +3,8 @@
 They are detected by a change over a step of n, the number of unstable modes, of v̇, the rate of the followed value, or
 of q̇, that of its conjugate:
 
-    limit point     force's rate changes sign           a dead load has an extremum and snaps from here
-    turning point   displacement's rate changes sign    so has a held point, or a motor
+    limit point     force's rate changes sign           a dead load has an extremum: the mechanism snaps
+    turning point   displacement's rate changes sign    so has a held displacement, or a motor
     bifurcation     n changes otherwise                 other paths cross this one
 
 n changes by one where v̇ changes sign. The point is located at the root of the line through the rates or, at a
@@ -14,7 +14,8 @@ small and holds a single change. μ comes from inverse iteration with the factor
     y = K⁻¹ M φ,    μ = (y · M φ) / (y · M y),    φ ← y / √(y · M y),
 
 M the identity of the coordinates s and 0 for multipliers and force; it is an eigenvalue of K under the constraints,
-with an error of second order in that of φ. Near a bifurcation μ is by far the smallest of all, and one iteration does.
+with an error of second order in that of φ. Near a bifurcation μ is by far the smallest of all, and one iteration
+suffices.
 
 The path that crosses at a simple bifurcation y_b is entered along the null vector φ of K, made orthogonal to the path,
 and found in the plane normal to φ, which meets the new path but, near the bifurcation, not the old one,
@@ -66,7 +67,7 @@ class CriticalPoint:
             equilibrium is near it, but the line through the stiffnesses on either side has its root where they would
             cross.
         modes: number of modes that change their stability there.
-        course: the direction of the path over the step in which it lies. The tangent in the point itself is another:
+        course: the direction of the path over the step in which it lies. The tangent at the point itself differs:
             rounding and the asymmetry of meshes turn it towards the paths that cross.
     """
 
@@ -166,7 +167,7 @@ class _Piece:
     def _stiffness(self, at: Linearisation) -> float:
         """μ of a KKT matrix, to a relative change of 1e-3.
 
-        Twelve iterations at most: where two modes are equally soft, either suffices.
+        At most twelve iterations: where two modes are equally soft, either suffices.
         """
         mask, mode, before = self._mask, self._mode, math.inf
         right, masked = mask.duplicate(), mask.duplicate()
@@ -186,8 +187,8 @@ class _Piece:
 def _search(piece: _Piece, low: _PiecePoint, high: _PiecePoint, tolerance: float) -> list[CriticalPoint]:
     """The critical points between two points of ``piece``.
 
-    Equilibria are found 0.4 tolerances beside the estimated root, so that it is bracketed; eight times farther off
-    where there is none.
+    Equilibria are computed 0.4 tolerances away from the estimated root, so that it is bracketed; where none is found,
+    eight times farther away.
     """
     path, least, before = piece.path, 0.4 * tolerance, None
     while (width := high.distance - low.distance) > tolerance and least < width:

@@ -1,9 +1,9 @@
 """Load steps (natural continuation): from a known equilibrium to the wanted value of a control.
 
 An equilibrium is predicted from those before, corrected, and accepted. Steps halve when the solver fails and double
-when it took few iterations; the tangent bounds their motion; equilibria reached are kept. They end where they are small
-relative to the distance covered, however far the end: the softest stiffness falls as √(1 − p / p*)
-towards a limit load p*, and the last equilibrium, at p* − 2 p* / 1024 or nearer, keeps 5 % of it at most. A step that
+when it took few iterations; the tangent bounds their motion; equilibria reached are kept. Stepping fails once steps are
+small relative to the distance covered, however far the prescribed value: the softest stiffness falls as √(1 − p / p*)
+towards a limit load p*, and the last equilibrium, at p* − 2 p* / 1024 or nearer, keeps at most 5 % of it. A step that
 moves a coordinate outside the range of the tangents at its ends may have snapped over a fold, where the path turns
 back: it is halved too, and if that does not help the snap is accepted and counted.
 
@@ -15,7 +15,8 @@ coordinate x moves ever faster while the links are free of strain: close by, in 
 e the strain and b how far the motors are beyond the dead centre. Before it (b < 0) joints close by x alone, x = √(−2b)
 and λ = 0; beyond it x = 0 and λ = k b. Newton's method does not get from one to the other: as long as λ = 0 the energy
 is not curved along x, every step closes the joints by x alone, x ← ½ x − b / x, and for b > 0 these oscillate without
-end. From a state that strains instead it converges, λ being the curvature. Such states lie along the rate with x held:
+end. From a state in which links strain instead, it converges, with λ as the curvature. Such states lie along the rate
+with x held:
 
     K ẏ = r,     K w = n,     ẏ ← ẏ − w (n · ẏ) / (n · w),     n the motion in ẏ, which is all x near the dead centre.
 """
@@ -40,13 +41,13 @@ class LoadSteps:
         motion: largest motion of a step along the tangent (measured).
         smallest_limited: smallest step that ``motion`` may impose, over the distance to the end; smaller ones arise
             in singular positions, where the tangent is ignored.
-        largest_prediction: motion from which on a prediction is discarded.
-        iterations: aimed number per step; after as many or fewer the next step is twice as long.
+        largest_prediction: motion above which a prediction is discarded.
+        iterations: after as many or fewer in a step, the next one is twice as long.
         deviation: of the rate over a step from the tangents at its ends, over the largest rate, that counts as a snap;
-            kinks stay below.
+            that of kinks is smaller.
         branching_rate: largest rate of a step off a bifurcation, over the rate at its end.
-        smallest_snap: smallest motion that counts as a snap; bifurcations stay below.
-        smallest_snap_step: smallest step, as ``smallest``, that is halved because of a snap.
+        smallest_snap: smallest motion that counts as a snap; that at bifurcations is smaller.
+        smallest_snap_step: smallest step, measured like ``smallest``, that is halved because of a snap.
         minimum_shift: least shift of the KKT matrix, in units of the mean stiffness, where a mechanism has zero-energy
             modes, which would leave it singular.
         shift_factors: of ``minimum_shift``, tried in order: a shift slows Newton's method down where soft springs or
@@ -85,8 +86,8 @@ class LoadStepper(Stepper):
     """Follows equilibria as the prescribed value of one control changes.
 
     Args:
-        solver: of the equilibria.
-        start: a first guess at the control's value there.
+        solver: for the equilibria.
+        start: first guess of the equilibrium at which steps begin; the control's value there is the first one.
         control: whose prescribed value changes.
         predictor: of the next equilibrium.
 
@@ -96,8 +97,8 @@ class LoadStepper(Stepper):
     """
 
     def __init__(self, solver: EquilibriumSolver, start: State, control: Control, *, predictor: Predictor) -> None:
-        super().__init__(solver, predictor)
-        self._steps, self._start, self._value = LoadSteps(), start, control.value(solver.system, start)
+        super().__init__(solver, predictor, start)
+        self._steps, self._value = LoadSteps(), control.value(solver.system, start)
         self._origin, self._covered = self._value, 0.0  # farthest from there so far
         factors = self._steps.shift_factors if start.minimum_shift else (0.0,)
         self._shifts = tuple(factor * start.minimum_shift for factor in factors)
@@ -109,6 +110,7 @@ class LoadStepper(Stepper):
 
         Raises:
             LoadStepsFailed: the smallest step failed.
+            EquilibriumError: a potential does not hold for a step.
         """
         if not self._points:
             self._settle(control.at(self._value))
@@ -179,7 +181,7 @@ class LoadStepper(Stepper):
         return last
 
     def _limited(self, step: float, distance: float) -> float:
-        """``step``, shortened to the largest ``motion`` unless next to nothing of the ``distance`` is left of it."""
+        """``step``, shortened to the largest ``motion`` unless that would leave too little of the ``distance``."""
         if not self._points:
             return step
         motion = self.system.size(self._points[-1].tangent) * abs(step)
@@ -189,7 +191,7 @@ class LoadStepper(Stepper):
     def _scale(self, distance: float) -> float:
         """Reference length of steps: the distance covered so far, at first the first step, whatever the end.
 
-        A limit load is located as closely by a load a thousand times as large as by one just beyond it.
+        So a prescribed load a thousand times the limit load locates it as closely as one just beyond it.
         """
         return min(abs(distance), self._covered or abs(self._limited(distance, distance)))
 
@@ -261,7 +263,7 @@ class MotorStepper(LoadStepper):
                 step *= 0.5
                 continue
             _log.info("links strain beyond a dead centre near %g", self._value)
-            self._rate, self._points = None, []
+            self._rate, self._points, self._start = None, [], last.state
             self._accept_at(point)
             return True
         return False

@@ -1,7 +1,8 @@
 """A step along a path of equilibria: prediction from the last two points, correction by a solver, acceptance.
 
 Load steps and arc-length steps differ in the parameter p of the path, the value of a control or its arc length, and in
-the size of steps. Both predict with the tangents y′ by p at the last two points; h ahead of the last, w apart,
+the size of steps. Both predict with the tangents y′ = dy/dp at the last two points; h is the distance of the guess
+from the last, w that between the two:
 
     constant   y₀
     tangent    y₀ + h y₀′
@@ -49,7 +50,7 @@ class HermitePredictor(Predictor):
     The tangent replaces it while there is only one, and where the two lie close together compared with the step.
 
     Attributes:
-        extrapolation: longest one, over the distance between the two: the error grows as t⁴.
+        extrapolation: longest one, over the distance between the two equilibria: the error grows as t⁴.
     """
 
     extrapolation: float = 4.0
@@ -93,12 +94,13 @@ class Stepper:
     """The last two points of a path, from which the next is predicted.
 
     Args:
-        solver: of the equilibria.
+        solver: for the equilibria.
         predictor: of the next one.
+        start: near the first of them.
     """
 
-    def __init__(self, solver: EquilibriumSolver, predictor: Predictor) -> None:
-        self.solver, self.system, self.predictor = solver, solver.system, predictor
+    def __init__(self, solver: EquilibriumSolver, predictor: Predictor, start: State) -> None:
+        self.solver, self.system, self.predictor, self._start = solver, solver.system, predictor, start
         self._points: list[EquilibriumPoint] = []
         self._width = 0.0  # by which the two are apart
 
@@ -107,5 +109,12 @@ class Stepper:
         return self.predictor.predict(self.system, self._points, self._width, ahead)
 
     def _accept(self, point: EquilibriumPoint, width: float) -> None:
-        """Keeps ``point``, ``width`` ahead of the last one, and that one unless they are in the same place."""
+        """Keeps ``point``, ``width`` ahead of the last one, and that one unless they are in the same place.
+
+        Raises:
+            EquilibriumError: a potential does not hold for the step.
+        """
+        before = self._points[-1].state if self._points else self._start
+        for potential in self.system.potentials:
+            potential.check_step(before.poses, point.state.poses)
         self._points, self._width = [*(self._points[-1:] if width else []), point], width

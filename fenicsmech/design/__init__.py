@@ -2,11 +2,11 @@
 
 A ``DesignProblem`` is described as plain data (``description``), minimised by one of the ``optimisers`` in a ``run``,
 round by round with a ``correction`` that brings values near the truth, and ends in a ``DesignResult``; a ``search``
-scatters starts and ends in several. Its ``objective`` compares the quantities of each ``target`` at its ``equilibria``
-with the wanted values, and adds ``regularisers``. The ``rest_shape`` of the links follows the parameters through
-``shape``: ``spline``, ``handles`` on it, ``weights`` by which handles move the mesh, the ``shape_map`` of these, and
-the ``handle_optimum`` of the mesh ``quality``; ``numbers`` of parts may change beside it. ``characterisation`` fits
-Young's modulus to measurements.
+from scattered starts ends in several. Its ``objective`` compares the quantities of each ``target`` at its
+``equilibria`` with the wanted values, and adds ``regularisers``. The ``rest_shape`` of the links follows the parameters
+through ``shape``: ``spline``, ``handles`` on it, ``weights`` by which handles move the mesh, the ``shape_map`` of
+these, and the ``handle_optimum`` of the mesh ``quality``; ``numbers`` of parts may change in addition.
+``characterisation`` fits Young's modulus to measurements.
 """
 
 from fenicsmech.design.characterisation import Experiment, ModulusFit, fit_modulus

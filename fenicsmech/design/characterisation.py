@@ -20,8 +20,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import t as student
 
-from fenicsmech.equilibrium import LoadControl
-from fenicsmech.errors import DescriptionError, counted, finite, set_fields
+from fenicsmech.equilibrium import LoadControl, State
+from fenicsmech.errors import DescriptionError, EquilibriumError, counted, finite, set_fields
 from fenicsmech.mechanism import DRAWN, Configuration, Force, Material
 from fenicsmech.quantities import Displacement, LawParameter, Observable, Sensitivity
 from fenicsmech.simulation import Curve, CurveRequest, Simulation, read_request
@@ -35,12 +35,12 @@ class Experiment:
         simulation: of the specimen in its test rig.
         part: the force that was applied.
         forces: its magnitudes, (n,).
-        displacements: of its point along it, (n,).
+        displacements: of the force's point along its direction, (n,).
         configuration: motor positions.
 
     Raises:
         DescriptionError: there are not as many forces as displacements, a number is not finite, no force moves
-            anything, or the simulation is one of another design.
+            anything, or the simulation belongs to another design.
     """
 
     simulation: Simulation
@@ -113,7 +113,7 @@ def fit_modulus(experiments: Sequence[Experiment], material: Material) -> Modulu
 
     Raises:
         DescriptionError: no link of an experiment is of this material, or there are fewer than two readings.
-        EquilibriumError: a measured force is not reached in simulation.
+        EquilibriumError: a measured force is not reached in simulation, or no modulus fits best.
     """
     rigs = [_Rig(experiment, material) for experiment in experiments]
     readings = sum(len(experiment.forces) for experiment in experiments)
@@ -126,8 +126,14 @@ def fit_modulus(experiments: Sequence[Experiment], material: Material) -> Modulu
         curves, residuals, slopes = zip(*(rig.compare(np.exp(log_modulus)) for rig in rigs), strict=True)
         scaled = np.concatenate([r / rig.range for r, rig in zip(residuals, rigs, strict=True)])
         J = np.concatenate([slope / rig.range for slope, rig in zip(slopes, rigs, strict=True)])
-        if abs(step) <= 1e-6 or iterations == 30:
+        if abs(step) <= 1e-6:
             break
+        if iterations == 30:
+            raise EquilibriumError(
+                f"modulus of {material.name!r}",
+                f"at {np.exp(log_modulus):.4g} its logarithm still changes by {step:.2g} in iteration {iterations}",
+                "Give readings that depend on it, with displacements along the force",
+            )
         step = float(np.clip(-(J @ scaled) / (J @ J), -1.0, 1.0))  # far from the minimum, by a factor of e at most
         log_modulus += step
         iterations += 1
@@ -170,11 +176,17 @@ class _Rig:
         self._modulus.set(modulus)
         curve = simulation.compute(self._request)
         travel: list[Observable] = [Displacement(part).on(model)]
+
+        def slope_of(state: State, force: float) -> float:
+            (gradient,) = self._adjoint.gradients(solver, state, LoadControl(force), travel)
+            return modulus * float(gradient.numbers[0])
+
+        # displacements count from the unloaded configuration, which changes unless it is a rigid assembly
+        unloaded = slope_of(curve.unloaded, 0.0) if curve.unloaded.has_reactions else 0.0
         slopes, travels = {}, {}
         for frame in curve.frames:
-            (gradient,) = self._adjoint.gradients(solver, frame.state, LoadControl(frame.force), travel)
             travels[frame.force] = frame.displacement
-            slopes[frame.force] = modulus * float(gradient.numbers[0])
+            slopes[frame.force] = slope_of(frame.state, frame.force) - unloaded
         measured = self._experiment
         reached, slope = (np.array([values[force] for force in measured.forces]) for values in (travels, slopes))
         return curve, reached - measured.displacements, slope

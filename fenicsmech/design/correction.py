@@ -3,16 +3,17 @@
     p_k = argmin O(Q(p) + c_k),     c_{k+1} = Q̂(p_k) + e(p_k) − Q(p_k),     c_0 = 0
 
 Q are the values of the simulation that is minimised, Q̂ those of the simulation that counts, and e the goal-oriented
-estimates of the discretisation error of Q̂. Only Q is differentiated. It is
+estimates of the discretisation error of Q̂. Only Q is differentiated. It belongs to
 
-- that of the same simulation (deferred correction): c = e,
-- or that of a surrogate, plane stress for space (space mapping): a few equilibria in space, and no gradient there.
+- the same simulation (deferred correction): c = e,
+- or a surrogate, plane stress for 3D (space mapping): a few equilibria in 3D, and no gradient there.
   Those of the first round are found from the surrogate's at the same design and followed from round to round; the
-  surrogate's at the optimum are loaded from zero again. Equilibria in space that are not found so are loaded from zero.
+  surrogate's at the optimum are loaded from zero again. Equilibria in 3D that are not found in this way are loaded from
+  zero.
 
-c changes from round to round by the part by which the derivatives of Q and Q̂ + e differ. At the end the corrected
-values are the true ones to within the last change. Where a surrogate does not contract, the simulation that counts is
-minimised itself.
+c changes from round to round because the derivatives of Q and of Q̂ + e differ. At the end the corrected
+values are the true ones to within the last change. Where changes of a surrogate's corrections do not contract, the
+simulation that counts is minimised itself.
 
 Sources: J. W. Bandler et al., Space mapping: the state of the art (doi:10.1109/TMTT.2003.820904); for deferred
 correction V. Pereyra, Iterated deferred corrections for nonlinear operator equations (doi:10.1007/BF02165406).
@@ -50,11 +51,12 @@ class Correction:
         estimates: whether error estimates are added; without, targets are met on the mesh of the simulation alone.
         change: largest change of a correction in the last round, over the target's scale: a tenth of the per cent
             within which targets count as met.
-        resolved: the same over the component's error estimate, which is not more certain than that.
-        contraction: change of corrections over that of the round before, above which a surrogate is given up if that
-            happens in two rounds in a row, for the gradient of the simulation itself leads there faster: one round may
-            end at another design, where corrections differ. Where changes grow it is given up at once.
-        rounds: most of them.
+        resolved: the same over the component's error estimate, which is itself uncertain by as much.
+        contraction: change of corrections over that of the round before. A surrogate whose ratio is larger in two
+            rounds in a row is given up, since the gradient of the simulation itself leads to the optimum faster; a
+            single round may exceed it, by ending at another design. Where changes grow, the surrogate is given up
+            immediately.
+        rounds: maximum number of rounds.
 
     Raises:
         DescriptionError: a number is not positive.
@@ -76,10 +78,10 @@ class Corrected:
     """The outcome of some rounds.
 
     Attributes:
-        optimum: of the last one.
+        optimum: of the last round.
         round: the last one, with the correction found there.
-        reached: at the optimum.
-        settled: whether there is nothing that other rounds would change.
+        reached: values at the optimum.
+        settled: whether further rounds would change nothing.
     """
 
     optimum: Optimum
@@ -113,7 +115,7 @@ def verified(
 ) -> tuple[Reached, bool]:
     """Values loaded from zero at the design that the model holds, and whether they are those that were followed.
 
-    Where loading fails, the values followed from design to design stand; the log names the targets.
+    Where loading fails, the values followed from design to design are kept; the log names the targets.
     """
     try:
         solved = equilibria.from_zero()
@@ -153,8 +155,10 @@ def correct(
 ) -> Corrected:
     """Rounds of minimisation and correction, until corrections have settled, do not contract, or iterations run out.
 
+    Where a later round has no value, the outcome is that of the one before.
+
     Args:
-        objective: that is minimised.
+        objective: the one that is minimised.
         begin: where the first round starts.
         first: the first round.
         options: of the correction.
@@ -163,12 +167,19 @@ def correct(
         continued: the optimiser's memory at the start of the next round, from that at the end of the last.
 
     Raises:
-        Infeasible: there is no value at the start, or the simulation that counts has none at an optimum.
+        Infeasible: there is no value at the start, or the simulation that counts has none at the first optimum.
     """
     round = first
+    last: Corrected | None = None
     while True:
-        optimum, round = minimise(begin, round)
-        reached = truth(optimum)
+        try:
+            optimum, round = minimise(begin, round)
+            reached = truth(optimum)
+        except Infeasible as failure:
+            if last is None:
+                raise
+            _log.warning("round %d has no value, that before it stands: %s", len(round.changes) + 1, failure)
+            return last
         needed, scales = reached.compared - objective.reached, objective.comparison.scale_of
         off = np.abs(needed - round.correction)
         change = float(np.max(off / np.maximum(options.change * scales, options.resolved * np.abs(reached.errors))))
@@ -179,8 +190,9 @@ def correct(
             largest=(*round.largest, float(np.max(off / scales))),
         )
         settled = change <= 1.0 or optimum.reason is Reason.ITERATIONS
+        last = Corrected(optimum, round, reached, settled)
         if settled or len(round.changes) >= options.rounds or (round.surrogate and _stalls(round.changes, options)):
-            return Corrected(optimum, round, reached, settled)
+            return last
         begin = Start(optimum.parameters, optimum.number, optimum.evaluations, continued(optimum.memory))
 
 
@@ -196,7 +208,7 @@ class Outcome:
 
     Attributes:
         of: the simulation that was minimised.
-        optimum, round, reached: as of ``Corrected``.
+        optimum, round, reached: as in ``Corrected``.
         placement: of the handles in the simulation that counts.
         verified: whether loading from zero leads there.
     """
@@ -214,11 +226,11 @@ class CorrectedRun:
 
     Args:
         problem: the simulation that counts.
-        optimiser: by which.
+        optimiser: of the objective.
         correction: of the values.
         start: initial design.
         saved: the checkpoint, if one is written.
-        found: its content, saved by the run that this one continues.
+        found: content of the checkpoint, saved by the run that this one continues.
     """
 
     def __init__(
@@ -238,8 +250,8 @@ class CorrectedRun:
 
     def from_surrogate(self, cheaper: DesignedSimulation | None) -> Outcome | None:
         """The optimum by a surrogate; None if there is none or its corrections do not settle."""
-        problem, found = self._problem, self._found
-        if cheaper is None or (found is not None and not found.round.surrogate):
+        problem = self._problem
+        if cheaper is None:
             return None
         placement: HandlePlacement | None = None
         solved: DesignEquilibria | None = None
@@ -250,11 +262,11 @@ class CorrectedRun:
             with problem.clock.phase("verification"):
                 try:
                     near = problem.rest.placement_from(optimum.parameters, theta) or placement
-                    placement = problem.rest.place(optimum.parameters, near)
+                    here = problem.rest.place(optimum.parameters, near)
                 except ShapeError as failure:
                     raise Infeasible(str(failure)) from failure
                 solved = carried(problem.loaded, solved, cheaper.team[1].equilibria)
-                values, errors = problem.loaded.values(solved), problem.loaded.errors(solved)
+                values, errors, placement = problem.loaded.values(solved), problem.loaded.errors(solved), here
             return Reached(values, errors, values + errors if self._options.estimates else values)
 
         try:
@@ -324,7 +336,10 @@ class CorrectedRun:
     ) -> Corrected:
         _, objective = low.team
         if objective.comparison.relative and not first.drawn and self._start is not None:
-            first = replace(first, drawn=tuple(objective.loaded(low.rest.initial).tolist()))
+            try:
+                first = replace(first, drawn=tuple(objective.loaded(low.rest.initial).tolist()))
+            except Infeasible as failure:
+                _log.info("the least quantities are relative to those at the start, not as drawn: %s", failure)
         objective.begin(near, np.array(first.drawn) if first.drawn else None)
         return correct(
             objective,

@@ -11,7 +11,7 @@ from fenicsmech.collective import from_one
 from fenicsmech.design.numbers import Number
 from fenicsmech.design.shape.shape_map import ImageRequest, ShapeRequest
 from fenicsmech.design.shape.spline import lay_out
-from fenicsmech.errors import DescriptionError, expect, finite, points, positive, set_fields
+from fenicsmech.errors import DescriptionError, expect, finite, points, positive, set_fields, whole
 from fenicsmech.mechanism import Centreline, FlexibleLink, Mechanism, Shape, Strip
 from fenicsmech.meshing import Figure, LinkOutline, find_centreline, link_outline, matches
 from fenicsmech.model import check_numbers, plan_sites
@@ -26,8 +26,8 @@ class Bounds:
     """Fabrication bounds of a link.
 
     Attributes:
-        thickness: least and largest thickness in the plane; at each sample of a spline if relative to a thickness drawn
-            so.
+        thickness: least and largest thickness in the plane; one pair for each sample of a spline whose drawn thickness
+            varies.
         bend: largest curvature ratio r.
     """
 
@@ -41,8 +41,8 @@ class SplineDesign:
 
     Attributes:
         link: the link.
-        segments: number of cubic segments; control points beyond those at joints and free ends go where these are
-            farthest apart.
+        segments: number of cubic segments; control points beyond those at joints and free ends are placed where these
+            are farthest apart.
         thickness: least and largest thickness in the plane that can be made; a third to three times the drawn one
             at the same place by default.
         bend: largest curvature ratio r, the spacing of 500 samples over the radius of curvature.
@@ -51,13 +51,13 @@ class SplineDesign:
         ends: points where the line found in an outline begins and ends; by default joints, or free ends where the link
             runs on beyond them.
         ends_move: whether free ends, to which the centreline runs on beyond the last joint, may move; otherwise they
-            stay where they are drawn, as a finger tip that has to reach a place.
+            stay where they are drawn, like a finger tip that has to reach a place.
         same: a link or several that are the same part in another place and keep its shape. Joints of links that share a
             shape cannot be shifted by numbers, and numbers of their depth name all of them.
         mirrored: those that are mirror images of it.
 
     Raises:
-        DescriptionError: a number makes no sense, or a link is named twice. Later, by a design problem: no motion
+        DescriptionError: a number is out of its range, or a link is named twice. Later, by a design problem: no motion
             brings the drawn link to one of ``same`` or ``mirrored``, or numbers shift joints of links that share a
             shape.
     """
@@ -85,8 +85,7 @@ class SplineDesign:
         if len(set(names)) < len(names):
             twice = next(name for name in names if names.count(name) > 1)
             raise DescriptionError(part, f"link {twice!r} is named twice", "Name each link once")
-        if not isinstance(self.segments, int) or self.segments < 1:
-            raise DescriptionError(part, f"{self.segments!r} segments", "Give a whole number of at least 1")
+        whole(f"number of segments of the {part}", self.segments, least=1)
         positive(f"curvature bound of the {part}", self.bend)
         if self.ends is not None:
             if self.centreline is not None:
@@ -131,7 +130,7 @@ class FollowingLink(SplineDesign):
     """A flexible link whose shape follows its joints, which numbers shift, and has no parameters of its own."""
 
 
-_FOLLOWED = 6  # segments of a link that follows its joints: its spline has to run inside it, and costs no parameters
+_FOLLOWED = 6  # segments of a link that follows its joints: its spline has to run inside it; they add no parameters
 
 
 def with_followers(designs: Sequence[SplineDesign], numbers: Sequence[Number]) -> tuple[SplineDesign, ...]:
@@ -263,7 +262,7 @@ def _images(
 
 
 def check_designs(designs: Sequence[SplineDesign | Number]) -> None:
-    """Refuses designs of nothing, and two of one link or of one number, with a DescriptionError."""
+    """Refuses an empty list of designs, and two designs of one link or number, with a DescriptionError."""
     if not designs:
         raise DescriptionError(
             "design problem", "no link or number may change", "Name them with SplineDesign(…) or Number(…)"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -23,7 +24,7 @@ from fenicsmech.design.optimisers.sqp import SQP
 from fenicsmech.design.regularisers import MeshQuality, NumberBounds, Regulariser, ShapeBounds, StayClose
 from fenicsmech.design.result import DesignResult, draw_links, link_designs, rest_meshes, target_results, write_solids
 from fenicsmech.design.run import Checkpoint, fingerprint
-from fenicsmech.design.search import Scatter, Search, SearchResult, cheapest
+from fenicsmech.design.search import Scatter, Search, SearchResult
 from fenicsmech.design.shape.handle_optimum import HandlePlacement
 from fenicsmech.design.target import Target
 from fenicsmech.design.verification import part_simulations, verified_parts
@@ -52,14 +53,15 @@ class DesignProblem:
     description is checked at once.
 
     Args:
-        simulation: of the equilibria, as drawn; it stays so. ``simulation.with_design`` gives one of a result.
+        simulation: of the scene as drawn, which it stays; ``simulation.with_design`` gives one of a result.
         designs: the links and the numbers that may change.
         targets: requirements on the mechanism.
         regulariser: R; by default mesh quality, bounds of fabrication, and closeness to the drawing with weight 1e-4,
             where the paper has 1: with 1 the demos miss their targets (benchmarks/closeness.py).
 
     Raises:
-        DescriptionError: the problem contradicts itself or the simulation's scene, or that is one of another design.
+        DescriptionError: the problem contradicts itself or the simulation's scene, or the simulation belongs to another
+            design.
         AssemblyError: a target's configuration does not assemble.
     """
 
@@ -71,10 +73,11 @@ class DesignProblem:
         targets: Sequence[Target],
         regulariser: Regulariser = DEFAULT_REGULARISER,
     ) -> None:
-        self.simulation, self.designs, self.targets = simulation, tuple(designs), tuple(targets)
+        self.designs, self.targets = tuple(designs), tuple(targets)
         self.regulariser, self._clock = regulariser, Clock()
         check_designs(self.designs)
         self._own = DesignedSimulation(simulation, self.designs, self.targets, regulariser, self._clock)
+        self.simulation = self._own.simulation
 
     @property
     def initial(self) -> np.ndarray:
@@ -88,7 +91,7 @@ class DesignProblem:
         found.
 
         Raises:
-            DescriptionError: the design is one of other links.
+            DescriptionError: the design belongs to other links.
             ShapeError: cells of the mesh are inverted in this shape, or a number is out of its bounds.
         """
         return self._own.rest.design(*self._own.given(design))
@@ -111,21 +114,21 @@ class DesignProblem:
         Args:
             optimiser: by default Levenberg–Marquardt where every target equals something, else sequential quadratic
                 programming.
-            start: initial design, as the result of a cheaper simulation, or parameters (parameters,); the drawn shapes
-                by default.
+            start: initial design, such as the result of a cheaper simulation, or parameters (parameters,); the drawn
+                shapes by default.
             surrogate: a cheaper simulation of the same scene that is minimised in place of this one, with corrections
-                to the values of this one. By default one in plane stress for a simulation in 3D of a scene that can be
-                simulated so; None: this simulation itself is minimised.
+                to the values of this one. By default, for a simulation in 3D, one in plane stress if the scene allows
+                it; None: this simulation itself is minimised.
             correction: of the values that are compared with targets.
             checkpoint: file updated after each iteration.
             resume: whether to continue from ``checkpoint`` if it exists.
 
         Raises:
-            DescriptionError: the checkpoint or the start is one of another problem, or no shape that may change moves
+            DescriptionError: the checkpoint or the start belongs to another problem, or no shape that may change moves
                 the point of a target.
             EquilibriumError: the initial design does not carry its loads.
         """
-        began, clock, model = perf_counter(), dict(self._clock.seconds), self.simulation.model
+        began, clock = perf_counter(), dict(self._clock.seconds)
         comm, cheaper = self.simulation.comm, self._surrogate(surrogate)
         optimiser = optimiser or self._default_optimiser
         saved = found = None
@@ -134,7 +137,11 @@ class DesignProblem:
             problem = fingerprint(self.simulation, self._own.rest, self.targets, self.regulariser, optimiser, other)
             saved = Checkpoint(Path(checkpoint), problem)
             found = saved.load_together(comm) if resume else None
-        with model.shaped(model.design):
+        if found is not None and not found.round.surrogate:
+            cheaper = None  # it was given up before
+        with ExitStack() as held:
+            for model in (own.simulation.model for own in (self._own, cheaper) if own is not None):
+                held.enter_context(model.shaped(model.design))
             run = CorrectedRun(self._own, optimiser, correction, start, saved, found)
             end = run.from_surrogate(cheaper) or run.directly()
             reached, round, (group, objective) = end.reached, end.round, end.of.team
@@ -177,27 +184,26 @@ class DesignProblem:
     ) -> SearchResult:
         """Distinct optima from scattered starts, best first, at the cheapest fidelity.
 
-        That is plane stress where the scene can be simulated so, with elements not smaller than the links are thick.
+        That is plane stress where the scene allows it, with elements not smaller than the links are thick.
         ``optimise(start=found.best)`` takes an optimum to this problem's fidelity. Each process works on a start of
-        its own; starts without an equilibrium stand in the result.
+        its own; starts without an equilibrium are listed in the result. Where the drawn design does not carry its
+        loads, minimised quantities are relative to those of each start, and designs compare only if these targets have
+        a ``scale``.
 
         Args:
-            scatter: how many starts, how far apart, and other numbers; 16 by default.
+            scatter: number of starts (16 by default), how far apart they are, and other options.
             optimiser: of each start; by default that of ``optimise``.
             checkpoint: folder with files for each start, written as it ends.
             resume: whether to continue from the files in ``checkpoint``.
 
         Raises:
-            DescriptionError: a checkpoint is one of another search, or no shape that may change moves the point of a
+            DescriptionError: a checkpoint belongs to another search, or no shape that may change moves the point of a
                 target.
             EquilibriumError: no start carries its loads.
         """
         scatter, comm = scatter or Scatter(), self.simulation.comm
         alone = DesignProblem(
-            cheapest(self.simulation, self.targets, self._own.numbers).on(MPI.COMM_SELF),
-            self.designs,
-            targets=self.targets,
-            regulariser=self.regulariser,
+            self._own.cheapest.on(MPI.COMM_SELF), self.designs, targets=self.targets, regulariser=self.regulariser
         )
         optimiser, saved = optimiser or self._default_optimiser, None
         if checkpoint is not None:
@@ -212,7 +218,7 @@ class DesignProblem:
         """Draws the links as drawn and as in ``design``, as a PNG.
 
         Raises:
-            DescriptionError: the design is one of other links.
+            DescriptionError: the design belongs to other links.
         """
         links = [link for own in self._own.shapes for link in own.links]
         both = (self.initial, None), self._own.given(design)
@@ -228,7 +234,9 @@ class DesignProblem:
     def export(
         self, folder: str | Path, design: DesignResult | np.ndarray, *, pin_diameter: float | None = None
     ) -> None:
-        """Writes ``NAME.step`` and ``NAME.stl`` of every link whose shape or depth may change.
+        """Writes ``NAME.step`` and ``NAME.stl`` of every link whose shape or depth may change, in mm.
+
+        Lengths in another unit are written as they are, with a warning.
 
         Args:
             folder: where to; it is created.
@@ -236,9 +244,12 @@ class DesignProblem:
             pin_diameter: of the holes left for the pins of round interfaces; none are left by default.
 
         Raises:
-            DescriptionError: the design is one of other links.
+            DescriptionError: the design belongs to other links.
             MeshingError: no solid can be made of a link.
         """
+        unit = self.simulation.scene.units.length
+        if unit != "mm":
+            _log.warning("STEP and STL files are in mm, and lengths of those in %s in %s: scale them", folder, unit)
         links, given = self._own.changed, self._own.given(design)
         solids, mechanism = self._meshes(links, given), self.simulation.scene.mechanism
         linkage = build_linkage(mechanism, self.simulation.linkage.dim, self._moved(given[0]))
@@ -248,7 +259,7 @@ class DesignProblem:
         """The result with the values of its targets in the parts to be made.
 
         The links that may change are written as STEP files without holes for pins; the same scene with links read from
-        these files is meshed anew with smaller elements, and every sample is loaded anew.
+        these files is remeshed with smaller elements, and every sample is loaded again.
 
         Args:
             result: of this problem's targets.
@@ -256,14 +267,14 @@ class DesignProblem:
             finer: ratio of the simulation's element size to that of the parts.
 
         Raises:
-            DescriptionError: the result is one of other links or targets, or a force or an output is at a point of a
+            DescriptionError: the result belongs to other links or targets, or a force or an output is at a point of a
                 link that may change.
             MeshingError: a part cannot be written or meshed.
         """
         if [target.name for target in result.targets] != [target.name for target in self.targets]:
             raise DescriptionError(
                 f"verification of {result.mechanism!r}",
-                "the result is one of other targets",
+                "the result belongs to other targets",
                 "Give a result of this problem",
             )
         links, given = self._own.changed, self._own.given(result)
@@ -271,7 +282,7 @@ class DesignProblem:
         with TemporaryDirectory() as temporary:  # only the first process writes and reads
             folder, moved = Path(folder or temporary), self._moved(given[0])
             coarse, fine = part_simulations(self.simulation, links, *solids, folder, finer, moved)
-            verified = verified_parts(result, coarse, fine, self.targets)
+            verified = verified_parts(result, coarse, fine, self.targets, links)
         return self.simulation.comm.bcast(verified, root=0)
 
     @property
@@ -284,7 +295,9 @@ class DesignProblem:
         """The same problem in a surrogate."""
         if isinstance(given, Simulation):
             return self._own.on(given)
-        return None if given is None or self.simulation.fidelity.model.dim < 3 else self._own.in_plane_stress
+        if given not in (None, "plane-stress"):
+            raise DescriptionError("surrogate", f"it is {given!r}", 'Give a Simulation, "plane-stress" or None')
+        return None if given is None else self._own.in_plane_stress
 
     def _moved(self, parameters: np.ndarray) -> dict[Joint, JointChange]:
         """Where a design places joints otherwise than drawn."""

@@ -5,22 +5,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
+from fenicsmech.collective import on_all
 from fenicsmech.design.description import SplineDesign, shape_requests, with_followers
 from fenicsmech.design.equilibria import FollowOptions, SampleEquilibria
 from fenicsmech.design.numbers import Number
 from fenicsmech.design.objective import Group, Objective, sample_numbers, split
 from fenicsmech.design.regularisers import Regulariser
 from fenicsmech.design.rest_shape import ParametricShape
-from fenicsmech.design.result import DesignResult, shapes_of
+from fenicsmech.design.result import DesignResult, shapes_of, solid_path
 from fenicsmech.design.shape.handle_optimum import HandlePlacement
 from fenicsmech.design.shape.shape_map import LinkShape, shape_links
 from fenicsmech.design.target import Comparison, Target, check_targets
 from fenicsmech.elasticity import PLANE_STRESS, Quadrature
 from fenicsmech.errors import DescriptionError
 from fenicsmech.log import Clock
+from fenicsmech.mechanism import Strip
 from fenicsmech.model import fits
 from fenicsmech.quantities import NumberKind
 from fenicsmech.simulation import Simulation
@@ -30,7 +33,7 @@ class DesignedSimulation:
     """The links of one simulation that may change, and the objective of all targets there, built on first use.
 
     Args:
-        simulation: of the equilibria.
+        simulation: in which equilibria are computed.
         designs: what may change.
         targets: requirements on the mechanism.
         regulariser: R.
@@ -42,8 +45,8 @@ class DesignedSimulation:
         changed: the links whose solids change.
 
     Raises:
-        DescriptionError: designs or targets name parts that the simulation does not have, or it is one of another
-            design.
+        DescriptionError: designs or targets name parts that the simulation does not have, or the simulation belongs to
+            another design.
         AssemblyError: a target's configuration does not assemble.
     """
 
@@ -55,7 +58,7 @@ class DesignedSimulation:
         regulariser: Regulariser,
         clock: Clock,
     ) -> None:
-        simulation.check_drawn("design problem")
+        simulation = simulation.check_drawn("design problem")
         check_targets(simulation, targets)
         self.simulation, self.designs, self.targets = simulation, tuple(designs), tuple(targets)
         self._regulariser, self.clock = regulariser, clock
@@ -65,6 +68,11 @@ class DesignedSimulation:
         self.shapes = with_followers([own for own in self.designs if isinstance(own, SplineDesign)], self.numbers)
         solids = [link for number in self.numbers for link in number.kind.reshaped]
         self.changed = tuple(dict.fromkeys([*(link for own in self.shapes for link in own.links), *solids]))
+        files = [solid_path("", link, "").name for link in self.changed]
+        if twice := [own.name for own, file in zip(self.changed, files, strict=True) if files.count(file) > 1]:
+            raise DescriptionError(
+                "design problem", f"files of {' and '.join(map(repr, twice))} have one name", "Rename one of the links"
+            )
         self._requests = shape_requests(self.shapes, simulation, self.numbers)
 
     def on(self, simulation: Simulation) -> DesignedSimulation:
@@ -73,16 +81,30 @@ class DesignedSimulation:
 
     @cached_property
     def in_plane_stress(self) -> DesignedSimulation | None:
-        """The same problem in plane stress; None if the scene or a target does not fit that."""
-        own = self.simulation.fidelity
-        if not fits(self.simulation.scene, PLANE_STRESS):
+        """The same problem in plane stress; None if that is not in space, or the scene or a target does not fit."""
+        if self.simulation.fidelity.model.dim < 3 or not fits(self.simulation.scene, PLANE_STRESS):
             return None
-        quadrature = Quadrature.for_order(own.order, PLANE_STRESS.dim)
-        flat = replace(own, model=PLANE_STRESS, quadrature=quadrature, layers=None)
         try:
-            return self.on(self.simulation.with_shapes({}, fidelity=flat))
+            return self.on(self._at(model=PLANE_STRESS))
         except DescriptionError:
             return None
+
+    @property
+    def cheapest(self) -> Simulation:
+        """That in plane stress if it is not None, else this one, with elements as large as strips are thick."""
+        flat = self.in_plane_stress or self
+        own, shapes = flat.simulation.fidelity, flat.simulation.shapes
+        sizes = {
+            link: max(size, shape.thickness) if isinstance(shape := shapes[link], Strip) else size
+            for link, size in own.sizes.items()
+        }
+        return flat._at(order=min(own.order, 2), sizes=sizes)
+
+    def _at(self, **changes: Any) -> Simulation:
+        """The simulation at another fidelity, of which layers and quadrature follow."""
+        fidelity = replace(self.simulation.fidelity, layers=None, **changes)
+        quadrature = Quadrature.for_order(fidelity.order, fidelity.model.dim)
+        return self.simulation.with_shapes({}, fidelity=replace(fidelity, quadrature=quadrature))
 
     @cached_property
     def _shapes(self) -> list[LinkShape]:
@@ -118,7 +140,9 @@ class DesignedSimulation:
             mine = [self.targets[k] for k in group.mine]
             # optimisers shorten steps that lose an equilibrium; the halves of the way there are solves for a step that
             # mostly is refused
-            equilibria = SampleEquilibria(simulation, mine, FollowOptions(halvings=0), numbers=self._kinds)
+            options, comm = FollowOptions(halvings=0), self.simulation.comm
+            # a point of one group's targets may be off its link
+            equilibria = on_all(comm, lambda: SampleEquilibria(simulation, mine, options, numbers=self._kinds))
             comparison = Comparison(self.targets, simulation.scene.units)
             objective = Objective(
                 rest, equilibria, comparison=comparison, regulariser=self._regulariser, group=group, clock=self.clock
@@ -129,7 +153,7 @@ class DesignedSimulation:
         """Parameters of a design, and its handle positions if it is a result.
 
         Raises:
-            DescriptionError: the result is one of other links, or the parameters are not as many finite numbers.
+            DescriptionError: the result belongs to other links, or the parameters are not as many finite numbers.
         """
         if not isinstance(design, DesignResult):
             parameters = np.array(design, dtype=float)

@@ -13,8 +13,8 @@ R(y₀). These are removed in one step. The same check applies, with R(y; d₀) 
 second one to the distance of y from y₀.
 
 Displacements q count from the unloaded configuration y°. Where that moves with the design (a point lies on a flexible
-link, or motors strain the links), it is an equilibrium that is followed too. A prescribed displacement v = v̄ + q_v(y°)
-moves with it:
+link, or motors strain links or wind up springs), it is an equilibrium that is followed too. A prescribed displacement
+v = v̄ + q_v(y°) moves with it:
 
     Q = g(q(y) − q(y°)),     dQ/dp = ∂g/∂q (dq/dp + dq/dv dq_v°/dp − dq°/dp).
 
@@ -44,9 +44,8 @@ from fenicsmech.equilibrium import (
     NotConverged,
     State,
 )
-from fenicsmech.errors import EquilibriumError
+from fenicsmech.errors import AssemblyError, EquilibriumError
 from fenicsmech.model import Design
-from fenicsmech.multibody import assemble
 from fenicsmech.quantities import (
     Displacement,
     Gradient,
@@ -65,13 +64,13 @@ class FollowOptions:
     """Criteria for an equilibrium at one design to continue the one at another.
 
     Attributes:
-        load_steps: least number to the largest load from zero; larger ones fail more often than they save a step.
+        load_steps: minimum number of steps from zero to the largest load; with fewer, failures cost more than is saved.
         halvings: of a change of design whose equilibrium is not found, or lies elsewhere.
-        largest_miss: of the prediction, over |δ|; larger misses are those of equilibria across a fold.
-        largest_transfer_miss: the same from another simulation: up to 2.9 on one branch, as δ holds the stress of links
-            that were at rest in a slightly different shape; 30 and more across folds.
+        largest_miss: of the prediction, over |δ|; a larger miss means an equilibrium across a fold.
+        largest_transfer_miss: the same from another simulation: up to 2.9 on one branch, as δ includes the stress of
+            links that were at rest in a slightly different shape; 30 and more across folds.
         farthest_transfer: distance from the equilibrium of another simulation, over its motion from the unloaded
-            configuration: up to 0.3 between plane stress and space, more where motors strain links, 2.8 and more across
+            configuration: up to 0.3 between plane stress and 3D, more where motors strain links, 2.8 and more across
             folds.
         rounding: misses below this part of the mechanism's length, or rad, are rounding.
     """
@@ -91,7 +90,7 @@ class SampleState:
     Attributes:
         state: the equilibrium.
         control: under which it was found.
-        unloaded: without loads, from which displacements count.
+        unloaded: the state without loads, from which displacements count.
     """
 
     state: State
@@ -120,19 +119,21 @@ class _Path:
     Attributes:
         sample: its description.
         solver: of its equilibria.
-        moves: whether its unloaded configuration moves with the design.
     """
 
     def __init__(
         self, simulation: Simulation, sample: Sample, observables: Iterable[Observable], numbers: Sequence[NumberKind]
     ) -> None:
         self.sample, self._model = sample, simulation.model
-        self.solver: EquilibriumSolver = simulation.solver(sample.part, sample.others)
+        self.solver: EquilibriumSolver = simulation.solver(sample.part, [force for force, _ in sample.others])
         self.moved = None if sample.moved is None else Displacement(sample.moved[0]).on(simulation.model)
-        strained = assemble(simulation.linkage, sample.configuration).fraction < 1.0
         own = observables if self.moved is None else (*observables, self.moved)
         moved = any(observable.on_link for observable in own)
-        self.moves = strained or moved or any(kind.moves_unloaded(sample.configuration) for kind in numbers)
+        self._moves = moved or any(kind.moves_unloaded(sample.configuration) for kind in numbers)
+
+    def moves(self, unloaded: State) -> bool:
+        """Whether the sample's unloaded configuration, or a point there, moves with the design."""
+        return self._moves or unloaded.has_reactions
 
     def control(self, unloaded: State) -> Control:
         """The sample's control at the design that the model holds."""
@@ -146,10 +147,10 @@ class SampleEquilibria:
     """The equilibria of the samples of ``targets`` in one simulation, and the values of their quantities.
 
     Args:
-        simulation: of the equilibria.
-        targets: whose samples they are.
+        simulation: in which equilibria are computed.
+        targets: whose samples these are.
         options: of following them from design to design.
-        numbers: derivatives by which are wanted beside those by the design field.
+        numbers: with respect to which derivatives are wanted, in addition to those by the design field.
     """
 
     def __init__(
@@ -231,7 +232,7 @@ class SampleEquilibria:
             at = solved.samples[path.sample]
             places, partials = self._partials(solved, path, at.state, own)
             loaded = self._sensitivity.of(path.solver, at.state, at.control, partials)
-            if path.moves:
+            if path.moves(at.unloaded):
                 loaded = self._less_unloaded(solved, path, places, loaded)
             for k, gradient in zip(places, loaded, strict=True):
                 found.setdefault(k, []).append(gradient)
@@ -246,11 +247,10 @@ class SampleEquilibria:
                 places, partials = self._partials(solved, path, at.state, self._of(path.sample))
                 adjoints = self._sensitivity.adjoints(path.solver, at.state, at.control, partials)
                 errors, slopes = self._estimated(adjoints), [own.by_control() if own else 0.0 for own in adjoints]
-                if path.moves:
+                if path.moves(at.unloaded):
                     from_there, counted, prescribed = self._unloaded_partials(solved, path, places)
-                    origin = solved.samples[path.sample].unloaded
                     unloaded = self._estimated(
-                        self._sensitivity.adjoints(path.solver, origin, LoadControl(0.0), from_there)
+                        self._sensitivity.adjoints(path.solver, at.unloaded, LoadControl(0.0), from_there)
                     )
                     for place, error in zip(counted, unloaded, strict=False):
                         errors[place] -= error
@@ -263,7 +263,7 @@ class SampleEquilibria:
     # -- values and derivatives of one sample --------------------------------------------------------------------
 
     def _of(self, sample: Sample) -> list[tuple[Observable, int]]:
-        """The observables asked of a sample, with the places of their targets."""
+        """The observables evaluated at a sample, with the places of their targets."""
         pairs = enumerate(zip(self.targets, self._observables, strict=True))
         return [(observable, k) for k, (target, observable) in pairs if target.sample == sample]
 
@@ -312,7 +312,7 @@ class SampleEquilibria:
     def _less_unloaded(
         self, solved: DesignEquilibria, path: _Path, places: Sequence[int], loaded: Sequence[Gradient]
     ) -> list[Gradient]:
-        """Derivatives of components with those of the unloaded configuration."""
+        """Derivatives of components less those in the unloaded configuration."""
         partials, counted, prescribed = self._unloaded_partials(solved, path, places)
         origin = solved.samples[path.sample].unloaded
         unloaded = self._sensitivity.of(path.solver, origin, LoadControl(0.0), partials)
@@ -347,7 +347,7 @@ class SampleEquilibria:
             before = sample.value
         try:
             curve = self._simulation.compute(sample_request(self._simulation, ordered[0], loads))
-        except EquilibriumError as error:
+        except (EquilibriumError, AssemblyError) as error:
             raise Infeasible(str(error)) from error
         found, snapped = dict[Sample, SampleState](), False
         for load, frame in zip(loads, curve.frames, strict=True):
@@ -368,7 +368,7 @@ class SampleEquilibria:
     def _unloaded(self, sample: Sample) -> State:
         try:
             return self._simulation.unloaded(sample_request(self._simulation, sample, [sample.value]))
-        except EquilibriumError as error:
+        except (EquilibriumError, AssemblyError) as error:
             raise Infeasible(str(error)) from error
 
     def _from_guess(self, path: _Path, other: WholeState, unloaded: State) -> SampleState:
@@ -390,7 +390,7 @@ class SampleEquilibria:
 
     def _followed(self, path: _Path, at: SampleState, before: Design, after: Design) -> SampleState:
         unloaded, halvings, nothing = at.unloaded, self._options.halvings, LoadControl(0.0)
-        if path.moves:
+        if path.moves(unloaded):
             unloaded = self._moved(path, unloaded, _Prescribed(before, nothing), _Prescribed(after, nothing), halvings)
         self._model.reshape(after)
         control = path.control(unloaded)

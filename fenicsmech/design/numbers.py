@@ -30,7 +30,7 @@ class Number:
         least, most: its bounds, in its own unit; the drawn value lies between them.
 
     Raises:
-        DescriptionError: it is not a kind of number, or the bounds make no sense.
+        DescriptionError: it is not a kind of number, or the bounds are not finite and in order.
     """
 
     kind: NumberKind

@@ -4,8 +4,8 @@
 
 (the paper's equation 5 and section V-A, relative to the targets and so free of units), where Q_k are the simulation's
 values plus a correction that is held fixed (``correction``). Each evaluation places the handles, reshapes the links,
-follows the equilibria of all samples from those of the best design so far, and takes the adjoint derivatives of all
-targets to p. Samples are spread over groups of processes, each with a communicator of its own.
+follows the equilibria of all samples from those of the best design so far, and computes the adjoint derivatives of all
+targets with respect to p. Samples are spread over groups of processes, each with a communicator of its own.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ class Objective:
 
         Args:
             near: handle positions to start from.
-            drawn: components to which the least quantities are relative; by default those of the next evaluation.
+            drawn: components to which minimised quantities are relative; by default those of the next evaluation.
         """
         self._base, self._near, self._scaled = None, near, drawn is not None
         if drawn is not None:
@@ -243,8 +243,8 @@ class Group:
 def group_count(processes: int, samples: int) -> int:
     """The number of groups with the shortest expected time.
 
-    A group of n processes works off ⌈samples / groups⌉ equilibria, each in a time of 1 / √n: two are 1.4
-    times as fast as one.
+    A group of n processes computes ⌈samples / groups⌉ equilibria, each in a time of 1 / √n: two processes are 1.4 times
+    as fast as one.
     """
     choices = range(1, min(processes, max(samples, 1)) + 1)
     return min(choices, key=lambda groups: -(-samples // groups) / (processes // groups) ** 0.5)
@@ -255,7 +255,7 @@ def split(comm: MPI.Comm, samples: Sequence[int]) -> Group:
 
     Args:
         comm: all processes.
-        samples: the number of each target's sample, as of ``sample_numbers``; targets of links at rest, which cost
+        samples: the number of each target's sample, from ``sample_numbers``; targets of links at rest, which cost
             little, go to the first group.
     """
     count = group_count(comm.size, len(set(samples) - {-1}))

@@ -27,8 +27,8 @@ class Regulariser(ABC):
     def around(self, rest: ParametricShape, placement: HandlePlacement) -> Model:
         """R near the design that ``rest`` holds, placed as in ``placement``.
 
-        The model needs no mesh: it is R itself where R is a function of the splines alone, and else agrees with R and
-        its gradient at the design.
+        The model needs no mesh: it is R itself where R is a function of the splines alone, otherwise it agrees with R
+        and its gradient at the design.
         """
 
     def active(self, rest: ParametricShape, placement: HandlePlacement) -> tuple[str, ...]:
@@ -72,14 +72,14 @@ class Weighted(Regulariser):
 class StayClose(Regulariser):
     """R_init = ½ Σ ((p − p₀) / h)², h the thickness of each link (the paper's equation 7, made free of units).
 
-    The sum runs over parameters of shapes, numbers are free. Thickness parameters δ are relative to h already.
-    Design problems weight it 1e-4 by default where the paper's equation has 1: with 1 the designs stay so close to the
-    drawing that the demos miss their targets (benchmarks/closeness.py).
+    The sum runs over parameters of shapes only. Thickness parameters δ are relative to h already.
+    Design problems weight it 1e-4 by default where the paper's equation has 1: with weight 1 the designs stay so close
+    to the drawing that the demos miss their targets (benchmarks/closeness.py).
     """
 
     def around(self, rest, placement):
         scale = 1.0 / rest.lengths**2
-        scale[rest.of_numbers] = 0.0  # what is identified is not drawn back
+        scale[rest.of_numbers] = 0.0  # numbers to be identified are not drawn back to their start
 
         def model(p: np.ndarray) -> Quadratic:
             away = p - rest.initial
@@ -90,7 +90,7 @@ class StayClose(Regulariser):
 
 @dataclass(frozen=True)
 class NumberBounds(Regulariser):
-    """Barriers on numbers, which begin 2 % of the interval between their bounds before these.
+    """Barriers on numbers; each begins at a distance of 2 % of the interval between both bounds from its bound.
 
     No design leaves the bounds themselves.
     """
@@ -126,19 +126,25 @@ class ShapeBounds(Regulariser):
     """
 
     def around(self, rest, placement):
+        links = [(link.parameters, _bounds(link)) for link in rest.links]
+
         def model(p: np.ndarray) -> Quadratic:
             value, gradient, curvature = 0.0, np.zeros(len(p)), np.zeros((len(p), len(p)))
-            for link in rest.links:
-                own = link.parameters
-                for bound in _bounds(link, own.of(p)):
+            for own, bounds in links:
+                size = len(own.fixed)
+                slope, bent = np.zeros(size), np.zeros((size, size))  # by the spline's parameters
+                for bound in bounds(own.of(p)):
                     barrier, beyond = bound.barrier, bound.values > bound.barrier.limit
                     if not beyond.any():
                         continue
-                    x, by_p = bound.values[beyond], bound.gradient(beyond) @ own.matrix
+                    x, by_own = bound.values[beyond], bound.gradient(beyond)
                     value += float(barrier.value(x).sum())
-                    gradient += barrier.slope(x) @ by_p
+                    slope += barrier.slope(x) @ by_own
                     # the curvature of x itself is left out: it may be negative, and is multiplied by a small slope
-                    curvature += by_p.T @ (barrier.curvature(x)[:, None] * by_p)
+                    bent += by_own.T @ (barrier.curvature(x)[:, None] * by_own)
+                if bent.any():
+                    gradient += slope @ own.matrix
+                    curvature += own.matrix.T @ bent @ own.matrix
             return Quadratic(value, gradient, curvature)
 
         return model
@@ -146,7 +152,7 @@ class ShapeBounds(Regulariser):
     def active(self, rest, placement):
         found = []
         for link in rest.links:
-            for bound in _bounds(link, link.parameters.of(placement.p)):
+            for bound in _bounds(link)(link.parameters.of(placement.p)):
                 if np.any(bound.values > bound.barrier.limit):
                     found.append(f"{bound.name} of {link.name!r}")
         return tuple(dict.fromkeys(found))
@@ -169,32 +175,28 @@ class _Bound:
     barrier: Barrier
 
 
-def _bounds(link: DesignedLink, p: np.ndarray) -> list[_Bound]:
-    """The bounds of a link, p the parameters of its spline; links that follow joints alone stay as drawn."""
+def _bounds(link: DesignedLink) -> Callable[[np.ndarray], list[_Bound]]:
+    """The bounds of a link by the parameters of its spline; links that follow joints alone stay as drawn."""
     if link.follows:
-        return []
-    samples, bend = link.samples, link.samples.curvature(p)
-    least, most = link.bounds.thickness
+        return lambda p: []
+    samples, (least, most) = link.samples, link.bounds.thickness
     # thickness over its bound at each sample, for δ = 1
-    lower, upper = (np.broadcast_to(link.thickness / bound, samples.t.shape)[:, None] for bound in (least, most))
-    delta, by_p = samples.thickness(p)[:, None], samples.thickness_gradient
-    sharpest, name = Barrier(link.bounds.bend - 0.01, 0.01), f"curvature {link.bounds.bend:g}"
-    return [
-        _Bound(
-            f"least thickness {_span(least)}",
-            -(lower * delta)[:, 0],
-            lambda chosen: -lower[chosen] * by_p[chosen],
-            Barrier(-1.02, 0.02),
-        ),
-        _Bound(
-            f"largest thickness {_span(most)}",
-            (upper * delta)[:, 0],
-            lambda chosen: upper[chosen] * by_p[chosen],
-            Barrier(0.98, 0.02),
-        ),
-        _Bound(name, bend, lambda chosen: samples.curvature_gradient(p, chosen), sharpest),
-        _Bound(name, -bend, lambda chosen: -samples.curvature_gradient(p, chosen), sharpest),
-    ]
+    lower, upper = (np.broadcast_to(link.thickness / bound, samples.t.shape) for bound in (least, most))
+    by_lower, by_upper = (-lower[:, None] * samples.thickness_gradient, upper[:, None] * samples.thickness_gradient)
+    thin, thick = f"least thickness {_span(least)}", f"largest thickness {_span(most)}"
+    thinnest, thickest = Barrier(-1.02, 0.02), Barrier(0.98, 0.02)
+    sharpest, sharp = Barrier(link.bounds.bend - 0.01, 0.01), f"curvature {link.bounds.bend:g}"
+
+    def at(p: np.ndarray) -> list[_Bound]:
+        delta, bend = samples.thickness(p), samples.curvature(p)
+        return [
+            _Bound(thin, -lower * delta, lambda chosen: by_lower[chosen], thinnest),
+            _Bound(thick, upper * delta, lambda chosen: by_upper[chosen], thickest),
+            _Bound(sharp, bend, lambda chosen: samples.curvature_gradient(p, chosen), sharpest),
+            _Bound(sharp, -bend, lambda chosen: -samples.curvature_gradient(p, chosen), sharpest),
+        ]
+
+    return at
 
 
 def _span(bound: float | np.ndarray) -> str:

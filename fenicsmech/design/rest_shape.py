@@ -79,7 +79,7 @@ class ParametricShape:
         model: whose links change.
         shapes: handles and weights of these links.
         designs: how they may change.
-        numbers: that may change beside shapes.
+        numbers: that may change in addition to shapes.
 
     Attributes:
         links: the links whose shape changes.
@@ -178,7 +178,7 @@ class ParametricShape:
 
         Args:
             p: the design, (parameters,).
-            near: placement of a design near by.
+            near: placement of a nearby design.
 
         Raises:
             ShapeError: cells stay inverted however the handles are placed, or curved ones are squeezed, or a number is
@@ -255,7 +255,7 @@ class ParametricShape:
         return self._model.mesh.mesh.comm.allreduce(worst, op=MPI.MAX)
 
     def quality_penalty(self, barrier: Barrier, placement: HandlePlacement) -> tuple[float, np.ndarray]:
-        """Σ_e β(ρ_e) over the cells of the present rest shape that can deform, and its derivative by p."""
+        """Σ_e β(ρ_e) over the cells of the present rest shape that can deform, and its derivative ∂/∂p."""
         if barrier not in self._penalties:
             counts = self._deformable * self._shares[self._model.mesh.link]
             self._penalties[barrier] = QualitySum(self._straight, barrier.symbolic, counts=counts)

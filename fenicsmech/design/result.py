@@ -19,7 +19,7 @@ from fenicsmech.design.shape.shape_map import gather_links
 from fenicsmech.design.target import Comparison
 from fenicsmech.errors import DescriptionError, counted, point_text
 from fenicsmech.export import PinHole, write_step, write_stl
-from fenicsmech.files import atomic_write
+from fenicsmech.files import atomic_write, read_json
 from fenicsmech.mechanism import Disc, FlexibleLink, Scene, Units
 from fenicsmech.meshing import Isometry, LinkMesh, boundary_polygons, section_of
 from fenicsmech.model import Design
@@ -70,7 +70,7 @@ Value = float | tuple[float, ...]
 
 @dataclass(frozen=True)
 class PartValue:
-    """A target's quantity in the exported parts, meshed anew and finer.
+    """A target's quantity in the exported parts, remeshed with finer elements.
 
     Attributes:
         value: of the quantity.
@@ -105,11 +105,11 @@ class TargetResult:
             fine elements.
         corrected: their sum, with which the target is compared; the reached value alone of an optimisation without
             estimates. Of a simulation in plane stress it is the value in plane stress; ``Curve.corrected`` is that in
-            space.
-        error: of the corrected value, relative to the target's scale; of a bound how far it is missed, of a vector the
-            length of its error.
+            3D.
+        error: of the corrected value, relative to the target's scale; for a bound how far it is missed, for a vector
+            the length of its error.
         part: the same in the exported parts; None before ``DesignProblem.verify``, and of quantities that parts do not
-            have, as the length of a centreline.
+            have, such as displacements of points on them.
     """
 
     name: str
@@ -160,21 +160,21 @@ class DesignResult:
         links: the best shapes found.
         numbers: the best numbers found.
         targets: their results, in the order they were given.
-        reason: of the end of the optimisation, in words.
-        converged: whether it ended at a minimum.
+        reason: why the optimisation ended, in words.
+        converged: whether the optimisation ended at a minimum.
         verified: whether loading the mechanism from zero leads to the equilibria that were followed from design to
             design; the log says where not.
         active: the bounds that hold the design back, in words.
         objective: of the design at the start as the optimiser saw it, and of the best one with corrected values.
-        objective_error: part of the latter that is due to corrections.
-        surrogate: the space of the surrogate that led there; None if the simulation itself was minimised.
+        objective_error: part of the objective of the best design that is due to corrections.
+        surrogate: the space of the surrogate that led to this design; None if the simulation itself was minimised.
         corrections: largest change of the corrections after each round, over the targets' scales; of a surrogate that
             was given up first.
         iterations, evaluations: of the objective.
         mesh_ratio_max: largest circumradius over inradius among the cells that can deform.
         seconds: wall-clock time.
-        phases: the same by phase, on the first process: setup, weights, handles, regularisers, equilibria, gradients,
-            verification; the rest is the optimiser's own.
+        phases: wall-clock time by phase, on the first process: setup, weights, handles, regularisers,
+            equilibria, gradients, verification; the rest is the optimiser's own.
         processes, groups: their numbers.
         part_fidelity: at which the exported parts were simulated, in words; empty if they were not.
     """
@@ -298,18 +298,11 @@ class DesignResult:
         Raises:
             DescriptionError: the file does not exist, or does not hold a design.
         """
-        part = f"design {str(path)!r}"
+        data = read_json(path, "design", form=_FORMAT, remedy="Give a file written by DesignResult.save")
         try:
-            data = json.loads(Path(path).read_text(encoding="utf-8"))
-        except FileNotFoundError:
-            raise DescriptionError(part, "there is no such file", "Check its name") from None
-        except (UnicodeDecodeError, json.JSONDecodeError):
-            data = None
-        if not isinstance(data, dict) or data.pop("format", None) != _FORMAT:
-            raise DescriptionError(part, "it does not hold a design", "Give a file written by DesignResult.save")
-        try:
-            return read_result(data)
+            return read_result({key: value for key, value in data.items() if key != "format"})
         except (KeyError, TypeError) as error:
+            part = f"design {str(path)!r}"
             raise DescriptionError(part, f"it is incomplete ({error})", "Give an unchanged file") from None
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from math import inf, log
 from pathlib import Path
 from time import monotonic
@@ -25,7 +25,7 @@ from fenicsmech.design.regularisers import Regulariser
 from fenicsmech.design.rest_shape import ParametricShape
 from fenicsmech.design.target import Target
 from fenicsmech.errors import DescriptionError
-from fenicsmech.files import atomic_write
+from fenicsmech.files import atomic_write, read_json
 from fenicsmech.log import Progress
 from fenicsmech.simulation import Simulation
 
@@ -104,7 +104,7 @@ def _follow(comm: MPI.Comm, objective: Objective) -> None:
         raise failure
 
 
-_FORMAT = "fenicsmech checkpoint 4"
+_FORMAT = "fenicsmech checkpoint 5"
 
 
 @dataclass(frozen=True)
@@ -115,10 +115,10 @@ class Round:
         surrogate: whether the simulation is a surrogate.
         correction: of its values, (components,).
         changes: of the corrections so far, over the allowed ones.
-        largest: the same over the scales of the targets.
+        largest: the changes over the scales of the targets.
         started, initial: components at the start of the optimisation, (components,), and the objective there; empty
             and None before.
-        drawn: components to which the least quantities are relative, (components,); empty before the start.
+        drawn: components to which minimised quantities are relative, (components,); empty before the start.
     """
 
     surrogate: bool
@@ -137,7 +137,7 @@ class Saved:
     Attributes:
         start: of the next run.
         handles: positions θ there.
-        round: that was going on.
+        round: the one in progress.
         ended: reason for the end of its minimisation, and the optimiser; None if it was interrupted.
     """
 
@@ -177,7 +177,7 @@ class Checkpoint:
         """Local. The start saved in the file.
 
         Raises:
-            DescriptionError: the file does not exist, is not a checkpoint, or is one of another problem.
+            DescriptionError: the file does not exist, is not a checkpoint, or belongs to another problem.
         """
         data = self.read()
         memory = np.array(data["memory"], dtype=float)
@@ -202,22 +202,14 @@ class Checkpoint:
         Raises:
             DescriptionError: as ``load``.
         """
-        part = f"checkpoint {str(self.path)!r}"
-        try:
-            data = json.loads(self.path.read_text())
-        except FileNotFoundError:
-            raise DescriptionError(part, "there is no such file", "Start without resuming") from None
-        except (UnicodeDecodeError, json.JSONDecodeError):
-            data = None
-        if not isinstance(data, dict) or data.get("format") != _FORMAT:
-            raise DescriptionError(part, "it is not a checkpoint of this program", "Start without resuming")
+        data = read_json(self.path, "checkpoint", form=_FORMAT, remedy="Start without resuming")
         mine = json.loads(json.dumps(self.problem))
         if data["problem"] != mine:
             other = [key for key in mine if data["problem"].get(key) != mine[key]]
             raise DescriptionError(
-                part,
+                f"checkpoint {str(self.path)!r}",
                 f"it belongs to another problem, with other {', '.join(other)}",
-                "Resume with the options of the first run, or start anew",
+                "Resume with the options of the first run, or start without resuming",
             )
         return data
 
@@ -231,25 +223,55 @@ def fingerprint(
     surrogate: Simulation | None,
 ) -> dict[str, object]:
     """The problem, its optimiser and surrogate as plain data, with which a checkpoint must agree."""
-    fidelity, mechanism = simulation.fidelity, simulation.scene.mechanism
+    mechanism = simulation.scene.mechanism
+    parts = (mechanism.links, mechanism.joints, mechanism.motors)
     return {
         "mechanism": mechanism.name,
-        "space": fidelity.model.name,
-        "order": fidelity.order,
-        "sizes": list(fidelity.sizes.values()),
-        "effects": [repr(effect) for effect in simulation.scene.effects],
-        "drawing": [repr(link) for link in mechanism.flexible_links],
+        **_simulated(simulation),
+        "effects": plain_data(simulation.scene.effects),
+        "drawing": plain_data(parts),
         "links": [
             [link.name, *((i.name, i.isometry.mirrors) for i in link.images), link.spline.initial.tolist()]
             for link in rest.links
         ],
-        "bounds": [repr(link.bounds) for link in rest.links],
-        "numbers": [repr(own) for own in rest.numbers.numbers],
-        "targets": [repr(target) for target in targets],
-        "regulariser": repr(regulariser),
+        "bounds": plain_data([link.bounds for link in rest.links]),
+        "numbers": plain_data(rest.numbers.numbers),
+        "targets": plain_data(targets),
+        "regulariser": plain_data(regulariser),
         "optimiser": type(optimiser).__name__,
-        "surrogate": None if surrogate is None else surrogate.fidelity.model.name,
+        "surrogate": None if surrogate is None else _simulated(surrogate),
     }
+
+
+def _simulated(simulation: Simulation) -> dict[str, object]:
+    """What a simulation adds to its scene."""
+    own = simulation.fidelity
+    return {
+        "space": own.model.name,
+        "order": own.order,
+        "sizes": list(own.sizes.values()),
+        "elements": plain_data((own.layers, own.segments, own.quadrature, own.formulation)),
+        "shapes": plain_data(tuple(simulation.shapes.values())),
+        "materials": plain_data(simulation.model.materials),
+    }
+
+
+def plain_data(value: object) -> object:
+    """``value`` as data of JSON, the same in every run: objects by their attributes, functions by their names."""
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return [plain_data(pair) for pair in value.items()]
+    if isinstance(value, Sequence):
+        return [plain_data(own) for own in value]
+    if isinstance(value, Path):
+        return str(value)
+    if hasattr(value, "__qualname__"):
+        return value.__qualname__
+    names = [own.name for own in fields(value)] if is_dataclass(value) else list(getattr(value, "__dict__", ()))
+    return {"kind": type(value).__name__} | {name: plain_data(getattr(value, name)) for name in names}
 
 
 class DesignProgress:

@@ -1,9 +1,9 @@
 """Search from scattered starts: distinct optima, best first, and evidence where targets are out of reach.
 
 The starts are the drawn design and designs scattered evenly around it, by Latin hypercubes in units of typical lengths
-(McKay, Beckman & Conover 1979, doi:10.2307/1268522). Each is optimised for a few iterations; then the better half goes
-on and those that meet their targets, and the rest is given up unless it has ended before. A start depends on its number
-alone, so that results are the same however many processes share the starts.
+(McKay, Beckman & Conover 1979, doi:10.2307/1268522). Each is optimised for a few iterations; then the better half and
+the designs that meet their targets continue; the rest is given up unless it has already ended. A start depends on its
+number alone, so that results are the same however many processes share the starts.
 """
 
 from __future__ import annotations
@@ -19,39 +19,34 @@ from scipy.stats import qmc
 
 from fenicsmech.collective import on_all
 from fenicsmech.design.correction import Correction
-from fenicsmech.design.numbers import Number
 from fenicsmech.design.optimisers.problem import Optimiser, Reason
 from fenicsmech.design.regularisers import ShapeBounds
 from fenicsmech.design.rest_shape import DesignedLink, ParametricShape
 from fenicsmech.design.result import DesignResult, read_result
 from fenicsmech.design.run import Checkpoint
 from fenicsmech.design.shape.handle_optimum import HandlePlacement, ShapeError
-from fenicsmech.design.target import Target, check_targets
-from fenicsmech.elasticity import PLANE_STRESS, ElasticModel
-from fenicsmech.errors import DescriptionError, EquilibriumError, counted, positive
+from fenicsmech.errors import EquilibriumError, counted, positive, whole
 from fenicsmech.log import Progress
-from fenicsmech.mechanism import Strip
-from fenicsmech.model import Design, fits
+from fenicsmech.model import Design
 from fenicsmech.polygons import first_crossing
-from fenicsmech.simulation import Simulation
 
 
 @dataclass(frozen=True)
 class Scatter:
-    """Numbers of a search from scattered starts.
+    """Options of a search from scattered starts.
 
     Attributes:
         starts: their number, the drawn design included.
         spread: largest change of a parameter, in typical lengths: a link's thickness, and for numbers a tenth of the
-            interval between their bounds. Thicknesses and numbers change by half of the way to the nearer bound at
-            most.
+            interval between their bounds. Thicknesses and numbers change by at most half of the way to the nearer
+            bound.
         seed: other seeds give other starts.
-        attempts: most shapes tried for a start until one is feasible.
-        trial: iterations after which the worse half is given up, but for designs that meet their targets.
-        distinct: designs are one if no parameter differs by more typical lengths.
+        attempts: maximum number of shapes tried for a start until one is feasible.
+        trial: iterations after which the worse half is given up, except for designs that meet their targets.
+        distinct: two designs count as the same if no parameter differs by more typical lengths.
 
     Raises:
-        DescriptionError: a number makes no sense.
+        DescriptionError: a number is out of its range.
     """
 
     starts: int = 16
@@ -63,9 +58,7 @@ class Scatter:
 
     def __post_init__(self) -> None:
         for name, least in (("starts", 1), ("seed", 0), ("attempts", 1), ("trial", 1)):
-            value = getattr(self, name)
-            if not isinstance(value, int) or value < least:
-                raise DescriptionError("search", f"{name} is {value!r}", f"Give a whole number of at least {least}")
+            whole(f"{name} of a search", getattr(self, name), least=least)
         for name in ("spread", "distinct"):
             positive(f"{name} of a search", getattr(self, name))
 
@@ -78,7 +71,7 @@ class StartResult:
         number: 0 is the drawn design.
         rejected: shapes tried before it that were not feasible.
         failure: the reason why it has no value; None if it has.
-        given_up: whether it was ended early, for others were better.
+        given_up: whether it was ended early because others were better.
         result: the design it led to; None if it has no value.
     """
 
@@ -138,35 +131,8 @@ class SearchResult:
         return "\n".join([*lines, *(f"  {sentence}" for sentence in self.evidence)])
 
 
-def cheapest(simulation: Simulation, targets: Sequence[Target], numbers: Sequence[Number]) -> Simulation:
-    """The scene as drawn, in a plane model if targets and numbers fit too, elements as large as strips are thick."""
-    fidelity = simulation.fidelity
-    sizes = {
-        link: max(size, link.shape.thickness) if isinstance(link.shape, Strip) else size
-        for link, size in fidelity.sizes.items()
-    }
-
-    def at(model: ElasticModel) -> Simulation:
-        order, formulation = min(fidelity.order, 2), fidelity.formulation
-        return Simulation(
-            simulation.scene, space=model.name, order=order, size=sizes, formulation=formulation, comm=simulation.comm
-        )
-
-    if fidelity.model.dim == 3 and fits(simulation.scene, PLANE_STRESS):
-        try:
-            check_targets(flat := at(PLANE_STRESS), targets)
-            for number in numbers:
-                number.kind.check(flat.scene, flat.linkage.dim)
-            return flat
-        except DescriptionError:
-            pass  # a target names a part that a plane model does not have, or a number leaves the plane
-    return at(fidelity.model)
-
-
 class Searchable(Protocol):
     """A design problem on one process."""
-
-    targets: tuple[Target, ...]
 
     def rest_shape(self, design: np.ndarray) -> Design:
         """The design of parameters, or a ShapeError."""
@@ -213,9 +179,9 @@ class Search:
         """
         with Progress(2.0 * self._scatter.starts, "search", shown=self._comm.rank == 0) as progress:
             tried = self._shared("trial", self._tried, progress)
-            continued = better_half(tried, self._problem.targets)
+            continued = better_half(tried)
             ends = self._shared("end", lambda k: self._ended(tried[k], continued), progress)
-        return outcome(ends, self._problem.targets, self._rest.lengths, self._scatter.distinct)
+        return outcome(ends, self._rest.lengths, self._scatter.distinct)
 
     def _shared(self, stage: str, work: Callable[[int], StartResult], progress: Progress) -> list[StartResult]:
         """``work`` of all starts, each on one process, by number."""
@@ -259,7 +225,7 @@ class Search:
         return self._optimised(tried.number, tried.rejected, self._optimiser, tried.result)
 
     def _optimised(self, k: int, rejected: int, optimiser: Optimiser, start: DesignResult | np.ndarray) -> StartResult:
-        plain = Correction(estimates=False)  # which optimum is near does not depend on the last per cent
+        plain = Correction(estimates=False)  # the last per cent does not change which optimum is near
         try:
             result = self._problem.optimise(optimiser=optimiser, start=start, correction=plain)
             return StartResult(k, rejected, None, False, result)
@@ -320,47 +286,32 @@ def _meets_all(result: DesignResult) -> bool:
     return all(target.met for target in result.targets)
 
 
-def _ranks(results: Sequence[DesignResult], targets: Sequence[Target]) -> list[tuple[float, float]]:
-    """Sort keys: designs that violate no bound come first, then those of lower objective.
-
-    Least quantities, which an objective takes relative to its own start, are made relative to the first design's.
-    """
-    ranks = []
-    for result in results:
-        bounded = [abs(own.error) for own in result.targets if own.relation.startswith("at ") and not own.met]
-        value = result.objective[1]
-        for target, own, first in zip(targets, result.targets, results[0].targets, strict=True):
-            if target.relation == "least" and target.scale is None:
-                scale, common = (abs(float(np.sum(each.started))) or 1.0 for each in (own, first))
-                value += target.weight * float(np.sum(own.reached)) * (1.0 / common - 1.0 / scale)
-        ranks.append((max(bounded, default=0.0), value))
-    return ranks
+def _rank(result: DesignResult) -> tuple[float, float]:
+    """Sort key: designs that violate no bound come first, then those of lower objective."""
+    bounded = [abs(own.error) for own in result.targets if own.relation.startswith("at ") and not own.met]
+    return max(bounded, default=0.0), result.objective[1]
 
 
-def _ordered(starts: Sequence[StartResult], targets: Sequence[Target]) -> list[tuple[DesignResult, int]]:
+def _ordered(starts: Sequence[StartResult]) -> list[tuple[DesignResult, int]]:
     """The results of starts that have a value and are not given up, best first, with their numbers."""
     ended = [(start.result, start.number) for start in starts if start.result is not None and not start.given_up]
-    ranks = _ranks([result for result, _ in ended], targets)
-    order = sorted(range(len(ended)), key=lambda k: (ranks[k], ended[k][1]))
-    return [ended[k] for k in order]
+    return sorted(ended, key=lambda own: (_rank(own[0]), own[1]))
 
 
-def better_half(tried: Sequence[StartResult], targets: Sequence[Target]) -> set[int]:
+def better_half(tried: Sequence[StartResult]) -> set[int]:
     """Numbers of the better half of the starts that have a value, and of those that meet their targets."""
-    ordered = _ordered(tried, targets)
+    ordered = _ordered(tried)
     half = (len(ordered) + 1) // 2
     return {number for place, (result, number) in enumerate(ordered) if place < half or _meets_all(result)}
 
 
-def outcome(
-    starts: Sequence[StartResult], targets: Sequence[Target], lengths: np.ndarray, distinct: float
-) -> SearchResult:
+def outcome(starts: Sequence[StartResult], lengths: np.ndarray, distinct: float) -> SearchResult:
     """Distinct designs among the ends of starts, and evidence for targets out of reach.
 
     Raises:
         EquilibriumError: no start carries its loads.
     """
-    ended = _ordered(starts, targets)
+    ended = _ordered(starts)
     if not ended:
         raise EquilibriumError(
             "search",
@@ -393,7 +344,7 @@ def _distance(one: DesignResult, other: DesignResult, lengths: np.ndarray) -> fl
 
 
 def evidence(ended: Sequence[DesignResult], starts: int) -> tuple[str, ...]:
-    """A sentence for each target that no design meets, or one if none meets all at once; none if one does.
+    """A sentence for each target that no design meets, or one if no design meets all of them; none if one does.
 
     Bounds are named at which all designs end that miss the target by at most twice the least miss.
     """
@@ -414,14 +365,14 @@ def evidence(ended: Sequence[DesignResult], starts: int) -> tuple[str, ...]:
         )
         if common:
             best = "all" if len(near) == len(ended) else f"the {len(near)} nearest"
-            sentences.append(f"{missed}; {best} end at {', '.join(common)}: widen that, or want less")
+            sentences.append(f"{missed}; {best} end at {', '.join(common)}: widen that, or relax the target")
         else:
             most = "".join(f", {number} of {len(near)} end at {bound}" for bound, number in held.most_common(1))
             sentences.append(f"{missed}; no bound is common to them{most}: scatter more starts, or farther")
     if not sentences:
         worst = max(ended[0].targets, key=lambda target: abs(target.error))
         sentences.append(
-            f"each target is met by some design, but none meets all at once: the best misses {worst.name} by "
+            f"each target is met by some design, but no design meets all of them: the best misses {worst.name} by "
             f"{worst.error:+.2%}"
         )
     return tuple(sentences)

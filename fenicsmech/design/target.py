@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from fenicsmech.collective import on_one
 from fenicsmech.design.description import SplineDesign
 from fenicsmech.design.numbers import Number
 from fenicsmech.errors import DescriptionError, counted, expect, finite, positive, set_fields
@@ -28,28 +30,28 @@ class Target:
         Target(LinkMass(crank, density=1e-9), least=True)
         Target(push, force=4.0, displacement=5.0)
 
-    The last one is short for ``Target(Displacement(push), Sample({push: 4.0}), equals=5.0)``.
+    The last form is short for ``Target(Displacement(push), Sample({push: 4.0}), equals=5.0)``.
 
     Args:
         quantity: the quantity, or a force.
-        sample: the equilibrium it is asked of; none for quantities of links at rest.
+        sample: the equilibrium at which it is evaluated; none for quantities of links at rest.
         equals: wanted value; of a vector as many components as are wanted of it, counted from the first.
         at_most, at_least: bounds instead.
         least: the quantity is made as small as possible instead.
-        weight: of its squared relative error, or of the least quantity, in the objective.
+        weight: of its squared relative error, or of the minimised quantity, in the objective.
         scale: to which errors are relative, in the unit of the quantity. By default the wanted value's size |ū|, or a
-            tenth of the largest one wanted of quantities in the same unit where that is more; of the least quantity its
-            value as drawn.
+            tenth of the largest one wanted of quantities in the same unit where that is more; for a minimised quantity
+            its value as drawn, or at the start where the drawn design does not carry its loads.
         force, displacement, configuration: of the short form.
 
     Attributes:
         quantity, sample, weight: likewise.
         relation: "equals", "at most", "at least" or "least".
-        wanted: components of the wanted value or bound; empty for the least quantity.
+        wanted: components of the wanted value or bound; empty for a minimised quantity.
         scale: if it was given.
 
     Raises:
-        DescriptionError: a number makes no sense, or no relation is given.
+        DescriptionError: a number is invalid, or there is not exactly one relation.
     """
 
     quantity: Quantity
@@ -89,14 +91,14 @@ class Target:
         elif force is not None or displacement is not None or configuration != DRAWN:
             raise DescriptionError(
                 f"target of the {quantity}",
-                "force, displacement and configuration stand in its sample",
+                "force, displacement and configuration belong in its sample",
                 "Give Sample(…)",
             )
         part, relations = f"target of the {quantity}", {"equals": equals, "at most": at_most, "at least": at_least}
         given = {relation: value for relation, value in relations.items() if value is not None}
         if len(given) + bool(least) != 1:
             raise DescriptionError(
-                part, f"it says {len(given) + bool(least)} things", "Give one of equals, at_most, at_least and least"
+                part, f"it has {len(given) + bool(least)} relations", "Give one of equals, at_most, at_least and least"
             )
         relation, wanted = next(iter(given.items()), ("least", ()))
         numbers = tuple(wanted) if isinstance(wanted, Sequence) and not isinstance(wanted, str) else (wanted,)
@@ -127,18 +129,18 @@ class Target:
         return f"{self.quantity}{'' if self.sample is None else f' under {self.sample}'}"
 
     @property
-    def on_curve(self) -> tuple[float, float, Configuration] | None:
-        """Force, displacement and configuration of a point of a load–displacement curve, if it is one."""
+    def on_curve(self) -> tuple[Force, float, float, Configuration] | None:
+        """Force, magnitude, displacement and configuration of a point of a load–displacement curve, if it is one."""
         if self.sample is None or self.sample.moved or self.relation != "equals" or len(self.sample.forces) != 1:
             return None
         (force, magnitude), *_ = self.sample.forces
         if self.quantity != Displacement(force) or not isinstance(magnitude, float):
             return None
-        return magnitude, self.wanted[0], self.sample.configuration
+        return force, magnitude, self.wanted[0], self.sample.configuration
 
 
 class Comparison:
-    """Values of all components beside the wanted ones.
+    """Values of all components compared with the wanted ones.
 
     With the scale s and the weight w of a target, and the value v of a component,
 
@@ -149,12 +151,12 @@ class Comparison:
     Args:
         targets: all of them.
         units: of the scene.
-        drawn: values of all components as drawn, to which the least quantities are relative; 1 where not known.
+        drawn: values of all components as drawn, to which minimised quantities are relative; 1 where not known.
 
     Attributes:
         places: the components of each target.
         scales, scale_of: of the targets, (targets,), and of their components, (components,).
-        relative: whether a least quantity is relative to its drawn value.
+        relative: whether a minimised quantity is relative to its drawn value.
 
     Raises:
         DescriptionError: zero is wanted, and no scale is given.
@@ -184,7 +186,7 @@ class Comparison:
         return len(self._wanted)
 
     def relative_to(self, values: np.ndarray) -> Comparison:
-        """The same with the least quantities relative to those in ``values`` (components,)."""
+        """The same with minimised quantities relative to those in ``values`` (components,)."""
         return Comparison(self.targets, self._units, values)
 
     def residuals(self, values: np.ndarray) -> np.ndarray:
@@ -192,7 +194,7 @@ class Comparison:
         return (self._relative(values) * self._root)[self._equal]
 
     def plain(self, values: np.ndarray) -> float:
-        """Σ w v / s of the least quantities."""
+        """Σ w v / s of the minimised quantities."""
         return float(np.sum((self._relative(values) * self._root**2)[self._summed]))
 
     def inequalities(self, values: np.ndarray) -> np.ndarray:
@@ -233,7 +235,7 @@ class Comparison:
     def objective_error(self, values: np.ndarray, errors: np.ndarray) -> float:
         """Discretisation error of the objective, O(v + d) − O(v), from the errors d of the components.
 
-            O(v + d) − O(v) = Σ w (r d / s + ½ (d / s)²) over equals,     Σ w d / s over the least quantities.
+            O(v + d) − O(v) = Σ w (r d / s + ½ (d / s)²) over equals,     Σ w d / s over the minimised quantities.
 
         Far from the targets the first term counts, and the estimate is as good as those of the components; where
         targets are met the second one is left, whose factor is the square of theirs. R depends on the design alone.
@@ -266,7 +268,7 @@ def check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
     """Refuses targets whose parts ``simulation`` does not have, and those that cannot be compared with anything.
 
     Raises:
-        DescriptionError: a target is missing, or one of another mechanism; its size is not that of its quantity.
+        DescriptionError: a target is missing or belongs to another mechanism; its size is not that of its quantity.
         AssemblyError: a configuration does not assemble.
     """
     if not targets:
@@ -277,7 +279,7 @@ def check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
         part, size = f"target of the {target.quantity}", target.quantity.size(dim)
         if target.sample is not None:
             sample_request(simulation, target.sample, [target.sample.value])
-            assemble(simulation.linkage, target.sample.configuration)
+            on_one(simulation.comm, partial(assemble, simulation.linkage, target.sample.configuration))
         target.quantity.check(simulation.scene, dim)
         if len(target.wanted) > size or target.size == 1 < size:
             raise DescriptionError(
@@ -300,7 +302,7 @@ def sample_request(simulation: Simulation, sample: Sample, values: Sequence[floa
     """The request for the path of a sample through ``values`` of its part, if it makes sense for ``simulation``.
 
     Raises:
-        DescriptionError: a force or motor is one of another mechanism.
+        DescriptionError: a force or motor belongs to another mechanism.
     """
     return read_request(
         simulation.scene.mechanism,
@@ -341,7 +343,7 @@ def check_sensitivities(
             reason, remedy = "no force acts", "Give a force that is not zero"
         else:
             reason = f"{names} do not carry the force, or something rigid holds its point"
-            remedy = "Let links change that carry it, or give targets of another force"
+            remedy = "Let links that carry it change, or give targets for another force"
         raise DescriptionError(
             f"target of the {target.name}", f"it does not depend on what may change: {reason}", remedy
         )

@@ -1,4 +1,4 @@
-"""The equilibrium of one simulation as a guess of that of another one of the same scene, as space from plane stress.
+"""The equilibrium of one simulation as a guess of that of another one of the same scene, such as 3D from plane stress.
 
 Displacements of one mesh are read where the nodes of the other one are at rest, all through the depth of links where
 that is another dimension:
@@ -7,7 +7,7 @@ that is another dimension:
 
 Points are compared at rest, not by reference coordinates X₀: on another mesh handles settle elsewhere along a link,
 with the same outline. Displacements along Z and multipliers start at zero and come from the first step of Newton's
-method, whose number of steps guesses of them do not reduce.
+method; guesses of them would not save any steps.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def guess(model: MechanismModel, found: WholeState, like: State) -> State:
     Args:
         model: with the same flexible links and bodies.
         found: the other equilibrium.
-        like: a state of the model in the same configuration.
+        like: any state of the model in the same configuration.
     """
     owned, dim, points = model.interfaces.owned, found.rest.shape[2], _rest(model)
     u = np.zeros((owned, model.interfaces.block))

@@ -1,12 +1,12 @@
-"""Verification of designs in the parts to be made: their STEP files are meshed anew and finer, and loaded.
+"""Verification of designs in the parts to be made: their STEP files are remeshed with finer elements, and loaded.
 
 The samples are loaded from zero in elements as large as the optimiser's, where a snap on the way is found; their
 equilibria in smaller elements start from those.
 
-Values on the optimiser's mesh differ from those of the part by the elements, by the outline between the vertices of the
-mesh, and by the deformation of the mesh with the design. All three are in the difference of both values: the part
-has the outline of the exported file, its mesh has nothing in common with the optimiser's, and goal-oriented estimates
-give the error of the part's own mesh.
+Values on the optimiser's mesh differ from those of the part because of the elements, of the outline between the
+vertices of the mesh, and of the deformation of the mesh with the design. The difference of both values contains all
+three: the part has the outline of the exported file, its mesh has nothing in common with the optimiser's, and
+goal-oriented estimates give the error of the part's own mesh.
 """
 
 from __future__ import annotations
@@ -47,20 +47,19 @@ def part_simulations(
     folder: Path,
     finer: float,
     moved: Mapping[Joint, JointChange],
-) -> tuple[Simulation | None, Simulation]:
+) -> tuple[Simulation, Simulation]:
     """The scene with ``links`` read from the STEP files of their ``meshes``, which this writes to ``folder``.
 
     Joints are drawn where they are ``moved`` to. In space half the depth is meshed where the scene allows it: exported
     links are symmetric.
 
     Returns:
-        Simulations with elements as large as those of ``simulation``, None if that cannot be meshed, and with ``finer``
-        ones.
+        Simulations with elements as large as those of ``simulation``, and with ``finer`` ones; nothing is meshed yet.
 
     Raises:
         DescriptionError: a point of a force or an output is on one of the links, so that its place in the part is not
             known; or ``finer`` is not positive.
-        MeshingError: a part cannot be written or meshed in the finer elements.
+        MeshingError: a part cannot be written or read.
     """
     scene, finer = simulation.scene, positive("refinement of the part's mesh", finer)
     for point in (*scene.mechanism.forces, *scene.mechanism.outputs):
@@ -73,12 +72,10 @@ def part_simulations(
     on_one(simulation.comm, lambda: _write(folder, links, meshes, depths))
     files = zip(links, depths, strict=True)
     shapes = {link: step_file(solid_path(folder, link, ".step"), depth=depth) for link, depth in files}
-    fine = simulation.with_shapes(shapes, fidelity=_finer(simulation, finer), moved=moved)
-    try:
-        return simulation.with_shapes(shapes, fidelity=_finer(simulation, 1.0), moved=moved), fine
-    except MeshingError as failure:
-        _log.info("the exported parts are not meshed in elements of the optimiser's size: %s", failure)
-        return None, fine
+    coarse, fine = (
+        simulation.with_shapes(shapes, fidelity=_finer(simulation, factor), moved=moved) for factor in (1.0, finer)
+    )
+    return coarse, fine
 
 
 def _write(folder: Path, links: Sequence[FlexibleLink], meshes: Sequence[LinkMesh], depths: Sequence[float]) -> None:
@@ -98,18 +95,23 @@ def _finer(simulation: Simulation, factor: float) -> Fidelity:
 
 
 def verified_parts(
-    result: DesignResult, coarse: Simulation | None, fine: Simulation, targets: Sequence[Target]
+    result: DesignResult, coarse: Simulation, fine: Simulation, targets: Sequence[Target], links: Sequence[FlexibleLink]
 ) -> DesignResult:
     """The result with the values of its targets in the parts; without them, and a warning, where loads are not carried.
 
     Args:
         result: of ``targets``, in their order.
-        coarse: the scene with the links from the exported files, whose equilibria are guesses; None: there are none.
+        coarse: the scene with the links from the exported files, whose equilibria are guesses.
         fine: the same with the elements whose values count.
         targets: of the design problem.
+        links: that were exported.
+
+    Raises:
+        MeshingError: a part cannot be meshed in the finer elements.
     """
-    comparison, measured = Comparison(targets, fine.scene.units), [t for t in targets if t.quantity.of_part]
-    guesses = None if coarse is None else _guesses(coarse, result, measured)
+    comparison, known = Comparison(targets, fine.scene.units), [own.quantity.of_part(links) for own in targets]
+    measured = [target for target, own in zip(targets, known, strict=True) if own]
+    guesses = _guesses(coarse, result, measured)
     with _equilibria(fine, result, measured) as equilibria:
         try:
             solved = _in_finer_elements(equilibria, guesses)
@@ -117,13 +119,13 @@ def verified_parts(
             _log.warning("the exported parts do not reach all targets: %s", failure)
             return result
         found_values, found_errors = equilibria.values(solved), equilibria.errors(solved)
-    of_part = np.repeat([target.quantity.of_part for target in targets], [target.size for target in targets])
+    of_part = np.repeat(known, [target.size for target in targets])
     values, adds = (np.full(comparison.size, np.nan) for _ in range(2))
     values[of_part], adds[of_part] = found_values, found_errors
     errors, found = comparison.errors(values + adds), []
-    for own, target, place, error in zip(result.targets, targets, comparison.places, errors, strict=True):
+    for own, has, place, error in zip(result.targets, known, comparison.places, errors, strict=True):
         pair = component_values(values[place]), component_values(adds[place])
-        found.append(replace(own, part=PartValue(*pair, float(error)) if target.quantity.of_part else None))
+        found.append(replace(own, part=PartValue(*pair, float(error)) if has else None))
     fidelity = f"{fine.fidelity.model.name}, elements of {fine.fidelity.size_text} {fine.scene.units.length}"
     return replace(result, targets=tuple(found), part_fidelity=fidelity)
 
@@ -141,12 +143,12 @@ def _equilibria(part: Simulation, result: DesignResult, targets: Sequence[Target
 
 def _guesses(coarse: Simulation, result: DesignResult, targets: Sequence[Target]) -> dict[Sample, WholeState] | None:
     """Equilibria in the parts, loaded from zero; None where that fails, since finer elements may carry the loads."""
-    with _equilibria(coarse, result, targets) as equilibria:
-        try:
+    try:
+        with _equilibria(coarse, result, targets) as equilibria:
             return equilibria.whole(equilibria.from_zero())
-        except Infeasible as failure:
-            _log.info("the exported parts do not reach all targets in elements of the optimiser's size: %s", failure)
-            return None
+    except (Infeasible, MeshingError) as failure:
+        _log.info("the exported parts have no equilibria in elements of the optimiser's size: %s", failure)
+        return None
 
 
 def _in_finer_elements(equilibria: SampleEquilibria, guesses: Mapping[Sample, WholeState] | None) -> DesignEquilibria:

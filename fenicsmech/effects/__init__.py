@@ -1,4 +1,4 @@
-"""Effects on a mechanism beside its links, joints and forces, one per file.
+"""Effects on a mechanism in addition to its links, joints and forces, one per file.
 
 - ``link_fields``: the fields of links' energies, and parts of links' boundaries
 - ``force_region``: averages over regions of links, which forces act on

@@ -3,9 +3,8 @@
     V = Σ_links ∫ ½ κ ⟨−g(x)⟩² dA + Σ_points ½ k ⟨−g(x)⟩²,     x = X + u,
 
 g the signed gap, positive outside, 0 on the surface, negative inside an obstacle, and ⟨·⟩ the positive part. The
-pressure κ ⟨−g⟩ pushes a link out along ∇g. V is once continuously differentiable, its second derivative jumps where
-points come into contact: Newton's method is semismooth there. Where it does not settle, the pressures become unknowns
-of an interior-point iteration (``one_sided``), which ends at the same equilibrium.
+pressure κ ⟨−g⟩ pushes a link out along ∇g. V is once continuously differentiable; its second derivative jumps where
+points come into contact: Newton's method is semismooth there.
 """
 
 from __future__ import annotations
@@ -149,17 +148,14 @@ class Contact(Effect):
             rigid links force per penetration k of each point; must be given.
         points: of a rigid link as drawn.
 
-    κ is the stiffness of a thin soft layer on the obstacle, not a numerical remedy: under the pressure p links sink in
-    by p / κ, and obstacles come out the harder the larger κ is. The number of iterations hardly depends on it. Points
-    of rigid links stay springs: few, they settle within a few iterations, and their forces enter as those of a
-    ``PosePotential``. Obstacles
-    act once the motors have moved: a configuration whose rigid assembly is on the far side of an obstacle stays there.
-    Afterwards flexible links cannot slip through a cylinder: states with a penetration of a quarter of its radius are
-    rejected. In space a pressed edge is also pressed on its flat faces inside the obstacle, with an error of
+    Penetration falls as 1 / stiffness, while Newton's method takes more iterations where contact changes. Obstacles act
+    only after the motors have moved: a configuration whose rigid assembly is on the far side of an obstacle stays
+    there. From then on flexible links cannot slip through a cylinder: states with a penetration of a quarter of its
+    radius are rejected. In space a pressed edge is also pressed on its flat faces inside the obstacle, with an error of
     the order of penetration over depth.
 
     Raises:
-        DescriptionError: a number makes no sense, or a field that a link of this kind needs is missing.
+        DescriptionError: a number is invalid, or a field that a link of this kind needs is missing.
     """
 
     link: Link

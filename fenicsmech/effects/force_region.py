@@ -13,9 +13,9 @@ facet, of the degree of u: for all v of that degree
 
     ∫ 1_R v dA = ∫_R v dA,
 
-whatever the elements' size. A disc counts as the regular polygon of the same area. What a half-plane leaves of
-a simplex are simplices again: edges that cross its border are bisected there until none does. In curved elements the
-border of R is drawn as if they were straight.
+whatever the elements' size. A disc counts as the regular polygon of the same area. The part of a simplex in a
+half-plane is divided into simplices: edges that cross its border are split there until none does. In curved elements
+the border of R is drawn as if they were straight.
 """
 
 from __future__ import annotations

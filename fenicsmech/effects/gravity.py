@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import ufl
 
-from fenicsmech.errors import DescriptionError, in_plane, point, positive, set_fields
+from fenicsmech.errors import DescriptionError, expect, in_plane, point, positive, set_fields
 from fenicsmech.mechanism import Effect, RigidLink, in_dimension
 from fenicsmech.multibody import BodyPoint, PosePotential
 
@@ -47,14 +47,17 @@ class Gravity(Effect):
         masses: of rigid links.
 
     Raises:
-        DescriptionError: the acceleration is not a vector; when it is simulated: nothing has weight, or the mass of a
-            link is given that is not a rigid link of the mechanism.
+        DescriptionError: the acceleration is not a vector, or a mass is not a ``Mass``; when it is simulated: nothing
+            has weight, or a mass is given for something that is not a rigid link of the mechanism.
     """
 
     acceleration: tuple[float, ...]
     masses: Mapping[RigidLink, Mass] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        expect("gravity", self.masses, Mapping, "a mapping of rigid links", "Give masses={link: Mass(…)}")
+        for link, mass in self.masses.items():
+            expect(f"gravity on {getattr(link, 'name', link)!r}", mass, Mass, "a mass", "Give Mass(mass, at=…)")
         set_fields(self, acceleration=point("acceleration of gravity", self.acceleration))
 
     def check(self, mechanism, dim):

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fenicsmech.errors import DescriptionError, positive, set_fields
+from fenicsmech.errors import DescriptionError, expect, positive, set_fields
 from fenicsmech.mechanism import Effect, Joint
 
 
@@ -26,13 +26,14 @@ class JointCompliance(Effect):
         compliance: c; with N and mm in mm/N.
 
     Raises:
-        DescriptionError: the compliance is not positive.
+        DescriptionError: this is not a joint, or the compliance is not positive.
     """
 
     joint: Joint
     compliance: float
 
     def __post_init__(self) -> None:
+        expect("joint compliance", self.joint, Joint, "a joint")
         set_fields(self, compliance=positive(f"compliance of {self.joint.name!r}", self.compliance))
 
     def check(self, mechanism, dim):

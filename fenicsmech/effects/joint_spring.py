@@ -3,7 +3,8 @@
     V = ½ k (φ − φ₀)² = ½ k φ² − k φ₀ φ + const.
 
 The first term holds the mechanism from the start, the second grows with the load factor of constant
-loads, which takes the rest position from 0 to φ₀.
+loads, which takes the rest position from 0 to φ₀. Displacements count from the equilibrium with the first term alone,
+in which the links are strained where motors have wound the spring up.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from math import pi
 
 import numpy as np
 
-from fenicsmech.errors import DescriptionError, finite, positive, set_fields
+from fenicsmech.errors import DescriptionError, expect, finite, positive, set_fields
 from fenicsmech.mechanism import Effect, Joint
 from fenicsmech.multibody import JointCoordinate, PosePotential
 
@@ -23,7 +24,7 @@ class JointSpring(Effect):
     """A torsion spring on a revolute joint, or a spring along a prismatic one.
 
     The coordinate φ is that of a motor: the angle (rad) or travel of the joint's second link, zero as drawn. In the
-    plane angles count full turns; in space they hold for |φ| < 2π.
+    plane angles count full turns; in space they hold for |φ| < 2π, and paths that go beyond end with an error.
 
     Attributes:
         joint: a revolute or prismatic joint.
@@ -31,7 +32,7 @@ class JointSpring(Effect):
         rest: φ₀, where the spring is relaxed; rad or length.
 
     Raises:
-        DescriptionError: a number makes no sense.
+        DescriptionError: this is not a joint, or a number is invalid.
     """
 
     joint: Joint
@@ -39,6 +40,7 @@ class JointSpring(Effect):
     rest: float = 0.0
 
     def __post_init__(self) -> None:
+        expect("joint spring", self.joint, Joint, "a joint")
         set_fields(self, stiffness=positive(f"stiffness of {self._name}", self.stiffness))
         set_fields(self, rest=finite(f"rest position of {self._name}", self.rest))
 
@@ -53,7 +55,7 @@ class JointSpring(Effect):
         if dim == 3 and not self.joint.kind.sliding and abs(self.rest) >= 2.0 * pi:
             raise DescriptionError(
                 self._name,
-                f"in space angles stay within a full turn, the rest angle is {self.rest:g} rad",
+                f"in 3D angles stay within a full turn, and the rest angle is {self.rest:g} rad",
                 "Wind the spring up by less than 2π, or simulate in the plane",
             )
 
@@ -83,6 +85,9 @@ class _Stiffness(PosePotential):
 
     def gradient(self, poses):
         return self.numbers["stiffness"] * self.gradient_by("stiffness", poses)
+
+    def check_step(self, before, after):
+        self._coordinate.check_step(before, after)
 
     def hessian(self, poses):
         slope, hessian = self._coordinate.gradient(poses), self._coordinate.hessian(poses)

@@ -48,7 +48,7 @@ class Boundary:
         sides: which corners of their cells are theirs, (facets, dim).
         corners: numbers of these in the whole mesh, the same on all ranks, (facets, dim).
         places: of these, (facets, dim, dim).
-        joined: whether these lie on a mid-plane, where the boundary goes on in its mirror image, (facets, dim).
+        joined: whether these lie on a mid-plane, where the boundary continues in its mirror image, (facets, dim).
         measures: ufl measures whose sum covers them.
     """
 
@@ -129,7 +129,7 @@ class LinkFields:
 
         Args:
             name: of the effect's attribute.
-            value: of that attribute; factors belong beside the field.
+            value: of that attribute; factors belong outside the field.
             links: that have it.
 
         Raises:
@@ -138,8 +138,8 @@ class LinkFields:
         if name in self.numbers:
             raise DescriptionError(
                 f"number {name!r} of an effect",
-                "its energy asks for the field twice",
-                "Ask once, for all links that have it, and use the field again",
+                "its energy makes this field twice",
+                "Make it once, for all links that have it, and use the field again",
             )
         chosen = np.array([links is None or link in links for link in self.links])
         known = f"{name}, number {len(self.body.numbers)}"  # other effects may use the same name
@@ -219,7 +219,7 @@ def find_boundaries(
         of_link = owner == links.index(part.link)
         within[:, k] = of_link
         if part.where is not None:
-            inside = _on_all_ranks(mesh.comm, part.where, every.places[of_link].reshape(-1, dim))
+            inside = _on_all_ranks(mesh.comm, part, every.places[of_link].reshape(-1, dim))
             within[of_link, k] &= inside.reshape(-1, dim).all(axis=1)
     kinds = sorted(set().union(*mesh.comm.allgather({tuple(row) for row in within.tolist() if any(row)})))
     tag = {kind: number for number, kind in enumerate(kinds, start=1)}
@@ -240,11 +240,23 @@ def find_boundaries(
     return boundaries
 
 
-def _on_all_ranks(comm: MPI.Comm, where: Callable[[np.ndarray], np.ndarray], places: np.ndarray) -> np.ndarray:
-    """``where`` at this rank's ``places``, called with those of all ranks, as it may compare them."""
+def _on_all_ranks(comm: MPI.Comm, faces: Faces, places: np.ndarray) -> np.ndarray:
+    """The predicate of ``faces`` at this rank's ``places``, called with those of all ranks, as it may compare them.
+
+    All ranks refuse it alike where it is not one of rows.
+    """
+    assert faces.where is not None
     everywhere = comm.allgather(places)
+    points = np.concatenate(everywhere)
+    inside = np.asarray(faces.where(points))
+    if inside.shape != points.shape[:1] or inside.dtype != bool:
+        raise DescriptionError(
+            f"boundary of link {faces.link.name!r}",
+            f"the predicate gives {inside.dtype} of shape {inside.shape} for points of shape {points.shape}",
+            "Points are rows, unlike those of dolfinx, and a boolean is wanted for each: lambda x: x[:, 0] > 5",
+        )
     before = sum(len(others) for others in everywhere[: comm.rank])
-    return np.asarray(where(np.concatenate(everywhere)), dtype=bool)[before : before + len(places)]
+    return inside[before : before + len(places)]
 
 
 def exterior_facets(mesh: dmesh.Mesh, *, half: bool) -> Boundary:

@@ -9,7 +9,7 @@ vanishes
 - where the rim is held,
 - in the plane, where its ends move along lines through x₀, as on an axis of symmetry,
 - in space, where it moves within planes through x₀ that it lies in, as on a plane of symmetry; with an axis x₀, within
-  planes z = const. that it lies in: motions along z meet the load on a hole closed by plugs.
+  planes z = const. that it lies in: motions along z would feel the load on plugs that close the hole.
 
 With other rims the load has no potential: its work depends on the path.
 """
@@ -41,7 +41,7 @@ class Pressure(Effect):
             axis along z, which suits holes through extruded links, and their sides.
 
     Raises:
-        DescriptionError: a number makes no sense, or the link is not flexible. Later, when it is meshed: the part is
+        DescriptionError: a number is invalid, or the link is not flexible. Later, when it is meshed: the part is
             open without a point to go ``about``, or empty.
     """
 

@@ -50,6 +50,6 @@ class Prestrain(Effect):
             raise DescriptionError(
                 f"prestrain of {self.link.name!r}",
                 "in all directions it would also strain the depth, which plane strain forbids",
-                "Give along=…, or simulate in plane stress or in space",
+                "Give along=…, or simulate in plane stress or in 3D",
             )
         return {self.link: Stretch(self.stretch, self.along and in_dimension(self.along, model.dim))}

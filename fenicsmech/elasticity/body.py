@@ -85,7 +85,7 @@ class ElasticBody(BodyFields):
         return found
 
     def contraction_energy(self, a, v, p, q, *, degree: int) -> ufl.Form:
-        """What links in plane stress store if they contract by a instead of h = F₃₃ − 1, and curl across by v.
+        """Energy of links in plane stress that contract by a instead of h = F₃₃ − 1 and curl across their depth by v.
 
         ½ ∫ E ((a − p)² − 2 q h) + μ b²/12 |∇a − Fᵀv|² + b⁴/720 E/(1 − ν²) ((1 − ν) G : G + ν (tr G)²) dV
 
@@ -146,7 +146,7 @@ class ElasticBody(BodyFields):
 
     @cached_property
     def _load_factor_forms(self) -> list:
-        """The derivatives of ``residual_forms`` by the load factor; only growth has one of ∂E/∂p."""
+        """The derivatives of ``residual_forms`` with respect to the load factor; only growth has one of ∂E/∂p."""
         terms = [self.effects_ufl] if self.effects_ufl is not None else []
         if self.growth is not None:
             terms.append(ufl.diff(self._strain_ufl, self.growth.load_factor))
@@ -186,7 +186,7 @@ class ElasticBody(BodyFields):
         return self.effects_ufl is not None or self.growth is not None
 
     def load_factor_residuals(self) -> np.ndarray:
-        """The derivative of ``residuals`` by the load factor."""
+        """The derivative of ``residuals`` with respect to the load factor."""
         found = np.zeros(len(self.values()))
         for part, form, work in zip(self.split(found), self._load_factor_forms, self._sums, strict=False):
             part[:] = assemble_vector(form, work)

@@ -124,7 +124,7 @@ class BodyFields:
         model: 3D, whole or half, plane strain or plane stress.
         order: degree of the displacement field.
         quadrature: explicit degree; never UFL's estimate.
-        effects: energies beside the elastic one, as functions of this body.
+        effects: energies in addition to the elastic one, as functions of this body.
         stretches: of the strain-free state of each link, None where it is as drawn.
         bulge: c, by which curved cells differ from straight ones; None if all are straight.
         mixed: whether each link is in the u–p formulation.
@@ -249,7 +249,7 @@ class BodyFields:
         return [self.u] if self.pressure is None else [self.u, self.pressure.p]
 
     def values(self) -> np.ndarray:
-        """This rank's owned values of u, and of p behind them, flat."""
+        """This rank's owned values of u, then those of p, flat."""
         return np.concatenate([owned_values(field) for field in self.fields])
 
     def split(self, values: np.ndarray) -> list[np.ndarray]:
@@ -258,7 +258,7 @@ class BodyFields:
         return np.split(values, ends[:-1])
 
     def take(self, values: np.ndarray) -> None:
-        """Sets the owned values of u, and of p behind them, flat; ghosts follow in ``update``."""
+        """Sets the owned values of u, then of p, flat; ghosts follow in ``update``."""
         for field, own in zip(self.fields, self.split(values), strict=True):
             owned_values(field)[:] = own
 

@@ -19,12 +19,11 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from numbers import Integral
 
 from ufl import Identity, as_matrix, det, diff, dot, inner, tr, variable
 from ufl.core.expr import Expr
 
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, whole
 from fenicsmech.laws import Law, NeoHookean, Strain, spatial_strain
 from fenicsmech.mechanism import Material
 
@@ -198,7 +197,7 @@ class MixedFormulation(Formulation):
             if mixed and not material.law.has_mixed_energy:
                 raise DescriptionError(
                     f"material {material.name!r}",
-                    f"ν = {material.law.nu:g} asks for the u–p formulation, and its law "
+                    f"ν = {material.law.nu:g} requires the u–p formulation, and its law "
                     f"{type(material.law).__name__} has no mixed_energy",
                     "Derive the law from SplitLaw, or use formulation=DisplacementFormulation()",
                 )
@@ -216,8 +215,7 @@ class Quadrature:
     degree: int
 
     def __post_init__(self) -> None:
-        if not isinstance(self.degree, Integral) or self.degree < 1:
-            raise DescriptionError("quadrature", f"degree {self.degree!r}", "Give a whole number of at least 1")
+        whole("degree of the quadrature", self.degree, least=1)
 
     @staticmethod
     def for_order(order: int, dim: int) -> Quadrature:

@@ -48,7 +48,7 @@ class PointLoad:
 
 
 class BorderTerms:
-    """Values, gradients and Hessian entries of L_b, of a ``controlled`` load and ``constant`` ones with magnitudes."""
+    """Values, gradients and Hessian entries of L_b, of a ``controlled`` load and ``constant`` ones."""
 
     def __init__(
         self,
@@ -56,14 +56,14 @@ class BorderTerms:
         joints: JointSystem,
         numbering: Numbering,
         controlled: PointLoad,
-        constant: tuple[tuple[PointLoad, float], ...],
+        constant: Sequence[PointLoad],
         *,
         potentials: Sequence[PosePotential],
         compliances: np.ndarray,
         idle: Sequence[IdleSpin],
     ) -> None:
         self._elastic, self._joints, self._numbering = elastic, joints, numbering
-        self._controlled, self._constant = controlled, constant
+        self._controlled, self._constant = controlled, tuple(constant)
         self._potentials = [(potential, self._places(potential)) for potential in potentials]
         self._compliances, self._idle = compliances, tuple(idle)
 
@@ -75,7 +75,7 @@ class BorderTerms:
 
     def work(self, state: State, force: float) -> float:
         """Σ f_k (a_k · u_k) + f (a · u_P) with ``force`` for f."""
-        constant = sum(magnitude * self.travel(load, state) for load, magnitude in self._constant)
+        constant = sum(magnitude * self.travel(load, state) for load, magnitude in self._held(state))
         return force * self.travel(self._controlled, state) + state.load_factor * constant
 
     def pose_potential(self, state: State) -> float:
@@ -86,7 +86,14 @@ class BorderTerms:
 
     def loads(self, state: State) -> list[tuple[PointLoad, float]]:
         """All loads with their magnitudes at ``state``. Local."""
-        return [(self._controlled, state.force), *((load, state.load_factor * size) for load, size in self._constant)]
+        return [
+            (self._controlled, state.force),
+            *((load, state.load_factor * size) for load, size in self._held(state)),
+        ]
+
+    def _held(self, state: State) -> list[tuple[PointLoad, float]]:
+        """The constant loads with their magnitudes f_k."""
+        return list(zip(self._constant, state.constant.tolist(), strict=True))
 
     def load_forces(self, loads: Iterable[tuple[PointLoad, float]], state: State) -> tuple[np.ndarray, np.ndarray]:
         """Σ magnitude · ∂(a · u_P) over ``loads``. Local."""
@@ -110,7 +117,7 @@ class BorderTerms:
 
     def load_factor_rate(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """−∂²L_b/∂(u, z)∂σ. Local."""
-        links, border = self.load_forces(self._constant, state)
+        links, border = self.load_forces(self._held(state), state)
         weights = self._pose_gradient(state, lambda potential: float(not potential.holds))
         self._numbering.rows.restrict_border(border).poses[:] -= weights
         return links, border
@@ -173,7 +180,8 @@ class BorderTerms:
     def pattern(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Pattern of ``entries``, as (global rows, global columns). Local."""
         joints, dim = self._joints, self._joints.space.dim
-        drawn = State(np.zeros(0), joints.drawn, np.zeros(joints.rows), 0.0, np.zeros(len(joints.connections)))
+        motors, constant = np.zeros(len(joints.connections)), np.zeros(len(self._constant))
+        drawn = State(np.zeros(0), joints.drawn, np.zeros(joints.rows), 0.0, motors, constant=constant)
         moments = {body: np.zeros((dim, dim)) for body in joints.columns}
         scale = np.ones(self._numbering.unknowns.border.size)
         for control in (LoadControl(0.0), DisplacementControl(0.0)):

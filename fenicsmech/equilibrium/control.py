@@ -179,7 +179,7 @@ class DisplacementControl(Control):
 
 @dataclass(frozen=True, eq=False)
 class MotorControl(Control):
-    """Motors stand at ``origin`` + ``prescribed`` · ``direction`` and the others where they are; the force keeps its
+    """Motors are at ``origin`` + ``prescribed`` · ``direction``, the others where they were; the force keeps its
     magnitude.
 
     Attributes:

@@ -210,8 +210,8 @@ def create_extended_matrix(
 class EntryCopy:
     """A matrix by entries that follows one ``blocked`` by nodes, whose pattern does not change any more.
 
-    PETSc's conversion finds the place of each entry anew, which is slow beside the assembly. Here it is asked once,
-    with the numbers of the entries for values; from then on values are copied in that order.
+    PETSc's conversion searches for the place of each entry every time, which is slow compared with the assembly. Here
+    it is called once, with the numbers of the entries as values; from then on values are copied in that order.
 
     Attributes:
         matrix: its copy by entries, valid after an ``update``.

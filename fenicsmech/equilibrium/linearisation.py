@@ -26,6 +26,7 @@ from fenicsmech.equilibrium.control import Control, MotorControl, Stability
 from fenicsmech.equilibrium.kkt import KktMatrix
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
+from fenicsmech.errors import OutOfMemoryError
 
 _ACCURACY = 1e-10  # relative error that iterative solvers may leave
 
@@ -43,7 +44,11 @@ class LinearSolver(ABC):
 
     @abstractmethod
     def refactor(self) -> bool:
-        """Factors the matrix's current values; whether this succeeded."""
+        """Factors the matrix's current values; whether this succeeded.
+
+        Raises:
+            OutOfMemoryError: memory does not suffice, whatever the values.
+        """
 
     @abstractmethod
     def solve(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float) -> bool:
@@ -82,35 +87,64 @@ _MUMPS = {
     7: 2,  # ordering AMF: fewest operations on slender links (Debian's MUMPS has neither METIS nor SCOTCH)
     12: 2,  # order the graph compressed by likely 2 × 2 pivots
     13: 1,  # root front factored by one process: exact inertia in parallel
-    14: 60,  # per cent of workspace beyond the estimate, for delayed pivots
     24: 1,  # detect null pivots instead of failing on them
 }
 """Controls ICNTL of MUMPS that differ from its own defaults."""
 
+_SMALL_WORKSPACE = (-8, -9, -17, -20)
+"""Values of INFOG(1): delayed pivots need more than the workspace, or a message more than the buffer."""
+
+_OUT_OF_MEMORY = (*_SMALL_WORKSPACE, -5, -7, -13, -19)
+"""Values of INFOG(1): an allocation failed, or memory beyond ICNTL(23) is needed."""
+
 
 class Factor(LinearSolver):
-    """MUMPS LDLᵀ of a matrix whose pattern does not change: the symbolic analysis is reused."""
+    """MUMPS LDLᵀ of a matrix whose pattern does not change: the symbolic analysis is reused.
 
-    def __init__(self, matrix: PETSc.Mat) -> None:
-        self._matrix, self._fresh = matrix, True
+    Args:
+        matrix: of any values.
+        workspace: per cent beyond the estimate of MUMPS, for delayed pivots; it grows where that does not suffice.
+
+    Attributes:
+        remedy: where memory does not suffice.
+    """
+
+    remedy = "Use larger elements, or more memory"
+
+    def __init__(self, matrix: PETSc.Mat, workspace: int = 60) -> None:
+        self._matrix, self._workspace, self._fresh = matrix, workspace, True
+        self._solver = PETSc.KSP()
         self._analyse()
 
     def refactor(self) -> bool:
-        done = self._numeric()
-        if not self._fresh and not (done and self.inertia().zero == 0):
+        status = self._numeric()
+        if not self._fresh and not (status >= 0 and self.inertia().zero == 0):
             # the analysis pairs unknowns by their present values: in later ones a pair may be zero, the matrix regular
-            self._solver.destroy()
             self._analyse()
-            done = self._numeric()
+            status = self._numeric()
+        for _ in range(3):
+            if status not in _SMALL_WORKSPACE:
+                break
+            # twice as much as before; PETSc repeats no factorisation that failed so
+            self._workspace = 2 * self._workspace + 100
+            self._analyse()
+            status = self._numeric()
         self._fresh = False
-        return done
+        if status in _OUT_OF_MEMORY:
+            raise OutOfMemoryError(
+                f"factor of a matrix of {self._matrix.size[0]} unknowns",
+                f"MUMPS has too little memory (INFOG(1) = {status})",
+                self.remedy,
+            )
+        return status >= 0
 
     def _analyse(self) -> None:
         """A new solver, which orders and pairs the unknowns by the first values it factors."""
+        self._solver.destroy()
         # the only way that reaches all of MUMPS's controls, the ordering among them
         prefix = "fenicsmech_kkt_"
         options = PETSc.Options(prefix)
-        for number, value in _MUMPS.items():
+        for number, value in {**_MUMPS, 14: self._workspace}.items():
             options[f"mat_mumps_icntl_{number}"] = value
         self._solver = PETSc.KSP().create(self._matrix.comm)
         self._solver.setOptionsPrefix(prefix)
@@ -122,20 +156,12 @@ class Factor(LinearSolver):
         self._solver.setFromOptions()
         self._fresh = True
 
-    def _numeric(self) -> bool:
+    def _numeric(self) -> int:
+        """Factors the present values; INFOG(1) of MUMPS, the same on all ranks, negative where that failed."""
         self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        for _ in range(4):
-            self._solver.setOperators(self._matrix)
-            self._solver.getPC().setUp()
-            mumps = self._solver.getPC().getFactorMatrix()
-            status = mumps.getMumpsInfog(1)
-            if status >= 0:
-                return True
-            if status not in (-8, -9):  # the integer or real workspace is too small
-                return False
-            mumps.setMumpsIcntl(14, 2 * mumps.getMumpsIcntl(14))
-            self._matrix.stateIncrease()  # marks the values as new
-        return False
+        self._solver.setOperators(self._matrix)
+        self._solver.getPC().setUp()
+        return self._solver.getPC().getFactorMatrix().getMumpsInfog(1)
 
     def inertia(self) -> Inertia:
         mumps = self._solver.getPC().getFactorMatrix()
@@ -154,6 +180,11 @@ class Factor(LinearSolver):
 
 class _KktFactor(Factor):
     """The factor of the whole KKT matrix, formed on demand."""
+
+    remedy = (
+        "Use larger elements, more memory or machines, or PrimalDualNewton(linear=TwoLevel()) with elements of order "
+        "2 or 3 in space"
+    )
 
     def __init__(self, kkt: KktMatrix) -> None:
         self._kkt = kkt
@@ -254,7 +285,7 @@ class Linearisation:
     def point(self, residuals: Sequence[float], iterations: int, *, tolerance: float = _ACCURACY) -> EquilibriumPoint:
         """The equilibrium at this state, with its tangent and stability, from one solve; raises as ``solve``.
 
-        Its multipliers are without self-stress, which is of rounding, and which predictions would amplify.
+        Its multipliers contain no self-stress: that is due to rounding, and predictions would amplify it.
         """
         self._check()
         self._turn()
@@ -281,7 +312,7 @@ class Linearisation:
         return self._system.travel_slopes(self._system.controlled, self.state)[0]
 
     def transpose(self, links: np.ndarray, border: np.ndarray) -> PETSc.Vec:
-        """Gᵀ of a gradient by this rank's (u, p), (owned dofs,), and by (z, λ, f), (border,)."""
+        """Gᵀ of a gradient with respect to this rank's (u, p), (owned dofs,), and to (z, λ, f), (border,)."""
         self._turn()
         return self._system.unknowns.apply_transpose(links, border)
 
@@ -319,7 +350,7 @@ class Adjoint:
         at: the linearisation it was solved with.
         x: in the scaled unknowns of the system.
         nodal: ∂u/∂y x, so that forces δF on the links change Q by nodal · δF: this rank's owned values at the nodes of
-            u, and of pressures behind them, flat.
+            u, then those of pressures, flat.
         poses: ∂z/∂y x of the bodies' poses z, (size,).
         multipliers: the part of the multipliers λ, (rows,).
         load: the part of the controlled force.

@@ -12,25 +12,26 @@ the augmented Lagrangian
 
     Φ(s) = E(s) − λᵀC + ½ ρ_m |C + cλ|²  at the new multipliers λ, with the compliance c of joints,
 
-and at the new pressures p, with ½ ρ_m |∂E/∂p|² beside it.
+and at the new pressures p, with the additional term ½ ρ_m |∂E/∂p|².
 
 Slender links are far softer in bending than in tension, so a good step may raise every merit for a few iterations:
-steps are taken in full as long as a watchdog allows, then the iteration returns to its best state and searches the
-line. For the same reason ∇²L holds, far from equilibrium, the stress that the last step solved for instead of the one
+steps are taken in full as long as a watchdog allows, then the iteration returns to its best state and applies a line
+search. For the same reason ∇²L holds, far from equilibrium, the stress that the last step solved for instead of the one
 its displacements led to (``elasticity.PredictedStress``): fewer iterations, and longer steps converge.
 
 Close to convergence the factor of the KKT matrix K is reused (simplified Newton method),
 
     y ← y − K(y₁)⁻¹ r(y),
 
-as long as corrections contract by a factor of 1000 or more; otherwise, as next to a limit point, K is factored anew.
+as long as corrections contract by a factor of 1000 or more; otherwise, for example near a limit point, K is factored
+again.
 
 Where contact changes at more points than in the iteration before and at more than those of a facet (at a first touch:
 and the residual grows), the pressures of contact become unknowns for a while (see ``interior_point``). Steps are taken
 as long as the inertia guarantees descent; where it does not, a smaller step of the load is due.
 
 Across a path (see ``control``) equilibria of any stability are wanted and a good guess is near: steps are taken in
-full, led into the plane by bordering; where they diverge, a shorter step along the path is tried instead of descent.
+full, moved into the plane by bordering; where they diverge, a shorter step along the path is tried instead of descent.
 
 Sources: Nocedal & Wright, Numerical Optimization (doi:10.1007/978-0-387-40065-5), chapters 17–19; Chamberlain et al. on
 the watchdog (Mathematical Programming Studies 16, 1982); Deuflhard on the simplified Newton method
@@ -51,7 +52,7 @@ from fenicsmech.equilibrium.linearisation import EquilibriumPoint, NotConverged
 from fenicsmech.equilibrium.solver import EquilibriumMethod, EquilibriumSolver
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
-from fenicsmech.errors import positive
+from fenicsmech.errors import positive, whole
 from fenicsmech.log import logger
 
 _log = logger(__name__)
@@ -65,7 +66,7 @@ class PrimalDualNewton(EquilibriumMethod):
     Attributes:
         near: residual over the forces below which any equilibrium, unstable ones too, is converged to; farther
             off, steps descend.
-        iterations: most iterations.
+        iterations: maximum number of iterations.
         watchdog: iterations in a row that may fail to improve on the best residual.
         predicted_stress: whether K_uu, as long as the residual is large, holds the stress that the last step solved
             for instead of the one it led to.
@@ -75,11 +76,12 @@ class PrimalDualNewton(EquilibriumMethod):
             boundary. Counts hardly depend on it: between 0.1 and 10 they change by a tenth or two.
         reuse_factor: largest contraction rate of corrections at which the last factor of K is reused, also for
             stability and the tangent of the path; 0: never.
-        path_iterations: most iterations of an arc-length step, after which a shorter one is tried.
+        path_iterations: maximum number of iterations of an arc-length step, after which a shorter one is tried.
         divergence: growth of the residual, over its least value or ``near``, at which a shorter step is tried too.
 
     Raises:
-        DescriptionError: a limit is not a positive number, or ``reuse_factor`` is negative.
+        DescriptionError: a limit is not a positive number, a number of iterations not a whole one, or ``reuse_factor``
+            is negative.
     """
 
     near: float = 1e-2
@@ -97,6 +99,8 @@ class PrimalDualNewton(EquilibriumMethod):
         super().__post_init__()
         for limit in ("near", "largest_turn", "divergence", "start_pressure"):
             positive(f"Newton's {limit}", getattr(self, limit))
+        for limit, least in (("iterations", 1), ("watchdog", 0), ("path_iterations", 1)):
+            whole(f"Newton's {limit}", getattr(self, limit), least=least)
         if self.reuse_factor != 0.0:
             positive("Newton's reuse_factor", self.reuse_factor)
 
@@ -148,9 +152,9 @@ class NewtonSolver(EquilibriumSolver):
             last = self._step_taken(before, -length * motion)
             if near and residual.norm > norm and not self.converged(residual, norm):
                 if diverged is None and self.relative(residual) < options.near:
-                    diverged = before  # once may happen: just beyond a bifurcation small residuals hide large motions
+                    diverged = before  # may happen once: just beyond a bifurcation small residuals hide large motions
                 else:
-                    # no contraction: near a limit or bifurcation point, where only descent leads on
+                    # no contraction: near a limit or bifurcation point, where only descent makes progress
                     state, any_stability, line_search, last = diverged or before, False, True, None
                     system.load(state)
                     residual = system.residual(state, control)

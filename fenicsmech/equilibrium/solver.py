@@ -21,9 +21,9 @@ from fenicsmech.equilibrium.linearisation import (
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 from fenicsmech.equilibrium.two_level import BySize
-from fenicsmech.errors import counted, positive
+from fenicsmech.errors import counted, expect, positive
 
-_STEP = 1e-6  # relative error that iterative solvers may leave in steps and tangents, as the next iteration mends it
+_STEP = 1e-6  # relative error that iterative solvers may leave in steps and tangents: the next iteration corrects it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +37,7 @@ class EquilibriumMethod(ABC):
         linear: method for the linear systems; by default chosen by their size.
 
     Raises:
-        DescriptionError: a limit is not a positive number.
+        DescriptionError: a limit is not a positive number, or ``linear`` is not a method.
     """
 
     tolerance: float = 1e-9
@@ -47,6 +47,7 @@ class EquilibriumMethod(ABC):
     def __post_init__(self) -> None:
         for limit in ("tolerance", "roundoff"):
             positive(f"Newton's {limit}", getattr(self, limit))
+        expect("linear systems", self.linear, LinearMethod, "a method", "Give BySize(…), Direct() or TwoLevel(…)")
 
     @abstractmethod
     def solver(self, system: EquilibriumSystem) -> EquilibriumSolver:
@@ -100,7 +101,7 @@ class EquilibriumSolver(ABC):
             state: the equilibrium.
             control: the prescribed value.
             residual: at the state, if that is loaded.
-            iterations: so far, for the failure.
+            iterations: number so far, reported with a failure.
 
         Raises:
             NotConverged: it cannot be factored.
@@ -128,7 +129,7 @@ class EquilibriumSolver(ABC):
             return x if self.linear.solve(right, x, tolerance) else None
 
     def newton_step(self, x: PETSc.Vec, state: State, control: Control, residual: Residual) -> Step:
-        """The step −``x`` with K x the residual, across a path led into its plane."""
+        """The step −``x`` with K x the residual; across a path it is moved into the plane."""
         step = self.system.unknowns.step(x).scaled(-1.0)
         if not isinstance(control, ArcLengthControl):
             return step
@@ -157,12 +158,12 @@ class EquilibriumSolver(ABC):
         return min(max(0.1 * relative, enough, _STEP), 1e-3)
 
     def converged(self, residual: Residual, before: float = 0.0, *, noise: float = 0.0) -> bool:
-        """Whether the residual is small beside the forces and joints are closed, or rounding that no longer falls.
+        """Whether joints are closed and the residual is small relative to the forces, or rounding that no longer falls.
 
         Joints count as closed within 1e-10 of the mechanism's length, or rad: unbounded reactions would hide wider
         gaps. Rounding must have stopped falling, to no less than a quarter of ``before``: soft springs and modes
         respond to residuals below the rounding of stiff links. ``before`` is the norm of the residual one iteration
-        ago, 0 if no other can follow, ``noise`` that of other rounding errors of the residual.
+        ago, 0 if this iteration is the last one; ``noise`` is that of other rounding errors of the residual.
         """
         if residual.norm <= self.options.tolerance * residual.forces < math.inf and residual.gap <= 1e-10:
             return True

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,14 +18,15 @@ class State:
     """A point (s, λ, f) of the equilibrium equations.
 
     Attributes:
-        u: displacements of this rank's owned nodes, then its owned pressures where links have some of their own, flat
-            (owned dofs,).
+        u: displacements of this rank's owned nodes, then its owned pressures where links are in u–p form, flat (owned
+            dofs,).
         poses: poses of all bodies, on every rank, (bodies, pose_size).
         multipliers: λ, one per constraint row, on every rank.
         force: magnitude f of the controlled force.
         motors: motor value per connection.
         load_factor: σ of the constant loads and effects, 0 … 1.
         minimum_shift: least shift δ of the KKT matrix, which zero-energy modes need, in units of the mean stiffness.
+        constant: magnitudes f_k of the constant loads, which act times σ.
     """
 
     u: np.ndarray
@@ -34,6 +36,12 @@ class State:
     motors: np.ndarray
     load_factor: float = 1.0
     minimum_shift: float = 0.0
+    constant: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def has_reactions(self) -> bool:
+        """Whether joints carry forces or moments, which they do not in a rigid assembly."""
+        return bool(np.any(self.multipliers))
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +66,7 @@ class Step:
         return Step(*(a + b for a, b in zip(vars(self).values(), vars(other).values(), strict=True)))
 
     def slower(self, other: Step) -> Step:
-        """This step with the smaller change of the two for every displacement and pose."""
+        """This step; for every displacement and pose the smaller change of this step and ``other``."""
 
         pairs = ((self.u, other.u), (self.z, other.z))
         u, z = (np.where(np.abs(one) < np.abs(two), one, two) for one, two in pairs)
@@ -114,48 +122,63 @@ def joint_reaction(joints: JointSystem, k: int, state: State) -> Reaction:
 
         F = g_t,     M = Bᵀ g_r − (R a) × F.
     """
-    space, (body, sign) = joints.space, _acted_on(joints, k)
-    pose, on_pose = state.poses[body], (state.poses, state.motors, state.multipliers)
-    g = sign * joints.generalised_force(k, body, *on_pose)
-    force, lever = g[: space.dim], space.rotate(pose, joints.arm(k, body))
-    return Reaction(force, space.rotation_rates(pose).T @ g[space.dim :] - _cross(lever, force))
+    space, end = joints.space, _end(joints, k, state)
+    force = end.g[: space.dim]
+    return Reaction(force, space.rotation_rates(end.pose).T @ end.g[space.dim :] - _cross(end.lever, force))
 
 
 def joint_reaction_slopes(joints: JointSystem, k: int, state: State) -> ReactionSlopes:
     """The derivatives of the reaction of connection ``k``."""
-    space, (body, sign) = joints.space, _acted_on(joints, k)
-    pose, on_pose, dim = state.poses[body], (state.poses, state.motors, state.multipliers), joints.space.dim
-    g = sign * joints.generalised_force(k, body, *on_pose)
-    arm, rates = joints.arm(k, body), space.rotation_rates(pose)
-    lever, force, moment = space.rotate(pose, arm), [], []
-    for by in joints.generalised_force_slopes(k, body, *on_pose):
-        force.append(sign * by[:dim])
-        across = np.column_stack([_cross(lever, column) for column in force[-1].T])
-        moment.append(sign * rates.T @ by[dim:] - across)
+    space, end, dim = joints.space, _end(joints, k, state), joints.space.dim
+    arm, rates, force, moment = joints.arm(k, end.body), space.rotation_rates(end.pose), [], []
+    for by in joints.generalised_force_slopes(k, end.body, state.poses, state.motors, state.multipliers):
+        force.append(end.sign * by[:dim])
+        across = np.column_stack([_cross(end.lever, column) for column in force[-1].T])
+        moment.append(end.sign * rates.T @ by[dim:] - across)
     # the body's own rotation changes B and its lever
-    own = joints.columns[body][dim:]
-    turned = [_cross(spin @ arm, g[:dim]) for spin in space.rotation_gradient(pose)]
-    moment[0][:, own] += (np.einsum("abk,b->ka", space.rotation_rates_gradient(pose), g[dim:])) - np.transpose(turned)
+    own = joints.columns[end.body][dim:]
+    turned = [_cross(spin @ arm, end.g[:dim]) for spin in space.rotation_gradient(end.pose)]
+    bent = np.einsum("abk,b->ka", space.rotation_rates_gradient(end.pose), end.g[dim:])
+    moment[0][:, own] += bent - np.transpose(turned)
     return ReactionSlopes((force[0], force[1]), (moment[0], moment[1]))
 
 
 def joint_reaction_rate(joints: JointSystem, k: int, state: State, changes: Mapping[int, JointChange]) -> Reaction:
     """The derivative of the reaction of connection ``k`` as the places of some connections change, at one state."""
-    space, (body, sign) = joints.space, _acted_on(joints, k)
+    space, dim = joints.space, joints.space.dim
     if k not in changes:
-        return Reaction(np.zeros(space.dim), np.zeros(1 if space.dim == 2 else 3))
-    pose, on_pose = state.poses[body], (state.poses, state.motors, state.multipliers)
-    force = sign * joints.generalised_force(k, body, *on_pose)[: space.dim]
-    rate = sign * joints.place_rates(k, changes[k], *on_pose)[1][body]
-    lever, lever_rate = (space.rotate(pose, arm) for arm in (joints.arm(k, body), changes[k].shift))
-    turned = space.rotation_rates(pose).T @ rate[space.dim :]
-    return Reaction(rate[: space.dim], turned - _cross(lever_rate, force) - _cross(lever, rate[: space.dim]))
+        return Reaction(np.zeros(dim), np.zeros(1 if dim == 2 else 3))
+    end = _end(joints, k, state)
+    rates = joints.place_rates(k, changes[k], state.poses, state.motors, state.multipliers)[1]
+    rate, lever_rate = end.sign * rates[end.body], space.rotate(end.pose, changes[k].shift)
+    turned = space.rotation_rates(end.pose).T @ rate[dim:]
+    return Reaction(rate[:dim], turned - _cross(lever_rate, end.g[:dim]) - _cross(end.lever, rate[:dim]))
 
 
-def _acted_on(joints: JointSystem, k: int) -> tuple[int, float]:
-    """The body whose pose gives the reaction of a connection, and the sign of the force on it."""
+class _End(NamedTuple):
+    """The body whose pose gives the reaction of a connection, the sign of the reaction on it, and what acts there.
+
+    Attributes:
+        body: its index.
+        sign: −1 where it is the joint's first link.
+        pose: of the body, (pose_size,).
+        g: generalised force of the reaction on the pose, (pose_size,).
+        lever: R a, (dim,).
+    """
+
+    body: int
+    sign: float
+    pose: np.ndarray
+    g: np.ndarray
+    lever: np.ndarray
+
+
+def _end(joints: JointSystem, k: int, state: State) -> _End:
+    """The end of connection ``k`` that can move."""
     connection = joints.connections[k]
-    return (connection.b, 1.0) if connection.b in joints.columns else (connection.a, -1.0)
+    body, sign = (connection.b, 1.0) if connection.b in joints.columns else (connection.a, -1.0)
+    g = sign * joints.generalised_force(k, body, state.poses, state.motors, state.multipliers)
+    return _End(body, sign, state.poses[body], g, joints.space.rotate(state.poses[body], joints.arm(k, body)))
 
 
 def motor_torques(joints: JointSystem, state: State) -> dict[Motor, float]:

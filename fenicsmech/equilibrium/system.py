@@ -4,8 +4,8 @@
 
     residual   Gᵀ ∇L,     KKT matrix   Gᵀ ∇²L G,     x ↦ (u, z, λ, f) = G x
 
-E is the energy of links and effects; where links are in u–p form, u stands for (u, p) and E is a saddle. The terms of
-L beside E are those of ``border``, the blocks of the equations those of ``unknowns``, their matrix that of ``kkt``.
+E is the energy of links and effects; where links are in u–p form, u stands for (u, p) and E is a saddle. The other
+terms of L are those of ``border``, the blocks of the equations those of ``unknowns``, their matrix that of ``kkt``.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from fenicsmech.collective import from_one
 from fenicsmech.compat import destroy_garbage
 from fenicsmech.effects import OneSided
 from fenicsmech.elasticity import ElasticBody, PredictedStress
@@ -67,7 +68,7 @@ class EquilibriumSystem:
         interfaces: interface nodes as functions of poses.
         joints: the constraints.
         controlled: the load whose magnitude f is controlled.
-        loads: constant ones, with their magnitudes.
+        loads: constant ones, whose magnitudes states hold.
         potentials: of body poses.
         compliances: c by constraint row; 0 where none is given.
         idle: spins that nothing resists, whose gauge K fixes.
@@ -90,7 +91,7 @@ class EquilibriumSystem:
         joints: JointSystem,
         *,
         controlled: PointLoad,
-        loads: tuple[tuple[PointLoad, float], ...] = (),
+        loads: Sequence[PointLoad] = (),
         potentials: Sequence[PosePotential] = (),
         compliances: Mapping[int, float] = MappingProxyType({}),
         idle: Sequence[IdleSpin] = (),
@@ -98,12 +99,13 @@ class EquilibriumSystem:
         clock: Clock,
         comm: MPI.Comm,
     ) -> None:
-        destroy_garbage(comm)  # of systems before this one
+        destroy_garbage(comm)  # objects of earlier systems
         self.elastic, self.interfaces, self.joints = elastic, interfaces, joints
         self.controlled, self.clock, self.comm = controlled, clock, comm
         self.numbering = numbering = Numbering(comm, interfaces, joints, elastic.pressure)
         self.blocks = numbering.unknowns
-        self.idle, self.one_sided = tuple(idle), tuple(one_sided)
+        self.idle, self.potentials = tuple(idle), tuple(potentials)
+        self.one_sided = tuple(one_sided)
         self.pressures: InteriorPressures | None = None
         self.compliances = np.array([compliances.get(row, 0.0) for row in range(joints.rows)])
         self._border = BorderTerms(
@@ -212,8 +214,10 @@ class EquilibriumSystem:
         return float(np.sqrt(self.comm.allreduce(float(missed @ missed))))
 
     def without_self_stress(self, state: State) -> State:
-        """``state`` with the least of all multipliers that balance the same forces. Local."""
-        least = self.joints.without_self_stress(state.multipliers, state.poses, state.motors, self.compliances)
+        """``state`` with the least of all multipliers that balance the same forces."""
+        on_joints = state.multipliers, state.poses, state.motors, self.compliances
+        # of one process: their number of self-stresses is a decision that depends on rounding
+        least = from_one(self.comm, lambda: self.joints.without_self_stress(*on_joints))
         return replace(state, multipliers=least)
 
     def constraints(self, state: State, multipliers: np.ndarray) -> np.ndarray:

@@ -23,7 +23,7 @@ errors with eigenvalues in [a, b] shrink alike. S is symmetric, positive definit
 
 Directions p of conjugate gradients are conjugate, so that the number of negative pᵀ K p is that of the negative
 eigenvalues they have met. For the inertia they start from random vectors, until one meets none in the complement of
-those found. Those found are certain; that none is left is as likely as the iteration has converged.
+those found. Those found are certain; that none is left is only as certain as the iteration has converged.
 
 Sources: Tang, Nabben, Vuik & Erlangga on the preconditioner, A-DEF2 (doi:10.1007/s10915-009-9272-6); Adams et al. on
 the smoother (doi:10.1016/S0021-9991(03)00194-3); Haynsworth (doi:10.1016/0024-3795(68)90050-5) on the inertia.
@@ -56,8 +56,8 @@ class TwoLevel(LinearMethod):
     Attributes:
         degree: m of the smoother, products with A that one application takes, plus one.
         ratio: a/b of the smoother; the claw's curve takes least time with these (benchmarks/large.py).
-        safety: b over the estimate of λ, which is a lower bound: single bad cells show late in it.
-        iterations: most conjugate gradients of one solve; more mean that the coarse level does not suit.
+        safety: b over the estimate of λ, which is a lower bound: it takes many iterations to include single bad cells.
+        iterations: maximum number of iterations of one solve; more would mean that the coarse level does not suit.
         probe: relative energy at which iterations from a random start end when counting the inertia.
         roundoff: of the solution, in units of the mean stiffness: residuals below are rounding.
     """
@@ -173,7 +173,7 @@ class TwoLevelSolver(LinearSolver):
         self._project(())
         curvature = self._z.dot(self._image)
         if curvature > 0.0:
-            # as much of it as of the error there is, in energy
+            # scaled to the energy of the error
             factor = math.sqrt(error / curvature)
             solution.axpy(factor, self._z)
             self._residual.axpy(-factor, self._image)

@@ -14,8 +14,8 @@ It is 2 × 2 blocks: links (thousands of unknowns, sparse, distributed) and the 
 on interfaces are functions of the poses of their bodies, which couples both: K_zu, K_pz and a part of B come from the
 links. Where the load is given instead of the displacement of its point, the load's row is −f alone.
 
-All blocks stand in one matrix, factored as LDLᵀ: by Sylvester's law its pivots have the signs of the eigenvalues, and
-at a stable equilibrium as many of these are negative as there are pressures, multipliers and the load (Gould,
+All blocks are parts of one matrix, factored as LDLᵀ: by Sylvester's law its pivots have the signs of the eigenvalues,
+and at a stable equilibrium as many of these are negative as there are pressures, multipliers and the load (Gould,
 doi:10.1007/BF02592103). The factor that solves for a step decides on stability at no extra cost. Elimination of the
 nodes would leave a Schur complement of the border, in which small stiffnesses are differences of large ones.
 
@@ -171,7 +171,7 @@ class Numbering:
         padding = -(sum(border.values()) + 1) % self.block
         self.rows = Blocks(comm, nodes=nodes, pressures=pressures, **border, padding=padding)
         self.unknowns = Blocks(comm, nodes=displacements, pressures=len(self.free) - displacements, **border)
-        # first node of every rank, and the pressures that stand before its displacements
+        # first node of every rank, and the pressures that precede its displacements
         ends = np.cumsum(comm.allgather(interfaces.owned))
         self.first_node, self._starts = int(ends[comm.rank] - interfaces.owned), ends[:-1]
         self._before = np.concatenate([[0], np.cumsum(comm.allgather(pressures))[:-1]])
@@ -200,7 +200,7 @@ class UnknownMap:
         rows, unknowns, free = numbering.rows, numbering.unknowns, numbering.free
         counts = np.zeros(rows.local, dtype=int)
         counts[free] = counts[rows.border.local] = 1
-        moved = {}  # rows of interface nodes
+        moved: dict[int, np.ndarray] = {}  # rows of interface nodes
         for body, nodes in interfaces.nodes.items():
             moved[body] = self._rows_of(nodes[nodes < interfaces.owned])
             counts[moved[body]] = len(joints.columns[body])
@@ -214,24 +214,25 @@ class UnknownMap:
         border = starts[:-1][rows.border.local]
         columns[border] = unknowns.border.first + np.arange(len(border))
         values[border] = scale[: len(border)]
+        # ∂u/∂z by rows, of all bodies: starts, columns, units of the columns, rows
+        turned = np.concatenate([np.zeros(0, int), *(np.tile(joints.columns[b], len(own)) for b, own in moved.items())])
+        turned_rows = rows.links.first + np.concatenate([np.zeros(0, int), *moved.values()])
+        self._turning = (
+            np.arange(0, len(turned) + 1, joints.space.pose_size, dtype=PETSc.IntType),
+            (unknowns.poses.first + turned).astype(PETSc.IntType),
+            scale[turned],
+            turned_rows.astype(PETSc.IntType),
+        )
         size = [(rows.local, rows.size), (unknowns.local, unknowns.size)]
         self.map = PETSc.Mat().createAIJ(size, csr=(starts.astype(PETSc.IntType), columns, values), comm=rows.comm)
 
     def turn(self, poses: np.ndarray) -> None:
         """Brings ∂u/∂z to ``poses``."""
         self.poses = poses
-        numbering, joints = self.numbering, self._joints
-        for body in self._interfaces.nodes:
-            nodes, gradient = self._interfaces.gradient_rows(poses, body)
-            if not len(nodes):
-                continue
-            columns, rows = joints.columns[body], self._rows_of(nodes)
-            self.map.setValuesIJV(
-                np.arange(0, len(columns) * len(rows) + 1, len(columns), dtype=PETSc.IntType),
-                np.tile(numbering.unknowns.poses.first + columns, len(rows)).astype(PETSc.IntType),
-                (gradient * self.scale[columns]).ravel(),
-                rowmap=(numbering.rows.links.first + rows).astype(PETSc.IntType),
-            )
+        values = [self._interfaces.gradient_rows(poses, body)[1].ravel() for body in self._interfaces.nodes]
+        starts, columns, units, rows = self._turning
+        if len(rows):
+            self.map.setValuesIJV(starts, columns, np.concatenate(values) * units, rowmap=rows)
         self.map.assemble()
 
     def _rows_of(self, nodes: np.ndarray) -> np.ndarray:
@@ -272,7 +273,7 @@ class ScaledUnknowns(UnknownMap):
         self._rows = self.map.createVecLeft()
 
     def apply_transpose(self, links: np.ndarray, border: np.ndarray) -> PETSc.Vec:
-        """Gᵀ of a gradient by this rank's (u, p), (owned dofs,), and by (z, λ, f), (border,)."""
+        """Gᵀ of a gradient with respect to this rank's (u, p), (owned dofs,), and to (z, λ, f), (border,)."""
         self._rows.array_w[:] = self.numbering.rows.join(links, border)
         vector = self.zeros()
         self.map.multTranspose(self._rows, vector)

@@ -2,6 +2,7 @@
 
 - ``estimates``: goal-oriented error estimates at equilibria, of elements and of plane stress
 - ``accuracy_control``: the cheapest fidelity whose estimated error is small enough
+- ``point_forces``: forces at points, whose displacement has no limit as elements shrink
 """
 
 from fenicsmech.estimates.accuracy_control import (

@@ -1,9 +1,9 @@
 """Accuracy control: the cheapest fidelity whose estimated error is below the required one.
 
-Fidelity levels are climbed from a coarse pilot. Errors of elements and of plane stress are estimated after each
-(``estimates``), and the next level is the first whose expected error suffices, by the gains of the levels of a model
-over each other. Gains and work of levels were measured on claw, truss and Klann leg; they only guide the choice: the
-estimate on the level itself decides.
+Fidelity levels are tried upwards from a coarse pilot. Errors of elements and of plane stress are estimated after each
+(``estimates``), and the next level is the first whose error, expected from the measured gains of levels over each
+other, is small enough. Gains and work of levels were measured on claw, truss and Klann leg; they only guide the search:
+the estimate on the level itself decides.
 
 Estimates are signed, and so they are added to the results (``Curve.corrected``). The error required to be small
 is the one they may leave,
@@ -11,7 +11,7 @@ is the one they may leave,
     |error| ≤ r |elements| + r_s |plane stress|,
 
 with r by level (``FidelityLevel.remainder``) and r_s = ``AccuracyOptions.plane_stress_remainder``: measured on
-cantilever, arch, truss, claw and Klann leg, by finer elements and by space. Source for corrections by adjoints: Pierce
+cantilever, arch, truss, claw and Klann leg, by finer elements and in 3D. Source for corrections by adjoints: Pierce
 & Giles (doi:10.1137/S0036144598349423).
 """
 
@@ -32,7 +32,7 @@ from fenicsmech.errors import counted, positive
 from fenicsmech.log import logger
 from fenicsmech.mechanism import FlexibleLink, MeshPart, Scene, StepPart
 from fenicsmech.meshing import link_thickness
-from fenicsmech.model import Fidelity, check_scene, fits
+from fenicsmech.model import Fidelity, check_scene, fits, per_link
 
 _log = logger(__name__)
 
@@ -120,7 +120,7 @@ class LevelErrors:
         elements: estimated discretisation error.
         plane_stress: estimated error of plane stress; 0 in space.
         unknowns: of the level.
-        growth: by each halving of the elements, without limit, under forces at points of flexible links.
+        growth: of the value with each halving of the elements, without limit, under forces at points of flexible links.
     """
 
     value: float
@@ -197,7 +197,7 @@ class Choice:
         return self.trials[-1]
 
     def __str__(self) -> str:
-        lines = [f"{self.accuracy:.2g} of the largest displacement asked for"]
+        lines = [f"{self.accuracy:.2g} of the largest displacement requested"]
         lines += [f"  not enough: {trial}" for trial in self.trials[:-1]]
         if self.cause:
             return "\n".join([*lines, f"  no finer one helps: {self.chosen}", f"  cause: {self.cause}"])
@@ -228,12 +228,11 @@ class AccuracyControl:
         self._accuracy, self._formulation = positive("accuracy", accuracy), formulation
         self.options = options or AccuracyOptions()
         links = scene.mechanism.flexible_links
-        given = thickness if isinstance(thickness, Mapping) else dict.fromkeys(links, thickness)
         self._thickness = {
             link: from_one(comm, partial(link_thickness, link.name, link.shape))
-            if given.get(link) is None
-            else positive(f"thickness of {link.name!r}", given[link])
-            for link in links
+            if given is None
+            else positive(f"thickness of {link.name!r}", given)
+            for link, given in per_link(scene.mechanism, thickness).items()
         }
         self._planar = fidelity_levels(PLANE_STRESS) if fits(scene, PLANE_STRESS) else []
         # files hold whole links
@@ -252,7 +251,8 @@ class AccuracyControl:
     def choose(self, run: Callable[[FidelityLevel], LevelErrors], cause: str = "") -> Choice:
         """Tries levels, from the last one on, until one suffices; ``run`` simulates a level.
 
-        None does where each halving of the elements adds more than the accuracy: the first is kept, for this ``cause``.
+        No level suffices where each halving of the elements adds more than the accuracy: the first is kept, for this
+        ``cause``.
         """
         trials: list[Trial] = []
         level: FidelityLevel | None = self.level
@@ -274,7 +274,7 @@ class AccuracyControl:
         return Choice(self._accuracy, tuple(trials), reached, self._tenfold(trials[-1]))
 
     def _next(self, trial: Trial) -> FidelityLevel | None:
-        """The first finer level expected to suffice, else the finest; None if no other is needed, or exists."""
+        """The first finer level expected to suffice, else the finest; None if none is needed or there is none."""
         finer = [] if trial.error <= self._accuracy else self._finer(trial.level)
         return next((level for level in finer if self._suffices(trial.expected(level))), finer[-1] if finer else None)
 

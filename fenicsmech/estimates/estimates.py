@@ -27,15 +27,15 @@ in straight cells ½ Σ λ_i λ_j (G_i − G_j) · (X_j − X_i) over the edges.
 
 Error of plane stress: there links contract across their depth b by h = F₃₃ − 1, each point for itself. In space
 interfaces hold links all through their depth; and where h varies over the thickness, as in bending, links curl across
-their depth (anticlastic bending), which stretches those that are curved along. With the least polynomials in the height
-z above the mid-plane, as in hierarchic models of plates, and moduli of small strain
+their depth (anticlastic bending), which stretches links that are curved along their length. With polynomials of the
+lowest degree in the height z above the mid-plane, as in hierarchic models of plates, and moduli of small strain
 
     u₃ = z a,     u = u_ps − ½ (z² − b²/12) v,     a = 0 and v = 0 in interfaces,
     V = min over a, v of ½ ∫ E (a − h)² + μ b²/12 |∇a − Fᵀv|² + b⁴/720 G : C : G dV,     G = sym Fᵀ∇v,
 
 C that of plane stress: one linear problem on the same mesh at every equilibrium. h of the elements jumps between them,
-which a could not follow; its projection p to continuous fields, as of recovered gradients, takes its place. V is the
-energy that space adds. It changes a quantity, to first order with its adjoint z,
+which a could not follow; its projection p to continuous fields, like that of recovered gradients, takes its place. V is
+the energy that 3D adds. It changes a quantity, to first order with its adjoint z,
 
     Q(space) − Q(plane stress) ≈ −∂V/∂u · z     at these a and v.
 
@@ -156,17 +156,23 @@ class Estimates:
         equilibrium: Equilibrium,
         kinds: Sequence[ErrorKind] = (ErrorKind.ELEMENTS,),
         output: PointLoad | None = None,
+        *,
+        origin: Sequence[float] = (),
     ) -> list[float]:
         """Corrections of the quantity of an equilibrium, by kinds of error, from one adjoint.
 
-        With an ``output``, those of the displacement of that point, under the same control.
+        With an ``output``, those of the displacement of that point, under the same control. Displacements count from
+        the drawing. Where the place that a prescribed one counts from has corrections, ``origin``, it moves with them.
 
         Raises:
             DescriptionError: ``kinds`` hold the error of plane stress and the model is another one.
             EquilibriumError: the KKT matrix is singular.
         """
         with self._model.clock.phase("estimate"), self._model.shaped(equilibrium.design):
-            return self.of(adjoint_at(solver, equilibrium, output), kinds)
+            adjoint = adjoint_at(solver, equilibrium, output)
+            slope = adjoint.by_control() if origin and equilibrium.unknown is Unknown.FORCE else 0.0
+            found = self.of(adjoint, kinds)
+            return [own + slope * moved for own, moved in zip(found, origin or [0.0] * len(found), strict=True)]
 
     def of(self, adjoint: Adjoint, kinds: Sequence[ErrorKind] = (ErrorKind.ELEMENTS,)) -> list[float]:
         """Corrections of a quantity from its adjoint, at the state and design that the model holds.
@@ -365,7 +371,7 @@ class PressureError:
 
 
 class PlaneStressError:
-    """Errors of plane stress relative to space of quantities of one model, which holds the equilibrium in question.
+    """Errors of plane stress relative to 3D, for quantities of one model, which holds the equilibrium in question.
 
     Raises:
         DescriptionError: the simulation is not in plane stress.

@@ -186,7 +186,7 @@ def _check_simple(link: str, polygons: Sequence[np.ndarray]) -> None:
     crossings += [corner for hole in holes for corner in hole if not is_inside(outline, corner)]
     if crossings:
         problem = f"its outline crosses itself near {point_text(crossings[0])}"
-        raise MeshingError(link, problem, "Choose a design that does not run into itself")
+        raise MeshingError(link, problem, "Choose a design whose outline does not cross itself")
 
 
 def _drills(pin: PinHole, hole: np.ndarray) -> bool:

@@ -268,7 +268,7 @@ def constraint_rate(kind: JointKind, dim: int, driven: bool) -> SmoothFunction:
 
 @cache
 def coordinate_rate(kind: JointKind, dim: int) -> SmoothFunction:
-    """∂φ/∂c · ċ of a ``free_coordinate``, (1,); arguments as of a ``constraint_rate``."""
+    """∂φ/∂c · ċ of a ``free_coordinate``, (1,); arguments as for ``constraint_rate``."""
     poses, constants, a, b = _markers(dim)
     return _rate([kind.coordinate(a, b)], poses, constants)
 

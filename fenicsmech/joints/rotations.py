@@ -17,6 +17,7 @@ rotations, and its second derivative is constant.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 
 import numpy as np
 import sympy
@@ -100,7 +101,7 @@ class RigidSpace(ABC):
         """∂u/∂z for points X − c = ``offsets`` (n, dim), shape (n, dim, pose_size)."""
         gradient = np.zeros((len(offsets), self.dim, self.pose_size))
         gradient[:, :, : self.dim] = np.eye(self.dim)
-        gradient[:, :, self.dim :] = np.einsum("aij,nj->nia", self.rotation_gradient(pose), offsets)
+        gradient[:, :, self.dim :] = (self.rotation_gradient(pose) @ offsets.T).T
         return gradient
 
     def displacement_hessian(self, pose: np.ndarray, moment: np.ndarray) -> np.ndarray:
@@ -118,18 +119,18 @@ class PlanarSpace(RigidSpace):
     freedoms = 3
     identity = np.zeros(3)
     identity.setflags(write=False)
-    _quarter_turn = np.array([[0.0, -1.0], [1.0, 0.0]])
+    _identity, _quarter_turn = np.eye(2), np.array([[0.0, -1.0], [1.0, 0.0]])
 
     def rotation_increment(self, pose):
         # cos θ − 1 = −2 sin²(θ/2) keeps the digits of small rotations
         half = np.sin(0.5 * pose[2])
-        return np.sin(pose[2]) * self._quarter_turn - 2.0 * half * half * np.eye(2)
+        return np.sin(pose[2]) * self._quarter_turn - 2.0 * half * half * self._identity
 
     def rotation_gradient(self, pose):
-        return (np.cos(pose[2]) * self._quarter_turn - np.sin(pose[2]) * np.eye(2))[None]
+        return (np.cos(pose[2]) * self._quarter_turn - np.sin(pose[2]) * self._identity)[None]
 
     def rotation_hessian(self, pose):
-        return -(np.eye(2) + self.rotation_increment(pose))[None, None]
+        return -(self._identity + self.rotation_increment(pose))[None, None]
 
     def symbolic_rotation(self, parameters):
         (angle,) = parameters
@@ -145,6 +146,12 @@ class PlanarSpace(RigidSpace):
         if poses.shape[1] == self.pose_size:
             return poses
         return np.column_stack([poses[:, :2], 2.0 * np.arctan2(poses[:, 6], poses[:, 3])])
+
+
+def cross_matrix(vector: Iterable) -> list[list]:
+    """[v]×, rows of three numbers or symbols: [v]× a = v × a."""
+    x, y, z = vector
+    return [[0, -z, y], [z, 0, -x], [-y, x, 0]]
 
 
 def _quaternion_hessian() -> np.ndarray:
@@ -180,16 +187,14 @@ class SpatialSpace(RigidSpace):
         return self._hessian
 
     def symbolic_rotation(self, parameters):
-        w, x, y, z = parameters
-        v = sympy.Matrix([x, y, z])
-        cross = sympy.Matrix([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-        return sympy.eye(3) + 2 * (w * cross + v * v.T - v.dot(v) * sympy.eye(3))
+        w, *vector = parameters
+        v = sympy.Matrix(vector)
+        return sympy.eye(3) + 2 * (w * sympy.Matrix(cross_matrix(v)) + v * v.T - v.dot(v) * sympy.eye(3))
 
     def rotation_rates(self, pose):
         # dq = ½ (0, ω) ∘ q
         w, v = pose[3], pose[4:]
-        cross = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
-        return 0.5 * np.vstack([-v, w * np.eye(3) - cross])
+        return 0.5 * np.vstack([-v, w * np.eye(3) - cross_matrix(v)])
 
     def rotation_rates_gradient(self, pose):
         # linear in q

@@ -24,7 +24,7 @@ from fenicsmech.mechanism.parts import (
     in_dimension,
     same_place,
 )
-from fenicsmech.mechanism.scene import DRAWN, Configuration, Effect, Scene, Units, validate
+from fenicsmech.mechanism.scene import DRAWN, Configuration, Effect, Scene, Units, check_loads, validate
 from fenicsmech.mechanism.shapes import (
     Arc,
     Centreline,

@@ -85,7 +85,7 @@ class Mechanism:
             remedy = "Make one with strip(), polygon(), outline(), step_file() or gmsh_mesh()"
             raise DescriptionError(f"link {name!r}", f"its shape is {shape!r}", remedy)
         if not isinstance(material, Material):
-            remedy = "Give a Material(name, E, ν) or one that exists, as ONYX"
+            remedy = "Give a Material(name, E, ν) or an existing one, such as ONYX"
             raise DescriptionError(f"link {name!r}", f"its material is {material!r}", remedy)
         return self._add_link(FlexibleLink(name, shape, material))
 
@@ -106,7 +106,7 @@ class Mechanism:
         Args:
             kind: the joint's kind.
             a, b: links of this mechanism.
-            at: where it is drawn, 2 or 3 coordinates (z = 0 if left out).
+            at: where the joint is drawn, 2 or 3 coordinates (z = 0 if left out).
             axis: its axis, 2 or 3 coordinates.
             interface_radius: on flexible links everything this close to the axis moves rigidly.
             region: interface region instead of a disc of ``interface_radius`` (a ``Rectangle`` for clamps).
@@ -174,7 +174,7 @@ class Mechanism:
             a: a link of this mechanism.
             strip: a flexible link whose shape is a strip.
             end: "start" or "end" of its centreline.
-            length: of the clamped piece, along the centreline; its inner face stands across the strip.
+            length: of the clamped piece, along the centreline; its inner face is normal to the strip.
             name: for messages; unique.
 
         Raises:
@@ -188,7 +188,7 @@ class Mechanism:
         return self.weld(a, strip, at=at, region=region, name=name)
 
     def motor(self, joint: Joint, *, name: str | None = None) -> Motor:
-        """Adds a motor that prescribes the free coordinate of ``joint``, as the angle of a revolute one.
+        """Adds a motor that prescribes the free coordinate of ``joint``, such as the angle of a revolute one.
 
         Raises:
             DescriptionError: the joint's kind takes no motor, it has one already, or it is not in the mechanism.
@@ -199,7 +199,7 @@ class Mechanism:
         if joint not in self.joints:
             raise DescriptionError(part, f"{joint.name!r} is not a joint of {self.name!r}", "Add the joint first")
         if not joint.kind.motorised:
-            remedy = "Use a joint with one free coordinate, as a revolute or a prismatic one"
+            remedy = "Use a joint with one free coordinate, such as a revolute or a prismatic one"
             raise DescriptionError(part, f"a {joint.kind.name} joint takes no motor", remedy)
         if joint in {motor.joint for motor in self.motors}:
             raise DescriptionError(part, f"{joint.name!r} has a motor already", "Give each joint one motor")
@@ -218,9 +218,9 @@ class Mechanism:
     ) -> Force:
         """Adds a dead force along ``direction`` at the material point ``at``, or on a region, of link ``on``.
 
-        Its displacement is that of the point, or the average over the region, on which it does work. As elements
-        shrink, the displacement under a force at a point of a flexible link grows without limit: give a region where
-        the displacement near the force matters.
+        The displacement of a force, on which it does work, is that of its point, or the average over its region. As
+        elements shrink, the displacement under a force at a point of a flexible link grows without limit: give a region
+        where the displacement near the force matters.
 
         Args:
             on: the link.
@@ -233,8 +233,9 @@ class Mechanism:
             name: for messages; unique.
 
         Raises:
-            DescriptionError: the link is not in the mechanism, a number makes no sense, the region is none or is one of
-                a rigid link, or the name is taken. Later, when the link is meshed: the region holds none of it.
+            DescriptionError: the link is not in the mechanism, a number is invalid, the region is not a region or is
+                given for a rigid link, or the name is taken. Later, when the link is meshed: the region holds none of
+                it.
         """
         return self._add_at_point(Force, self.forces, on, at, direction, region, name)
 

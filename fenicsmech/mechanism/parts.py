@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
-from fenicsmech.errors import DescriptionError, finite, point_text, positive, set_fields
+from fenicsmech.errors import DescriptionError, expect, finite, point_text, positive, set_fields
 from fenicsmech.joints import JointKind
 from fenicsmech.laws import Law, NeoHookean
 from fenicsmech.mechanism.shapes import Face, Point, Region, Shape
+
+Single = TypeVar("Single", "Motor", "Force")
 
 
 @dataclass(frozen=True, init=False)
@@ -51,7 +54,7 @@ class Material:
                 part, "both a law and numbers are given", f"Give the numbers to the law, {type(law).__name__}(…)"
             )
         if not isinstance(law, Law):
-            raise DescriptionError(part, f"its law is {law!r}", "Give a law with its numbers, as NeoHookean(E, nu)")
+            raise DescriptionError(part, f"its law is {law!r}", "Give a law with its numbers: NeoHookean(E, nu)")
         if density is not None:
             density = positive(f"density of {part}", density)
         set_fields(self, name=name, law=law, density=density)
@@ -142,27 +145,48 @@ class Motor:
         return ((self, 1.0),)
 
 
+def read_pairs(part: str, given: Any, sort: type[Single], number: str) -> tuple[tuple[Single, float], ...]:
+    """``given``, pairs of a motor or force and its ``number``, or a mapping, as pairs.
+
+    Raises:
+        DescriptionError: it is neither, something else than a ``sort`` is given, one is given twice, or a number is not
+            finite.
+    """
+    noun = sort.__name__.lower()
+    try:
+        pairs = [(own, value) for own, value in (given.items() if isinstance(given, Mapping) else given)]
+    except (TypeError, ValueError):
+        raise DescriptionError(part, f"{given!r} gives no {number}s", f"Give {{{noun}: {number}, …}}") from None
+    read: dict[Single, float] = {}
+    for own, value in pairs:
+        expect(part, own, sort, f"a {noun}")
+        if own in read:
+            raise DescriptionError(part, f"{own.name!r} is given twice", f"Give each {noun} once")
+        read[own] = finite(f"{number} of {noun} {own.name!r} in {part}", value)
+    return tuple(read.items())
+
+
 @dataclass(frozen=True)
 class Drive:
-    """Motors that move together, as geared to each other: at its position p each stands at ratio · p.
+    """Motors that move together, as if geared to each other: when the drive is at p, each motor is at ratio · p.
 
     Attributes:
         name: for messages, plots and tables.
         ratios: (motor, ratio) pairs, or a mapping; motors that all turn or all slide.
 
     Raises:
-        DescriptionError: there are no motors, a ratio is zero or not a number, or some motors turn and others slide.
+        DescriptionError: there are no motors, one is given twice, a ratio is zero or not a number, or some motors turn
+            and others slide.
     """
 
     name: str
     ratios: tuple[tuple[Motor, float], ...]
 
     def __post_init__(self) -> None:
-        part, given = f"drive {self.name!r}", self.ratios
-        pairs = tuple(given.items()) if isinstance(given, Mapping) else tuple(given)
-        checked = tuple((motor, finite(f"ratio of a motor of {part}", ratio)) for motor, ratio in pairs)
-        if not checked or not all(isinstance(motor, Motor) and ratio for motor, ratio in checked):
-            raise DescriptionError(part, f"its ratios are {given!r}", "Give motors with ratios other than zero")
+        part = f"drive {self.name!r}"
+        checked = read_pairs(part, self.ratios, Motor, "ratio")
+        if not checked or not all(ratio for _, ratio in checked):
+            raise DescriptionError(part, f"its ratios are {self.ratios!r}", "Give motors with ratios other than zero")
         if len({motor.sliding for motor, _ in checked}) > 1:
             raise DescriptionError(part, "some of its motors turn and others slide", "Give motors of one kind")
         set_fields(self, ratios=checked)
@@ -214,18 +238,17 @@ class ForceGroup:
         ratios: (force, ratio) pairs, or a mapping.
 
     Raises:
-        DescriptionError: a part is not a force, or a ratio is not a number.
+        DescriptionError: there are no forces, one is given twice, or a ratio is not a number.
     """
 
     name: str
     ratios: tuple[tuple[Force, float], ...]
 
     def __post_init__(self) -> None:
-        part, given = f"forces {self.name!r}", self.ratios
-        pairs = tuple(given.items()) if isinstance(given, Mapping) else tuple(given)
-        if not all(isinstance(force, Force) for force, _ in pairs):
-            raise DescriptionError(part, f"its ratios are {given!r}", "Give forces with their ratios")
-        checked = tuple((force, finite(f"ratio of {force.name!r} in {part}", ratio)) for force, ratio in pairs)
+        part = f"forces {self.name!r}"
+        checked = read_pairs(part, self.ratios, Force, "ratio")
+        if not checked:
+            raise DescriptionError(part, "there are none", "Give forces with their ratios")
         set_fields(self, ratios=checked)
 
     def __repr__(self) -> str:

@@ -4,8 +4,9 @@ Effects add to the potential energy
 
     Π = E_int + σ · (Σ link energies + Σ pose potentials) + Σ potentials that hold − loads.
 
-The load factor σ grows from 0 to 1 before the controlled force does, as that of the constant loads. What holds the
-mechanism, as the stiffness of a spring does, acts from the start: without it equilibria on the way need not exist.
+The load factor σ, which also multiplies constant loads, grows from 0 to 1 before the controlled force does. Potentials
+that hold the mechanism, such as the stiffness of a spring, act from the start: without them equilibria on the way need
+not exist.
 """
 
 from __future__ import annotations
@@ -14,9 +15,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 
-from fenicsmech.errors import DescriptionError, expect, finite, set_fields
+from fenicsmech.errors import DescriptionError, expect, set_fields
 from fenicsmech.mechanism.mechanism import Mechanism
-from fenicsmech.mechanism.parts import FlexibleLink, Joint, Link, Motor, RigidLink, same_place
+from fenicsmech.mechanism.parts import FlexibleLink, Joint, Link, Motor, RigidLink, read_pairs, same_place
 from fenicsmech.mechanism.shapes import Region
 
 
@@ -24,8 +25,8 @@ from fenicsmech.mechanism.shapes import Region
 class Effect(ABC):
     """An effect on a mechanism: a frozen dataclass derived from this one, in a file of its own.
 
-    It overrides the hooks that it needs. Each is nothing by default and then adds no form, no unknown and no entry of a
-    matrix. The arguments of hooks are objects of the layers above.
+    It overrides the hooks that it needs. By default each hook returns nothing, and adds no form, no unknown and no
+    entry of a matrix. The arguments of hooks are objects of the layers above.
     """
 
     @property
@@ -71,7 +72,7 @@ class Effect(ABC):
         return {}
 
     def growth(self, model):
-        """The ``Stretch`` by flexible link by which it is longer or shorter without strain than drawn.
+        """The ``Stretch`` of each flexible link whose strain-free length differs from the drawn one.
 
         Raises:
             DescriptionError: the ``ElasticModel`` does not support it.
@@ -94,21 +95,17 @@ class Configuration:
 
     Attributes:
         name: for messages, plots and tables.
-        positions: (motor, position) pairs: angle in rad or travel, counted from the drawn configuration.
+        positions: (motor, position) pairs, or a mapping: angle in rad or travel, counted from the drawn configuration.
 
     Raises:
-        DescriptionError: a position is not finite.
+        DescriptionError: something else than a motor is given, one is given twice, or a position is not finite.
     """
 
     name: str
     positions: tuple[tuple[Motor, float], ...] = ()
 
     def __post_init__(self) -> None:
-        checked = (
-            (motor, finite(f"position of motor {motor.name!r} in configuration {self.name!r}", value))
-            for motor, value in self.positions
-        )
-        set_fields(self, positions=tuple(checked))
+        set_fields(self, positions=read_pairs(f"configuration {self.name!r}", self.positions, Motor, "position"))
 
     def __repr__(self) -> str:
         positions = ", ".join(f"{motor.name!r} at {position:g}" for motor, position in self.positions)
@@ -139,7 +136,7 @@ class Scene:
         set_fields(self, effects=tuple(self.effects))
         expect("scene", self.mechanism, Mechanism, "a mechanism", "Pass a Mechanism")
         for effect in self.effects:
-            expect("scene", effect, Effect, "an effect", "List effects only, as Gravity(…)")
+            expect("scene", effect, Effect, "an effect", "List effects only, such as Gravity(…)")
 
     def __repr__(self) -> str:
         effects = "; ".join(effect.explain() for effect in self.effects)
@@ -151,12 +148,12 @@ class Scene:
         Raises:
             DescriptionError: a motor is not in the mechanism, or its position is not finite.
         """
-        for motor in positions:
+        made = Configuration(name, positions)  # type: ignore[arg-type]  # a mapping becomes pairs
+        for motor, _ in made.positions:
             if motor not in self.mechanism.motors:
                 problem = f"{motor.name!r} is not a motor of {self.mechanism.name!r}"
-                remedy = "Add it with motor(), and name motors, not joints"
-                raise DescriptionError(f"configuration {name!r}", problem, remedy)
-        return Configuration(name, tuple(positions.items()))
+                raise DescriptionError(f"configuration {name!r}", problem, "Add it with motor()")
+        return made
 
 
 def validate(mechanism: Mechanism, dim: int) -> None:
@@ -167,10 +164,26 @@ def validate(mechanism: Mechanism, dim: int) -> None:
             or direction that does not exist in the plane, two interfaces of different shape at one place of a link.
     """
     _check_ground(mechanism)
-    _check_forces(mechanism)
+    check_loads(mechanism, dim)
     _check_interfaces(mechanism, dim)
     if dim == 2:
         _check_planar(mechanism)
+
+
+def check_loads(mechanism: Mechanism, dim: int) -> None:
+    """Checks the forces and outputs of ``mechanism``, which may be added later than its other parts.
+
+    Raises:
+        DescriptionError: a force on a fixed link, or in two dimensions a direction that leaves the plane.
+    """
+    for force in mechanism.forces:
+        if isinstance(force.on, RigidLink) and force.on.fixed:
+            problem = f"it acts on the fixed link {force.on.name!r}"
+            raise DescriptionError(f"force {force.name!r}", problem, "Give a link that moves")
+    for load in (*mechanism.forces, *mechanism.outputs):
+        if dim == 2 and len(load.direction) == 3 and abs(load.direction[2]) > 1e-12:
+            problem = f"its direction {load.direction} leaves the plane"
+            raise DescriptionError(f"{load.name!r}", problem, "Give (x, y) or use space='3d'")
 
 
 def _check_ground(mechanism: Mechanism) -> None:
@@ -191,13 +204,6 @@ def _check_ground(mechanism: Mechanism) -> None:
     if apart := [link.name for link in mechanism.links if link not in grounded]:
         problem = f"no load path to ground: no joint connects {', '.join(map(repr, apart))} with a fixed link"
         raise DescriptionError(f"link {apart[0]!r}", problem, "Join one of them to a fixed link")
-
-
-def _check_forces(mechanism: Mechanism) -> None:
-    for force in mechanism.forces:
-        if isinstance(force.on, RigidLink) and force.on.fixed:
-            problem = f"it acts on the fixed link {force.on.name!r}"
-            raise DescriptionError(f"force {force.name!r}", problem, "Give a link that moves")
 
 
 def _check_interfaces(mechanism: Mechanism, dim: int) -> None:
@@ -229,7 +235,3 @@ def _check_planar(mechanism: Mechanism) -> None:
         if not joint.kind.axis_in_plane and out_of_plane < 1.0 - 1e-12:
             remedy = "Leave it at (0, 0, 1) or use space='3d'"
             raise DescriptionError(part, f"{axis} is not normal to the plane", remedy)
-    for load in (*mechanism.forces, *mechanism.outputs):
-        if len(load.direction) == 3 and abs(load.direction[2]) > 1e-12:
-            problem = f"its direction {load.direction} leaves the plane"
-            raise DescriptionError(f"{load.name!r}", problem, "Give (x, y) or use space='3d'")

@@ -29,7 +29,7 @@ class Disc:
 class Rectangle:
     """A rectangle centred on a joint or a force: interface region of a clamp, or region that a force acts on.
 
-    ``length`` runs along the direction at ``angle`` (rad) from x, ``width`` across it. At the end of a strip
+    ``length`` runs along the direction at ``angle`` (rad) from x, ``width`` across it. For the end of a strip
     ``Mechanism.clamp`` finds position, angle and width.
     """
 
@@ -48,7 +48,7 @@ class Face:
     Attributes:
         within: the part of the flat face through the force's point within a disc or rectangle about that point, through
             the depth of the link; None for the whole flat face.
-        where: instead of the flat face, which may be curved then: predicate of points on the drawn boundary,
+        where: instead of the flat face, a part that may be curved: predicate of points on the drawn boundary,
             (n, dim) → (n,) bool; a facet belongs to the part if it holds at all its corners.
 
     Raises:

@@ -45,7 +45,7 @@ class CentrelineSearch:
             into which the medial axis runs off, it is less than 1.6; at the tip of a wedge of 60° it is 2.
         spacings: of the stations over the width, one after the other: the path from the diagram is rough, and where a
             link tapers, roughness on less than a width grows from move to move.
-        moves: most moves to the middles of chords at each spacing.
+        moves: maximum number of moves to the middles of chords at each spacing.
         settled: last move over the width.
         halved: largest distance of the centreline from the middles of its chords, over the width.
     """
@@ -298,7 +298,7 @@ def _medial_path(
         if away.min() > outline.width + outline.eye(path[np.argmin(away)]):
             raise DescriptionError(
                 part,
-                f"the joint {site.name!r} at {point_text(site.centre[:2])} is on a branch beside its longest part",
+                f"the joint {site.name!r} at {point_text(site.centre[:2])} is on a branch off its longest part",
                 "Give centreline=…, points along the link",
             )
     return path, (free[0], free[1])
@@ -355,10 +355,10 @@ class MedialAxis:
         return dijkstra(self.graph, directed=False, indices=starts)
 
     def path(self, start: int, end: int, *, part: str) -> np.ndarray:
-        """The nodes on the way from one to another, (k, 2).
+        """The nodes on the path from one to another, (k, 2).
 
         Raises:
-            DescriptionError: there is no way: in a narrow neck the points on the outline are too far apart.
+            DescriptionError: there is no path: in a narrow neck the points on the outline are too far apart.
         """
         _, before = dijkstra(self.graph, directed=False, indices=start, return_predecessors=True)
         way = [end]

@@ -3,8 +3,8 @@
     x′ = Q x + c,     Qᵀ Q = I,     det Q = 1, or −1 of a mirror image
 
 Q and c follow from the joints, and where there is a single one from the centroid of the outline as well. Joints have to
-fall on joints with interfaces of the same extent, outlines on outlines. Such links have meshes that are images too: a
-mechanism that is symmetric as drawn is symmetric as meshed.
+coincide with joints whose interfaces have the same extent, outlines with outlines. Such links have meshes that are
+images too: a mechanism that is symmetric as drawn is symmetric as meshed.
 """
 
 from __future__ import annotations
@@ -162,9 +162,9 @@ def matches(one: Figure, other: Figure, *, mirrored: bool) -> list[Match]:
 
 
 def same_mesh(one: Figure, other: Figure) -> Match | None:
-    """The motion of ``one`` to ``other`` where outlines agree to rounding, so that both can have one mesh; else None.
+    """The motion of ``one`` to ``other`` if outlines agree to rounding, so that both can share a mesh; else None.
 
-    Among several, as of symmetric links, translations come first, then mirror images.
+    If there are several, as for symmetric links, translations come first, then mirror images.
     """
     if abs(abs(signed_area(one.polygon)) - abs(signed_area(other.polygon))) > _EXACT * one.extent**2:
         return None

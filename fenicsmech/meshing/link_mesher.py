@@ -10,7 +10,7 @@ from itertools import combinations
 
 import numpy as np
 
-from fenicsmech.errors import DescriptionError, MeshingError, point_text, positive, set_fields
+from fenicsmech.errors import DescriptionError, MeshingError, point_text, positive, set_fields, whole
 from fenicsmech.log import logger
 from fenicsmech.mechanism import Disc, Region, Shape
 from fenicsmech.meshing.link_mesh import FREE, LinkMesh, cell_measures, count_pieces
@@ -116,17 +116,15 @@ class MeshRequest:
     half: bool = False
 
     def __post_init__(self) -> None:
-        part, layers, segments = f"mesh of {self.part}", self.layers, self.segments
+        part = f"mesh of {self.part}"
         set_fields(self, size=positive(f"element size, {part}", self.size))
         if self.dim not in (2, 3):
             raise DescriptionError(part, f"dim is {self.dim!r}", "Give 2 or 3")
-        if layers is not None and not (isinstance(layers, int) and layers > 0):
-            raise DescriptionError(part, f"the number of layers is {layers!r}", "Give a whole number from 1 up")
-        if not (isinstance(segments, int) and segments >= LEAST_SEGMENTS):
-            remedy = f"Give a whole number from {LEAST_SEGMENTS} up"
-            raise DescriptionError(part, f"the number of segments around pins is {segments!r}", remedy)
+        if self.layers is not None:
+            whole(f"number of layers, {part}", self.layers, least=1)
+        whole(f"number of segments around pins, {part}", self.segments, least=LEAST_SEGMENTS)
         if self.dim == 2 or self.half:
-            # in the plane every region is swept along z, whatever the joint's own axis (of a slider, say)
+            # in the plane every region is swept along z, whatever the joint's own axis, such as that of a slider
             set_fields(self, sites=tuple(replace(site, axis=(0.0, 0.0, 1.0)) for site in self.sites))
 
     @property
@@ -177,7 +175,7 @@ def clamp_defect(shape: object, site: InterfaceSite) -> tuple[str, str] | None:
 def mesh_link(name: str, shape: Shape, sites: Sequence[InterfaceSite] = (), **options) -> LinkMesh:
     """Meshes one link so that the cells of each interface fill the region where its joint holds the link.
 
-    The same input gives the same arrays. Lengths have no preferred unit, except that STEP files are read in mm.
+    The same input gives the same arrays. No unit of length is preferred, except that STEP files are read in mm.
 
     Args:
         name: the link's name, for messages.
@@ -203,7 +201,7 @@ def mesh_link(name: str, shape: Shape, sites: Sequence[InterfaceSite] = (), **op
 def check_link(
     name: str, shape: Shape, sites: Sequence[InterfaceSite], points: Mapping[str, Sequence[float]], **options
 ) -> None:
-    """Checks a link before it is meshed; arguments and errors as of ``mesh_link``.
+    """Checks a link before it is meshed; arguments and errors as for ``mesh_link``.
 
     A warning is logged for rectangles that do not hold a strip as a clamp across it would.
 

@@ -152,7 +152,7 @@ def _draw(curve: Curve, ends: tuple[int, int], height: float) -> list[int]:
     """The edges that draw a curve between two points of the current gmsh model."""
     occ = gmsh.model.occ
     if isinstance(curve, CircleArc):
-        # in pieces below a half turn, whose ends say on which side they run
+        # in pieces below a half turn, whose ends determine on which side they run
         pieces = math.ceil(abs(curve.sweep) / (0.75 * math.pi))
         between = [occ.addPoint(*at, height) for at in curve.at(np.arange(1, pieces) / pieces)]
         helpers = [occ.addPoint(*curve.centre, height)]
@@ -279,6 +279,6 @@ def _loop(outline: Outline, request: MeshRequest) -> list[Curve]:
             loop.append(straight_line(start, segment.end))
         start = segment.end
     if len(loop) < 2:
-        problem = f"an outline of {counted(len(loop), 'segment')} encloses nothing"
+        problem = f"an outline of {counted(len(loop), 'segment')} encloses no area"
         raise MeshingError(request.part, problem, "Give at least two segments")
     return loop

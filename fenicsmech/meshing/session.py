@@ -22,7 +22,7 @@ def _restore_interrupts(handler: Callable[[int, FrameType | None], Any] | int | 
         signal.signal(signal.SIGINT, handler)
 
 
-# gmsh takes Ctrl-C away from Python, some versions already on import: keep Python's handler throughout
+# gmsh takes Ctrl-C away from Python, some versions even on import: keep Python's handler throughout
 _handler = signal.getsignal(signal.SIGINT)
 import gmsh  # noqa: E402
 

@@ -280,6 +280,6 @@ def _end(
         return [occ.addLine(*points)]
     middle = centreline.evaluate(station)
     x, y = corner - middle
-    # two quarter turns to the left: the ends of a half circle do not say on which side it runs
+    # two quarter turns to the left: the ends of a half circle do not determine on which side it runs
     tip, centre = occ.addPoint(*(middle + (-y, x)), 0.0), occ.addPoint(*middle, 0.0)
     return [occ.addCircleArc(points[0], centre, tip), occ.addCircleArc(tip, centre, points[1])]

@@ -2,8 +2,9 @@
 
 - ``points``: interface nodes of the mesh as functions of body poses, the design field at nodes, material points
 - ``places``: the places of joints in the drawn configuration, which designs change
-- ``linkage``: bodies, constraints between them and potentials of their poses
-- ``idle_spins``: turns of bodies about the line through two ball joints, which nothing resists
+- ``linkage``: bodies and the constraints between them
+- ``potentials``: potentials of poses, and the free coordinate of a joint
+- ``spins``: idle spins, turns of bodies about the line through two ball joints, which nothing resists
 - ``assembly``: the rigid assembly of a configuration, and the motions that joints, motors and springs leave
 """
 
@@ -18,16 +19,8 @@ from fenicsmech.multibody.assembly import (
     is_held,
     stiff_motions,
 )
-from fenicsmech.multibody.linkage import (
-    Body,
-    Connection,
-    JointCoordinate,
-    JointSystem,
-    Linkage,
-    PosePotential,
-    build_linkage,
-    spring_potentials,
-)
+from fenicsmech.multibody.linkage import Body, Connection, JointSystem, Linkage, build_linkage
 from fenicsmech.multibody.places import JointChange, JointPlaces
 from fenicsmech.multibody.points import BodyPoint, DesignAtNodes, InterfaceMap, LinkPoint, link_point, shape_functions
+from fenicsmech.multibody.potentials import JointCoordinate, PosePotential, spring_potentials
 from fenicsmech.multibody.spins import IdleSpin, idle_spins

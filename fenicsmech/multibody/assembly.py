@@ -19,8 +19,9 @@ Springs are potentials V(z). Along the null space N of A they have the slope and
 
     Nᵀ ∂V/∂z,     Nᵀ (∂²V/∂z² − Σ λ_k ∂²C_k/∂z²) N,     Aᵀλ = ∂V/∂z,
 
-and hold the motions along which this curvature is not zero. The others are the zero-energy modes. In an assembly
-the energy of springs is least, by Newton steps with the absolute eigenvalues of the curvature, which descend.
+and hold the motions along which this curvature is not zero. The others are the zero-energy modes. In an assembly the
+energy of springs is least. It is found by Newton steps with the absolute eigenvalues of the curvature, which always
+descend.
 
 Where flexible links are bent, but move as rigid bodies, a link with the velocity v of a point x₀ and the spin ω takes
 its bodies along:
@@ -40,7 +41,8 @@ from scipy.sparse.csgraph import breadth_first_order
 
 from fenicsmech.errors import AssemblyError
 from fenicsmech.mechanism import Configuration
-from fenicsmech.multibody.linkage import RANK, JointSystem, Linkage, PosePotential
+from fenicsmech.multibody.linkage import RANK, JointSystem, Linkage
+from fenicsmech.multibody.potentials import PosePotential
 from fenicsmech.multibody.spins import IdleSpin
 
 
@@ -62,6 +64,7 @@ def assemble(linkage: Linkage, configuration: Configuration, springs: Sequence[P
 
     Raises:
         AssemblyError: a loop does not close even with freely deformable links.
+        EquilibriumError: the motors take a spring beyond the poses that it holds for.
     """
     if springs:
         return _assembled(linkage, configuration, springs)
@@ -158,6 +161,8 @@ class _Assembler:
             elif last_step > 0.0 and missed > self.deviation * moved and not shortest:
                 step *= 0.5
             else:
+                for spring in self.springs:
+                    spring.check_step(poses, trial)
                 before, poses, last_step = poses, trial, step
                 fraction = 1.0 if fraction + step >= 1.0 - 1e-12 else fraction + step
                 step = min(largest, 2.0 * step)
@@ -282,7 +287,7 @@ def count_freedom(
     dependent = _null_space(system.scaled_gradient(poses, motors).T)
     free = free_motions(system, poses, motors, springs)
     curvatures, modes = np.linalg.eigh(free.curvature)
-    # along these the curvature is that of rounding, beside that of the stiffest motion
+    # along these the curvature is rounding, relative to that of the stiffest motion
     flat = np.abs(curvatures) <= 1e-12 * np.max(np.abs(curvatures), initial=0.0)
 
     def moving(motions: np.ndarray) -> tuple[str, ...]:

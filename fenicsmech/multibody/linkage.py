@@ -1,4 +1,4 @@
-"""Bodies and constraints of a described mechanism: C(z), A = ∂C/∂z, Σ λ_k ∂²C_k/∂z²; potentials of poses.
+"""Bodies and constraints of a described mechanism: C(z), A = ∂C/∂z, Σ λ_k ∂²C_k/∂z².
 
 Bodies are the rigid links and the interfaces of flexible ones. Rows: the connections in order (a motor's row last in
 its connection), then the norm constraints of the unfixed bodies. Columns: the poses of the unfixed bodies in order.
@@ -7,27 +7,16 @@ Fixed bodies carry no columns.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from scipy.linalg import qr
 
-from fenicsmech.joints import (
-    RIGID_SPACES,
-    WELD,
-    JointKind,
-    constraint,
-    constraint_rate,
-    coordinate_rate,
-    free_coordinate,
-)
+from fenicsmech.joints import RIGID_SPACES, WELD, JointKind, constraint, constraint_rate
 from fenicsmech.mechanism import (
     Configuration,
-    Effect,
     FlexibleLink,
     Joint,
     Link,
@@ -190,7 +179,7 @@ class JointSystem:
         """A, (rows, size)."""
         matrix = np.zeros((self.rows, self.size))
         for rows, columns, block in self.gradient_blocks(poses, motors):
-            matrix[np.ix_(rows, columns)] += block
+            matrix[rows[:, None], columns] += block
         return matrix
 
     def scaled_gradient(self, poses: np.ndarray, motors: np.ndarray) -> np.ndarray:
@@ -358,95 +347,6 @@ class Linkage:
             if np.any(np.abs(np.delete(residual, list(joints.motor_rows.values()))) > 1e-12):
                 return False
         return True
-
-
-class PosePotential(ABC):
-    """A potential V(z) of the poses of a few bodies.
-
-    Attributes:
-        bodies: indices of the bodies.
-        holds: whether it acts in full from the start, as springs do, instead of growing with the load factor.
-        numbers: that designs may change, by name; none by default.
-    """
-
-    bodies: tuple[int, ...]
-    holds: bool = False
-    numbers: dict[str, float] = MappingProxyType({})  # type: ignore[assignment]
-
-    @abstractmethod
-    def value(self, poses: np.ndarray) -> float:
-        """V; ``poses`` are those of all bodies, (bodies, pose_size)."""
-
-    @abstractmethod
-    def gradient(self, poses: np.ndarray) -> np.ndarray:
-        """∂V/∂z of ``bodies``, one after the other, (n · pose_size,)."""
-
-    @abstractmethod
-    def hessian(self, poses: np.ndarray) -> np.ndarray:
-        """∂²V/∂z², (n · pose_size, n · pose_size)."""
-
-    def factor(self, load_factor: float) -> float:
-        """The factor that V counts with."""
-        return 1.0 if self.holds else load_factor
-
-    def gradient_by(self, name: str, poses: np.ndarray) -> np.ndarray:
-        """∂²V/∂z∂p of one of ``numbers``, (n · pose_size,)."""
-        raise NotImplementedError(f"{type(self).__name__} has no numbers")
-
-    def gradient_by_places(self, changes: Mapping[int, JointChange], poses: np.ndarray) -> np.ndarray | float:
-        """∂²V/∂z∂p of a number p that changes the places of joints, (n · pose_size,).
-
-        Zero by default, which is right where V refers to no joint. A potential that does overrides it, and reads
-        places from ``JointSystem.places``, as ``JointCoordinate`` does; otherwise derivatives by ``JointPosition`` and
-        ``JointAxis`` are wrong.
-
-        Args:
-            changes: by a unit of p, by index of the connection (``Linkage.connection_of``).
-            poses: of all bodies, (bodies, pose_size).
-        """
-        return 0.0
-
-
-def spring_potentials(effects: Sequence[Effect], linkage: Linkage) -> tuple[PosePotential, ...]:
-    """The potentials of ``effects`` that act in full from the start."""
-    return tuple(found for effect in effects for found in effect.pose_potentials(linkage) if found.holds)
-
-
-class JointCoordinate:
-    """φ, the free coordinate of a ``joint`` that can have a motor: the angle or travel of its second link.
-
-    Attributes:
-        bodies: indices of both bodies.
-    """
-
-    def __init__(self, linkage: Linkage, joint: Joint) -> None:
-        self._k, self._places = linkage.connection_of(joint), linkage.joints.places
-        connection = linkage.joints.connections[self._k]
-        self.bodies = (connection.a, connection.b)
-        self._kind, self._formula = joint.kind, free_coordinate(joint.kind, linkage.dim)
-
-    def value(self, poses: np.ndarray) -> float:
-        """φ, zero as drawn, from the ``poses`` of all bodies, (bodies, pose_size)."""
-        return float(self._formula.value(*self._point(poses))[0])
-
-    def gradient(self, poses: np.ndarray) -> np.ndarray:
-        """∂φ/∂z of ``bodies``, one after the other, (2 pose_size,)."""
-        return self._formula.gradient(*self._point(poses))[0]
-
-    def hessian(self, poses: np.ndarray) -> np.ndarray:
-        """∂²φ/∂z², (2 pose_size, 2 pose_size)."""
-        return self._formula.hessian(*self._point(poses), np.ones(1))
-
-    def place_rates(self, changes: Mapping[int, JointChange], poses: np.ndarray) -> tuple[float, np.ndarray | float]:
-        """Derivatives of φ, and of ∂φ/∂z (2 pose_size,), as the places of some connections change."""
-        if self._k not in changes:
-            return 0.0, 0.0
-        formula, (variables, constants) = coordinate_rate(self._kind, self._places.dim), self._point(poses)
-        arguments = variables, np.concatenate([constants, self._places.rate(self._k, changes[self._k])])
-        return float(formula.value(*arguments)[0]), formula.gradient(*arguments)[0]
-
-    def _point(self, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return poses[list(self.bodies)].ravel(), self._places[self._k]
 
 
 def build_linkage(mechanism: Mechanism, dim: int, changes: Mapping[Joint, JointChange] | None = None) -> Linkage:

@@ -3,8 +3,9 @@
     c = (P + δ − c_a, P + δ − c_b, E Qᵀ(ω)),     Q = exp [ω]×
 
 are the constants of a joint's equations, with its drawn place P, the centres c_a and c_b of its bodies and the rows E
-of its triad. Both bodies attach at the same point, along the same axes. So the poses of the drawn configuration close
-all joints at any δ and ω, as the unloaded, assembled ones. The derivative Q′ of Q as ω changes by a is given by
+of its triad. Both bodies attach at the same point, along the same axes. So at any δ and ω the poses of the drawn
+configuration close all joints: they stay the unloaded, assembled ones. The derivative Q′ of Q as ω changes by a is
+given by
 
     Q′ Qᵀ = [J a]×,     J = ∫₀¹ exp(s [ω]×) ds,
 
@@ -18,6 +19,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
+
+from fenicsmech.joints import cross_matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,8 +108,7 @@ class JointPlaces:
 
 def _mean_turn(vector: np.ndarray) -> np.ndarray:
     """J, the mean of exp(s [ω]×) over 0 ≤ s ≤ 1, (3, 3)."""
-    x, y, z = vector
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    cross = np.array(cross_matrix(vector))
     angle = float(np.linalg.norm(vector))
     # (1 − cos |ω|) / |ω|² and (|ω| − sin |ω|) / |ω|³, of which the limit is good to rounding where the second cancels
     first = 0.5 * np.sinc(0.5 * angle / np.pi) ** 2

@@ -5,7 +5,8 @@ Interface nodes follow body poses, with the pose (t, R) and the centre c of a bo
     u_i = t + (R − I)(X_i − c).
 
 All nodes of the cells in an interface are eliminated from the unknowns; each follows the pose of its body. Where bodies
-move in the plane while the mesh is one half of the links in space, that is u_z = 0, as it is on the mid-plane z = 0.
+move in the plane while the mesh is one half of the links in space, this includes u_z = 0, which also holds on the
+mid-plane z = 0.
 
 Rest positions of all nodes follow the design field d, d_i = Σ_k N_k(X_i) d_k.
 

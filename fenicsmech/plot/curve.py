@@ -47,7 +47,7 @@ class CurveSeries:
         snapped_through: (n,) whether the mechanism snapped through on the way to each point; empty: nowhere.
         joined: draw the line through the points; False for measurements.
         colour: a matplotlib colour; None takes the next of the palette.
-        faint: draw it thin and light behind the others, as a curve before a change.
+        faint: draw it thin and light behind the others, for a curve before a change.
         marks: points with a marker.
 
     Raises:

@@ -59,7 +59,7 @@ class Lengths:
     padding: float = 0.12  # air around a mechanism
     gap: float = 0.16  # between panels with a common axis
     bar: float = 0.14  # width of a colour bar
-    bar_room: float = 1.1  # the same with its numbers and label
+    bar_room: float = 1.1  # width of a colour bar with its numbers and label
     key: float = 0.6  # line and gap of one entry of a legend
     longest_arrow: float = 0.17  # relative to the mechanism's diagonal
     # largest width and height of all links laid down, unless they would be smaller than in place

@@ -1,4 +1,4 @@
-"""Quantities of equilibria and of links at rest, with their derivatives by the design field and by numbers of parts.
+"""Quantities of equilibria and of links at rest; derivatives with respect to the design field and numbers of parts.
 
 - ``quantity``: the interface of quantities; components and magnitudes of vectors
 - ``motion``: displacements and rotations

@@ -1,4 +1,4 @@
-"""Forces of an equilibrium: that which prescribes a displacement, torques of motors, reactions of joints.
+"""Forces of an equilibrium: the force at a prescribed displacement, torques of motors, reactions of joints.
 
 They are unknowns of the equilibrium, the controlled force f and the multipliers λ, or linear in these:
 

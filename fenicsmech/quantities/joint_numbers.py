@@ -1,6 +1,6 @@
 """Numbers of joints: stiffness and rest position of springs, and offsets of motors.
 
-A motor at the prescribed position φ stands at φ + φ₀ with the offset φ₀. Configurations are assembled with it,
+A motor with the offset φ₀ and the prescribed position φ is at φ + φ₀. Configurations are assembled with it,
 C(z, φ + φ₀) = 0, and with the parts ẑ and λ̂ of the adjoint that belong to poses and multipliers
 
     −xᵀ ∂F/∂φ₀ = ẑ · ∂(Aᵀλ)/∂φ + λ̂ · ∂C/∂φ.
@@ -58,9 +58,6 @@ class SpringStiffness(_OfSprings):
     def unit(self, units):
         sliding = self.parts[0].joint.kind.sliding
         return f"{units.force}/{units.length}" if sliding else f"{units.force} {units.length}/rad"
-
-    def moves_unloaded(self, configuration: Configuration) -> bool:
-        return any(position for _, position in configuration.positions)
 
 
 @dataclass(frozen=True, init=False)

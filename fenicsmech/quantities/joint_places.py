@@ -87,12 +87,12 @@ class JointPosition(_OfJoints):
 
     Two numbers, along x and y, let a joint go anywhere in the plane. All bodies that meet there attach at the shifted
     point. In a design problem flexible links follow: their interface by the shift, their centreline by the linear
-    interpolation of the shifts of its joints. Forces and outputs on rigid links stay where they are drawn on them, also
-    those drawn at the joint. Joints of flexible links are shifted in the plane only, all those at one place of a link
-    together, and not at all if the link shares its shape with others (``SplineDesign.same``).
+    interpolation of the shifts of its joints. Forces and outputs on rigid links stay where they are drawn on the link,
+    even at the place of the joint. Joints of flexible links are shifted in the plane only, all those at one place of a
+    link together, and not at all if the link shares its shape with others (``SplineDesign.same``).
 
     Args:
-        parts: a joint, or several with the same shift, as those of a pin through several links.
+        parts: a joint, or several with the same shift, such as those of a pin through several links.
         direction: in which the shift is positive, of any length; 2 or 3 coordinates.
 
     Raises:
@@ -153,8 +153,8 @@ class JointAxis(_OfJoints):
 
         exp [v e]×,     e the unit vector along ``about``, v the number, zero as drawn, |v| < π
 
-    In the plane only axes that lie in it turn, about z, as those of sliders. Turns of one joint about several axes add
-    up as rotation vectors. Interfaces of flexible links keep their regions.
+    In the plane only axes that lie in it, such as those of sliders, turn, about z. Turns of one joint about several
+    axes add up as rotation vectors. Interfaces of flexible links keep their regions.
 
     Args:
         parts: a joint, or several whose axes turn by the same angle.

@@ -1,6 +1,7 @@
 """Numbers of flexible links: numbers of their law, and their depth.
 
-Both are fields with one value per cell in the energy E, whose derivative by the value on one link is a form,
+Both are fields with one value per cell in the energy E, whose derivative with respect to the value on one link is a
+form,
 
     xᵀ ∂F/∂p = ∂(r · û)/∂p,     r = ∂E/∂u,     û = ∂u/∂y · x.
 
@@ -13,12 +14,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 
 import numpy as np
 
 from fenicsmech.compat import cell_dofs
-from fenicsmech.errors import DescriptionError, finite, set_fields
-from fenicsmech.mechanism import FlexibleLink, Scene, Units
+from fenicsmech.errors import DescriptionError, expect, finite, set_fields
+from fenicsmech.mechanism import FlexibleLink, Material, Scene, Units
 from fenicsmech.model import MechanismModel
 from fenicsmech.quantities.number import ModelNumber, NumberKind
 
@@ -27,6 +29,11 @@ class _OfLinks(NumberKind):
     """A number of flexible links."""
 
     parts: tuple[FlexibleLink, ...]
+
+    def __init__(self, *parts: FlexibleLink) -> None:
+        for part in parts:
+            expect(self.what, part, FlexibleLink, "a flexible link")
+        super().__init__(*parts)
 
     @staticmethod
     def candidates(scene: Scene) -> Sequence[FlexibleLink]:
@@ -61,7 +68,8 @@ class Depth(_OfLinks):
         return units.length
 
     def on(self, model):
-        return _Depth(model, self.chosen(model))
+        chosen = self.chosen(model)
+        return _Depth(model, chosen, self.shared(compress(model.depths, chosen)))
 
 
 @dataclass(frozen=True, init=False)
@@ -104,10 +112,13 @@ class LawParameter(_OfLinks):
         return cls(words[0], *(cls._part(scene, word) for word in words[1:]))
 
     def described(self, part):
-        known = part.material.law.parameters
+        return self._of(part.material)
+
+    def _of(self, material: Material) -> float:
+        known = material.law.parameters
         if self.parameter not in known:
             raise DescriptionError(
-                self.name, f"the law of {part.material.name!r} has no such number", f"It has {', '.join(known)}"
+                self.name, f"the law of {material.name!r} has no such number", f"It has {', '.join(known)}"
             )
         return known[self.parameter]
 
@@ -121,15 +132,17 @@ class LawParameter(_OfLinks):
         return units.stress if self.parameter == "E" else ""
 
     def on(self, model):
-        return _LawParameter(model, self.parameter, self.chosen(model))
+        chosen = self.chosen(model)
+        drawn = self.shared(map(self._of, compress(model.materials, chosen)))
+        return _LawParameter(model, self.parameter, chosen, drawn)
 
 
 class _LawParameter(ModelNumber):
     """A number of the laws of the ``chosen`` links."""
 
-    def __init__(self, model: MechanismModel, name: str, chosen: np.ndarray) -> None:
+    def __init__(self, model: MechanismModel, name: str, chosen: np.ndarray, drawn: float) -> None:
         self._model, self._name, self._chosen = model, name, chosen
-        self.drawn = self.value = model.materials[int(np.argmax(chosen))].law.parameters[name]
+        self.drawn = self.value = drawn
 
     def set(self, value):
         self.value = value
@@ -142,9 +155,9 @@ class _LawParameter(ModelNumber):
 class _Depth(ModelNumber):
     """The depth of the ``chosen`` links."""
 
-    def __init__(self, model: MechanismModel, chosen: np.ndarray) -> None:
+    def __init__(self, model: MechanismModel, chosen: np.ndarray, drawn: float) -> None:
         self._model, self._chosen = model, chosen
-        self.drawn = self.value = model.depths[int(np.argmax(chosen))]
+        self.drawn = self.value = drawn
         self.rate = (self._heights() / self.drawn).ravel()
 
     def set(self, value):

@@ -14,6 +14,7 @@ from typing import ClassVar
 
 import numpy as np
 import ufl
+from dolfinx import fem
 
 from fenicsmech.collective import from_one
 from fenicsmech.errors import DescriptionError, expect, points, positive, set_fields
@@ -73,7 +74,7 @@ class StrainEnergy(_OfLinks):
         elastic = model.elastic
         share = elastic.cellwise(self.weights(model))
         terms = [share * density * dx for density, dx in elastic.densities(elastic.gradient(elastic.u))]
-        return _Energy(model, sum(terms[1:], start=terms[0]))
+        return _Form(model, sum(terms[1:], start=terms[0]), elastic.fields)
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,7 @@ class LinkVolume(_OfLinks):
 
     def on(self, model):
         fields = model.fields
-        return _Volume(model, fields.integral(fields.cellwise(self.weights(model)), degree=0))
+        return _RestForm(model, fields.integral(fields.cellwise(self.weights(model)), degree=0))
 
 
 @dataclass(frozen=True)
@@ -136,41 +137,33 @@ class LinkMass(LinkVolume):
         return super().weights(model) * [self.density or material.density or 0.0 for material in materials]
 
 
-class _Energy(Observable):
-    """A form in the fields of the links."""
+class _Form(Observable):
+    """A form in the shape, numbers and some ``states`` of the links."""
 
-    def __init__(self, model: MechanismModel, form: ufl.Form) -> None:
-        elastic, self._numbers = model.elastic, dict(model.elastic.numbers)
-        self._states = {f"state {k}": own for k, own in enumerate(elastic.fields)}
-        self._form = FormValue(model, form, {"design": elastic.shape, **self._states, **self._numbers})
+    def __init__(self, model: MechanismModel, form: ufl.Form, states: Sequence[fem.Function] = ()) -> None:
+        self._numbers, self._states = dict(model.elastic.numbers), {f"state {k}": own for k, own in enumerate(states)}
+        self._form = FormValue(model, form, {"design": model.elastic.shape, **self._states, **self._numbers})
 
-    def values(self, state):
-        return np.array([self._form.value()])
-
-    def partials(self, system, state):
-        return [
-            Partial(
-                links=np.concatenate([self._form.slope(name) for name in self._states]),
-                design=self._form.slope("design"),
-                per_link={name: self._form.per_link(name) for name in self._numbers},
-            )
-        ]
-
-
-class _Volume(RestObservable):
-    """A form in the shape and the depth."""
-
-    def __init__(self, model: MechanismModel, form: ufl.Form) -> None:
-        self._depths = {name: own for name, own in model.elastic.numbers.items() if own is model.elastic.depth}
-        self._form = FormValue(model, form, {"design": model.elastic.shape, **self._depths})
-
-    def value(self):
+    def value(self) -> float:
         return self._form.value()
 
-    def slope(self):
+    def slope(self) -> Partial:
+        links = [self._form.slope(name) for name in self._states]
         return Partial(
-            design=self._form.slope("design"), per_link={name: self._form.per_link(name) for name in self._depths}
+            links=np.concatenate(links) if links else 0.0,
+            design=self._form.slope("design"),
+            per_link={name: self._form.per_link(name) for name in self._numbers},
         )
+
+    def values(self, state):
+        return np.array([self.value()])
+
+    def partials(self, system, state):
+        return [self.slope()]
+
+
+class _RestForm(_Form, RestObservable):
+    """The same of links at rest."""
 
 
 @dataclass(frozen=True)
@@ -190,9 +183,8 @@ class CentrelineLength(Quantity):
     centreline: Sequence[Sequence[float]] | None = None
     of_state = False
 
-    @property
-    def of_part(self):  # type: ignore[override]
-        return self.centreline is None  # a given one is that of the drawn link
+    def of_part(self, links):
+        return self.centreline is None or self.link not in links  # a given one is that of the drawn link
 
     def __post_init__(self) -> None:
         expect("length of a link", self.link, FlexibleLink, "a flexible link", "Give a flexible link of the mechanism")

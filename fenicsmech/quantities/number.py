@@ -1,4 +1,4 @@
-"""Numbers p of parts, which designs change beside shapes.
+"""Numbers p of parts, which designs change in addition to shapes.
 
 A ``NumberKind`` is described as plain data: ``Depth(finger)``, or ``Depth(left, right)`` for parts that share a value.
 ``on`` a model it is a ``ModelNumber``, which sets the value there and gives the derivative of a component Q of a
@@ -16,7 +16,7 @@ and by potentials V of poses, with the poses' part ẑ of x, which count with a 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -109,7 +109,7 @@ class EffectNumber(ModelNumber):
                     raise DescriptionError(
                         f"{name} of {effect}",
                         f"its field on links has the value {value:g}, and the effect {getattr(effect, name):g}",
-                        "Give fields.number(…) the attribute, and write factors beside the field",
+                        "Give fields.number(…) the attribute, and keep factors outside the field",
                     )
                 self._fields.append((known, chosen))
         if not self._potentials and not self._fields:
@@ -224,14 +224,15 @@ class NumberKind(ABC):
         return False
 
     def check_value(self, value: float) -> None:
-        """Refuses a value that makes no sense with a DescriptionError; by default one that is not positive."""
+        """Refuses an invalid value with a DescriptionError; by default one that is not positive."""
         positive(self.name, value)
 
     def check(self, scene: Scene, dim: int) -> None:
         """Checks that the number exists in ``scene`` in ``dim`` dimensions.
 
         Raises:
-            DescriptionError: a part is not one of the scene, or they are drawn with different numbers.
+            DescriptionError: a part is not one of the scene or not the only one of its name there, or they are drawn
+                with different numbers.
         """
         candidates = self.candidates(scene)
         for part in self.parts:
@@ -240,13 +241,26 @@ class NumberKind(ABC):
                 raise DescriptionError(
                     self.name, f"{part!r} of {scene.mechanism.name!r} has none", f"The scene has {has}"
                 )
-        values = sorted({self.described(part) for part in self.parts})
-        if len(values) > 1:
+            # results find parts by their labels
+            alike = [self.label(other) for other in candidates].count(self.label(part))
+            if alike > 1:
+                raise DescriptionError(self.name, f"the scene has {alike} parts of that name", "Describe them as one")
+        self.shared([self.described(part) for part in self.parts])
+
+    def shared(self, values: Iterable[float]) -> float:
+        """The one of ``values`` of the parts, which are drawn alike.
+
+        Raises:
+            DescriptionError: they are not.
+        """
+        first, *others = sorted(set(values))
+        if others:
             raise DescriptionError(
                 self.name,
-                f"they are drawn with {', '.join(f'{v:g}' for v in values)}",
+                f"they are drawn with {', '.join(f'{v:g}' for v in (first, *others))}",
                 "Draw parts alike that share it",
             )
+        return first
 
     @classmethod
     def _part(cls, scene: Scene, word: str) -> Any:

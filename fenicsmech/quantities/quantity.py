@@ -3,16 +3,16 @@
     y = (u, p, z, λ, f) the unknowns of the equilibrium,      p the design field d and numbers of parts
 
 A ``Quantity`` is described as plain data. ``on`` a model it is an ``Observable``, which gives the values of a state
-and the partial derivatives of each component; the adjoint in ``sensitivity`` makes total ones of them. A new quantity
-is one subclass of each.
+and the partial derivatives of each component; the adjoint in ``sensitivity`` turns them into total derivatives. A new
+quantity is one subclass of each.
 
-Quantities of quantities follow by the chain rule: ``Component`` of a vector along a direction, and its ``Magnitude``.
+Derived quantities follow by the chain rule: ``Component`` of a vector along a direction, and its ``Magnitude``.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from types import MappingProxyType
@@ -25,7 +25,7 @@ from mpi4py import MPI
 
 from fenicsmech.compat import assemble_vector, compile_form, owned_values
 from fenicsmech.equilibrium import EquilibriumSystem, State
-from fenicsmech.errors import DescriptionError, direction, point_text, set_fields
+from fenicsmech.errors import DescriptionError, direction, in_plane, point_text, set_fields
 from fenicsmech.mechanism import FlexibleLink, Force, Joint, Motor, Output, RigidLink, Scene, Units, in_dimension
 from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import JointChange
@@ -99,7 +99,7 @@ class RestObservable(Observable):
 
     @abstractmethod
     def slope(self) -> Partial:
-        """The derivatives by the design."""
+        """The derivatives with respect to the design."""
 
     def values(self, state):
         return np.array([self.value()])
@@ -115,11 +115,9 @@ class Quantity(ABC):
     Attributes:
         of_state: whether it depends on an equilibrium; those that do not need no sample.
         from_unloaded: whether it counts from the unloaded configuration.
-        of_part: whether exported parts, known by their outline alone, have it.
     """
 
     of_state: ClassVar[bool] = True
-    of_part: ClassVar[bool] = True
     from_unloaded: ClassVar[bool] = False
 
     @property
@@ -134,6 +132,10 @@ class Quantity(ABC):
     @abstractmethod
     def on(self, model: MechanismModel) -> Observable:
         """The quantity of one model."""
+
+    def of_part(self, links: Collection[FlexibleLink]) -> bool:
+        """Whether parts that are known by their outline alone, in place of ``links``, have it; by default they do."""
+        return True
 
     def size(self, dim: int) -> int:
         """Number of its components in ``dim`` dimensions; 1 by default."""
@@ -178,6 +180,9 @@ class _OfVector(Quantity):
     def from_unloaded(self):  # type: ignore[override]
         return self.vector.from_unloaded
 
+    def of_part(self, links):
+        return self.vector.of_part(links)
+
     def unit(self, units):
         return self.vector.unit(units)
 
@@ -211,6 +216,10 @@ class Component(_OfVector):
     @property
     def name(self):
         return f"{self.vector} along {point_text(self.direction)}"
+
+    def check(self, scene, dim):
+        super().check(scene, dim)
+        in_plane(f"direction of the {self.vector}", self.direction, dim)
 
     def reduce(self, values):
         along = np.array(in_dimension(self.direction, len(values)))
@@ -246,12 +255,12 @@ def border_of(system: EquilibriumSystem, **blocks: tuple[Sequence[int] | np.ndar
 
 
 class FormValue:
-    """A form at the fields that the model holds and its derivatives by them, compiled when they are first needed.
+    """A form at the fields that the model holds, and its derivatives with respect to them, compiled when first needed.
 
     Args:
         model: whose links it is integrated over.
         form: a scalar.
-        fields: by which it is derived, by name.
+        fields: by name, with respect to which it is differentiated.
     """
 
     def __init__(self, model: MechanismModel, form: ufl.Form, fields: Mapping[str, fem.Function]) -> None:
@@ -263,7 +272,7 @@ class FormValue:
         return float(self._model.mesh.comm.allreduce(fem.assemble_scalar(self._compiled)))
 
     def slope(self, name: str) -> np.ndarray:
-        """The derivative by a field, this rank's owned values, flat; zeros if the form does not depend on it."""
+        """The derivative with respect to a field, this rank's owned values, flat; zeros if there is none."""
         if self._fields[name] not in self._form.coefficients():
             return np.zeros(len(owned_values(self._fields[name])))
         if name not in self._slopes:
@@ -275,7 +284,7 @@ class FormValue:
             return assemble_vector(*self._slopes[name]).copy()
 
     def per_link(self, name: str) -> np.ndarray:
-        """The derivative by the value of a field of cells on each flexible link, (links,)."""
+        """The derivative with respect to the value of a field of cells on each flexible link, (links,)."""
         cells, links = self.slope(name), len(self._model.mechanism.flexible_links)
         sums = np.bincount(self._model.mesh.link[: len(cells)], weights=cells, minlength=links)
         return self._model.mesh.comm.allreduce(sums, op=MPI.SUM)

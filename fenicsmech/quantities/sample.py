@@ -14,7 +14,7 @@ class PrescribedDisplacement:
     """A prescribed displacement of a force's point in place of the force's magnitude; ``at`` makes it.
 
     Attributes:
-        value: the displacement along the force, from the unloaded configuration, length.
+        value: the displacement along the force, from the unloaded configuration; a length.
     """
 
     value: float
@@ -24,12 +24,22 @@ def at(displacement: float) -> PrescribedDisplacement:
     """A prescribed displacement as a value of a ``Sample``; the force follows.
 
     Args:
-        displacement: of the force's point along it, from the unloaded configuration, length.
+        displacement: of the force's point along its direction, from the unloaded configuration; a length.
 
     Raises:
         DescriptionError: it is not a finite number.
     """
     return PrescribedDisplacement(finite("displacement of a sample", displacement))
+
+
+class _NoForce(ForceGroup):
+    """The part prescribed where nothing but motors and effects acts; groups that users make have forces."""
+
+    def __init__(self) -> None:
+        set_fields(self, name="no force", ratios=())
+
+
+_NO_FORCE = _NoForce()
 
 
 @dataclass(frozen=True, init=False)
@@ -68,7 +78,9 @@ class Sample:
             if isinstance(part, Motor):
                 positions.append((part, finite(f"position of {part.name!r} in a sample", value)))
             elif not isinstance(part, Force):
-                raise DescriptionError("sample", f"{part!r} is neither a force nor a motor", "Give the mechanism's")
+                raise DescriptionError(
+                    "sample", f"{part!r} is neither a force nor a motor", "Give forces and motors of the mechanism"
+                )
             elif isinstance(value, PrescribedDisplacement):
                 forces.append((part, value))
             else:
@@ -106,9 +118,11 @@ class Sample:
         if self.moved:
             return self.moved[0]
         acting = self._acting or self.forces[:1]
+        if not acting:
+            return _NO_FORCE
         if len(acting) == 1:
             return acting[0][0]
-        name = " and ".join(force.name for force, _ in acting) or "no force"
+        name = " and ".join(force.name for force, _ in acting)
         return ForceGroup(name, tuple((force, magnitude / self.magnitude) for force, magnitude in self._acting))
 
     @property
@@ -128,5 +142,5 @@ class Sample:
 
     @property
     def _acting(self) -> tuple[tuple[Force, float], ...]:
-        """Forces of given magnitude, without those of none."""
+        """Forces of given magnitude, except those of magnitude zero."""
         return tuple((force, value) for force, value in self.forces if isinstance(value, float) and value)

@@ -5,15 +5,16 @@ At an equilibrium F(y, p) = Gᵀ ∇L = 0 with y = (s, λ, f). For a quantity Q(
     K x = ∂Q/∂y,     dQ/dp = ∂Q/∂p − xᵀ ∂F/∂p,     dQ/dv = x · r
 
 where v is the value of the control, whose rate is K⁻¹ r. With û = ∂u/∂y · x at all nodes, pressures included where
-links have some of their own, ẑ the poses' part of x and f̂ that of the controlled force,
+links are in u–p form, ẑ the poses' part of x and f̂ that of the controlled force,
 
     xᵀ ∂F/∂d = ∂(r · û)/∂d  +  Σ_i over interface nodes [ (K_uu û − a f̂)_i · (R − I) + r_i · (ẑ_r ∂R/∂r) ] ∂X_i/∂d.
 
 The first part is a form, differentiated symbolically: elements, and effects whose energy is a form, depend on X.
 The second part is derived by hand. An interface node moves with its body, u_i = t + (R − I)(X_i − X_b): where it was
 drawn enters its displacement through G, which is not a form; a quantity of such nodes has ∂Q/∂u_i · (R − I) in ∂Q/∂d.
-Nor is the work of forces at points, a of the controlled one; they stay at the same place of their cell, or of their
-body, so that it depends on d through the displacements of nodes alone, and the nodal forces r hold it.
+The work of forces at points, a of the controlled one, is not a form either. Such points stay at the same place of their
+cell, or of their body: their work depends on d through the displacements of nodes alone, and the nodal forces r contain
+it.
 
 Numbers of parts (``number``) add one product with the same x each.
 
@@ -44,7 +45,7 @@ class Gradient:
 
     Attributes:
         design: by the design field, this rank's owned values, flat.
-        numbers: by the numbers of parts that were asked for, (numbers,).
+        numbers: by the numbers of parts that were requested, (numbers,).
         control: by the value of the control.
     """
 
@@ -66,7 +67,7 @@ class Sensitivity:
 
     Args:
         model: the model.
-        numbers: derivatives by which are wanted beside those by the design field.
+        numbers: with respect to which derivatives are wanted, in addition to those by the design field.
     """
 
     def __init__(self, model: MechanismModel, numbers: Sequence[NumberKind] = ()) -> None:
@@ -79,7 +80,7 @@ class Sensitivity:
         """The derivatives of all components of some quantities at an equilibrium.
 
         Args:
-            solver: which found it.
+            solver: that found the equilibrium.
             state: the equilibrium.
             control: under which it was found.
             observables: the quantities.

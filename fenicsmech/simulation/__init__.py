@@ -12,7 +12,7 @@
 from fenicsmech.simulation.curve import Axis, Curve
 from fenicsmech.simulation.fields import MechanismPlotter, gather, joint_points, rest_geometry, rest_vertices
 from fenicsmech.simulation.following import FollowedCurve, PathEvent, Until
-from fenicsmech.simulation.frame import BucklingLoad, BucklingPosition, Frame, ModeShape, SoftMode
+from fenicsmech.simulation.frame import BucklingPoint, Frame, ModeShape, SoftMode
 from fenicsmech.simulation.omitted_effects import Explanation, Hint, PinFriction, weight_influence
 from fenicsmech.simulation.simulation import RestShape, Simulation
 from fenicsmech.simulation.stepping import CurveRequest, read_request

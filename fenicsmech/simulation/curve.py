@@ -12,17 +12,17 @@ import numpy as np
 from fenicsmech.collective import on_one
 from fenicsmech.continuation import Mode, critical_changes, softest_modes
 from fenicsmech.elasticity import PLANE_STRESS
-from fenicsmech.equilibrium import EquilibriumSolver, LoadControl, MotorControl, NotConverged, State, Unknown
+from fenicsmech.equilibrium import EquilibriumSolver, LoadControl, MotorControl, NotConverged, PointLoad, State, Unknown
 from fenicsmech.errors import DescriptionError, EquilibriumError, counted
 from fenicsmech.estimates import AccuracyOptions, Equilibrium, ErrorKind, cause_of_growth, growth_by_halving
 from fenicsmech.files import write_csv
 from fenicsmech.log import logger
 from fenicsmech.mechanism import Configuration, Force, ForceGroup, Joint, Output, PrescribedPart, Units
 from fenicsmech.multibody import Freedom
-from fenicsmech.plot import CurveSeries, Panel, Trace, draw_configurations, plot_curve
+from fenicsmech.plot import Arrow, CurveSeries, Panel, Trace, draw_configurations, plot_curve
 from fenicsmech.simulation.discretisation import Discretisation
-from fenicsmech.simulation.fields import MechanismPlotter, gather, write_xdmf
-from fenicsmech.simulation.frame import BucklingLoad, BucklingPosition, Frame, ModeShape, SoftMode, mode_shape
+from fenicsmech.simulation.fields import MechanismPlotter, gather, position, write_xdmf
+from fenicsmech.simulation.frame import BucklingPoint, Frame, ModeShape, SoftMode, mode_shape
 from fenicsmech.simulation.omitted_effects import Explanation, ExplanationOptions, PinFriction, explain, friction_band
 
 _log = logger(__name__)
@@ -64,7 +64,7 @@ class Curve:
         freedom: mobility and redundancy of the assembled configuration.
         frames: one per prescribed value, in their order.
         discretisation: of the scene, with which they were computed.
-        unloaded: the configuration without any load or effect, from which displacements count.
+        unloaded: the equilibrium without forces, effects at load factor 0, from which displacements count.
         others: constant magnitudes of other forces.
         unknown: of the curve: displacements, or forces where displacements were prescribed or the curve was followed.
     """
@@ -146,8 +146,8 @@ class Curve:
     def error_estimates(self, *, output: Output | None = None) -> np.ndarray:
         """Estimated discretisation errors of ``values``, (frames,), to be added to them; computed once.
 
-        A warning is logged where ``growth_by_halving`` is more than a hundredth of the largest value: then there is no
-        limit that they could lead to.
+        A warning is logged where ``growth_by_halving`` is more than a hundredth of the largest value: then the values
+        have no limit as elements shrink.
 
         Args:
             output: whose displacement is estimated instead, under the same control.
@@ -161,8 +161,8 @@ class Curve:
     def modelling_errors(self, *, output: Output | None = None) -> np.ndarray:
         """Estimated errors of plane stress, (frames,), to be added; arguments as those of ``error_estimates``.
 
-        What space adds: contraction that interfaces hold, and wide thin links that curl across their depth as they
-        bend. Not motion out of the plane.
+        They include contraction that interfaces prevent, and wide thin links that curl across their depth as they bend,
+        but not motion out of the plane.
 
         Raises:
             DescriptionError: motors move along the curve, or it is not in plane stress.
@@ -181,8 +181,8 @@ class Curve:
     def corrections(self) -> np.ndarray:
         """Sums of the estimated errors, to be added to ``values``, (frames,); 0 and a warning where they are too large.
 
-        They lead to infinitely fine elements in space, from plane stress too. Targets of designs are corrected by the
-        errors of elements alone, ``error_estimates``: they stay in the model of their simulation.
+        Corrected values are those of infinitely fine elements in 3D, from plane stress too. Targets of designs are
+        corrected by the errors of elements alone, ``error_estimates``: they stay in the model of their simulation.
 
         Raises as ``error_estimates``.
         """
@@ -205,57 +205,42 @@ class Curve:
 
     @property
     def growth_by_halving(self) -> np.ndarray:
-        """Growth of ``values`` by each halving of the elements: a bound in the plane, about so in space, (frames,).
+        """Growth of ``values`` with each halving of the elements, (frames,): a bound in the plane, approximate in 3D.
 
-        Without end, as its force acts at a point of a flexible link; 0 if it does not, and where motors move.
+        They grow without limit if the force is at a point of a flexible link; 0 if it does not, and where motors move.
         """
         found = self.discretisation
         growth = growth_by_halving(self.part, found.model, found.fidelity.sizes) * self.forces
         if self.unknown is Unknown.DISPLACEMENT:
             return growth
-        # at a given displacement the force is smaller by as much as its displacement would be larger
+        # at a given displacement the force is smaller in proportion as its displacement would be larger
         return -growth * np.divide(self.forces, self.displacements, out=0.0 * growth, where=self.displacements != 0.0)
 
     # -- stability, friction, assumptions ------------------------------------------------------------------------
 
-    def buckling_loads(self, *, frame: Frame | None = None, count: int = 3) -> tuple[BucklingLoad, ...]:
-        """Forces at which the equilibrium would stop being unique, from the KKT matrix and its rate.
+    def buckling_points(self, *, frame: Frame | None = None, count: int = 3) -> tuple[BucklingPoint, ...]:
+        """Forces, or positions of the motors, at which the equilibrium would stop being unique.
 
-        Exact for columns and others that hardly move before they buckle; otherwise more accurate from closer frames.
+        From the KKT matrix and its rate: exact for columns and other mechanisms that hardly move before they buckle;
+        otherwise more accurate from closer frames.
 
         Args:
             frame: one of the curve's; the last one by default.
-            count: how many, those nearest to the force of the frame, in both senses, nearest first.
+            count: how many, those nearest to the force or position of the frame, in both directions, nearest first.
 
         Raises:
-            DescriptionError: motors move along the curve, or the frame is of another curve.
-            EquilibriumError: the force moves nothing, or the KKT matrix is singular.
+            DescriptionError: the frame is of another curve.
+            EquilibriumError: the force or the motors move nothing, or the KKT matrix is singular.
         """
-        self._need_force()
-        at, found = self._modes(LoadControl(), critical_changes, frame, count)
-        return tuple(BucklingLoad(at.force + value, mode) for value, mode in found)
-
-    def buckling_positions(self, *, frame: Frame | None = None, count: int = 3) -> tuple[BucklingPosition, ...]:
-        """Positions of the curve's motors at which the equilibrium would stop being unique.
-
-        Accuracy and arguments as of ``buckling_loads``.
-
-        Raises:
-            DescriptionError: a force changes along the curve, or the frame is of another curve.
-            EquilibriumError: the motors move nothing, or the KKT matrix is singular.
-        """
-        if isinstance(self.part, Force | ForceGroup):
-            raise DescriptionError(
-                f"curve of {self.part.name!r}", "no motor moves along it", "Call this on a curve that follows a motor"
-            )
         control = self.discretisation.followed_control(self.part)
         at, found = self._modes(control, critical_changes, frame, count)
-        return tuple(BucklingPosition(at.displacement + value, mode) for value, mode in found)
+        start = at.displacement if control.displaces else at.force
+        return tuple(BucklingPoint(start + change, mode) for change, mode in found)
 
     def soft_modes(self, *, frame: Frame | None = None, count: int = 3) -> tuple[SoftMode, ...]:
         """The directions in which an equilibrium is softest under dead loads, softest first.
 
-        Arguments and errors as those of ``buckling_loads``.
+        Arguments and errors as those of ``buckling_points``.
         """
         _, found = self._modes(LoadControl(), softest_modes, frame, count)
         return tuple(SoftMode(value, mode) for value, mode in found)
@@ -281,7 +266,7 @@ class Curve:
         """The assumptions of the simulation as text, with figures of the last frame where these may matter.
 
         Args:
-            tolerance: relative change of the displacement from which an omitted effect matters.
+            tolerance: relative change of the displacement above which an omitted effect matters.
             weight: of the flexible links per volume, in units of the scene; in mm and N that of plastics and silicones,
                 1.2 g/cm³, by default.
 
@@ -341,22 +326,26 @@ class Curve:
 
     def panel(self, *, stress: bool = True, traces: Sequence[Trace] = ()) -> Panel | None:
         """The picture of the first and the last frame, on rank 0; None elsewhere."""
-        model = self.discretisation.model
+        model, (across, up), end = self.discretisation.model, self.axes, self.frames[-1]
         first, last = (gather(model, self.frames[k]) for k in (0, -1))
-        if first is None or last is None:
-            return None
-        plotter = MechanismPlotter(model)
-        (across, up), end, arrows = self.axes, self.frames[-1], []
-        if isinstance(self.part, Force | ForceGroup):
-            for force, ratio in self.part.ratios:
-                arrows.append(plotter.arrow(force, ratio * end.force, last, label=f"{ratio * end.force:g} {up.unit}"))
-        return Panel(
-            plotter.shape(first, stress=False),
-            (plotter.shape(last, stress=stress),),
-            tuple(arrows),
-            tuple(traces),
-            f"{self.configuration.name}: {up(end.force)}, {across(end.displacement)}",
-        )
+        forces = self.part.ratios if isinstance(self.part, Force | ForceGroup) else ()
+        places = [position(model, force, end)[:2] for force, _ in forces]
+
+        def draw() -> Panel:
+            assert first is not None and last is not None  # on rank 0
+            plotter, arrows = MechanismPlotter(model), []
+            for (force, ratio), place in zip(forces, places, strict=True):
+                size = ratio * end.force
+                arrows.append(Arrow(place, size * np.array(force.direction[:2]), label=f"{size:g} {up.unit}"))
+            return Panel(
+                plotter.shape(first, stress=False),
+                (plotter.shape(last, stress=stress),),
+                tuple(arrows),
+                tuple(traces),
+                f"{self.configuration.name}: {up(end.force)}, {across(end.displacement)}",
+            )
+
+        return on_one(self.discretisation.comm, draw)
 
     def write(self, path: str | Path) -> None:
         """Writes displacement, stress and pressure fields of all frames as XDMF for ParaView.
@@ -401,7 +390,7 @@ class Curve:
 
     @property
     def _solver(self) -> EquilibriumSolver:
-        return self.discretisation.solver(self.part, self.others)
+        return self.discretisation.solver(self.part, [other for other, _ in self.others])
 
     def _need_force(self) -> None:
         if not isinstance(self.part, Force | ForceGroup):
@@ -411,7 +400,7 @@ class Curve:
     def _chosen(self, frame: Frame | None) -> Frame:
         if frame is not None and frame not in self.frames:
             raise DescriptionError(
-                f"curve of {self.part.name!r}", "the frame is one of another curve", "Choose from its frames"
+                f"curve of {self.part.name!r}", "the frame belongs to another curve", "Choose from its frames"
             )
         return frame or self.frames[-1]
 
@@ -440,10 +429,24 @@ class Curve:
         if missing:
             estimates, model = self.discretisation.estimates, self.discretisation.model
             point = None if output is None else model.point_load(output)
-            rows = [estimates.at(self._solver, self.equilibrium(frame), missing, point) for frame in self.frames]
-            for kind, column in zip(missing, np.array(rows).T, strict=True):
-                self._errors[kind, output] = column
+            origin, zero = self._unloaded_errors(missing, point)
+            at = map(self.equilibrium, self.frames)
+            rows = [estimates.at(self._solver, own, missing, point, origin=origin) for own in at]
+            for kind, column, less in zip(missing, np.array(rows).T, zero, strict=True):
+                self._errors[kind, output] = column - less
             growth, largest = np.abs(self.growth_by_halving).max(), np.abs(self.values).max()
             if output is None and growth > ExplanationOptions().tolerance * largest:
                 _log.warning("%s (each halving adds %.2g of it)", cause_of_growth(self.part), growth / largest)
         return [self._errors[kind, output] for kind in kinds]
+
+    def _unloaded_errors(self, kinds: Sequence[ErrorKind], output: PointLoad | None) -> tuple[list[float], list[float]]:
+        """Estimated errors of each kind in the unloaded configuration: of the force's displacement, and of the quantity
+        in question where it counts from there; 0 in a rigid assembly."""
+        estimates, nothing = self.discretisation.estimates, [0.0] * len(kinds)
+        if not self.unloaded.has_reactions:
+            return nothing, nothing
+        at = Equilibrium(self.unloaded, self.frames[0].design, Unknown.DISPLACEMENT)
+        origin = estimates.at(self._solver, at, kinds)
+        if output is not None:
+            return origin, estimates.at(self._solver, at, kinds, output)
+        return origin, nothing if self.unknown is Unknown.FORCE else origin

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import copy
 from functools import cached_property
 
@@ -114,11 +114,14 @@ class Discretisation:
         """Error estimates at equilibria."""
         return Estimates(self.model)
 
-    def solver(self, part: PrescribedPart, others: tuple[tuple[Force, float], ...] = ()) -> EquilibriumSolver:
-        """The solver for a force or motors that change and some constant forces, kept for all configurations."""
-        key = part, others
+    def solver(self, part: PrescribedPart, others: Sequence[Force] = ()) -> EquilibriumSolver:
+        """The solver for a force or motors that change and some constant forces.
+
+        It is kept for all configurations and magnitudes.
+        """
+        key = part, tuple(others)
         if key not in self._solvers:
-            loads = tuple((self.model.point_load(other), float(magnitude)) for other, magnitude in others)
+            loads = [self.model.point_load(other) for other in others]
             self._solvers[key] = self.method.solver(self.model.system(self._controlled_load(part), loads))
         return self._solvers[key]
 
@@ -130,7 +133,7 @@ class Discretisation:
         return MotorControl(0.0, self.linkage.joints.motor_values(lambda motor: ratios.get(motor, 0.0)))
 
     def _controlled_load(self, part: PrescribedPart) -> PointLoad:
-        """The load whose magnitude is unknown; for motors one that acts nowhere."""
+        """The load whose magnitude is unknown; for motors, a load that acts nowhere."""
         forces = part.ratios if isinstance(part, Force | ForceGroup) else ()
         loads = [(self.model.point_load(force), ratio) for force, ratio in forces]
         acting = tuple((point, ratio * way) for load, ratio in loads for point, way in load.acting)

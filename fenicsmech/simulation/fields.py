@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
-from fenicsmech.collective import from_one, on_one
+from fenicsmech.collective import from_one, on_all, on_one
 from fenicsmech.compat import (
     cell_dofs,
     cell_nodes,
@@ -24,11 +25,11 @@ from fenicsmech.compat import (
     write_series,
 )
 from fenicsmech.errors import DescriptionError
-from fenicsmech.mechanism import Force, Link, in_dimension
+from fenicsmech.mechanism import Force, Link, Output
 from fenicsmech.meshing import CurvedEdges, node_ends
 from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import Linkage
-from fenicsmech.plot import Arrow, FlexibleShape, MechanismShape, Pin, RigidShape, plan_view, rigid_outline
+from fenicsmech.plot import FlexibleShape, MechanismShape, Pin, RigidShape, plan_view, rigid_outline
 from fenicsmech.simulation.frame import Frame
 
 
@@ -114,6 +115,13 @@ def gather(model: MechanismModel, frame: Frame) -> Snapshot | None:
     return Snapshot(rest, displacement, von_mises, frame.state.poses, joints)
 
 
+def position(model: MechanismModel, part: Force | Output, frame: Frame) -> np.ndarray:
+    """Position of the point of a force or output in ``frame``, (dim,)."""
+    with model.shaped(frame.design):
+        model.load(frame.state)
+        return model.position(part, frame.state)
+
+
 class MechanismPlotter:
     """Draws states of one mechanism in plan view; the triangles are those of the undeformed mesh."""
 
@@ -142,16 +150,6 @@ class MechanismPlotter:
             for link in self._mechanism.rigid_links
         )
 
-    def arrow(self, force: Force, magnitude: float, snapshot: Snapshot, *, label: str) -> Arrow:
-        """The arrow of a force on a rigid link in the state of ``snapshot``."""
-        at = self.position(force.on, force.at, snapshot.poses)
-        return Arrow(at, magnitude * np.array(force.direction[:2]), label=label)
-
-    def position(self, link: Link, at: Sequence[float], poses: np.ndarray) -> np.ndarray:
-        """Position of the point drawn at ``at`` of ``link``, (2,); a flexible link moves with its first interface."""
-        drawn = np.array(in_dimension(tuple(at), self._linkage.dim))
-        return (drawn + self._linkage.point(link, at).displacement(None, poses))[:2]
-
     def _places(self, link: Link, poses: np.ndarray, joints: np.ndarray) -> np.ndarray:
         """Positions of the joints, forces and outputs of a rigid link, (k, 2)."""
         body, connections = self._linkage.body_of(link), self._linkage.joints.connections
@@ -161,8 +159,9 @@ class MechanismPlotter:
             for own, point in zip((each.a, each.b), points, strict=True)
             if own == body
         ]
-        parts = [part for part in (*self._mechanism.forces, *self._mechanism.outputs) if part.on == link]
-        return np.array([*held, *(self.position(link, part.at, poses) for part in parts)])
+        parts = [part.at for part in (*self._mechanism.forces, *self._mechanism.outputs) if part.on == link]
+        moved = [np.array(at[:2]) + self._linkage.point(link, at).displacement(None, poses)[:2] for at in parts]
+        return np.array([*held, *moved])
 
     def _visible(self, index: int) -> tuple[np.ndarray, np.ndarray]:
         """Triangles of a link seen from above, and the cell each belongs to."""
@@ -176,7 +175,7 @@ class MechanismPlotter:
 def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame]) -> None:
     """Writes vertex displacements, von Mises stress and pressure of ``frames`` of one design; time is the force.
 
-    There are pressures where elements are mixed, zero in all other links. The files appear when they are complete.
+    Pressures are written where links are in u–p form, with zero in all others. The files appear when they are complete.
     """
     target = Path(path)
     if target.suffix != ".xdmf":
@@ -204,17 +203,19 @@ def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame])
         """Moves the heavy data first, so that the light file never refers to a missing file."""
         for suffix in (".h5", ".xdmf"):
             os.replace(folder / target.with_suffix(suffix).name, target.with_suffix(suffix))
-        folder.rmdir()
 
-    folder, forces = from_one(comm, new_folder), np.array([frame.force for frame in frames])
+    forces = np.array([frame.force for frame in frames])
     x, drawn = mesh.geometry.x, mesh.geometry.x.copy()
     with model.shaped(frames[0].design):
         rest = at_vertices(model, elastic.shape)
+    folder = from_one(comm, new_folder)
     # only here the coordinates of a mesh change: dolfinx writes functions with their own mesh
     try:
         x[:, : elastic.model.dim] += rest
-        write_series(folder / target.name, mesh, {**nodal, "von Mises stress": stress}, forces, update, comm)
+        series = {**nodal, "von Mises stress": stress}
+        on_all(comm, lambda: write_series(folder / target.name, mesh, series, forces, update, comm))
+        on_one(comm, move_up)  # all have closed the file
     finally:
         x[:] = drawn
-    comm.barrier()  # all have closed the file
-    on_one(comm, move_up)
+        if comm.rank == 0:
+            shutil.rmtree(folder, ignore_errors=True)

@@ -18,7 +18,7 @@ from fenicsmech.continuation import (
     null_space,
 )
 from fenicsmech.equilibrium import EquilibriumPoint, LoadControl, NotConverged, State, Unknown
-from fenicsmech.errors import DescriptionError, EquilibriumError, finite, set_fields
+from fenicsmech.errors import DescriptionError, EquilibriumError, finite, set_fields, whole
 from fenicsmech.mechanism import Configuration, Drive, Force, ForceGroup, Mechanism, Motor, PrescribedPart
 from fenicsmech.plot import CurveMark, CurveSeries
 from fenicsmech.simulation.curve import Curve, axes
@@ -29,16 +29,16 @@ from fenicsmech.simulation.stepping import CurveRequest, CurveStepper, check_for
 
 @dataclass(frozen=True)
 class Until:
-    """A path ends as soon as it passes one of these values, exactly there, or after so many frames.
+    """A path ends exactly at the first of these values that it passes, or after a number of frames.
 
     Args:
-        displacement: of the point of the prescribed force, along it, counted as on curves; one value or several.
+        displacement: of the prescribed force's point along its direction, counted as on curves; one value or several.
         position: of the prescribed motors, rad or length, counted from the drawing; one value or several.
         force: magnitude of the prescribed force, or torque or force of the motors; one value or several.
-        frames: most frames, critical points aside; the path ends there without error.
+        frames: maximum number of frames, not counting critical points; the path ends there without error.
 
     Raises:
-        DescriptionError: nothing to end at, displacement and position at once, or numbers that make no sense.
+        DescriptionError: no end is given, both a displacement and a position are given, or a number is invalid.
     """
 
     displacement: float | tuple[float, ...] = ()
@@ -55,8 +55,7 @@ class Until:
         if self.displacement and self.position:
             remedy = "Give displacement for a force, position for a motor"
             raise DescriptionError("end of a path", "a displacement and a position are given", remedy)
-        if isinstance(self.frames, bool) or not isinstance(self.frames, int) or self.frames < 2:
-            raise DescriptionError("end of a path", f"{self.frames!r} frames", "Give a whole number of at least 2")
+        whole("frames until the end of a path", self.frames, least=2)
 
     @property
     def displacements(self) -> tuple[float, ...]:
@@ -107,7 +106,7 @@ class PathEvent:
 
     Attributes:
         kind: limit point of the force, turning point of the displacement or of a motor, or bifurcation.
-        frame: the equilibrium; also one of the curve's frames.
+        frame: the equilibrium, which is also one of the curve's frames.
         index: of that frame.
         null_space: at a bifurcation a basis of the KKT matrix's null space, one direction for each of the modes that
             change; else the direction of the path.
@@ -151,12 +150,12 @@ class FollowedCurve(Curve):
 
     @property
     def limit_points(self) -> tuple[PathEvent, ...]:
-        """Limit points: a dead load snaps there."""
+        """Limit points: under a dead load the mechanism snaps there."""
         return self._of(Critical.LIMIT)
 
     @property
     def turning_points(self) -> tuple[PathEvent, ...]:
-        """Turning points: a held displacement snaps there."""
+        """Turning points: under a prescribed displacement the mechanism snaps there."""
         return self._of(Critical.TURNING)
 
     @property
@@ -176,7 +175,7 @@ class FollowedCurve(Curve):
 def branches(
     curve: FollowedCurve, event: PathEvent, until: Until, steps: ArcSteps, mode: ModeShape | None
 ) -> tuple[FollowedCurve, FollowedCurve]:
-    """The curve that crosses another one, in both senses, as ``Simulation.branches``."""
+    """The curve that crosses another one, in both directions, like ``Simulation.branches``."""
     check_until(until, curve.part)
     if event not in curve.bifurcations:
         raise DescriptionError(
@@ -241,15 +240,16 @@ class CurveFollower:
         while True:
             began, seconds = perf_counter(), dict(clock.seconds)
             try:
-                if (ends := next(steps, None)) is None:
-                    break
+                with stepper.keeping_frames():
+                    if (ends := next(steps, None)) is None:
+                        break
                 for critical in locate(path, *ends):
                     self._record_event(path, critical)
             except NotConverged as failure:
                 raise self._ended(failure) from failure
             frame = stepper.record(ends[1])
             self._frames.append(replace(frame, seconds=perf_counter() - began, phases=clock.since(seconds)))
-            watch(min(len(self._frames), self._until.frames))  # critical points come on top
+            watch(min(len(self._frames), self._until.frames))  # critical points are additional frames
         return FollowedCurve(
             request.part,
             request.configuration,

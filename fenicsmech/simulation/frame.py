@@ -18,21 +18,21 @@ class Frame:
 
     Attributes:
         force: magnitude of the prescribed force, or torque or force of the prescribed motors.
-        displacement: of the force's point along it, from the assembled configuration, or the motors' position, from
-            the drawing.
+        displacement: of the force's point along its direction, from the unloaded configuration, or the motors'
+            position, from the drawing.
         snapped_through: whether the mechanism snapped on the way from the frame before: the path turns back there, and
             this equilibrium lies on another one, perhaps not the one that dynamics would lead to.
         unstable_modes: directions in which the energy has a maximum, under dead loads.
         stable_under_control: whether it is stable while its control is held.
         strain_energy: elastic energy of all links.
         max_stress: largest von Mises stress at cell midpoints.
-        outputs: displacement of each output of the mechanism, from the assembled configuration.
+        outputs: displacement of each output of the mechanism, from the unloaded configuration.
         reactions: force and moment of each joint on its second link, by joint name.
         motors: torque or force of each motor.
         iterations: Newton iterations, load steps on the way included.
         residuals: relative residual before each iteration of the last step, and at the end.
         seconds: wall-clock time.
-        phases: the same, by phase.
+        phases: wall-clock time by phase.
         state: the equilibrium itself.
         design: that it belongs to.
     """
@@ -88,18 +88,10 @@ class ModeShape:
 
 
 @dataclass(frozen=True)
-class BucklingLoad:
-    """A magnitude of the force that changes at which the KKT matrix is singular, and the mode."""
+class BucklingPoint:
+    """A force, or a position of the motors that move, at which the KKT matrix is singular; and the mode."""
 
-    force: float
-    mode: ModeShape
-
-
-@dataclass(frozen=True)
-class BucklingPosition:
-    """A position of the motors that move at which the KKT matrix is singular while they are held, and the mode."""
-
-    position: float
+    value: float
     mode: ModeShape
 
 
@@ -114,7 +106,7 @@ class SoftMode:
 def mode_shape(model: MechanismModel, step: Step) -> ModeShape:
     """The direction ``step`` and its characteristics."""
     comm, links = model.mesh.mesh.comm, model.mechanism.flexible_links
-    # where half is meshed, nodes move in space and bodies in the plane; pressures come behind
+    # where half is meshed, nodes move in space and bodies in the plane; pressures come last
     dim = model.interfaces.block
     squares = model.elastic.split(step.u)[0].reshape(-1, dim) ** 2
     owners = model.node_link[: len(squares)]

@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import ROUND_FLOOR, Context
 from itertools import combinations
-from math import hypot, pi
+from math import pi
 from typing import Literal
 
 import numpy as np
@@ -31,7 +31,7 @@ from fenicsmech.effects import Gravity
 from fenicsmech.equilibrium import EquilibriumSolver, Unknown
 from fenicsmech.errors import DescriptionError, positive, set_fields
 from fenicsmech.estimates import Equilibrium, adjoint_at, cause_of_growth, growth_by_halving
-from fenicsmech.mechanism import FlexibleLink, Force, Joint, Output, PrescribedPart, Shape, Strip, Units, in_dimension
+from fenicsmech.mechanism import FlexibleLink, Force, Joint, Output, PrescribedPart, Shape, Strip, Units
 from fenicsmech.meshing import thinnest_stretch
 from fenicsmech.model import MechanismModel, plan_sites
 from fenicsmech.multibody import JointCoordinate, Linkage
@@ -42,16 +42,16 @@ from fenicsmech.simulation.frame import Frame
 
 @dataclass(frozen=True)
 class ExplanationOptions:
-    """Thresholds from which an omitted effect matters.
+    """Thresholds above which an omitted effect matters.
 
     Attributes:
         tolerance: relative change of the displacement.
         weight: per volume, of the flexible links, in the units of the scene; None is unknown.
-        locking: Poisson's ratio from which displacement elements of an order lose accuracy.
-        slender: fraction of the out-of-plane buckling load from which a link needs a simulation in space.
-        longest: elements of an order over the thickness of the thinnest stretch of their link, longer than which they
-            bend it too little. Displacements of straight leaves and quarter circles, 40 times as long as thick, change
-            by 1 % to elements of length zero; of order 1 by 8 % at 0.25, 30 % at 0.5 and 67 % at 1; of order 2
+        locking: Poisson's ratio above which displacement elements of an order lose accuracy.
+        slender: fraction of the out-of-plane buckling load above which a link needs a simulation in 3D.
+        longest: element length of each order, over the thickness of the thinnest stretch of the link, above which
+            elements bend too little. Displacements of straight leaves and quarter circles, 40 times as long as thick,
+            change by 1 % to elements of length zero; of order 1 by 8 % at 0.25, 30 % at 0.5 and 67 % at 1; of order 2
             by 0.2 % at 2, 2 % at 4, and 7 % at 6, where the error estimates are of no use. Of order 3, in quarter
             circles 80 times as long as thick, by 0.03 % up to 8, and from 9 on by 6 % to 11 % on some meshes.
     """
@@ -73,7 +73,7 @@ class Hint:
     """A hint on an omitted effect.
 
     Attributes:
-        what: its name.
+        what: name of the effect.
         text: the consequence of omitting it.
         matters: whether it changes the displacement by more than the tolerance, or may change it altogether.
     """
@@ -118,7 +118,8 @@ def explain(
     hints += [_length_hint(discretisation, units, options), _spin_hint(model, solver, at)]
     hints += [_compressibility_hint(model, options.locking[model.elastic.order]), _touching_hint(model, frame)]
     if model.linkage.dim == 2:
-        hints.append(_buckling_hint(model, frame, options.slender))
+        with model.shaped(at.design):
+            hints.append(_buckling_hint(model, frame, options.slender))
     return Explanation(_simulated(model), tuple(hint for hint in hints if hint is not None))
 
 
@@ -130,10 +131,12 @@ def _simulated(model: MechanismModel) -> tuple[str, ...]:
         for link, material in zip(mechanism.flexible_links, model.materials, strict=True)
     )
     mixed = [link.name for link, is_mixed in zip(mechanism.flexible_links, model.mixed, strict=True) if is_mixed]
+    softened = any(effect.soften(model.linkage) for effect in model.effects)
+    compliance = "other compliance than listed below" if softened else "compliance"
     items = [
         f"flexible links in large deformation ({elastic.model.name}, order {elastic.order}): {links}",
         f"rigid links: {', '.join(link.name for link in mechanism.rigid_links)}",
-        f"ideal joints, without play, friction or compliance: {', '.join(kinds)}",
+        f"ideal joints, without play, friction or {compliance}: {', '.join(kinds)}",
         "forces that keep their direction, applied without inertia",
     ]
     if mixed:
@@ -145,7 +148,7 @@ def _weight_hint(change: float | None, displacement: float, units: Units, option
     """The hint on weight, whose ``change`` of the displacement is None where the weight is unknown."""
     per_volume = f"{units.force}/{units.length}³"
     if change is None:
-        return Hint("weight", f"its influence needs explain(weight=…), the weight per volume in {per_volume}", False)
+        return Hint("weight", f"call explain(weight=…) with the weight per volume in {per_volume}", False)
     part = change / max(abs(displacement), 1e-300)
     return Hint(
         "weight",
@@ -207,20 +210,17 @@ def _compressibility_hint(model: MechanismModel, limit: float) -> Hint | None:
 
 def _spin_hint(model: MechanismModel, solver: EquilibriumSolver, at: Equilibrium) -> Hint | None:
     """Outputs, and points of forces that do not act, on links that spin idly, away from the line of the spin."""
-    mechanism, linkage, elastic, names = model.mechanism, model.linkage, model.elastic, []
+    mechanism, linkage, names = model.mechanism, model.linkage, list[str]()
     if not solver.system.idle:
         return None
     parts: tuple[Force | Output, ...] = (*mechanism.outputs, *mechanism.forces)
     with model.shaped(at.design):
-        shift = fem.Function(elastic.u.function_space)
-        shift.x.array[:] = model.design_nodes.values(elastic.design).ravel()
-        unloaded = linkage.rigid.drawn
         for spin in solver.system.idle:
-            start, along = spin.line(unloaded)
+            start, along = spin.line(linkage.rigid.drawn)
             for part in parts:
                 if linkage.body_of(part.on) not in spin.bodies:
                     continue
-                arm = np.array(in_dimension(part.at, 3)) + model.point(part).displacement(shift, unloaded) - start
+                arm = model.rest_position(part) - start
                 if np.linalg.norm(arm - (arm @ along) * along) > 1e-9 * linkage.length:
                     names.append(repr(part.name))
     if not names:
@@ -229,7 +229,7 @@ def _spin_hint(model: MechanismModel, solver: EquilibriumSolver, at: Equilibrium
         "idle spins",
         f"nothing keeps the links of {', '.join(names)} from turning about the line between their ball joints: how far "
         "they turn is set by a gauge, and these points, away from the line, move with it; place them on the line, or "
-        "hold the spin, as by a universal joint in place of a ball",
+        "hold the spin, for example by a universal joint in place of a ball",
         True,
     )
 
@@ -273,7 +273,7 @@ def coarse_links(discretisation: Discretisation, units: Units, options: Explanat
 
 
 def _touching_hint(model: MechanismModel, frame: Frame) -> Hint:
-    """Links that come closer than half an element, those that share a joint apart."""
+    """Links that come closer to each other than half an element, except those that share a joint."""
     mesh, links = model.mesh, model.mechanism.flexible_links
     snapshot, joined = gather(model, frame), [{joint.a, joint.b} for joint in model.mechanism.joints]
 
@@ -296,24 +296,50 @@ def _touching_hint(model: MechanismModel, frame: Frame) -> Hint:
 
 
 def _buckling_hint(model: MechanismModel, frame: Frame, slender: float) -> Hint | None:
-    """The largest compression of a strip between two joints over its Euler load out of the plane.
+    """The largest compression of a strip between its joints over its Euler load out of the plane.
 
     N_cr = π² E I / L²,     I = h b³ / 12,     h in the plane, b the depth
     """
     fraction, name = 0.0, ""
-    for link, material, depth in zip(model.mechanism.flexible_links, model.materials, model.depths, strict=True):
-        joints = [joint for joint in model.mechanism.joints if link in (joint.a, joint.b)]
-        if isinstance(link.shape, Strip) and len(joints) > 1:
-            length = hypot(*np.subtract(joints[-1].at[:2], joints[0].at[:2]))
-            forces = [frame.reactions[joint.name].force[:2] for joint in joints if joint.name in frame.reactions]
-            load = max((float(np.linalg.norm(force)) for force in forces), default=0.0)
-            critical = pi**2 * material.law.E * link.shape.thickness * depth**3 / 12.0 / length**2
-            fraction, name = max((fraction, name), (load / critical, link.name))
+    links = zip(model.mechanism.flexible_links, model.shapes, model.materials, model.depths, strict=True)
+    for link, shape, material, depth in links:
+        compression, length = _compression(model, frame, link)
+        if isinstance(shape, Strip) and length:
+            critical = pi**2 * material.law.E * shape.thickness * depth**3 / 12.0 / length**2
+            fraction, name = max((fraction, name), (compression / critical, link.name))
     if not name:
         return None
     text = f"the compression of {name} is about {fraction:.2g} of its buckling load out of the plane"
     remedy = "; use space='3d'" if fraction > slender else ""
     return Hint("bending out of the plane", text + remedy, fraction > slender)
+
+
+def _compression(model: MechanismModel, frame: Frame, link: FlexibleLink) -> tuple[float, float]:
+    """The largest compression of a link along the line between its joints farthest apart, and their distance at rest.
+
+    Between two joints it is the sum of the reactions along the line on one side of them, or on the other side where
+    forces act between.
+    """
+    linkage, drawn, ends = model.linkage, model.linkage.joints.drawn, []
+    for joint in model.mechanism.joints:
+        if link in (joint.a, joint.b):
+            k = linkage.connection_of(joint)
+            connection = linkage.joints.connections[k]
+            body, sign = (connection.b, 1.0) if joint.b == link else (connection.a, -1.0)
+            at_rest, here = (linkage.joints.place(k, body, poses) for poses in (drawn, frame.state.poses))
+            ends.append((at_rest, here, sign * frame.reactions[joint.name].force))
+    if not ends:
+        return 0.0, 0.0
+    at_rest, here, forces = (np.array(each) for each in zip(*ends, strict=True))
+    distances = np.linalg.norm(at_rest[:, None] - at_rest, axis=2)
+    first, last = np.unravel_index(np.argmax(distances), distances.shape)
+    length = float(distances[first, last])
+    if length <= 1e-9 * linkage.length:
+        return 0.0, 0.0
+    line = (here[last] - here[first]) / np.linalg.norm(here[last] - here[first])
+    pushing = np.cumsum((forces @ line)[np.argsort(at_rest @ (at_rest[last] - at_rest[first]))])
+    before, after = pushing[:-1], pushing[:-1] - pushing[-1]
+    return max(0.0, float(before.max()), float(after.max())), length
 
 
 @dataclass(frozen=True)
@@ -339,7 +365,7 @@ class PinFriction:
 def friction_band(
     frames: Sequence[Frame], pins: Mapping[Joint, PinFriction], linkage: Linkage
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds of the force between which friction holds the mechanism, as ``Curve.friction_band``."""
+    """Bounds of the force between which friction holds the mechanism, see ``Curve.friction_band``."""
     poses = [frame.state.poses for frame in frames]
     if len(poses) < 2:
         raise DescriptionError("friction band", "the curve has one frame only", "Give two values or more")

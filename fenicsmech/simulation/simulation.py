@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import copy
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -14,7 +15,7 @@ from fenicsmech.collective import from_one
 from fenicsmech.continuation import ArcSteps, HermitePredictor, Predictor
 from fenicsmech.elasticity import Formulation, MixedFormulation, Quadrature
 from fenicsmech.equilibrium import EquilibriumMethod, EquilibriumSolver, PrimalDualNewton, State
-from fenicsmech.errors import AssemblyError, DescriptionError
+from fenicsmech.errors import AssemblyError, DescriptionError, expect
 from fenicsmech.estimates import AccuracyControl, Choice, Estimates, FidelityLevel, LevelErrors, cause_of_growth
 from fenicsmech.log import Clock, Progress, logger
 from fenicsmech.mechanism import (
@@ -30,6 +31,7 @@ from fenicsmech.mechanism import (
     PrescribedPart,
     Scene,
     Shape,
+    check_loads,
     in_dimension,
 )
 from fenicsmech.meshing import radius_ratios
@@ -63,13 +65,16 @@ class Simulation:
         space: "3d", the default; "3d-symmetric", which meshes half the depth of links that joints and forces move in
             the plane; "plane-stress" or "plane-strain".
         order: degree of the displacement field, 1, 2 or 3; 2 by default.
-        size: element size in the plane of the links, or one per flexible link.
+        size: element size in the plane of the links, or one per flexible link; that of a mesh file's elements serves
+            warnings and estimates.
         accuracy: instead of space, order, layers, segments and quadrature: relative error allowed in the largest
             displacement of every curve, or in the largest force where displacements are prescribed, once the estimates
             of its errors are added (``Curve.corrected``). ``load_displacement`` finds the cheapest fidelity that is
-            good enough, see ``choice``; ``follow`` and ``branches`` use the one chosen last and raise an error before.
-            Links from STEP files are measured; ``size`` stands for the thickness of those from mesh files.
-        layers: of elements through the depth, or half of it where half is meshed; by default from depth and size.
+            good enough, see ``choice``; ``follow``, ``branches``, simulations derived from this one and design problems
+            use the one chosen last, and raise an error if there is none yet. Links from STEP files are measured; for
+            those from mesh files ``size`` gives the thickness.
+        layers: of elements through the depth of strips and outlines in space, or half of it where half is meshed; by
+            default from depth and size.
         segments: of elements around pins, at least; 8 by default.
         quadrature: quadrature degree; the measured optimum by default.
         formulation: ``MixedFormulation()``: pressures are unknowns in nearly incompressible links;
@@ -101,10 +106,15 @@ class Simulation:
         predictor: Predictor | None = None,
         comm: MPI.Comm = MPI.COMM_WORLD,
     ) -> None:
-        if formulation is not None and not isinstance(formulation, Formulation):
-            raise DescriptionError(
-                "formulation", f"it is {formulation!r}", "Give MixedFormulation() or DisplacementFormulation()"
-            )
+        expect("simulation", scene, Scene, "a scene", "Give Scene(mechanism, effects=[…])")
+        for name, value, kind, remedy in (
+            ("formulation", formulation, Formulation, "MixedFormulation() or DisplacementFormulation()"),
+            ("quadrature", quadrature, Quadrature, "Quadrature(degree)"),
+            ("solver", solver, EquilibriumMethod, "PrimalDualNewton(…)"),
+            ("predictor", predictor, Predictor, "HermitePredictor(), TangentPredictor() or ConstantPredictor()"),
+        ):
+            if value is not None:
+                expect(name, value, kind, f"a {name}", f"Give {remedy}")
         formulation = formulation or MixedFormulation()
         self.scene, self.comm, self.clock = scene, comm, Clock()
         self.choice: Choice | None = None
@@ -114,12 +124,12 @@ class Simulation:
         if accuracy is None:
             fidelity = read_fidelity(scene, size=size, formulation=formulation, **given)
         else:
-            name = next((name for name, value in given.items() if value is not None), None)
-            if name:
+            both = next((name for name, value in given.items() if value is not None), None)
+            if both:
                 raise DescriptionError(
-                    f"accuracy and {name}",
-                    f"both are given, and {name}={given[name]!r} would decide what accuracy is to choose",
-                    f"Leave out {name}, or give {name} and size=… instead of an accuracy",
+                    f"accuracy and {both}",
+                    f"both are given, and {both}={given[both]!r} would decide what accuracy is to choose",
+                    f"Leave out {both}, or give {both} and size=… instead of an accuracy",
                 )
             self._control = AccuracyControl(scene, accuracy, size, formulation, comm=comm)
             fidelity = self._control.fidelity(self._control.level)
@@ -152,12 +162,12 @@ class Simulation:
         Args:
             part: the force that changes, or a ``ForceGroup`` of several.
             forces: its magnitudes (load control), or
-            displacements: of its point along it, for a group Σ ratio · displacement (displacement control).
+            displacements: of its point along its direction, for a group Σ ratio · displacement (displacement control).
             configuration: motor positions.
             others: constant magnitudes of other forces.
 
         Raises:
-            DescriptionError: the request makes no sense.
+            DescriptionError: the request contradicts itself or the mechanism.
             AssemblyError: the configuration does not assemble.
             EquilibriumError: a prescribed value was not reached; carries the frames before it.
         """
@@ -198,8 +208,8 @@ class Simulation:
         """The whole curve under a changing force or a moving motor, past limit points and folds.
 
         Starts in the configuration, without the force that changes, and goes towards the first displacement or
-        position, or else the first force, of ``until``. Across the curve of a motor lies its position, up its torque or
-        force.
+        position, or else the first force, of ``until``. The abscissa of a motor's curve is its position, the ordinate
+        its torque or force.
 
         Args:
             part: the force that changes, or the motor that moves, or a ``Drive`` of several.
@@ -209,17 +219,13 @@ class Simulation:
             steps: how finely it is followed.
 
         Raises:
-            DescriptionError: the request makes no sense, or no fidelity was chosen for an accuracy yet.
+            DescriptionError: the request contradicts itself or the mechanism, or no fidelity was chosen for an accuracy
+                yet.
             AssemblyError: the configuration does not assemble.
             EquilibriumError: the curve ends early; carries the frames before that.
         """
         self._check_description()
-        if self._control is not None and self.choice is None:
-            raise DescriptionError(
-                f"curve of {part.name!r}",
-                "no fidelity has been chosen for the required accuracy yet",
-                "Call load_displacement() first, up to such forces, or give space, order and size instead of accuracy",
-            )
+        self._check_chosen(f"curve of {part.name!r}")
         request = read_path(self.scene.mechanism, part, until, configuration, others)
         with Progress(until.frames, configuration.name, shown=self.comm.rank == 0) as progress, self._shaped():
             return CurveFollower(self._discretisation, request, until, steps or ArcSteps()).from_rest(progress.update)
@@ -233,7 +239,7 @@ class Simulation:
         steps: ArcSteps | None = None,
         mode: ModeShape | None = None,
     ) -> tuple[FollowedCurve, FollowedCurve]:
-        """The curve that crosses ``curve`` at a bifurcation, from there in both senses, at the design of ``curve``.
+        """The curve that crosses ``curve`` at a bifurcation, from there in both directions, at the design of ``curve``.
 
         Args:
             curve: a followed curve.
@@ -258,26 +264,28 @@ class Simulation:
         return branches(curve, event, until, steps or ArcSteps(), mode)
 
     def path(self, part: Force | Output, configurations: Sequence[Configuration]) -> np.ndarray:
-        """Unloaded position of the point of a force or output in each configuration, (configurations, dim).
+        """Position of the point of a force or output in each rigid assembly, (configurations, dim).
 
         Raises:
             AssemblyError: one of the configurations does not assemble, or its motors strain the links.
+            EquilibriumError: its motors turn a spring in space by more than a full turn.
         """
         linkage, designed = self.linkage, self._design is not None
         # designs change the model's springs; those drawn need no mesh
         springs = self.model.spring_potentials if designed else spring_potentials(self.scene.effects, linkage)
-        point, drawn = linkage.point(part.on, part.at), np.array(in_dimension(part.at, linkage.dim))
-        positions = []
+        with self._shaped():
+            rest = self.model.rest_position(part) if designed else np.array(in_dimension(part.at, linkage.dim))
+        point, positions = linkage.point(part.on, rest.tolist()), []
         for configuration in configurations:
             with self._shaped():
-                assembly = assemble(linkage, configuration, springs)
+                assembly = from_one(self.comm, partial(assemble, linkage, configuration, springs))
             if assembly.fraction < 1.0:
                 raise AssemblyError(
                     f"configuration {configuration.name!r}",
                     f"its motors strain the links beyond {assembly.fraction:.1%} of their way",
                     "Use load_displacement with an output at the point",
                 )
-            positions.append(drawn + point.displacement(None, assembly.poses))
+            positions.append(rest + point.displacement(None, assembly.poses))
         return np.array(positions)
 
     # -- simulations derived from this one ------------------------------------------------------------------------
@@ -293,10 +301,11 @@ class Simulation:
                 alone, this rank's values with ghosts, flat.
 
         Raises:
-            DescriptionError: the design is one of other links, or of another mesh, or the scene has no parts with such
-                numbers.
+            DescriptionError: the design belongs to other links or another mesh, or the scene has no parts with such
+                numbers; or no fidelity was chosen for an accuracy yet.
             ShapeError: cells of the mesh are inverted in this shape.
         """
+        other = self._derived()
         if isinstance(design, np.ndarray):
             given = Design(design)
         else:
@@ -310,8 +319,7 @@ class Simulation:
                 f"it has values of shape {given.field.shape}, and the mesh has {size}",
                 "Give the design field of this simulation",
             )
-        other = copy(self)
-        other._design, other._control = Design(given.field.copy(), dict(given.numbers)), None
+        other._design = Design(given.field, dict(given.numbers))
         return other
 
     def with_material(self, drawn: Material, other: Material) -> Simulation:
@@ -319,13 +327,13 @@ class Simulation:
 
         Args:
             drawn: the material of some links.
-            other: their new material; effects, as ``Gravity`` by its density, keep the drawn one.
+            other: their new material; effects keep the drawn one, such as its density in ``Gravity``.
 
         Raises:
-            DescriptionError: no link is made of ``drawn``.
+            DescriptionError: no link is made of ``drawn``, or no fidelity was chosen for an accuracy yet.
         """
-        simulation = copy(self)
-        simulation._discretisation, simulation._control = self._discretisation.with_material(drawn, other), None
+        simulation = self._derived()
+        simulation._discretisation = self._discretisation.with_material(drawn, other)
         return simulation
 
     def with_shapes(
@@ -335,18 +343,19 @@ class Simulation:
         fidelity: Fidelity | None = None,
         moved: Mapping[Joint, JointChange] | None = None,
     ) -> Simulation:
-        """The same scene with links of other shapes, meshed anew; joints keep their interfaces.
+        """The same scene with links of other shapes, remeshed; joints keep their interfaces.
 
-        Quantities, samples, targets and effects that name these links mean those of other shapes. Links keep the
+        Quantities, samples, targets and effects that name these links apply to them in their new shapes. Links keep the
         centreline they were described with.
 
         Args:
-            shapes: of some flexible links, as ``step_file`` of a designed part.
+            shapes: of some flexible links, such as ``step_file`` of a designed part.
             fidelity: by default that of this simulation.
-            moved: joints that are placed otherwise than drawn, as those of a designed part.
+            moved: joints that are placed otherwise than drawn, such as those of a designed part.
 
         Raises:
-            DescriptionError: these are not shapes of links of the mechanism, or it does not fit the fidelity.
+            DescriptionError: these are not shapes of links of the mechanism, or it does not fit the fidelity; or none
+                was chosen for an accuracy yet.
             MeshingError: a file cannot be read, or a joint is not on its link.
         """
         for link, shape in shapes.items():
@@ -356,8 +365,8 @@ class Simulation:
                     f"{shape!r} is given as the shape of {link!r}",
                     "Give {link: shape, …} of flexible links of the mechanism",
                 )
-        other = copy(self)
-        other.clock, other.choice, other._control, other._design = Clock(), None, None, None
+        other = self._derived()
+        other.clock, other.choice, other._design = Clock(), None, None
         fidelity = fidelity or self.fidelity
         other._discretisation = self._discretisation.at(fidelity, other.clock, self.comm, shapes, moved)
         if shapes:
@@ -365,10 +374,21 @@ class Simulation:
         return other
 
     def on(self, comm: MPI.Comm) -> Simulation:
-        """The same scene at the same fidelity for other processes, as drawn."""
-        other = copy(self)
-        other.comm, other.clock, other._control, other._design = comm, Clock(), None, None
+        """The same scene at the same fidelity for other processes, as drawn.
+
+        Raises:
+            DescriptionError: no fidelity was chosen for an accuracy yet.
+        """
+        other = self._derived()
+        other.comm, other.clock, other._design = comm, Clock(), None
         other._discretisation = self._discretisation.at(self.fidelity, other.clock, comm)
+        return other
+
+    def _derived(self) -> Simulation:
+        """A copy of the fidelity that was given or chosen."""
+        self._check_chosen(f"simulation of {self.scene.mechanism.name!r}")
+        other = copy(self)
+        other._control = None
         return other
 
     # -- parts ------------------------------------------------------------------------------------------------------
@@ -410,12 +430,12 @@ class Simulation:
             rest, cells, dim = rest_vertices(self.model), self.model.mesh.cells, self.fidelity.model.dim
         return from_one(self.comm, lambda: 1.0 if rest is None else dim / float(radius_ratios(rest, cells).min()))
 
-    def solver(self, part: PrescribedPart, others: tuple[tuple[Force, float], ...] = ()) -> EquilibriumSolver:
-        """The solver for a force or motors that change and some constant forces, kept for all configurations."""
+    def solver(self, part: PrescribedPart, others: Sequence[Force] = ()) -> EquilibriumSolver:
+        """The solver for a force or motors that change and some constant forces, whose magnitudes states hold."""
         return self._discretisation.solver(part, others)
 
     def compute(self, request: CurveRequest, *, watch: Callable[[int], None] = lambda done: None) -> Curve:
-        """The curve of a checked request, as ``load_displacement`` without showing progress.
+        """The curve of a checked request, like ``load_displacement`` but without showing progress.
 
         Args:
             request: of the curve.
@@ -425,26 +445,30 @@ class Simulation:
             return CurveStepper(self._discretisation, request).curve(watch)
 
     def unloaded(self, request: CurveRequest) -> State:
-        """The configuration of a checked request without any force or effect.
+        """The equilibrium of a checked request without forces, effects at load factor 0.
 
         Raises:
-            EquilibriumError: motors strain the links, and no equilibrium was found.
+            EquilibriumError: motors strain the links or wind up springs, and no equilibrium was found.
         """
         with self._shaped():
             return CurveStepper(self._discretisation, request).unloaded
 
-    def check_drawn(self, part: str) -> None:
-        """Refuses a simulation ``with_design`` for a ``part`` that changes the design itself.
+    def check_drawn(self, part: str) -> Simulation:
+        """This simulation for a ``part`` that changes the design itself; its fidelity stays, whatever curves follow.
 
         Raises:
-            DescriptionError: this is one.
+            DescriptionError: it is one ``with_design``, its mechanism changed since it was made, or no fidelity was
+                chosen for an accuracy yet.
         """
+        self._check_description()
+        self._check_chosen(part)
         if self._design is not None:
             raise DescriptionError(
                 part,
                 f"its simulation of {self.scene.mechanism.name!r} has another design than the drawn one",
                 "Give it as drawn, before with_design(); problem.optimise(start=result) starts from a result",
             )
+        return self._derived()
 
     @contextmanager
     def _shaped(self) -> Iterator[None]:
@@ -456,18 +480,31 @@ class Simulation:
                 yield
 
     def _warn_of_coarse_links(self) -> None:
-        """Tells links whose elements are too long to bend with them."""
+        """Logs a warning for links whose elements are too long to resolve their bending."""
         if text := coarse_links(self._discretisation, self.scene.units):
             _log.warning("%s", text)
 
+    def _check_chosen(self, part: str) -> None:
+        """Refuses, for a ``part``, the pilot mesh of an accuracy for which no fidelity was chosen yet."""
+        if self._control is not None and self.choice is None:
+            raise DescriptionError(
+                part,
+                "no fidelity has been chosen for the required accuracy yet",
+                "Call load_displacement() first, up to such forces, or give space, order and size instead of accuracy",
+            )
+
     def _check_description(self) -> None:
-        """Refuses a mechanism that is not the one this simulation was made for."""
+        """Refuses a mechanism that is not the one this simulation was made for, and forces and outputs it cannot have.
+
+        These may have been added since.
+        """
         if _description(self.scene.mechanism) != self._described:
             raise DescriptionError(
                 f"mechanism {self.scene.mechanism.name!r}",
                 "links, joints or motors were added after the simulation was made",
                 "Make a new Simulation",
             )
+        check_loads(self.scene.mechanism, self.linkage.dim)
 
 
 def _errors(curve: Curve) -> LevelErrors:

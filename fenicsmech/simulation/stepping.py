@@ -1,7 +1,7 @@
 """Curves at prescribed values: the request, checked before anything is meshed, and the load steps through all values.
 
-A curve starts in the assembled configuration, under constant loads. The prescribed part is a force or motors; both give
-a curve of force (or torque) over displacement (or position).
+A curve starts from the unloaded configuration, under constant loads. The prescribed part is a force or motors; both
+give a curve of force (or torque) over displacement (or position).
 
 Rounding of the nodal forces of stiff links may exceed small loads, so that a residual of the size of rounding does not
 fix the rest position of a zero-energy mode. The forces inside an element cancel along motions that deform no link, and
@@ -10,7 +10,8 @@ so do their errors: the work along these is precise, and equilibria whose loads 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
@@ -18,6 +19,7 @@ from time import perf_counter
 import numpy as np
 from mpi4py import MPI
 
+from fenicsmech.collective import from_one
 from fenicsmech.continuation import LoadStepper, LoadSteps, LoadStepsFailed, MotorStepper
 from fenicsmech.equilibrium import (
     Control,
@@ -99,12 +101,12 @@ def read_request(
 def read_others(
     mechanism: Mechanism, part: PrescribedPart, configuration: Configuration, others: Mapping[Force, float] | None
 ) -> tuple[tuple[Force, float], ...]:
-    """The constant forces beside ``part``, if they and the configuration are of ``mechanism``."""
+    """The constant forces in addition to ``part``, if they and the configuration are of ``mechanism``."""
     others = dict(others or {})
     for other in others:
         check_force(mechanism, other)
     if isinstance(part, Force | ForceGroup) and not others.keys().isdisjoint(dict(part.ratios)):
-        raise DescriptionError(f"{part.name!r}", "it changes and is held constant at once", "Leave it out of others")
+        raise DescriptionError(f"{part.name!r}", "it is to change and to be held constant", "Leave it out of others")
     if not isinstance(configuration, Configuration):
         raise DescriptionError(
             f"configuration {configuration!r}", "it is not a configuration", "Make one with scene.configuration()"
@@ -136,7 +138,7 @@ class CurveStepper:
         frames: those of the curve so far.
         solver: for the request's forces.
         freedom: mobility of the configuration.
-        unloaded: the configuration without any force or effect.
+        unloaded: the equilibrium without forces, effects at load factor 0.
         followed: the control whose value changes along the curve.
         origin: zero of displacements: that of the force's point in the unloaded configuration.
     """
@@ -144,15 +146,18 @@ class CurveStepper:
     def __init__(self, discretisation: Discretisation, request: CurveRequest) -> None:
         self.discretisation, self.request, self._model = discretisation, request, discretisation.model
         self.frames: list[Frame] = []
-        model, rigid = self._model, self._model.linkage.rigid
-        assembly = assemble_before_strain(model.linkage, request.configuration, model.spring_potentials)
-        motors = rigid.on_the_way(request.configuration.position, assembly.fraction)
-        self.solver = discretisation.solver(request.part, request.others)
+        model, rigid, springs = self._model, self._model.linkage.rigid, self._model.spring_potentials
+        # of one process: decisions that depend on rounding are the same on all
+        comm, configuration = discretisation.comm, request.configuration
+        assembly = from_one(comm, lambda: assemble_before_strain(model.linkage, configuration, springs))
+        motors = rigid.on_the_way(configuration.position, assembly.fraction)
+        self.solver = discretisation.solver(request.part, [other for other, _ in request.others])
         self._system, self._joints = self.solver.system, model.linkage.joints
-        self.freedom = count_freedom(rigid, assembly.poses, motors, model.spring_potentials, self._system.idle)
+        idle = self._system.idle
+        self.freedom = from_one(comm, lambda: count_freedom(rigid, assembly.poses, motors, springs, idle))
         self.followed = discretisation.followed_control(request.part)
         self.origin, self._origins = 0.0, dict.fromkeys(model.mechanism.outputs, 0.0)
-        self._snaps = 0  # so far, that no frame reports
+        self._snaps = 0  # so far, which no frame reports yet
         self._poses = assembly.poses
         state = self.unloaded = self._unloaded(assembly)
         self._system.load(state)
@@ -197,7 +202,8 @@ class CurveStepper:
         if control.constrained:
             control = control.at(control.prescribed + self.origin)
         try:
-            point = stepper.advance(control)
+            with self.keeping_frames():
+                point = stepper.advance(control)
         except LoadStepsFailed as failure:
             raise self._unreached(control, failure) from failure
         record = self.record(point)
@@ -211,6 +217,15 @@ class CurveStepper:
         spent, phases = perf_counter() - start, clock.since(seconds)
         iterations = stepper.iterations - iterations
         return replace(record, snapped_through=snapped_through, iterations=iterations, seconds=spent, phases=phases)
+
+    @contextmanager
+    def keeping_frames(self) -> Iterator[None]:
+        """A context in which errors of potentials, which know no frames, get those so far."""
+        try:
+            yield
+        except EquilibriumError as error:
+            error.last, error.frames = self.frames[-1] if self.frames else None, tuple(self.frames)
+            raise
 
     def record(self, point: EquilibriumPoint) -> Frame:
         """The measured quantities of an equilibrium; the caller adds iterations and times."""
@@ -240,30 +255,36 @@ class CurveStepper:
             )
 
     def _unloaded(self, assembly: Assembly) -> State:
-        """The configuration without force or effect: the rigid assembly, or the equilibrium with strained links."""
+        """The equilibrium without forces, effects at load factor 0.
+
+        It is the rigid assembly unless motors strain links, or wind up springs that do.
+        """
         configuration, fraction = self.request.configuration, assembly.fraction
         drawn, here, there = (self._joints.on_the_way(configuration.position, part) for part in (0.0, fraction, 1.0))
         state = replace(
             self._model.assembled_state(assembly.poses, here),
             load_factor=0.0 if self.request.others or self._model.effects else 1.0,
+            constant=np.array([magnitude for _, magnitude in self.request.others]),
             minimum_shift=LoadSteps().minimum_shift if self.freedom.zero_energy else 0.0,
         )
-        if fraction == 1.0:
+        wound = bool(self._model.spring_potentials) and not np.array_equal(drawn, there)
+        if fraction == 1.0 and not wound:
             return state
         control = MotorControl(fraction, there - drawn, origin=drawn)
         stepper = MotorStepper(self.solver, state, control, predictor=self.discretisation.predictor)
         # a quarter of a radian, or of the mechanism's length: in space a motor's equation is periodic
-        steps = int(np.ceil((1.0 - fraction) * self._joints.travel(there - drawn) / 0.25))
+        steps = max(int(np.ceil((1.0 - fraction) * self._joints.travel(there - drawn) / 0.25)), 1)
         try:
             for value in np.linspace(fraction, 1.0, steps + 1)[1:]:
                 state = stepper.advance(control.at(float(value))).state
             self._snaps += stepper.snaps
         except LoadStepsFailed as failure:
+            strained = "links and springs" if wound else "the links"
+            beyond = "there" if fraction == 1.0 else f"beyond {failure.reached:.1%} of their way"
             raise EquilibriumError(
                 f"configuration {configuration.name!r}",
-                f"the motors strain the links, and no equilibrium was found beyond {failure.reached:.1%} of their way "
-                f"({failure.reason})",
-                "Choose motor positions nearer to the drawn ones, or a softer link",
+                f"the motors strain {strained}, and no equilibrium was found {beyond} ({failure.reason})",
+                "Choose motor positions nearer to the drawn ones, or a softer link or spring",
                 last=self._last(failure),
             ) from failure
         return state
@@ -357,10 +378,12 @@ class CurveStepper:
         nothing moves.
         """
         model, joints, residual = self._model, self._joints, self._system.residual(state, control)
-        loads = abs(state.force) + sum(abs(state.load_factor * magnitude) for _, magnitude in self.request.others)
+        loads = abs(state.force) + abs(state.load_factor) * float(np.abs(state.constant).sum())
         loads, worst = loads + self._effect_forces(state), 0.0
         reactions = np.abs(state.multipliers) @ np.abs(joints.gradient(state.poses, state.motors))
-        for motion in stiff_motions(model.linkage, state.poses, state.motors):
+        # all processes take the same basis of the motions
+        comm = self.discretisation.comm
+        for motion in from_one(comm, lambda: stiff_motions(model.linkage, state.poses, state.motors)):
             rounding = 1e-12 * float(reactions @ np.abs(motion.z))
             worst = max(worst, (self._work(residual, state, motion) - rounding) / motion.fastest(model.linkage.length))
         return worst / loads if loads > 0.0 else 0.0

@@ -52,6 +52,7 @@ def test_gradient_and_matrix_are_derivatives_of_the_value(space, kind):
     assert product.dot(way) == pytest.approx(curvature, rel=1e-4)
 
 
+@pytest.mark.thorough
 def test_rounding_of_redundant_hinges_ends_iterations():
     made = fm.Mechanism("four-bar")
     base, left, right = made.rigid("base", fixed=True), made.rigid("left"), made.rigid("right")

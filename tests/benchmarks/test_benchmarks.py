@@ -71,7 +71,7 @@ def test_sqp_solves_every_formula_and_every_design_under_inequalities():
 
 
 @pytest.mark.slow
-def test_accuracy_control_is_as_accurate_as_asked_on_the_truss():
+def test_accuracy_control_is_as_accurate_as_requested_on_the_truss():
     *_, row = printed("accuracy_control", "truss", "--accuracy", "0.05", "--repeats", "1")
     asked, bound, error = (float(row[column].rstrip("%")) for column in (1, 3, 4))
     assert error <= asked and bound <= asked

@@ -54,6 +54,6 @@ def test_two_meshes_give_a_doubtful_limit_and_one_gives_none():
 
 
 @pytest.mark.parametrize("sizes", [(1.0,), (1.0, 0.0)])
-def test_sizes_that_make_no_sense_are_refused(sizes):
+def test_invalid_sizes_are_refused(sizes):
     with pytest.raises(DescriptionError, match="positive size"):
         extrapolate(sizes, [1.0, 2.0])

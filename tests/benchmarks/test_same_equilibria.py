@@ -137,7 +137,7 @@ def test_kkt_newton_follows_the_path_of_the_default_solver():
 
 
 @pytest.mark.parametrize("solver", [AugmentedLagrangian(), SNES()], ids=["augmented Lagrangian", "SNES"])
-def test_solvers_that_correct_no_arc_length_say_so(solver):
+def test_solvers_without_arc_length_corrections_refuse_them(solver):
     simulation, push = finger("plane-stress", solver=solver)
     with pytest.raises(fm.DescriptionError, match="no arc-length steps.*PrimalDualNewton"):
         simulation.follow(push, until=fm.Until(force=2.0))

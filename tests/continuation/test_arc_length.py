@@ -82,7 +82,7 @@ def test_path_against_the_force_and_end_at_a_force():
     assert len(few.frames) == 4 and few.forces[-1] < 2.0 and not few.events
 
 
-@pytest.mark.parametrize("largest", [0.02, 0.2])
+@pytest.mark.parametrize("largest", [pytest.param(0.02, marks=pytest.mark.thorough), 0.2])
 def test_path_does_not_depend_on_its_steps(largest):
     case = toggle.toggle(stilt_modulus=SOFT)
     steps = fm.ArcSteps(largest=largest, first=0.5 * largest)
@@ -92,6 +92,7 @@ def test_path_does_not_depend_on_its_steps(largest):
     assert len(curve.events) == 4
 
 
+@pytest.mark.thorough
 def test_shallow_arch_follows_the_beam_through_both_limit_points():
     simulation, push = arch()
     curve = simulation.follow(push, until=fm.Until(displacement=DISPLACEMENTS[-1]))

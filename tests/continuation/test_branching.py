@@ -79,7 +79,7 @@ def test_bifurcation_is_located_by_few_equilibria_to_the_accuracy_of_the_eigenva
 
     case = column(size=size)
     near = case.simulation.load_displacement(case.push, forces=[0.9 * CRITICAL])
-    loads = [load.force for load in near.buckling_loads(count=1)]
+    loads = [load.value for load in near.buckling_points(count=1)]
     monkeypatch.setattr(ArcLengthStepper, "between", counted)
     steps = fm.ArcSteps(largest=0.2)
     curve = case.simulation.follow(case.push, until=fm.Until(force=1.1 * EULER, frames=50), steps=steps)

@@ -22,6 +22,8 @@ RESOLUTION = 2.0 / 1024.0  # of it
 class OneFreedom:
     """A path with a limit load of one, p = 1 − (1 − y)², in closed form, as ``LoadStepper`` sees it."""
 
+    potentials = ()
+
     def __init__(self) -> None:
         self.system, self.solved, self.softest = self, 0, 1.0
 
@@ -84,7 +86,7 @@ def pulled():
 
 
 @pytest.mark.thorough
-def test_steps_of_a_led_force_and_of_constant_loads_do_not_depend_on_what_is_out_of_reach(pulled, caplog):
+def test_steps_of_a_prescribed_force_and_of_constant_loads_do_not_depend_on_what_is_out_of_reach(pulled, caplog):
     simulation, push, other = pulled
     reached = []
     for load in (80.0, 8e4):

@@ -5,7 +5,7 @@ import pytest
 
 from ..equilibrium.finger import finger
 
-SPACES = ["plane-stress", "plane-strain", "3d"]
+SPACES = ["plane-stress", "plane-strain", pytest.param("3d", marks=pytest.mark.thorough)]
 
 
 @pytest.mark.parametrize("space", SPACES)

@@ -42,7 +42,7 @@ def test_arch_under_more_than_its_limit_load_snaps_through(snapping, loads):
     assert np.all(curve.displacements[:first] < limit.displacement) and curve.displacements[first] > 1.8 * RISE
 
 
-def test_arch_below_its_limit_load_or_led_by_its_displacement_does_not_snap_through(snapping):
+def test_arch_below_its_limit_load_or_under_prescribed_displacement_does_not_snap_through(snapping):
     simulation, push, limit = snapping
     for loads in ([0.9999], [0.5, 0.97, 0.9999, 0.5], [-5.0]):
         curve = simulation.load_displacement(push, forces=np.array(loads) * limit.force)
@@ -68,7 +68,7 @@ def test_snap_through_is_logged(snapping, caplog):
     assert "the path turns back" in caplog.text
 
 
-@pytest.mark.parametrize("space", ["plane-stress", "3d"])
+@pytest.mark.parametrize("space", ["plane-stress", pytest.param("3d", marks=pytest.mark.thorough)])
 def test_finger_that_bends_far_in_one_step_does_not_snap_through(space):
     simulation, push = finger(space)
     assert not simulation.load_displacement(push, forces=[8.0]).snapped_through.any()
@@ -97,7 +97,7 @@ def test_snap_is_seen_among_motors_that_turn_much_farther():
         assert curve.snapped_through.tolist() == [snapped_through], angle
 
 
-@pytest.mark.parametrize("sag", [LENGTH / 5e3, LENGTH / 5e4])
+@pytest.mark.parametrize("sag", [LENGTH / 5e3, pytest.param(LENGTH / 5e4, marks=pytest.mark.thorough)])
 def test_column_that_buckles_does_not_snap_through(sag):
     # the smaller the sag, the more suddenly the path bends off, but it does not turn back
     points = [(0.0, 0.0), (0.5 * LENGTH, sag), (LENGTH, 0.0)]

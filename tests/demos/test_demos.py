@@ -169,7 +169,7 @@ def test_two_ranks_give_the_same_curve_and_the_same_optimum(truss_alone, tmp_pat
 
 
 @pytest.mark.thorough
-def test_an_interrupted_optimisation_goes_on(truss_alone):
+def test_an_interrupted_optimisation_is_continued(truss_alone):
     alone, _, folder = truss_alone
     again, _ = report("truss", folder, *QUICK, "--resume")
     assert again["iterations"] >= alone["iterations"]

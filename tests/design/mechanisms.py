@@ -176,6 +176,27 @@ def strained(*forces: float, angle: float = 0.1) -> Case:
     )
 
 
+def sprung(*forces: float, angle: float = 0.4) -> Case:
+    """A four-bar whose motor winds up a spring at its rocker's foot by bending the coupler; the rocker is loaded."""
+    mechanism = fm.Mechanism("sprung four-bar")
+    base = mechanism.rigid("base", fixed=True)
+    crank, rocker = mechanism.rigid("crank"), mechanism.rigid("rocker")
+    coupler = mechanism.flexible("coupler", fm.strip([(0, 30), (20, 36), (40, 30)], thickness=3.0, depth=6.0), PLASTIC)
+    shaft = mechanism.revolute(base, crank, at=(0, 0))
+    foot = mechanism.revolute(base, rocker, at=(40, 0))
+    mechanism.revolute(crank, coupler, at=(0, 30), interface_radius=2.5)
+    mechanism.revolute(coupler, rocker, at=(40, 30), interface_radius=2.5)
+    motor = mechanism.motor(shaft)
+    push = mechanism.force(on=rocker, at=(40, 30), direction=(1, 0))
+    scene = fm.Scene(mechanism, [fm.JointSpring(foot, 600.0, rest=0.1)])
+    turned = scene.configuration("turned", {motor: angle})
+    return Case(
+        scene,
+        [fm.SplineDesign(coupler, 2)],
+        [fm.Target(push, force=force, displacement=force / 20.0, configuration=turned) for force in forces],
+    )
+
+
 def turned_beam(*forces: float, angle: float = 0.75 * np.pi) -> Case:
     """A beam clamped to a hub that a motor turns by ``angle`` from the drawing, with a loaded hand at its end."""
     mechanism = fm.Mechanism("turned beam")

@@ -62,7 +62,7 @@ def test_a_fit_leaves_simulations_and_their_curves_as_they_are():
     assert fit.curves[0].error_estimates() == pytest.approx(wanted, rel=1e-4)
 
 
-def test_a_simulation_goes_on_with_the_fitted_material():
+def test_a_simulation_continues_with_the_fitted_material():
     simulation, push = bench(GUESS)
     fit = fit_modulus([Experiment(simulation, push, FORCES, exact())], GUESS)
     fitted = simulation.with_material(GUESS, fit.material)
@@ -76,7 +76,7 @@ def test_all_links_of_the_material_change_together():
 
 
 @pytest.mark.thorough
-def test_interval_covers_the_truth_as_often_as_it_says():
+def test_interval_covers_the_truth_as_often_as_stated():
     random, covered, rounds = np.random.default_rng(3), 0, 20
     true = exact()
     simulation, push = bench(GUESS)
@@ -105,7 +105,7 @@ def test_interval_shrinks_with_the_noise():
         ((0.0, 0.0), (0.0, 1.0), "no force moves anything"),
     ],
 )
-def test_data_that_tell_nothing_are_refused(forces, displacements, message):
+def test_invalid_measurements_are_refused(forces, displacements, message):
     simulation, push = bench(GUESS)
     with pytest.raises(DescriptionError, match=message):
         Experiment(simulation, push, forces, displacements)
@@ -121,3 +121,34 @@ def test_specimens_of_another_design_are_refused():
 def test_a_material_that_no_sample_is_made_of_is_refused():
     with pytest.raises(DescriptionError, match="no link of 'bench' is made of it"):
         fit_modulus([experiment(exact())], fm.ONYX)
+
+
+def test_measurements_against_the_force_have_no_modulus():
+    with pytest.raises(fm.EquilibriumError, match="modulus of 'nylon'.*still changes"):
+        fit_modulus([experiment(-exact())], GUESS)
+
+
+def test_the_error_of_a_modulus_counts_from_a_configuration_that_it_strains_too():
+    rig = fm.Mechanism("clamped between")
+    ground, hub, hand = rig.rigid("ground", fixed=True), rig.rigid("hub"), rig.rigid("hand")
+    motor = rig.motor(rig.revolute(ground, hub, at=(0, 0)))
+    specimen = rig.flexible("specimen", fm.strip([(0, 0), (30, 0)], thickness=2.0, depth=4.0), GUESS)
+    brace = rig.flexible("brace", fm.strip([(30, 0), (60, 0)], thickness=2.0, depth=4.0), fm.ONYX)
+    for rigid, link, x in ((hub, specimen, 1), (hand, specimen, 29), (hand, brace, 31), (ground, brace, 59)):
+        rig.weld(rigid, link, at=(x, 0), region=fm.Rectangle(2, 4))
+    push = rig.force(on=hand, at=(30, 0), direction=(0, 1))
+    scene = fm.Scene(rig)
+    turned = scene.configuration("turned", {motor: 0.2})
+    sim = fm.Simulation(scene, space="plane-stress", size=3.0)
+
+    def travel(modulus: float) -> np.ndarray:
+        other = sim.with_material(GUESS, replace(GUESS, law=replace(GUESS.law, E=modulus)))
+        return other.load_displacement(push, forces=FORCES, configuration=turned).displacements
+
+    true = travel(1500.0)
+    noisy = true + 0.01 * true.max() * np.array([1.0, -1.0, 1.0, -1.0])
+    fit = fit_modulus([Experiment(sim, push, FORCES, noisy, configuration=turned)], GUESS)
+    step = 1e-3
+    slope = (travel(fit.youngs_modulus * (1.0 + step)) - travel(fit.youngs_modulus * (1.0 - step))) / (2.0 * step)
+    wanted = fit.spread / np.linalg.norm(slope / np.abs(noisy).max())
+    assert fit.standard_error / fit.youngs_modulus == pytest.approx(wanted, rel=1e-4)

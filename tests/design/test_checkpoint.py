@@ -108,7 +108,7 @@ def test_tuples_of_a_problem_are_those_of_its_file(tmp_path):
 def test_a_file_that_is_not_a_checkpoint_is_refused(tmp_path, content):
     there = checkpoint(tmp_path)
     there.path.write_bytes(content)
-    with pytest.raises(fm.DescriptionError, match="not a checkpoint"):
+    with pytest.raises(fm.DescriptionError, match="does not hold a checkpoint"):
         there.load()
 
 
@@ -116,7 +116,7 @@ def test_truncated_checkpoints_are_refused(tmp_path):
     there = checkpoint(tmp_path)
     there.save(iterate(), HANDLES, ROUND, LevenbergMarquardt())
     there.path.write_bytes(there.path.read_bytes()[:-5])
-    with pytest.raises(fm.DescriptionError, match="not a checkpoint"):
+    with pytest.raises(fm.DescriptionError, match="does not hold a checkpoint"):
         there.load()
 
 

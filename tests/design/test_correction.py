@@ -10,7 +10,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.design import SampleEquilibria
+from fenicsmech.design import Infeasible, SampleEquilibria
 
 from .mechanisms import Case, truss
 
@@ -96,6 +96,7 @@ def test_plane_stress_with_corrections_ends_at_the_targets_in_space(loads):
     assert corrected(result) == pytest.approx(corrected(direct), rel=5e-3)
 
 
+@pytest.mark.thorough
 def test_equilibria_in_space_that_plane_stress_does_not_lead_to_are_loaded_from_zero(loads, monkeypatch, caplog):
     problem = truss(*WANTED).problem(**COARSE)
     guessed = problem.optimise()
@@ -106,6 +107,41 @@ def test_equilibria_in_space_that_plane_stress_does_not_lead_to_are_loaded_from_
     assert loads["3d"] == 1
     assert corrected(loaded) == pytest.approx(corrected(guessed), rel=1e-6)
     assert loaded.verified
+
+
+def test_a_surrogate_stays_as_it_is():
+    case = truss(*WANTED)
+    surrogate = case.simulate(size=4.0)
+    before = surrogate.load_displacement(case.targets[0].quantity.part, forces=[0.4]).displacements
+    problem = case.problem(**COARSE)
+    problem.optimise(surrogate=surrogate, optimiser=fm.LevenbergMarquardt(iterations=1))
+    assert not np.any(surrogate.model.design.field)
+    after = surrogate.load_displacement(case.targets[0].quantity.part, forces=[0.4]).displacements
+    assert after == pytest.approx(before, rel=1e-12)
+
+
+def test_the_design_of_the_last_round_with_a_value_is_not_lost(loads, monkeypatch, caplog):
+    settled = fm.Correction(resolved=0.02)
+    whole = truss(*WANTED).problem(**COARSE).optimise(correction=settled)
+    assert len(whole.corrections) > 1
+    from_design, from_zero, failed = SampleEquilibria.from_design, SampleEquilibria.from_zero, set()
+
+    def failing(name, found):
+        def once(equilibria: SampleEquilibria, *given):
+            if equilibria._simulation.fidelity.model.name == "3d" and name not in failed:
+                failed.add(name)
+                raise Infeasible("it snaps")
+            return found(equilibria, *given)
+
+        return once
+
+    monkeypatch.setattr(SampleEquilibria, "from_design", failing("from_design", from_design))
+    monkeypatch.setattr(SampleEquilibria, "from_zero", failing("from_zero", from_zero))
+    result = truss(*WANTED).problem(**COARSE).optimise(correction=settled)
+    assert "round 2 has no value, that before it stands: it snaps" in caplog.text
+    assert result.surrogate is None and result.worst_error < 5e-3
+    assert result.corrections[0] == pytest.approx(whole.corrections[0], rel=1e-6)
+    assert result.iterations > 1
 
 
 def misleading(case: Case) -> fm.Simulation:
@@ -153,7 +189,7 @@ def test_two_ranks_correct_as_one_does():
     assert (together.iterations, together.reason) == (alone.iterations, alone.reason)
 
 
-def test_corrections_that_make_no_sense_are_refused():
+def test_invalid_corrections_are_refused():
     for name in ("change", "resolved", "contraction", "rounds"):
         with pytest.raises(fm.DescriptionError, match=name):
             fm.Correction(**{name: 0.0})

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
 import pytest
 
 import fenicsmech as fm
@@ -19,7 +23,7 @@ def test_resuming_without_a_checkpoint_starts_from_the_beginning(tmp_path):
     assert file.exists()
 
 
-def test_going_on_from_a_checkpoint_ends_where_one_run_does(tmp_path):
+def test_resuming_from_a_checkpoint_ends_where_one_run_does(tmp_path):
     file = tmp_path / "checkpoint.json"
     direct = truss(*REACHABLE).problem().optimise()
     first = truss(*REACHABLE).problem().optimise(optimiser=fm.LevenbergMarquardt(iterations=3), checkpoint=file)
@@ -31,7 +35,7 @@ def test_going_on_from_a_checkpoint_ends_where_one_run_does(tmp_path):
     assert resumed.links[0].parameters == pytest.approx(direct.links[0].parameters, abs=1e-5)
 
 
-def test_a_checkpoint_is_not_used_unless_asked_for(tmp_path):
+def test_a_checkpoint_is_not_used_unless_requested(tmp_path):
     file = tmp_path / "checkpoint.json"
     first = truss((0.4, 1.8)).problem().optimise(checkpoint=file)
     again = truss((0.4, 1.8)).problem().optimise(checkpoint=file)
@@ -101,3 +105,62 @@ def test_checkpoints_of_another_optimiser_are_refused_but_not_those_of_other_lim
         .optimise(optimiser=fm.LevenbergMarquardt(iterations=5, tolerance=1e-2), checkpoint=file, resume=True)
     )
     assert resumed.iterations >= 1
+
+
+@dataclass(frozen=True)
+class Pushed(fm.Effect):
+    """Nothing, where a function says so."""
+
+    where: Callable[[np.ndarray], np.ndarray]
+
+    def explain(self) -> str:
+        return "nothing"
+
+
+def pulled(
+    *, thickness: float = 3.0, depth: float = 5.0, E: float = 2000.0, arm: float = 20.0, **fidelity
+) -> fm.DesignProblem:
+    """A strip whose depth may change, and whose hand moves a rigid slide."""
+    rig = fm.Mechanism("cantilever")
+    wall, hand, slide = rig.rigid("wall", fixed=True), rig.rigid("hand"), rig.rigid("slide")
+    shape = fm.strip([(0, 0), (40, 0)], thickness=thickness, depth=depth)
+    strip = rig.flexible("strip", shape, fm.Material("plastic", E, 0.35))
+    rig.clamp(wall, strip, end="start", length=5.0)
+    rig.clamp(hand, strip, end="end", length=5.0)
+    rig.revolute(hand, slide, at=(40, arm))
+    rig.prismatic(wall, slide, at=(0, 30), axis=(1, 0))
+    push = rig.force(on=hand, at=(40, 0), direction=(1, 0))
+    scene = fm.Scene(rig, effects=[Pushed(lambda points: points[:, 0] > 0.0)])
+    sim = fm.Simulation(scene, **{"space": "plane-stress", "size": 3.0} | fidelity)
+    numbers = [fm.Number(fm.Depth(strip), 3.0, 9.0)]
+    return fm.DesignProblem(sim, numbers, targets=[fm.Target(push, force=2.0, displacement=0.01)])
+
+
+def test_checkpoints_of_the_same_words_with_other_numbers_are_refused(tmp_path):
+    file, once = tmp_path / "checkpoint.json", fm.LevenbergMarquardt(iterations=1)
+    pulled().optimise(optimiser=once, checkpoint=file)
+    assert pulled().optimise(optimiser=once, checkpoint=file, resume=True).iterations == 1
+    for differs, changes in (
+        ("drawing", {"thickness": 2.9}),
+        ("drawing", {"depth": 5.1}),
+        ("drawing", {"E": 1990.0}),
+        ("drawing", {"arm": 21.0}),
+        ("elements", {"formulation": fm.DisplacementFormulation()}),
+        ("elements", {"segments": 10}),
+        ("elements", {"quadrature": fm.Quadrature.for_order(3, 2)}),
+    ):
+        with pytest.raises(fm.DescriptionError, match=f"another problem.*{differs}"):
+            pulled(**changes).optimise(optimiser=once, checkpoint=file, resume=True)
+
+
+def test_checkpoints_of_another_material_or_shape_of_the_simulation_are_refused(tmp_path):
+    file, once, problem = tmp_path / "checkpoint.json", fm.LevenbergMarquardt(iterations=1), pulled()
+    problem.optimise(optimiser=once, checkpoint=file)
+    (strip,) = problem.simulation.scene.mechanism.flexible_links
+    for differs, other in (
+        ("materials", problem.simulation.with_material(strip.material, fm.Material("plastic", 1990.0, 0.35))),
+        ("shapes", problem.simulation.with_shapes({strip: replace(strip.shape, thickness=2.9)})),
+    ):
+        with pytest.raises(fm.DescriptionError, match=f"another problem.*{differs}"):
+            changed = fm.DesignProblem(other, problem.designs, targets=problem.targets)
+            changed.optimise(optimiser=once, checkpoint=file, resume=True)

@@ -257,6 +257,18 @@ def test_refusals_are_the_same_on_all_ranks(shared_tmp_path):
         whole.optimise(checkpoint=file / "not a folder" / "checkpoint.json")
 
 
+@pytest.mark.parallel
+def test_a_point_beside_its_link_in_the_targets_of_one_group_is_refused_on_all_ranks():
+    case = truss((0.4, 1.8))
+    (design,), (target,) = case.designs, case.targets
+    (force, _), *_ = target.sample.forces
+    away = fm.Target(fm.Displacement(design.link, at=(500, 500)), fm.Sample({force: 0.1}), equals=(1.0, 1.0))
+    problem = Case(case.scene, case.designs, [target, away]).problem(comm=MPI.COMM_WORLD)
+    with pytest.raises(fm.DescriptionError, match=r"500") as caught:
+        problem.optimise()
+    assert len(set(MPI.COMM_WORLD.allgather(str(caught.value)))) == 1
+
+
 def test_elements_too_large_for_the_handles_of_a_thin_strip_are_refused():
     mechanism = fm.Mechanism("thin strip")
     base, tip = mechanism.rigid("base", fixed=True), mechanism.rigid("tip")

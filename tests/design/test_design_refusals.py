@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
+from mpi4py import MPI
 
 import fenicsmech as fm
 from fenicsmech import model
@@ -44,6 +45,29 @@ def test_a_link_is_given_twice():
         part="'diagonal'",
         problem="twice",
         remedy="once",
+    )
+
+
+def test_an_accuracy_that_has_chosen_nothing_yet():
+    case = truss(*REACHABLE)
+    simulation = fm.Simulation(case.scene, accuracy=0.01, comm=MPI.COMM_SELF)
+    refused(
+        lambda: fm.DesignProblem(simulation, case.designs, targets=case.targets),
+        part="design problem",
+        problem="no fidelity has been chosen",
+        remedy="load_displacement",
+    )
+
+
+def test_a_force_added_later_that_leaves_the_plane():
+    case = truss(*REACHABLE)
+    simulation, push = case.simulate(), case.targets[0].quantity.part
+    late = case.scene.mechanism.force(on=push.on, at=push.at, direction=(1, 0, 1), name="late")
+    refused(
+        lambda: fm.DesignProblem(simulation, case.designs, targets=[fm.Target(late, force=0.1, displacement=2.0)]),
+        part="'late'",
+        problem="leaves the plane",
+        remedy="space",
     )
 
 
@@ -122,7 +146,7 @@ def test_motors_of_another_mechanism():
 
 @pytest.mark.parametrize("number", [math.nan, math.inf, "two", None])
 @pytest.mark.parametrize("name", ["force", "displacement", "weight"])
-def test_targets_that_are_no_numbers(name, number):
+def test_targets_that_are_not_numbers(name, number):
     push = truss(*REACHABLE).targets[0].quantity.part
     numbers = {"force": 0.1, "displacement": 2.0, "weight": 1.0, name: number}
     refused(lambda: fm.Target(push, **numbers), part=f"{name} of a target for", problem="", remedy="finite")
@@ -161,7 +185,7 @@ def test_fewer_segments_than_gaps_between_joints():
 
 
 @pytest.mark.parametrize("segments", [0, -1, 2.5, None])
-def test_numbers_of_segments_that_make_no_sense(segments):
+def test_invalid_numbers_of_segments(segments):
     link = truss().designs[0].link
     refused(lambda: fm.SplineDesign(link, segments), part="'diagonal'", problem="segments", remedy="whole number")
 
@@ -178,7 +202,7 @@ def test_numbers_of_segments_that_make_no_sense(segments):
         ({"bend": math.inf}, "inf"),
     ],
 )
-def test_bounds_that_make_no_sense(bounds, problem):
+def test_invalid_bounds(bounds, problem):
     link = truss().designs[0].link
     with pytest.raises(fm.DescriptionError, match=problem) as caught:
         fm.SplineDesign(link, 3, **bounds)
@@ -209,3 +233,24 @@ def test_a_link_without_a_centreline():
     push = mechanism.force(on=plate, at=(20, 0), direction=(0, 1))
     case = Case(fm.Scene(mechanism), [fm.SplineDesign(plate, 2)], [fm.Target(push, force=1.0, displacement=0.1)])
     refused(lambda: case.problem(), part="'plate'", problem="no longer than it is wide", remedy="centreline=")
+
+
+@pytest.mark.parametrize("given", ["plane_stress", "3d", 1.0])
+def test_surrogates_that_are_none(given):
+    problem = truss(*REACHABLE).problem(space="3d")
+    refused(lambda: problem.optimise(surrogate=given), part="surrogate", problem=str(given), remedy="plane-stress")
+
+
+def test_links_whose_files_would_have_one_name():
+    mechanism = fm.Mechanism("stool")
+    ground, seat = mechanism.rigid("ground", fixed=True), mechanism.rigid("seat")
+    legs = []
+    for x, name in ((0, "leg 1"), (20, "leg-1")):
+        legs.append(mechanism.flexible(name, fm.strip([(x, 0), (x, 30)], thickness=2.0, depth=5.0), fm.ONYX))
+        for link, y in ((ground, 0), (seat, 30)):
+            mechanism.revolute(link, legs[-1], at=(x, y), interface_radius=2.0)
+    push = mechanism.force(on=seat, at=(10, 30), direction=(0, -1))
+    case = Case(
+        fm.Scene(mechanism), [fm.SplineDesign(leg, 1) for leg in legs], [fm.Target(push, force=1, displacement=1)]
+    )
+    refused(lambda: case.problem(), part="design problem", problem="'leg 1' and 'leg-1'", remedy="Rename")

@@ -11,16 +11,18 @@ from fenicsmech.design import DesignEquilibria, Infeasible, SampleEquilibria
 from fenicsmech.equilibrium import NewtonSolver, NotConverged
 
 from .alike import assert_alike, displacements
-from .mechanisms import Bench, Case, bench, bow, strained, strains, truss, turned_beam
+from .mechanisms import Bench, Case, bench, bow, sprung, strained, strains, truss, turned_beam
 
 CASES = {
     "truss": lambda: truss((0.1, 1.0), (0.4, 2.0)),
     "force on a link": lambda: bow(20.0, 60.0),
     "strained by motors": lambda: strained(1.0, 3.0),
+    "springs wound up by motors": lambda: sprung(1.0, 3.0),
     "turned by 135°": lambda: turned_beam(1.0, 3.0, -2.0),
 }
 each_case = pytest.mark.parametrize("name", CASES)
-MOVING = ("force on a link", "strained by motors")  # cases whose unloaded point moves with the design
+# cases whose unloaded point moves with the design
+MOVING = ("force on a link", "strained by motors", "springs wound up by motors")
 
 
 def made(name: str, **fidelity) -> Bench:

@@ -126,7 +126,7 @@ def test_pictures_show_joints_where_numbers_place_them():
     assert far[0] > x and far[1] > y
 
 
-def test_turned_axes_of_rigid_links_are_axes_drawn_so():
+def test_turned_axes_of_rigid_links_are_as_axes_drawn_turned():
     turns = {"hinge": (0.3, -0.4, 0.0), "slider": (0.0, 0.2, 0.5)}
     (sim, push, joints), (there, other, _) = chain(), chain(turns)
     numbers = {
@@ -234,7 +234,8 @@ def test_strips_follow_shifted_joints_as_if_drawn_there(space, shift):
     assert abs(before - wanted.displacements[0]) > 0.02 * abs(wanted.displacements[0])
 
 
-def test_position_is_found_where_a_strip_so_drawn_moves_as_wanted_and_is_exported_there(tmp_path):
+@pytest.mark.thorough
+def test_position_is_found_at_which_a_strip_drawn_there_moves_as_wanted_and_is_exported(tmp_path):
     there, _, other = prop((0.0, 8.0), size=2.0)
     wanted = float(there.load_displacement(other, forces=[1.5]).corrected[0])
     sim, pin, push = prop(size=2.0)
@@ -301,7 +302,7 @@ def test_any_number_of_processes_finds_the_same_derivatives_by_shifts():
         assert together == pytest.approx(one, rel=1e-7, abs=1e-7 * np.abs(one).max())
 
 
-def test_places_that_make_no_sense_are_refused():
+def test_invalid_places_are_refused():
     case = shifted_truss()
     sim, (diagonal,) = case.simulate(size=6.0), case.scene.mechanism.flexible_links
     joints = case.scene.mechanism.joints

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from functools import cache
 
+import numpy as np
 import pytest
 
 import fenicsmech as fm
 
 from .mechanisms import truss
+from .test_verification import flexure
 
 KEPT = 2e-3  # SQP's violation, 0.1 %, and the last change of a correction, 0.1 % or a tenth of the estimate
 
@@ -69,3 +71,18 @@ def test_exported_part_keeps_the_bound():
     bounded = verified.targets[0].part
     assert bounded is not None and bounded.error <= 0.01
     assert bounded.value + bounded.finer_elements_add <= 1.01
+
+
+def test_a_start_that_carries_loads_under_which_the_drawn_design_snaps_gives_the_scale():
+    sim, leaf, push = flexure(1.0)
+    mass, bounded = (
+        fm.LinkMass(leaf, density=1e-9),
+        fm.Target(fm.Displacement(push), fm.Sample({push: 20.0}), at_most=2),
+    )
+    numbers, least = [fm.Number(fm.Depth(leaf), 4.5, 9.5)], fm.Target(mass, least=True)
+    problem = fm.DesignProblem(sim, numbers, targets=[least, bounded])
+    with pytest.raises(fm.EquilibriumError, match="has no value"):
+        problem.optimise()
+    result = problem.optimise(start=np.array([0.8]), optimiser=fm.SQP(iterations=1))
+    assert result.targets[0].started == pytest.approx(8.5 * 2.0 * 40.0 * 1e-9, rel=0.05)
+    assert result.objective[0] == pytest.approx(1.0, abs=1e-6)

@@ -73,7 +73,7 @@ def test_an_offset_is_the_same_as_another_position_of_the_motor(describe, space)
         assert shifted.path(push, [here]) == pytest.approx(sim.path(push, [there]), abs=1e-10)
 
 
-def test_values_of_designs_with_other_offsets_are_those_of_a_scene_whose_motor_stands_there():
+def test_values_of_designs_with_other_offsets_are_those_of_a_scene_whose_motor_is_there():
     def equilibria(position: float) -> tuple[fm.Simulation, fm.MotorOffset, SampleEquilibria]:
         scene, motor, push = crank()
         sim, sample = fm.Simulation(scene, space="plane-stress", size=4.0), fm.Sample({push: 1.0, motor: position})
@@ -133,7 +133,7 @@ def test_gradients_of_the_objective_by_shapes_and_offsets_agree_with_central_dif
     assert here.gradient[-1] != 0.0
 
 
-def test_offsets_that_make_no_sense_are_refused():
+def test_invalid_offsets_are_refused():
     scene, motor, push = crank()
     sim = fm.Simulation(scene, space="plane-stress", size=4.0)
     targets = [fm.Target(push, force=1.0, displacement=1.0)]
@@ -150,3 +150,22 @@ def test_offsets_that_make_no_sense_are_refused():
         problem="nan",
         remedy="finite",
     )
+
+
+def test_offsets_at_which_the_joints_do_not_close_have_no_value():
+    mechanism = fm.Mechanism("rocking four-bar")
+    ground, left, coupler, right = (mechanism.rigid(name, fixed=name == "a") for name in "abcd")
+    leaf = mechanism.flexible("leaf", fm.strip([(25, 35), (45, 35)], thickness=2.0, depth=6.0), PLASTIC)
+    shaft = mechanism.revolute(ground, left, at=(0, 0))
+    mechanism.revolute(left, coupler, at=(0, 30))
+    mechanism.revolute(ground, right, at=(40, 0))
+    mechanism.revolute(right, coupler, at=(25, 35))
+    mechanism.weld(coupler, leaf, at=(27, 35), interface_radius=2.0)
+    motor, push = mechanism.motor(shaft), mechanism.force(on=leaf, at=(44, 35), direction=(0, 1))
+    sim = fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=2.0)
+    bounds = -0.1, 1.9  # from 0.7 rad on coupler and right link are too short to reach the left one
+    problem = fm.DesignProblem(
+        sim, [fm.Number(fm.MotorOffset(motor), *bounds)], targets=[fm.Target(push, force=0.1, displacement=0.1)]
+    )
+    with pytest.raises(fm.EquilibriumError, match="has no value.*does not close"):
+        problem.optimise(start=np.array([0.8]))

@@ -49,7 +49,7 @@ def test_a_modulus_is_recovered_from_a_curve_computed_with_it():
 
 
 @pytest.mark.parametrize("space", ["plane-stress", pytest.param("3d", marks=pytest.mark.thorough)])
-def test_depth_is_found_with_which_a_link_so_drawn_moves_as_wanted(space):
+def test_depth_is_found_with_which_a_link_drawn_as_deep_moves_as_wanted(space):
     scene, strip, push = cantilever(depth=5.0)
     sim = fm.Simulation(scene, space=space, size=3.0)
     (moved,) = curve(sim, push, [2.0])
@@ -83,7 +83,7 @@ def test_depths_change_the_solid_that_is_exported_and_verified(tmp_path):
     assert np.ptp(heights) == pytest.approx(6.5, rel=1e-6)
 
 
-def test_results_tell_their_numbers_and_keep_them_in_files(tmp_path):
+def test_results_print_their_numbers_and_keep_them_in_files(tmp_path):
     scene, strip, push = cantilever()
     sim = fm.Simulation(scene, space="plane-stress", size=3.0)
     numbers = [fm.Number(fm.Depth(strip), 3.0, 9.0), fm.Number(fm.LawParameter("E", strip), 500.0, 4000.0)]
@@ -168,7 +168,7 @@ def test_any_number_of_processes_finds_the_same_derivatives_by_numbers():
         assert together == pytest.approx(one, rel=1e-7, abs=1e-7 * np.abs(one).max())
 
 
-def test_numbers_that_make_no_sense_are_refused():
+def test_invalid_numbers_are_refused():
     scene, strip, push = cantilever()
     sim = fm.Simulation(scene, space="plane-stress", size=3.0)
     targets, depth = [fm.Target(push, force=2.0, displacement=1.0)], fm.Depth(strip)
@@ -230,7 +230,7 @@ def test_numbers_of_a_design_are_refused_as_those_of_a_problem_are():
     refused(lambda: given(*both), part="depth", problem="both change the same", remedy="once")
 
 
-def test_springs_are_as_stiff_as_the_moment_of_the_force_asks_for():
+def test_springs_are_as_stiff_as_the_moment_of_the_force_requires():
     rest, angle, force = -0.2, 0.5, 1.5
     case = lever(lambda hinge: [fm.JointSpring(hinge, 60.0, rest=rest)])
     (spring,) = case.simulation.scene.effects
@@ -263,3 +263,51 @@ def test_paths_are_those_of_springs_as_designed():
     soft = sim.with_design(fm.Design(sim.model.design.field, {fm.SpringStiffness(springs[0]): 0.5}))
     assert soft.path(push, apart)[0] == pytest.approx((4.0, 0.0), abs=1e-9)
     assert sim.path(push, apart)[0] == pytest.approx((2.5, 0.0), abs=1e-9)
+
+
+def test_one_of_two_springs_in_a_joint_is_refused():
+    case = lever(lambda hinge: [fm.JointSpring(hinge, 60.0), fm.JointSpring(hinge, 40.0)])
+    numbers = [fm.Number(fm.SpringStiffness(case.simulation.scene.effects[1]), 20.0, 200.0)]
+    targets = [fm.Target(case.force, force=1.0, displacement=5.0)]
+    refused(
+        lambda: fm.DesignProblem(case.simulation, numbers, targets=targets),
+        part="stiffness of the spring",
+        problem="2 parts of that name",
+        remedy="as one",
+    )
+
+
+def test_numbers_are_shared_by_links_that_are_alike_in_the_simulation():
+    rig = fm.Mechanism("two leaves")
+    ground, hand = rig.rigid("ground", fixed=True), rig.rigid("hand")
+    links, materials = [], [fm.Material(name, 2000.0, 0.35) for name in ("one", "other")]
+    for y, material in zip((0, 10), materials, strict=True):
+        links.append(rig.flexible(material.name, fm.strip([(0, y), (30, y)], thickness=2.0, depth=5.0), material))
+        rig.clamp(ground, links[-1], end="start", length=4.0)
+        rig.clamp(hand, links[-1], end="end", length=4.0)
+    sim = fm.Simulation(fm.Scene(rig), space="plane-stress", size=3.0)
+    assert sim.model.number(fm.Depth(*links)).drawn == 5.0
+    assert sim.model.number(fm.LawParameter("E", *links)).drawn == 2000.0
+    deeper = sim.with_shapes({links[1]: replace(links[1].shape, depth=6.0)})
+    refused(lambda: deeper.model.number(fm.Depth(*links)), part="depth", problem="5, 6", remedy="alike")
+    stiffer = sim.with_material(materials[1], fm.Material("stiff", 3000.0, 0.35))
+    refused(
+        lambda: stiffer.model.number(fm.LawParameter("E", *links)), part="E of", problem="2000, 3000", remedy="alike"
+    )
+
+
+def test_laws_and_depths_of_rigid_links_are_refused():
+    scene, _, _ = cantilever()
+    wall = scene.mechanism.rigid_links[0]
+    refused(lambda: fm.LawParameter("E", wall), part="parameter", problem="'wall'.*not a flexible link", remedy="Give")
+    refused(lambda: fm.Depth(wall), part="depth", problem="'wall'.*not a flexible link", remedy="Give")
+
+
+def test_files_of_lengths_in_another_unit_are_warned_of(tmp_path, caplog):
+    scene, strip, push = cantilever()
+    targets = [fm.Target(push, force=2.0, displacement=1.0)]
+    for unit in ("mm", "cm"):
+        sim = fm.Simulation(replace(scene, units=fm.Units(length=unit)), space="plane-stress", size=3.0)
+        problem = fm.DesignProblem(sim, [fm.Number(fm.Depth(strip), 3.0, 9.0)], targets=targets)
+        problem.export(tmp_path, problem.initial)
+        assert ("scale them" in caplog.text) == (unit == "cm")

@@ -88,7 +88,7 @@ def test_gradient_does_not_depend_on_the_way_to_a_design():
         assert other == pytest.approx(seen[0], rel=1e-6, abs=1e-6 * np.abs(seen[0]).max())
 
 
-def test_values_that_are_of_no_use_are_refused_without_derivatives(monkeypatch):
+def test_values_above_the_limit_are_refused_without_derivatives(monkeypatch):
     whole, bench = objective(truss(*TARGETS), StayClose())
     p, _ = away(bench)
     value = whole.evaluate(p).value

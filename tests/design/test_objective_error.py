@@ -13,7 +13,7 @@ from fenicsmech.design import Comparison, SampleEquilibria, rest_meshes
 from ..simulation.demo_scenes import demo
 from ..simulation.five_problems import case
 from ..simulation.refined import cantilever, refine
-from .mechanisms import truss
+from .mechanisms import sprung, strained, truss
 
 
 def value(targets, reached) -> float:
@@ -69,6 +69,52 @@ def test_designs_carry_the_errors_of_displacements_and_objective():
     assert result.objective_error == pytest.approx(
         Comparison(case.targets, fm.Units()).objective_error(reached, np.array(errors))
     )
+
+
+@pytest.mark.parametrize("described", [strained, sprung])
+def test_errors_of_curves_are_those_of_designs_where_links_are_strained_without_loads(described):
+    scene, push, place = _strained(described)
+    lift = scene.mechanism.output(on=scene.mechanism.flexible_links[0], at=(20, 36), direction=(0, 1))
+    simulation = fm.Simulation(scene, space="plane-stress", size=4.0, comm=MPI.COMM_SELF)
+    curve = simulation.load_displacement(push, forces=[2.0], configuration=place)
+    (reached,) = curve.displacements
+    held = simulation.load_displacement(push, displacements=[reached], configuration=place)
+    sample = fm.Sample({push: fm.at(float(reached))}, configuration=place)
+    targets = [
+        fm.Target(push, force=2.0, displacement=1.0, configuration=place),
+        fm.Target(fm.ForceMagnitude(push), sample, equals=1.0),
+        fm.Target(fm.Displacement(lift), sample, equals=1.0),
+    ]
+    equilibria = SampleEquilibria(simulation, targets)
+    found = [*curve.error_estimates(), *held.error_estimates(), *held.error_estimates(output=lift)]
+    assert found == pytest.approx(equilibria.errors(equilibria.from_zero()), rel=1e-5)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("described", [strained, sprung])
+def test_effectivity_where_links_are_strained_without_loads_is_between_a_half_and_two(described, monkeypatch):
+    scene, push, place = _strained(described)
+    lift = scene.mechanism.output(on=scene.mechanism.flexible_links[0], at=(20, 36), direction=(0, 1))
+    samples = {"forces": [2.0]}, {"displacements": [0.4]}
+
+    def curves(order: int) -> list[fm.Curve]:
+        simulation = fm.Simulation(scene, space="plane-stress", order=order, size=4.0, comm=MPI.COMM_SELF)
+        return [simulation.load_displacement(push, configuration=place, **own) for own in samples]
+
+    coarse = curves(2)
+    estimates = [[*curve.error_estimates(), *curve.error_estimates(output=lift)] for curve in coarse]
+    refine(monkeypatch, 2)
+    for curve, finer, estimated in zip(coarse, curves(3), estimates, strict=True):
+        changes = [*(finer.values - curve.values), finer.frames[0].outputs[lift] - curve.frames[0].outputs[lift]]
+        effectivity = np.array(estimated) / changes
+        assert np.all((effectivity > 0.5) & (effectivity < 2.0))
+
+
+def _strained(described) -> tuple[fm.Scene, fm.Force, fm.Configuration]:
+    """A scene, its force, and a configuration in which links are strained without it."""
+    case = described(2.0)
+    (target,) = case.targets
+    return case.scene, target.quantity.part, target.sample.configuration
 
 
 @pytest.mark.parametrize(

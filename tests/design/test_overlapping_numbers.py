@@ -63,7 +63,7 @@ def test_a_number_of_two_parts_counts_after_that_of_one_and_the_other_way_round(
 
 
 @pytest.mark.parametrize("name", NUMBERS)
-def test_asking_for_a_number_leaves_the_design_and_finds_the_drawn_value(name):
+def test_requesting_a_number_leaves_the_design_and_finds_the_drawn_value(name):
     (sim, _), (describe, value) = frame(), NUMBERS[name]
     model = sim.model
     one, both = (describe(sim.scene, count) for count in (1, 2))

@@ -78,7 +78,7 @@ def undisturbed(tmp_path_factory) -> tuple[fm.DesignResult, list[int]]:
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(("ranks", "victim"), [(1, 0), (2, 1)])
-def test_killed_optimisation_goes_on_from_its_checkpoint(ranks, victim, tmp_path, undisturbed):
+def test_killed_optimisation_continues_from_its_checkpoint(ranks, victim, tmp_path, undisturbed):
     expected, whole = undisturbed
     before = run_and_kill(tmp_path, ranks, victim=victim)
     assert saved_iteration(tmp_path) < whole[-1]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -43,7 +44,6 @@ class TwoValleys:
         asked: parameters of all starts.
     """
 
-    targets = (SimpleNamespace(relation="equals"),)
     BARRIER = Barrier(1.5, 0.01)
 
     def __init__(self, *, wanted: float = 1.0, broken: Sequence[int] = (), inverted: float = np.inf) -> None:
@@ -149,6 +149,21 @@ def test_starts_are_the_drawn_design_and_feasible_shapes_spread_evenly():
     assert q.min() < -1.2 and q.max() > 1.2
 
 
+def test_designs_are_in_the_order_of_their_objectives_wherever_they_started():
+    class Least(TwoValleys):
+        """With another quantity, as small as possible, that is relative to its value as drawn in all starts."""
+
+        def optimise(self, **given) -> fm.DesignResult:
+            result = super().optimise(**given)
+            started = float(10 ** (len(self.asked) % 3))
+            mass = fm.TargetResult("mass", "", None, "t", "least", None, started, 1.0, 0.0, 1.0, 0.0)
+            return replace(result, targets=(*result.targets, mass))
+
+    found = searched(problem := Least())
+    assert middles(problem, found) == pytest.approx([1.0, -1.0], abs=0.05)
+    assert [design.objective[1] for design in found.optima] == sorted(design.objective[1] for design in found.optima)
+
+
 def test_other_seeds_give_other_starts_and_the_same_seed_the_same():
     first, same, other = (TwoValleys() for _ in range(3))
     for problem, seed in ((first, 3), (same, 3), (other, 4)):
@@ -157,20 +172,20 @@ def test_other_seeds_give_other_starts_and_the_same_seed_the_same():
     assert not np.allclose(first.asked[1], other.asked[1])
 
 
-def test_shapes_with_inverted_cells_are_drawn_anew():
+def test_shapes_with_inverted_cells_are_drawn_again():
     found = searched(problem := TwoValleys(inverted=0.0))
     assert all(problem.q(p) <= 0.0 for p in problem.asked[: SCATTER.starts])
     assert sum(start.rejected for start in found.starts) > 0
     assert all(start.result is not None for start in found.starts)
 
 
-def test_starts_for_which_no_feasible_shape_is_drawn_are_told():
+def test_starts_for_which_no_feasible_shape_is_drawn_are_reported():
     found = searched(TwoValleys(inverted=-np.inf), fm.Scatter(starts=3, attempts=5))
     assert [start.result is None for start in found.starts] == [False, True, True]
     assert str(found.starts[1]) == "start 1: no feasible shape was found, 5 shapes rejected before"
 
 
-def test_infeasible_starts_are_survived_and_told():
+def test_infeasible_starts_do_not_end_a_search_and_are_reported():
     found = searched(TwoValleys(broken=(0, 3)))
     assert [start.number for start in found.starts if start.result is None] == [0, 3]
     assert "it has no value" in str(found.starts[3])
@@ -191,7 +206,7 @@ def test_the_worse_half_is_given_up_unless_it_has_ended():
     assert not {start.number for start in given_up} & set(sum(found.sources, ()))
 
 
-def test_targets_out_of_reach_are_told_with_the_bound_at_which_all_designs_end():
+def test_targets_out_of_reach_are_reported_with_the_bound_at_which_all_designs_end():
     found = searched(TwoValleys(wanted=9.0))
     (sentence,) = found.evidence
     reached = [1.0 - start.result.targets[0].reached / 9.0 for start in found.starts if start.result]
@@ -201,7 +216,7 @@ def test_targets_out_of_reach_are_told_with_the_bound_at_which_all_designs_end()
     assert sentence in str(found)
 
 
-def test_a_missed_target_without_a_common_bound_is_no_fault_of_bounds():
+def test_a_missed_target_without_a_common_bound_is_not_attributed_to_bounds():
     found = searched(TwoValleys(wanted=-0.5))
     (sentence,) = found.evidence
     assert "no bound is common to them" in sentence and "widen" not in sentence
@@ -216,7 +231,7 @@ class Killed(Exception):
 
 
 @pytest.mark.parametrize("after", [1, 5, 9, 14])
-def test_a_search_that_was_killed_goes_on_and_gives_the_same_list(tmp_path, after):
+def test_a_search_that_was_killed_continues_and_gives_the_same_list(tmp_path, after):
     whole = searched(undisturbed := TwoValleys())
 
     class Mortal(Checkpoint):
@@ -304,7 +319,26 @@ def test_numbers_that_leave_the_plane_are_searched_in_space():
     assert [own.name for own in found.best.numbers] == [str(own) for own in numbers]
 
 
-def test_a_bar_whose_bounds_hold_it_back_says_so():
+def test_bounds_that_hold_a_bar_back_are_reported():
     found = pulled_bar(20.0, 5.0, thickness=(2.8, 3.2), bend=0.01).search(fm.Scatter(starts=3, spread=0.5))
     (sentence,) = found.evidence
     assert "pull" in sentence and "curvature 0.01 of 'bar'" in sentence
+
+
+def test_searches_keep_materials_and_shapes_that_the_simulation_was_given():
+    case = pulled_bar(20.0, 0.5)
+    (bar,), (target,) = case.simulation.scene.mechanism.flexible_links, case.targets
+    flat = fm.Simulation(case.simulation.scene, space="plane-stress", size=3.0)
+    for change in (
+        lambda sim: sim.with_material(PLASTIC, fm.Material("soft", 1000.0, 0.35)),
+        lambda sim: sim.with_shapes({bar: fm.strip([(0, 0), (60, 0)], thickness=3.0, depth=4.0)}),
+    ):
+        problem = fm.DesignProblem(change(case.simulation), case.designs, targets=case.targets)
+        once = fm.Scatter(starts=1, trial=1)
+        best = problem.search(once, optimiser=fm.LevenbergMarquardt(iterations=1)).best
+        wanted, other = (
+            sim.with_design(best).load_displacement(target.quantity.part, forces=[20.0]).displacements[0]
+            for sim in (change(flat), flat)
+        )
+        assert best.targets[0].reached == pytest.approx(wanted, rel=1e-6)
+        assert best.targets[0].reached != pytest.approx(other, rel=0.1)

@@ -194,6 +194,7 @@ def test_two_links_apart_that_share_a_shape_have_the_optimum_of_one():
     assert both.objective[1] == pytest.approx(one.objective[1], rel=1e-8)
 
 
+@pytest.mark.thorough
 def test_results_files_pictures_and_parts_have_all_links_of_a_shape(tmp_path):
     own = case(mirrored)
     problem = own.problem(size=3.0)
@@ -214,6 +215,7 @@ def test_results_files_pictures_and_parts_have_all_links_of_a_shape(tmp_path):
     assert once == pytest.approx([result.targets[0].reached], rel=1e-6)
 
 
+@pytest.mark.thorough
 def test_imported_links_share_a_shape_up_to_their_meshes(tmp_path):
     own = case(mirrored)
     drawn = own.problem(size=3.0)
@@ -244,7 +246,7 @@ def test_checkpoints_of_shapes_that_are_shared_in_another_way_are_refused(tmp_pa
         problem(mirrored=other).optimise(**once, resume=True)
 
 
-def test_links_that_are_no_images_are_refused():
+def test_links_that_are_not_images_are_refused():
     def problem(scene, design, push) -> Callable[[], fm.DesignProblem]:
         sim = fm.Simulation(scene, space="plane-stress", size=3.0)
         targets = [fm.Target(push, force=1.0, displacement=1.0)]

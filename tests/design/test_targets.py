@@ -70,7 +70,7 @@ def test_short_form_is_the_displacement_of_a_force_at_its_sample():
     push, motor, scene = arm().push, arm().motor, arm().scene
     short = fm.Target(push, force=4.0, displacement=5.0, weight=2.0)
     assert short == fm.Target(fm.Displacement(push), fm.Sample({push: 4.0}), equals=5.0, weight=2.0)
-    assert short.on_curve == (4.0, 5.0, fm.Sample().configuration)
+    assert short.on_curve == (push, 4.0, 5.0, fm.Sample().configuration)
     turned = fm.Sample({push: 4.0, motor: 0.3})
     assert turned.configuration.position(motor) == 0.3
     assert turned.configuration.positions == scene.configuration("turned", {motor: 0.3}).positions
@@ -103,7 +103,7 @@ def test_following_ends_where_tracing_does():
     assert followed == pytest.approx(both.equilibria.values(both.equilibria.from_zero()), rel=1e-7, abs=1e-7)
 
 
-def test_samples_say_what_a_user_computes():
+def test_values_at_samples_are_those_that_a_user_computes():
     both = every()
     both.rest.place(both.rest.initial, None)
     values = both.equilibria.values(both.equilibria.from_zero())
@@ -119,6 +119,7 @@ def test_samples_say_what_a_user_computes():
     assert values[10] == pytest.approx(curve.frames[0].strain_energy, rel=1e-7)
 
 
+@pytest.mark.thorough
 def test_equilibria_at_a_prescribed_displacement_may_be_unstable_under_the_force():
     simulation, push = arch()
     path = simulation.follow(push, until=fm.Until(displacement=1.2 * RISE))
@@ -195,15 +196,16 @@ def test_comparison_makes_residuals_bounds_and_objective_of_values():
         assert slopes @ step == pytest.approx(function(values + rows @ step) - function(values), rel=1e-9, abs=1e-12)
 
 
-def test_targets_without_sense_are_refused():
+def test_invalid_targets_are_refused():
     push, energy, sample = arm().push, fm.StrainEnergy(), fm.Sample({arm().push: 1.0})
+    upward = fm.Component(fm.JointForce(arm().clamp), (0, 0, 1))
     for make, problem, remedy in (
-        (lambda: fm.Target(energy, sample), "says 0 things", "Give one of"),
-        (lambda: fm.Target(energy, sample, equals=1.0, at_most=2.0), "says 2 things", "Give one of"),
+        (lambda: fm.Target(energy, sample), "has 0 relations", "Give one of"),
+        (lambda: fm.Target(energy, sample, equals=1.0, at_most=2.0), "has 2 relations", "Give one of"),
         (lambda: fm.Target(energy, equals=1.0), "its sample is None", "Sample"),
         (lambda: fm.Target(fm.LinkVolume(), sample, equals=1.0), "its sample is", "Leave it out"),
         (lambda: fm.Target(push, sample, equals=1.0), "not a quantity", "Displacement"),
-        (lambda: fm.Target(energy, sample, equals=1.0, force=1.0), "are its sample's|stand in its sample", "Sample"),
+        (lambda: fm.Target(energy, sample, equals=1.0, force=1.0), "belong in its sample", "Sample"),
         (lambda: fm.Target(energy, sample, equals="much"), "not a number", "finite"),
         (lambda: fm.Target(energy, sample, equals=1.0, scale=0.0), "not positive", "greater"),
         (lambda: fm.Sample({push: fm.at(1.0), arm().pull: fm.at(2.0)}), "two displacements", "at"),
@@ -223,5 +225,6 @@ def test_targets_without_sense_are_refused():
             "at",
         ),
         (lambda: arm().case(fm.Target(fm.LinkMass(), least=True)).problem(), "the density of 'plastic'", "density"),
+        (lambda: arm().case(fm.Target(upward, sample, equals=1.0)).problem(), "leaves the plane", "two coordinates"),
     ):
         refused(make, part="", problem=problem, remedy=remedy)

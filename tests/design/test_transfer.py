@@ -13,15 +13,17 @@ from fenicsmech.joints import RIGID_SPACES
 
 from ..equilibrium.arch import RISE, arch, lowered
 from .alike import assert_alike
-from .mechanisms import Case, bench, bow, objective, strained, truss, turned_beam
+from .mechanisms import Case, bench, bow, objective, sprung, strained, truss, turned_beam
 
 CASES = {
     "truss": lambda: truss((0.1, 1.0), (0.4, 2.0)),
     "force on a link": lambda: bow(20.0, 60.0),
     "strained by motors": lambda: strained(1.0, 3.0),
+    "springs wound up by motors": lambda: sprung(1.0, 3.0),
     "turned by 135°": lambda: turned_beam(1.0, 3.0, -2.0),
     "held": lambda: held(),
 }
+QUICK = [("3d-symmetric", "truss"), ("3d-symmetric", "strained by motors")]
 
 
 def held() -> Case:
@@ -53,9 +55,15 @@ def spent(counts: list[int]) -> int:
     return total
 
 
-@pytest.mark.parametrize("name", CASES)
-@pytest.mark.parametrize("space", ["3d-symmetric", pytest.param("3d", marks=pytest.mark.thorough)])
-def test_equilibria_in_space_from_plane_stress_are_those_loaded_from_zero(name, space, iterations):
+@pytest.mark.parametrize(
+    ("space", "name"),
+    [
+        pytest.param(space, name, marks=() if (space, name) in QUICK else pytest.mark.thorough)
+        for space in ("3d-symmetric", "3d")
+        for name in CASES
+    ],
+)
+def test_equilibria_in_space_from_plane_stress_are_those_loaded_from_zero(space, name, iterations):
     case = CASES[name]()
     flat, solid = (bench(case, case.simulate(kind, size=4.0)) for kind in ("plane-stress", space))
     for both in (flat, solid):
@@ -100,7 +108,7 @@ def test_every_process_gets_the_equilibria_of_all_samples():
     assert_alike(solid.from_other(shared.equilibria()), solid.from_zero())
 
 
-@pytest.mark.parametrize("fall", [0.012, 0.015, 0.3])
+@pytest.mark.parametrize("fall", [pytest.param(0.012, marks=pytest.mark.thorough), 0.015, 0.3])
 def test_equilibrium_beyond_a_fold_is_refused(fall):
     """An arch under 0.97 of its limit load, and arches lower by a part of its rise, whose limit may be lower."""
     simulation, push = arch()

@@ -61,7 +61,7 @@ def test_target_that_is_met_may_be_beyond_influence():
     assert abs(result.targets[1].reached) < 1e-9 and result.targets[0].error != 0.0
 
 
-def test_weak_influence_is_no_refusal():
+def test_weak_influence_is_not_refused():
     whole = problem(MPI.COMM_SELF, [0, 1], (0, 1e-6, 0.5), (1, 1.0, 0.5))
     result = whole.optimise(optimiser=fm.LevenbergMarquardt(iterations=1))
     assert np.isfinite(result.worst_error)

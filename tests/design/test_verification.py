@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
+from fenicsmech import model
 
 from .mechanisms import bow, truss
 from .refusal import refused
@@ -50,6 +51,7 @@ def test_parts_have_the_values_of_a_scene_drawn_with_the_files(tmp_path):
     assert parts(result)[:, 1] == pytest.approx(curve.error_estimates(), rel=1e-6)
 
 
+@pytest.mark.thorough
 def test_errors_in_the_part_are_those_of_still_finer_elements(verified):
     problem, result, half = verified
     assert [target.part for target in result.targets] == [None, None]
@@ -61,7 +63,7 @@ def test_errors_in_the_part_are_those_of_still_finer_elements(verified):
     assert result.worst_part_error is None
 
 
-def test_results_tell_both_numbers_and_keep_them_in_files(verified, tmp_path):
+def test_results_print_both_numbers_and_keep_them_in_files(verified, tmp_path):
     _, result, half = verified
     assert "in the part" in str(half) and "in the part" not in str(result)
     assert half.part_fidelity == "plane-stress, elements of 1.5 mm"
@@ -71,7 +73,7 @@ def test_results_tell_both_numbers_and_keep_them_in_files(verified, tmp_path):
     assert data["targets"][0]["part"]["value"] == half.targets[0].part.value
 
 
-def test_other_shapes_bend_as_if_drawn_so():
+def test_other_shapes_bend_as_if_drawn_in_these_shapes():
     def link(thickness: float):
         rig = fm.Mechanism("cantilever")
         wall, hand = rig.rigid("wall", fixed=True), rig.rigid("hand")
@@ -119,6 +121,7 @@ def flexure(size: float, shape: fm.Shape | None = None) -> tuple[fm.Simulation, 
     return fm.Simulation(fm.Scene(rig), space="plane-stress", order=1, size=size), leaf, push
 
 
+@pytest.mark.thorough
 def test_parts_that_elements_of_the_optimiser_do_not_carry_are_loaded_from_zero(tmp_path):
     def problem(size: float) -> fm.DesignProblem:
         sim, leaf, push = flexure(size)
@@ -132,3 +135,35 @@ def test_parts_that_elements_of_the_optimiser_do_not_carry_are_loaded_from_zero(
     again, _, push = flexure(2.0, fm.step_file(tmp_path / "leaf.step", depth=result.numbers[0].value))
     curve = again.load_displacement(push, forces=[20.0])
     assert parts(found)[:, 0] == pytest.approx(curve.displacements, rel=1e-8)
+
+
+def test_parts_that_are_not_meshed_in_elements_of_the_optimiser_are_loaded_from_zero(verified, monkeypatch, caplog):
+    problem, result, half = verified
+    mesh_link = model.mesh_link
+
+    def fine_only(name, shape, *, size, **options):
+        if size == 3.0:
+            raise fm.MeshingError(f"link {name!r}", "elements are too large", "Give smaller ones")
+        return mesh_link(name, shape, size=size, **options)
+
+    monkeypatch.setattr(model, "mesh_link", fine_only)
+    with caplog.at_level("INFO", logger="fenicsmech"):
+        found = problem.verify(result)
+    assert "elements are too large" in caplog.text
+    assert parts(found)[:, 0] == pytest.approx(parts(half)[:, 0], rel=1e-7)
+
+
+def test_material_points_of_designed_links_have_no_place_in_the_part():
+    case = truss((0.4, 1.8))
+    (target,), (design,) = case.targets, case.designs
+    point = fm.Displacement(design.link, at=(18, 34))
+    targets = [
+        target,
+        fm.Target(point, target.sample, equals=(1.0, 0.5)),
+        fm.Target(fm.Component(point, (1, 0)), target.sample, equals=1.0),
+        fm.Target(fm.Magnitude(point), target.sample, equals=1.0),
+    ]
+    problem = fm.DesignProblem(case.simulate(), case.designs, targets=targets)
+    found = problem.verify(problem.optimise(optimiser=fm.LevenbergMarquardt(iterations=1)))
+    assert [own.part is None for own in found.targets] == [False, True, True, True]
+    assert point.of_part([])  # those of other links have

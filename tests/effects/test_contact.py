@@ -67,7 +67,9 @@ def test_a_finger_closes_on_a_cylinder_and_penetrates_the_less_the_stiffer_it_is
     assert depths[-1] < 0.05
 
 
-@pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
+@pytest.mark.parametrize(
+    "space", ["plane-stress", *(pytest.param(s, marks=pytest.mark.thorough) for s in ("3d-symmetric", "3d"))]
+)
 def test_an_obstacle_out_of_reach_changes_nothing(space):
     far, without = finger(space, centre=(-100.0, 38.0)), finger(space, active=False)
     curves = [case.simulation.load_displacement(case.force, forces=PULLS) for case in (far, without)]
@@ -176,7 +178,7 @@ def test_a_rigid_link_rests_on_its_points(space):
     assert frame.stable
 
 
-def test_descriptions_without_sense_are_refused():
+def test_invalid_descriptions_are_refused():
     mechanism = fm.Mechanism("finger")
     base = mechanism.rigid("base", fixed=True)
     link = mechanism.flexible("link", fm.strip([(0, 0), (20, 0)], thickness=2.0, depth=2.0), fm.ONYX)

@@ -95,5 +95,15 @@ def test_a_part_without_a_facet_is_refused(bars):
     refused(lambda: bars.fields(nowhere), part="'lower'", problem="no facet", remedy="Widen")
 
 
+def across(x):
+    return x[0] > 5.0  # as dolfinx has it, points as columns
+
+
+@pytest.mark.parametrize("where", [across, lambda x: x[:, 0], lambda x: True], ids=["columns", "numbers", "one"])
+def test_a_predicate_that_does_not_give_a_boolean_for_each_row_is_refused_on_all_ranks(bars, where):
+    one = Faces(bars.bars[0], where)
+    refused(lambda: bars.fields(one), part="'lower'", problem="the predicate gives", remedy="lambda x: x[:, 0] > 5")
+
+
 def test_without_parts_nothing_is_made(bars):
     assert bars.fields().boundaries == {}

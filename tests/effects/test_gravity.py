@@ -103,6 +103,8 @@ def test_without_effects_no_form_term_is_added():
     [
         (lambda block: Gravity((0, -G), masses={block: Mass(float("nan"), (0, 0))}), "nan"),
         (lambda block: Gravity((0, -G), masses={"block": Mass(1.0, (0, 0))}), "'block' is not a rigid link"),
+        (lambda block: Gravity((0, -G), masses={block: 0.02}), "gravity on 'block': 0.02 is not a mass"),
+        (lambda block: Gravity((0, -G), masses=Mass(1.0, (0, 0))), "is not a mapping of rigid links"),
         (lambda block: Gravity((0, -G, 1.0)), "leaves the plane"),
     ],
 )

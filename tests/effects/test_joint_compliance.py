@@ -154,12 +154,15 @@ def test_turn_of_a_soft_hinge_is_that_about_its_axis():
     assert STIFFNESS * angle == pytest.approx(ARM * np.cos(angle), rel=1e-7)
 
 
-def test_compliances_that_make_no_sense_are_refused():
+def test_invalid_compliances_are_refused():
     mechanism = fm.Mechanism("pair")
     a, b = mechanism.rigid("a", fixed=True), mechanism.rigid("b")
     hinge, slider = mechanism.revolute(a, b, at=(0, 0)), mechanism.prismatic(a, b, at=(0, 0), axis=(1, 0))
     with pytest.raises(fm.DescriptionError, match="not positive"):
         JointCompliance(hinge, -1.0)
+    for other in (mechanism.motor(hinge), "hinge"):
+        with pytest.raises(fm.DescriptionError, match="joint compliance: .* is not a joint"):
+            JointCompliance(other, 1.0)
     with pytest.raises(fm.DescriptionError, match="share no point"):
         JointCompliance(slider, 1.0).check(mechanism, 2)
     with pytest.raises(fm.DescriptionError, match="is not a joint of 'other'"):

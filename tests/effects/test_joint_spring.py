@@ -181,6 +181,39 @@ def test_motor_in_the_joint_of_a_spring_holds_it_wound_up(space):
     assert frame.motors[motor] == pytest.approx(STIFFNESS * 2.7, rel=1e-9)
 
 
+def motorised(space: str):
+    """The lever on a spring with a motor in its joint, and that."""
+    case = lever(lambda hinge: [JointSpring(hinge, STIFFNESS)], space=space)
+    motor = case.simulation.scene.mechanism.motor(case.joint)
+    return fm.Simulation(case.simulation.scene, space=space, order=1, size=6.0, comm=MPI.COMM_SELF), case.force, motor
+
+
+@pytest.mark.parametrize(
+    ("space", "angle"), [("plane-stress", 7.0), ("3d-symmetric", -20.0), ("3d", 6.2), ("3d", -6.2)]
+)
+def test_moment_of_a_spring_grows_with_every_turn_in_the_plane_and_up_to_a_full_turn_in_space(space, angle):
+    simulation, force, motor = motorised(space)
+    turned = simulation.scene.configuration("turned", {motor: angle})
+    (frame,) = simulation.load_displacement(force, forces=[0.0], configuration=turned).frames
+    assert frame.motors[motor] == pytest.approx(STIFFNESS * angle, rel=1e-9)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_spring_in_space_that_is_turned_further_is_refused(sign):
+    simulation, force, motor = motorised("3d")
+    turned = simulation.scene.configuration("turned", {motor: 7.0 * sign})
+    with pytest.raises(fm.EquilibriumError, match="passes 2π" if sign > 0.0 else "passes −2π") as caught:
+        simulation.load_displacement(force, forces=[0.0], configuration=turned)
+    assert "'revolute joint base–lever'" in caught.value.part and "plane" in caught.value.remedy
+    steps = fm.ArcSteps(motion=0.5, largest=0.2)
+    with pytest.raises(fm.EquilibriumError, match="full turn") as caught:
+        simulation.follow(motor, until=fm.Until(position=7.0 * sign), steps=steps)
+    frames = caught.value.frames
+    angles = sign * np.array([frame.displacement for frame in frames])
+    assert 5.0 < angles.max() < 2.0 * np.pi and caught.value.last is frames[-1]
+    assert sign * np.array([frame.force for frame in frames]) == pytest.approx(STIFFNESS * angles, abs=1e-6)
+
+
 def test_springs_of_one_joint_add_up():
     one = lever(lambda hinge: [JointSpring(hinge, STIFFNESS)])
     two = lever(lambda hinge: [JointSpring(hinge, 0.3 * STIFFNESS), JointSpring(hinge, 0.7 * STIFFNESS)])
@@ -251,12 +284,15 @@ def test_ranks_agree_on_a_mechanism_with_a_spring():
     assert curves[1].stable.tolist() == curves[0].stable.tolist()
 
 
-def test_springs_that_make_no_sense_are_refused():
+def test_invalid_springs_are_refused():
     mechanism = fm.Mechanism("pair")
     a, b = mechanism.rigid("a", fixed=True), mechanism.rigid("b")
     hinge, ball = mechanism.revolute(a, b, at=(0, 0)), mechanism.spherical(a, b, at=(0, 0), name="ball")
     with pytest.raises(fm.DescriptionError, match="not positive"):
         JointSpring(hinge, 0.0)
+    for other in (mechanism.motor(hinge), "hinge"):
+        with pytest.raises(fm.DescriptionError, match="joint spring: .* is not a joint"):
+            JointSpring(other, 1.0)
     with pytest.raises(fm.DescriptionError, match="no single free coordinate"):
         JointSpring(ball, 1.0).check(mechanism, 3)
     with pytest.raises(fm.DescriptionError, match="is not a joint of 'other'"):

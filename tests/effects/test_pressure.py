@@ -151,7 +151,7 @@ def test_displacements_under_pressure_are_differentiated_by_the_design_field(spa
     assert_design_gradient(simulation, push, 0.05)
 
 
-def test_pressure_without_sense_is_refused():
+def test_invalid_pressure_is_refused():
     _, push = beam("plane-stress", 1.0)
     link, stranger = push.on, fm.Mechanism("other").rigid("stranger")
     remedy = "a flexible link of the mechanism"

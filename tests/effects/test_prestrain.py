@@ -152,7 +152,7 @@ def test_without_prestrain_the_energy_has_no_field_for_it():
     assert counts[1] > counts[0]
 
 
-def test_prestrain_without_sense_is_refused():
+def test_invalid_prestrain_is_refused():
     simulation, push = bar("plane-strain", 1.1, along=None)
     refused(
         lambda: simulation.load_displacement(push, forces=[0.0]), part="'bar'", problem="plane strain", remedy="along"

@@ -64,6 +64,7 @@ def test_nothing_grows_on_the_way_to_the_incompressible_limit():
     assert gaps[1] == pytest.approx(gaps[0] / 10.0, rel=0.02)  # linear in 1 − 2ν
 
 
+@pytest.mark.thorough
 def test_both_converge_to_the_same_compressible_panel():
     gaps = [
         abs(

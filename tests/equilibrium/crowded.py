@@ -64,7 +64,7 @@ def system_of(case: Crowded, *, controlled: Force) -> EquilibriumSystem:
     """The equilibrium equations with one force ``controlled`` and the other one fixed."""
     model = case.simulation.model
     other = case.on_flexible if controlled is case.on_rigid else case.on_rigid
-    return model.system(model.point_load(controlled), ((model.point_load(other), 0.7),))
+    return model.system(model.point_load(controlled), [model.point_load(other)])
 
 
 def control_of(kind: type[Control]) -> Control:
@@ -104,4 +104,4 @@ def random_state(case: Crowded, system: EquilibriumSystem, *, seed: int = 5) -> 
     multipliers = (
         system.blocks.restrict_border(system.unknowns.scale).multipliers * 0.1 * random.standard_normal(joints.rows)
     )
-    return State(u, poses, multipliers, 1.3, motors)
+    return State(u, poses, multipliers, 1.3, motors, constant=np.array([0.7]))

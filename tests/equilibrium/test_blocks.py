@@ -19,7 +19,7 @@ BULKY = fm.Material("bulky", 2.0, 0.499)
 
 @pytest.mark.parallel
 @pytest.mark.parametrize("rubber", [None, BULKY], ids=["u", "u–p"])
-def test_blocks_part_the_unknowns(rubber):
+def test_blocks_partition_the_unknowns(rubber):
     case = crowded("plane-strain", MPI.COMM_WORLD, **({} if rubber is None else {"rubber": rubber}))
     system = system_of(case, controlled=case.on_flexible)
     blocks, comm = system.blocks, system.comm

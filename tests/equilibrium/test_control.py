@@ -65,7 +65,7 @@ def test_load_below_the_limit_stays_on_its_side_and_beyond_it_snaps_to_the_other
     assert held.force == pytest.approx(after.force, rel=1e-8)
 
 
-def test_other_forces_stay_while_one_is_led():
+def test_other_forces_stay_constant_while_one_changes():
     simulation, push = finger("plane-stress")
     mechanism = simulation.scene.mechanism
     pull = mechanism.force(on=push.on, at=push.at, direction=(-1, 0), name="pull")
@@ -77,7 +77,7 @@ def test_other_forces_stay_while_one_is_led():
     assert nothing.strain_energy == pytest.approx(0.0, abs=1e-12)
 
 
-def test_constant_force_is_reached_as_surely_as_one_that_is_led():
+def test_constant_force_is_reached_as_surely_as_a_prescribed_one():
     # takes several load steps from the unloaded state, whichever way the force is given
     scene, lift = describe("klann")
     constant = scene.mechanism.force(on=lift.on, at=lift.at, direction=(0, 1), name="constant")

@@ -1,11 +1,14 @@
-"""The inertia that the factorisation reports is that of the eigenvalues, on any number of ranks."""
+"""The inertia that the factorisation reports is that of the eigenvalues, on any number of ranks; limits of memory."""
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
+import fenicsmech as fm
 from fenicsmech.equilibrium import Factor
+
+from .finger import finger
 
 SIZE = 60
 
@@ -38,7 +41,7 @@ def test_negative_pivots_are_counted(negative):
 
 
 @pytest.mark.parallel
-def test_new_values_of_the_same_matrix_are_factored_anew():
+def test_new_values_of_the_same_matrix_are_factored_again():
     values = np.linspace(0.5, 2.0, SIZE)
     matrix = distributed(with_eigenvalues(values), MPI.COMM_WORLD)
     factor = Factor(matrix)
@@ -60,3 +63,35 @@ def test_zero_pivots_are_found_instead_of_failing():
     assert factor.refactor()
     inertia = factor.inertia()
     assert (inertia.negative, inertia.zero) == (1, 2)
+
+
+@pytest.mark.parallel
+def test_workspace_that_is_too_small_grows():
+    values = np.linspace(-0.5, 2.0, SIZE)
+    factor = Factor(distributed(with_eigenvalues(values), MPI.COMM_WORLD), workspace=-60)
+    assert factor.refactor()
+    assert factor.inertia().negative == np.sum(values < 0.0)
+
+
+@pytest.fixture
+def one_megabyte():
+    """MUMPS may take no more memory."""
+    options = PETSc.Options("fenicsmech_kkt_")
+    options["mat_mumps_icntl_23"] = 1
+    yield
+    options.delValue("mat_mumps_icntl_23")
+
+
+@pytest.mark.parallel
+def test_factor_that_does_not_fit_into_memory_is_an_error_on_all_ranks(one_megabyte):
+    size = 450  # 1.6 MB of a front
+    factor = Factor(distributed(with_eigenvalues(np.linspace(0.5, 2.0, size)), MPI.COMM_WORLD))
+    with pytest.raises(fm.OutOfMemoryError, match="450 unknowns") as caught:
+        factor.refactor()
+    assert "larger elements" in caught.value.remedy
+
+
+def test_curve_whose_matrix_does_not_fit_into_memory_says_so_instead_of_searching_for_descent(one_megabyte):
+    simulation, push = finger("plane-stress", size=1.0)
+    with pytest.raises(MemoryError, match="larger elements.*TwoLevel"):
+        simulation.load_displacement(push, forces=[1.0])

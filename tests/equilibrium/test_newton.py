@@ -11,7 +11,7 @@ from fenicsmech.equilibrium import LoadControl
 from ..simulation.clamped import cantilever
 from .finger import RUBBER, finger
 
-SPACES = ["plane-stress", "plane-strain", "3d"]
+SPACES = ["plane-stress", "plane-strain", pytest.param("3d", marks=pytest.mark.thorough)]
 OUT_OF_REACH = 200.0  # the legs are 60 long
 LOADS = {"plane-stress": [2.0, 4.0, 8.0, 16.0], "plane-strain": [2.0, 4.0, 8.0, 16.0], "3d": [2.0, 4.0, 8.0]}
 
@@ -103,7 +103,21 @@ def test_slender_link_takes_a_load_that_rolls_it_up_in_one_solve():
     assert solution.iterations <= 16
 
 
-def test_too_few_iterations_are_told_as_the_reason():
+@pytest.mark.parametrize(
+    ("limit", "value"),
+    [("iterations", -1), ("iterations", 2.5), ("watchdog", "x"), ("watchdog", -1), ("path_iterations", 0)],
+)
+def test_invalid_numbers_of_iterations_are_refused(limit, value):
+    with pytest.raises(fm.DescriptionError, match=f"Newton's {limit}: the value is {value!r}.*whole number"):
+        fm.PrimalDualNewton(**{limit: value})
+
+
+def test_something_other_than_a_method_for_linear_systems_is_refused():
+    with pytest.raises(fm.DescriptionError, match="linear systems: 'direct' is not a method"):
+        fm.PrimalDualNewton(linear="direct")
+
+
+def test_too_few_iterations_are_given_as_the_reason():
     simulation, push = finger("plane-stress", solver=fm.PrimalDualNewton(iterations=1))
     with pytest.raises(fm.EquilibriumError, match="after 1 iteration"):
         simulation.load_displacement(push, forces=[5.0])

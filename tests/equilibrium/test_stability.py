@@ -27,7 +27,7 @@ def test_column_is_stable_below_the_euler_load_and_has_one_unstable_mode_above_i
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("size", [0.7, 1.0])
-def test_straight_column_in_space_stays_straight_beyond_its_euler_load_and_says_it_is_unstable(size):
+def test_straight_column_in_space_stays_straight_beyond_its_euler_load_and_is_reported_unstable(size):
     # meshes without symmetry push it aside by next to nothing, from which Newton's method must come back
     simulation, push = hard_column("3d", MPI.COMM_SELF, [(0, 0), (LENGTH, 0)], poisson=0.3, size=size)
     loads = [0.98 * euler("3d"), 1.02 * euler("3d"), 1.2 * euler("3d")]

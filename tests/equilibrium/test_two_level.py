@@ -72,7 +72,7 @@ def test_curves_and_reactions_are_those_of_the_factor(asked):
 
 
 @pytest.mark.parametrize("asked", [{"forces": [0.02]}, {"displacements": [6.0]}])
-def test_so_are_those_of_a_force_on_a_link(asked):
+def test_curves_and_reactions_under_a_force_on_a_link_are_those_of_the_factor(asked):
     curves = []
     for linear in (TwoLevel(), Direct()):
         simulation, tip = tongue(linear)
@@ -233,7 +233,7 @@ def test_linear_displacements_have_no_level_below_them():
     [{"material": fm.Material("bulky", 2.0, 0.499)}, {"space": "3d-symmetric"}],
     ids=["pressures", "mid-plane"],
 )
-def test_nor_do_they_suit_pressures_and_mid_planes_which_the_factor_solves_at_any_size(unsuited):
+def test_two_levels_do_not_suit_pressures_and_mid_planes_which_the_factor_solves_at_any_size(unsuited):
     curves = []
     for linear in (BySize(limit=0), Direct()):
         simulation, tip = tongue(linear, **unsuited)

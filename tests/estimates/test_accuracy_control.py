@@ -90,7 +90,7 @@ def test_choice_prints_what_was_tried_and_what_ten_times_the_accuracy_would_cost
 
 
 @pytest.mark.thorough
-def test_curves_are_as_accurate_as_asked_for_with_their_corrections(tmp_path):
+def test_corrected_curves_are_as_accurate_as_requested(tmp_path):
     scene, push = describe("truss")[:2]
     forces = [0.2, LOADS["truss"]]
     finest = fm.Simulation(scene, space="3d-symmetric", order=3, size=3.6, layers=2, segments=16)
@@ -124,7 +124,39 @@ def test_curve_that_fails_on_a_finer_level_leaves_no_answers_of_a_coarser_one(mo
     assert computed and simulation.choice is None
 
 
-def test_forces_are_as_accurate_as_asked_for_where_displacements_are_prescribed():
+def test_simulations_derived_from_a_choice_have_its_fidelity():
+    scene, push, load = cantilever()
+    (link,) = scene.mechanism.flexible_links
+    simulation = fm.Simulation(scene, accuracy=0.02)
+    curve = simulation.load_displacement(push, forces=[load])
+    assert len(simulation.choice.trials) > 1  # not the pilot's
+    nothing = np.zeros_like(simulation.model.elastic.shape.x.array)
+    for derived in (
+        simulation.with_design(nothing),
+        simulation.with_material(link.material, link.material),
+        simulation.with_shapes({link: link.shape}),
+    ):
+        assert derived.fidelity == simulation.fidelity
+        again = derived.load_displacement(push, forces=[load])
+        assert again.displacements == pytest.approx(curve.displacements, rel=1e-8)
+
+
+def test_design_problems_keep_the_fidelity_chosen_before():
+    scene, push, load = arch()
+    (link,) = scene.mechanism.flexible_links
+    simulation = fm.Simulation(scene, accuracy=0.02)
+    simulation.load_displacement(push, forces=[0.01 * load])
+    chosen = simulation.fidelity
+    target = fm.Target(push, force=0.01 * load, displacement=0.01)
+    problem = fm.DesignProblem(simulation, [fm.SplineDesign(link, 2)], targets=[target])
+    drawn = problem.rest_shape(problem.initial)
+    simulation.load_displacement(push, forces=[load])
+    assert simulation.fidelity != chosen == problem.simulation.fidelity
+    assert problem.simulation.with_design(drawn).fidelity == chosen
+
+
+@pytest.mark.thorough
+def test_forces_are_as_accurate_as_requested_where_displacements_are_prescribed():
     scene, push, load = cantilever()
     finest = fm.Simulation(scene, space="3d-symmetric", order=3, size=3.0, layers=2, segments=16)
     reference = finest.load_displacement(push, displacements=[5.0, 10.0]).forces[-1]
@@ -135,7 +167,7 @@ def test_forces_are_as_accurate_as_asked_for_where_displacements_are_prescribed(
     assert curve.corrected[-1] != curve.forces[-1] == curve.frames[-1].force
 
 
-def test_estimates_beyond_first_order_are_no_corrections():
+def test_estimates_beyond_first_order_are_not_used_as_corrections():
     found = AccuracyOptions().corrections(np.array([0.01, -0.5, 0.02]), np.array([0.1, 0.5, 1.0]))
     assert found.tolist() == [0.01, 0.0, 0.02]
 
@@ -203,7 +235,7 @@ def test_all_accuracies_are_kept_on_the_demos(name):
         assert abs(reached / reference - 1.0) < accuracy
 
 
-def test_nonsense_is_refused():
+def test_invalid_accuracies_are_refused():
     scene = cantilever()[0]
     with pytest.raises(fm.DescriptionError, match="accuracy"):
         fm.Simulation(scene, accuracy=0.0)

@@ -130,6 +130,7 @@ def test_estimate_falls_with_the_mesh_and_vanishes_without_load():
     assert estimates[0][1] > 2.0 * estimates[1][1] > 4.0 * estimates[2][1] > 0.0
 
 
+@pytest.mark.thorough
 def test_estimate_takes_half_of_the_factors_of_its_frame_at_most(monkeypatch):
     simulation, push, forces = grasping()
     factored, refactor = [], EquilibriumSolver.factor

@@ -85,7 +85,7 @@ WIDE = [(10.0, 10.0, 0.0), (10.0, 30.0, 0.5 * pi), (30.0, 10.0, 0.0)]
 
 
 @pytest.mark.parametrize(("depth", "length", "turn"), WIDE)
-def test_wide_thin_strips_are_told_how_much_stiffer_they_are_in_space(depth, length, turn):
+def test_estimate_finds_how_much_stiffer_wide_thin_strips_are_in_space(depth, length, turn):
     scene, push, load = strip(depth, length, turn)
     flat = fm.Simulation(scene, space="plane-stress", size=2.0)
     deep = fm.Simulation(scene, space="3d-symmetric", size=2.0, layers=2)
@@ -100,7 +100,7 @@ def test_wide_thin_strips_are_told_how_much_stiffer_they_are_in_space(depth, len
     [(10.0, {}), (30.0, {"poisson": 0.3}), (30.0, {"turn": 0.5 * pi}), (30.0, {"turn": pi / 3.0, "pinned": True})],
     ids=["short", "poisson", "arc", "pinned arc"],
 )
-def test_strips_of_all_depths_are_told_how_much_stiffer_they_are_in_space(depth, length, options):
+def test_estimate_finds_how_much_stiffer_strips_of_all_depths_are_in_space(depth, length, options):
     scene, push, load = strip(depth, length, **options)
     loads = [factor * load for factor in ((0.05, 1.5) if "pinned" in options else (0.05, 3.0))]
     flat = fm.Simulation(scene, space="plane-stress", order=3, size=1.5)
@@ -110,7 +110,7 @@ def test_strips_of_all_depths_are_told_how_much_stiffer_they_are_in_space(depth,
 
 
 @pytest.mark.thorough
-def test_the_designed_claw_is_told_how_much_stiffer_it_is_in_space():
+def test_estimate_finds_how_much_stiffer_the_designed_claw_is_in_space():
     script = demo("claw")
     scene, grasp, configurations = script.describe()
     flat = fm.Simulation(scene, space="plane-stress", size=script.QUICK)

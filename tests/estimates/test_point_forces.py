@@ -30,7 +30,7 @@ class Block:
         return np.array([self.curve(size=size, **fidelity).displacements[0] for size in sizes])
 
 
-@pytest.mark.parametrize("space", ["plane-stress", "plane-strain"])
+@pytest.mark.parametrize("space", ["plane-stress", pytest.param("plane-strain", marks=pytest.mark.thorough)])
 @pytest.mark.parametrize(("at", "along"), [((30.0, 10.0), (0.0, -1.0)), ((40.0, 0.0), (1.0, 0.0))])
 def test_each_halving_adds_as_much_as_flamant_says(space, at, along):
     block = Block(at=at, along=along)
@@ -40,6 +40,7 @@ def test_each_halving_adds_as_much_as_flamant_says(space, at, along):
     assert added == pytest.approx([predicted, predicted], rel=0.05)
 
 
+@pytest.mark.thorough
 def test_less_is_added_inside_a_link():
     block = Block(at=(30.0, 0.0))
     added = np.diff(block.displacements([2.5, 1.25], space="plane-stress"))[0]
@@ -58,6 +59,7 @@ def test_forces_at_given_displacements_shrink_as_much():
     assert found[0].growth_by_halving[0] == pytest.approx(change, rel=0.1)
 
 
+@pytest.mark.thorough
 def test_displacements_in_space_grow_with_one_over_the_size():
     block = Block(at=(40.0, 0.0), along=(1.0, 0.0))
     layers = {5.0: 1, 2.5: 2, 1.25: 4}
@@ -71,9 +73,9 @@ def test_displacements_in_space_grow_with_one_over_the_size():
 @pytest.mark.parametrize(
     ("region", "at", "along"),
     [
-        (fm.Disc(2.0), (30.0, 0.0), (0.0, -1.0)),
+        pytest.param(fm.Disc(2.0), (30.0, 0.0), (0.0, -1.0), marks=pytest.mark.thorough),
         (fm.Face(within=fm.Rectangle(6.0, 1.0)), (30.0, 10.0), (0.0, -1.0)),
-        (fm.Face(), (40.0, 0.0), (1.0, 0.0)),
+        pytest.param(fm.Face(), (40.0, 0.0), (1.0, 0.0), marks=pytest.mark.thorough),
     ],
 )
 def test_displacements_of_regions_converge(region, at, along):

@@ -15,15 +15,15 @@ from .case import PLANE, SPACE, Check, Fact, HardCase, deviation
 def _columns(space: str, comm: MPI.Comm) -> Iterator[Check]:
     pinned = column.column(comm=comm)
     start = pinned.simulation.load_displacement(pinned.push, forces=[0.0])
-    loads = np.array([load.force for load in start.buckling_loads(count=3)])
+    loads = np.array([load.value for load in start.buckling_points(count=3)])
     first = column.critical_load(0.5 * column.THICKNESS)
     yield deviation("pinned: first three", loads / first / [1.0, 4.0, 9.0], 1.0, 2e-3)
     for hold in struts.Hold:
         case = struts.strut(hold, comm)
         start = case.simulation.load_displacement(case.push, forces=[0.0])
-        (load,) = start.buckling_loads(count=1)
-        yield deviation(hold.name.lower().replace("_", "-"), load.force, case.euler, 2e-3)
-        at = case.simulation.load_displacement(case.push, forces=[0.99 * load.force, 1.01 * load.force]).frames
+        (load,) = start.buckling_points(count=1)
+        yield deviation(hold.name.lower().replace("_", "-"), load.value, case.euler, 2e-3)
+        at = case.simulation.load_displacement(case.push, forces=[0.99 * load.value, 1.01 * load.value]).frames
         yield Fact("stable 1 % below, unstable 1 % above", [frame.unstable_modes for frame in at] == [0, 1])
 
 
@@ -31,8 +31,8 @@ def _column_in_space(space: str, comm: MPI.Comm) -> Iterator[Check]:
     """A hinge is a pin about its axis only: across it the ends are clamped, and the square column is stiffer."""
     case = column.column(space=space, poisson=0.0, size=2.0, comm=comm)
     start = case.simulation.load_displacement(case.push, forces=[0.0])
-    (load,) = start.buckling_loads(count=1)
-    yield deviation("pinned, in space", load.force, column.critical_load(0.5 * column.THICKNESS), 5e-3)
+    (load,) = start.buckling_points(count=1)
+    yield deviation("pinned, in space", load.value, column.critical_load(0.5 * column.THICKNESS), 5e-3)
 
 
 def _blade(space: str, comm: MPI.Comm) -> Iterator[Check]:
@@ -52,8 +52,8 @@ def _blade(space: str, comm: MPI.Comm) -> Iterator[Check]:
     critical = 4.013 * np.sqrt(sideways * torsion) / length**2
     critical /= (1.0 - np.sqrt(warping / torsion) / length) ** 2
     critical /= np.sqrt((1.0 - sideways / upright) * (1.0 - torsion / upright))
-    pair = start.buckling_loads(count=2)
-    yield deviation("up and down", sorted(load.force for load in pair), [-critical, critical], 3e-2)
+    pair = start.buckling_points(count=2)
+    yield deviation("up and down", sorted(load.value for load in pair), [-critical, critical], 3e-2)
     yield Fact("out of the plane", all(load.mode.out_of_plane > 0.9 for load in pair))
 
 

@@ -148,7 +148,7 @@ def test_motor_on_a_joint_without_a_free_coordinate_is_refused():
         lambda: p.mechanism.motor(ball),
         "motor 'motor of ball'",
         "a spherical joint takes no motor",
-        "Use a joint with one free coordinate, as a revolute or a prismatic one",
+        "Use a joint with one free coordinate, such as a revolute or a prismatic one",
     )
 
 
@@ -182,7 +182,7 @@ def test_position_of_a_motor_of_another_mechanism_is_refused():
         lambda: Scene(p.mechanism).configuration("up", {foreign: 1.0}),
         "configuration 'up'",
         f"{foreign.name!r} is not a motor of 'press'",
-        "Add it with motor(), and name motors, not joints",
+        "Add it with motor()",
     )
 
 
@@ -190,6 +190,29 @@ def test_motor_not_named_in_a_configuration_stays_as_drawn():
     p = parts()
     assert Configuration("as it is").position(p.motor) == 0.0
     assert Scene(p.mechanism).configuration("up", {p.motor: 1}).position(p.motor) == 1.0
+
+
+def test_positions_are_pairs_or_a_mapping_with_each_motor_once():
+    p = parts()
+    assert Configuration("up", {p.motor: 1}) == Configuration("up", [(p.motor, 1.0)])
+    assert Configuration("up", {p.motor: 1}) == Scene(p.mechanism).configuration("up", {p.motor: 1})
+    part = "configuration 'up'"
+    assert_refused(
+        lambda: Configuration("up", [(p.motor, 0.2), (p.motor, 0.3)]),
+        part,
+        "'drive' is given twice",
+        "Give each motor once",
+    )
+    assert_refused(
+        lambda: Configuration("up", {p.shaft: 0.2}), part, f"{p.shaft!r} is not a motor", "Give one from this mechanism"
+    )
+    for given in (0.2, [p.motor], p.motor):
+        assert_refused(
+            lambda given=given: Configuration("up", given),
+            part,
+            f"{given!r} gives no positions",
+            "Give {motor: position, …}",
+        )
 
 
 def test_parts_are_listed_in_the_order_given():

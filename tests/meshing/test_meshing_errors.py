@@ -107,7 +107,7 @@ def test_a_strip_with_a_doubled_point_is_refused():
     [
         (polygon([(0, 0), (10, 10), (10, 0), (0, 10)], depth=1), r"the outline crosses itself near \(5, 5\)"),
         (outline((0, 0), [Arc((1, 0), (2, 0)), Line((2, 3))], depth=1), "three points in line"),
-        (outline((0, 0), [Line((0, 0))], depth=1), "encloses nothing"),
+        (outline((0, 0), [Line((0, 0))], depth=1), "encloses no area"),
     ],
 )
 def test_an_outline_that_encloses_no_area_properly_is_refused(shape, complaint):

@@ -105,6 +105,7 @@ def test_a_motor_turns_a_nut():
     assert moved(m, 3, {m.motor(thread): 2.0}, nut) == pytest.approx(LEAD * 2.0 / TURN * AXIS, abs=1e-12)
 
 
+@pytest.mark.thorough
 def test_screws_of_different_lead_are_different_joints():
     travels = []
     for lead in (LEAD, 2.0 * LEAD):

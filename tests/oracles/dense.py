@@ -96,6 +96,15 @@ def taylor_rates(
     return TaylorRates(_rates(first, steps), _rates(second, steps), second)
 
 
+def linear_term(remainders: Sequence[float]) -> float:
+    """|b| h from remainders r = b h + c h² + d h³ of a Taylor test at h, h/2 and h/4.
+
+    b is the error of the derivative. A remainder b h + c h² has the rate 2 − log₂(1 + b h / r) from h to h/2: a rate of
+    1.95 says that b h / r = 0.035. Terms of third order that nearly cancel c h² spoil the rate, but not b h.
+    """
+    return abs(float(np.dot((1.0, -12.0, 32.0), remainders))) / 3.0
+
+
 def _rates(values: np.ndarray, steps: np.ndarray) -> np.ndarray:
     values = np.maximum(values, np.finfo(float).tiny)
     return np.log(values[:-1] / values[1:]) / np.log(steps[:-1] / steps[1:])

@@ -196,7 +196,7 @@ def test_unsolvable_problem_is_reported_with_the_output_of_ccx():
 
 
 @needs_ccx
-def test_cells_turned_inside_out_are_no_solution():
+def test_cells_turned_inside_out_are_not_accepted_as_a_solution():
     mesh = block((1, 1, 1), (1.0, 1.0, 1.0))
     crushed = calculix.Fixed(plane(mesh, 0, 1.0), np.array([-1.5, 0.0, 0.0]))
     with pytest.raises(RuntimeError, match="6 of 6 cells inside out"):

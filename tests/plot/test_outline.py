@@ -50,6 +50,6 @@ def test_the_outline_scales_with_the_unit():
         ([(0.0, 0.0)], 0.0, "width.*: 0 is not positive"),
     ],
 )
-def test_bad_input_is_refused(points, width, message):
+def test_invalid_input_is_refused(points, width, message):
     with pytest.raises(DescriptionError, match=message):
         rigid_outline(points, width)

@@ -40,6 +40,7 @@ NUMBERS = {
     "rest": (lambda bench: fm.SpringRest(*bench.simulation.scene.effects), (0.1, 0.05, 0.025)),
     "offset": (lambda bench: fm.MotorOffset(*bench.simulation.scene.mechanism.motors), (0.04, 0.02, 0.01, 0.005)),
 }
+QUICK = ("modulus", "depth", "stiffness", "offset")
 CASES = ("plane-stress", "plane-stress moved", "plane-strain pressure", "3d-symmetric", "3d moved", "3d pressure")
 
 
@@ -59,7 +60,7 @@ def bench(request) -> Bench:
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.thorough if " of both" in name else ()) for name in NUMBERS]
+    "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.thorough) for name in NUMBERS]
 )
 def test_derivatives_by_a_number(bench, name):
     describe, steps = NUMBERS[name]

@@ -13,7 +13,7 @@ from fenicsmech.equilibrium import Control, DisplacementControl, LoadControl, St
 from fenicsmech.quantities import Gradient, Observable, Sensitivity
 
 from ..design.in_plane import design_field
-from ..oracles.dense import taylor_rates
+from ..oracles.dense import linear_term, taylor_rates
 
 pytestmark = pytest.mark.parallel
 
@@ -145,11 +145,12 @@ def assert_slopes(
             continue
         # the field of a rank is part of the number: t alone is common to all of them
         rates = taylor_rates(lambda t, place=place: known[t[0]][place], [0.0], [1.0], [slope], steps)
-        remainder = max(abs(known[h][place] - known[0.0][place] - h * slope) for h in steps)
-        if remainder <= 1e-7 * first:  # linear in the number
+        remainders = [known[h][place] - known[0.0][place] - h * slope for h in steps]
+        if np.max(np.abs(remainders)) <= 1e-7 * first:  # linear in the number
             continue
         # the cubic term shows in the first steps, rounding in the last
-        assert np.max(rates.with_gradient[-2:]) >= 1.95, (name, rates.with_gradient)
+        linear = linear_term(remainders[-3:]) <= 0.035 * np.max(np.abs(remainders[-3:]))
+        assert np.max(rates.with_gradient[-2:]) >= 1.95 or linear, (name, rates.with_gradient, remainders)
 
 
 @pytest.mark.thorough

@@ -155,7 +155,7 @@ def test_torque_of_a_motor_is_the_change_of_energy_with_its_position():
     assert fm.MotorTorque(twice).on(model).values(state) == pytest.approx(2.0 * measured(0.05)[1], rel=1e-9)
 
 
-def test_quantities_without_sense_are_refused():
+def test_invalid_quantities_are_refused():
     other = fm.Mechanism("other")
     stranger, bar = other.rigid("stranger"), arm().link
     for make, complaint in (

@@ -1,7 +1,9 @@
 """Requests that a simulation cannot fulfil are refused by name, before anything is meshed."""
 
 import math
+from pathlib import Path
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 
@@ -9,6 +11,8 @@ import fenicsmech as fm
 from fenicsmech.elasticity import Quadrature
 
 from .demo_scenes import describe
+
+MESHES = Path(__file__).parents[2] / "meshes"
 
 
 def simulate(scene: fm.Scene, **options) -> fm.Simulation:
@@ -37,7 +41,7 @@ def test_unknown_space(space):
     refused("space", lambda: simulate(scene, space=space))
 
 
-@pytest.mark.parametrize("order", [0, 4, -1, 1.5, "2"])
+@pytest.mark.parametrize("order", [0, 4, -1, 1.5, 2.0, "2"])
 def test_order_that_is_not_1_2_or_3(order):
     scene, _ = describe("truss")
     refused("order", lambda: simulate(scene, order=order))
@@ -58,8 +62,53 @@ def test_following_before_the_accuracy_has_chosen_anything():
     refused("curve of", lambda: simulation.follow(push, until=fm.Until(force=1.0)), simulation=simulation)
 
 
+@pytest.mark.parametrize(
+    "derive",
+    [
+        lambda simulation, link: simulation.with_design(np.zeros(1)),
+        lambda simulation, link: simulation.with_material(link.material, fm.ONYX),
+        lambda simulation, link: simulation.with_shapes({link: link.shape}),
+        lambda simulation, link: simulation.on(MPI.COMM_SELF),
+    ],
+    ids=["design", "material", "shapes", "processes"],
+)
+def test_simulation_derived_before_the_accuracy_has_chosen_anything(derive):
+    scene, _ = describe("truss")
+    simulation = fm.Simulation(scene, accuracy=0.01, comm=MPI.COMM_SELF)
+    (link,) = scene.mechanism.flexible_links
+    refused("simulation of", lambda: derive(simulation, link), simulation=simulation)
+
+
+def test_scene_that_is_not_one():
+    scene, _ = describe("truss")
+    refused("simulation", lambda: simulate(scene.mechanism))
+
+
+@pytest.mark.parametrize("option", [{"quadrature": 4}, {"solver": "newton"}, {"predictor": "tangent"}])
+def test_options_of_another_kind(option):
+    scene, _ = describe("truss")
+    (name,) = option
+    refused(name, lambda: simulate(scene, **option))
+
+
+@pytest.mark.parametrize(
+    ("name", "space", "option"),
+    [("truss", "plane-stress", "layers"), ("mesh", "3d", "layers"), ("mesh", "3d", "segments")],
+)
+def test_options_that_would_change_nothing(name, space, option):
+    scene, _ = describe("truss")
+    if name == "mesh":
+        mechanism = fm.Mechanism("read")
+        shape = fm.gmsh_mesh(MESHES / "strip3d.msh", depth=10.0)
+        bar = mechanism.flexible("bar", shape, fm.ONYX)
+        mechanism.revolute(mechanism.rigid("base", fixed=True), bar, at=(0, 0), interface_radius=3.0)
+        scene = fm.Scene(mechanism)
+    simulate(scene, space=space)
+    refused(option, lambda: simulate(scene, space=space, **{option: 9}))
+
+
 @pytest.mark.parametrize("formulation", ["mixed", 0.49, fm.MixedFormulation])
-def test_formulation_that_is_none(formulation):
+def test_formulation_that_is_not_one(formulation):
     scene, _ = describe("truss")
     refused("formulation", lambda: simulate(scene, formulation=formulation))
 
@@ -70,7 +119,7 @@ def test_mixed_formulation_without_a_sensible_limit(above):
 
 
 @pytest.mark.parametrize("size", [0.0, -2.0, math.nan, math.inf, "fine"])
-def test_element_size_that_is_no_positive_number(size):
+def test_element_size_that_is_not_a_positive_number(size):
     scene, _ = describe("truss")
     refused("'diagonal'", lambda: simulate(scene, size=size))
     (diagonal,) = scene.mechanism.flexible_links
@@ -82,6 +131,14 @@ def test_sizes_per_link_that_leave_one_out():
     crank, *others = scene.mechanism.flexible_links
     simulate(scene, size={crank: 3.0, **{link: 5.0 for link in others}})
     refused("'crank'", lambda: simulate(scene, size={link: 5.0 for link in others}))
+
+
+@pytest.mark.parametrize("given", [{"space": "plane-stress"}, {"accuracy": 0.01, "space": None}])
+def test_sizes_of_links_that_do_not_exist(given):
+    scene, _ = describe("truss")
+    rigid, sizes = scene.mechanism.rigid_links[0], dict.fromkeys(scene.mechanism.flexible_links, 5.0)
+    for stranger in ("diagonal", rigid):
+        refused("size", lambda stranger=stranger: simulate(scene, **given, size={**sizes, stranger: 5.0}))
 
 
 def test_neither_or_both_of_forces_and_displacements(truss):
@@ -96,7 +153,7 @@ def test_neither_or_both_of_forces_and_displacements(truss):
 
 @pytest.mark.parametrize("kind", ["forces", "displacements"])
 @pytest.mark.parametrize("samples", [[0.0, math.nan], [math.inf], ["much"], [None]])
-def test_samples_that_are_no_finite_numbers(truss, kind, samples):
+def test_samples_that_are_not_finite_numbers(truss, kind, samples):
     simulation, push, _ = truss
     refused("'push on tip'", lambda: simulation.load_displacement(push, **{kind: samples}), simulation=simulation)
 
@@ -128,7 +185,7 @@ def test_other_force_without_a_finite_magnitude(truss):
         )
 
 
-def test_force_that_is_led_and_constant_at_once(truss):
+def test_force_that_is_to_change_and_to_be_constant(truss):
     simulation, push, _ = truss
     refused(
         "'push on tip'",
@@ -196,6 +253,33 @@ def test_mechanism_that_changed_after_the_simulation_was_made(truss):
     simulation, push, _ = truss
     simulation.scene.mechanism.rigid("late")
     refused("'truss finger'", lambda: simulation.load_displacement(push, forces=[0.1]), simulation=simulation)
+
+
+def test_forces_and_outputs_added_later_act_as_those_described_first(truss):
+    simulation, push, _ = truss
+    late = simulation.scene.mechanism.force(on=push.on, at=push.at, direction=push.direction, name="late")
+    along = simulation.scene.mechanism.output(on=push.on, at=push.at, direction=push.direction, name="along")
+    curve = simulation.load_displacement(late, forces=[0.1])
+    assert curve.displacements == pytest.approx(simulation.load_displacement(push, forces=[0.1]).displacements)
+    assert curve.frames[0].outputs[along] == pytest.approx(curve.displacements[0])
+
+
+@pytest.mark.parametrize("kind", ["force", "output"])
+def test_forces_and_outputs_added_later_that_leave_the_plane(truss, kind):
+    simulation, push, _ = truss
+    add = getattr(simulation.scene.mechanism, kind)
+    late = add(on=push.on, at=push.at, direction=(1, 0, 1), name="late")
+    part = late if kind == "force" else push
+    refused("'late'", lambda: simulation.load_displacement(part, forces=[0.1]), simulation=simulation)
+    refused("'late'", lambda: simulation.follow(part, until=fm.Until(force=0.1)), simulation=simulation)
+
+
+def test_force_on_the_ground_added_later(truss):
+    simulation, _, _ = truss
+    (ground,) = (link for link in simulation.scene.mechanism.rigid_links if link.fixed)
+    late = simulation.scene.mechanism.force(on=ground, at=(5, 0), direction=(1, 0), name="grounded")
+    for values in ({"forces": [0.1]}, {"displacements": [0.1]}):
+        refused("'grounded'", lambda values=values: simulation.load_displacement(late, **values), simulation=simulation)
 
 
 def test_force_configuration_and_samples_of_the_wrong_kind(truss):

@@ -113,7 +113,7 @@ def test_links_with_elements_short_enough_give_no_warning(caplog):
     assert "length of elements" not in [hint.what for hint in explanation.left_out]
 
 
-def test_a_notch_shorter_than_the_elements_is_no_stretch_of_them(caplog):
+def test_a_notch_shorter_than_the_elements_gives_no_warning(caplog):
     rig = fm.Mechanism("notched")
     wall, hand = rig.rigid("wall", fixed=True), rig.rigid("hand")
     below = [(0, -4), (18, -4), (19.5, -0.5), (20.5, -0.5), (22, -4), (40, -4)]

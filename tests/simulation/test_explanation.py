@@ -10,6 +10,8 @@ from fenicsmech.simulation import weight_influence
 
 from .demo_scenes import describe
 
+STIFF = fm.Material("stiff", 2000.0, 0.3)
+
 
 def hint(explanation, what: str):
     """The hint of that name, None if there is none."""
@@ -72,27 +74,84 @@ def test_effects_that_are_listed_are_named_and_not_hinted_at():
     assert "Left out:" in str(explanation)
 
 
-def pinned(material: fm.Material, *, depth: float = 4.0, space: str = "plane-stress", order: int = 2, formulation=None):
-    """A straight link on a slider, compressed along its axis."""
+def test_joints_are_ideal_but_for_the_compliance_that_is_listed():
+    scene, push = describe("truss")
+    pin = scene.mechanism.joints[0]
+    for effects, others in (([], ""), ([fm.JointCompliance(pin, 0.1)], "other ")):
+        simulation = fm.Simulation(fm.Scene(scene.mechanism, effects=effects), space="plane-stress", size=4.0)
+        simulated = simulation.load_displacement(push, forces=[0.1]).explain().simulated
+        assert any(f"without play, friction or {others}compliance" in text for text in simulated)
+        assert ("compliance 0.1 of" in simulated[-1]) == bool(effects)
+
+
+def pinned(
+    material: fm.Material,
+    *,
+    depth: float = 4.0,
+    space: str = "plane-stress",
+    order: int = 2,
+    formulation=None,
+    knob: tuple[float, float] | None = None,
+):
+    """A straight link on a slider, compressed along its axis, maybe with a ``knob`` that nothing acts on."""
     rig = fm.Mechanism("strut")
     ground, slide = rig.rigid("ground", fixed=True), rig.rigid("slide")
     strut = rig.flexible("strut", fm.strip([(0, 0), (60, 0)], thickness=6.0, depth=depth), material)
     rig.revolute(ground, strut, at=(0, 0), interface_radius=2.0)
     rig.revolute(strut, slide, at=(60, 0), interface_radius=2.0)
     rig.prismatic(ground, slide, at=(60, 0), axis=(1, 0, 0))
+    if knob is not None:
+        rig.weld(strut, rig.rigid("knob"), at=knob, interface_radius=2.0)
     push = rig.force(on=slide, at=(60, 0), direction=(-1, 0))
     return fm.Simulation(fm.Scene(rig), space=space, size=4.0, order=order, formulation=formulation), push
 
 
+def euler(*, thickness: float, depth: float = 4.0) -> float:
+    """Euler load of a stiff link, 60 long, that bends out of the plane."""
+    return np.pi**2 * STIFF.law.E * thickness * depth**3 / 12.0 / 60.0**2
+
+
 def test_compression_is_compared_with_the_load_that_buckles_a_link_out_of_the_plane():
-    stiff = fm.Material("stiff", 2000.0, 0.3)
-    critical = np.pi**2 * 2000.0 * 6.0 * 4.0**3 / 12.0 / 60.0**2
+    critical = euler(thickness=6.0)
     for fraction in (0.05, 0.5):
-        simulation, push = pinned(stiff)
+        simulation, push = pinned(STIFF)
         curve = simulation.load_displacement(push, forces=[fraction * critical])
         found = hint(curve.explain(), "bending out of the plane")
         assert f"about {fraction:.2g} " in found.text
         assert found.matters is (fraction > 0.2)
+
+
+@pytest.mark.parametrize("knob", [(30, 0), (0, 0)], ids=["between", "at the same place as another"])
+def test_compression_and_length_do_not_depend_on_joints_that_carry_nothing(knob):
+    simulation, push = pinned(STIFF, knob=knob)
+    curve = simulation.load_displacement(push, forces=[0.5 * euler(thickness=6.0)])
+    assert "about 0.5 " in hint(curve.explain(), "bending out of the plane").text
+
+
+def test_compression_is_compared_with_the_buckling_load_of_the_shape_that_is_simulated():
+    simulation, push = pinned(STIFF)
+    (strut,) = simulation.scene.mechanism.flexible_links
+    thicker = simulation.with_shapes({strut: fm.strip([(0, 0), (60, 0)], thickness=8.0, depth=4.0)})
+    curve = thicker.load_displacement(push, forces=[0.5 * euler(thickness=8.0)])
+    assert "about 0.5 " in hint(curve.explain(), "bending out of the plane").text
+
+
+def test_tension_does_not_buckle_a_link():
+    simulation, push = pinned(STIFF)
+    curve = simulation.load_displacement(push, forces=[-0.5 * euler(thickness=6.0)])
+    assert not hint(curve.explain(), "bending out of the plane").matters
+
+
+def test_force_across_a_link_does_not_buckle_it():
+    rig = fm.Mechanism("cantilever")
+    ground, end = rig.rigid("ground", fixed=True), rig.rigid("end")
+    leaf = rig.flexible("leaf", fm.strip([(0, 0), (60, 0)], thickness=6.0, depth=1.0), STIFF)
+    rig.weld(ground, leaf, at=(0, 0), interface_radius=2.0)
+    rig.weld(leaf, end, at=(60, 0), interface_radius=2.0)
+    push = rig.force(on=end, at=(60, 0), direction=(0, 1))
+    simulation = fm.Simulation(fm.Scene(rig), space="plane-stress", size=4.0)
+    curve = simulation.load_displacement(push, forces=[0.5 * euler(thickness=6.0, depth=1.0)])
+    assert not hint(curve.explain(), "bending out of the plane").matters
 
 
 @pytest.mark.parametrize(

@@ -39,7 +39,9 @@ def names(folder: Path) -> set[str]:
     return found
 
 
-@pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", pytest.param("3d", marks=pytest.mark.thorough)])
+@pytest.mark.parametrize(
+    "space", ["plane-stress", *(pytest.param(s, marks=pytest.mark.thorough) for s in ("3d-symmetric", "3d"))]
+)
 def test_fields_are_written_as_a_time_series_over_the_force(space, shared_tmp_path):
     simulation, curve = claw(space)
     path = shared_tmp_path / "new folder" / "claw.xdmf"
@@ -75,6 +77,22 @@ def test_folders_that_cannot_be_written_are_refused_on_all_ranks(shared_tmp_path
         (shared_tmp_path / "no folder").touch()
     with pytest.raises(OSError, match="no folder"):
         curve.write(shared_tmp_path / "no folder" / "claw.xdmf")
+
+
+def test_errors_of_one_rank_are_raised_on_all_and_leave_no_file(shared_tmp_path, monkeypatch):
+    _, curve = claw("plane-stress")
+
+    def failing(*arguments):
+        if COMM.rank == 0:
+            raise OSError("no space left")
+
+    monkeypatch.setattr("fenicsmech.simulation.fields.write_series", failing)
+    with pytest.raises(OSError, match="no space left"):
+        curve.write(shared_tmp_path / "claw.xdmf")
+    monkeypatch.setattr("fenicsmech.simulation.curve.MechanismPlotter", failing)
+    with pytest.raises(OSError, match="no space left"):
+        curve.picture(shared_tmp_path / "claw.png")
+    assert names(shared_tmp_path) == set()
 
 
 def test_files_of_an_earlier_run_are_replaced(shared_tmp_path):
@@ -123,7 +141,9 @@ def test_curve_is_drawn_and_tabulated(shared_tmp_path):
     assert table["max von Mises [MPa]"] == pytest.approx([frame.max_stress for frame in curve.frames], abs=0.0)
 
 
-@pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", pytest.param("3d", marks=pytest.mark.thorough)])
+@pytest.mark.parametrize(
+    "space", ["plane-stress", *(pytest.param(s, marks=pytest.mark.thorough) for s in ("3d-symmetric", "3d"))]
+)
 def test_stress_field_peaks_at_the_largest_stress_of_the_frame_and_vanishes_in_interfaces(space):
     simulation, curve = claw(space)
     stress = curve.von_mises(curve.frames[-1])

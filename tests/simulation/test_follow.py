@@ -17,11 +17,11 @@ STIFF = 200.0
         ({"displacement": float("nan")}, "nan"),
         ({"force": (1.0, "much")}, "not a number"),
         ({"displacement": 1.0, "position": 2.0}, "a displacement and a position"),
-        ({"force": 1.0, "frames": 1}, "1 frames"),
-        ({"force": 1.0, "frames": 2.5}, "2.5 frames"),
+        ({"force": 1.0, "frames": 1}, "the value is 1"),
+        ({"force": 1.0, "frames": 2.5}, "the value is 2.5"),
     ],
 )
-def test_ends_that_make_no_sense_are_refused(given, message):
+def test_invalid_ends_are_refused(given, message):
     with pytest.raises(fm.DescriptionError, match=message):
         fm.Until(**given)
 
@@ -29,7 +29,7 @@ def test_ends_that_make_no_sense_are_refused(given, message):
 @pytest.mark.parametrize(
     "given", [{"first": 0.0}, {"largest": -1.0}, {"smallest": float("nan")}, {"motion": 0.0}, {"tolerance": 2.0}]
 )
-def test_steps_that_make_no_sense_are_refused(given):
+def test_invalid_steps_are_refused(given):
     with pytest.raises(fm.DescriptionError):
         fm.ArcSteps(**given)
 
@@ -95,5 +95,5 @@ def test_constant_forces_act_along_the_whole_path():
     assert both.forces + 0.25 == pytest.approx(toggle.force(sunk), abs=1e-8)
     # the tangent is that of both forces together
     near = both.frames[both.limit_points[0].index - 1]
-    ahead = min(abs(load.force - both.limit_points[0].frame.force) for load in both.buckling_loads(frame=near))
+    ahead = min(abs(load.value - both.limit_points[0].frame.force) for load in both.buckling_points(frame=near))
     assert ahead < 0.05 * toggle.force(2.1)

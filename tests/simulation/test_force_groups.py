@@ -44,14 +44,19 @@ def test_displacement_of_a_group_can_be_prescribed():
     assert moved.forces == pytest.approx([3.0], rel=1e-8)
 
 
-def test_groups_that_make_no_sense_are_refused():
+def test_invalid_groups_are_refused():
     scene, push, _ = arm()
     simulation = fm.Simulation(scene, space="plane-stress", size=4.0, comm=MPI.COMM_SELF)
     other = fm.Mechanism("other")
     stranger = other.force(on=other.rigid("body"), at=(0, 0), direction=(1, 0), name="stranger")
     with pytest.raises(fm.DescriptionError, match="'push' in forces 'both'"):
         fm.ForceGroup("both", {push: "much"})
+    for none in ({}, ()):
+        with pytest.raises(fm.DescriptionError, match="forces 'none': there are none"):
+            fm.ForceGroup("none", none)
+    with pytest.raises(fm.DescriptionError, match="'push' is given twice"):
+        fm.ForceGroup("twice", [(push, 1.0), (push, 2.0)])
     with pytest.raises(fm.DescriptionError, match="'stranger'.*not a force of 'arm'"):
         simulation.load_displacement(fm.ForceGroup("both", {push: 1.0, stranger: 1.0}), forces=[1.0])
-    with pytest.raises(fm.DescriptionError, match="constant at once"):
+    with pytest.raises(fm.DescriptionError, match="to be held constant"):
         simulation.load_displacement(fm.ForceGroup("one", {push: 1.0}), forces=[1.0], others={push: 1.0})

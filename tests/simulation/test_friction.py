@@ -76,7 +76,7 @@ def test_pins_take_their_parts_of_the_load_one_by_one():
     assert curve.friction_band({})[0] == pytest.approx(curve.forces)
 
 
-def test_bands_without_meaning_are_refused():
+def test_invalid_friction_bands_are_refused():
     case = lever(lambda hinge: [JointSpring(hinge, STIFFNESS)])
     mechanism = case.simulation.scene.mechanism
     one = case.simulation.load_displacement(case.force, forces=[1.0])

@@ -72,7 +72,7 @@ def idle_hint(simulation, push) -> str:
 
 
 @pytest.mark.parametrize("kind", ["output", "force"])
-def test_points_away_from_the_line_of_an_idle_spin_are_told_by_explanations(kind):
+def test_points_away_from_the_line_of_an_idle_spin_are_named_by_explanations(kind):
     for at, told in (((50, 0, 0), False), ((50, 1.0, 0), True)):
         simulation, push, _ = rssr()
         mechanism = simulation.scene.mechanism
@@ -81,7 +81,7 @@ def test_points_away_from_the_line_of_an_idle_spin_are_told_by_explanations(kind
         assert ("'side'" in idle_hint(simulation, push)) is told
 
 
-def test_points_on_the_line_between_joints_of_a_design_are_not_told():
+def test_points_on_the_line_between_joints_of_a_design_are_not_named():
     simulation, push, _ = rssr(rod=True)
     mechanism = simulation.scene.mechanism
     rod, ball = mechanism.links[-1], mechanism.joints[-2]

@@ -7,6 +7,7 @@ import weakref
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 
@@ -58,6 +59,43 @@ def test_curves_of_one_simulation_give_their_memory_back():
         simulation.load_displacement(curve.part, forces=[0.05]).error_estimates()
 
     assert growth(run, before=2, times=4) < 0.8
+
+
+def test_constant_forces_of_all_magnitudes_share_one_matrix():
+    simulation, curve = simulate(space="plane-stress", size=3.0)
+    mechanism = simulation.scene.mechanism
+    pull = mechanism.force(on=curve.part.on, at=curve.part.at, direction=(0, -1), name="pull")
+
+    def pulled(magnitude: float) -> fm.Curve:
+        return simulation.load_displacement(curve.part, forces=[0.05], others={pull: magnitude})
+
+    def systems() -> int:
+        gc.collect()
+        return sum(isinstance(thing, fm.EquilibriumSystem) for thing in gc.get_objects())
+
+    before, magnitudes = systems(), (0.0, 0.01, -0.02, 0.03)
+    curves = {magnitude: pulled(magnitude) for magnitude in magnitudes}
+    assert systems() == before + 1
+    # each still has its own force: none is that of the curve without, but where its magnitude is zero
+    errors = {magnitude: own.error_estimates() for magnitude, own in curves.items()}
+    assert errors[0.0] == pytest.approx(curve.error_estimates(), rel=1e-6)
+    assert curves[0.0].displacements == pytest.approx(curve.displacements, rel=1e-8)
+    for magnitude in magnitudes[1:]:
+        alone = fm.Simulation(simulation.scene, space="plane-stress", size=3.0)
+        again = alone.load_displacement(curve.part, forces=[0.05], others={pull: magnitude})
+        assert curves[magnitude].displacements == pytest.approx(again.displacements, rel=1e-8)
+        assert errors[magnitude] == pytest.approx(again.error_estimates(), rel=1e-6)
+        assert abs(curves[magnitude].displacements[0] / curve.displacements[0] - 1.0) > 1e-3
+
+
+def test_frames_of_one_design_share_its_field():
+    simulation, curve = simulate(space="plane-stress", size=3.0)
+    for own in (simulation, simulation.with_design(np.zeros_like(curve.frames[0].design.field))):
+        curves = [own.load_displacement(curve.part, forces=[0.02, 0.05]) for _ in range(2)]
+        fields = [frame.design.field for curve in curves for frame in curve.frames]
+        assert all(field is fields[0] for field in fields)
+        with pytest.raises(ValueError, match="read-only"):
+            fields[0][:] = 1.0
 
 
 @pytest.mark.thorough

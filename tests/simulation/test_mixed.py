@@ -83,7 +83,7 @@ def test_results_are_the_same_on_any_number_of_ranks(space):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("space", ["plane-strain", "3d"])
-def test_limit_of_incompressibility_is_approached_without_trouble(space):
+def test_limit_of_incompressibility_is_approached_without_failure(space):
     """Newton's method needs as many iterations, and what is left of the way falls as 1 − 2ν."""
     tips, iterations = [], []
     for poisson in (0.499, 0.4999, 0.49999):

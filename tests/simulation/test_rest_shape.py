@@ -183,3 +183,39 @@ def test_design_of_another_mesh_is_refused():
     simulation, _, _ = crane("plane-stress")
     with pytest.raises(fm.DescriptionError, match="design field"):
         simulation.with_design(np.zeros(3))
+
+
+@pytest.mark.parallel
+@each_space
+def test_paths_of_points_on_flexible_links_start_at_the_designed_shape(space):
+    simulation, _, turned = crane(space)
+    (beam,) = simulation.scene.mechanism.flexible_links
+    end = simulation.scene.mechanism.output(on=beam, at=(40, 0), direction=(0, 1), name="end")
+    raised = simulation.with_design(wave(simulation, 5.0))
+    cos, sin = np.cos(2.4), np.sin(2.4)
+    for own, height in ((raised, 5.0), (simulation, 0.0)):
+        place = own.path(end, [fm.DRAWN, turned])[:, :2]
+        assert place == pytest.approx(
+            np.array([(40.0, height), (40.0 * cos - height * sin, 40.0 * sin + height * cos)]), abs=1e-9
+        )
+
+
+@pytest.mark.parallel
+@each_space
+@pytest.mark.parametrize("height", [0.0, 5.0])
+def test_arrows_of_forces_on_flexible_links_are_where_their_points_have_moved(space, height):
+    simulation, *_ = crane(space)
+    mechanism = simulation.scene.mechanism
+    (beam,) = mechanism.flexible_links
+    press = mechanism.force(on=beam, at=(40, 0), direction=(0, -1), name="press")
+    across, up = (mechanism.output(on=beam, at=(40, 0), direction=way, name=f"{way}") for way in ((1, 0), (0, 1)))
+    designed = simulation.with_design(wave(simulation, height))
+    curve = designed.load_displacement(press, forces=[0.0, 50.0])
+    panel, end = curve.panel(), curve.frames[-1]
+    assert end.outputs[up] < -2.0
+    assert (panel is None) == (MPI.COMM_WORLD.rank > 0)
+    if panel is not None:
+        (arrow,) = panel.arrows
+        place = (40.0 + end.outputs[across], height + end.outputs[up])
+        assert arrow.at == pytest.approx(np.array(place), abs=1e-9)
+        assert arrow.vector == pytest.approx(np.array([0.0, -50.0]))

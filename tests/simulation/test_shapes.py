@@ -43,6 +43,7 @@ def test_section_of_a_cad_part_bends_like_the_strip_it_was_drawn_as():
     assert drawn == pytest.approx(pulled(same, radius=3.0, **options), rel=0.06)
 
 
+@pytest.mark.thorough
 def test_solid_cad_part_lies_between_plane_stress_and_plane_strain():
     part = fm.step_file(MESHES / "curved_link.step", depth=10.0)
     stress, strain = (pulled(part, radius=3.5, space=s, size=1.0) for s in ("plane-stress", "plane-strain"))

@@ -12,7 +12,7 @@ from fenicsmech.equilibrium import NewtonSolver, NotConverged
 from ..equilibrium.column import EULER, column
 
 ASKED = {
-    "buckling loads": lambda curve: curve.buckling_loads(),
+    "buckling loads": lambda curve: curve.buckling_points(),
     "soft modes": lambda curve: curve.soft_modes(),
     "error estimates": lambda curve: curve.error_estimates(),
     "explanation": lambda curve: curve.explain(),
@@ -25,7 +25,7 @@ def failing(*arguments, **options):
 
 
 @pytest.mark.parametrize("ask", ASKED.values(), ids=ASKED)
-def test_questions_about_a_singular_equilibrium_are_answered_in_words(ask, monkeypatch):
+def test_evaluations_at_a_singular_equilibrium_raise_errors(ask, monkeypatch):
     case = column()
     curve = case.simulation.load_displacement(case.push, forces=[0.1 * EULER])
     design = case.simulation.model.elastic.design
@@ -50,7 +50,7 @@ def test_force_that_joints_hold_has_no_buckling_load_and_no_path():
     across = mechanism.force(on=case.push.on, at=case.push.at, direction=(0, 1), name="across")
     curve = case.simulation.load_displacement(across, forces=[EULER])
     with pytest.raises(fm.EquilibriumError, match="moves nothing"):
-        curve.buckling_loads()
+        curve.buckling_points()
     with pytest.raises(fm.EquilibriumError, match="moves nothing"):
         case.simulation.follow(across, until=fm.Until(force=EULER))
 

@@ -21,7 +21,7 @@ def traced(name: str, space: str, **options) -> tuple[fm.Simulation, fm.Curve]:
 @pytest.mark.thorough
 @pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric"])
 @pytest.mark.parametrize("name", MECHANISMS)
-def test_displacements_move_by_a_small_fraction_of_their_estimated_error_when_newton_goes_on(name, space):
+def test_displacements_move_by_a_small_fraction_of_their_estimated_error_when_newton_continues(name, space):
     simulation, curve = traced(name, space)
     _, strict = traced(name, space, tolerance=1e-13, reuse_factor=0.0)
     moved = np.abs(curve.displacements - strict.displacements)
@@ -31,7 +31,7 @@ def test_displacements_move_by_a_small_fraction_of_their_estimated_error_when_ne
 
 
 @pytest.mark.parametrize("tolerance", [1e-5, 1e-7])
-def test_a_tolerance_that_was_given_is_kept_to(tolerance):
+def test_a_given_tolerance_is_used(tolerance):
     _, curve = traced("truss", "plane-stress", tolerance=tolerance)
     _, default = traced("truss", "plane-stress")
     ends = [frame.residuals[-1] for frame in curve.frames]

@@ -8,9 +8,10 @@ regulariser R, whose barriers are too steep to be learnt from gradients, enters 
     d = argmin ½ dᵀ B d + (Jᵀ r + ∂f/∂p)ᵀ d + R(p + d).
 
 A BFGS that learns O as a whole advances slowly along the barriers of thickness and curvature. Line searches begin
-within half a length of each parameter, since distant designs are often infeasible, and B is made anew where none of its
-directions descends. Steps p + α d meet the strong Wolfe conditions (Nocedal & Wright, Numerical Optimization,
-doi:10.1007/978-0-387-40065-5, algorithms 3.5 and 3.6, as scipy has them); infeasible points count as infinitely high.
+within half a length of each parameter, since distant designs are often infeasible, and B is reset where the search
+along its direction finds no descent. Steps p + α d meet the strong Wolfe conditions (Nocedal & Wright, Numerical
+Optimization, doi:10.1007/978-0-387-40065-5, algorithms 3.5 and 3.6, as scipy has them); infeasible points count as
+infinitely high.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ class BFGS(Optimiser):
         tolerance: least reduction worth a step, over O.
         armijo: fraction of the decrease predicted by the slope that a step must reach.
         wolfe: largest slope at the end of a step over that at its start.
-        longest: change of a parameter over its length at which a line search begins at most.
+        longest: largest change of a parameter, over its length, in the first step of a line search.
 
     Raises:
         DescriptionError: the tolerance is not a positive number; later: there are inequalities.
@@ -133,7 +134,7 @@ def _gradient(here: Evaluation) -> np.ndarray:
 
 
 def _fresh(here: Evaluation, lengths: np.ndarray) -> np.ndarray:
-    """B before anything is learnt: the gradient changes by itself when parameters change by their lengths."""
+    """B at the start: the gradient changes by its own size when parameters change by their lengths."""
     return max(float(np.linalg.norm(lengths * _gradient(here))), 1e-30) * np.diag(lengths**-2)
 
 

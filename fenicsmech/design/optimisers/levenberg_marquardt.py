@@ -1,7 +1,7 @@
 """Levenberg–Marquardt for least squares with a regulariser of negligible cost.
 
-Residuals r enter each step by their Jacobian J and what steps so far tell of their Hessians H, the regulariser R,
-barriers included, exactly:
+Residuals r enter each step by their Jacobian J and estimates of their Hessians H from the steps so far; the regulariser
+R, barriers included, enters exactly:
 
     s = argmin ½ |r + J s + ½ sᵀ H s|² + R(p + s) + ½ μ |s / ℓ|²,     ℓ the lengths of the parameters.
 
@@ -10,8 +10,8 @@ infeasible ones. This is sequential quadratic programming (``sqp``) without ineq
 Numerical Optimization (doi:10.1007/978-0-387-40065-5), chapter 10; for the composite model: Fletcher, Practical Methods
 of Optimization (doi:10.1002/9781118723203), chapter 14.
 
-Residuals have errors e_k, those of the finite elements. It is enough if the undamped step s would change no residual by
-more than a tenth of its error, and O by no more than the errors do:
+Residuals have errors e_k, those of the finite elements. Iteration ends early if the undamped step s would change no
+residual by more than a tenth of its error, and O by no more than the errors do:
 
     |J s|_k ≤ φ e_k  for all k,     O(p) − min O ≤ Σ (|r_k| e_k + ½ e_k²),     φ = 0.1.
 
@@ -80,7 +80,7 @@ class LevenbergMarquardt(SQP):
 class Resolution:
     """Test of the remaining reduction against the errors, which are estimated a few times from ``start`` on.
 
-    A resumed run does not know how far the start of the interrupted one was from the minimum, and estimates at once.
+    A resumed run does not know how far the interrupted one has come from its start, and estimates errors immediately.
     """
 
     def __init__(self, options: LevenbergMarquardt, start: Iterate, *, resumed: bool = False) -> None:

@@ -29,7 +29,7 @@ class TooHigh(Infeasible):
 
     Attributes:
         merit: O + Σ ν_k (x_k + ½ x_k²), x = max(c, 0).
-        residuals: r there, (m,), which tell how they bend; None if they are not given.
+        residuals: r there, (m,), from which their curvature is estimated; None if they are not given.
     """
 
     def __init__(self, merit: float, residuals: np.ndarray | None = None) -> None:
@@ -75,7 +75,7 @@ class Plain:
 
 @dataclass(frozen=True, eq=False)
 class Inequalities:
-    """The inequalities c ≤ 0, best scaled so that 0.01 is little and 1 is much.
+    """The inequalities c ≤ 0, best scaled so that 0.01 is small and 1 is large.
 
     Attributes:
         names: of each, for messages, (k,).
@@ -208,8 +208,8 @@ class Reason(Enum):
     """Reasons for the end of a minimisation; the value is text."""
 
     CONVERGED = "the gradient vanishes or the objective no longer falls: a minimum was found"
-    RESOLVED = "the remaining gain is small beside the error of the elements: refine them, or give a tolerance"
-    VIOLATED = "inequalities stay violated, and no small change of the design mends it: relax one, or start elsewhere"
+    RESOLVED = "the remaining gain is small compared with the error of the elements: refine them, or give a tolerance"
+    VIOLATED = "inequalities stay violated, and no small change of the design helps: relax one, or start elsewhere"
     ITERATIONS = "the number of iterations ran out: allow more to get closer to the minimum"
     NO_DESCENT = "no step lowers the objective although the gradient does not vanish: check bounds and mesh quality"
 
@@ -263,8 +263,8 @@ class Optimiser(ABC):
     """A method that minimises from a start, a frozen dataclass.
 
     Attributes:
-        iterations: most iterations.
-        least_reduction: predicted reduction over the objective at which it ends at the latest.
+        iterations: maximum number of iterations.
+        least_reduction: predicted reduction over the objective below which it ends in any case.
     """
 
     iterations: int

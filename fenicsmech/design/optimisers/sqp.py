@@ -9,8 +9,8 @@ Each step s minimises a model under linearised inequalities (``step``),
 with the regulariser R exact, in B the curvature of f + λᵀ c that its gradients show (BFGS, damped as Powell proposes),
 and in H that of the residuals along the steps so far, refused ones included (``step``). Where residuals are steep and R
 is flat, the minimum lies at the end of a curved valley, along which R falls. Without H (Gauss–Newton) steps leave the
-valley and are refused until μ makes them short, and it takes R for all the curvature along the valley, where
-Σ r_k H_k outweighs it. The end is judged by the undamped step without H, which may bend too much.
+valley and are refused until μ makes them short: the model takes R for all the curvature along the valley, where in
+truth Σ r_k H_k outweighs R. Convergence is judged by the undamped step without H, since H may be too large.
 
 A step is accepted if it lowers the merit O + Σ ν_k β(c_k) by a part of the predicted reduction; μ falls after good
 steps and grows after bad or infeasible ones. The penalties ν exceed the multipliers λ of the undamped step, follow them
@@ -18,9 +18,9 @@ slowly where they fall, and grow where that step leaves inequalities violated: t
 Methods of Optimization, doi:10.1002/9781118723203, section 14.4) with Levenberg's damping in place of a trust region
 and Powell's rule for ν (Nocedal & Wright, Numerical Optimization, doi:10.1007/978-0-387-40065-5, chapter 18).
 
-Libraries' methods (SLSQP, MMA, CCSA, trust-constr) see O as one function: they know nothing of residuals, take the
-barriers of R for curvature, and end or diverge at infeasible points. ``python3 -m benchmarks.constrained`` compares
-them on formulas: SLSQP needs about as many evaluations, the others two to five times as many.
+Libraries' methods (SLSQP, MMA, CCSA, trust-constr) see O as one function: they do not use residuals, take the barriers
+of R for curvature, and end or diverge at infeasible points. ``python3 -m benchmarks.constrained`` compares them on
+formulas: SLSQP needs about as many evaluations, the others two to five times as many.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ class SQP(Optimiser):
         damping: μ at the start, over the change of O when parameters change by their lengths.
         least_damping: least μ, which keeps parameters without influence in place.
         poor, good: actual over predicted reduction; below the first a step is refused, above the second damping falls.
-        refusals: most steps refused in a row.
+        refusals: maximum number of steps refused in a row.
         stalls: steps in a row that gain less than ``tolerance``, after which it ends.
 
     Raises:
@@ -130,7 +130,7 @@ class SQP(Optimiser):
         return self.tolerance
 
     def continued(self, memory: np.ndarray) -> np.ndarray | None:
-        """H, B and ν as they are, for shifts leave derivatives alone; no stalls, and μ not above that of a start."""
+        """H, B and ν as they are, since shifts keep derivatives; no stalls, and μ not above that of a start."""
         return np.concatenate([[min(memory[0], self.damping), 0.0], memory[2:]])
 
     def minimise(self, problem: Problem, start: Start, *, watch: Callable[[Iterate], None]) -> Iterate:

@@ -7,16 +7,16 @@ and Hessian H = L Lᵀ, and slacks t ≥ 0 of the inequalities, each step solves
 
     min ½ dᵀ H d + gᵀ d + Σ ν_k (t_k + ½ t_k²)   subject to   c + C d ≤ t,  0 ≤ t,
 
-which always has a solution. In x = (Lᵀ d + L⁻¹ g, √ν (t + 1)) it is to find the x of least length with G x ≥ h, which
-scipy's non-negative least squares do (Lawson & Hanson, Solving Least Squares Problems, doi:10.1137/1.9781611971217,
-section 23.4). Its multipliers are those of the inequalities.
+which always has a solution. In x = (Lᵀ d + L⁻¹ g, √ν (t + 1)) this means finding the x of least length with G x ≥ h,
+which scipy's non-negative least squares do (Lawson & Hanson, Solving Least Squares Problems,
+doi:10.1137/1.9781611971217, section 23.4). Its multipliers are those of the inequalities.
 
-Models learn second derivatives from what steps have found: of a sum by BFGS, of each residual r_k by the update that
+Models estimate second derivatives from earlier steps: of a sum by BFGS, of each residual r_k by the update that
 changes H_k least (Powell's symmetric Broyden update, in parameters over their lengths), with
 
     H s = J(p + s) − J(p)  after a step,     sᵀ H s = 2 (r(p + s) − r − J s)  where only values are known.
 
-H learnt along earlier steps may bend too much here; before the update it is shrunk to what fits along s. Dennis, Gay &
+H estimated along earlier steps may be too large here; before the update it is scaled down to fit along s. Dennis, Gay &
 Welsch found this sizing indispensable (An adaptive nonlinear least-squares algorithm, doi:10.1145/355958.355965).
 """
 
@@ -95,7 +95,7 @@ def updated(
 ) -> np.ndarray:
     """The BFGS update of a Hessian for the change ``y`` of the gradient along the step ``s``.
 
-    Damped as Powell proposes, so that the Hessian stays positive definite; at the ``first`` step it is made anew, in
+    Damped as Powell proposes, so that the Hessian stays positive definite; at the ``first`` step it is reset, in
     units of ``lengths``.
     """
     if not y.any():

@@ -1,19 +1,19 @@
 """Weights of the handles at the midpoints of edges, so that a design bends edges too.
 
-The outline of a designed link is that of the drawn link under a smooth map. Vertices alone would leave it chords, in
-error by the square of the element size whatever the order of the elements; the midpoint m of an edge of the outline
-therefore moves like a vertex,
+The outline of a designed link is that of the drawn link under a smooth map. Moving vertices alone would leave chords,
+with an error of second order in the element size whatever the order of the elements; the midpoint m of an edge of the
+outline therefore moves like a vertex,
 
     d(m) = Σ_j w_j(m) T_j (m − X_j, 1),
 
-w_j(m) interpolated along the outline: the cubic in the arc length through the two vertices on either side. It reaches
-across no corner and not into interfaces, whose vertices are held; there it is the quadratic through three. Edges around
+w_j(m) interpolated along the outline: the cubic in the arc length through the two vertices on either side. It does not
+reach across corners or into interfaces, whose vertices are held; there it is the quadratic through three. Edges around
 interfaces move with them. All other edges stay as straight as the map of their ends makes them. An extruded link has
 the weights of its plan.
 
 Where handles slide, the map stretches one end of an edge more than the other and shifts its midpoint along the outline.
-A shift by a quarter of the edge turns cells inside out and says nothing of the outline's shape: ``MidEdgeNodes`` take
-it back.
+Such a shift does not change the shape of the outline, but turns cells inside out if it is a quarter of the edge:
+``MidEdgeNodes`` take it back.
 """
 
 from __future__ import annotations

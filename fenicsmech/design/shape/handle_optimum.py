@@ -1,4 +1,4 @@
-"""Optimal handle positions, min over θ of S(θ, p) = Σ_e ρ(e), and their derivatives by p.
+"""Optimal handle positions, min over θ of S(θ, p) = Σ_e ρ(e), and their derivatives with respect to p.
 
 Links do not have cells in common, so S is a sum of functions of the θ of one shape each; the cells of links that share
 a shape depend on the same θ. Newton's method with exact Hessians minimises them together, with a line search for each
@@ -40,7 +40,7 @@ class HandleOptions:
     """Options of the search for optimal handle positions.
 
     Attributes:
-        iterations: most Newton iterations; designs near by take two or three.
+        iterations: maximum number of Newton iterations; nearby designs take two or three.
         settled: predicted decrease of S, relative, after which one last step is taken: smaller ones are rounding.
         armijo: fraction of the decrease predicted by the slope that a step must reach.
         shortest: fraction of a step at which the search of a link ends without one.
@@ -98,7 +98,7 @@ class HandleOptimum:
 
         Args:
             p: the design, (parameters,).
-            start: placement of a design near by; that of the initial mesh by default.
+            start: placement of a nearby design; that of the initial mesh by default.
 
         Raises:
             ShapeError: cells stay inverted however the handles are placed.

@@ -61,7 +61,7 @@ def _spatial(a, b, c):
 
 
 class QualitySum:
-    """Σ φ(ρ) over cells, with its derivatives by the design field.
+    """Σ φ(ρ) over cells, with its derivatives with respect to the design field.
 
     Args:
         design: the design field d, vector P1.

@@ -406,7 +406,7 @@ class ShapeMap:
         """Σ_j T_j r_ij from the maps of each link's handles, (nodes, dim)."""
         d = np.zeros((len(self.original), self.mesh.vertices.shape[1]))
         for own in self.pieces:
-            moved = np.einsum("ijk,jak->ia", own.local_reach, transforms[own.shape], optimize=True)
+            moved = np.tensordot(own.local_reach, transforms[own.shape], ((1, 2), (0, 2)))
             d[own.nodes, :2] = moved @ own.matrix.T
         return d
 

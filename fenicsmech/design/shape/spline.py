@@ -4,8 +4,8 @@ With control points C_k (position P_k and tangent M_k, three components each) an
 
     (x, y, δ)(p, t) = h₀₀(τ) P_k + h₁₀(τ) M_k + h₀₁(τ) P_{k+1} + h₁₁(τ) M_{k+1}.
 
-The parameters p are the tangents at joints, and position and tangent at all other control points: a joint keeps its
-thickness, and stays where it is unless joints move. Free ends change their thickness; they stay where they are drawn
+The parameters p are the tangents at joints, and position and tangent at all other control points: the thickness at a
+joint stays, and so does its place unless joints move. Free ends change their thickness; they stay where they are drawn
 unless they may move. The curve is linear in p.
 
 Where joints move, their places are parameters too. Shifts δ_j of joints shift the curve between two of them to
@@ -153,34 +153,36 @@ class SplineSamples:
 
     def __init__(self, spline: LinkSpline, *, count: int = 500) -> None:
         self.t = np.linspace(0.0, spline.segments, count)
-        self._gradient = spline.gradient(self.t)
-        self._fixed = spline.evaluate(np.zeros(spline.size), self.t)
+        gradient, fixed = spline.gradient(self.t), spline.evaluate(np.zeros(spline.size), self.t)
+        # apart from each other, as products with strided arrays take several times as long
+        self._thickness, self._thickness_gradient = fixed[:, 2].copy(), gradient[:, 2].copy()
+        self._segments, self._moves = np.diff(fixed[:, :2], axis=0), np.diff(gradient[:, :2], axis=0)
 
     @property
     def thickness_gradient(self) -> np.ndarray:
         """∂δ/∂p, the same for all p, (count, size)."""
-        return self._gradient[:, 2]
+        return self._thickness_gradient
 
     def thickness(self, p: np.ndarray) -> np.ndarray:
         """δ, (count,)."""
-        return self._fixed[:, 2] + self._gradient[:, 2] @ p
+        return self._thickness + self._thickness_gradient @ p
 
     def curvature(self, p: np.ndarray) -> np.ndarray:
         """r, signed, at the inner samples, (count − 2,)."""
-        a, b = self._segments(p, slice(None))
-        return _cross(a, b) * (1.0 / _length(a) + 1.0 / _length(b)) / _length(a + b)
+        segments = self._segments_at(p)
+        a, b, inverse = segments[:-1], segments[1:], 1.0 / _length(segments)
+        return _cross(a, b) * (inverse[:-1] + inverse[1:]) / _length(a + b)
 
     def curvature_gradient(self, p: np.ndarray, chosen: np.ndarray) -> np.ndarray:
         """∂r/∂p at some of the inner samples, a mask (count − 2,), (chosen, size)."""
-        slopes = _ratio_gradient(*self._segments(p, chosen))
-        moves = np.diff(self._gradient[:, :2], axis=0)
-        pairs = zip(slopes, (moves[:-1][chosen], moves[1:][chosen]), strict=True)
+        segments = self._segments_at(p)
+        slopes = _ratio_gradient(segments[:-1][chosen], segments[1:][chosen])
+        pairs = zip(slopes, (self._moves[:-1][chosen], self._moves[1:][chosen]), strict=True)
         return sum(np.einsum("nc,ncp->np", slope, move) for slope, move in pairs)
 
-    def _segments(self, p: np.ndarray, chosen: np.ndarray | slice) -> tuple[np.ndarray, np.ndarray]:
-        """The segments a and b before and after the chosen inner samples, both (chosen, 2)."""
-        segments = np.diff(self._fixed[:, :2] + self._gradient[:, :2] @ p, axis=0)
-        return segments[:-1][chosen], segments[1:][chosen]
+    def _segments_at(self, p: np.ndarray) -> np.ndarray:
+        """The segments between samples, (count − 1, 2)."""
+        return self._segments + (self._moves.reshape(-1, len(p)) @ p).reshape(-1, 2)
 
 
 def _length(a: np.ndarray) -> np.ndarray:

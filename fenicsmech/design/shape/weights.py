@@ -27,7 +27,7 @@ def handle_weights(mesh: LinkMesh, handles: LinkHandles, *, part: str = "link") 
 
     Args:
         mesh: the link's mesh.
-        handles: its handles; intermediary ones must lie in free cells.
+        handles: its handles; intermediate ones must lie in free cells.
         part: the link's name, for messages.
 
     Raises:
@@ -45,7 +45,7 @@ def handle_weights(mesh: LinkMesh, handles: LinkHandles, *, part: str = "link") 
 
 
 def _expand(mesh: LinkMesh, handles: LinkHandles) -> tuple[LinkMesh, np.ndarray]:
-    """``mesh`` with intermediary handles as further vertices, and the handle that holds each vertex or none."""
+    """``mesh`` with intermediate handles as further vertices, and the handle that holds each vertex or none."""
     held: list[tuple[int, np.ndarray | int]] = []
     for index, (site, centre) in enumerate(zip(handles.site, handles.centre, strict=True)):
         if site != BETWEEN:
@@ -92,7 +92,7 @@ def pierced(mesh: LinkMesh, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     enter = np.where(rise > 0.0, crossing, np.where((rise < 0.0) | (start >= -_INSIDE), -np.inf, np.inf)).max(axis=1)
     leave = np.where(rise < 0.0, crossing, np.inf).min(axis=1)
     height = np.ptp(mesh.points[mesh.cells, 2], axis=1)
-    cells = np.flatnonzero(leave - enter > 0.05 * height)  # the line cuts no mere corner
+    cells = np.flatnonzero(leave - enter > 0.05 * height)  # the line does more than touch a corner
     return cells, np.column_stack([np.tile(at, (len(cells), 1)), 0.5 * (enter + leave)[cells]])
 
 
@@ -185,7 +185,7 @@ def solve_partition(
         part: what the weights belong to, for messages.
         penalty: κ; larger ones save rounds, but their minimisations take longer.
         tolerance: largest |s| accepted; TRON minimises a hundred times closer.
-        rounds: most updates of λ.
+        rounds: maximum number of updates of λ.
 
     Raises:
         FenicsmechError: the multipliers did not converge.

@@ -170,14 +170,14 @@ def test_levenberg_marquardt_takes_the_same_way_in_any_unit_of_length():
 
 
 @pytest.mark.parametrize("optimiser", [LevenbergMarquardt(iterations=2, tolerance=1e-14), BFGS(iterations=2)])
-def test_running_out_of_iterations_is_said(optimiser):
+def test_running_out_of_iterations_is_reported(optimiser):
     last, history = watched(optimiser, Rosenbrock())
     assert last.reason is Reason.ITERATIONS
     assert [iterate.number for iterate in history] == [0, 1, 2]
 
 
 @each_optimiser
-def test_nothing_feasible_ahead_is_said_and_the_start_kept(optimiser):
+def test_nothing_feasible_ahead_is_reported_and_the_start_kept(optimiser):
     last, _ = watched(optimiser, Cliff())
     assert last.reason is Reason.NO_DESCENT
     assert np.array_equal(last.evaluation.parameters, np.zeros(2))
@@ -223,7 +223,7 @@ def test_residuals_of_second_degree_along_a_step_are_met_by_the_next_one(poor):
     assert last.evaluation.parameters == pytest.approx([1.0], abs=1e-9)
 
 
-def test_barriers_are_not_run_through_where_the_residual_would():
+def test_steps_do_not_cross_barriers_that_the_residual_alone_would_cross():
     exact, parabola = Wall(), Wall(quadratic=True)
     optimiser = LevenbergMarquardt(tolerance=1e-6)
     (last, _), (other, _) = (watched(optimiser, problem) for problem in (exact, parabola))
@@ -247,7 +247,7 @@ def test_bfgs_takes_walls_of_the_regulariser_exactly():
 
 
 @each_optimiser
-def test_going_on_from_any_iterate_repeats_what_would_have_come(optimiser):
+def test_resuming_from_any_iterate_repeats_the_uninterrupted_run(optimiser):
     _, history = watched(optimiser, Rosenbrock(spring=1e-3))
     assert len(history) > 8
     for index, iterate in enumerate(history[:-1]):

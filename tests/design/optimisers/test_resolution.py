@@ -52,7 +52,7 @@ def minimised(optimiser: LevenbergMarquardt, problem: Doubtful) -> Iterate:
 
 @pytest.mark.parametrize("error", ERRORS)
 @pytest.mark.parametrize("spring", SPRINGS)
-def test_residuals_move_by_less_than_their_errors_when_it_goes_on(error, spring):
+def test_residuals_move_by_less_than_their_errors_when_iterations_continue(error, spring):
     doubtful = Doubtful(error, spring)
     early, late = minimised(LevenbergMarquardt(), doubtful), minimised(EXACT, Doubtful(error, spring))
     assert early.reason.converged
@@ -62,7 +62,7 @@ def test_residuals_move_by_less_than_their_errors_when_it_goes_on(error, spring)
     assert gain <= np.sum(np.abs(early.evaluation.residuals) * error + 0.5 * error**2)
 
 
-def test_larger_errors_end_it_earlier_and_the_reason_says_so():
+def test_larger_errors_end_iterations_earlier_and_are_given_as_the_reason():
     counts, reasons = [], []
     for error in (0.0, *ERRORS, 1.0):
         last = minimised(LevenbergMarquardt(tolerance=None), Doubtful(error, 1e-4))
@@ -72,7 +72,7 @@ def test_larger_errors_end_it_earlier_and_the_reason_says_so():
     assert reasons[0] is Reason.CONVERGED and reasons[-1] is Reason.RESOLVED
 
 
-def test_a_tolerance_that_was_given_is_kept_to_and_no_error_asked_for():
+def test_a_given_tolerance_is_used_and_no_error_is_estimated():
     doubtful = Doubtful(1.0, 1e-4)
     last = minimised(EXACT, doubtful)
     assert last.reason is Reason.CONVERGED and last.reduction <= 1e-12
@@ -88,7 +88,7 @@ def test_errors_are_estimated_a_few_times_and_at_the_end():
     assert 1 <= doubtful.estimates < last.number / 3
 
 
-def test_an_old_estimate_alone_does_not_end_it():
+def test_an_old_estimate_alone_does_not_end_iterations():
     errors = iter([np.array([0.5]), np.array([0.05]), np.array([0.5])])
 
     def at(residual: float) -> Iterate:

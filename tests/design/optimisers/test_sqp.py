@@ -122,7 +122,7 @@ def test_other_optimisers_refuse_inequalities_and_name_the_remedy(optimiser):
         minimised(FormulaProblem(KNOWN["HS22"]), optimiser)
 
 
-def test_levenberg_marquardt_refuses_objectives_that_are_no_squares():
+def test_levenberg_marquardt_refuses_objectives_that_are_not_sums_of_squares():
     with pytest.raises(DescriptionError, match=r"more than a sum of squares.*fm\.SQP\(\)"):
         minimised(FormulaProblem(Formulas((1.0,), (0.0,), (), "x1**2")), LevenbergMarquardt())
 

@@ -29,7 +29,7 @@ def small(seed: int) -> bool:
 
 @hypothesis.given(SPOILED)
 @hypothesis.settings(max_examples=12)
-def test_scenes_that_make_no_sense_are_refused_by_name(seed):
+def test_invalid_scenes_are_refused_by_name(seed):
     result = judge(seed)
     assert not result.wrong, result
 
@@ -134,7 +134,7 @@ def test_joints_are_not_opened_for_a_displacement_out_of_reach(seed):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("seed", [1097, pytest.param(3003, marks=pytest.mark.slow)])
-def test_a_limit_point_at_a_hundredth_of_the_load_is_told_where_it_is(seed):
+def test_a_limit_point_at_a_hundredth_of_the_load_is_reported_where_it_is(seed):
     # of a led force, and of a constant one
     result = judge(seed)
     assert result.outcome == "true: EquilibriumError, at a limit point", result
