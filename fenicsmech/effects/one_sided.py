@@ -38,7 +38,6 @@ class OneSided(ABC):
 
     Attributes:
         compliances: c, (n,).
-        points_of_facets: how many of the points are on one facet.
         weights: areas that points stand for, of the links at rest, their depth included, (n,).
         gaps: g, (n,), as ``weights`` of the last ``update``.
     """
@@ -49,7 +48,7 @@ class OneSided(ABC):
         self._body, self._boundary, dim = fields.body, boundary, fields.dim
         points, self._weights = basix.make_quadrature(_FACETS[dim], degree)
         self._points = np.column_stack([1.0 - points.sum(axis=1), points])
-        self.points_of_facets = len(points)
+        self.weights0 = np.zeros(len(points) * len(boundary.cells))
         self._nodes = self._tabulated(fields.u, 0)[0]
         self._shape, *self._along = self._tabulated(fields.body.shape, 1)
         space = fields.u.function_space

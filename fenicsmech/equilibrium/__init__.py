@@ -8,7 +8,7 @@
 - ``system``: energy, residual and KKT matrix at a state
 - ``linearisation``: its factor LDLᵀ with inertia; rates, stability and adjoints at an equilibrium
 - ``two_level``: conjugate gradients on two levels for large systems
-- ``interior_point``: pressures of one-sided constraints as unknowns
+- ``active_set``: one-sided constraints within a Newton step
 - ``solver``: the interface of equilibrium solvers
 - ``newton``: the default method, a primal–dual Newton iteration
 """

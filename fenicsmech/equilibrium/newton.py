@@ -47,7 +47,6 @@ import numpy as np
 from petsc4py import PETSc
 
 from fenicsmech.equilibrium.control import Control
-from fenicsmech.equilibrium.interior_point import InteriorPressures
 from fenicsmech.equilibrium.linearisation import EquilibriumPoint, NotConverged
 from fenicsmech.equilibrium.solver import EquilibriumMethod, EquilibriumSolver
 from fenicsmech.equilibrium.state import State, Step
@@ -120,22 +119,29 @@ class NewtonSolver(EquilibriumSolver):
         best, not_better, line_search, diverged = (state, residual), 0, False, None
         last: tuple[State, np.ndarray] | None = None  # where the last step began, and its motion of the nodes
         residuals, shift, any_stability, predicted, norm = [], least, True, False, math.inf
-        touching, changes, interior = system.touching(), 0, 0  # iterations with pressures as unknowns
-        loaded = residual.forces * start.load_factor > 0.0  # or pressures have no scale
+        contact = None if path else system.contact
+        if contact is not None:
+            contact.start(start.load_factor)
         for iteration in range(limit + 1):
             residuals.append(self.relative(residual))
             if self.converged(residual, norm) and iteration > 0:
                 if path:  # critical points are located by its tangent and inertia
                     return self.linearise(state, control, residual).point(residuals, iteration + 1)
-                if predicted or shift > least or options.reuse_factor == 0.0:  # stability is of the true matrix
-                    self.linearise(state, control, residual, iterations=iteration + interior)
-                return self.accept(state, control, residual, residuals, iteration + interior)
+                if contact is not None:
+                    contact.keep()
+                if predicted or shift > least or options.reuse_factor == 0.0 or (contact is not None and contact.changed):  # stability is of the true matrix
+                    self.linearise(state, control, residual, iterations=iteration)
+                return self.accept(state, control, residual, residuals, iteration)
             if iteration == limit:
                 break
             near = path or (any_stability and residuals[-1] < options.near)
             predicted = last is not None and not near
-            system.linearise(state, control, residual, last if predicted else None)
+            system.linearise(state, control, residual, last if predicted else None, predicted_contact=contact is not None)
             x, shift = self._direction(residual, least, last=shift, any_stability=near)
+            if contact is not None:
+                contact.new_factor()
+                x = self._with_contact(x, residual)
+                contact.take()
             step = self.newton_step(x, state, control, residual)
             _log.debug("iteration %d: residual %.2e, shift %.1e", iteration, residuals[-1], shift)
             if path:
@@ -147,7 +153,6 @@ class NewtonSolver(EquilibriumSolver):
             try:
                 state, residual, length = advance(state, control, step, residual, iteration)
             except NotConverged as failure:
-                failure = NotConverged(failure.reason, failure.iterations + interior)
                 return self.accept_best(*best, control, residuals, failure)
             last = self._step_taken(before, -length * motion)
             if near and residual.norm > norm and not self.converged(residual, norm):
@@ -160,13 +165,6 @@ class NewtonSolver(EquilibriumSolver):
                     residual = system.residual(state, control)
             elif near and shift == least and length == 1.0:
                 state, residual, norm = self._finish(state, control, residual, norm, step)
-            if system.one_sided and loaded and not interior:
-                now = system.touching()
-                changes, last_changes, touching = system.count(now != touching), changes, now
-                growing = iteration > 0 and changes > last_changes and (last_changes > 0 or residual.norm > norm)
-                if (growing and changes > system.points_of_facets) or (changes and iteration >= options.watchdog):
-                    (state, residual), interior = self._with_pressures(start, control, residuals)
-                    last, any_stability, predicted = None, True, True  # the last factor is not of the true matrix
             if residual.norm < best[1].norm:
                 best, not_better = (state, residual), 0
             else:
@@ -175,89 +173,11 @@ class NewtonSolver(EquilibriumSolver):
                 state, line_search, last = best[0], True, None
                 system.load(state)
                 residual = system.residual(state, control)
-        return self.accept_best(*best, control, residuals, self.exhausted(residuals, limit + interior))
+        return self.accept_best(*best, control, residuals, self.exhausted(residuals, limit))
 
-    def _with_pressures(
-        self, state: State, control: Control, residuals: list[float]
-    ) -> tuple[tuple[State, Residual], int]:
-        """Iterations from ``state`` with the pressures of contact as unknowns.
-
-        Returns a state near the equilibrium with its residual, and their number; ``residuals`` grow by one for each.
-
-        Raises:
-            NotConverged: they fail. Where contact does not settle the plain law would not do better: a smaller step
-                of the load is due.
-        """
-        system, options, count = self.system, self.options, len(residuals)
-        system.load(state)
-        forces = system.residual(state, control).forces / system.unknowns.unit_u
-        pressures = InteriorPressures(system.one_sided, state.load_factor, options.start_pressure * forces, system.comm)
-        norm, last, tried = math.inf, None, False
-        for _ in range(options.interior_iterations):
-            try:
-                following, motion = self._pressure_step(state, control, pressures, last)
-            except NotConverged as failure:
-                raise NotConverged(failure.reason, len(residuals) + 1) from failure
-            plain = system.residual(following, control)
-            residuals.append(self.relative(plain))
-            _log.debug("pressures as unknowns: residual %.2e", residuals[-1])
-            state, last = following, self._step_taken(state, motion)
-            if self.converged(plain, norm):
-                return (state, plain), len(residuals) - count
-            norm = plain.norm
-            if not tried and residuals[-1] < 0.1 * options.near and pressures.settled:
-                tried, found = True, self._plain_step(state, control, plain)
-                residuals.append(self.relative(found[1]))
-                if found[1].norm < 0.1 * norm:
-                    return found, len(residuals) - count
-                system.load(state)
-        raise self.exhausted(residuals, len(residuals))
-
-    def _pressure_step(
-        self, state: State, control: Control, pressures: InteriorPressures, last: tuple[State, np.ndarray] | None
-    ) -> tuple[State, np.ndarray]:
-        """One iteration with ``pressures`` as unknowns: the state after it, and the motion of the nodes.
-
-        Raises:
-            NotConverged: the step need not descend; a shift would make it short beside the steps of the pressures.
-        """
-        system, nodes = self.system, self.system.numbering.rows.nodes.local
-        system.pressures = pressures
-        try:
-            pressures.aim(0.0)
-            residual = system.residual(state, control)
-            system.linearise(state, control, residual, last)
-            if not self.factor(state.minimum_shift):
-                raise NotConverged("the KKT matrix with pressures of contact cannot be factored")
-            x = self._solved(residual)
-            if not self.descends():
-                raise NotConverged("with pressures of contact as unknowns the step need not descend")
-            pressures.aim_again(pressures.solved(-system.unknowns.apply(x)[nodes]))
-            residual = system.residual(state, control)
-            x = self._solved(residual)
-            step, motion = self.newton_step(x, state, control, residual), system.unknowns.apply(x)
-            change = pressures.solved(-motion[nodes])
-            longest = pressures.longest(change)
-            length = min(longest, self.options.largest_turn / max(system.size(step), 1e-300))
-            following, length = self._without_inversion(state, step, length)
-            pressures.advance(change, length, length / longest)
-        finally:
-            system.pressures = None
-        return following, -length * motion
-
-    def _solved(self, residual: Residual) -> PETSc.Vec:
-        """x with K x the residual and K as last factored."""
-        x = self.try_solve(residual.vector, self.step_accuracy(residual))
-        if x is None:
-            raise NotConverged("the linear solver stalled")
-        return x
-
-    def _plain_step(self, state: State, control: Control, residual: Residual) -> tuple[State, Residual]:
-        """The whole Newton step from the loaded ``state``."""
-        self.system.linearise(state, control, residual)
-        x, _ = self._direction(residual, state.minimum_shift, last=0.0, any_stability=False)
-        state = self.system.moved(state, self.newton_step(x, state, control, residual))
-        return state, self.system.residual(state, control)
+    def _with_contact(self, x: PETSc.Vec, residual: Residual) -> PETSc.Vec:
+        solve = lambda right: self.try_solve(right, self.step_accuracy(residual))
+        return self.system.contact.corrected(x, residual.vector, self.system.unknowns, solve) or x
 
     def _step_taken(self, before: State, motion: np.ndarray) -> tuple[State, np.ndarray] | None:
         """The last step, whose stress the next stiffness predicts, if it does.
@@ -311,6 +231,8 @@ class NewtonSolver(EquilibriumSolver):
             x = self.try_solve(residual.vector, self.step_accuracy(residual))
             if x is None:
                 break
+            if system.contact is not None:
+                x = self._with_contact(x, residual)
             correction = self.newton_step(x, state, control, residual)
             length = system.size(correction)
             if not length <= self.options.reuse_factor * size:

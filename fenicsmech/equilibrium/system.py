@@ -23,9 +23,9 @@ from fenicsmech.collective import from_one
 from fenicsmech.compat import destroy_garbage
 from fenicsmech.effects import OneSided
 from fenicsmech.elasticity import ElasticBody, PredictedStress
+from fenicsmech.equilibrium.active_set import ActiveSet
 from fenicsmech.equilibrium.border import BorderTerms, PointLoad
 from fenicsmech.equilibrium.control import Control
-from fenicsmech.equilibrium.interior_point import InteriorPressures
 from fenicsmech.equilibrium.kkt import KktMatrix, create_extended_matrix
 from fenicsmech.equilibrium.state import State, Step, load_fields
 from fenicsmech.equilibrium.unknowns import Numbering, ScaledUnknowns
@@ -105,8 +105,7 @@ class EquilibriumSystem:
         self.numbering = numbering = Numbering(comm, interfaces, joints, elastic.pressure)
         self.blocks = numbering.unknowns
         self.idle, self.potentials = tuple(idle), tuple(potentials)
-        self.one_sided = tuple(one_sided)
-        self.pressures: InteriorPressures | None = None
+        self.contact = ActiveSet(one_sided, numbering, comm) if one_sided else None
         self.compliances = np.array([compliances.get(row, 0.0) for row in range(joints.rows)])
         self._border = BorderTerms(
             elastic,
@@ -236,8 +235,6 @@ class EquilibriumSystem:
             self.unknowns.turn(state.poses)
             scale, joints = self.unknowns.scale, self.joints
             r = self.elastic.residuals()
-            if self.pressures is not None:
-                r[self.numbering.rows.nodes.local] += self.pressures.forces()
             loads, rigid_loads = self._border.load_forces(self._border.loads(state), state)
             r -= loads
             reactions = joints.gradient(state.poses, state.motors).T @ state.multipliers
@@ -260,25 +257,10 @@ class EquilibriumSystem:
             moments = self._moments(nodal)
             return Residual(vector, vector.norm(), float(np.sqrt(forces)), gap, motion, moments, nodal, poses.copy())
 
-    def touching(self) -> np.ndarray:
-        """Whether each of this rank's points of one-sided constraints touches, at the loaded state. Local."""
-        for constraints in self.one_sided:
-            constraints.update()
-        return np.concatenate([np.zeros(0, bool), *(constraints.gaps < 0.0 for constraints in self.one_sided)])
-
-    @property
-    def points_of_facets(self) -> int:
-        """How many points of one-sided constraints are on one facet."""
-        return max((constraints.points_of_facets for constraints in self.one_sided), default=0)
-
-    def count(self, points: np.ndarray) -> int:
-        """How many of all ranks' points are in a mask of those on this rank."""
-        return self.comm.allreduce(int(points.sum()))
-
     # -- derivatives at the loaded state -------------------------------------------------------------------
 
     def linearise(
-        self, state: State, control: Control, residual: Residual, last: tuple[State, np.ndarray] | None = None
+        self, state: State, control: Control, residual: Residual, last: tuple[State, np.ndarray] | None = None, predicted_contact: bool = False
     ) -> None:
         """Brings ``kkt`` to the loaded ``state``, with the stress predicted by the ``last`` step if that is given.
 
@@ -286,9 +268,9 @@ class EquilibriumSystem:
         """
         self.kkt.set_stiffness()
         moments = residual.moments
-        if self.pressures is not None:
+        if predicted_contact and self.contact is not None:
             with self.clock.phase("assemble"):
-                self.pressures.add_stiffness(self.kkt.extended, self.numbering)
+                self.contact.add_stiffness(self.kkt.extended)
         if last is not None:
             with self.clock.phase("assemble"):
                 self._predicted_stress.take(last[0].u, last[1])
