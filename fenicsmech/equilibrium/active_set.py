@@ -50,6 +50,10 @@ class ActiveSet:
         if not hasattr(self, "known"):
             self.known = self._gaps < 0.0, self._penalties
         self.active, self.pressures = self.known
+        mode = __import__("os").environ.get("START", "gaps")
+        if mode == "gaps": self.active = self._gaps < 0
+        if mode == "or": self.active = self.active | (self._gaps < 0)
+        if mode == "empty": self.active = self.active & False
         self._columns = np.zeros((len(self._gaps), 0))
         self.new_factor()
 
