@@ -177,7 +177,7 @@ class LoadStepper(Stepper):
         for predictor in (self.predictor, TangentPredictor()):
             guess = predictor.predict(system, self._points, self._width, ahead)
             if system.size(system.difference(guess, last)) <= self._steps.largest_prediction:
-                mode = __import__("os").environ.get("PRED", "no")
+                mode = __import__("os").environ.get("PRED", "any")
                 if system.contact is not None and mode != "no":
                     system.load(last); system.contact.start(last.load_factor); a = system.contact._gaps < 0; pa = system.contact._penalties
                     system.load(guess); system.contact.update(); b = system.contact._gaps < 0; pb = system.contact._penalties

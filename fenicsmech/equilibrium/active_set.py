@@ -47,13 +47,7 @@ class ActiveSet:
         self._factor = factor
         self._sections = np.cumsum([len(surface.weights0) for surface in self._surfaces])[:-1]
         self.update()
-        if not hasattr(self, "known"):
-            self.known = self._gaps < 0.0, self._penalties
-        self.active, self.pressures = self.known
-        mode = __import__("os").environ.get("START", "gaps")
-        if mode == "gaps": self.active = self._gaps < 0
-        if mode == "or": self.active = self.active | (self._gaps < 0)
-        if mode == "empty": self.active = self.active & False
+        self.active, self.pressures = self._gaps < 0.0, self._penalties
         self._columns = np.zeros((len(self._gaps), 0))
         self.new_factor()
 
@@ -73,10 +67,6 @@ class ActiveSet:
         """Whether the points of the matrix last linearised are not those that touch at the loaded state."""
         self.update()
         return self._comm.allreduce(int(np.any((self._gaps < 0.0) != self.active))) > 0
-
-    def keep(self):
-        self.update()
-        self.known = self._gaps < 0.0, self._penalties
 
     def add_stiffness(self, matrix: PETSc.Mat) -> None:
         self.update()

@@ -127,8 +127,6 @@ class NewtonSolver(EquilibriumSolver):
             if self.converged(residual, norm) and iteration > 0:
                 if path:  # critical points are located by its tangent and inertia
                     return self.linearise(state, control, residual).point(residuals, iteration + 1)
-                if contact is not None:
-                    contact.keep()
                 if predicted or shift > least or options.reuse_factor == 0.0 or (contact is not None and contact.changed):  # stability is of the true matrix
                     self.linearise(state, control, residual, iterations=iteration)
                 return self.accept(state, control, residual, residuals, iteration)
