@@ -177,14 +177,26 @@ class LoadStepper(Stepper):
         for predictor in (self.predictor, TangentPredictor()):
             guess = predictor.predict(system, self._points, self._width, ahead)
             if system.size(system.difference(guess, last)) <= self._steps.largest_prediction:
-                mode = __import__("os").environ.get("PRED", "any")
-                if system.contact is not None and mode != "no":
-                    system.load(last); system.contact.start(last.load_factor); a = system.contact._gaps < 0; pa = system.contact._penalties
-                    system.load(guess); system.contact.update(); b = system.contact._gaps < 0; pb = system.contact._penalties
-                    if mode == "any" and (a != b).any(): return last
-                    if mode == "press" and pb.max(initial=0) > float(__import__("os").environ.get("PF", 10)) * pa.max(initial=0): return last
+                if system.contact is not None and self._better(last, guess, ahead):
+                    return last
                 return guess
         return last
+
+    def _better(self, last, guess, ahead):
+        system = self.system
+        control = self._points[-1].control.at(self._value + ahead)
+        system.load(last)
+        system.contact.start(last.load_factor)
+        a = system.contact._gaps < 0
+        start = control.prepare(last)
+        ra = system.residual(start, control).norm
+        system.load(guess)
+        system.contact.update()
+        b = system.contact._gaps < 0
+        guess = control.prepare(guess)
+        rb = system.residual(guess, control).norm
+        if __import__("os").environ.get("LOG"): print("     points", a.sum(), "->", b.sum(), "changed", (a != b).sum(), "residuals %.2e %.2e" % (ra, rb), "size %.2e" % system.size(system.difference(guess, last)))
+        return (a != b).any() and not rb <= float(__import__("os").environ.get("PF", 10)) * ra
 
     def _limited(self, step: float, distance: float) -> float:
         """``step``, shortened to the largest ``motion`` unless that would leave too little of the ``distance``."""
