@@ -186,13 +186,11 @@ class LoadStepper(Stepper):
         system = self.system
         control = self._points[-1].control.at(self._value + ahead)
         system.load(last)
-        system.contact.start(last.load_factor)
-        a = system.contact._gaps < 0
+        a = system.contact.touching()
         start = control.prepare(last)
         ra = system.residual(start, control).norm
         system.load(guess)
-        system.contact.update()
-        b = system.contact._gaps < 0
+        b = system.contact.touching()
         guess = control.prepare(guess)
         rb = system.residual(guess, control).norm
         if __import__("os").environ.get("LOG"): print("     points", a.sum(), "->", b.sum(), "changed", (a != b).sum(), "residuals %.2e %.2e" % (ra, rb), "size %.2e" % system.size(system.difference(guess, last)))

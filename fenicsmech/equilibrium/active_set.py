@@ -1,25 +1,26 @@
-"""One-sided constraints within a Newton step: the step with contact linearised, not fixed.
+"""One-sided constraints within a Newton step: gaps are linearised, the points that touch are found with the step.
 
-With the forces of contact f = d ⟨−g⟩, d = w / c, a Newton step fixes which points touch; here it does not. The step δu is
-that of the energy with the gap linearised, its minimum where that is convex,
+A Newton step of the energy ∫ ½ ⟨−g⟩² / c dA fixes which points touch and pushes them out one by one: hundreds of
+iterations where a slender link lies down on an obstacle or peels off. Here the step s solves, with b = ∇g, d = w / c,
 
-    K₀ δu + r₀ = Σ f(γ) b,     γ = g + b · δu,     b = ∇g,     f(γ) = d ⟨−γ⟩.
+    K₀ s + r₀ = Σ f(γ) b,     γ = g + b · s,     f(γ) = d ⟨−γ⟩,
 
-K is factored with the points A that are expected to touch, K = K₀ + Σ_A d b bᵀ; its own step s₀ leads to gaps γ₀. What
-others do is a correction a of their forces,
+K₀ and r₀ without contact. The factored matrix holds the points A that are expected to touch, K = K₀ + Σ_A d b bᵀ. Its
+step leaves the gaps γ₀ and misses forces of contact by a,
 
     γ = γ₀ + S a,     a = f(γ) − f(g) + [A] d (γ − g),     S = bᵀ K⁻¹ b,
 
-a piecewise linear equation in the points alone that change, one solve with the factor for each. It is itself solved by
-Newton's method, its steps in full as long as they settle, then shortened to the least energy
+a piecewise linear equation of the points where a is not zero, found by the largest a, and doubled until none is left:
+a solve with the factor for each, and small dense systems. Newton's method settles most of them in a few steps. If not,
+the forces p = f(γ) ≥ 0 at these points are the least of ½ p · (S₀ + 1/d) p + γ₀₀ · p, a non-negative least-squares
+problem if contact is not all that keeps the links stable; S₀, γ₀₀ without the springs d. If it is, the step stays as it is.
 
-    ½ aᵀ S a − Σ ∫ a(γ) dγ.
+Iterations thus depend on how far from linear links and gaps are, not on how many points touch or come and go. The next
+matrix takes the points and pressures of the linearised gaps, not those of the state, whose gaps are of second order.
 
-Iterations so depend on how far from linear gaps and links are, not on how many points change: those that come to touch
-when a link lies down on an obstacle, or peels off, cost a solve and no iteration.
-
-Source: Robinson's generalised equations, Josephy–Newton method; Dontchev & Rockafellar, Implicit Functions and Solution
-Mappings (doi:10.1007/978-1-4939-1037-3), section 6C.
+Sources: Dontchev & Rockafellar, Implicit Functions and Solution Mappings (doi:10.1007/978-1-4939-1037-3), section 6C,
+Newton's method for generalised equations; Lawson & Hanson, Solving Least Squares Problems
+(doi:10.1137/1.9781611971217), chapter 23.
 """
 
 from __future__ import annotations
@@ -33,180 +34,199 @@ from scipy.optimize import nnls
 
 from fenicsmech.collective import from_one
 from fenicsmech.effects import OneSided
-from fenicsmech.equilibrium.unknowns import Numbering, ScaledUnknowns
+from fenicsmech.equilibrium.unknowns import ScaledUnknowns
 
-Solve = Callable[[PETSc.Vec], "PETSc.Vec | None"]
-_DEBUG = __import__("os").environ.get("LOG")
+_FIRST = 8
+"""Points that are corrected at first."""
+
+_MOST = 1000
+"""Points above which a step leaves the others to the next one: solves for more would cost more than that."""
+
+_NEWTON = 10
+"""Newton steps after which the equation of the points is taken for one that does not settle."""
+
+_ROUNDING = 1e-10
+"""Missed force, over the largest, that is left to the next step."""
 
 
 class ActiveSet:
-    def __init__(self, surfaces: Sequence[OneSided], numbering: Numbering, comm: MPI.Comm) -> None:
-        self._surfaces, self._numbering, self._comm = surfaces, numbering, comm
+    """Points of some surfaces that are expected to touch, and the steps in which they change.
 
-    def start(self, factor: float) -> None:
-        self._factor = factor
-        self._sections = np.cumsum([len(surface.weights0) for surface in self._surfaces])[:-1]
-        self.update()
-        self.active, self.pressures = self._gaps < 0.0, self._penalties
-        self._columns = np.zeros((len(self._gaps), 0))
-        self.new_factor()
+    Args:
+        surfaces: with the points.
+        unknowns: x and G, at the poses of the last residual.
+        comm: the processes.
+    """
 
-    def new_factor(self) -> None:
-        self._places = np.zeros(0, int)
-        self._columns = np.zeros((len(self._gaps), 0))
+    def __init__(self, surfaces: Sequence[OneSided], unknowns: ScaledUnknowns, comm: MPI.Comm) -> None:
+        self._surfaces, self._unknowns, self._comm = surfaces, unknowns, comm
+        self._compliances = self._joined(lambda surface: surface.compliances)
+        self._sections = np.cumsum([len(surface.compliances) for surface in surfaces])[:-1]
+        counts = comm.allgather(len(self._compliances))
+        self._first = sum(counts[: comm.rank])  # number of this rank's first point over all ranks
+        self._load_factor = 0.0
+        # A and the pressures in K, and those expected after the step; None: those of the state
+        self._active, self._expected = np.zeros(0, bool), None
+        # numbers of the points corrected with the present factor, and b · K⁻¹ b of each at this rank's points
+        self._corrected, self._columns = np.zeros(0, int), np.zeros((0, 0))
 
-    def update(self) -> None:
+    def start(self, load_factor: float) -> None:
+        """Expects the points that touch at the state that is next linearised; ``load_factor`` is that of the energy."""
+        self._load_factor, self._expected = load_factor, None
+
+    def touching(self) -> np.ndarray:
+        """Whether each of this rank's points touches, at the loaded state. Local."""
+        self._update()
+        return self._gaps < 0.0
+
+    @property
+    def current(self) -> bool:
+        """Whether the points in the matrix are those that touch at the loaded state."""
+        return self._comm.allreduce(int(np.any(self.touching() != self._active))) == 0
+
+    def add_stiffness(self, matrix: PETSc.Mat) -> None:
+        """Adds the stiffness with the points expected to touch, minus that with those that do at the loaded state, into
+        ``matrix`` and leaves it unassembled. Local."""
+        touching = self.touching()
+        present = np.maximum(-self._gaps, 0.0) / self._compliances
+        self._active, pressures = (touching, present) if self._expected is None else self._expected
+        self._corrected, self._columns = np.zeros(0, int), np.zeros((len(touching), 0))
+        stiffness = self._load_factor * (self._active * 1.0 - touching) / self._compliances
+        pairs = zip(self._each(stiffness), self._each(self._load_factor * (pressures - present)), strict=True)
+        for (surface, own), (_, pressure) in pairs:
+            surface.add_stiffness(matrix, self._unknowns.numbering.rows_of, own, pressure)
+
+    def corrected(
+        self, x: PETSc.Vec, residual: PETSc.Vec, solve: Callable[[PETSc.Vec], PETSc.Vec | None]
+    ) -> PETSc.Vec | None:
+        """The solution ``x`` of K x = ``residual`` with contact linearised; None if a solve fails.
+
+        ``solve`` solves with the last factor of the matrix with ``add_stiffness``.
+        """
+        self._update()
+        stiffness = self._load_factor * self._joined(lambda surface: surface.weights) / self._compliances
+        fixed = gaps = self._gaps - self._rates(x)
+        a, solved = np.zeros(len(self._corrected)), False
+        while len(new := self._missed(gaps, stiffness)) or (len(self._corrected) and not solved):
+            if len(self._corrected) + len(new) > _MOST:
+                break
+            for number in new:
+                z = solve(self._force(np.array([number]), np.ones(1)))
+                if z is None:
+                    return None
+                self._columns = np.column_stack([self._columns, self._rates(z)])
+                self._corrected = np.append(self._corrected, number)
+            found = self._settled(fixed, stiffness)
+            if found is None:
+                self._expected = None
+                return x
+            a, solved = found, True
+            gaps = fixed + self._columns @ a
+        self._expected = gaps < 0.0, np.maximum(-gaps, 0.0) / self._compliances
+        if not solved:
+            return x
+        right = residual.copy()
+        right.axpy(-1.0, self._force(self._corrected, a))
+        return solve(right)
+
+    def _update(self) -> None:
+        """Takes the displacements that the fields hold. Local."""
         for surface in self._surfaces:
             surface.update()
         self._gaps = self._joined(lambda surface: surface.gaps)
-        self._stiffness = self._factor * self._joined(lambda s: s.weights / s.compliances)
-        self._c = self._joined(lambda s: s.compliances)
 
-    @property
-    def changed(self) -> bool:
-        """Whether the points of the matrix last linearised are not those that touch at the loaded state."""
-        self.update()
-        return self._comm.allreduce(int(np.any((self._gaps < 0.0) != self.active))) > 0
-
-    def add_stiffness(self, matrix: PETSc.Mat) -> None:
-        self.update()
-        excess = self._factor * (self.active * 1.0 - (self._gaps < 0.0)) / self._c
-        pressures = self._factor * (self.pressures - self._penalties)
-        for (surface, own), (_, pressure) in zip(self._each(excess), self._each(pressures), strict=True):
-            surface.add_stiffness(matrix, self._numbering.rows_of, own, pressure)
-
-    def corrected(self, x: PETSc.Vec, right: PETSc.Vec, unknowns: ScaledUnknowns, solve: Solve) -> PETSc.Vec | None:
-        """x with K x the residual (``right``), after the changes of contact."""
-        self.update()
-        nodes = self._numbering.rows.nodes.local
-        start = self._gaps - self._rates(unknowns.apply(x)[nodes])
-        gaps = start
-        a = np.zeros(len(self._places))
-        for _ in range(30):
-            inside = np.zeros(len(self._first_numbers()), bool)
-            a_all = self._change(gaps)
-            numbers = self._first + np.flatnonzero(np.abs(a_all) > 0)
-            new = np.setdiff1d(np.concatenate(self._comm.allgather(numbers)), self._places)
-            if not len(new) and _ > 0:
-                break
-            if not self._add(new, unknowns, solve):
-                return None
-            a = self._solved(start, a)
-            gaps = start + self._columns @ a
-        if _DEBUG:
-            print(f"      columns {len(self._places)} of {len(gaps)}, rounds {_}, active {self.active.sum()} -> {(gaps < 0).sum()}, inner {self._inner}")
-        self.next_active, self.next_pressures = gaps < 0.0, np.maximum(-gaps, 0.0) / self._c
-        if not len(a):
-            return x
-        b = right.duplicate()
-        forces = np.zeros(len(gaps))
-        own = (self._places >= self._first) & (self._places < self._first + len(gaps))
-        forces[self._places[own] - self._first] = a[own]
-        b.axpby(1.0, 0.0, right)
-        b.axpy(-1.0, self._right(forces, unknowns))
-        return solve(b)
-
-    def _rates(self, motion: np.ndarray) -> np.ndarray:
+    def _rates(self, x: PETSc.Vec) -> np.ndarray:
+        """b · x at this rank's points."""
+        motion = self._unknowns.apply(x)[self._unknowns.numbering.rows.nodes.local]
         return self._joined(lambda surface: surface.rates(motion))
 
-    @property
-    def _penalties(self) -> np.ndarray:
-        """⟨−g⟩ / c."""
-        return np.maximum(-self._gaps, 0.0) / self._c
+    def _force(self, points: np.ndarray, forces: np.ndarray) -> PETSc.Vec:
+        """Σ a b of ``points``, numbered over all ranks, with the ``forces`` a."""
+        numbering, values = self._unknowns.numbering, np.zeros(len(self._gaps))
+        own = (points >= self._first) & (points < self._first + len(values))
+        values[points[own] - self._first] = forces[own]
+        links = np.zeros(numbering.rows.links.count)
+        for surface, forces_here in self._each(values):
+            links[numbering.rows.nodes.local] -= surface.forces(forces_here / surface.weights)
+        return self._unknowns.apply_transpose(links, np.zeros(numbering.unknowns.border.size))
 
-    def _joined(self, values) -> np.ndarray:
+    def _missed(self, gaps: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
+        """Numbers of the points to correct next: those of the largest a among the others, as many as so far."""
+        a = np.abs(_missing(gaps, self._gaps, stiffness, self._active))
+        forces = stiffness * np.maximum(-gaps, 0.0)
+        least = _ROUNDING * self._comm.allreduce(float(np.max([a, forces], initial=0.0)), op=MPI.MAX)
+        own = np.flatnonzero(a > least)
+        numbers, sizes = (np.concatenate(self._comm.allgather(part)) for part in (self._first + own, a[own]))
+        others = ~np.isin(numbers, self._corrected)
+        order = np.argsort(-sizes[others], kind="stable")
+        return numbers[others][order][: max(_FIRST, len(self._corrected))]
+
+    def _settled(self, fixed: np.ndarray, stiffness: np.ndarray) -> np.ndarray | None:
+        """a of the points corrected, None if it is not found."""
+        points = self._corrected
+        own = np.flatnonzero((points >= self._first) & (points < self._first + len(fixed)))
+        rows = points[own] - self._first
+        values = np.column_stack([fixed[rows], self._gaps[rows], stiffness[rows], self._active[rows]])
+        parts = self._comm.gather((own, self._columns[rows], values))
+
+        def solution() -> np.ndarray | None:
+            places, columns, known = (np.concatenate(part) for part in zip(*parts, strict=True))
+            order = np.argsort(places)
+            compliance, (gaps, present, d, active) = columns[order], known[order].T
+            return _forces(0.5 * (compliance + compliance.T), gaps, present, d, active > 0.0)
+
+        # of one process: which points touch is a decision that depends on rounding
+        return from_one(self._comm, solution)
+
+    def _joined(self, values: Callable[[OneSided], np.ndarray]) -> np.ndarray:
         return np.concatenate([values(surface) for surface in self._surfaces])
 
     def _each(self, values: np.ndarray) -> list[tuple[OneSided, np.ndarray]]:
         return list(zip(self._surfaces, np.split(values, self._sections), strict=True))
 
-    def take(self):
-        self.active, self.pressures = self.next_active, self.next_pressures
 
-    def _first_numbers(self):
-        counts = self._comm.allgather(len(self._gaps))
-        self._first = sum(counts[: self._comm.rank])
-        return self._gaps
-
-    def _right(self, forces: np.ndarray, unknowns: ScaledUnknowns) -> PETSc.Vec:
-        """Gᵀ of Σ a b."""
-        links = np.zeros(self._numbering.rows.links.count)
-        values = forces / self._joined(lambda s: s.weights)
-        links[self._numbering.rows.nodes.local] = -np.sum([s.forces(own) for s, own in self._each(values)], axis=0)
-        return unknowns.apply_transpose(links, np.zeros(self._numbering.unknowns.border.size))
-
-    def _add(self, new: np.ndarray, unknowns, solve) -> bool:
-        columns = []
-        for number in new:
-            forces = np.zeros(len(self._gaps))
-            if 0 <= number - self._first < len(forces):
-                forces[number - self._first] = 1.0
-            z = solve(self._right(forces, unknowns))
-            if z is None:
-                return False
-            columns.append(self._rates(unknowns.apply(z)[self._numbering.rows.nodes.local]))
-        if columns:
-            self._columns = np.column_stack([self._columns, *columns])
-            self._places = np.concatenate([self._places, new])
-        return True
-
-    def _change(self, gaps):
-        """a by γ."""
-        now, d = self._gaps, self._stiffness
-        return d * (np.maximum(-gaps, 0) - np.maximum(-now, 0) + self.active * (gaps - now))
-
-    def _solved(self, start, a):
-        own = (self._places >= self._first) & (self._places < self._first + len(start))
-        rows = self._places[own] - self._first
-        local = (np.flatnonzero(own), self._columns[rows], start[rows], self._gaps[rows], self._stiffness[rows], self.active[rows])
-        parts = self._comm.allgather(local)
-        n = len(self._places)
-        S, g0, g, d, act = np.zeros((n, n)), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n, bool)
-        for where, columns, s0, now, stiff, active in parts:
-            S[where], g0[where], g[where], d[where], act[where] = columns, s0, now, stiff, active
-        first = np.concatenate([a, np.zeros(n - len(a))])
-        a, self._inner = from_one(self._comm, lambda: _settled(0.5 * (S + S.T), g0, g, d, act, first))
-        return a
+def _missing(gaps: np.ndarray, present: np.ndarray, d: np.ndarray, active: np.ndarray) -> np.ndarray:
+    """a, the force of contact at ``gaps`` γ minus that of the step with A fixed, from the ``present`` gaps g."""
+    return d * (np.maximum(-gaps, 0.0) - np.maximum(-present, 0.0) + active * (gaps - present))
 
 
-def _settled(compliance, start, now, d, active, a):
-    """a of the points, and whether it was found."""
-    found = _by_newton(compliance, start, now, d, active, a, 10)
-    if found[1] > 0:
-        return found
-    guess = _by_pressures(compliance, start, now, d, active)
-    if guess is None:
-        return found[0], -2
-    found = _by_newton(compliance, start, now, d, active, guess, 10)
-    return found if found[1] > 0 else (guess, -1)
+def _forces(S: np.ndarray, fixed: np.ndarray, present: np.ndarray, d: np.ndarray, active: np.ndarray):
+    """a with γ = γ₀ + S a, γ₀ the ``fixed`` gaps; None if it is not found."""
+    try:
+        found = _by_newton(S, fixed, present, d, active, np.zeros(len(d)))
+        if found is None:
+            found = _by_newton(S, fixed, present, d, active, _by_least_squares(S, fixed, present, d, active))
+    except (np.linalg.LinAlgError, RuntimeError):  # not convex; too many iterations of nnls
+        return None
+    return found
 
 
-def _by_newton(S, start, now, d, active, a, limit):
+def _by_newton(S, fixed, present, d, active, a):
+    """From the points that touch with ``a``.
+
+    With σ = 1 in A, −1 elsewhere, a = d (⟨σ γ⟩ − ⟨σ g⟩), linear where σ γ > 0 and constant elsewhere.
+    """
     sign = np.where(active, 1.0, -1.0)
-    const = np.maximum(sign * now, 0)
-    on = sign * (start + S @ a) > 0
-    for k in range(limit):
-        target = np.where(on, 0.0, -d * const)
-        rhs = start[on] - sign[on] * const[on] + S[np.ix_(on, ~on)] @ target[~on]
-        target[on] = np.linalg.solve(np.diag(sign[on] / d[on]) - S[np.ix_(on, on)], rhs)
-        a, before = target, on
-        on = sign * (start + S @ a) > 0
-        if (on == before).all():
-            return a, k + 1
-    return a, -1
+    before = np.maximum(sign * present, 0.0)
+    on = sign * (fixed + S @ a) > 0.0
+    for _ in range(_NEWTON):
+        a = -d * before
+        right = fixed[on] - sign[on] * before[on] + S[np.ix_(on, ~on)] @ a[~on]
+        a[on] = np.linalg.solve(np.diag(sign[on] / d[on]) - S[np.ix_(on, on)], right)
+        last, on = on, sign * (fixed + S @ a) > 0.0
+        if np.array_equal(last, on):
+            return a
+    return None
 
 
-def _by_pressures(S, start, now, d, active):
-    """The least of ½ p · M p + γ₀ · p for p ≥ 0."""
-    force = d * np.maximum(-now, 0.0)
-    springs = d * active
-    known = np.linalg.solve(np.eye(len(d)) - S * springs, np.column_stack([S, start - S @ (force + springs * now)]))
+def _by_least_squares(S, fixed, present, d, active):
+    """From the forces p, with the springs of A among these points removed."""
+    force, springs = d * np.maximum(-present, 0.0), d * active
+    known = np.column_stack([S, fixed - S @ (force + springs * present)])
+    known = np.linalg.solve(np.eye(len(d)) - S * springs, known)
     M, free = known[:, :-1] + np.diag(1.0 / d), known[:, -1]
     unit = 1.0 / np.sqrt(np.abs(np.diag(M)))
-    try:
-        L = np.linalg.cholesky(0.5 * (M + M.T) * unit[:, None] * unit)
-    except np.linalg.LinAlgError:
-        return None
+    L = np.linalg.cholesky(0.5 * (M + M.T) * unit[:, None] * unit)
     p = unit * nnls(L.T, np.linalg.solve(L, -unit * free), maxiter=10 * len(d))[0]
     gaps = free + M @ p - p / d
-    return p - force + springs * (gaps - now)
+    return p - force + springs * (gaps - present)

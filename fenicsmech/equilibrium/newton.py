@@ -127,7 +127,7 @@ class NewtonSolver(EquilibriumSolver):
             if self.converged(residual, norm) and iteration > 0:
                 if path:  # critical points are located by its tangent and inertia
                     return self.linearise(state, control, residual).point(residuals, iteration + 1)
-                if predicted or shift > least or options.reuse_factor == 0.0 or (contact is not None and contact.changed):  # stability is of the true matrix
+                if predicted or shift > least or options.reuse_factor == 0.0 or (contact is not None and not contact.current):  # stability is of the true matrix
                     self.linearise(state, control, residual, iterations=iteration)
                 return self.accept(state, control, residual, residuals, iteration)
             if iteration == limit:
@@ -137,9 +137,7 @@ class NewtonSolver(EquilibriumSolver):
             system.linearise(state, control, residual, last if predicted else None, predicted_contact=contact is not None)
             x, shift = self._direction(residual, least, last=shift, any_stability=near)
             if contact is not None:
-                contact.new_factor()
                 x = self._with_contact(x, residual)
-                contact.take()
             step = self.newton_step(x, state, control, residual)
             _log.debug("iteration %d: residual %.2e, shift %.1e", iteration, residuals[-1], shift)
             if path:
@@ -174,8 +172,16 @@ class NewtonSolver(EquilibriumSolver):
         return self.accept_best(*best, control, residuals, self.exhausted(residuals, limit))
 
     def _with_contact(self, x: PETSc.Vec, residual: Residual) -> PETSc.Vec:
-        solve = lambda right: self.try_solve(right, self.step_accuracy(residual))
-        return self.system.contact.corrected(x, residual.vector, self.system.unknowns, solve) or x
+        """The solution ``x`` with contact linearised in place of the points that touch.
+
+        Raises:
+            NotConverged: an iterative solver stalled.
+        """
+        accuracy = self.step_accuracy(residual)
+        x = self.system.contact.corrected(x, residual.vector, lambda right: self.try_solve(right, accuracy))
+        if x is None:
+            raise NotConverged("the linear solver stalled")
+        return x
 
     def _step_taken(self, before: State, motion: np.ndarray) -> tuple[State, np.ndarray] | None:
         """The last step, whose stress the next stiffness predicts, if it does.

@@ -105,7 +105,6 @@ class EquilibriumSystem:
         self.numbering = numbering = Numbering(comm, interfaces, joints, elastic.pressure)
         self.blocks = numbering.unknowns
         self.idle, self.potentials = tuple(idle), tuple(potentials)
-        self.contact = ActiveSet(one_sided, numbering, comm) if one_sided else None
         self.compliances = np.array([compliances.get(row, 0.0) for row in range(joints.rows)])
         self._border = BorderTerms(
             elastic,
@@ -125,6 +124,7 @@ class EquilibriumSystem:
             extended = create_extended_matrix(elastic, numbering, self._border.pattern())
             self.unknowns = ScaledUnknowns(elastic, numbering, interfaces, joints, extended.getDiagonal().array_r)
             self.kkt = KktMatrix(elastic, numbering, self.unknowns, extended, clock=clock)
+            self.contact = ActiveSet(one_sided, self.unknowns, comm) if one_sided else None
 
     @cached_property
     def _predicted_stress(self) -> PredictedStress:
