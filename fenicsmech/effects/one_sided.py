@@ -5,7 +5,7 @@ Between gap g and pressure p the compliance c of the constraint stands:
     p ≥ 0,     g + c p ≥ 0,     p (g + c p) = 0,
 
 which is p = ⟨−g⟩ / c, and the energy of the constraint is ∫ ½ ⟨−g⟩² / c dA over the boundary at rest. That energy is a
-form like any other. Here its points are at hand, for methods that take pressures as unknowns of their own:
+form like any other. Here its points are at hand, for Newton steps that find those that touch (see ``active_set``):
 
     forces     −Σ w p ∇g,     stiffness     Σ w (D ∇g ⊗ ∇g − p ∇²g),     D = −∂p/∂g.
 """
@@ -48,7 +48,6 @@ class OneSided(ABC):
         self._body, self._boundary, dim = fields.body, boundary, fields.dim
         points, self._weights = basix.make_quadrature(_FACETS[dim], degree)
         self._points = np.column_stack([1.0 - points.sum(axis=1), points])
-        self.weights0 = np.zeros(len(points) * len(boundary.cells))
         self._nodes = self._tabulated(fields.u, 0)[0]
         self._shape, *self._along = self._tabulated(fields.body.shape, 1)
         space = fields.u.function_space
@@ -112,13 +111,15 @@ class OneSided(ABC):
 
         ``rows_of`` gives the matrix's rows of nodes, numbered over all ranks, ``stiffness`` is D, ``pressures`` p.
         """
-        normals, count = self._normals, len(self.weights)
+        points = np.flatnonzero((stiffness != 0.0) | (pressures != 0.0))
+        normals, count = self._normals[points], len(points)
         if not count:
             return
-        blocks = stiffness[:, None, None] * normals[:, :, None] * normals[:, None, :]
-        blocks = self.weights[:, None, None] * (blocks - pressures[:, None, None] * self._curvatures)
-        used = np.unique(self._nodes.indices)
-        nodes = kron(self._nodes[:, used], identity(normals.shape[1]), format="csr")
+        blocks = stiffness[points, None, None] * normals[:, :, None] * normals[:, None, :]
+        blocks = self.weights[points, None, None] * (blocks - pressures[points, None, None] * self._curvatures[points])
+        shape = self._nodes[points]
+        used = np.unique(shape.indices)
+        nodes = kron(shape[:, used], identity(normals.shape[1]), format="csr")
         diagonal = bsr_matrix((blocks, np.arange(count), np.arange(count + 1)), shape=2 * (nodes.shape[0],))
         found = (nodes.T @ diagonal @ nodes).tocsr()
         rows = rows_of(self._global[used]).astype(PETSc.IntType)

@@ -26,9 +26,7 @@ Close to convergence the factor of the KKT matrix K is reused (simplified Newton
 as long as corrections contract by a factor of 1000 or more; otherwise, for example near a limit point, K is factored
 again.
 
-Where contact changes at more points than in the iteration before and at more than those of a facet (at a first touch:
-and the residual grows), the pressures of contact become unknowns for a while (see ``interior_point``). Steps are taken
-as long as the inertia guarantees descent; where it does not, a smaller step of the load is due.
+Where links may touch obstacles a step linearises the gaps and finds the points that touch (see ``active_set``).
 
 Across a path (see ``control``) equilibria of any stability are wanted and a good guess is near: steps are taken in
 full, moved into the plane by bordering; where they diverge, a shorter step along the path is tried instead of descent.
@@ -46,12 +44,13 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
+from fenicsmech.equilibrium.active_set import ActiveSet
 from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.linearisation import EquilibriumPoint, NotConverged
 from fenicsmech.equilibrium.solver import EquilibriumMethod, EquilibriumSolver
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
-from fenicsmech.errors import positive, whole
+from fenicsmech.errors import not_negative, set_options
 from fenicsmech.log import logger
 
 _log = logger(__name__)
@@ -70,9 +69,6 @@ class PrimalDualNewton(EquilibriumMethod):
         predicted_stress: whether K_uu, as long as the residual is large, holds the stress that the last step solved
             for instead of the one it led to.
         largest_turn: largest rotation (rad), or displacement over the mechanism's length, of one step.
-        interior_iterations: most iterations with pressures as unknowns, which count beside the others.
-        start_pressure: first pressures as unknowns, over those that would carry the loads, spread over the whole
-            boundary. Counts hardly depend on it: between 0.1 and 10 they change by a tenth or two.
         reuse_factor: largest contraction rate of corrections at which the last factor of K is reused, also for
             stability and the tangent of the path; 0: never.
         path_iterations: maximum number of iterations of an arc-length step, after which a shorter one is tried.
@@ -88,20 +84,14 @@ class PrimalDualNewton(EquilibriumMethod):
     watchdog: int = 12
     predicted_stress: bool = True
     largest_turn: float = 0.5
-    interior_iterations: int = 40
-    start_pressure: float = 10.0
     reuse_factor: float = 1e-3
     path_iterations: int = 10
     divergence: float = 1e3
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for limit in ("near", "largest_turn", "divergence", "start_pressure"):
-            positive(f"Newton's {limit}", getattr(self, limit))
-        for limit, least in (("iterations", 1), ("watchdog", 0), ("path_iterations", 1)):
-            whole(f"Newton's {limit}", getattr(self, limit), least=least)
-        if self.reuse_factor != 0.0:
-            positive("Newton's reuse_factor", self.reuse_factor)
+        set_options(self, "Newton's method", free=("reuse_factor",), iterations=1, watchdog=0, path_iterations=1)
+        not_negative("reuse_factor of Newton's method", self.reuse_factor)
 
     def solver(self, system: EquilibriumSystem) -> NewtonSolver:
         return NewtonSolver(system, self)
@@ -127,17 +117,18 @@ class NewtonSolver(EquilibriumSolver):
             if self.converged(residual, norm) and iteration > 0:
                 if path:  # critical points are located by its tangent and inertia
                     return self.linearise(state, control, residual).point(residuals, iteration + 1)
-                if predicted or shift > least or options.reuse_factor == 0.0 or (contact is not None and not contact.current):  # stability is of the true matrix
+                current = shift == least and not predicted and (contact is None or contact.current)
+                if not current or options.reuse_factor == 0.0:  # stability is of the true matrix
                     self.linearise(state, control, residual, iterations=iteration)
                 return self.accept(state, control, residual, residuals, iteration)
             if iteration == limit:
                 break
             near = path or (any_stability and residuals[-1] < options.near)
             predicted = last is not None and not near
-            system.linearise(state, control, residual, last if predicted else None, predicted_contact=contact is not None)
+            system.linearise(state, control, residual, last if predicted else None, contact)
             x, shift = self._direction(residual, least, last=shift, any_stability=near)
             if contact is not None:
-                x = self._with_contact(x, residual)
+                x = self._with_contact(contact, x, residual, iteration + 1)
             step = self.newton_step(x, state, control, residual)
             _log.debug("iteration %d: residual %.2e, shift %.1e", iteration, residuals[-1], shift)
             if path:
@@ -150,15 +141,15 @@ class NewtonSolver(EquilibriumSolver):
                 state, residual, length = advance(state, control, step, residual, iteration)
             except NotConverged as failure:
                 return self.accept_best(*best, control, residuals, failure)
-            last = self._step_taken(before, -length * motion)
+            # pressures of mixed elements are stresses that the step solves for already
+            last = (before, -length * motion) if options.predicted_stress and not system.blocks.pressures.size else None
             if near and residual.norm > norm and not self.converged(residual, norm):
                 if diverged is None and self.relative(residual) < options.near:
                     diverged = before  # may happen once: just beyond a bifurcation small residuals hide large motions
                 else:
                     # no contraction: near a limit or bifurcation point, where only descent makes progress
                     state, any_stability, line_search, last = diverged or before, False, True, None
-                    system.load(state)
-                    residual = system.residual(state, control)
+                    residual = self._again(state, control)
             elif near and shift == least and length == 1.0:
                 state, residual, norm = self._finish(state, control, residual, norm, step)
             if residual.norm < best[1].norm:
@@ -167,28 +158,24 @@ class NewtonSolver(EquilibriumSolver):
                 not_better += 1
             if not_better > options.watchdog and not line_search:
                 state, line_search, last = best[0], True, None
-                system.load(state)
-                residual = system.residual(state, control)
+                residual = self._again(state, control)
         return self.accept_best(*best, control, residuals, self.exhausted(residuals, limit))
 
-    def _with_contact(self, x: PETSc.Vec, residual: Residual) -> PETSc.Vec:
-        """The solution ``x`` with contact linearised in place of the points that touch.
-
-        Raises:
-            NotConverged: an iterative solver stalled.
-        """
+    def _with_contact(self, contact: ActiveSet, x: PETSc.Vec, residual: Residual, iterations: int) -> PETSc.Vec:
+        """The solution ``x`` with gaps linearised in place of the points that touch."""
         accuracy = self.step_accuracy(residual)
-        x = self.system.contact.corrected(x, residual.vector, lambda right: self.try_solve(right, accuracy))
-        if x is None:
-            raise NotConverged("the linear solver stalled")
-        return x
+        corrected = contact.corrected(x, residual.vector, lambda right: self.try_solve(right, accuracy))
+        if corrected is None:
+            raise NotConverged("the linear solver stalled", iterations)
+        return corrected
 
-    def _step_taken(self, before: State, motion: np.ndarray) -> tuple[State, np.ndarray] | None:
-        """The last step, whose stress the next stiffness predicts, if it does.
-
-        Pressures of mixed elements are stresses that the step solves for already.
-        """
-        return (before, motion) if self.options.predicted_stress and not self.system.blocks.pressures.size else None
+    def _again(self, state: State, control: Control) -> Residual:
+        """The residual at an earlier ``state``, from which iterations go on."""
+        system = self.system
+        system.load(state)
+        if system.contact is not None:
+            system.contact.start(state.load_factor)
+        return system.residual(state, control)
 
     def _direction(
         self, residual: Residual, least: float, *, last: float, any_stability: bool
@@ -236,7 +223,7 @@ class NewtonSolver(EquilibriumSolver):
             if x is None:
                 break
             if system.contact is not None:
-                x = self._with_contact(x, residual)
+                x = self._with_contact(system.contact, x, residual, 0)
             correction = self.newton_step(x, state, control, residual)
             length = system.size(correction)
             if not length <= self.options.reuse_factor * size:
@@ -253,21 +240,14 @@ class NewtonSolver(EquilibriumSolver):
         self, state: State, control: Control, step: Step, residual: Residual, iteration: int
     ) -> tuple[State, Residual, float]:
         """The whole step, shortened only where it turns too far or inverts elements."""
-        length = min(1.0, self.options.largest_turn / max(self.system.size(step), 1e-300))
-        try:
-            trial, length = self._without_inversion(state, step, length)
-        except NotConverged as failure:
-            raise NotConverged(failure.reason, iteration + 1) from failure
-        return trial, self.system.residual(trial, control), length
-
-    def _without_inversion(self, state: State, step: Step, length: float) -> tuple[State, float]:
-        """The state after ``length`` of a step, halved until no element is inverted, and the length."""
+        system = self.system
+        length = min(1.0, self.options.largest_turn / max(system.size(step), 1e-300))
         for _ in range(12):
-            trial = self.system.moved(state, step.scaled(length))
-            if math.isfinite(self.system.elastic_energy()):
-                return trial, length
+            trial = system.moved(state, step.scaled(length))
+            if math.isfinite(system.elastic_energy()):
+                return trial, system.residual(trial, control), length
             length *= 0.5
-        raise NotConverged("every step along the Newton direction inverts elements")
+        raise NotConverged("every step along the Newton direction inverts elements", iteration + 1)
 
     def _search(
         self, state: State, control: Control, step: Step, residual: Residual, iteration: int

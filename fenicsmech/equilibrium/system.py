@@ -72,16 +72,16 @@ class EquilibriumSystem:
         potentials: of body poses.
         compliances: c by constraint row; 0 where none is given.
         idle: spins that nothing resists, whose gauge K fixes.
-        one_sided: constraints on links whose energy is in that of the links; their pressures may be unknowns.
+        one_sided: constraints on links, whose energy is in that of the links.
         clock: of the phases.
         comm: the processes that share the links.
 
     Attributes:
         numbering: of rows and unknowns.
         blocks: of the unknowns.
-        pressures: those of one-sided constraints while they are unknowns; None otherwise.
         unknowns: x and G, at the poses of the last ``residual``.
         kkt: the KKT matrix last linearised; take it before another ``residual``.
+        contact: the points of one-sided constraints; None without them.
     """
 
     def __init__(
@@ -260,17 +260,23 @@ class EquilibriumSystem:
     # -- derivatives at the loaded state -------------------------------------------------------------------
 
     def linearise(
-        self, state: State, control: Control, residual: Residual, last: tuple[State, np.ndarray] | None = None, predicted_contact: bool = False
+        self,
+        state: State,
+        control: Control,
+        residual: Residual,
+        last: tuple[State, np.ndarray] | None = None,
+        contact: ActiveSet | None = None,
     ) -> None:
         """Brings ``kkt`` to the loaded ``state``, with the stress predicted by the ``last`` step if that is given.
 
-        It is the state before the step and δu of owned nodes, linear in it on interface nodes too, (owned dofs,).
+        It is the state before the step and δu of owned nodes, linear in it on interface nodes too, (owned dofs,). Points
+        of obstacles touch as the state has it, or as ``contact`` expects.
         """
         self.kkt.set_stiffness()
         moments = residual.moments
-        if predicted_contact and self.contact is not None:
+        if contact is not None:
             with self.clock.phase("assemble"):
-                self.contact.add_stiffness(self.kkt.extended)
+                contact.add_stiffness(self.kkt.extended)
         if last is not None:
             with self.clock.phase("assemble"):
                 self._predicted_stress.take(last[0].u, last[1])
