@@ -256,12 +256,12 @@ def free_motions(
         columns = [column for body in spring.bodies for column in system.columns.get(body, ())]
         slope[columns] += spring.gradient(poses)[own]
         curvature[np.ix_(columns, columns)] += spring.hessian(poses)[np.ix_(own, own)]
-    size = np.linalg.norm(units * curvature) + np.linalg.norm(scale * slope)
+    rounding = 1e-12 * float(np.linalg.norm(units * curvature) + np.linalg.norm(scale * slope))
     multipliers = system.row_scale * np.linalg.lstsq(scaled.T, scale * slope, rcond=RANK)[0]
     for rows, columns, block in system.hessian_blocks(poses, motors, multipliers):
         curvature[np.ix_(rows, columns)] -= block
     along = motions @ (units * curvature) @ motions.T
-    return FreeMotions(motions, motions @ (scale * slope), 0.5 * (along + along.T), 1e-12 * float(size))
+    return FreeMotions(motions, motions @ (scale * slope), 0.5 * (along + along.T), rounding)
 
 
 @dataclass(frozen=True)
