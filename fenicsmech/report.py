@@ -151,7 +151,7 @@ def design_study(
 
     Raises:
         DescriptionError: there are no curves, two of one configuration or one of motors, a checkpoint in the folder
-            belongs to another problem, or a force or an output is at a point of a link that may change.
+            belongs to another problem.
         EquilibriumError: the drawn design does not carry its loads, or the optimum not those of a curve.
         MeshingError: a part cannot be written or meshed.
         OSError: the folder or a file cannot be written.

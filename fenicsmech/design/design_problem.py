@@ -27,7 +27,7 @@ from fenicsmech.design.run import Checkpoint, fingerprint
 from fenicsmech.design.search import Scatter, Search, SearchResult
 from fenicsmech.design.shape.handle_optimum import HandlePlacement
 from fenicsmech.design.target import Target
-from fenicsmech.design.verification import part_simulations, verified_parts
+from fenicsmech.design.verification import part_simulations, placed_points, verified_parts
 from fenicsmech.errors import DescriptionError
 from fenicsmech.log import Clock, logger
 from fenicsmech.mechanism import FlexibleLink, Joint
@@ -267,8 +267,7 @@ class DesignProblem:
             finer: ratio of the simulation's element size to that of the parts.
 
         Raises:
-            DescriptionError: the result belongs to other links or targets, or a force or an output is at a point of a
-                link that may change.
+            DescriptionError: the result belongs to other links or targets.
             MeshingError: a part cannot be written or meshed.
         """
         if [target.name for target in result.targets] != [target.name for target in self.targets]:
@@ -277,11 +276,13 @@ class DesignProblem:
                 "the result belongs to other targets",
                 "Give a result of this problem",
             )
-        links, given = self._own.changed, self._own.given(result)
+        links, given, model = self._own.changed, self._own.given(result), self.simulation.model
         solids = self._meshes(links, given)
+        with model.shaped(self._own.rest.design(*given)):
+            placed = placed_points(self.simulation, links, self.targets)
         with TemporaryDirectory() as temporary:  # only the first process writes and reads
             folder, moved = Path(folder or temporary), self._moved(given[0])
-            coarse, fine = part_simulations(self.simulation, links, *solids, folder, finer, moved)
+            coarse, fine = part_simulations(self.simulation, links, *solids, folder, finer, moved, placed)
             verified = verified_parts(result, coarse, fine, self.targets, links)
         return self.simulation.comm.bcast(verified, root=0)
 
