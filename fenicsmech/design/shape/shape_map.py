@@ -414,9 +414,10 @@ class ShapeMap:
         """The transpose of ``spread``: Σ_i g_i ⊗ r_ij of each handle, per shape (…, handles, 2, 3), over all ranks."""
         parts: list[Any] = [0.0] * len(self.shapes)
         for own in self.pieces:
-            mine = own.nodes < g.shape[-2]
-            back = g[..., own.nodes[mine], :2] @ own.matrix
-            parts[own.shape] = parts[own.shape] + np.einsum("...ia,ijk->...jak", back, own.local_reach[mine])
+            count = np.searchsorted(own.nodes, g.shape[-2])  # nodes are sorted
+            back = g[..., own.nodes[:count], :2] @ own.matrix
+            moments = np.tensordot(back, own.local_reach[:count], (-2, 0))  # (…, 2, handles, 3)
+            parts[own.shape] = parts[own.shape] + np.moveaxis(moments, -2, -3)
         return self.sum_over_ranks(parts)
 
     def sum_over_ranks(self, parts: Sequence[np.ndarray]) -> list[np.ndarray]:

@@ -32,6 +32,7 @@ from fenicsmech.polygons import chord_lengths
 # h₀₀ (P_k), h₁₀ (M_k), h₀₁ (P_{k+1}), h₁₁ (M_{k+1}) in powers of τ, and their derivatives
 _HERMITE = np.array([[1.0, 0.0, -3.0, 2.0], [0.0, 1.0, -2.0, 1.0], [0.0, 0.0, 3.0, -2.0], [0.0, 0.0, -1.0, 1.0]])
 _DERIVATIVES = [polyder(_HERMITE, order, axis=1) for order in range(5)]
+_TOGETHER = np.array([np.pad(rows, ((0, 0), (0, 4 - rows.shape[1]))).T for rows in _DERIVATIVES[:4]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +117,12 @@ class LinkSpline:
     def derivative(self, p: np.ndarray, t: np.ndarray) -> np.ndarray:
         """d(x, y, δ)/dt at ``t`` (m,), (m, 3); at a control point both segments agree."""
         return self.basis(t, order=1) @ self.controls_at(p).reshape(-1, 3)
+
+    def derivatives(self, p: np.ndarray, t: np.ndarray, segments: np.ndarray) -> np.ndarray:
+        """(x, y, δ) at ``t`` (m,) of ``segments`` (m,), differentiated 0 to 3 times by t, (4, m, 3)."""
+        weights = (t - segments)[:, None] ** np.arange(4) @ _TOGETHER
+        near = self.controls_at(p).reshape(-1, 3)[2 * segments[:, None] + np.arange(4)]
+        return (weights[:, :, None] @ near)[:, :, 0]
 
     def gradient(self, t: np.ndarray, *, order: int = 0, segments: np.ndarray | None = None) -> np.ndarray:
         """∂/∂p of (x, y, δ), differentiated ``order`` times by t, at ``t`` (m,), (m, 3, size); the same for all p."""
