@@ -16,7 +16,7 @@ from fenicsmech.design.optimisers.problem import Deferred, Quadratic
 from fenicsmech.design.rest_shape import DesignedLink, ParametricShape
 from fenicsmech.design.shape.handle_optimum import HandlePlacement
 from fenicsmech.design.shape.quality import Barrier
-from fenicsmech.errors import finite, positive
+from fenicsmech.errors import finite, set_options
 
 Model = Callable[[np.ndarray], Quadratic]
 
@@ -238,8 +238,7 @@ class MeshQuality(Regulariser):
     strength: float = 5.0
 
     def __post_init__(self) -> None:
-        for constant in ("limit", "width", "strength"):
-            positive(f"{constant} of the mesh quality", getattr(self, constant))
+        set_options(self, "the mesh quality")
 
     def around(self, rest, placement):
         here = Quadratic.zero(len(placement.p))

@@ -334,13 +334,26 @@ def test_invalid_places_are_refused():
         feet.append(table.weld(ground, legs[-1], at=line[0], interface_radius=3.0))
         table.weld(top, legs[-1], at=line[-1], interface_radius=3.0)
     shared = fm.SplineDesign(legs[0], 2, same=legs[1])
-    shift = fm.Number(fm.JointPosition(feet[1], direction=(1, 0)), -1.0, 1.0)
     target = fm.Target(table.force(on=top, at=(0, 40), direction=(1, 0)), force=1.0, displacement=0.1)
     stand = fm.Simulation(fm.Scene(table), space="plane-stress", size=6.0)
+
+    def shifted(*joints, along) -> fm.DesignProblem:
+        shift = fm.Number(fm.JointPosition(*joints, direction=along), -1.0, 1.0)
+        return fm.DesignProblem(stand, [shared, shift], targets=[target])
+
     refused(
-        lambda: fm.DesignProblem(stand, [shared, shift], targets=[target]),
-        part="leg -20",
-        problem="shared, and joints of 'leg 20'",
-        remedy="on its own",
+        lambda: shifted(feet[1], along=(1, 0)),
+        part="position",
+        problem="'leg -20' shares the shape",
+        remedy="all links",
+    )
+    refused(
+        lambda: shifted(*feet, along=[(1, 0), (-1, 0)]),
+        part="position",
+        problem="the image of 'leg -20' in 'leg 20'",
+        remedy="direction=[(1, 0), (-1, 0)]",
+    )
+    refused(
+        lambda: shifted(*feet, along=[(1, 0)]), part="direction", problem="1 direction for 2 joints", remedy="for each"
     )
     assert len(tip) == 2 and diagonal in (tip[0].a, tip[0].b, tip[1].a, tip[1].b)

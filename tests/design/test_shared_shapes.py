@@ -57,6 +57,14 @@ def case(move: Move, wanted: float = 0.25) -> Case:
     return Case(scene, [fm.SplineDesign(one, 2, **how)], [fm.Target(push, force=1.0, displacement=wanted)])
 
 
+def with_feet(own: Case, move: Move, way: tuple[float, float] = (1.0, 0.5)) -> Case:
+    """``own`` whose first joint may be shifted too, and its image likewise."""
+    feet = own.scene.mechanism.joints[0], own.scene.mechanism.joints[2]
+    image = np.diff(move(np.array([(0.0, 0.0), way])), axis=0)[0]
+    shift = fm.Number(fm.JointPosition(*feet, direction=[way, image.tolist()]), -4.0, 6.0)
+    return Case(own.scene, [*own.designs, shift], own.targets)
+
+
 def images(problem: fm.DesignProblem, design: fm.Design, move: Move) -> float:
     """Largest distance of the designed nodes of the second leg from the images of those of the first one."""
     elastic, mesh = problem.simulation.model.elastic, problem.simulation.model.mesh
@@ -132,6 +140,32 @@ def test_derivatives_of_quantities_by_shared_shapes_pass_taylor_tests(space, siz
         assert np.max(rates.with_gradient) >= 1.95, targets[k].name
 
 
+@pytest.mark.parametrize("move", [mirrored, shifted, turned])
+def test_links_with_shifted_joints_that_share_a_shape_stay_exact_images(move):
+    problem = with_feet(case(move), move).problem(size=3.0)
+    p = problem.initial + 0.1 * np.random.default_rng(3).standard_normal(len(problem.initial))
+    design = problem.rest_shape(p)
+    assert len(p) == 13 and max(map(abs, design.numbers.values())) > 0.2
+    assert images(problem, design, move) < 1e-12
+    (kind,) = design.numbers
+    assert type(kind).read(problem.simulation.scene, kind.words) == kind  # as results in files have it
+
+
+@pytest.mark.parametrize("move", [mirrored, pytest.param(turned, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize(
+    ("space", "size"), [("plane-stress", 3.0), pytest.param("3d", 4.0, marks=pytest.mark.thorough)]
+)
+def test_gradients_by_shared_shapes_and_joints_agree_with_central_differences(move, space, size):
+    regulariser = MeshQuality(limit=2.5, width=2.5) + ShapeBounds() + 1e-3 * StayClose()
+    whole, bench = objective(with_feet(case(move), move), regulariser, space=space, size=size)
+    p, direction = bench.design(0.05, seed=5), bench.direction(6)
+    direction[:-1] *= 0.1
+    here, step = whole.evaluate(p), 1e-3
+    ahead, back = (whole.evaluate(p + h * direction) for h in (step, -step))
+    assert here.gradient @ direction == pytest.approx((ahead.value - back.value) / (2 * step), rel=1e-5)
+    assert here.jacobian @ direction == pytest.approx((ahead.residuals - back.residuals) / (2 * step), rel=1e-5)
+
+
 @pytest.mark.parallel
 @pytest.mark.thorough
 def test_any_number_of_processes_finds_the_same_derivatives_by_shared_shapes():
@@ -160,15 +194,22 @@ def guided(*, half: bool) -> tuple[fm.Simulation, list[fm.SplineDesign], fm.Forc
     return fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=3.0), [design], push
 
 
-def test_a_symmetric_mechanism_has_the_optimum_of_its_half():
-    found, regulariser = [], ShapeBounds() + 1e-2 * StayClose()  # a well-conditioned optimum
+@pytest.mark.parametrize("moved", [False, True])
+def test_a_symmetric_mechanism_has_the_optimum_of_its_half(moved):
+    # a well-conditioned optimum
+    found, regulariser = [], ShapeBounds() + fm.NumberBounds() + 1e-2 * StayClose()
     for half, force in ((True, 1.0), (False, 2.0)):
         sim, designs, push = guided(half=half)
         drawn = sim.load_displacement(push, forces=[force, 2.0 * force]).displacements
         pairs = zip((1.0, 2.0), (1.2, 1.3), drawn, strict=True)
         targets = [fm.Target(push, force=f * force, displacement=factor * float(u)) for f, factor, u in pairs]
+        feet = [joint for joint in sim.scene.mechanism.joints if joint.at[1] == 0.0]
+        shift = fm.JointPosition(*feet, direction=[(1, 0), (-1, 0)][: len(feet)])
+        designs = [*designs, fm.Number(shift, -2.0, 2.0)] if moved else designs
         found.append(fm.DesignProblem(sim, designs, targets=targets, regulariser=regulariser).optimise(**EXACT))
     one, both = found
+    assert [n.value for n in both.numbers] == pytest.approx([n.value for n in one.numbers], abs=1e-7)
+    assert all(abs(number.value) > 0.01 for number in one.numbers)
     assert both.links[0].mirrored == ("leg 1",)
     assert both.links[0].parameters == pytest.approx(one.links[0].parameters, abs=1e-8)
     assert both.objective[1] == pytest.approx(one.objective[1], rel=1e-8)
