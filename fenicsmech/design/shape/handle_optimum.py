@@ -24,7 +24,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 from fenicsmech.design.shape.handles import LinkHandles
 from fenicsmech.design.shape.quality import QualitySum
 from fenicsmech.design.shape.shape_map import ShapeMap
-from fenicsmech.errors import FenicsmechError
+from fenicsmech.errors import FenicsmechError, set_options
 from fenicsmech.log import logger
 
 _log = logger(__name__)
@@ -47,6 +47,9 @@ class HandleOptions:
         turn: largest turn of a joint in one step, rad.
         kept: part of the gap to the next handle that one step must leave.
         flattest: least eigenvalue of the Hessian in a step, relative to the largest.
+
+    Raises:
+        DescriptionError: a number is out of its range.
     """
 
     iterations: int = 60
@@ -57,6 +60,10 @@ class HandleOptions:
     turn: float = 0.5
     kept: float = 0.2
     flattest: float = 1e-8
+
+    def __post_init__(self) -> None:
+        parts = ("armijo", "shortest", "kept", "flattest")
+        set_options(self, "optimal handle positions", below_one=parts, iterations=1, halvings=0)
 
 
 @dataclass(frozen=True, eq=False)
