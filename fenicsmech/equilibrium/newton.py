@@ -47,7 +47,7 @@ from fenicsmech.equilibrium.linearisation import EquilibriumPoint, NotConverged
 from fenicsmech.equilibrium.solver import EquilibriumMethod, EquilibriumSolver
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
-from fenicsmech.errors import positive, whole
+from fenicsmech.errors import not_negative, set_options
 from fenicsmech.log import logger
 
 _log = logger(__name__)
@@ -87,12 +87,8 @@ class PrimalDualNewton(EquilibriumMethod):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for limit in ("near", "largest_turn", "divergence"):
-            positive(f"Newton's {limit}", getattr(self, limit))
-        for limit, least in (("iterations", 1), ("watchdog", 0), ("path_iterations", 1)):
-            whole(f"Newton's {limit}", getattr(self, limit), least=least)
-        if self.reuse_factor != 0.0:
-            positive("Newton's reuse_factor", self.reuse_factor)
+        set_options(self, "Newton's method", free=("reuse_factor",), iterations=1, watchdog=0, path_iterations=1)
+        not_negative("reuse_factor of Newton's method", self.reuse_factor)
 
     def solver(self, system: EquilibriumSystem) -> NewtonSolver:
         return NewtonSolver(system, self)
