@@ -137,7 +137,7 @@ from fenicsmech.mechanism import (
     strip,
 )
 from fenicsmech.model import SPACES, Design, Fidelity
-from fenicsmech.multibody import BodyPoint, Freedom, JointChange, Linkage, PosePotential
+from fenicsmech.multibody import BodyPoint, Freedom, JointChange, Linkage, PlacedPoint, PosePotential
 from fenicsmech.plot import CurveMark, CurveSeries, CurveTarget, Trace, plot_curve
 from fenicsmech.quantities import (
     CentrelineLength,
@@ -233,7 +233,7 @@ __all__ = [
     # numbers that designs change in addition to shapes; NumberKind for kinds of your own
     "Number", "Depth", "LawParameter", "SpringStiffness", "SpringRest", "MotorOffset", "JointPosition", "JointAxis",
     "NumberBounds", "NumberDesign", "NumberKind", "ModelNumber", "EffectNumber", "NumberTerms",
-    "JointChange",
+    "JointChange", "PlacedPoint",
     # errors
     "FenicsmechError", "DescriptionError", "MeshingError", "AssemblyError", "EquilibriumError",
     "OutOfMemoryError",

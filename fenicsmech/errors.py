@@ -7,7 +7,8 @@ raises a ``DescriptionError`` that starts with ``part``.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import fields
 from numbers import Integral
 from typing import Any
 
@@ -85,6 +86,14 @@ def positive(part: str, value: Any) -> float:
     number = finite(part, value)
     if number <= 0.0:
         raise DescriptionError(part, f"{number:g} is not positive", "Give a number greater than zero")
+    return number
+
+
+def not_negative(part: str, value: Any) -> float:
+    """``value`` as a float of at least zero."""
+    number = finite(part, value)
+    if number < 0.0:
+        raise DescriptionError(part, f"{number:g} is negative", "Give zero or a greater number")
     return number
 
 
@@ -187,3 +196,26 @@ def set_fields(frozen: object, **values: Any) -> None:
     """Sets fields of a frozen dataclass to their checked values, for its ``__post_init__``."""
     for name, value in values.items():
         object.__setattr__(frozen, name, value)
+
+
+def set_options(
+    options: Any, of: str, *, free: Collection[str] = (), below_one: Collection[str] = (), **least: int
+) -> None:
+    """Sets the numbers of an options record, a frozen dataclass, to their checked values, for its ``__post_init__``.
+
+    Args:
+        options: its fields with a float as default are positive numbers.
+        of: what they are options of.
+        free: those of these fields that may be any finite number.
+        below_one: those that are below one.
+        least: of the fields that are whole numbers.
+    """
+    for field in fields(options):
+        name, part, value = field.name, f"{field.name} of {of}", getattr(options, field.name)
+        if name in least:
+            set_fields(options, **{name: whole(part, value, least=least[name])})
+        elif isinstance(field.default, float):
+            number = (finite if name in free else positive)(part, value)
+            if name in below_one and number >= 1.0:
+                raise DescriptionError(part, f"{number:g} is not below 1", "Give a number between 0 and 1")
+            set_fields(options, **{name: number})

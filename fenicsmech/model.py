@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
@@ -37,6 +37,7 @@ from fenicsmech.mechanism import (
     FlexibleLink,
     Force,
     Material,
+    MaterialPoint,
     Mechanism,
     MeshPart,
     Output,
@@ -59,7 +60,16 @@ from fenicsmech.meshing import (
     mesh_link,
     same_mesh,
 )
-from fenicsmech.multibody import BodyPoint, DesignAtNodes, InterfaceMap, Linkage, LinkPoint, idle_spins, link_point
+from fenicsmech.multibody import (
+    BodyPoint,
+    DesignAtNodes,
+    InterfaceMap,
+    Linkage,
+    LinkPoint,
+    PlacedPoint,
+    idle_spins,
+    link_point,
+)
 
 SPACES = {model.name: model for model in (SPATIAL, MID_PLANE_SYMMETRIC, PLANE_STRESS, PLANE_STRAIN)}
 """Names of the elastic models, as users type them."""
@@ -173,10 +183,17 @@ def fits(scene: Scene, model: ElasticModel) -> bool:
     return True
 
 
-def check_links(mechanism: Mechanism, shapes: Sequence[Shape], linkage: Linkage, fidelity: Fidelity) -> None:
-    """Checks links of some shapes, joints and points before anything is meshed."""
+def check_links(
+    mechanism: Mechanism,
+    shapes: Sequence[Shape],
+    linkage: Linkage,
+    fidelity: Fidelity,
+    placed: Collection[MaterialPoint] = (),
+) -> None:
+    """Checks links of some shapes, joints, and points that are not ``placed`` elsewhere, before anything is meshed."""
+    parts = [part for part in (*mechanism.forces, *mechanism.outputs) if part.material not in placed]
     for link, shape in zip(mechanism.flexible_links, shapes, strict=True):
-        points = {part.name: part.at for part in (*mechanism.forces, *mechanism.outputs) if part.on == link}
+        points = {part.name: part.at for part in parts if part.on == link}
         check_link(link.name, shape, points=points, **_mesh_options(link, linkage, fidelity))
 
 
@@ -275,6 +292,7 @@ class MechanismModel:
         clock: of the phases.
         mixed: whether each flexible link is in the u–p formulation.
         effects: of the scene.
+        placed: points of links that are elsewhere than drawn.
         effect_potentials: potentials of body poses of each effect.
         potentials: all of these.
         spring_potentials: those of springs, which act from the start.
@@ -290,7 +308,9 @@ class MechanismModel:
         effects: Sequence[Effect] = (),
         materials: Sequence[Material] | None = None,
         shapes: Sequence[Shape] | None = None,
+        placed: Mapping[MaterialPoint, PlacedPoint] | None = None,
     ) -> None:
+        self.placed = dict(placed or {})
         self.mechanism, self.linkage, self.mesh, self.clock = mechanism, linkage, mesh, clock
         self.effects, links = tuple(effects), mechanism.flexible_links
         self.materials = tuple(link.material for link in links) if materials is None else tuple(materials)
@@ -467,6 +487,11 @@ class MechanismModel:
         """The material point, or region, of a force or output."""
         if not isinstance(part.on, FlexibleLink):
             return self.linkage.point(part.on, part.at)
+        if (placed := self.placed.get(part.material)) is not None:
+            found = self._link_points(f"{part.name!r}", part.on, placed.positions, self.elastic.u, placed=True)
+            weights = [own * point.weights for own, point in zip(placed.weights, found, strict=True)]
+            nodes, node = np.unique(np.concatenate([point.global_nodes for point in found]), return_inverse=True)
+            return LinkPoint(nodes, np.bincount(node, np.concatenate(weights)))
         if part.region is not None:
             links = self.mechanism.flexible_links
             return region_average(part, self._drawn(part.at), self.mesh, self.elastic, links)
@@ -475,12 +500,30 @@ class MechanismModel:
 
     def rest_position(self, part: Force | Output) -> np.ndarray:
         """Position of the point of a force or output at the present rest shape, (dim,); its mean over a region."""
-        drawn = np.array(in_dimension(part.at, self.linkage.dim))
+        if (placed := self.placed.get(part.material)) is not None:
+            drawn = (placed.weights @ placed.positions)[: self.linkage.dim]
+        else:
+            drawn = np.array(in_dimension(part.at, self.linkage.dim))
         if not isinstance(part.on, FlexibleLink):
             return drawn
         design = fem.Function(self.elastic.u.function_space)
         design.x.array[:] = self.design_nodes.values(self.elastic.design).ravel()
         return drawn + self.point(part).displacement(design, self.linkage.joints.drawn)[: self.linkage.dim]
+
+    def placed_point(self, material: MaterialPoint) -> PlacedPoint:
+        """A point of a flexible link, or the nodes in a region of it with their weights, at the present rest shape."""
+        link, at, region = material
+        point = self.point(Output(link, at, (), f"point of {link.name}", region))
+        assert isinstance(point, LinkPoint)
+        nodes = self.elastic.drawn_nodes + self.design_nodes.values(self.elastic.design)
+        first, last = self.elastic.u.function_space.dofmap.index_map.local_range
+        mine = (first <= point.global_nodes) & (point.global_nodes < last)
+        positions = np.zeros((len(mine), nodes.shape[1]))
+        positions[mine] = nodes[point.global_nodes[mine] - first]
+        positions = self.mesh.comm.allreduce(positions)
+        if region is None:
+            return PlacedPoint((point.weights @ positions)[None], np.ones(1))
+        return PlacedPoint(positions, point.weights)
 
     def position(self, part: Force | Output, state: State) -> np.ndarray:
         """Position of the point of a force or output in the loaded ``state``, (dim,)."""
@@ -499,9 +542,15 @@ class MechanismModel:
         return csr_matrix(weights)
 
     def _link_points(
-        self, part: str, link: FlexibleLink, positions: Iterable[Sequence[float]], field: fem.Function
+        self,
+        part: str,
+        link: FlexibleLink,
+        positions: Iterable[Sequence[float]],
+        field: fem.Function,
+        *,
+        placed: bool = False,
     ) -> list[LinkPoint]:
-        """The points drawn at ``positions`` on a link, with the weights of a field there."""
+        """The points drawn, or ``placed``, at ``positions`` on a link, with the weights of a field there."""
         mesh, elastic = self.mesh.mesh, self.elastic
         owned = mesh.topology.index_map(mesh.topology.dim).size_local
         cells = np.flatnonzero(self.mesh.link[:owned] == self.mechanism.flexible_links.index(link))
@@ -509,7 +558,12 @@ class MechanismModel:
         if elastic.bulge is None:
             bulges = np.zeros_like(bulges)
         corners = self.mesh.corners(cells)
-        return [link_point(part, self._drawn(at), field, cells, corners, bulges) for at in positions]
+        if placed:  # those of whole links stand for both halves
+            points = np.array(positions)
+            points[:, 2:] = np.abs(points[:, 2:]) if elastic.model.half else points[:, 2:]
+        else:
+            points = np.array([self._drawn(at) for at in positions])
+        return [link_point(part, at, field, cells, corners, bulges, placed=placed) for at in points]
 
     def _drawn(self, at: Sequence[float]) -> np.ndarray:
         """A drawn point on the mesh; where the mechanism moves in the plane, at any height it is on the mid-plane."""

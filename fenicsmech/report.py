@@ -6,7 +6,7 @@
 ``curve.csv``          displacement, force, stability, energy, stress and estimated error of every equilibrium
 ``deformed.xdmf``      displacements and stresses of every equilibrium, for ParaView
 ``links.png``          the links before and after an optimisation
-``links/``             STEP and STL of every link that has changed
+``links/``             STEP and STL of every link that has changed; ``parts.json`` counts the equal ones
 ``design.json``        the design, for ``DesignResult.load``
 ``checkpoint.json``    the last iterate of an optimisation by ``design_study``
 ``summary.json``       all figures
@@ -151,7 +151,7 @@ def design_study(
 
     Raises:
         DescriptionError: there are no curves, two of one configuration or one of motors, a checkpoint in the folder
-            belongs to another problem, or a force or an output is at a point of a link that may change.
+            belongs to another problem.
         EquilibriumError: the drawn design does not carry its loads, or the optimum not those of a curve.
         MeshingError: a part cannot be written or meshed.
         OSError: the folder or a file cannot be written.

@@ -25,7 +25,7 @@ from fenicsmech.equilibrium import (
     State,
     Step,
 )
-from fenicsmech.errors import DescriptionError, positive
+from fenicsmech.errors import set_options
 from fenicsmech.log import logger
 
 _log = logger(__name__)
@@ -47,7 +47,7 @@ class ArcSteps:
         iterations: number per step that step sizes aim at; the last one only determines the stability.
 
     Raises:
-        DescriptionError: a length is not positive, or the tolerance not between 0 and 1.
+        DescriptionError: a number is not positive, the tolerance not below 1, or the number of iterations not whole.
     """
 
     first: float = 0.02
@@ -60,12 +60,7 @@ class ArcSteps:
     iterations: int = 5
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            positive(f"{name} of arc-length steps", value)
-        if not self.tolerance < 1.0:
-            raise DescriptionError(
-                "tolerance of arc-length steps", f"{self.tolerance:g} is not below 1", "Give a part of a step, as 1e-4"
-            )
+        set_options(self, "arc-length steps", below_one=("tolerance",), iterations=1)
 
 
 @dataclass(frozen=True)

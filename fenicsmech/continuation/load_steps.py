@@ -29,6 +29,7 @@ import numpy as np
 
 from fenicsmech.continuation.stepper import Predictor, Stepper, TangentPredictor
 from fenicsmech.equilibrium import Control, EquilibriumPoint, EquilibriumSolver, NotConverged, State, Step
+from fenicsmech.errors import not_negative, set_fields, set_options
 from fenicsmech.log import logger
 
 _log = logger(__name__)
@@ -56,6 +57,9 @@ class LoadSteps:
             modes, which would leave it singular.
         shift_factors: of ``minimum_shift``, tried in order: a shift slows Newton's method down where soft springs or
             forces hold zero-energy modes with a smaller stiffness.
+
+    Raises:
+        DescriptionError: a number is not positive, a factor is negative, or the number of iterations not whole.
     """
 
     smallest: float = 1.0 / 1024.0
@@ -70,6 +74,11 @@ class LoadSteps:
     smallest_snap_step: float = 1.0 / 64.0
     minimum_shift: float = 1e-10
     shift_factors: tuple[float, ...] = (1.0, 1e-3, 0.0)
+
+    def __post_init__(self) -> None:
+        set_options(self, "load steps", iterations=1)
+        factors = tuple(not_negative("shift factor of load steps", factor) for factor in self.shift_factors)
+        set_fields(self, shift_factors=factors)
 
 
 class LoadStepsFailed(Exception):

@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from fenicsmech.equilibrium import ArcMetric, EquilibriumPoint, EquilibriumSolver, EquilibriumSystem, State, Step
+from fenicsmech.errors import set_options
 
 
 class Predictor(ABC):
@@ -51,9 +52,15 @@ class HermitePredictor(Predictor):
 
     Attributes:
         extrapolation: longest one, over the distance between the two equilibria: the error grows as t⁴.
+
+    Raises:
+        DescriptionError: it is not a positive number.
     """
 
     extrapolation: float = 4.0
+
+    def __post_init__(self) -> None:
+        set_options(self, "predictions")
 
     def predict(self, system, points, width, ahead):
         if len(points) == 1 or abs(ahead) > self.extrapolation * abs(width):

@@ -19,6 +19,7 @@ from fenicsmech.design.objective import Objective, group_count, sample_numbers, 
 from fenicsmech.design.optimisers.bfgs import BFGS
 from fenicsmech.design.optimisers.levenberg_marquardt import LevenbergMarquardt, Resolution
 from fenicsmech.design.optimisers.problem import (
+    Deferred,
     Evaluation,
     Inequalities,
     Infeasible,
@@ -38,13 +39,7 @@ from fenicsmech.design.result import DesignResult, LinkDesign, PartValue, Target
 from fenicsmech.design.run import Checkpoint, DesignProgress, Round, minimise_together
 from fenicsmech.design.search import Scatter, Search, SearchResult, StartResult
 from fenicsmech.design.shape.edges import MidEdgeNodes, edge_weights
-from fenicsmech.design.shape.handle_optimum import (
-    HandleOptimum,
-    MapDerivatives,
-    ShapeError,
-    by_positions,
-    follow_spline,
-)
+from fenicsmech.design.shape.handle_optimum import HandleOptimum, ShapeError, follow_spline, motion
 from fenicsmech.design.shape.handles import BETWEEN, LinkHandles
 from fenicsmech.design.shape.quality import Barrier, QualitySum
 from fenicsmech.design.shape.shape_map import LinkParameters, ShapeMap, ShapeRequest, shape_link, shape_links

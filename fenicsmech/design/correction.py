@@ -35,7 +35,7 @@ from fenicsmech.design.run import Checkpoint, DesignProgress, Optimum, Round, Sa
 from fenicsmech.design.shape.handle_optimum import HandlePlacement, ShapeError
 from fenicsmech.design.target import Comparison, check_sensitivities
 from fenicsmech.design.transfer import WholeState
-from fenicsmech.errors import EquilibriumError, positive
+from fenicsmech.errors import EquilibriumError, set_options
 from fenicsmech.log import logger
 from fenicsmech.quantities import Sample
 
@@ -59,7 +59,7 @@ class Correction:
         rounds: maximum number of rounds.
 
     Raises:
-        DescriptionError: a number is not positive.
+        DescriptionError: a number is not positive, or that of rounds not whole.
     """
 
     estimates: bool = True
@@ -69,8 +69,7 @@ class Correction:
     rounds: int = 8
 
     def __post_init__(self) -> None:
-        for name in ("change", "resolved", "contraction", "rounds"):
-            positive(f"{name} of the correction", getattr(self, name))
+        set_options(self, "the correction", rounds=1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from fenicsmech.collective import from_one
 from fenicsmech.design.numbers import Number
 from fenicsmech.design.shape.shape_map import ImageRequest, ShapeRequest
 from fenicsmech.design.shape.spline import lay_out
-from fenicsmech.errors import DescriptionError, expect, finite, points, positive, set_fields, whole
+from fenicsmech.errors import DescriptionError, expect, finite, point_text, points, positive, set_fields, whole
 from fenicsmech.mechanism import Centreline, FlexibleLink, Mechanism, Shape, Strip
 from fenicsmech.meshing import Figure, LinkOutline, find_centreline, link_outline, matches
 from fenicsmech.model import check_numbers, plan_sites
@@ -200,6 +200,7 @@ def shape_request(
         found = find_centreline(outline, reach, design.ends, part=part) if line is None else line
         centreline = Centreline(found, part=part)
     images = _images(design, mechanism, linkage, known)
+    _check_shifts(link, images, mechanism, linkage, numbers)
     everywhere = zip([link, *(mechanism.flexible_links[image.link] for image in images)], [None, *images], strict=True)
     turns = [
         [linkage.turns_about_z(linkage.interfaces[own][k]) for k in (range(len(bodies)) if i is None else i.sites)]
@@ -261,6 +262,38 @@ def _images(
     return tuple(found)
 
 
+def joint_shifts(number: Number, link: FlexibleLink, linkage: Linkage) -> np.ndarray:
+    """Shifts of the joints of a link in the plane by a unit of a number, (sites, 2)."""
+    shifts = np.zeros((len(linkage.interfaces[link]), 2))
+    for joint, change in number.kind.changes(linkage.dim).items():
+        if link in (joint.a, joint.b):
+            shifts[linkage.site(link, joint)] = change.shift[:2]
+    return shifts
+
+
+def _check_shifts(
+    link: FlexibleLink,
+    images: Sequence[ImageRequest],
+    mechanism: Mechanism,
+    linkage: Linkage,
+    numbers: Sequence[Number],
+) -> None:
+    """Refuses numbers that shift joints of a link and of its images otherwise than as images of one another."""
+    for number, image in ((number, image) for number in numbers for image in images):
+        other = mechanism.flexible_links[image.link]
+        wanted = image.isometry.vectors(joint_shifts(number, link, linkage))
+        given = joint_shifts(number, other, linkage)[image.sites]
+        unlike = np.flatnonzero(np.linalg.norm(given - wanted, axis=1) > _AGREE)
+        if len(unlike):
+            site = linkage.bodies[linkage.interfaces[other][image.sites[unlike[0]]]].name
+            pair = point_text(np.round(wanted[unlike[0]], 6)), point_text(given[unlike[0]])
+            raise DescriptionError(
+                str(number),
+                f"the image of {link.name!r} in {other.name!r} has {site!r} shifted along {pair[0]}, not {pair[1]}",
+                "Name this joint with its own direction, as JointPosition(left, right, direction=[(1, 0), (-1, 0)])",
+            )
+
+
 def check_designs(designs: Sequence[SplineDesign | Number]) -> None:
     """Refuses an empty list of designs, and two designs of one link or number, with a DescriptionError."""
     if not designs:
@@ -278,16 +311,11 @@ def check_designs(designs: Sequence[SplineDesign | Number]) -> None:
         if names.count(name) > 1:
             raise DescriptionError(f"design of link {name!r}", "it is given twice", "Give each link once")
     for shape in (shape for shape in shapes if len(shape.links) > 1):
-        for link in taken_along(numbers):
-            if link in shape.links:
-                raise DescriptionError(
-                    f"design of link {shape.link.name!r}",
-                    f"it is shared, and joints of {link.name!r} are shifted",
-                    "Design such links each on its own, or leave their joints where they are",
-                )
         for kind in (number.kind for number in numbers):
             missing = [link.name for link in shape.links if link not in kind.reshaped]
             if 0 < len(missing) < len(shape.links):
                 raise DescriptionError(
-                    str(kind), f"{missing[0]!r} shares the shape of {shape.link.name!r}", "Name all links that do"
+                    str(kind),
+                    f"{missing[0]!r} shares the shape of {shape.link.name!r}",
+                    "Name all links that do, or the joints of all",
                 )

@@ -22,12 +22,20 @@ from fenicsmech.design.optimisers.levenberg_marquardt import LevenbergMarquardt
 from fenicsmech.design.optimisers.problem import Optimiser
 from fenicsmech.design.optimisers.sqp import SQP
 from fenicsmech.design.regularisers import MeshQuality, NumberBounds, Regulariser, ShapeBounds, StayClose
-from fenicsmech.design.result import DesignResult, draw_links, link_designs, rest_meshes, target_results, write_solids
+from fenicsmech.design.result import (
+    DesignResult,
+    draw_links,
+    link_designs,
+    rest_meshes,
+    target_results,
+    write_parts,
+    write_solids,
+)
 from fenicsmech.design.run import Checkpoint, fingerprint
 from fenicsmech.design.search import Scatter, Search, SearchResult
 from fenicsmech.design.shape.handle_optimum import HandlePlacement
 from fenicsmech.design.target import Target
-from fenicsmech.design.verification import part_simulations, verified_parts
+from fenicsmech.design.verification import part_simulations, placed_points, verified_parts
 from fenicsmech.errors import DescriptionError
 from fenicsmech.log import Clock, logger
 from fenicsmech.mechanism import FlexibleLink, Joint
@@ -236,7 +244,8 @@ class DesignProblem:
     ) -> None:
         """Writes ``NAME.step`` and ``NAME.stl`` of every link whose shape or depth may change, in mm.
 
-        Lengths in another unit are written as they are, with a warning.
+        Each is at its place in the mechanism. ``parts.json`` lists how many to make of each part: links that share a
+        shape are the same part. Lengths in another unit are written as they are, with a warning.
 
         Args:
             folder: where to; it is created.
@@ -253,7 +262,14 @@ class DesignProblem:
         links, given = self._own.changed, self._own.given(design)
         solids, mechanism = self._meshes(links, given), self.simulation.scene.mechanism
         linkage = build_linkage(mechanism, self.simulation.linkage.dim, self._moved(given[0]))
-        on_one(self.simulation.comm, lambda: write_solids(folder, linkage, links, *solids, pin_diameter))
+        shared = [own.links for own in self._own.shapes]
+        alone = [(link,) for link in links if not any(link in own for own in shared)]
+
+        def write() -> None:
+            write_solids(folder, linkage, links, *solids, pin_diameter)
+            write_parts(folder, [*shared, *alone], dict(zip(links, solids[1], strict=True)))
+
+        on_one(self.simulation.comm, write)
 
     def verify(self, result: DesignResult, folder: str | Path | None = None, *, finer: float = 2.0) -> DesignResult:
         """The result with the values of its targets in the parts to be made.
@@ -267,8 +283,7 @@ class DesignProblem:
             finer: ratio of the simulation's element size to that of the parts.
 
         Raises:
-            DescriptionError: the result belongs to other links or targets, or a force or an output is at a point of a
-                link that may change.
+            DescriptionError: the result belongs to other links or targets.
             MeshingError: a part cannot be written or meshed.
         """
         if [target.name for target in result.targets] != [target.name for target in self.targets]:
@@ -277,11 +292,13 @@ class DesignProblem:
                 "the result belongs to other targets",
                 "Give a result of this problem",
             )
-        links, given = self._own.changed, self._own.given(result)
+        links, given, model = self._own.changed, self._own.given(result), self.simulation.model
         solids = self._meshes(links, given)
+        with model.shaped(self._own.rest.design(*given)):
+            placed = placed_points(self.simulation, links, self.targets)
         with TemporaryDirectory() as temporary:  # only the first process writes and reads
             folder, moved = Path(folder or temporary), self._moved(given[0])
-            coarse, fine = part_simulations(self.simulation, links, *solids, folder, finer, moved)
+            coarse, fine = part_simulations(self.simulation, links, *solids, folder, finer, moved, placed)
             verified = verified_parts(result, coarse, fine, self.targets, links)
         return self.simulation.comm.bcast(verified, root=0)
 

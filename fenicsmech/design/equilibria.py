@@ -44,7 +44,7 @@ from fenicsmech.equilibrium import (
     NotConverged,
     State,
 )
-from fenicsmech.errors import AssemblyError, EquilibriumError
+from fenicsmech.errors import AssemblyError, EquilibriumError, set_options
 from fenicsmech.model import Design
 from fenicsmech.quantities import (
     Displacement,
@@ -73,6 +73,9 @@ class FollowOptions:
             configuration: up to 0.3 between plane stress and 3D, more where motors strain links, 2.8 and more across
             folds.
         rounding: misses below this part of the mechanism's length, or rad, are rounding.
+
+    Raises:
+        DescriptionError: a number is out of its range.
     """
 
     load_steps: int = 8
@@ -81,6 +84,9 @@ class FollowOptions:
     largest_transfer_miss: float = 8.0
     farthest_transfer: float = 1.0
     rounding: float = 1e-6
+
+    def __post_init__(self) -> None:
+        set_options(self, "following equilibria", load_steps=1, halvings=0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -425,13 +431,18 @@ class SampleEquilibria:
         return found.state
 
     def _solved(self, path: _Path, start: State, control: Control) -> EquilibriumPoint:
-        """The stable equilibrium that Newton's method finds from ``start``."""
+        """The stable equilibrium that Newton's method finds from ``start``, where all potentials hold."""
         try:
             found = path.solver.solve(start, control)
         except NotConverged as failure:
             raise _Lost(f"no equilibrium under {path.sample} ({failure.reason})") from failure
         if found.unstable_under_control:
             raise Infeasible(_unstable(path.sample))
+        try:
+            for potential in path.solver.system.potentials:
+                potential.check_step(start.poses, found.state.poses)
+        except EquilibriumError as error:
+            raise Infeasible(str(error)) from error
         return found
 
     def _missed(self, path: _Path, found: EquilibriumPoint, start: State, back: State, missing: PETSc.Vec) -> float:

@@ -23,7 +23,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from fenicsmech.compat import cell_dofs, original_cells, owned_values, vector_space
-from fenicsmech.design.description import Bounds, SplineDesign, shape_requests
+from fenicsmech.design.description import Bounds, SplineDesign, joint_shifts, shape_requests
 from fenicsmech.design.numbers import TYPICAL, Number, ScaledNumbers
 from fenicsmech.design.shape.edges import MidEdgeNodes
 from fenicsmech.design.shape.handle_optimum import HandleOptimum, HandlePlacement, ShapeError
@@ -147,10 +147,7 @@ class ParametricShape:
         link = self._model.mechanism.flexible_links[shape.own.link]
         sites = shape.handles.site[shape.handles.site != BETWEEN].tolist()  # in order along the spline
         for column, number in enumerate(self.numbers.numbers, start=self.of_numbers.start):
-            shifts = np.zeros((len(sites), 2))
-            for joint, change in number.kind.changes(linkage.dim).items():
-                if link in (joint.a, joint.b):
-                    shifts[sites.index(linkage.site(link, joint))] = change.shift[:2]
+            shifts = joint_shifts(number, link, linkage)[sites]
             if np.any(shifts):
                 width = self.numbers.width[column - self.of_numbers.start]
                 matrix[:, column] = np.einsum("sja,ja->s", spline.following(), shifts) * width

@@ -25,7 +25,7 @@ from fenicsmech.design.rest_shape import DesignedLink, ParametricShape
 from fenicsmech.design.result import DesignResult, read_result
 from fenicsmech.design.run import Checkpoint
 from fenicsmech.design.shape.handle_optimum import HandlePlacement, ShapeError
-from fenicsmech.errors import EquilibriumError, counted, positive, whole
+from fenicsmech.errors import EquilibriumError, counted, set_options
 from fenicsmech.log import Progress
 from fenicsmech.model import Design
 from fenicsmech.polygons import first_crossing
@@ -57,10 +57,7 @@ class Scatter:
     distinct: float = 1.0
 
     def __post_init__(self) -> None:
-        for name, least in (("starts", 1), ("seed", 0), ("attempts", 1), ("trial", 1)):
-            whole(f"{name} of a search", getattr(self, name), least=least)
-        for name in ("spread", "distinct"):
-            positive(f"{name} of a search", getattr(self, name))
+        set_options(self, "a search", starts=1, seed=0, attempts=1, trial=1)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ goal-oriented estimates give the error of the part's own mesh.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -26,13 +26,13 @@ from fenicsmech.design.result import DesignResult, PartValue, component_values, 
 from fenicsmech.design.target import Comparison, Target
 from fenicsmech.design.transfer import WholeState
 from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, SPATIAL
-from fenicsmech.errors import DescriptionError, MeshingError, positive
+from fenicsmech.errors import MeshingError, positive
 from fenicsmech.export import write_step
 from fenicsmech.log import logger
-from fenicsmech.mechanism import FlexibleLink, Joint, step_file
+from fenicsmech.mechanism import FlexibleLink, Joint, MaterialPoint, in_dimension, step_file
 from fenicsmech.meshing import LinkMesh
 from fenicsmech.model import Design, Fidelity, fits
-from fenicsmech.multibody import JointChange
+from fenicsmech.multibody import JointChange, PlacedPoint
 from fenicsmech.quantities import Sample
 from fenicsmech.simulation import Simulation
 
@@ -47,35 +47,43 @@ def part_simulations(
     folder: Path,
     finer: float,
     moved: Mapping[Joint, JointChange],
+    placed: Mapping[MaterialPoint, PlacedPoint],
 ) -> tuple[Simulation, Simulation]:
     """The scene with ``links`` read from the STEP files of their ``meshes``, which this writes to ``folder``.
 
-    Joints are drawn where they are ``moved`` to. In space half the depth is meshed where the scene allows it: exported
-    links are symmetric.
+    Joints are drawn where they are ``moved`` to, and points of links where they are ``placed`` (``placed_points``). In
+    space half the depth is meshed where the scene allows it: exported links are symmetric.
 
     Returns:
         Simulations with elements as large as those of ``simulation``, and with ``finer`` ones; nothing is meshed yet.
 
     Raises:
-        DescriptionError: a point of a force or an output is on one of the links, so that its place in the part is not
-            known; or ``finer`` is not positive.
+        DescriptionError: ``finer`` is not positive.
         MeshingError: a part cannot be written or read.
     """
-    scene, finer = simulation.scene, positive("refinement of the part's mesh", finer)
-    for point in (*scene.mechanism.forces, *scene.mechanism.outputs):
-        if point.on in links:
-            raise DescriptionError(
-                f"verification of {scene.mechanism.name!r}",
-                f"{point.name!r} is at a point of {point.on.name!r}, whose place in the part is not known",
-                "Join a rigid link there, and let it act on that",
-            )
+    finer = positive("refinement of the part's mesh", finer)
     on_one(simulation.comm, lambda: _write(folder, links, meshes, depths))
     files = zip(links, depths, strict=True)
     shapes = {link: step_file(solid_path(folder, link, ".step"), depth=depth) for link, depth in files}
     coarse, fine = (
-        simulation.with_shapes(shapes, fidelity=_finer(simulation, factor), moved=moved) for factor in (1.0, finer)
+        simulation.with_shapes(shapes, fidelity=_finer(simulation, factor), moved=moved, placed=placed)
+        for factor in (1.0, finer)
     )
     return coarse, fine
+
+
+def placed_points(
+    simulation: Simulation, links: Collection[FlexibleLink], targets: Sequence[Target]
+) -> dict[MaterialPoint, PlacedPoint]:
+    """Where the points of ``links`` that forces, outputs and targets refer to are in the shape that the model has.
+
+    Designs move material points X to X + d(X). Averages over regions become sums over the nodes in them, each with its
+    share, so that every part of a region keeps its share of a force.
+    """
+    mechanism = simulation.scene.mechanism
+    points = [part.material for part in (*mechanism.forces, *mechanism.outputs)]
+    points += [point for target in targets for point in target.quantity.material_points]
+    return {point: simulation.model.placed_point(point) for point in dict.fromkeys(points) if point[0] in links}
 
 
 def _write(folder: Path, links: Sequence[FlexibleLink], meshes: Sequence[LinkMesh], depths: Sequence[float]) -> None:
@@ -88,7 +96,9 @@ def _finer(simulation: Simulation, factor: float) -> Fidelity:
     fidelity = simulation.fidelity
     layers = None if fidelity.layers is None else math.ceil(factor * fidelity.layers)
     sizes = {link: size / factor for link, size in fidelity.sizes.items()}
-    if fidelity.model is SPATIAL and fits(simulation.scene, MID_PLANE_SYMMETRIC):
+    mechanism = simulation.scene.mechanism
+    off_plane = any(in_dimension(part.at, 3)[2] for part in (*mechanism.forces, *mechanism.outputs))
+    if fidelity.model is SPATIAL and fits(simulation.scene, MID_PLANE_SYMMETRIC) and not off_plane:
         half = None if layers is None else math.ceil(0.5 * layers)
         return replace(fidelity, model=MID_PLANE_SYMMETRIC, sizes=sizes, layers=half)
     return replace(fidelity, sizes=sizes, layers=layers)

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from ufl import Identity, as_matrix, det, diff, dot, inner, tr, variable
 from ufl.core.expr import Expr
 
-from fenicsmech.errors import DescriptionError, whole
+from fenicsmech.errors import DescriptionError, finite, set_fields, whole
 from fenicsmech.laws import Law, NeoHookean, Strain, spatial_strain
 from fenicsmech.mechanism import Material
 
@@ -186,10 +186,12 @@ class MixedFormulation(Formulation):
     above: float = LOCKING
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.above < 0.5:
+        above = finite("limit of Poisson's ratio of the mixed formulation", self.above)
+        if not 0.0 <= above < 0.5:
             raise DescriptionError(
-                "mixed formulation", f"its limit of Poisson's ratio is {self.above!r}", "Give one from 0 to below 0.5"
+                "mixed formulation", f"its limit of Poisson's ratio is {above:g}", "Give one from 0 to below 0.5"
             )
+        set_fields(self, above=above)
 
     def mixed(self, materials, model, order):
         found = tuple(model.confined and order > 1 and material.law.nu > self.above for material in materials)

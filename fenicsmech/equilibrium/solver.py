@@ -21,7 +21,7 @@ from fenicsmech.equilibrium.linearisation import (
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 from fenicsmech.equilibrium.two_level import BySize
-from fenicsmech.errors import counted, expect, positive
+from fenicsmech.errors import counted, expect, positive, set_fields
 
 _STEP = 1e-6  # relative error that iterative solvers may leave in steps and tangents: the next iteration corrects it
 
@@ -45,8 +45,8 @@ class EquilibriumMethod(ABC):
     linear: LinearMethod = field(default_factory=BySize)
 
     def __post_init__(self) -> None:
-        for limit in ("tolerance", "roundoff"):
-            positive(f"Newton's {limit}", getattr(self, limit))
+        for name in ("tolerance", "roundoff"):
+            set_fields(self, **{name: positive(f"{name} of Newton's method", getattr(self, name))})
         expect("linear systems", self.linear, LinearMethod, "a method", "Give BySize(…), Direct() or TwoLevel(…)")
 
     @abstractmethod

@@ -46,7 +46,7 @@ from fenicsmech.compat import interpolation_matrix, vector_space
 from fenicsmech.equilibrium.linearisation import Direct, Factor, Inertia, LinearMethod, LinearSolver
 from fenicsmech.equilibrium.system import EquilibriumSystem
 from fenicsmech.equilibrium.unknowns import Numbering, UnknownMap
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, set_options
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,6 +60,9 @@ class TwoLevel(LinearMethod):
         iterations: maximum number of iterations of one solve; more would mean that the coarse level does not suit.
         probe: relative energy at which iterations from a random start end when counting the inertia.
         roundoff: of the solution, in units of the mean stiffness: residuals below are rounding.
+
+    Raises:
+        DescriptionError: a number is out of its range.
     """
 
     degree: int = 8
@@ -68,6 +71,9 @@ class TwoLevel(LinearMethod):
     iterations: int = 300
     probe: float = 1e-6
     roundoff: float = 1e-15
+
+    def __post_init__(self) -> None:
+        set_options(self, "two levels", below_one=("ratio", "probe"), degree=1, iterations=1)
 
     @staticmethod
     def suits(system: EquilibriumSystem) -> bool:
@@ -94,9 +100,15 @@ class BySize(LinearMethod):
 
     Attributes:
         limit: number of unknowns.
+
+    Raises:
+        DescriptionError: it is not a whole number of at least 0.
     """
 
     limit: int = 80_000
+
+    def __post_init__(self) -> None:
+        set_options(self, "methods by size", limit=0)
 
     def solver(self, system):
         large = system.blocks.size > self.limit and system.joints.space.dim == 3 and TwoLevel.suits(system)

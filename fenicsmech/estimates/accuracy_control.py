@@ -28,7 +28,7 @@ from mpi4py import MPI
 
 from fenicsmech.collective import from_one
 from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRESS, SPATIAL, ElasticModel, Formulation, Quadrature
-from fenicsmech.errors import counted, positive
+from fenicsmech.errors import counted, positive, set_options
 from fenicsmech.log import logger
 from fenicsmech.mechanism import FlexibleLink, MeshPart, Scene, StepPart
 from fenicsmech.meshing import link_thickness
@@ -48,6 +48,9 @@ class AccuracyOptions:
         first_order: largest valid estimate over the largest displacement: larger ones, as near limit points, are
             meaningless.
         space_work: time of the coarsest level in space over that in plane stress.
+
+    Raises:
+        DescriptionError: a number is not positive.
     """
 
     plane_stress_remainder: float = 0.6
@@ -55,6 +58,9 @@ class AccuracyOptions:
     safety: float = 1.3
     first_order: float = 0.1
     space_work: float = 5.0
+
+    def __post_init__(self) -> None:
+        set_options(self, "accuracy control")
 
     def corrections(self, errors: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Corrections of the values of a curve, from the estimates of their errors, (frames,) each."""

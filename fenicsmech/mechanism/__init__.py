@@ -17,6 +17,7 @@ from fenicsmech.mechanism.parts import (
     Joint,
     Link,
     Material,
+    MaterialPoint,
     Motor,
     Output,
     PrescribedPart,

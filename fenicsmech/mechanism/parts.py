@@ -200,6 +200,10 @@ class Drive:
         return self.ratios[0][0].sliding
 
 
+MaterialPoint = tuple[Link, Point, Region | Face | None]
+"""A link, a drawn point of it, and a region about or through this point."""
+
+
 @dataclass(frozen=True)
 class _AtPoint:
     """A direction at a material point of a link, or on a ``region`` of a flexible link about or through this point."""
@@ -214,6 +218,11 @@ class _AtPoint:
         sort, at, direction = type(self).__name__, point_text(self.at), point_text(self.direction)
         region = "" if self.region is None else f" over {self.region}"
         return f"{sort}({self.name!r} on {self.on.name!r} at {at}{region} along {direction})"
+
+    @property
+    def material(self) -> MaterialPoint:
+        """The point or region alone."""
+        return self.on, self.at, self.region
 
 
 class Force(_AtPoint):

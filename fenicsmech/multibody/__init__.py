@@ -21,6 +21,14 @@ from fenicsmech.multibody.assembly import (
 )
 from fenicsmech.multibody.linkage import Body, Connection, JointSystem, Linkage, build_linkage
 from fenicsmech.multibody.places import JointChange, JointPlaces
-from fenicsmech.multibody.points import BodyPoint, DesignAtNodes, InterfaceMap, LinkPoint, link_point, shape_functions
+from fenicsmech.multibody.points import (
+    BodyPoint,
+    DesignAtNodes,
+    InterfaceMap,
+    LinkPoint,
+    PlacedPoint,
+    link_point,
+    shape_functions,
+)
 from fenicsmech.multibody.potentials import JointCoordinate, PosePotential, spring_potentials
 from fenicsmech.multibody.spins import IdleSpin, idle_spins

@@ -19,9 +19,11 @@ Springs are potentials V(z). Along the null space N of A they have the slope and
 
     Nᵀ ∂V/∂z,     Nᵀ (∂²V/∂z² − Σ λ_k ∂²C_k/∂z²) N,     Aᵀλ = ∂V/∂z,
 
-and hold the motions along which this curvature is not zero. The others are the zero-energy modes. In an assembly the
-energy of springs is least. It is found by Newton steps with the absolute eigenvalues of the curvature, which always
-descend.
+and hold the motions along which this curvature is not zero. The others are the zero-energy modes. Motors may hold
+springs wound up: their forces pass through joints, λ ≠ 0, and their stiffness has no part in any free motion, so that
+what should cancel along it leaves the rounding of ∂V/∂z and ∂²V/∂z², not that of the curvatures left. In an assembly
+the energy of springs is least. It is found by Newton steps with the absolute eigenvalues of the curvature, which
+always descend.
 
 Where flexible links are bent, but move as rigid bodies, a link with the velocity v of a point x₀ and the spin ω takes
 its bodies along:
@@ -195,7 +197,8 @@ class _Assembler:
                 break
             free = free_motions(system, poses, motors, self.springs)
             stiffness, modes = np.linalg.eigh(free.curvature)
-            kept = np.abs(stiffness) > self.curved * np.max(np.abs(stiffness), initial=0.0)
+            largest = np.max(np.abs(stiffness), initial=0.0)
+            kept = np.abs(stiffness) > max(self.curved * largest, free.rounding)
             step = -((modes.T @ free.slope)[kept] / np.abs(stiffness[kept])) @ modes[:, kept].T @ free.motions
             size = float(np.max(np.abs(step), initial=0.0))
             if size <= self.relaxed:
@@ -228,12 +231,14 @@ def _loop(system: JointSystem, row: int) -> str:
 class FreeMotions:
     """Slope (n,) and curvature (n, n) of the potential of springs along the motions N that joints and motors leave.
 
-    ``motions`` are orthonormal rows, (n, size), in units of ``JointSystem.pose_scale``.
+    ``motions`` are orthonormal rows, (n, size), in units of ``JointSystem.pose_scale``. Curvatures of at most
+    ``rounding`` are none.
     """
 
     motions: np.ndarray
     slope: np.ndarray
     curvature: np.ndarray
+    rounding: float
 
 
 def free_motions(
@@ -244,17 +249,19 @@ def free_motions(
     scaled = system.scaled_gradient(poses, motors)
     motions = _null_space(scaled)
     slope, curvature = np.zeros(system.size), np.zeros((system.size, system.size))
+    units = np.outer(scale, scale)
     for spring in springs:
         # fixed bodies have no columns
         own = np.repeat([body in system.columns for body in spring.bodies], size)
         columns = [column for body in spring.bodies for column in system.columns.get(body, ())]
         slope[columns] += spring.gradient(poses)[own]
         curvature[np.ix_(columns, columns)] += spring.hessian(poses)[np.ix_(own, own)]
+    rounding = 1e-12 * float(np.linalg.norm(units * curvature) + np.linalg.norm(scale * slope))
     multipliers = system.row_scale * np.linalg.lstsq(scaled.T, scale * slope, rcond=RANK)[0]
     for rows, columns, block in system.hessian_blocks(poses, motors, multipliers):
         curvature[np.ix_(rows, columns)] -= block
-    along = motions @ (curvature * np.outer(scale, scale)) @ motions.T
-    return FreeMotions(motions, motions @ (scale * slope), 0.5 * (along + along.T))
+    along = motions @ (units * curvature) @ motions.T
+    return FreeMotions(motions, motions @ (scale * slope), 0.5 * (along + along.T), rounding)
 
 
 @dataclass(frozen=True)
@@ -287,8 +294,7 @@ def count_freedom(
     dependent = _null_space(system.scaled_gradient(poses, motors).T)
     free = free_motions(system, poses, motors, springs)
     curvatures, modes = np.linalg.eigh(free.curvature)
-    # along these the curvature is rounding, relative to that of the stiffest motion
-    flat = np.abs(curvatures) <= 1e-12 * np.max(np.abs(curvatures), initial=0.0)
+    flat = np.abs(curvatures) <= free.rounding
 
     def moving(motions: np.ndarray) -> tuple[str, ...]:
         moves = _takes_part(motions)

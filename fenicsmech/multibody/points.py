@@ -178,10 +178,36 @@ class LinkPoint:
         return V.mesh.comm.allreduce(here)
 
 
+@dataclass(frozen=True, eq=False)
+class PlacedPoint:
+    """A material point of a flexible link, or the average over a region of it, in another shape than the drawn one.
+
+        u = Σ_k w_k u(Y_k)
+
+    Attributes:
+        positions: Y_k in this shape, (n, dim).
+        weights: w_k, (n,).
+    """
+
+    positions: np.ndarray
+    weights: np.ndarray
+
+
+_OFF = 0.01  # largest distance of a drawn point from its link, in cells
+_OFF_OUTLINE = 0.25  # of one placed on the outline, which another mesh replaces by other curves
+
+
 def link_point(
-    part: str, position: np.ndarray, u: fem.Function, cells: np.ndarray, vertices: np.ndarray, bulges: np.ndarray
+    part: str,
+    position: np.ndarray,
+    u: fem.Function,
+    cells: np.ndarray,
+    vertices: np.ndarray,
+    bulges: np.ndarray,
+    *,
+    placed: bool = False,
 ) -> LinkPoint:
-    """The point drawn at ``position`` on a flexible link.
+    """The point at ``position`` on a flexible link.
 
     Args:
         part: for messages.
@@ -190,16 +216,22 @@ def link_point(
         cells: owned cells of the link on this rank.
         vertices: their corner coordinates, (cells, dim + 1, dim).
         bulges: of their edges, pairs of corners in lexical order, (cells, pairs, dim).
+        placed: whether the point was drawn on another mesh.
 
     Raises:
-        DescriptionError: the point lies outside the link by more than a hundredth of a cell.
+        DescriptionError: the point lies outside the link by more than a hundredth of a cell, a placed one by more than
+            a quarter.
     """
     V, comm, corners = u.function_space, u.function_space.mesh.comm, len(position) + 1
+    low, high = vertices.min(axis=1), vertices.max(axis=1)
+    margin = 0.5 * (high - low).max(axis=1, keepdims=True) + np.abs(bulges).max(axis=(1, 2), initial=0.0)[:, None]
+    near = np.all((low - margin <= position) & (position <= high + margin), axis=1)
+    cells, vertices, bulges = cells[near], vertices[near], bulges[near]
     barycentric = _barycentric(position, vertices, bulges) if len(cells) else np.full((1, corners), -np.inf)
     k = int(np.argmax(barycentric.min(axis=1)))  # the cell that the point lies deepest in
     depths = comm.allgather(float(barycentric[k].min()))
     owner = int(np.argmax(depths))
-    if depths[owner] < -0.01:
+    if depths[owner] < -(_OFF_OUTLINE if placed else _OFF):
         raise DescriptionError(
             part, f"the point {tuple(map(float, position))} is not on the link", "Move it onto the link"
         )

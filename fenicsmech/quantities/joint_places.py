@@ -19,7 +19,7 @@ from math import pi
 
 import numpy as np
 
-from fenicsmech.errors import DescriptionError, direction, finite, in_plane, point_text, set_fields
+from fenicsmech.errors import DescriptionError, counted, direction, finite, in_plane, point_text, set_fields
 from fenicsmech.mechanism import Configuration, FlexibleLink, Joint, Scene, in_dimension, same_place
 from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import JointChange
@@ -31,11 +31,16 @@ class _OfJoints(NumberKind):
     """A number of the places of joints, zero as drawn."""
 
     parts: tuple[Joint, ...]
-    vector: tuple[float, ...] = ()
+    vectors: tuple[tuple[float, ...], ...] = ()
 
-    def __init__(self, *parts: Joint, vector: Sequence[float]) -> None:
+    def __init__(self, *parts: Joint, given: Sequence[float] | Sequence[Sequence[float]]) -> None:
         super().__init__(*parts)
-        set_fields(self, vector=direction(f"direction of the {self.what}", vector))
+        each = given if isinstance(next(iter(given), None), Sequence | np.ndarray) else [given] * len(parts)
+        where = f"direction of the {self.what}"
+        if len(each) != len(parts):
+            several = counted(len(each), "direction"), counted(len(parts), "joint")
+            raise DescriptionError(where, f"{several[0]} for {several[1]}", "Give one for all joints, or one for each")
+        set_fields(self, vectors=tuple(direction(where, own) for own in each))  # type: ignore[arg-type]  # of each joint
 
     @staticmethod
     def candidates(scene: Scene) -> Sequence[Joint]:
@@ -43,21 +48,31 @@ class _OfJoints(NumberKind):
 
     @property
     def slots(self):
-        return tuple((*slot, self.vector) for slot in super().slots)
+        return tuple((*slot, vector) for slot, vector in zip(super().slots, self.vectors, strict=True))
 
     @property
     def words(self):
-        return (" ".join(map(repr, self.vector)), *super().words)
+        return ("; ".join(" ".join(map(repr, own)) for own in self._distinct), *super().words)
 
     @classmethod
     def read(cls, scene, words):
         parts = (cls._part(scene, word) for word in words[1:])
-        return cls._read(parts, tuple(map(float, words[0].split())))
+        vectors = [tuple(map(float, own.split())) for own in words[0].split(";")]
+        return cls._read(parts, vectors if len(vectors) > 1 else vectors[0])
 
     @classmethod
     @abstractmethod
-    def _read(cls, parts, vector):
-        """The kind of some parts and its vector."""
+    def _read(cls, parts, given):
+        """The kind of some parts and its vector, or those of each."""
+
+    @property
+    def _distinct(self) -> tuple[tuple[float, ...], ...]:
+        """The one vector of all parts, or those of each."""
+        return self.vectors[:1] if len(set(self.vectors)) == 1 else self.vectors
+
+    @property
+    def _text(self) -> str:
+        return " and ".join(map(point_text, self._distinct))
 
     def described(self, part):
         return 0.0
@@ -69,14 +84,14 @@ class _OfJoints(NumberKind):
         return any(position for _, position in configuration.positions)
 
     def changes(self, dim):
-        return dict.fromkeys(self.parts, self.change(dim))
+        return {part: self.change(vector, dim) for part, vector in zip(self.parts, self.vectors, strict=True)}
 
     def on(self, model):
         return _Place(model, self.changes(model.linkage.dim))
 
     @abstractmethod
-    def change(self, dim: int) -> JointChange:
-        """The change of each joint by a unit of the number, in ``dim`` dimensions."""
+    def change(self, vector: tuple[float, ...], dim: int) -> JointChange:
+        """The change of a joint with this vector by a unit of the number, in ``dim`` dimensions."""
 
 
 @dataclass(frozen=True, init=False)
@@ -89,29 +104,30 @@ class JointPosition(_OfJoints):
     point. In a design problem flexible links follow: their interface by the shift, their centreline by the linear
     interpolation of the shifts of its joints. Forces and outputs on rigid links stay where they are drawn on the link,
     even at the place of the joint. Joints of flexible links are shifted in the plane only, all those at one place of a
-    link together, and not at all if the link shares its shape with others (``SplineDesign.same``).
+    link together. Links that share a shape (``SplineDesign.same``, ``mirrored``) have their joints shifted as images of
+    one another: ``JointPosition(left, right, direction=[(1, 0), (-1, 0)])`` for links mirrored in x.
 
     Args:
         parts: a joint, or several with the same shift, such as those of a pin through several links.
-        direction: in which the shift is positive, of any length; 2 or 3 coordinates.
+        direction: in which the shift is positive, of any length; 2 or 3 coordinates; or one direction for each joint.
 
     Raises:
-        DescriptionError: there are no joints, one is given twice, or the direction has no length. Later, by a design
-            problem: a flexible link does not allow the shift.
+        DescriptionError: there are no joints, one is given twice, directions are not as many as joints, or one has no
+            length. Later, by a design problem: a flexible link does not allow the shift.
     """
 
     what = "position"
 
-    def __init__(self, *parts: Joint, direction: Sequence[float]) -> None:
-        super().__init__(*parts, vector=direction)
+    def __init__(self, *parts: Joint, direction: Sequence[float] | Sequence[Sequence[float]]) -> None:
+        super().__init__(*parts, given=direction)
 
     @classmethod
-    def _read(cls, parts, vector):
-        return cls(*parts, direction=vector)
+    def _read(cls, parts, given):
+        return cls(*parts, direction=given)
 
     @property
     def name(self):
-        return f"{super().name} along {point_text(self.vector)}"
+        return f"{super().name} along {self._text}"
 
     @property
     def reshaped(self):
@@ -124,27 +140,31 @@ class JointPosition(_OfJoints):
 
     def check(self, scene, dim):
         super().check(scene, dim)
-        in_plane(f"direction of the {self.name}", self.vector, dim)
-        mechanism = scene.mechanism
-        if self.reshaped and any(self.vector[2:]):
-            raise DescriptionError(
-                self.name,
-                f"{self.reshaped[0].name!r} is flexible, and follows its joints in the plane alone",
-                "Shift joints of flexible links along x and y",
-            )
+        for vector in self.vectors:
+            in_plane(f"direction of the {self.name}", vector, dim)
+        mechanism, along = scene.mechanism, dict(zip(self.parts, self.vectors, strict=True))
+        for joint, vector in along.items():
+            held = [link for link in (joint.a, joint.b) if isinstance(link, FlexibleLink)]
+            if held and any(vector[2:]):
+                raise DescriptionError(
+                    self.name,
+                    f"{joint.name!r} holds {held[0].name!r}, which is flexible and follows joints in the plane alone",
+                    "Shift it along x and y, or weld a rigid link there and shift a joint of that",
+                )
         for joint, link in ((joint, link) for joint in self.parts for link in self.reshaped):
             for other in mechanism.joints:
                 here = same_place(joint.at, other.at, dim=dim, length=mechanism.length)
-                if other not in self.parts and link in (other.a, other.b) and link in (joint.a, joint.b) and here:
+                alike = along.get(other) == along[joint]
+                if not alike and link in (other.a, other.b) and link in (joint.a, joint.b) and here:
                     raise DescriptionError(
                         self.name,
                         f"{other.name!r} is at the same place of {link.name!r}",
-                        f"Shift both: name {other.name!r} too",
+                        f"Shift both alike: name {other.name!r} too, with the same direction",
                     )
 
-    def change(self, dim):
+    def change(self, vector, dim):
         nothing = np.zeros(1 if dim == 2 else 3)
-        return JointChange(np.array(in_dimension(self.vector, dim)), nothing)
+        return JointChange(np.array(in_dimension(vector, dim)), nothing)
 
 
 @dataclass(frozen=True, init=False)
@@ -158,25 +178,25 @@ class JointAxis(_OfJoints):
 
     Args:
         parts: a joint, or several whose axes turn by the same angle.
-        about: the axis of the turn, of any length; 2 or 3 coordinates, z by default.
+        about: the axis of the turn, of any length; 2 or 3 coordinates, z by default; or one for each joint.
 
     Raises:
-        DescriptionError: there are no joints, one is given twice, or the axis has no length. Later, by a design
-            problem: a joint has no axis in the plane, or the axis would leave it.
+        DescriptionError: there are no joints, one is given twice, axes are not as many as joints, or one has no length.
+            Later, by a design problem: a joint has no axis in the plane, or the axis would leave it.
     """
 
     what = "axis"
 
-    def __init__(self, *parts: Joint, about: Sequence[float] = (0.0, 0.0, 1.0)) -> None:
-        super().__init__(*parts, vector=about)
+    def __init__(self, *parts: Joint, about: Sequence[float] | Sequence[Sequence[float]] = (0.0, 0.0, 1.0)) -> None:
+        super().__init__(*parts, given=about)
 
     @classmethod
-    def _read(cls, parts, vector):
-        return cls(*parts, about=vector)
+    def _read(cls, parts, given):
+        return cls(*parts, about=given)
 
     @property
     def name(self):
-        return f"{super().name} about {point_text(self.vector)}"
+        return f"{super().name} about {self._text}"
 
     def unit(self, units):
         return "rad"
@@ -194,12 +214,12 @@ class JointAxis(_OfJoints):
                     f"a {joint.kind.name} joint has no axis in the plane",
                     "Turn axes of hinges in space, or those of sliders",
                 )
-        if dim == 2 and abs(in_dimension(self.vector, 3)[2]) != 1.0:
+        if dim == 2 and any(abs(in_dimension(vector, 3)[2]) != 1.0 for vector in self.vectors):
             raise DescriptionError(self.name, "the axis would leave the plane", "Turn it about z in the plane")
 
-    def change(self, dim):
-        vector = np.array(in_dimension(self.vector, 3))
-        return JointChange(np.zeros(dim), vector[2:] if dim == 2 else vector)
+    def change(self, vector, dim):
+        turn = np.array(in_dimension(vector, 3))
+        return JointChange(np.zeros(dim), turn[2:] if dim == 2 else turn)
 
 
 class _Place(ModelNumber):

@@ -59,8 +59,9 @@ class Displacement(Quantity):
     def unit(self, units):
         return units.length
 
-    def of_part(self, links):
-        return self.part not in links  # whose material points are elsewhere in the part
+    @property
+    def material_points(self):
+        return () if self.at is None else ((self.part, self.at, None),)
 
     def size(self, dim):
         return 1 if self.at is None else dim

@@ -26,7 +26,18 @@ from mpi4py import MPI
 from fenicsmech.compat import assemble_vector, compile_form, owned_values
 from fenicsmech.equilibrium import EquilibriumSystem, State
 from fenicsmech.errors import DescriptionError, direction, in_plane, point_text, set_fields
-from fenicsmech.mechanism import FlexibleLink, Force, Joint, Motor, Output, RigidLink, Scene, Units, in_dimension
+from fenicsmech.mechanism import (
+    FlexibleLink,
+    Force,
+    Joint,
+    MaterialPoint,
+    Motor,
+    Output,
+    RigidLink,
+    Scene,
+    Units,
+    in_dimension,
+)
 from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import JointChange
 
@@ -133,6 +144,11 @@ class Quantity(ABC):
     def on(self, model: MechanismModel) -> Observable:
         """The quantity of one model."""
 
+    @property
+    def material_points(self) -> tuple[MaterialPoint, ...]:
+        """The points of links that it refers to by their drawn places; none by default."""
+        return ()
+
     def of_part(self, links: Collection[FlexibleLink]) -> bool:
         """Whether parts that are known by their outline alone, in place of ``links``, have it; by default they do."""
         return True
@@ -179,6 +195,10 @@ class _OfVector(Quantity):
     @property
     def from_unloaded(self):  # type: ignore[override]
         return self.vector.from_unloaded
+
+    @property
+    def material_points(self):
+        return self.vector.material_points
 
     def of_part(self, links):
         return self.vector.of_part(links)

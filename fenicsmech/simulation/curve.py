@@ -258,9 +258,10 @@ class Curve:
             The lower and the upper bound, (frames,) each; infinite where the force's point does not move but pins turn.
 
         Raises:
-            DescriptionError: the curve has one frame only or a frame twice, or a joint is not a hinge that turns.
+            DescriptionError: the curve has one frame only or a frame twice, a joint is not a hinge that turns, or its
+                friction is not a ``PinFriction``.
         """
-        return friction_band(self.frames, pins, self.discretisation.linkage)
+        return friction_band(self.frames, pins, self.discretisation.model)
 
     def explain(self, *, tolerance: float = 0.01, weight: float | None = None) -> Explanation:
         """The assumptions of the simulation as text, with figures of the last frame where these may matter.

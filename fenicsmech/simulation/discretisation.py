@@ -14,10 +14,20 @@ from fenicsmech.equilibrium import EquilibriumMethod, EquilibriumSolver, LoadCon
 from fenicsmech.errors import DescriptionError
 from fenicsmech.estimates import Estimates
 from fenicsmech.log import Clock
-from fenicsmech.mechanism import FlexibleLink, Force, ForceGroup, Joint, Material, PrescribedPart, Scene, Shape
+from fenicsmech.mechanism import (
+    FlexibleLink,
+    Force,
+    ForceGroup,
+    Joint,
+    Material,
+    MaterialPoint,
+    PrescribedPart,
+    Scene,
+    Shape,
+)
 from fenicsmech.meshing import MechanismMesh
 from fenicsmech.model import Fidelity, MechanismModel, check_links, mesh_mechanism
-from fenicsmech.multibody import JointChange, build_linkage
+from fenicsmech.multibody import JointChange, PlacedPoint, build_linkage
 
 
 class Discretisation:
@@ -28,6 +38,7 @@ class Discretisation:
         materials: of the flexible links.
         shapes: of the flexible links.
         moved: joints that are placed otherwise than drawn.
+        placed: points of links that are elsewhere than drawn.
 
     Raises:
         DescriptionError: links, joints or points contradict each other.
@@ -43,16 +54,18 @@ class Discretisation:
         comm: MPI.Comm,
         shapes: Mapping[FlexibleLink, Shape] | None = None,
         moved: Mapping[Joint, JointChange] | None = None,
+        placed: Mapping[MaterialPoint, PlacedPoint] | None = None,
     ) -> None:
         self.scene, self.fidelity, self.clock, self.comm = scene, fidelity, clock, comm
         self.method, self.predictor = method, predictor
-        self.moved = dict(moved or {})
+        self.moved, self.placed = dict(moved or {}), dict(placed or {})
         self.linkage = build_linkage(scene.mechanism, fidelity.model.mechanism_dim, self.moved)
         links = scene.mechanism.flexible_links
         self.materials = tuple(link.material for link in links)
         self.shapes = {link: link.shape for link in links} | dict(shapes or {})
         self._solvers: dict[tuple, EquilibriumSolver] = {}
-        on_one(comm, lambda: check_links(scene.mechanism, tuple(self.shapes.values()), self.linkage, fidelity))
+        own = tuple(self.shapes.values())
+        on_one(comm, lambda: check_links(scene.mechanism, own, self.linkage, fidelity, self.placed))
 
     def at(
         self,
@@ -61,11 +74,13 @@ class Discretisation:
         comm: MPI.Comm,
         shapes: Mapping[FlexibleLink, Shape] | None = None,
         moved: Mapping[Joint, JointChange] | None = None,
+        placed: Mapping[MaterialPoint, PlacedPoint] | None = None,
     ) -> Discretisation:
-        """The same scene at another fidelity, on other processes, with links of other shapes or joints at other places,
-        nothing meshed yet."""
+        """The same scene at another fidelity, on other processes, with links of other shapes, or joints or points at
+        other places, nothing meshed yet."""
         shapes, moved = self.shapes | dict(shapes or {}), self.moved | dict(moved or {})
-        other = Discretisation(self.scene, fidelity, self.method, self.predictor, clock, comm, shapes, moved)
+        placed = self.placed | dict(placed or {})
+        other = Discretisation(self.scene, fidelity, self.method, self.predictor, clock, comm, shapes, moved, placed)
         other.materials = self.materials
         return other
 
@@ -107,6 +122,7 @@ class Discretisation:
                 scene.effects,
                 self.materials,
                 tuple(self.shapes.values()),
+                self.placed,
             )
 
     @cached_property

@@ -29,12 +29,12 @@ from fenicsmech.collective import from_one
 from fenicsmech.compat import compile_form
 from fenicsmech.effects import Gravity
 from fenicsmech.equilibrium import EquilibriumSolver, Unknown
-from fenicsmech.errors import DescriptionError, positive, set_fields
+from fenicsmech.errors import DescriptionError, expect, positive, set_fields, set_options
 from fenicsmech.estimates import Equilibrium, adjoint_at, cause_of_growth, growth_by_halving
 from fenicsmech.mechanism import FlexibleLink, Force, Joint, Output, PrescribedPart, Shape, Strip, Units
 from fenicsmech.meshing import thinnest_stretch
 from fenicsmech.model import MechanismModel, plan_sites
-from fenicsmech.multibody import JointCoordinate, Linkage
+from fenicsmech.multibody import JointCoordinate
 from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.fields import gather
 from fenicsmech.simulation.frame import Frame
@@ -63,9 +63,9 @@ class ExplanationOptions:
     longest: Mapping[int, float] = field(default_factory=lambda: {1: 0.1, 2: 3.0, 3: 8.0})
 
     def __post_init__(self) -> None:
-        positive("tolerance of an explanation", self.tolerance)
+        set_options(self, "an explanation")
         if self.weight is not None:
-            positive("weight per volume of an explanation", self.weight)
+            set_fields(self, weight=positive("weight per volume of an explanation", self.weight))
 
 
 @dataclass(frozen=True)
@@ -363,19 +363,22 @@ class PinFriction:
 
 
 def friction_band(
-    frames: Sequence[Frame], pins: Mapping[Joint, PinFriction], linkage: Linkage
+    frames: Sequence[Frame], pins: Mapping[Joint, PinFriction], model: MechanismModel
 ) -> tuple[np.ndarray, np.ndarray]:
     """Bounds of the force between which friction holds the mechanism, see ``Curve.friction_band``."""
-    poses = [frame.state.poses for frame in frames]
+    expect("friction band", pins, Mapping, "a mapping", "Give {joint: PinFriction(coefficient, radius)}")
+    poses, linkage = [frame.state.poses for frame in frames], model.linkage
     if len(poses) < 2:
         raise DescriptionError("friction band", "the curve has one frame only", "Give two values or more")
     turning = []  # moment of friction and angle of each pin, (frames,) each
     for joint, pin in pins.items():
-        is_hinge = joint.kind.motorised and not joint.kind.sliding
-        if not is_hinge or joint.name not in frames[0].reactions:
+        is_hinge = isinstance(joint, Joint) and joint.kind.motorised and not joint.kind.sliding
+        if not is_hinge or joint not in model.mechanism.joints or joint.name not in frames[0].reactions:
+            name = getattr(joint, "name", joint)
             raise DescriptionError(
-                "friction band", f"{joint.name!r} is not a hinge of this curve that turns", "Name its revolute joints"
+                "friction band", f"{name!r} is not a hinge of this curve that turns", "Name its revolute joints"
             )
+        expect(f"friction of {joint.name!r}", pin, PinFriction, "a friction", "Give PinFriction(coefficient, radius)")
         coordinate = JointCoordinate(linkage, joint)
         turned = np.array([coordinate.value(z) for z in poses])
         forces = np.array([frame.reactions[joint.name].force for frame in frames])

@@ -26,6 +26,7 @@ from fenicsmech.mechanism import (
     ForceGroup,
     Joint,
     Material,
+    MaterialPoint,
     Mechanism,
     Output,
     PrescribedPart,
@@ -36,7 +37,7 @@ from fenicsmech.mechanism import (
 )
 from fenicsmech.meshing import radius_ratios
 from fenicsmech.model import Design, Fidelity, MechanismModel, read_fidelity
-from fenicsmech.multibody import JointChange, Linkage, assemble, spring_potentials
+from fenicsmech.multibody import JointChange, Linkage, PlacedPoint, assemble, spring_potentials
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.fields import rest_vertices
@@ -342,6 +343,7 @@ class Simulation:
         *,
         fidelity: Fidelity | None = None,
         moved: Mapping[Joint, JointChange] | None = None,
+        placed: Mapping[MaterialPoint, PlacedPoint] | None = None,
     ) -> Simulation:
         """The same scene with links of other shapes, remeshed; joints keep their interfaces.
 
@@ -352,6 +354,7 @@ class Simulation:
             shapes: of some flexible links, such as ``step_file`` of a designed part.
             fidelity: by default that of this simulation.
             moved: joints that are placed otherwise than drawn, such as those of a designed part.
+            placed: points of these links that are elsewhere than drawn, likewise.
 
         Raises:
             DescriptionError: these are not shapes of links of the mechanism, or it does not fit the fidelity; or none
@@ -368,7 +371,7 @@ class Simulation:
         other = self._derived()
         other.clock, other.choice, other._design = Clock(), None, None
         fidelity = fidelity or self.fidelity
-        other._discretisation = self._discretisation.at(fidelity, other.clock, self.comm, shapes, moved)
+        other._discretisation = self._discretisation.at(fidelity, other.clock, self.comm, shapes, moved, placed)
         if shapes:
             other._warn_of_coarse_links()
         return other

@@ -366,8 +366,8 @@ class CurveStepper:
         rigid, motors = self._model.linkage.rigid, self._joints.motor_values(self.request.configuration.position)
         motors = np.concatenate([motors, np.zeros(len(rigid.connections) - len(motors))])  # welds of links
         free = free_motions(rigid, self._poses, motors, self._model.spring_potentials)
-        held = np.abs(np.linalg.eigvalsh(free.curvature)) if self._model.spring_potentials else np.zeros(0)
-        return bool(np.min(held[held > 0.0], initial=np.inf) < 1e-15 * self._system.unknowns.unit**2)
+        held = np.abs(np.linalg.eigvalsh(free.curvature))
+        return bool(np.min(held[held > free.rounding], initial=np.inf) < 1e-15 * self._system.unknowns.unit**2)
 
     # -- residual along zero-energy modes -----------------------------------------------------------------------
 

@@ -10,6 +10,7 @@ import fenicsmech as fm
 from fenicsmech.design import DesignEquilibria, Infeasible, SampleEquilibria
 from fenicsmech.equilibrium import NewtonSolver, NotConverged
 
+from ..effects.levers import lever
 from .alike import assert_alike, displacements
 from .mechanisms import Bench, Case, bench, bow, sprung, strained, strains, truss, turned_beam
 
@@ -210,3 +211,21 @@ def test_targets_of_several_forces_directions_and_sizes_are_told_apart():
     assert together[2] == together[4]
     assert together[3] < 0.0 < together[2] < together[0]
     assert together[5] == pytest.approx(0.0, abs=1e-10)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_design_whose_motor_turns_a_spring_in_space_by_more_than_a_full_turn_is_infeasible(sign):
+    case = lever(lambda hinge: [fm.JointSpring(hinge, 50.0)], space="3d")
+    scene, motor = case.simulation.scene, case.simulation.scene.mechanism.motor(case.joint)
+    simulation, kind = fm.Simulation(scene, space="3d", order=1, size=6.0, comm=MPI.COMM_SELF), fm.MotorOffset(motor)
+    target = fm.Target(fm.MotorTorque(motor), fm.Sample({case.force: 0.1, motor: 6.1 * sign}), equals=0.0, scale=1.0)
+    equilibria = SampleEquilibria(simulation, [target], numbers=[kind])
+    known, field = equilibria.from_zero(), simulation.model.design.field
+    simulation.model.reshape(fm.Design(field, {kind: 0.1 * sign}))
+    nearer = equilibria.from_design(known)
+    moments = [equilibria.values(at)[0] for at in (known, nearer)]
+    assert moments[1] - moments[0] == pytest.approx(50.0 * 0.1 * sign, rel=0.1)
+    simulation.model.reshape(fm.Design(field, {kind: 0.3 * sign}))
+    for solve in (equilibria.from_zero, lambda: equilibria.from_design(nearer)):
+        with pytest.raises(Infeasible, match="passes 2π" if sign > 0.0 else "passes −2π"):
+            solve()

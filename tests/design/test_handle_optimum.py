@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fenicsmech.design import HandleOptimum, LinkHandles, MapDerivatives, ShapeError, by_positions, follow_spline
+from fenicsmech.design import HandleOptimum, LinkHandles, ShapeError, follow_spline, motion
 
 from ..oracles.dense import taylor_rates
 from .shapes import bench
@@ -155,14 +155,14 @@ def one_handle_at_a_control_point() -> tuple[LinkHandles, np.ndarray, np.ndarray
 @pytest.mark.parametrize("held", [True, False])
 def test_a_handle_at_a_kink_is_held_or_goes_to_the_side_where_the_sum_falls(held):
     handles, p, theta = one_handle_at_a_control_point()
-    after, before = (handles.gradients(p, theta, segments=np.full(3, segment))[1][1] for segment in (1, 0))
+    after, before = (handles.by_theta(p, theta, np.full(3, segment))[1] for segment in (1, 0))
     assert np.abs(after - before).max() > 1e-3
     # the sum rises both ways, or falls on the later side
     wanted = np.array([1.0, -1.0]) if held else np.array([-1.0, -1.0])
     slope = np.linalg.lstsq(np.array([after.ravel(), before.ravel()]), wanted, rcond=None)[0]
     gradient = np.zeros((3, 2, 3))
     gradient[1] = slope.reshape(2, 3)
-    sides = by_positions(handles, p, theta, MapDerivatives(gradient, np.zeros((3, 2, 3, 3, 2, 3))))
+    sides = motion(handles, p, theta, gradient)
     assert sides.free.tolist() == [True, not held, True]
     assert held or sides.segments[1] == 1
 

@@ -87,7 +87,10 @@ def test_maps_pass_the_taylor_test_by_parameters_and_positions_together(link):
 def test_second_derivatives_of_the_maps(link):
     handles, p, theta = away(link)
     weights = np.random.default_rng(5).standard_normal((len(handles), 2, 3))
-    cross, twice = handles.curvatures(p, theta, weights, segments=handles.segments(theta))
+    cross, twice = (
+        derivative(p, theta, weights, handles.segments(theta))
+        for derivative in (handles.by_theta_and_p, handles.twice_by_theta)
+    )
 
     def slope(q, x):
         return np.sum(weights * handles.gradients(q, x)[1], axis=(1, 2))

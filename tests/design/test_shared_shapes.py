@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from mpi4py import MPI
 
 import fenicsmech as fm
 from fenicsmech.design import Correction, MeshQuality, ShapeBounds, StayClose
+from fenicsmech.meshing import gmsh, gmsh_session
 
 from ..oracles.dense import taylor_rates
 from .mechanisms import Case, objective
@@ -55,6 +58,14 @@ def case(move: Move, wanted: float = 0.25) -> Case:
     scene, (one, other), push = legs(move)
     how = {"mirrored" if move is mirrored else "same": other}
     return Case(scene, [fm.SplineDesign(one, 2, **how)], [fm.Target(push, force=1.0, displacement=wanted)])
+
+
+def with_feet(own: Case, move: Move, way: tuple[float, float] = (1.0, 0.5)) -> Case:
+    """``own`` whose first joint may be shifted too, and its image likewise."""
+    feet = own.scene.mechanism.joints[0], own.scene.mechanism.joints[2]
+    image = np.diff(move(np.array([(0.0, 0.0), way])), axis=0)[0]
+    shift = fm.Number(fm.JointPosition(*feet, direction=[way, image.tolist()]), -4.0, 6.0)
+    return Case(own.scene, [*own.designs, shift], own.targets)
 
 
 def images(problem: fm.DesignProblem, design: fm.Design, move: Move) -> float:
@@ -132,6 +143,32 @@ def test_derivatives_of_quantities_by_shared_shapes_pass_taylor_tests(space, siz
         assert np.max(rates.with_gradient) >= 1.95, targets[k].name
 
 
+@pytest.mark.parametrize("move", [mirrored, shifted, turned])
+def test_links_with_shifted_joints_that_share_a_shape_stay_exact_images(move):
+    problem = with_feet(case(move), move).problem(size=3.0)
+    p = problem.initial + 0.1 * np.random.default_rng(3).standard_normal(len(problem.initial))
+    design = problem.rest_shape(p)
+    assert len(p) == 13 and max(map(abs, design.numbers.values())) > 0.2
+    assert images(problem, design, move) < 1e-12
+    (kind,) = design.numbers
+    assert type(kind).read(problem.simulation.scene, kind.words) == kind  # as results in files have it
+
+
+@pytest.mark.parametrize("move", [mirrored, pytest.param(turned, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize(
+    ("space", "size"), [("plane-stress", 3.0), pytest.param("3d", 4.0, marks=pytest.mark.thorough)]
+)
+def test_gradients_by_shared_shapes_and_joints_agree_with_central_differences(move, space, size):
+    regulariser = MeshQuality(limit=2.5, width=2.5) + ShapeBounds() + 1e-3 * StayClose()
+    whole, bench = objective(with_feet(case(move), move), regulariser, space=space, size=size)
+    p, direction = bench.design(0.05, seed=5), bench.direction(6)
+    direction[:-1] *= 0.1
+    here, step = whole.evaluate(p), 1e-3
+    ahead, back = (whole.evaluate(p + h * direction) for h in (step, -step))
+    assert here.gradient @ direction == pytest.approx((ahead.value - back.value) / (2 * step), rel=1e-5)
+    assert here.jacobian @ direction == pytest.approx((ahead.residuals - back.residuals) / (2 * step), rel=1e-5)
+
+
 @pytest.mark.parallel
 @pytest.mark.thorough
 def test_any_number_of_processes_finds_the_same_derivatives_by_shared_shapes():
@@ -160,15 +197,22 @@ def guided(*, half: bool) -> tuple[fm.Simulation, list[fm.SplineDesign], fm.Forc
     return fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=3.0), [design], push
 
 
-def test_a_symmetric_mechanism_has_the_optimum_of_its_half():
-    found, regulariser = [], ShapeBounds() + 1e-2 * StayClose()  # a well-conditioned optimum
+@pytest.mark.parametrize("moved", [False, True])
+def test_a_symmetric_mechanism_has_the_optimum_of_its_half(moved):
+    # a well-conditioned optimum
+    found, regulariser = [], ShapeBounds() + fm.NumberBounds() + 1e-2 * StayClose()
     for half, force in ((True, 1.0), (False, 2.0)):
         sim, designs, push = guided(half=half)
         drawn = sim.load_displacement(push, forces=[force, 2.0 * force]).displacements
         pairs = zip((1.0, 2.0), (1.2, 1.3), drawn, strict=True)
         targets = [fm.Target(push, force=f * force, displacement=factor * float(u)) for f, factor, u in pairs]
+        feet = [joint for joint in sim.scene.mechanism.joints if joint.at[1] == 0.0]
+        shift = fm.JointPosition(*feet, direction=[(1, 0), (-1, 0)][: len(feet)])
+        designs = [*designs, fm.Number(shift, -2.0, 2.0)] if moved else designs
         found.append(fm.DesignProblem(sim, designs, targets=targets, regulariser=regulariser).optimise(**EXACT))
     one, both = found
+    assert [n.value for n in both.numbers] == pytest.approx([n.value for n in one.numbers], abs=1e-7)
+    assert all(abs(number.value) > 0.01 for number in one.numbers)
     assert both.links[0].mirrored == ("leg 1",)
     assert both.links[0].parameters == pytest.approx(one.links[0].parameters, abs=1e-8)
     assert both.objective[1] == pytest.approx(one.objective[1], rel=1e-8)
@@ -213,6 +257,29 @@ def test_results_files_pictures_and_parts_have_all_links_of_a_shape(tmp_path):
     )
     assert again == pytest.approx(once, rel=1e-12)
     assert once == pytest.approx([result.targets[0].reached], rel=1e-6)
+
+
+def test_exports_count_the_links_that_are_one_part(tmp_path):
+    scene, made, push = legs(mirrored, shifted, turned)
+    plain = scene.mechanism.flexible("brace", fm.strip([(0, 40), (40, 40)], thickness=2.0, depth=5.0), PLASTIC)
+    for end in (0, 40):
+        scene.mechanism.weld(scene.mechanism.links[1], plain, at=(end, 40), interface_radius=2.0)
+    sim = fm.Simulation(scene, space="plane-stress", size=3.0)
+    designs = [fm.SplineDesign(made[0], 2, mirrored=made[1], same=made[2:]), fm.Number(fm.Depth(plain), 2.0, 9.0)]
+    problem = fm.DesignProblem(sim, designs, targets=[fm.Target(push, force=1.0, displacement=0.1)])
+    problem.export(tmp_path, problem.initial)
+    first, second = json.loads((tmp_path / "parts.json").read_text())["parts"]
+    assert (first["file"], first["count"], first["material"]) == ("leg-0.step", 4, "plastic")
+    assert sorted(first["links"]) == ["leg 0", "leg 1", "leg 2", "leg 3"]
+    assert (second["file"], second["count"], second["depth"]) == ("brace.step", 1, 5.0)
+    volumes = [_volume(tmp_path / f"leg-{k}.step") for k in range(4)]  # of solids that are one part
+    assert volumes == pytest.approx([volumes[0]] * 4, rel=1e-6)
+
+
+def _volume(file: Path) -> float:
+    with gmsh_session("part"):
+        (solid,) = gmsh.model.occ.importShapes(str(file))
+        return gmsh.model.occ.getMass(*solid)
 
 
 @pytest.mark.thorough

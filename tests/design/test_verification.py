@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 import fenicsmech as fm
 from fenicsmech import model
 
-from .mechanisms import bow, truss
+from .mechanisms import PLASTIC, bow, truss
 from .refusal import refused
 
 WANTED = ((0.1, 2.0), (0.4, 3.2))
@@ -102,10 +103,91 @@ def test_other_shapes_are_refused(verified):
     refused(lambda: other.verify(result), part="truss finger", problem="other targets", remedy="this problem")
 
 
-def test_points_on_links_that_change_are_refused():
-    problem = bow(10.0).problem()
-    result = problem.optimise(optimiser=fm.LevenbergMarquardt(iterations=1))
-    refused(lambda: problem.verify(result), part="bow", problem="place in the part", remedy="rigid link")
+@pytest.fixture(scope="module")
+def bow_in_part(tmp_path_factory) -> tuple[fm.DesignProblem, fm.DesignResult, Path]:
+    """A designed arch, loaded at a point of its own, whose height two outputs and a target tell too; and its file."""
+    folder = tmp_path_factory.mktemp("bow")
+    case = bow(10.0)
+    mechanism, ((arch,), (target,)) = case.scene.mechanism, (case.scene.mechanism.flexible_links, case.targets)
+    for k, region in enumerate((None, fm.Disc(2.0))):
+        mechanism.output(on=arch, at=(40, 12), direction=(0, 1), region=region, name=f"height {k}")
+    point = fm.Displacement(arch, at=(30, 14))
+    targets = [target, *(fm.Target(fm.Displacement(own), target.sample, equals=-0.1) for own in mechanism.outputs)]
+    targets.append(fm.Target(point, target.sample, equals=(0.1, -0.2)))
+    targets.append(fm.Target(fm.Magnitude(point), target.sample, equals=0.3))
+    problem = fm.DesignProblem(case.simulate(), case.designs, targets=targets)
+    result = problem.optimise(optimiser=fm.LevenbergMarquardt(iterations=3))
+    return problem, problem.verify(result, folder), folder / "arch.step"
+
+
+def test_forces_at_points_of_the_link_act_where_the_design_moves_these(bow_in_part):
+    problem, result, file = bow_in_part
+    drawn = problem.simulation
+    (push,), (height, _) = drawn.scene.mechanism.forces, drawn.scene.mechanism.outputs
+    moved = [drawn.with_design(result).path(part, [fm.DRAWN])[0] for part in (push, height)]
+    assert np.linalg.norm(np.array(moved) - ((25, 13), (40, 12)), axis=1).max() > 0.5  # otherwise nothing is tested
+    rig = fm.Mechanism("bow")
+    base = rig.rigid("base", fixed=True)
+    arch = rig.flexible("part", fm.step_file(file, depth=8.0), PLASTIC)
+    for at in ((0, 0), (60, 0)):
+        rig.revolute(base, arch, at=at, interface_radius=3.0)
+    force = rig.force(on=arch, at=moved[0], direction=(0.6, -0.8))
+    there = rig.output(on=arch, at=moved[1], direction=(0, 1))
+    again = fm.Simulation(fm.Scene(rig), space="plane-stress", size=1.5)
+    curve = again.load_displacement(force, forces=[10.0])
+    found = [target.part.value for target in result.targets[:2]]
+    assert found == pytest.approx([curve.displacements[0], curve.frames[0].outputs[there]], rel=1e-8)
+
+
+def test_points_and_regions_of_designed_links_move_in_the_part_as_in_the_design(bow_in_part):
+    _, result, _ = bow_in_part
+    for target in result.targets:
+        part = np.add(target.part.value, target.part.finer_elements_add)
+        assert part == pytest.approx(np.array(target.corrected), rel=0.01)
+
+
+def thorough(region: fm.Region | fm.Face):
+    return pytest.param(region, marks=pytest.mark.thorough)
+
+
+@pytest.mark.parametrize(
+    "region", [fm.Disc(2.0), *map(thorough, (fm.Rectangle(4, 3, 0.2), fm.Face(), fm.Face(fm.Disc(3.0))))], ids=str
+)
+def test_forces_on_regions_of_designed_links_act_on_these_in_the_part(region):
+    mechanism = fm.Mechanism("bow")
+    base = mechanism.rigid("base", fixed=True)
+    line = [(-10, 0), (0, 0), (20, 0), (40, 0), (60, 0), (70, 0)]
+    strip = mechanism.flexible("strip", fm.strip(line, thickness=4.0, depth=8.0), PLASTIC)
+    for at in ((0, 0), (60, 0)):
+        mechanism.revolute(base, strip, at=at, interface_radius=1.5)
+    height = 2.0 if isinstance(region, fm.Face) else 1.0
+    push = mechanism.force(on=strip, at=(25, height), direction=(0.6, -0.8), region=region)
+    target = fm.Target(push, force=10.0, displacement=0.5)
+    scene, design = fm.Scene(mechanism), fm.SplineDesign(strip, 4)
+    problem = fm.DesignProblem(fm.Simulation(scene, space="plane-stress", size=3.0), [design], targets=[target])
+    result = problem.optimise(optimiser=fm.LevenbergMarquardt(iterations=2))
+    (found,) = problem.verify(result).targets
+    assert abs(found.corrected / problem.simulation.load_displacement(push, forces=[10.0]).displacements[0] - 1) > 0.2
+    assert found.part.value + found.part.finer_elements_add == pytest.approx(found.corrected, rel=0.01)
+
+
+@pytest.mark.thorough
+def test_forces_beside_the_mid_plane_twist_the_part_as_they_twist_the_design():
+    mechanism = fm.Mechanism("twisted")
+    base = mechanism.rigid("base", fixed=True)
+    strip = mechanism.flexible("strip", fm.strip([(0, 0), (40, 0)], thickness=6.0, depth=6.0), PLASTIC)
+    mechanism.weld(base, strip, at=(2, 0), region=fm.Rectangle(4, 8))
+    push = mechanism.force(on=strip, at=(38, 0, 2), direction=(0, -1), region=fm.Disc(1.5))
+    top, below = (mechanism.output(on=strip, at=(38, 0, z), direction=(0, 1), name=f"{z}") for z in (2, -2))
+    sample = fm.Sample({push: 5.0})
+    targets = [fm.Target(fm.Displacement(own), sample, equals=-1.0) for own in (top, below)]
+    sim = fm.Simulation(fm.Scene(mechanism), space="3d", size=3.0, layers=2)
+    problem = fm.DesignProblem(sim, [fm.SplineDesign(strip, 2)], targets=targets)
+    result = problem.verify(problem.optimise(optimiser=fm.LevenbergMarquardt(iterations=1), surrogate=None))
+    assert result.part_fidelity.startswith("3d,")
+    for target in result.targets:
+        part = target.part.value + target.part.finer_elements_add
+        assert part == pytest.approx(target.corrected, rel=0.02)
 
 
 def flexure(size: float, shape: fm.Shape | None = None) -> tuple[fm.Simulation, fm.FlexibleLink, fm.Force]:
@@ -151,19 +233,3 @@ def test_parts_that_are_not_meshed_in_elements_of_the_optimiser_are_loaded_from_
         found = problem.verify(result)
     assert "elements are too large" in caplog.text
     assert parts(found)[:, 0] == pytest.approx(parts(half)[:, 0], rel=1e-7)
-
-
-def test_material_points_of_designed_links_have_no_place_in_the_part():
-    case = truss((0.4, 1.8))
-    (target,), (design,) = case.targets, case.designs
-    point = fm.Displacement(design.link, at=(18, 34))
-    targets = [
-        target,
-        fm.Target(point, target.sample, equals=(1.0, 0.5)),
-        fm.Target(fm.Component(point, (1, 0)), target.sample, equals=1.0),
-        fm.Target(fm.Magnitude(point), target.sample, equals=1.0),
-    ]
-    problem = fm.DesignProblem(case.simulate(), case.designs, targets=targets)
-    found = problem.verify(problem.optimise(optimiser=fm.LevenbergMarquardt(iterations=1)))
-    assert [own.part is None for own in found.targets] == [False, True, True, True]
-    assert point.of_part([])  # those of other links have

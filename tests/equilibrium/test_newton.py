@@ -108,7 +108,7 @@ def test_slender_link_takes_a_load_that_rolls_it_up_in_one_solve():
     [("iterations", -1), ("iterations", 2.5), ("watchdog", "x"), ("watchdog", -1), ("path_iterations", 0)],
 )
 def test_invalid_numbers_of_iterations_are_refused(limit, value):
-    with pytest.raises(fm.DescriptionError, match=f"Newton's {limit}: the value is {value!r}.*whole number"):
+    with pytest.raises(fm.DescriptionError, match=f"{limit} of Newton's method: the value is {value!r}.*whole number"):
         fm.PrimalDualNewton(**{limit: value})
 
 

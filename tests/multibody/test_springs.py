@@ -64,3 +64,18 @@ def test_soft_springs_hold_as_stiff_ones_do(stiffness):
     assert loose(shoulder) == (3, ("fore", "hand"))
     assert loose(shoulder, elbow) == (3, ("hand",))
     assert loose(shoulder, elbow, wrist) == (3, ())
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("stiffness", [1e-3, 1e4])
+def test_a_spring_that_a_motor_holds_wound_up_holds_no_other_joint(stiffness, dim):
+    mechanism, (shoulder, _, _) = arm()
+    motor = mechanism.motor(shoulder)
+    scene = Scene(mechanism, effects=[JointSpring(shoulder, stiffness)])
+    linkage, configuration = build_linkage(mechanism, dim), scene.configuration("wound", {motor: DRIVEN})
+    springs, motors = spring_potentials(scene.effects, linkage), linkage.rigid.motor_values(configuration.position)
+    poses = assemble(linkage, configuration, springs).poses
+    freedom = count_freedom(linkage.rigid, poses, motors, springs)
+    assert (freedom.mobility, freedom.zero_energy) == (2, ("fore", "hand"))
+    # nor does the rounding of its moment turn these
+    assert poses == pytest.approx(assemble(linkage, configuration).poses, abs=1e-9)

@@ -90,3 +90,19 @@ def test_invalid_friction_bands_are_refused():
         twice.friction_band({weld: PIN})
     with pytest.raises(fm.DescriptionError, match="not positive"):
         PinFriction(0.0, 1.0)
+
+
+def test_friction_of_what_is_no_pin_or_of_no_size_is_refused_by_name():
+    simulation, push, pins = parallelogram()
+    curve = simulation.load_displacement(push, displacements=[1.0, 2.0])
+    motor = simulation.scene.mechanism.motor(pins[0], name="drive")
+    other = lever(lambda hinge: []).joint
+    for pin, named in ((motor, "'drive'"), (push, repr(push.name)), ("hinge", "'hinge'"), (other, repr(other.name))):
+        with pytest.raises(
+            fm.DescriptionError, match=f"{named} is not a hinge of this curve.*Name its revolute joints"
+        ):
+            curve.friction_band({pin: PIN})
+    with pytest.raises(fm.DescriptionError, match=f"{pins[1].name}.*0.2 is not a friction.*PinFriction"):
+        curve.friction_band({pins[1]: 0.2})
+    with pytest.raises(fm.DescriptionError, match="is not a mapping.*PinFriction"):
+        curve.friction_band(pins[1])

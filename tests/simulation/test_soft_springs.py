@@ -1,8 +1,10 @@
-"""A spring far softer than the links holds a mechanism, and loads far below rounding of its length are balanced.
+"""A spring far softer than the links holds a mechanism, and loads far below rounding of its length are balanced; one
+that a motor winds up holds nothing else.
 
 A blade that turns strains by rounding, 1e-16 of its stiffness times its way, which limits how soft a spring may be.
 """
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 
@@ -54,3 +56,24 @@ def test_displacements_count_from_where_springs_hold_what_motors_leave():
     (frame,) = simulation.load_displacement(push, displacements=[0.0], configuration=bent).frames
     assert abs(frame.force) < 1e-9
     assert frame.state.poses[1] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_link_beyond_a_spring_that_a_motor_winds_up_swings_freely_into_the_line_of_a_pull():
+    mechanism = fm.Mechanism("double pendulum")
+    base, upper, fore = mechanism.rigid("base", fixed=True), mechanism.rigid("upper"), mechanism.rigid("fore")
+    blade = mechanism.flexible(
+        "blade", fm.strip([(50, 0), (60, 0)], thickness=2.0, depth=4.0), fm.Material("steel", 2e5, 0.3)
+    )
+    shoulder = mechanism.revolute(base, upper, at=(0, 0))
+    mechanism.revolute(upper, fore, at=(30, 0))
+    mechanism.weld(fore, blade, at=(50, 0), interface_radius=1.0)
+    motor = mechanism.motor(shoulder)
+    pull = mechanism.force(on=fore, at=(50, 0), direction=(np.cos(0.1), np.sin(0.1)))
+    scene = fm.Scene(mechanism, effects=[fm.JointSpring(shoulder, 1e3)])
+    simulation = fm.Simulation(scene, space="plane-stress", order=1, size=2.0, comm=MPI.COMM_SELF)
+    wound = scene.configuration("wound", {motor: 0.7})
+    curve = simulation.load_displacement(pull, forces=[1.0], configuration=wound)
+    index = [body.link for body in simulation.linkage.bodies].index(fore)
+    turned = 0.1 - curve.unloaded.poses[index, 2]
+    assert curve.displacements == pytest.approx([20.0 * (1.0 - np.cos(turned))], rel=1e-6)
+    assert not curve.snapped_through.any() and curve.freedom.zero_energy == ("fore", "blade")

@@ -24,6 +24,7 @@ import numpy as np
 from scipy.optimize import line_search
 
 from fenicsmech.design.optimisers.problem import (
+    Deferred,
     Evaluation,
     Inequalities,
     Infeasible,
@@ -37,7 +38,7 @@ from fenicsmech.design.optimisers.problem import (
     refuse_inequalities,
 )
 from fenicsmech.design.optimisers.step import minimum, updated
-from fenicsmech.errors import positive
+from fenicsmech.errors import DescriptionError, set_options
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class BFGS(Optimiser):
         longest: largest change of a parameter, over its length, in the first step of a line search.
 
     Raises:
-        DescriptionError: the tolerance is not a positive number; later: there are inequalities.
+        DescriptionError: a number is out of its range; later: there are inequalities.
     """
 
     iterations: int = 300
@@ -64,7 +65,13 @@ class BFGS(Optimiser):
     longest: float = 0.5
 
     def __post_init__(self) -> None:
-        positive("tolerance of BFGS", self.tolerance)
+        set_options(self, "BFGS", below_one=("armijo", "wolfe"), iterations=1)
+        if not self.armijo < self.wolfe:
+            raise DescriptionError(
+                "line search of BFGS",
+                f"armijo={self.armijo:g} is not below wolfe={self.wolfe:g}",
+                "Give a smaller armijo, so that there are steps that satisfy both",
+            )
 
     @property
     def least_reduction(self) -> float:
@@ -143,7 +150,7 @@ def _model(here: Evaluation, curvature: np.ndarray, p: np.ndarray) -> Quadratic:
     away, gradient, penalty = p - here.parameters, _gradient(here), here.regulariser(p)
     curved = curvature @ away
     value = here.value - here.penalty.value + float((gradient + 0.5 * curved) @ away) + penalty.value
-    return Quadratic(value, gradient + curved + penalty.gradient, curvature + penalty.curvature)
+    return Deferred(value, lambda: (gradient + curved + penalty.gradient, curvature + penalty.curvature))
 
 
 def _step(here: Evaluation, curvature: np.ndarray) -> np.ndarray:

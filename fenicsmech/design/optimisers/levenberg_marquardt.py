@@ -27,7 +27,7 @@ import numpy as np
 
 from fenicsmech.design.optimisers.problem import Evaluation, Iterate, no_errors, refuse_inequalities
 from fenicsmech.design.optimisers.sqp import SQP, Memory
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, positive, set_fields
 
 
 @dataclass(frozen=True)
@@ -44,12 +44,17 @@ class LevenbergMarquardt(SQP):
     The others are those of ``SQP``.
 
     Raises:
-        DescriptionError: tolerance or damping is not a positive number; later: the problem is not one of least squares.
+        DescriptionError: a number is out of its range; later: the problem is not one of least squares.
     """
 
     tolerance: float | None = None  # type: ignore[assignment]
     resolved: float = 0.1
     again: float = 0.1
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.tolerance is not None:
+            set_fields(self, tolerance=positive(f"tolerance of {type(self).__name__}", self.tolerance))
 
     @property
     def least_reduction(self) -> float:

@@ -42,7 +42,7 @@ from fenicsmech.design.optimisers.problem import (
     merit,
 )
 from fenicsmech.design.optimisers.step import Step, bent, minimum, turned, updated
-from fenicsmech.errors import positive
+from fenicsmech.errors import DescriptionError, set_options
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +104,7 @@ class SQP(Optimiser):
         stalls: steps in a row that gain less than ``tolerance``, after which it ends.
 
     Raises:
-        DescriptionError: tolerance, violation or damping is not a positive number.
+        DescriptionError: a number is out of its range.
     """
 
     iterations: int = 60
@@ -118,12 +118,14 @@ class SQP(Optimiser):
     stalls: int = 3
 
     def __post_init__(self) -> None:
-        for name, value in (
-            ("tolerance", self.least_reduction),
-            ("violation", self.violation),
-            ("damping", self.damping),
-        ):
-            positive(f"{name} of {type(self).__name__}", value)
+        name = type(self).__name__
+        set_options(self, name, free=("poor",), iterations=1, refusals=1, stalls=1)
+        if not self.poor < self.good:
+            raise DescriptionError(
+                f"reductions of {name}",
+                f"poor={self.poor:g} is not below good={self.good:g}",
+                "Give the ratio at which steps are refused below that at which damping falls",
+            )
 
     @property
     def least_reduction(self) -> float:

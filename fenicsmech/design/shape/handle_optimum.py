@@ -15,17 +15,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
 from scipy.linalg import cho_factor, cho_solve
-from scipy.sparse import csr_matrix
+from scipy.sparse import coo_matrix, csr_matrix
 
 from fenicsmech.design.shape.handles import LinkHandles
 from fenicsmech.design.shape.quality import QualitySum
 from fenicsmech.design.shape.shape_map import ShapeMap
-from fenicsmech.errors import FenicsmechError
+from fenicsmech.errors import FenicsmechError, set_options
 from fenicsmech.log import logger
 
 _log = logger(__name__)
@@ -48,6 +47,9 @@ class HandleOptions:
         turn: largest turn of a joint in one step, rad.
         kept: part of the gap to the next handle that one step must leave.
         flattest: least eigenvalue of the Hessian in a step, relative to the largest.
+
+    Raises:
+        DescriptionError: a number is out of its range.
     """
 
     iterations: int = 60
@@ -58,6 +60,10 @@ class HandleOptions:
     turn: float = 0.5
     kept: float = 0.2
     flattest: float = 1e-8
+
+    def __post_init__(self) -> None:
+        parts = ("armijo", "shortest", "kept", "flattest")
+        set_options(self, "optimal handle positions", below_one=parts, iterations=1, halvings=0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +131,7 @@ class HandleOptimum:
         each = zip(self._map.shapes, self._map.of_link, links, self._map.positions(by_theta), strict=True)
         for shape, own, link, slope in each:
             try:
-                total -= cho_solve(link.factor, slope[..., link.free].T).T @ (link.cross @ own.matrix)
+                total -= cho_solve(link.factor, slope[..., link.motion.free].T).T @ (link.cross @ own.matrix)
             except np.linalg.LinAlgError:
                 raise ShapeError(
                     f"shape of link {shape.own.name!r}",
@@ -135,32 +141,29 @@ class HandleOptimum:
         return total
 
     def _solve(self, p: np.ndarray, start: HandlePlacement, halvings: int) -> HandlePlacement:
-        theta = self._first_guess(p, start)
-        if theta is not None:
-            return self._minimise(p, theta)
+        positions, sums = self._first_guess(p, start)
+        if np.all(np.isfinite(sums)):
+            return self._minimise(p, positions, sums)
         if halvings == 0:
             raise ShapeError("rest shape", "cells are inverted however the handles are placed", "Change it by less")
         halfway = self._solve(0.5 * (start.p + p), start, halvings - 1)
         return self._solve(p, halfway, halvings - 1)
 
-    def _first_guess(self, p: np.ndarray, start: HandlePlacement) -> np.ndarray | None:
-        """The best of a few positions for each link; None if all of them invert cells of a link."""
+    def _first_guess(self, p: np.ndarray, start: HandlePlacement) -> tuple[list[np.ndarray], np.ndarray]:
+        """The best of a few positions for each link, and its sum, inf if all of them invert cells of the link."""
         following = [follow_spline(h, q) for h, q in zip(self._handles, self._map.parameters(p), strict=True)]
         guesses = [self._map.positions(start.theta), following]
         if self._known[0] is start:  # θ + dθ/dp Δp
             tangent = self._map.positions(start.theta.copy())
             before, after = self._map.parameters(start.p), self._map.parameters(p)
             for theta, link, old, new in zip(tangent, self._known[1], before, after, strict=True):
-                theta[link.free] -= cho_solve(link.factor, link.cross @ (new - old))
+                theta[link.motion.free] -= cho_solve(link.factor, link.cross @ (new - old))
             guesses.append(tangent)
         sums = np.array([self._sums(p, guess) for guess in guesses])
-        if not np.all(np.isfinite(sums.min(axis=0))):
-            return None
-        return np.concatenate([guesses[choice][link] for link, choice in enumerate(np.argmin(sums, axis=0))])
+        return [guesses[best][link] for link, best in enumerate(np.argmin(sums, axis=0))], sums.min(axis=0)
 
-    def _minimise(self, p: np.ndarray, theta: np.ndarray) -> HandlePlacement:
-        positions = self._map.positions(theta)
-        sums, moving, iterations = self._sums(p, positions), set(range(len(positions))), 0
+    def _minimise(self, p: np.ndarray, positions: list[np.ndarray], sums: np.ndarray) -> HandlePlacement:
+        moving, iterations = set(range(len(positions))), 0
         while moving and iterations < self._options.iterations:
             iterations += 1
             steps = {}
@@ -168,11 +171,11 @@ class HandleOptimum:
                 if link not in moving:
                     continue
                 step = by_theta.newton_step(self._options.flattest)
-                if -0.5 * by_theta.slope @ step[by_theta.free] > self._options.settled * sums[link]:
+                if -0.5 * by_theta.slope @ step[by_theta.motion.free] > self._options.settled * sums[link]:
                     steps[link] = by_theta, step
                 else:
                     # the decrease is below rounding, the improvement of θ is not
-                    positions[link] = by_theta.moved(positions[link], step)
+                    positions[link] = by_theta.motion.moved(step)
                     moving.remove(link)
             if steps:
                 positions, sums, stuck = self._search(p, positions, sums, steps)
@@ -191,17 +194,17 @@ class HandleOptimum:
         steps: dict[int, tuple[PositionDerivatives, np.ndarray]],
     ) -> tuple[list[np.ndarray], np.ndarray, set[int]]:
         """Positions and sums after a step of each link in ``steps``, and the links that found no lower sum."""
-        lengths = {link: by.longest(positions[link], step, self._options) for link, (by, step) in steps.items()}
+        lengths = {link: by.motion.longest(step, self._options) for link, (by, step) in steps.items()}
         pending, stuck, trial = set(steps), set(), list(positions)
         while pending:
             for link in pending:
                 by_theta, step = steps[link]
-                trial[link] = by_theta.moved(positions[link], lengths[link] * step)
+                trial[link] = by_theta.motion.moved(lengths[link] * step)
             new = self._sums(p, trial)
             for link in sorted(pending):
                 by_theta, _ = steps[link]
-                wanted = self._options.armijo * by_theta.slope @ (trial[link] - positions[link])[by_theta.free]
-                if new[link] <= sums[link] + wanted:
+                moved = (trial[link] - positions[link])[by_theta.motion.free]
+                if new[link] <= sums[link] + self._options.armijo * by_theta.slope @ moved:
                     pending.remove(link)
                 elif lengths[link] < self._options.shortest:
                     trial[link] = positions[link]
@@ -234,9 +237,10 @@ class HandleOptimum:
         hessian = self._quality.hessian()
         if self._reducer is None:
             self._reducer = _MomentHessian(self._map, hessian)
-        by_T = map(MapDerivatives, self._map.moments(self._quality.gradient()), self._reducer.reduce(hessian))
-        links = zip(self._handles, self._map.parameters(p), positions, by_T, strict=True)
-        return [by_positions(*link) for link in links]
+        moments = self._map.moments(self._quality.gradient())
+        links = zip(self._handles, self._map.parameters(p), positions, moments, strict=True)
+        motions = [motion(*link) for link in links]
+        return list(map(PositionDerivatives, motions, self._reducer.reduce(hessian, [own.by_theta for own in motions])))
 
     def _second_derivatives(self, placement: HandlePlacement) -> list[PositionDerivatives]:
         """S_θθ and S_θp of each link at ``placement``; those of the last one are kept."""
@@ -249,37 +253,93 @@ class HandleOptimum:
 
 
 @dataclass(frozen=True, eq=False)
-class MapDerivatives:
-    """Derivatives of S by the maps of a link's handles.
+class HandleMotion:
+    """How the handles of a link move, each to the side to which S falls.
 
     Attributes:
+        handles: all handles of the link.
+        p, theta: parameters of its spline, (size,), and positions of the handles, (n,).
         gradient: ∂S/∂T, (n, 2, 3).
-        hessian: ∂²S/∂T∂T, (n, 2, 3, n, 2, 3).
+        segments: the segment of the spline each of them stays in, (n,).
+        free: which of them move, (n,).
     """
 
+    handles: LinkHandles
+    p: np.ndarray
+    theta: np.ndarray
     gradient: np.ndarray
-    hessian: np.ndarray
+    segments: np.ndarray
+    free: np.ndarray
+
+    @cached_property
+    def by_theta(self) -> np.ndarray:
+        """∂T_j/∂θ_j, (n, 2, 3)."""
+        return self.handles.by_theta(self.p, self.theta, self.segments)
+
+    def moved(self, step: np.ndarray) -> np.ndarray:
+        """θ after a step; a handle that would leave its segment stops at the control point."""
+        slides, after = self.handles.slides, self.theta + step
+        return np.where(slides, np.clip(after, self.segments, self.segments + 1), after)
+
+    def longest(self, step: np.ndarray, options: HandleOptions) -> float:
+        """The largest fraction of a step, up to 1, that keeps handles in order and turns joints moderately."""
+        slides = self.handles.slides
+        turn = np.abs(step[~slides]).max(initial=0.0)
+        gaps, closing = np.diff(_along(self.handles, self.theta)), -np.diff(np.where(slides, step, 0.0))
+        limits = (1.0 - options.kept) * gaps[closing > 0.0] / closing[closing > 0.0]
+        return min(1.0, options.turn / max(turn, options.turn), limits.min(initial=1.0))
+
+
+def motion(handles: LinkHandles, p: np.ndarray, theta: np.ndarray, gradient: np.ndarray) -> HandleMotion:
+    """The motion of handles, from ∂S/∂T; at a control point to the side to which S falls."""
+    segments = after = handles.segments(theta)
+    free = handles.slides | handles.turns
+    at_kink = handles.slides & (theta == after)
+    if np.any(at_kink):
+        before = np.where(at_kink, after - 1, after)
+        forward, backward = (
+            np.sum(gradient * handles.by_theta(p, theta, side), axis=(1, 2)) for side in (after, before)
+        )
+        segments = np.where(at_kink & (forward >= 0.0), before, after)
+        free &= ~(at_kink & (forward >= 0.0) & (backward <= 0.0))
+    return HandleMotion(handles, p, theta, gradient, segments, free)
 
 
 @dataclass(frozen=True, eq=False)
 class PositionDerivatives:
-    """Derivatives of S by the positions of a link's free handles, to the side to which each of them moves.
+    """Derivatives of S by the positions of a link's free handles.
+
+    S_θ = S_T · T_θ,     S_θθ = T_θ · S_TT · T_θ + S_T · T_θθ,     S_θp alike.
 
     Attributes:
-        handles: all handles of the link.
-        segments: the segment of the spline each of them stays in, (n,).
-        free: which of them move, (n,).
-        slope: S_θ, (f,).
-        hessian: S_θθ, (f, f).
-        cross: S_θp, (f, parameters).
+        motion: of the handles.
+        rows: T_θ · S_TT, (n, n, 2, 3).
     """
 
-    handles: LinkHandles
-    segments: np.ndarray
-    free: np.ndarray
-    slope: np.ndarray
-    hessian: np.ndarray
-    cross: np.ndarray
+    motion: HandleMotion
+    rows: np.ndarray
+
+    @cached_property
+    def slope(self) -> np.ndarray:
+        """S_θ, (f,)."""
+        own = self.motion
+        return np.sum(own.gradient * own.by_theta, axis=(1, 2))[own.free]
+
+    @cached_property
+    def hessian(self) -> np.ndarray:
+        """S_θθ, (f, f)."""
+        own = self.motion
+        twice = own.handles.twice_by_theta(own.p, own.theta, own.gradient, own.segments)[own.free]
+        hessian = np.einsum("jmbl,mbl->jm", self.rows[own.free][:, own.free], own.by_theta[own.free]) + np.diag(twice)
+        return 0.5 * (hessian + hessian.T)
+
+    @cached_property
+    def cross(self) -> np.ndarray:
+        """S_θp, (f, size)."""
+        own = self.motion
+        by_p = own.handles.by_p(own.p, own.theta, own.segments)
+        cross = own.handles.by_theta_and_p(own.p, own.theta, own.gradient, own.segments)
+        return np.tensordot(self.rows[own.free], by_p, 3) + cross[own.free]
 
     @cached_property
     def factor(self) -> tuple[np.ndarray, bool]:
@@ -290,47 +350,9 @@ class PositionDerivatives:
         """−|S_θθ|⁻¹ S_θ, with the eigenvalues of the Hessian made positive, (n,)."""
         values, vectors = np.linalg.eigh(self.hessian)
         values = np.maximum(np.abs(values), flattest * np.abs(values).max(initial=0.0))
-        step = np.zeros(len(self.handles))
-        step[self.free] = -vectors @ (vectors.T @ self.slope / values)
+        step = np.zeros(len(self.motion.free))
+        step[self.motion.free] = -vectors @ (vectors.T @ self.slope / values)
         return step
-
-    def moved(self, theta: np.ndarray, step: np.ndarray) -> np.ndarray:
-        """θ after a step; a handle that would leave its segment stops at the control point."""
-        slides, after = self.handles.slides, theta + step
-        return np.where(slides, np.clip(after, self.segments, self.segments + 1), after)
-
-    def longest(self, theta: np.ndarray, step: np.ndarray, options: HandleOptions) -> float:
-        """The largest fraction of a step, up to 1, that keeps handles in order and turns joints moderately."""
-        slides = self.handles.slides
-        turn = np.abs(step[~slides]).max(initial=0.0)
-        gaps, closing = np.diff(_along(self.handles, theta)), -np.diff(np.where(slides, step, 0.0))
-        limits = (1.0 - options.kept) * gaps[closing > 0.0] / closing[closing > 0.0]
-        return min(1.0, options.turn / max(turn, options.turn), limits.min(initial=1.0))
-
-
-def by_positions(handles: LinkHandles, p: np.ndarray, theta: np.ndarray, by_T: MapDerivatives) -> PositionDerivatives:
-    """Derivatives of S by θ, from those by the maps; at a control point to the side to which S falls.
-
-    S_θ = S_T · T_θ,     S_θθ = T_θ · S_TT · T_θ + S_T · T_θθ,     S_θp alike.
-    """
-    segments = after = handles.segments(theta)
-    free = handles.slides | handles.turns
-    at_kink = handles.slides & (theta == after)
-    if np.any(at_kink):
-        before = np.where(at_kink, after - 1, after)
-        forward, backward = (
-            np.sum(by_T.gradient * handles.gradients(p, theta, segments=side)[1], axis=(1, 2))
-            for side in (after, before)
-        )
-        segments = np.where(at_kink & (forward >= 0.0), before, after)
-        free &= ~(at_kink & (forward >= 0.0) & (backward <= 0.0))
-    by_p, by_theta = handles.gradients(p, theta, segments=segments)
-    cross, twice = handles.curvatures(p, theta, by_T.gradient, segments=segments)
-    slope = np.einsum("jak,jak->j", by_T.gradient, by_theta)[free]
-    rows = np.einsum("jak,jakmbl->jmbl", by_theta, by_T.hessian)[free]
-    hessian = np.einsum("jmbl,mbl->jm", rows, by_theta)[:, free] + np.diag(twice[free])
-    cross = np.einsum("jmbl,mblp->jp", rows, by_p) + cross[free]
-    return PositionDerivatives(handles, segments, free, slope, 0.5 * (hessian + hessian.T), cross)
 
 
 def follow_spline(handles: LinkHandles, p: np.ndarray) -> np.ndarray:
@@ -359,30 +381,38 @@ class _MomentHessian:
 
     def __init__(self, shape_map: ShapeMap, hessian: PETSc.Mat) -> None:
         self._map = shape_map
+        self._sizes = [len(shape.handles) for shape in shape_map.shapes]
+        before, count = np.cumsum([0, *self._sizes[:-1]]), sum(self._sizes)
         # class of each vertex of the whole mesh, −1 where no handle moves it; two unknowns (x, y) per class
-        classes = np.full(len(shape_map.mesh.vertices), -1)
-        self._arms, self._unknowns, first = [], [], 0
+        classes, first, arms = np.full(len(shape_map.mesh.vertices), -1), 0, []
         for piece in shape_map.pieces:
             reach = piece.reach
-            rows, inverse = np.unique(reach.reshape(len(reach), -1), axis=0, return_inverse=True)
+            unique, inverse = np.unique(reach.reshape(len(reach), -1), axis=0, return_inverse=True)
             classes[piece.vertices] = first + inverse.ravel()
             # ∂d/∂T of every class from its r, (2 classes, 6 handles)
-            arms = np.einsum("ab,njk->najbk", piece.matrix, rows.reshape(-1, *reach.shape[1:]))
-            self._arms.append(arms.reshape(2 * len(rows), -1))
-            self._unknowns.append(slice(2 * first, 2 * (first + len(rows))))
-            first += len(rows)
+            own = np.einsum("ab,njk->najbk", piece.matrix, unique.reshape(-1, *reach.shape[1:]))
+            own = coo_matrix(own.reshape(2 * len(unique), -1))
+            arms.append((own.data, own.row + 2 * first, own.col + 6 * before[piece.shape]))
+            first += len(unique)
+        data, rows, columns = (np.concatenate(part) for part in zip(*arms, strict=True))
+        self._arms = csr_matrix((data, (rows, columns)), shape=(2 * first, 6 * count))
+        self._along = np.repeat(np.arange(count), 6), np.arange(6 * count + 1)  # entries ∂T_j/∂θ_j, of 6 rows each
+        # place of (j, 0) among the results, one shape after another
+        self._ends = np.cumsum([6 * size * size for size in self._sizes])
+        places = zip(self._ends, self._sizes, before, strict=True)
+        self._places = np.concatenate([end - 6 * (size * np.arange(size, 0, -1) + own) for end, size, own in places])
         self._find_slots(hessian, classes, 2 * first)
 
-    def reduce(self, hessian: PETSc.Mat) -> list[np.ndarray]:
-        """∂²/∂T∂T per shape, (handles, 2, 3, handles, 2, 3)."""
+    def reduce(self, hessian: PETSc.Mat, by_theta: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """∂T_j/∂θ_j · ∂²/∂T_j∂T per shape, (handles, handles, 2, 3), from ∂T_j/∂θ_j (handles, 2, 3)."""
         values = hessian.getValuesCSR()[2][self._kept]
         self._sum.data = np.bincount(self._slots, weights=values, minlength=self._sum.nnz)
-        blocks: list[Any] = [0.0] * len(self._map.shapes)
-        for piece, mine, arms in zip(self._map.pieces, self._unknowns, self._arms, strict=True):
-            handles = arms.shape[1] // 6
-            block = arms.T @ (self._sum[mine, mine] @ arms)
-            blocks[piece.shape] = blocks[piece.shape] + block.reshape(handles, 2, 3, handles, 2, 3)
-        return self._map.sum_over_ranks(blocks)
+        along = self._arms @ csr_matrix((np.concatenate(by_theta).ravel(), *self._along))
+        found = ((self._sum @ along).T @ self._arms).tocoo()
+        blocks = np.zeros(self._ends[-1])
+        blocks[self._places[found.row] + found.col] = found.data
+        parts = zip(np.split(blocks, self._ends[:-1]), self._sizes, strict=True)
+        return self._map.sum_over_ranks([part.reshape(size, size, 2, 3) for part, size in parts])
 
     def _find_slots(self, hessian: PETSc.Mat, classes: np.ndarray, size: int) -> None:
         """Place of each entry of the owned rows in the matrix between classes."""

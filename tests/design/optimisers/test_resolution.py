@@ -82,7 +82,7 @@ def test_a_given_tolerance_is_used_and_no_error_is_estimated():
 
 def test_errors_are_estimated_a_few_times_and_at_the_end():
     # damping that never falls
-    doubtful, crawling = Doubtful(3e-2, 1e-4), LevenbergMarquardt(damping=1.0, good=np.inf)
+    doubtful, crawling = Doubtful(3e-2, 1e-4), LevenbergMarquardt(damping=1.0, good=1e9)
     last = minimised(crawling, doubtful)
     assert last.reason is Reason.RESOLVED
     assert 1 <= doubtful.estimates < last.number / 3
