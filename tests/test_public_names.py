@@ -16,6 +16,7 @@ PUBLIC = [getattr(fm, name) for name in fm.__all__]
 # Classes that methods return for the package's own layers, or hand to solvers, optimisers and regularisers, which
 # read attributes of it and never make one.
 INNER = {
+    "ActiveSet",
     "Adjoint",
     "Body",
     "Bounds",

@@ -28,7 +28,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fenicsmech.continuation.stepper import Predictor, Stepper, TangentPredictor
-from fenicsmech.equilibrium import Control, EquilibriumPoint, EquilibriumSolver, NotConverged, State, Step
+from fenicsmech.equilibrium import ActiveSet, Control, EquilibriumPoint, EquilibriumSolver, NotConverged, State, Step
 from fenicsmech.errors import not_negative, set_fields, set_options
 from fenicsmech.log import logger
 
@@ -186,10 +186,11 @@ class LoadStepper(Stepper):
     def _guess(self, control: Control) -> State:
         """The prediction; the last equilibrium where the prediction runs into obstacles, or comes off them."""
         guess = self._predict(control.prescribed - self._value)
-        if self.system.contact is None or not self._points:
+        contact = self.system.contact
+        if contact is None or not self._points:
             return guess
         last = self._points[-1].state
-        return last if self._leaves_contact(last, guess, control) else guess
+        return last if self._leaves_contact(contact, last, guess, control) else guess
 
     def _predict(self, ahead: float) -> State:
         """The prediction; where it moves too far that of the tangent, then the last equilibrium."""
@@ -202,17 +203,17 @@ class LoadStepper(Stepper):
                 return guess
         return last
 
-    def _leaves_contact(self, last: State, guess: State, control: Control) -> bool:
+    def _leaves_contact(self, contact: ActiveSet, last: State, guess: State, control: Control) -> bool:
         """Whether other points touch in ``guess`` than in ``last``, and its residual under ``control`` is far larger.
 
-        The tangent holds as long as the same points touch. Elsewhere the first step from the last equilibrium, with gaps
-        linearised, is the prediction that keeps links outside obstacles.
+        The tangent holds as long as the same points touch. Elsewhere the first step from the last equilibrium, with
+        gaps linearised, is the prediction that keeps links outside obstacles.
         """
         system, norms, touching = self.system, [], []
         for state in (control.prepare(last), control.prepare(guess)):
             system.load(state)
             norms.append(system.residual(state, control).norm)
-            touching.append(system.contact.touching())
+            touching.append(contact.touching())
         changed = system.comm.allreduce(int(np.any(touching[0] != touching[1]))) > 0
         return changed and not norms[1] <= self._steps.contact_residual * norms[0]  # NaN where elements are inverted
 

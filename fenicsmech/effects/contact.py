@@ -4,27 +4,33 @@
 
 g the signed gap, positive outside, 0 on the surface, negative inside an obstacle, and ⟨·⟩ the positive part. The
 pressure κ ⟨−g⟩ pushes a link out along ∇g. V is once continuously differentiable; its second derivative jumps where
-points come into contact: Newton's method is semismooth there.
+points come into contact, and Newton steps find them with gaps linearised.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+import basix
 import numpy as np
 import sympy
 import ufl
 from dolfinx import fem
+from petsc4py import PETSc
+from scipy.sparse import bsr_matrix, csr_matrix, identity, kron
 
+from fenicsmech.compat import add_ghosts, cell_dofs, cell_nodes, owned_values
 from fenicsmech.effects.link_fields import Faces, LinkFields
-from fenicsmech.effects.one_sided import OneSided
 from fenicsmech.errors import DescriptionError, direction, in_plane, point, points, positive, set_fields
 from fenicsmech.mechanism import Effect, FlexibleLink, Link, RigidLink, in_dimension
 from fenicsmech.multibody import Linkage, PosePotential
 from fenicsmech.symbolic import SmoothFunction, derive
+
+_FACETS = {2: basix.CellType.interval, 3: basix.CellType.triangle}
+_CELLS = {2: basix.CellType.triangle, 3: basix.CellType.tetrahedron}
 
 _RELATIVE_STIFFNESS = 0.1
 """Default stiffness over that of the outermost layer of elements."""
@@ -148,7 +154,7 @@ class Contact(Effect):
             rigid links force per penetration k of each point; must be given.
         points: of a rigid link as drawn.
 
-    Penetration falls as 1 / stiffness, while Newton's method takes more iterations where contact changes. Obstacles act
+    Penetration falls as 1 / stiffness; iterations hardly depend on it. Obstacles act
     only after the motors have moved: a configuration whose rigid assembly is on the far side of an obstacle stays
     there. From then on flexible links cannot slip through a cylinder: states with a penetration of a quarter of its
     radius are rejected. In space a pressed edge is also pressed on its flat faces inside the obstacle, with an error of
@@ -192,7 +198,7 @@ class Contact(Effect):
         return (Faces(self.link),) if isinstance(self.link, FlexibleLink) else ()
 
     def one_sided(self, fields):
-        return [_Surface(self, self.link, fields)] if isinstance(self.link, FlexibleLink) else []
+        return [OneSided(self, self.link, fields)] if isinstance(self.link, FlexibleLink) else []
 
     def link_energy(self, fields):
         if not isinstance(self.link, FlexibleLink):
@@ -219,30 +225,140 @@ class Contact(Effect):
         return [_Points(self, linkage)] if isinstance(self.link, RigidLink) else []
 
 
-class _Surface(OneSided):
-    """The surface of a flexible link, at the points of the quadrature of its energy."""
+class OneSided:
+    """The boundary of a flexible link and an obstacle at the points of the quadrature of V, n on this rank.
+
+    Newton steps find with them which points touch (``equilibrium.active_set``); forces and stiffness, with D = −∂p/∂g:
+
+        −Σ w p ∇g,     Σ w (D ∇g ⊗ ∇g − p ∇²g).
+
+    Args:
+        contact: of the link.
+        link: with the boundary.
+        fields: of the links.
+
+    Attributes:
+        compliances: 1/κ, (n,).
+        weights: areas that points stand for, of the links at rest, their depth included, (n,).
+        gaps: g, (n,), as ``weights`` of the last ``update``.
+    """
 
     def __init__(self, contact: Contact, link: FlexibleLink, fields: LinkFields) -> None:
-        self._obstacle, boundary = contact.obstacle, fields.boundaries[Faces(link)]
-        super().__init__(fields, boundary, degree=2 * fields.order)
+        boundary, dim = fields.boundaries[Faces(link)], fields.dim
+        self._obstacle, self._body, self._boundary = contact.obstacle, fields.body, boundary
+        points, self._weights = basix.make_quadrature(_FACETS[dim], 2 * fields.order)
+        self._points = np.column_stack([1.0 - points.sum(axis=1), points])
+        self._nodes = self._tabulated(fields.u, 0)[0]
+        self._shape, *self._along = self._tabulated(fields.body.shape, 1)
+        space = fields.u.function_space
+        self._motion = fem.Function(space)
+        count = self._nodes.shape[1]
+        self._global = space.dofmap.index_map.local_to_global(np.arange(count, dtype=np.int32)).astype(np.int64)
         if contact.stiffness is not None:
             stiffness = np.full(len(boundary.cells), contact.stiffness)
         else:
-            stiffness = _RELATIVE_STIFFNESS * link.material.law.E / self.heights()
-        self.compliances = self.at_points(1.0 / stiffness)
+            stiffness = _RELATIVE_STIFFNESS * link.material.law.E / self._heights()
+        self.compliances = np.repeat(1.0 / stiffness, len(self._points))
 
     @cached_property
     def _gap(self) -> SmoothFunction:
         return _smooth_gap(self._obstacle, self._body.model.dim)
 
-    def gap(self, x):
+    def _heights(self) -> np.ndarray:
+        """Heights of the cells over their facets, as meshed, (facets,)."""
+        dim, mesh = self._body.model.dim, self._body.mesh
+        cells = mesh.geometry.x[cell_nodes(mesh)[self._boundary.cells]][..., :dim]
+        volume = np.abs(np.linalg.det(cells[:, 1:] - cells[:, :1]))
+        edges = self._boundary.places[:, 1:] - self._boundary.places[:, :1]
+        area = np.linalg.norm(edges[:, 0] if dim == 2 else np.cross(edges[:, 0], edges[:, 1]), axis=1)
+        return volume / area
+
+    def update(self) -> None:
+        """Takes the rest shape and the displacements that the fields hold. Local."""
+        places, dim = self._boundary.places, self._body.model.dim
+        shape = self._body.shape.x.array.reshape(-1, dim)
+        rest = (self._points @ places).reshape(-1, dim) + self._shape @ shape
+        edges = [np.repeat(places[:, k] - places[:, 0], len(self._points), axis=0) for k in range(1, dim)]
+        edges = [edge + along @ shape for edge, along in zip(edges, self._along, strict=True)]
+        area = edges[0] if dim == 2 else np.cross(edges[0], edges[1])
+        depth = self._body.model.multiplier(self._body.depth.x.array[self._boundary.cells])
+        weights = np.outer(depth * np.ones(len(places)), self._weights).ravel()
+        self.weights = weights * np.linalg.norm(area, axis=1)
+        moved = rest + self._nodes @ self._body.u.x.array.reshape(-1, dim)
         numbers = np.array([self._obstacle.numbers])
-        weights = np.ones((len(x), 1))
-        return (
-            self._gap.value(x, numbers)[:, 0],
-            self._gap.gradient(x, numbers)[:, 0],
-            self._gap.hessian(x, numbers, weights),
+        self.gaps = self._gap.value(moved, numbers)[:, 0]
+        self._normals = self._gap.gradient(moved, numbers)[:, 0]
+        self._curvatures = self._gap.hessian(moved, numbers, np.ones((len(moved), 1)))
+
+    def rates(self, motion: np.ndarray) -> np.ndarray:
+        """∇g · δu at the points, (n,), from δu of this rank's owned nodes, flat."""
+        owned_values(self._motion)[:] = motion
+        self._motion.x.scatter_forward()
+        moved = self._nodes @ self._motion.x.array.reshape(self._nodes.shape[1], -1)
+        return np.einsum("ni,ni->n", self._normals, moved)
+
+    def forces(self, pressures: np.ndarray) -> np.ndarray:
+        """−Σ w p ∇g, the gradient of the energy where p are the ``pressures``, this rank's owned values, flat."""
+        values = -(self.weights * pressures)[:, None] * self._normals
+        self._motion.x.array[:] = (self._nodes.T @ values).ravel()
+        add_ghosts(self._motion)
+        return owned_values(self._motion).copy()
+
+    def add_stiffness(
+        self,
+        matrix: PETSc.Mat,
+        rows_of: Callable[[np.ndarray], np.ndarray],
+        stiffness: np.ndarray,
+        pressures: np.ndarray,
+    ) -> None:
+        """Adds Σ w (D ∇g ⊗ ∇g − p ∇²g) into ``matrix`` and leaves it unassembled.
+
+        ``rows_of`` gives the matrix's rows of nodes, numbered over all ranks, ``stiffness`` is D, ``pressures`` p.
+        """
+        points = np.flatnonzero((stiffness != 0.0) | (pressures != 0.0))
+        normals, count = self._normals[points], len(points)
+        if not count:
+            return
+        blocks = stiffness[points, None, None] * normals[:, :, None] * normals[:, None, :]
+        blocks = self.weights[points, None, None] * (blocks - pressures[points, None, None] * self._curvatures[points])
+        shape = self._nodes[points]
+        used = np.unique(shape.indices)
+        nodes = kron(shape[:, used], identity(normals.shape[1]), format="csr")
+        diagonal = bsr_matrix((blocks, np.arange(count), np.arange(count + 1)), shape=2 * (nodes.shape[0],))
+        found = (nodes.T @ diagonal @ nodes).tocsr()
+        rows = rows_of(self._global[used]).astype(PETSc.IntType)
+        matrix.setValuesIJV(found.indptr.astype(PETSc.IntType), rows[found.indices], found.data, addv=True, rowmap=rows)
+
+    def _tabulated(self, field: fem.Function, order: int) -> list[csr_matrix]:
+        """The basis functions of a field's space at the points, (n, local nodes), and for ``order`` 1 their derivatives
+        along the facets' edges from the first corner to each other one."""
+        space, sides = field.function_space, self._boundary.sides
+        dim, dofs = self._body.model.dim, cell_dofs(space)[self._boundary.cells]
+        element = basix.create_element(
+            basix.ElementFamily.P, _CELLS[dim], self._degree(dofs.shape[1]), basix.LagrangeVariant.gll_warped
         )
+        corners = np.vstack([np.zeros(dim), np.eye(dim)])
+        values = np.zeros((1 + order * (dim - 1), len(sides), len(self._points), dofs.shape[1]))
+        for own in np.unique(sides, axis=0):
+            table = element.tabulate(order, self._points @ corners[own])[..., 0]
+            here = (sides == own).all(axis=1)
+            values[0, here] = table[0]
+            for k in range(1, len(values)):
+                edge = corners[own[k]] - corners[own[0]]
+                values[k, here] = np.einsum("d,dqn->qn", edge, table[1:])
+        values[np.abs(values) < 1e-13] = 0.0
+        columns = np.broadcast_to(dofs[:, None, :], values.shape[1:]).ravel()
+        starts = np.arange(0, columns.size + 1, dofs.shape[1])
+        shape, found = (len(starts) - 1, len(field.x.array) // dim), []
+        for table in values:
+            found.append(csr_matrix((table.ravel(), columns, starts), shape=shape, copy=True))
+            found[-1].eliminate_zeros()  # in its own arrays
+        return found
+
+    def _degree(self, nodes: int) -> int:
+        """The degree of the element with as many nodes."""
+        by_nodes = {2: {3: 1, 6: 2, 10: 3}, 3: {4: 1, 10: 2, 20: 3}}
+        return by_nodes[self._body.model.dim][nodes]
 
 
 class _Points(PosePotential):

@@ -1,10 +1,19 @@
-"""Linear springs in revolute and prismatic joints.
+"""Elastic joints: linear springs in revolute and prismatic joints, and elastic pins.
+
+A spring along the free coordinate φ of a joint:
 
     V = ½ k (φ − φ₀)² = ½ k φ² − k φ₀ φ + const.
 
 The first term holds the mechanism from the start, the second grows with the load factor of constant
 loads, which takes the rest position from 0 to φ₀. Displacements count from the equilibrium with the first term alone,
 in which the links are strained where motors have wound the spring up.
+
+Compliance c of a pin: a force λ across it moves its two ends apart by c λ. With the constraint C = x_b − x_a of a rigid
+pin,
+
+    C + c λ = 0,    V = ½ |C|² / c,
+
+so that c enters the KKT matrix as −c on the diagonal of the multipliers, and c → 0 is the rigid pin.
 """
 
 from __future__ import annotations
@@ -128,3 +137,41 @@ class _Preload(PosePotential):
     @property
     def _moment(self) -> float:
         return self.numbers["stiffness"] * self.numbers["rest"]
+
+
+@dataclass(frozen=True)
+class JointCompliance(Effect):
+    """Compliance of a joint at the shared point of its links, isotropic; its axis stays aligned.
+
+    Two compliances of one joint act in series. The energy of the joint is not part of a frame's strain energy.
+
+    Attributes:
+        joint: a revolute, spherical, universal or weld joint.
+        compliance: c; with N and mm in mm/N.
+
+    Raises:
+        DescriptionError: this is not a joint, or the compliance is not positive.
+    """
+
+    joint: Joint
+    compliance: float
+
+    def __post_init__(self) -> None:
+        expect("joint compliance", self.joint, Joint, "a joint")
+        set_fields(self, compliance=positive(f"compliance of {self.joint.name!r}", self.compliance))
+
+    def check(self, mechanism, dim):
+        super().check(mechanism, dim)
+        if not self.joint.kind.shares_point:
+            raise DescriptionError(
+                f"compliance of {self.joint.name!r}",
+                f"the links of a {self.joint.kind.name} joint share no point",
+                "Soften revolute, spherical, universal or weld joints",
+            )
+
+    def explain(self):
+        return f"compliance {self.compliance:g} of {self.joint.name!r}"
+
+    def soften(self, linkage):
+        rows = [row for row, name in enumerate(linkage.joints.row_names) if name == self.joint.name]
+        return dict.fromkeys(rows[: linkage.dim], self.compliance)

@@ -13,6 +13,7 @@
 - ``newton``: the default method, a primal–dual Newton iteration
 """
 
+from fenicsmech.equilibrium.active_set import ActiveSet
 from fenicsmech.equilibrium.border import REGULARISATION, PointLoad
 from fenicsmech.equilibrium.control import (
     ArcLengthControl,

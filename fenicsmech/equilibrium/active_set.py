@@ -13,7 +13,8 @@ step leaves the gaps γ₀ and misses forces of contact by a,
 a piecewise linear equation of the points where a is not zero, found by the largest a, and doubled until none is left:
 a solve with the factor for each, and small dense systems. Newton's method settles most of them in a few steps. If not,
 the forces p = f(γ) ≥ 0 at these points are the least of ½ p · (S₀ + 1/d) p + γ₀₀ · p, a non-negative least-squares
-problem if contact is not all that keeps the links stable; S₀, γ₀₀ without the springs d. If it is, the step stays as it is.
+problem if contact at others keeps the links stable; S₀ and γ₀₀ are S and γ₀ without the springs d. If it does not, the
+step stays that of K.
 
 Iterations thus depend on how far from linear links and gaps are, not on how many points touch or come and go. The next
 matrix takes the points and pressures of the linearised gaps, not those of the state, whose gaps are of second order.
@@ -66,7 +67,8 @@ class ActiveSet:
         self._first = sum(counts[: comm.rank])  # number of this rank's first point over all ranks
         self._load_factor = 0.0
         # A and the pressures in K, and those expected after the step; None: those of the state
-        self._active, self._expected = np.zeros(0, bool), None
+        self._active = np.zeros(0, bool)
+        self._expected: tuple[np.ndarray, np.ndarray] | None = None
         # numbers of the points corrected with the present factor, and b · K⁻¹ b of each at this rank's points
         self._corrected, self._columns = np.zeros(0, int), np.zeros((0, 0))
 
@@ -167,7 +169,7 @@ class ActiveSet:
         own = np.flatnonzero((points >= self._first) & (points < self._first + len(fixed)))
         rows = points[own] - self._first
         values = np.column_stack([fixed[rows], self._gaps[rows], stiffness[rows], self._active[rows]])
-        parts = self._comm.gather((own, self._columns[rows], values))
+        parts = self._comm.allgather((own, self._columns[rows], values))
 
         def solution() -> np.ndarray | None:
             places, columns, known = (np.concatenate(part) for part in zip(*parts, strict=True))

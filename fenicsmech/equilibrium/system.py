@@ -269,8 +269,8 @@ class EquilibriumSystem:
     ) -> None:
         """Brings ``kkt`` to the loaded ``state``, with the stress predicted by the ``last`` step if that is given.
 
-        It is the state before the step and δu of owned nodes, linear in it on interface nodes too, (owned dofs,). Points
-        of obstacles touch as the state has it, or as ``contact`` expects.
+        It is the state before the step and δu of owned nodes, linear in it on interface nodes too, (owned dofs,).
+        Points touch obstacles as the state has it, or as ``contact`` expects.
         """
         self.kkt.set_stiffness()
         moments = residual.moments

@@ -56,8 +56,8 @@ class Effect(ABC):
         return None
 
     def one_sided(self, fields):
-        """A sequence of ``OneSided`` constraints, whose energy ``link_energy`` contains: where plain Newton iterations
-        keep changing the points that touch, their pressures become unknowns."""
+        """A sequence of ``OneSided`` constraints, whose energy ``link_energy`` contains: Newton steps find with them
+        which points touch."""
         return ()
 
     def pose_potentials(self, linkage):
