@@ -95,8 +95,8 @@ def finger(
     return Touching(_simulation(mechanism, [contact] if active else [], space, size, comm), pull, contact)
 
 
-def wrapped(*, unit: float = 1.0, stress: float = 1.0, comm: MPI.Comm = MPI.COMM_SELF) -> Touching:
-    """A slender cantilever, 100 × 0.5 × 10 of 2000 MPa, over a cylinder of 50 times its length that is tangent to it.
+def wrapped(*, gap: float = 0.0, unit: float = 1.0, stress: float = 1.0, comm: MPI.Comm = MPI.COMM_SELF) -> Touching:
+    """A slender cantilever, 100 × 0.5 × 10 of 2000 MPa, over a cylinder of 50 times its length, ``gap`` below its root.
 
     unit, stress: of a mm and a MPa in the units of the scene.
     """
@@ -108,7 +108,7 @@ def wrapped(*, unit: float = 1.0, stress: float = 1.0, comm: MPI.Comm = MPI.COMM
     mechanism.weld(base, beam, at=(-0.5 * thickness, 0), region=fm.Rectangle(thickness, 1.5 * thickness))
     push = mechanism.force(on=beam, at=(length, 0), direction=(0, -1))
     radius = 50.0 * length
-    contact = Contact(beam, Cylinder((0, -0.5 * thickness - radius), radius))
+    contact = Contact(beam, Cylinder((0, -0.5 * thickness - gap - radius), radius))
     return Touching(_simulation(mechanism, [contact], "plane-stress", unit, comm), push, contact)
 
 
