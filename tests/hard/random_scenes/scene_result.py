@@ -16,6 +16,7 @@ import numpy as np
 import fenicsmech as fm
 
 from .blueprint import Blueprint, Built, build
+from .designs import design_scene, run
 from .generator import random_scene
 from .invalid import spoiled_scene
 from .potential import Potential
@@ -25,6 +26,7 @@ from .stability_check import checkable, unstable_directions
 from .thresholds import THRESHOLDS
 
 INVALID_SHARE = 3  # in ten
+DESIGNS = 40  # scenes for one design problem
 _CHECKED = 6  # frames of a path
 
 
@@ -35,7 +37,7 @@ class SceneResult:
     Attributes:
         seed: of the scene.
         scene: its topology, or its fault.
-        outcome: "equilibrium", "equilibrium to rounding", "refused", "true: …" or "wrong: …".
+        outcome: "equilibrium", "equilibrium to rounding", "designed: …", "refused", "true: …" or "wrong: …".
         detail: the error, or the figures.
         seconds: wall-clock time.
         frames: how many equilibria were checked.
@@ -77,9 +79,14 @@ class _Verdict:
 
 
 def judge(seed: int, *, quick: bool = False) -> SceneResult:
-    """Runs the scene of a seed; three in ten make no sense. ``quick`` ones have larger elements and fewer loads."""
+    """Runs the scene of a seed; three in ten make no sense, one in forty is a design problem.
+
+    ``quick`` scenes have larger elements and fewer loads; design problems are what they are.
+    """
     start = time.perf_counter()
-    if seed % 10 < INVALID_SHARE:
+    if seed % DESIGNS == DESIGNS - 1:
+        scene, verdict = _judge_design(seed)
+    elif seed % 10 < INVALID_SHARE:
         scene, verdict = _judge_spoiled(seed)
     else:
         blueprint = random_scene(seed)
@@ -102,6 +109,17 @@ def _judge_spoiled(seed: int) -> tuple[str, _Verdict]:
     except Exception as error:
         return spoiled.what, _Verdict(f"wrong: {type(error).__name__} escaped", str(error))
     return spoiled.what, _Verdict("wrong: accepted")
+
+
+def _judge_design(seed: int) -> tuple[str, _Verdict]:
+    problem = design_scene(seed)
+    try:
+        outcome, detail = run(problem)
+    except fm.FenicsmechError as error:
+        return problem.summary, _Verdict(f"wrong: {_unclear(error) or type(error).__name__}", str(error))
+    except Exception as error:
+        return problem.summary, _Verdict(f"wrong: {type(error).__name__} escaped", str(error))
+    return problem.summary, _Verdict(outcome, detail)
 
 
 def judge_sound(blueprint: Blueprint) -> _Verdict:

@@ -43,4 +43,4 @@ def raw_table(results: Iterable[SceneResult]) -> str:
 
 
 def _order(outcome: str, count: int) -> tuple[int, int]:
-    return ["equilibrium", "refused", "true", "wrong"].index(outcome.split(" ")[0].split(":")[0]), -count
+    return ["equilibrium", "designed", "refused", "true", "wrong"].index(outcome.split(" ")[0].split(":")[0]), -count

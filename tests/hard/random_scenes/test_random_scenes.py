@@ -52,6 +52,14 @@ def test_scenes_that_make_sense_end_well(seed):
     assert not result.wrong, result
 
 
+@pytest.mark.parametrize("seed", [39, 639, 799])
+def test_designs_end_well(seed):
+    # a target that is met, links that do not carry the force, a force that moves nothing
+    result = judge(seed)
+    assert not result.wrong, result
+    assert result.scene.startswith("design")
+
+
 def test_every_seed_gives_the_same_scene_again():
     assert [random_scene(seed) for seed in range(50)] == [random_scene(seed) for seed in range(50)]
     assert len({repr(random_scene(seed)) for seed in range(50)}) == 50
