@@ -22,7 +22,7 @@ RESOLUTION = 2.0 / 1024.0  # of it
 class OneFreedom:
     """A path with a limit load of one, p = 1 − (1 − y)², in closed form, as ``LoadStepper`` sees it."""
 
-    potentials = ()
+    potentials, contact = (), None
 
     def __init__(self) -> None:
         self.system, self.solved, self.softest = self, 0, 1.0
