@@ -154,11 +154,11 @@ class Contact(Effect):
             rigid links force per penetration k of each point; must be given.
         points: of a rigid link as drawn.
 
-    Penetration falls as 1 / stiffness; iterations hardly depend on it. Obstacles act
-    only after the motors have moved: a configuration whose rigid assembly is on the far side of an obstacle stays
-    there. From then on flexible links cannot slip through a cylinder: states with a penetration of a quarter of its
-    radius are rejected. In space a pressed edge is also pressed on its flat faces inside the obstacle, with an error of
-    the order of penetration over depth.
+    Penetration falls as 1 / stiffness; iterations hardly depend on it. Obstacles act only after the motors have moved:
+    a configuration whose rigid assembly is on the far side of an obstacle stays there. From then on flexible links
+    cannot slip through a cylinder: states with a penetration of a quarter of its radius are rejected. In space a
+    pressed edge is also pressed on its flat faces inside the obstacle, with an error of the order of penetration over
+    depth.
 
     Raises:
         DescriptionError: a number is invalid, or a field that a link of this kind needs is missing.
