@@ -108,7 +108,8 @@ class NewtonSolver(EquilibriumSolver):
         residuals, shift, any_stability, predicted, norm = [], least, True, False, math.inf
         for iteration in range(limit + 1):
             residuals.append(self.relative(residual))
-            if self.converged(residual, norm) and iteration > 0:
+            # steps with a shift creep along soft modes: that rounding no longer falls with them says nothing
+            if iteration > 0 and self.converged(residual, norm if shift == least else math.inf):
                 if path:  # critical points are located by its tangent and inertia
                     return self.linearise(state, control, residual).point(residuals, iteration + 1)
                 if predicted or shift > least or options.reuse_factor == 0.0:  # stability is of the true matrix

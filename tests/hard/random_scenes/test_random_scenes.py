@@ -138,3 +138,16 @@ def test_a_limit_point_at_a_hundredth_of_the_load_is_reported_where_it_is(seed):
     # of a led force, and of a constant one
     result = judge(seed)
     assert result.outcome == "true: EquilibriumError, at a limit point", result
+
+
+@pytest.mark.thorough
+def test_springs_hardly_stiffer_than_the_rounding_of_links_hold_whatever_the_last_digits_of_loads():
+    # where rounding makes the inertia doubtful, shifted steps creep, which is no sign of convergence
+    scene, rng = random_scene(244), np.random.default_rng(0)
+    (spring,) = scene.effects
+    reached = []
+    for load, stiffness in 1.0 + 1e-3 * rng.standard_normal((5, 2)):
+        samples = tuple(load * sample for sample in scene.samples)
+        near = replace(scene, samples=samples, effects=(replace(spring, stiffness=stiffness * spring.stiffness),))
+        reached.append(build(near).curve(near).displacements)
+    assert np.all(np.ptp(reached, axis=0) < 1e-3 * np.abs(reached[0]))
