@@ -6,7 +6,7 @@
 ``curve.csv``          displacement, force, stability, energy, stress and estimated error of every equilibrium
 ``deformed.xdmf``      displacements and stresses of every equilibrium, for ParaView
 ``links.png``          the links before and after an optimisation
-``links/``             STEP and STL of every link that has changed
+``links/``             STEP and STL of every link that has changed; ``parts.json`` counts the equal ones
 ``design.json``        the design, for ``DesignResult.load``
 ``checkpoint.json``    the last iterate of an optimisation by ``design_study``
 ``summary.json``       all figures

@@ -19,6 +19,7 @@ from fenicsmech.design.objective import Objective, group_count, sample_numbers, 
 from fenicsmech.design.optimisers.bfgs import BFGS
 from fenicsmech.design.optimisers.levenberg_marquardt import LevenbergMarquardt, Resolution
 from fenicsmech.design.optimisers.problem import (
+    Deferred,
     Evaluation,
     Inequalities,
     Infeasible,

@@ -22,7 +22,15 @@ from fenicsmech.design.optimisers.levenberg_marquardt import LevenbergMarquardt
 from fenicsmech.design.optimisers.problem import Optimiser
 from fenicsmech.design.optimisers.sqp import SQP
 from fenicsmech.design.regularisers import MeshQuality, NumberBounds, Regulariser, ShapeBounds, StayClose
-from fenicsmech.design.result import DesignResult, draw_links, link_designs, rest_meshes, target_results, write_solids
+from fenicsmech.design.result import (
+    DesignResult,
+    draw_links,
+    link_designs,
+    rest_meshes,
+    target_results,
+    write_parts,
+    write_solids,
+)
 from fenicsmech.design.run import Checkpoint, fingerprint
 from fenicsmech.design.search import Scatter, Search, SearchResult
 from fenicsmech.design.shape.handle_optimum import HandlePlacement
@@ -236,7 +244,8 @@ class DesignProblem:
     ) -> None:
         """Writes ``NAME.step`` and ``NAME.stl`` of every link whose shape or depth may change, in mm.
 
-        Lengths in another unit are written as they are, with a warning.
+        Each is at its place in the mechanism. ``parts.json`` lists how many to make of each part: links that share a
+        shape are the same part. Lengths in another unit are written as they are, with a warning.
 
         Args:
             folder: where to; it is created.
@@ -253,7 +262,14 @@ class DesignProblem:
         links, given = self._own.changed, self._own.given(design)
         solids, mechanism = self._meshes(links, given), self.simulation.scene.mechanism
         linkage = build_linkage(mechanism, self.simulation.linkage.dim, self._moved(given[0]))
-        on_one(self.simulation.comm, lambda: write_solids(folder, linkage, links, *solids, pin_diameter))
+        shared = [own.links for own in self._own.shapes]
+        alone = [(link,) for link in links if not any(link in own for own in shared)]
+
+        def write() -> None:
+            write_solids(folder, linkage, links, *solids, pin_diameter)
+            write_parts(folder, [*shared, *alone], dict(zip(links, solids[1], strict=True)))
+
+        on_one(self.simulation.comm, write)
 
     def verify(self, result: DesignResult, folder: str | Path | None = None, *, finer: float = 2.0) -> DesignResult:
         """The result with the values of its targets in the parts to be made.

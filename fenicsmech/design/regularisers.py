@@ -8,10 +8,11 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from fenicsmech.design.optimisers.problem import Quadratic
+from fenicsmech.design.optimisers.problem import Deferred, Quadratic
 from fenicsmech.design.rest_shape import DesignedLink, ParametricShape
 from fenicsmech.design.shape.handle_optimum import HandlePlacement
 from fenicsmech.design.shape.quality import Barrier
@@ -56,11 +57,14 @@ class Weighted(Regulariser):
 
         def model(p: np.ndarray) -> Quadratic:
             parts = [(weight, part(p)) for weight, part in models]
-            return Quadratic(
-                sum(weight * part.value for weight, part in parts),
-                sum(weight * part.gradient for weight, part in parts),
-                sum(weight * part.curvature for weight, part in parts),
-            )
+
+            def derivatives() -> tuple[np.ndarray, np.ndarray]:
+                return (
+                    sum(weight * part.gradient for weight, part in parts),
+                    sum(weight * part.curvature for weight, part in parts),
+                )
+
+            return Deferred(sum(weight * part.value for weight, part in parts), derivatives)
 
         return model
 
@@ -105,7 +109,8 @@ class NumberBounds(Regulariser):
             value = float(np.sum(barrier.value(high) + barrier.value(low)))
             return Quadratic(value, found.gradient, found.curvature)
 
-        return model
+        nothing = Quadratic.zero(len(placement.p))
+        return model if rest.numbers.numbers else lambda p: nothing
 
     def active(self, rest, placement):
         found = []
@@ -129,23 +134,25 @@ class ShapeBounds(Regulariser):
         links = [(link.parameters, _bounds(link)) for link in rest.links]
 
         def model(p: np.ndarray) -> Quadratic:
-            value, gradient, curvature = 0.0, np.zeros(len(p)), np.zeros((len(p), len(p)))
-            for own, bounds in links:
-                size = len(own.fixed)
-                slope, bent = np.zeros(size), np.zeros((size, size))  # by the spline's parameters
-                for bound in bounds(own.of(p)):
-                    barrier, beyond = bound.barrier, bound.values > bound.barrier.limit
-                    if not beyond.any():
-                        continue
-                    x, by_own = bound.values[beyond], bound.gradient(beyond)
-                    value += float(barrier.value(x).sum())
-                    slope += barrier.slope(x) @ by_own
-                    # the curvature of x itself is left out: it may be negative, and is multiplied by a small slope
-                    bent += by_own.T @ (barrier.curvature(x)[:, None] * by_own)
-                if bent.any():
-                    gradient += slope @ own.matrix
-                    curvature += own.matrix.T @ bent @ own.matrix
-            return Quadratic(value, gradient, curvature)
+            exceeded = [(own, [bound for bound in bounds(own.of(p)) if bound.beyond.any()]) for own, bounds in links]
+            value = sum(float(b.barrier.value(b.values[b.beyond]).sum()) for _, bounds in exceeded for b in bounds)
+
+            def derivatives() -> tuple[np.ndarray, np.ndarray]:
+                gradient, curvature = np.zeros(len(p)), np.zeros((len(p), len(p)))
+                for own, bounds in exceeded:
+                    size = len(own.fixed)
+                    slope, bent = np.zeros(size), np.zeros((size, size))  # by the spline's parameters
+                    for bound in bounds:
+                        x, by_own, barrier = bound.values[bound.beyond], bound.gradient(bound.beyond), bound.barrier
+                        slope += barrier.slope(x) @ by_own
+                        # the curvature of x itself is left out: it may be negative, and is multiplied by a small slope
+                        bent += by_own.T @ (barrier.curvature(x)[:, None] * by_own)
+                    if bounds:
+                        gradient += slope @ own.matrix
+                        curvature += own.matrix.T @ bent @ own.matrix
+                return gradient, curvature
+
+            return Deferred(value, derivatives)
 
         return model
 
@@ -153,7 +160,7 @@ class ShapeBounds(Regulariser):
         found = []
         for link in rest.links:
             for bound in _bounds(link)(link.parameters.of(placement.p)):
-                if np.any(bound.values > bound.barrier.limit):
+                if bound.beyond.any():
                     found.append(f"{bound.name} of {link.name!r}")
         return tuple(dict.fromkeys(found))
 
@@ -173,6 +180,11 @@ class _Bound:
     values: np.ndarray
     gradient: Callable[[np.ndarray], np.ndarray]
     barrier: Barrier
+
+    @cached_property
+    def beyond(self) -> np.ndarray:
+        """Mask of the samples where the barrier is positive, (n,)."""
+        return self.values > self.barrier.limit
 
 
 def _bounds(link: DesignedLink) -> Callable[[np.ndarray], list[_Bound]]:
@@ -229,7 +241,7 @@ class MeshQuality(Regulariser):
         set_options(self, "the mesh quality")
 
     def around(self, rest, placement):
-        size, here = len(placement.p), Quadratic.zero(len(placement.p))
+        here = Quadratic.zero(len(placement.p))
         if rest.worst_ratio() > self.limit:
             barrier = Barrier(self.limit, self.width, self.strength)
             value, gradient = rest.quality_penalty(barrier, placement)
@@ -243,7 +255,7 @@ class MeshQuality(Regulariser):
                 here.value + float((here.gradient + 0.5 * curved) @ step), here.gradient + curved, here.curvature
             )
 
-        return model if here.value else lambda p: Quadratic.zero(size)
+        return model if here.value else lambda p: here
 
     def active(self, rest, placement):
         return (f"aspect ratio {self.limit:g} of the mesh",) if rest.worst_ratio() > self.limit else ()

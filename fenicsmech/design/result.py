@@ -19,7 +19,7 @@ from fenicsmech.design.shape.shape_map import gather_links
 from fenicsmech.design.target import Comparison
 from fenicsmech.errors import DescriptionError, counted, point_text
 from fenicsmech.export import PinHole, write_step, write_stl
-from fenicsmech.files import atomic_write, read_json
+from fenicsmech.files import atomic_write, read_json, write_json
 from fenicsmech.mechanism import Disc, FlexibleLink, Scene, Units
 from fenicsmech.meshing import Isometry, LinkMesh, boundary_polygons, section_of
 from fenicsmech.model import Design
@@ -476,6 +476,35 @@ def write_solids(
         pins = [PinHole((b.centre[0], b.centre[1]), hole) for b in regions if hole and isinstance(b.region, Disc)]
         for suffix, write in ((".step", write_step), (".stl", write_stl)):
             write(solid_path(folder, link, suffix), mesh, depth=depth, pins=pins, name=link.name)
+
+
+def write_parts(
+    folder: str | Path, shapes: Sequence[Sequence[FlexibleLink]], depths: Mapping[FlexibleLink, float]
+) -> None:
+    """Local. Writes ``parts.json``: how many to make of each part, and the links that it is.
+
+    Links that share a shape are one part where they are of one material; so are mirror images, turned over.
+
+    Args:
+        folder: where to.
+        shapes: the links that have each shape.
+        depths: of the links.
+    """
+    parts: dict[tuple, list[FlexibleLink]] = {}
+    for number, links in enumerate(shapes):
+        for link in links:
+            parts.setdefault((number, link.material, depths[link]), []).append(link)
+    listed = [
+        {
+            "file": solid_path("", links[0], ".step").name,
+            "count": len(links),
+            "links": [link.name for link in links],
+            "material": material.name,
+            "depth": depth,
+        }
+        for (_, material, depth), links in parts.items()
+    ]
+    write_json(Path(folder) / "parts.json", {"parts": listed})
 
 
 def solid_path(folder: str | Path, link: FlexibleLink, suffix: str) -> Path:

@@ -51,8 +51,10 @@ in place of β² / (60 + β²), which is up to 1.3 times as large,
 
 Measured, estimate over true difference: 1.0 to 1.8 for strips of depths from 1 to 30 and lengths from 10 to 30
 thicknesses, clamped or pinned, straight or curved, bent by up to 1 rad (1.3 and more only where the difference is below
-3 %); 0.9 to 1.4 for the demos' links as drawn and as designed, but 2.5 for the designed truss pulled straight, where
-the difference is 0.4 %. Not included: motion out of the plane, and tension that flattens curled links.
+3 %); 0.9 to 1.4 for the demos' links as drawn and as designed. Both models have to have the same outline, that of the
+exported part: a design on another mesh is a slightly different shape, whose length alone decides how far the designed
+truss can be pulled straight (0.97 to 1.05 in the part; 2.5 on meshes of its own, where the shapes differ by more than
+3D adds). Not included: motion out of the plane, and tension that flattens curled links.
 
 c² was measured once, see ``Calibration``. Sources: Zienkiewicz & Zhu (doi:10.1002/nme.1620240206) for the recovery,
 Oden & Prudhomme (doi:10.1016/S0898-1221(00)00317-5) for goal-oriented estimates, Oden & Vemaganti

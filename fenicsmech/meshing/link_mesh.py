@@ -205,7 +205,7 @@ def least_stretches(corners: np.ndarray, bulges: np.ndarray) -> np.ndarray:
     places = np.vstack([corner, 0.5 * (corner[i] + corner[j])])
     # ∇(4 λ_i λ_j) = Σ_c weight_c ∇λ_c at each place
     weights = 4.0 * (places[:, i, None] * corner[j] + places[:, j, None] * corner[i])
-    gradient = np.eye(dim) + np.einsum("mek,pec,mcl->mpkl", bulges[bent], weights, slopes, optimize=True)
+    gradient = np.eye(dim) + bulges[bent].transpose(0, 2, 1)[:, None] @ (weights @ slopes[:, None])
     least = np.ones(len(corners))
     least[bent] = np.linalg.det(gradient).min(axis=1)
     return least

@@ -143,12 +143,14 @@ class JointPosition(_OfJoints):
         for vector in self.vectors:
             in_plane(f"direction of the {self.name}", vector, dim)
         mechanism, along = scene.mechanism, dict(zip(self.parts, self.vectors, strict=True))
-        if self.reshaped and any(any(vector[2:]) for vector in self.vectors):
-            raise DescriptionError(
-                self.name,
-                f"{self.reshaped[0].name!r} is flexible, and follows its joints in the plane alone",
-                "Shift joints of flexible links along x and y",
-            )
+        for joint, vector in along.items():
+            held = [link for link in (joint.a, joint.b) if isinstance(link, FlexibleLink)]
+            if held and any(vector[2:]):
+                raise DescriptionError(
+                    self.name,
+                    f"{joint.name!r} holds {held[0].name!r}, which is flexible and follows joints in the plane alone",
+                    "Shift it along x and y, or weld a rigid link there and shift a joint of that",
+                )
         for joint, link in ((joint, link) for joint in self.parts for link in self.reshaped):
             for other in mechanism.joints:
                 here = same_place(joint.at, other.at, dim=dim, length=mechanism.length)

@@ -85,7 +85,7 @@ def check_design(summary: dict, folder: Path, thickness: tuple[float, float]) ->
         assert there == pytest.approx(target["reached"], rel=1e-6)
     assert {"links.png", "design.json", "curve.png", "mechanism.png"} <= {path.name for path in folder.iterdir()}
     solids = {path.suffix for path in (folder / "links").iterdir()}
-    assert solids == {".step", ".stl"}
+    assert solids == {".step", ".stl", ".json"}
     assert fm.DesignResult.load(folder / "design.json").parameters == summary["parameters"]
 
 

@@ -98,6 +98,7 @@ def _zero(size: int) -> float | tuple[float, ...]:
         pytest.param("3d-symmetric", "shifted", fm.MixedFormulation(above=0.3), marks=pytest.mark.thorough),
         pytest.param("3d", "mirrored", None, marks=pytest.mark.thorough),
         pytest.param("3d", "shifted", None, marks=pytest.mark.thorough),
+        pytest.param("3d", "mirrored", fm.MixedFormulation(above=0.3), marks=pytest.mark.thorough),
     ],
 )
 def test_derivatives_of_all_quantities_by_all_parameters(space, shapes, formulation):

@@ -68,8 +68,8 @@ def _measured(sim: fm.Simulation, push, joint: str, place: Configuration = DRAWN
     return np.array(each).ravel()
 
 
-def chain(turns: dict | None = None) -> tuple[fm.Simulation, fm.Force, dict[str, fm.Joint]]:
-    """An arm on a hinge and a sled on the arm in space, held by springs, the axes drawn turned."""
+def chain(turns: dict | None = None, shifts: dict | None = None) -> tuple[fm.Simulation, fm.Force, dict[str, fm.Joint]]:
+    """An arm on a hinge and a sled on the arm in space, held by springs, the axes drawn turned and shifted."""
     rig = fm.Mechanism("chain")
     ground, arm, sled = rig.rigid("ground", fixed=True), rig.rigid("arm"), rig.rigid("sled")
     _leaf(rig, ground)
@@ -77,8 +77,11 @@ def chain(turns: dict | None = None) -> tuple[fm.Simulation, fm.Force, dict[str,
     def axis(name: str, drawn: tuple[float, float, float]) -> np.ndarray:
         return Rotation.from_rotvec((turns or {}).get(name, (0, 0, 0))).apply(drawn)
 
-    hinge = rig.revolute(ground, arm, at=(0, 0, 0), axis=axis("hinge", (0, 0, 1)), name="hinge")
-    slider = rig.prismatic(arm, sled, at=(40, 5, 0), axis=axis("slider", (1, 0, 0)), name="slider")
+    def place(name: str, drawn: tuple[float, float, float]) -> np.ndarray:
+        return np.add((shifts or {}).get(name, (0, 0, 0)), drawn)
+
+    hinge = rig.revolute(ground, arm, at=place("hinge", (0, 0, 0)), axis=axis("hinge", (0, 0, 1)), name="hinge")
+    slider = rig.prismatic(arm, sled, at=place("slider", (40, 5, 0)), axis=axis("slider", (1, 0, 0)), name="slider")
     push = rig.force(on=sled, at=(60, 10, 5), direction=(0.5, 1, 0.3))
     scene = fm.Scene(rig, [fm.JointSpring(hinge, 3000.0, rest=0.2), fm.JointSpring(slider, 4.0)])
     sim = fm.Simulation(scene, space="3d", size=6.0, order=1, comm=MPI.COMM_SELF)
@@ -138,6 +141,21 @@ def test_turned_axes_of_rigid_links_are_as_axes_drawn_turned():
         found, wanted = _measured(designed(sim, numbers), push, joint), _measured(there, other, joint)
         assert found == pytest.approx(wanted, rel=1e-10, abs=1e-10 * np.abs(wanted).max())
         assert np.abs(found - _measured(sim, push, joint)).max() > 0.01 * np.abs(wanted).max()
+
+
+def test_joints_of_rigid_links_are_shifted_in_all_three_directions():
+    turns = {"hinge": (0.6, 0.2, 0.0)}
+    shifts = {"hinge": (1.0, -2.0, 4.0), "slider": (0.0, 1.0, -3.0)}
+    (there, push, _), (drawn, own_push, joints) = chain(turns, shifts), chain(turns)
+    numbers = {
+        fm.JointPosition(joints[name], direction=axis): shift
+        for name, by in shifts.items()
+        for axis, shift in zip(np.eye(3), by, strict=True)
+    }
+    found, wanted = _measured(designed(drawn, numbers), own_push, "hinge"), _measured(there, push, "hinge")
+    assert found == pytest.approx(wanted, rel=1e-9, abs=1e-9 * np.abs(wanted).max())
+    before = _measured(drawn, own_push, "hinge")
+    assert np.abs(found - before).max() > 0.01 * np.abs(before).max()
 
 
 @pytest.mark.parametrize("space", ["plane-stress", pytest.param("3d", marks=pytest.mark.thorough)])
@@ -322,6 +340,13 @@ def test_invalid_places_are_refused():
         part="position",
         problem="leaves the plane",
         remedy="two coordinates",
+    )
+    spatial = fm.Number(fm.JointPosition(*tip, direction=(0, 0, 1)), -1.0, 1.0)
+    refused(
+        lambda: fm.DesignProblem(case.simulate("3d", size=6.0), [spatial], targets=case.targets),
+        part="position",
+        problem=f"{tip[-1].name!r} holds 'diagonal', which is flexible",
+        remedy="along x and y, or weld a rigid link",
     )
     refused(lambda: problem(fm.JointAxis(tip[0], about=(1, 0, 0))), part="axis", problem="no axis", remedy="sliders")
     refused(lambda: fm.Number(fm.JointAxis(tip[0]), -4.0, 1.0), part="axis", problem="-4 rad", remedy="half a turn")

@@ -1,13 +1,16 @@
 """From parameters to the design field and back: identity, rigid interfaces, derivatives, transposes, ranks."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from fenicsmech.design import BETWEEN
+from fenicsmech.design import BETWEEN, shape_links
 from fenicsmech.meshing import FREE
 
 from ..oracles.dense import taylor_rates
-from .shapes import bench
+from .refusal import refused
+from .shapes import bench, request
 
 each_dim = pytest.mark.parametrize("dim", [2, 3])
 
@@ -147,3 +150,12 @@ def test_field_does_not_depend_on_the_number_of_ranks(dim):
     ]
     for one, other in zip(*pulled, strict=True):
         assert other == pytest.approx(one, rel=1e-10, abs=1e-10)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("link", [0, 1])
+def test_a_link_without_a_shape_is_refused_on_all_ranks(link):
+    requests = [request(k) for k in range(2)]
+    requests[link] = replace(requests[link], segments=0)
+    mesh = bench(2, shared=True).mesh
+    refused(lambda: shape_links(mesh, requests), part=repr(str(link)), problem="0 segments", remedy="Give at least")

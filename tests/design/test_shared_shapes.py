@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from mpi4py import MPI
 
 import fenicsmech as fm
 from fenicsmech.design import Correction, MeshQuality, ShapeBounds, StayClose
+from fenicsmech.meshing import gmsh, gmsh_session
 
 from ..oracles.dense import taylor_rates
 from .mechanisms import Case, objective
@@ -254,6 +257,29 @@ def test_results_files_pictures_and_parts_have_all_links_of_a_shape(tmp_path):
     )
     assert again == pytest.approx(once, rel=1e-12)
     assert once == pytest.approx([result.targets[0].reached], rel=1e-6)
+
+
+def test_exports_count_the_links_that_are_one_part(tmp_path):
+    scene, made, push = legs(mirrored, shifted, turned)
+    plain = scene.mechanism.flexible("brace", fm.strip([(0, 40), (40, 40)], thickness=2.0, depth=5.0), PLASTIC)
+    for end in (0, 40):
+        scene.mechanism.weld(scene.mechanism.links[1], plain, at=(end, 40), interface_radius=2.0)
+    sim = fm.Simulation(scene, space="plane-stress", size=3.0)
+    designs = [fm.SplineDesign(made[0], 2, mirrored=made[1], same=made[2:]), fm.Number(fm.Depth(plain), 2.0, 9.0)]
+    problem = fm.DesignProblem(sim, designs, targets=[fm.Target(push, force=1.0, displacement=0.1)])
+    problem.export(tmp_path, problem.initial)
+    first, second = json.loads((tmp_path / "parts.json").read_text())["parts"]
+    assert (first["file"], first["count"], first["material"]) == ("leg-0.step", 4, "plastic")
+    assert sorted(first["links"]) == ["leg 0", "leg 1", "leg 2", "leg 3"]
+    assert (second["file"], second["count"], second["depth"]) == ("brace.step", 1, 5.0)
+    volumes = [_volume(tmp_path / f"leg-{k}.step") for k in range(4)]  # of solids that are one part
+    assert volumes == pytest.approx([volumes[0]] * 4, rel=1e-6)
+
+
+def _volume(file: Path) -> float:
+    with gmsh_session("part"):
+        (solid,) = gmsh.model.occ.importShapes(str(file))
+        return gmsh.model.occ.getMass(*solid)
 
 
 @pytest.mark.thorough

@@ -120,6 +120,22 @@ def test_estimate_finds_how_much_stiffer_the_designed_claw_is_in_space():
     assert np.all((found > 0.5) & (found < 2.0))
 
 
+@pytest.mark.thorough
+def test_estimate_finds_how_much_stiffer_the_designed_truss_is_in_space_even_pulled_straight(tmp_path):
+    script = demo("truss")
+    scene, push, configurations = script.describe()
+    (diagonal,) = scene.mechanism.flexible_links
+    drawn = fm.Simulation(scene, space="plane-stress", size=script.QUICK)
+    problem = fm.DesignProblem(drawn, **script.wanted(scene, push, configurations))
+    problem.export(tmp_path, problem.optimise())
+    # of one outline: it has its full length at the last force, whose displacement that decides
+    part = {diagonal: fm.step_file(tmp_path / "diagonal.step", depth=20.0)}
+    flat = fm.Simulation(scene, space="plane-stress", order=3, size=script.QUICK).with_shapes(part)
+    deep = fm.Simulation(scene, space="3d-symmetric", order=3, size=script.QUICK, layers=1).with_shapes(part)
+    found = told_over_true(flat, deep, push, [0.1, 0.3, 0.4])
+    assert np.all((found > 0.8) & (found < 1.25)), found
+
+
 @pytest.mark.parametrize("depth", [10.0, 20.0, 40.0])
 def test_curved_strips_stiffen_from_beams_to_plates_as_in_closed_form(depth):
     radius, poisson, changes, turns = 100.0, 0.4, [], []

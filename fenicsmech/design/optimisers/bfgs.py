@@ -24,6 +24,7 @@ import numpy as np
 from scipy.optimize import line_search
 
 from fenicsmech.design.optimisers.problem import (
+    Deferred,
     Evaluation,
     Inequalities,
     Infeasible,
@@ -149,7 +150,7 @@ def _model(here: Evaluation, curvature: np.ndarray, p: np.ndarray) -> Quadratic:
     away, gradient, penalty = p - here.parameters, _gradient(here), here.regulariser(p)
     curved = curvature @ away
     value = here.value - here.penalty.value + float((gradient + 0.5 * curved) @ away) + penalty.value
-    return Quadratic(value, gradient + curved + penalty.gradient, curvature + penalty.curvature)
+    return Deferred(value, lambda: (gradient + curved + penalty.gradient, curvature + penalty.curvature))
 
 
 def _step(here: Evaluation, curvature: np.ndarray) -> np.ndarray:

@@ -60,6 +60,30 @@ class Quadratic:
         return Quadratic(0.0, np.zeros(size), np.zeros((size, size)))
 
 
+class Deferred(Quadratic):
+    """One whose gradient and curvature are computed when they are asked for: line searches compare many values.
+
+    Args:
+        value: R.
+        derivatives: computes its gradient and curvature.
+    """
+
+    def __init__(self, value: float, derivatives: Callable[[], tuple[np.ndarray, np.ndarray]]) -> None:
+        vars(self).update(value=value, _derivatives=derivatives)
+
+    @cached_property
+    def _found(self) -> tuple[np.ndarray, np.ndarray]:
+        return vars(self).pop("_derivatives")()
+
+    @property
+    def gradient(self) -> np.ndarray:  # type: ignore[override]
+        return self._found[0]
+
+    @property
+    def curvature(self) -> np.ndarray:  # type: ignore[override]
+        return self._found[1]
+
+
 @dataclass(frozen=True, eq=False)
 class Plain:
     """An objective f that is not a sum of squares.
@@ -150,14 +174,16 @@ class Evaluation:
         """
         step, penalty = parameters - self.parameters, self.regulariser(parameters)
         turned, bent = hessians @ step, bend @ step
-        r, jacobian = self.residuals + (self.jacobian + 0.5 * turned) @ step, self.jacobian + turned
+        r = self.residuals + (self.jacobian + 0.5 * turned) @ step
         smooth = self.plain.value + float(np.sum(self.plain.gradient * step)) + 0.5 * float(bent @ step)
-        curvature = jacobian.T @ jacobian + bend + penalty.curvature
-        return Quadratic(
-            0.5 * float(r @ r) + smooth + penalty.value,
-            jacobian.T @ r + self.plain.gradient + bent + penalty.gradient,
-            _positive(curvature + np.tensordot(r, hessians, 1), curvature),
-        )
+
+        def derivatives() -> tuple[np.ndarray, np.ndarray]:
+            jacobian = self.jacobian + turned
+            gradient = jacobian.T @ r + self.plain.gradient + bent + penalty.gradient
+            curvature = jacobian.T @ jacobian + bend + penalty.curvature
+            return gradient, _positive(curvature + np.tensordot(r, hessians, 1), curvature)
+
+        return Deferred(0.5 * float(r @ r) + smooth + penalty.value, derivatives)
 
 
 def _positive(matrix: np.ndarray, otherwise: np.ndarray) -> np.ndarray:

@@ -396,7 +396,9 @@ class _MomentHessian:
             first += len(unique)
         data, rows, columns = (np.concatenate(part) for part in zip(*arms, strict=True))
         self._arms = csr_matrix((data, (rows, columns)), shape=(2 * first, 6 * count))
-        self._along = np.repeat(np.arange(count), 6), np.arange(6 * count + 1)  # entries ∂T_j/∂θ_j, of 6 rows each
+        self._back = self._arms.T.tocsr()
+        along = np.zeros(6 * count), np.repeat(np.arange(count), 6), np.arange(6 * count + 1)
+        self._along = csr_matrix(along)  # ∂T_j/∂θ_j, in 6 rows each
         # place of (j, 0) among the results, one shape after another
         self._ends = np.cumsum([6 * size * size for size in self._sizes])
         places = zip(self._ends, self._sizes, before, strict=True)
@@ -407,10 +409,10 @@ class _MomentHessian:
         """∂T_j/∂θ_j · ∂²/∂T_j∂T per shape, (handles, handles, 2, 3), from ∂T_j/∂θ_j (handles, 2, 3)."""
         values = hessian.getValuesCSR()[2][self._kept]
         self._sum.data = np.bincount(self._slots, weights=values, minlength=self._sum.nnz)
-        along = self._arms @ csr_matrix((np.concatenate(by_theta).ravel(), *self._along))
-        found = ((self._sum @ along).T @ self._arms).tocoo()
+        self._along.data = np.concatenate(by_theta).ravel()
+        found = (self._back @ (self._sum @ (self._arms @ self._along))).tocoo()
         blocks = np.zeros(self._ends[-1])
-        blocks[self._places[found.row] + found.col] = found.data
+        blocks[self._places[found.col] + found.row] = found.data
         parts = zip(np.split(blocks, self._ends[:-1]), self._sizes, strict=True)
         return self._map.sum_over_ranks([part.reshape(size, size, 2, 3) for part, size in parts])
 

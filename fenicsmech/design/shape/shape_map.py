@@ -19,7 +19,7 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
-from fenicsmech.collective import from_one
+from fenicsmech.collective import on_all
 from fenicsmech.compat import original_cells
 from fenicsmech.design.shape.edges import EdgeWeights, edge_weights
 from fenicsmech.design.shape.handles import BETWEEN, LinkHandles
@@ -218,13 +218,14 @@ def _measured(outline: LinkOutline, spline: LinkSpline, *, part: str) -> np.ndar
 
 
 def shape_links(mesh: MechanismMesh, requests: Sequence[ShapeRequest]) -> list[LinkShape]:
-    """The shapes of some links, computed on the first rank and the same on all; errors too."""
-    links = gather_links(mesh)
+    """The shapes of some links, each computed on one rank and the same on all; errors too."""
+    links, comm = gather_links(mesh), mesh.mesh.comm
 
     def shape(request: ShapeRequest) -> LinkShape:
         return shape_link(links[request.link], request, [links[image.link] for image in request.images])
 
-    return from_one(mesh.mesh.comm, lambda: [shape(request) for request in requests])
+    shapes = comm.allgather(on_all(comm, lambda: list(map(shape, requests[comm.rank :: comm.size]))))
+    return [shapes[k % comm.size][k // comm.size] for k in range(len(requests))]
 
 
 def gather_links(mesh: MechanismMesh, rest: tuple[np.ndarray, CurvedEdges] | None = None) -> list[LinkMesh]:

@@ -133,7 +133,7 @@ class LinkSpline:
 
     def segments_of(self, t: np.ndarray) -> np.ndarray:
         """The segment of each ``t`` (m,), the later one at a control point, (m,)."""
-        return np.clip(np.floor(t).astype(int), 0, self.segments - 1)
+        return np.minimum(np.maximum(np.floor(t).astype(int), 0), self.segments - 1)
 
     def basis(self, t: np.ndarray, *, order: int = 0, segments: np.ndarray | None = None) -> np.ndarray:
         """Weights of P_0, M_0, P_1, M_1, … in the curve, differentiated ``order`` times by t, at ``t`` (m,), (m, 2n).
@@ -163,7 +163,9 @@ class SplineSamples:
         gradient, fixed = spline.gradient(self.t), spline.evaluate(np.zeros(spline.size), self.t)
         # apart from each other, as products with strided arrays take several times as long
         self._thickness, self._thickness_gradient = fixed[:, 2].copy(), gradient[:, 2].copy()
-        self._segments, self._moves = np.diff(fixed[:, :2], axis=0), np.diff(gradient[:, :2], axis=0)
+        self._segments, self._moves = (
+            np.diff(np.ascontiguousarray(np.moveaxis(part, 1, 0)[:2]), axis=1) for part in (fixed, gradient)
+        )
 
     @property
     def thickness_gradient(self) -> np.ndarray:
@@ -177,37 +179,37 @@ class SplineSamples:
     def curvature(self, p: np.ndarray) -> np.ndarray:
         """r, signed, at the inner samples, (count − 2,)."""
         segments = self._segments_at(p)
-        a, b, inverse = segments[:-1], segments[1:], 1.0 / _length(segments)
+        a, b, inverse = segments[:, :-1], segments[:, 1:], 1.0 / _length(segments)
         return _cross(a, b) * (inverse[:-1] + inverse[1:]) / _length(a + b)
 
     def curvature_gradient(self, p: np.ndarray, chosen: np.ndarray) -> np.ndarray:
         """∂r/∂p at some of the inner samples, a mask (count − 2,), (chosen, size)."""
         segments = self._segments_at(p)
-        slopes = _ratio_gradient(segments[:-1][chosen], segments[1:][chosen])
-        pairs = zip(slopes, (self._moves[:-1][chosen], self._moves[1:][chosen]), strict=True)
-        return sum(np.einsum("nc,ncp->np", slope, move) for slope, move in pairs)
+        slopes = _ratio_gradient(segments[:, :-1][:, chosen], segments[:, 1:][:, chosen])
+        pairs = zip(slopes, (self._moves[:, :-1][:, chosen], self._moves[:, 1:][:, chosen]), strict=True)
+        return sum(np.einsum("cn,cnp->np", slope, move) for slope, move in pairs)
 
     def _segments_at(self, p: np.ndarray) -> np.ndarray:
-        """The segments between samples, (count − 1, 2)."""
-        return self._segments + (self._moves.reshape(-1, len(p)) @ p).reshape(-1, 2)
+        """The segments between samples, (2, count − 1)."""
+        return self._segments + (self._moves.reshape(-1, len(p)) @ p).reshape(2, -1)
 
 
 def _length(a: np.ndarray) -> np.ndarray:
-    return np.hypot(a[:, 0], a[:, 1])
+    return np.sqrt(a[0] * a[0] + a[1] * a[1])  # several times as fast as np.hypot
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    return a[0] * b[1] - a[1] * b[0]
 
 
 def _ratio_gradient(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Derivatives of r = g (a × b), g = (1/|a| + 1/|b|) / |a + b|, by a and by b, both (n, 2)."""
-    c, cross = a + b, _cross(a, b)[:, None]
-    A, B, C = (_length(v)[:, None] for v in (a, b, c))
+    """Derivatives of r = g (a × b), g = (1/|a| + 1/|b|) / |a + b|, by a and by b, both (2, n)."""
+    c, cross = a + b, _cross(a, b)
+    A, B, C = (_length(v) for v in (a, b, c))
     g = (1.0 / A + 1.0 / B) / C
     shared = g * c / C**2
-    by_a = g * np.stack([b[:, 1], -b[:, 0]], axis=1) - cross * (a / (A**3 * C) + shared)
-    by_b = g * np.stack([-a[:, 1], a[:, 0]], axis=1) - cross * (b / (B**3 * C) + shared)
+    by_a = g * np.stack([b[1], -b[0]]) - cross * (a / (A**3 * C) + shared)
+    by_b = g * np.stack([-a[1], a[0]]) - cross * (b / (B**3 * C) + shared)
     return by_a, by_b
 
 

@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 from fenicsmech.design import (
     BFGS,
     Barrier,
+    Deferred,
     Evaluation,
     Infeasible,
     Iterate,
@@ -115,6 +116,22 @@ class Wall(Problem):
         return Quadratic(float(b.value(x).sum()), b.slope(x), np.diag(b.curvature(x)))
 
 
+class CountedWall(Wall):
+    """A wall that counts how often its regulariser and the derivatives of this are computed."""
+
+    values = slopes = 0
+
+    def regulariser(self, parameters):
+        self.values += 1
+        here = super().regulariser(parameters)
+
+        def derivatives() -> tuple[np.ndarray, np.ndarray]:
+            self.slopes += 1
+            return here.gradient, here.curvature
+
+        return Deferred(here.value, derivatives)
+
+
 class Cliff(Problem):
     """Falls towards a cliff that cannot be approached: everything but the start is infeasible."""
 
@@ -157,6 +174,14 @@ def test_regulariser_moves_the_minimum_to_where_the_whole_gradient_vanishes(opti
     last, _ = watched(optimiser, Rosenbrock(spring=0.1))
     assert np.linalg.norm(last.evaluation.gradient) < 1e-5
     assert last.evaluation.parameters[0] < 0.9
+
+
+@each_optimiser
+def test_derivatives_of_the_regulariser_are_not_computed_where_line_searches_pass(optimiser):
+    problem = CountedWall()
+    last, _ = watched(optimiser, problem)
+    assert last.evaluation.parameters == watched(optimiser, Wall())[0].evaluation.parameters
+    assert 0 < problem.slopes < problem.values
 
 
 def test_levenberg_marquardt_takes_the_same_way_in_any_unit_of_length():

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from mpi4py import MPI
 
@@ -94,6 +94,49 @@ class CompliancePlan:
 
 
 @dataclass(frozen=True)
+class PressurePlan:
+    """Pressure on the whole boundary of a link."""
+
+    link: str
+    pressure: float
+
+
+@dataclass(frozen=True)
+class PrestrainPlan:
+    """A link whose strain-free state is stretched, ``along`` a direction or in all."""
+
+    link: str
+    stretch: float
+    along: Point | None
+
+
+@dataclass(frozen=True)
+class PlanePlan:
+    """The obstacle behind a plane."""
+
+    point: Point
+    normal: Point
+
+
+@dataclass(frozen=True)
+class CylinderPlan:
+    """A cylinder along z."""
+
+    centre: Point
+    radius: float
+
+
+@dataclass(frozen=True)
+class ContactPlan:
+    """Contact of a link, a rigid one at ``points``; ``stiffness`` by default that of the package."""
+
+    link: str
+    obstacle: PlanePlan | CylinderPlan
+    stiffness: float | None = None
+    points: tuple[Point, ...] = ()
+
+
+@dataclass(frozen=True)
 class GravityPlan:
     """Weight of all flexible links, of one density."""
 
@@ -101,7 +144,7 @@ class GravityPlan:
     density: float
 
 
-EffectPlan = SpringPlan | CompliancePlan | GravityPlan
+EffectPlan = SpringPlan | CompliancePlan | GravityPlan | PressurePlan | PrestrainPlan | ContactPlan
 
 
 @dataclass(frozen=True)
@@ -110,9 +153,11 @@ class Blueprint:
 
     Attributes:
         topology: what kind of mechanism it is.
-        control: "forces" or "displacements".
-        samples: of the control.
-        forces: the one that changes first.
+        control: "forces" or "displacements", or "path": followed to a displacement.
+        samples: of the control, or where the path ends.
+        forces: those that change first.
+        ratios: of those that change, to their common magnitude.
+        most: frames of a path.
     """
 
     topology: str
@@ -125,6 +170,8 @@ class Blueprint:
     order: int
     control: str
     samples: tuple[float, ...]
+    ratios: tuple[float, ...] = (1.0,)
+    most: int = 25
 
     def link(self, name: str) -> LinkPlan:
         """The link of that name."""
@@ -136,8 +183,23 @@ class Blueprint:
 
     @property
     def dim(self) -> int:
-        """Dimension of the model."""
+        """Dimension of the space that bodies move in."""
         return 3 if self.space == "3d" else 2
+
+    @property
+    def half(self) -> bool:
+        """Whether half of the links is meshed, the rest its mirror image."""
+        return self.space == "3d-symmetric"
+
+    def mixed(self, link: LinkPlan) -> bool:
+        """Whether a link is in the u–p formulation: nearly incompressible, of order 2 or 3, volume confined."""
+        return self.order > 1 and self.space != "plane-stress" and link.poisson > 0.49
+
+    @property
+    def idle_spins(self) -> int:
+        """Number of links that turn idly between two ball joints."""
+        kinds = [[j.kind for j in self.joints if link.name in (j.a, j.b)] for link in self.links if not link.fixed]
+        return sum(set(found) == {"spherical"} for found in kinds)
 
     @property
     def flexible(self) -> tuple[LinkPlan, ...]:
@@ -147,14 +209,28 @@ class Blueprint:
     @property
     def length(self) -> float:
         """Largest distance between two joints along a coordinate."""
-        return max(max(axis) - min(axis) for axis in zip(*(joint.at[:2] for joint in self.joints), strict=True))
+        places = [(*joint.at, 0.0)[:3] for joint in self.joints]
+        return max(max(axis) - min(axis) for axis in zip(*places, strict=True))
+
+    @property
+    def summary(self) -> str:
+        """In a few words."""
+        effects = {type(plan).__name__.removesuffix("Plan").lower() for plan in self.effects}
+        words = [self.topology, self.space, f"P{self.order}", *(["u–p"] if any(map(self.mixed, self.flexible)) else [])]
+        words += [self.control, *sorted(effects)]
+        return ", ".join([*words, f"{len(self.forces)} forces"] if len(self.forces) > 1 else words)
+
+    def coarsened(self) -> Blueprint:
+        """The same scene with larger elements and fewer loads."""
+        links = tuple(replace(link, size=1.6 * link.size) if link.centreline else link for link in self.links)
+        return replace(self, links=links, samples=self.samples[-1:], most=12)
 
     def shuffled(self, seed: int) -> Blueprint:
         """The same scene with links and joints in another order."""
         links, joints, order = list(self.links), list(self.joints), random.Random(seed)
         order.shuffle(links)
         order.shuffle(joints)
-        return Blueprint(**{**self.__dict__, "links": tuple(links), "joints": tuple(joints)})
+        return replace(self, links=tuple(links), joints=tuple(joints))
 
 
 @dataclass
@@ -171,13 +247,16 @@ class Built:
 
     def curve(self, blueprint: Blueprint) -> fm.Curve:
         """The curve that the blueprint asks for."""
-        first, *others = blueprint.forces
-        return self.simulation.load_displacement(
-            self.forces[first.name],
-            configuration=self.configuration,
-            others={self.forces[plan.name]: plan.magnitude for plan in others},
-            **{blueprint.control: blueprint.samples},
-        )
+        led = len(blueprint.ratios)
+        parts = [self.forces[plan.name] for plan in blueprint.forces[:led]]
+        part = fm.ForceGroup("loads", dict(zip(parts, blueprint.ratios, strict=True))) if led > 1 else parts[0]
+        others = {self.forces[plan.name]: plan.magnitude for plan in blueprint.forces[led:]}
+        shared = {"configuration": self.configuration, "others": others}
+        if blueprint.control == "path":
+            (end,) = blueprint.samples
+            until = fm.Until(displacement=end, frames=blueprint.most)
+            return self.simulation.follow(part, until=until, **shared)
+        return self.simulation.load_displacement(part, **{blueprint.control: blueprint.samples}, **shared)
 
 
 def build(blueprint: Blueprint) -> Built:
@@ -237,3 +316,17 @@ def _effect(plan: EffectPlan, built: Built):
             return fm.JointCompliance(built.joints[joint], compliance)
         case GravityPlan(acceleration=acceleration):
             return fm.Gravity(acceleration)
+        case PressurePlan(link=link, pressure=pressure):
+            return fm.Pressure(built.links[link], pressure)
+        case PrestrainPlan(link=link, stretch=stretch, along=along):
+            return fm.Prestrain(built.links[link], stretch, along=along)
+        case ContactPlan(link=link, obstacle=obstacle, stiffness=stiffness, points=points):
+            return fm.Contact(built.links[link], _obstacle(obstacle), stiffness=stiffness, points=points)
+
+
+def _obstacle(plan: PlanePlan | CylinderPlan) -> fm.HalfPlane | fm.Cylinder:
+    match plan:
+        case PlanePlan(point=point, normal=normal):
+            return fm.HalfPlane(point, normal)
+        case CylinderPlan(centre=centre, radius=radius):
+            return fm.Cylinder(centre, radius)

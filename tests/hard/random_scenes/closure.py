@@ -20,7 +20,10 @@ from .strain_energy import REAL
 
 @dataclass(frozen=True)
 class Place:
-    """Place of a body: x = X + shift + (turn − 1) (X − centre); ``angle`` counts full turns (in the plane)."""
+    """Place of a body: x = X + shift + (turn − 1) (X − centre); ``angle`` counts full turns (in the plane).
+
+    Points drawn in space are displaced in the plane by bodies that move in it.
+    """
 
     centre: np.ndarray
     shift: np.ndarray
@@ -29,7 +32,9 @@ class Place:
 
     def displacement(self, at: np.ndarray) -> np.ndarray:
         """Of points drawn at (…, dim)."""
-        return self.shift + (np.asarray(at) - self.centre) @ (self.turn - np.eye(len(self.centre))).T
+        at, dim = np.asarray(at), len(self.centre)
+        moved = self.shift + (at[..., :dim] - self.centre) @ (self.turn - np.eye(dim)).T
+        return moved if at.shape[-1] == dim else np.concatenate([moved, np.zeros((*at.shape[:-1], 1))], axis=-1)
 
     def moved(self, velocity: np.ndarray) -> Place:
         """After an infinitesimal motion: velocity of the centre, then angular velocity; (3,) or (6,)."""
@@ -107,8 +112,8 @@ class Closure:
             return self.gap(joint, places) @ (a.turn @ axis)
         if self.blueprint.dim == 2:
             return b.angle - a.angle
-        relative = a.turn.T @ b.turn
-        sine, cosine = relative[1, 0] - relative[0, 1], relative[0, 0] + relative[1, 1]
+        relative, (e1, e2) = a.turn.T @ b.turn, _across(joint)
+        sine, cosine = e2 @ relative @ e1 - e1 @ relative @ e2, e1 @ relative @ e1 + e2 @ relative @ e2
         angle = math.atan2(sine.real, cosine.real)
         # d atan2(y, x) = (x dy − y dx) / (x² + y²)
         size = sine.real**2 + cosine.real**2
@@ -122,9 +127,13 @@ class Closure:
         for joint in self.blueprint.joints:
             a, b = (places[i] for i in self.ends[joint.name])
             gap, relative = self.gap(joint, places) / length, a.turn.T @ b.turn
-            lean = [] if dim == 2 else [relative[0, 2], relative[1, 2]]
-            turned = [b.angle - a.angle] if dim == 2 else [*lean, 0.5 * (relative[1, 0] - relative[0, 1])]
+            lean = [] if dim == 2 else [across @ relative @ _axis(joint) for across in _across(joint)]
+            turned = [b.angle - a.angle]
+            if dim == 3:
+                turned = [relative[0, 2], relative[1, 2], 0.5 * (relative[1, 0] - relative[0, 1])]
             match joint.kind:
+                case "spherical":
+                    rows += [] if joint.name in self.soft else [*gap]
                 case "revolute":
                     rows += [*([] if joint.name in self.soft else gap), *lean]
                 case "weld":
@@ -137,3 +146,18 @@ class Closure:
                 scale = length if joint.kind == "prismatic" else 1.0
                 rows.append((self.coordinate(joint, places) - motors[joint.name]) / scale)
         return np.array(rows)
+
+
+def _axis(joint: JointPlan) -> np.ndarray:
+    """Unit vector along the axis of a revolute joint in space; z by default."""
+    axis = np.array((0.0, 0.0, 1.0) if joint.axis is None else (*joint.axis, 0.0)[:3])
+    return axis / np.linalg.norm(axis)
+
+
+def _across(joint: JointPlan) -> tuple[np.ndarray, np.ndarray]:
+    """Two unit vectors across the axis, right-handed with it; x and y for z."""
+    axis = _axis(joint)
+    start = np.eye(3)[0] if abs(axis[0]) < 0.9 else np.eye(3)[1]
+    first = start - (start @ axis) * axis
+    first = first / np.linalg.norm(first)
+    return first, np.cross(axis, first)

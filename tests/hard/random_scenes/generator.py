@@ -16,45 +16,57 @@ from .blueprint import (
     CompliancePlan,
     EffectPlan,
     ForcePlan,
-    GravityPlan,
     JointPlan,
     LinkPlan,
     MotorPlan,
     SpringPlan,
 )
+from .draw import INCOMPRESSIBLE, LAWS, MATERIALS, bending_force, decade, length
+from .link_effects import with_link_effect
+from .spatial import spatial_scene
 from .topologies import TOPOLOGIES, Point, Skeleton, chain
 
 _NEVER_FLEXIBLE = ("base", "slider", "tip")
-_LAWS = ("NeoHookean", "LogarithmicNeoHookean", "IsochoricNeoHookean", "IsochoricSimoNeoHookean")
-_MATERIALS = ((2e5, 0.3), (1770.0, 0.42), (1.9, 0.475), (0.2, 0.49))  # steel, nylon, two silicones
 
 
 def random_scene(seed: int) -> Blueprint:
-    """The scene of a seed."""
+    """The scene of a seed; two in five of those in three dimensions, whole, are spatial linkages."""
     rng = Random(f"scene {seed}")
-    skeleton = _scaled(rng.choice(TOPOLOGIES)(rng), _decade(rng, 1.0, 2.3))
-    space = rng.choices(("plane-stress", "plane-strain", "3d"), (80, 12, 8))[0]
+    space = rng.choices(("plane-stress", "plane-strain", "3d", "3d-symmetric"), (62, 12, 15, 11))[0]
+    if space == "3d" and rng.random() < 0.4:
+        return spatial_scene(rng)
+    return with_link_effect(rng, planar_scene(rng, space))
+
+
+def planar_scene(rng: Random, space: str) -> Blueprint:
+    """A planar mechanism without effects on its links."""
+    skeleton = _scaled(rng.choice(TOPOLOGIES)(rng), decade(rng, 1.0, 2.3))
     links = _links(rng, skeleton, space)
     draft = _hold(rng, skeleton, _Draft(links, _joints(rng, skeleton, links)))
-    force = _force(rng, skeleton, links, "load")
-    others = [_force(rng, skeleton, links, "second load")] if rng.random() < 0.15 else []
+    forces = [_force(rng, skeleton, links, "load")]
+    ratios = (1.0, rng.uniform(-1.0, 1.0)) if rng.random() < 0.1 else (1.0,)
+    count = len(ratios) - 1 + rng.choices((0, 1, 2), (85, 11, 4))[0]
+    forces += [_force(rng, skeleton, links, f"load {k + 2}") for k in range(count)]
     bend = min(map(bending_force, (link for link in links if link.centreline)))
-    size = bend * (_decade(rng, 1.0, 3.0) if rng.random() < 0.06 else _decade(rng, -6.0, 0.7))
-    others = [replace(other, magnitude=bend * _decade(rng, -4.0, 0.0)) for other in others]
-    control = rng.choices(("forces", "displacements"), (75, 25))[0]
-    if control == "displacements":
-        size = _extent(skeleton) * _decade(rng, -6.0, -1.0)
+    size = bend * (decade(rng, 1.0, 3.0) if rng.random() < 0.06 else decade(rng, -6.0, 0.7))
+    forces[len(ratios) :] = [replace(force, magnitude=bend * decade(rng, -4.0, 0.0)) for force in forces[len(ratios) :]]
+    control = rng.choices(("forces", "displacements", "path"), (60, 22, 18))[0]
+    if control != "forces":
+        size = _extent(skeleton) * decade(rng, -6.0, -1.0)
+    samples = rng.choice(((size,), (0.0, size), (0.3 * size, size), (0.5 * size, -0.5 * size)))
+    compiled = {link.law for link in links if link.centreline} == {"NeoHookean"}  # one law is enough with P3
     return Blueprint(
         topology=skeleton.name,
         links=links,
         joints=draft.joints,
         motors=draft.motors,
-        forces=(force, *others),
+        forces=tuple(forces),
         effects=(*draft.effects, *_effects(rng, links, draft.joints)),
         space=space,
-        order=rng.choice((1, 1, 2)) if space == "3d" else rng.choices((1, 2), (1, 4))[0],
+        order=rng.choices((1, 2, 3), (2, 8, 1 if compiled else 0))[0] if "3d" not in space else rng.choice((1, 1, 2)),
         control=control,
-        samples=rng.choice(((size,), (0.0, size), (0.3 * size, size), (0.5 * size, -0.5 * size))),
+        samples=(size,) if control == "path" else samples,
+        ratios=ratios,
     )
 
 
@@ -71,10 +83,6 @@ class _Draft:
             replace(j, kind="weld", axis=None, interface=interface) if j.name == name else j for j in self.joints
         )
         return replace(self, joints=joints)
-
-
-def _decade(rng: Random, low: float, high: float) -> float:
-    return 10.0 ** rng.uniform(low, high)
 
 
 def _scaled(skeleton: Skeleton, factor: float) -> Skeleton:
@@ -94,9 +102,11 @@ def _links(rng: Random, skeleton: Skeleton, space: str) -> tuple[LinkPlan, ...]:
         for name in flexible
         for a, b in zip(skeleton.links[name], skeleton.links[name][1:], strict=False)
     )
-    slender = _decade(rng, -1.3 if space == "3d" else -2.0, -0.75)
-    law = "NeoHookean" if space == "plane-stress" else rng.choice(_LAWS)  # one per scene: each must be compiled
-    materials = [rng.choice(_MATERIALS) for _ in range(2)]
+    slender = decade(rng, -1.3 if "3d" in space else -2.0, -0.75)
+    law = "NeoHookean" if space == "plane-stress" else rng.choice(LAWS)  # one per scene: each must be compiled
+    materials = [rng.choice(MATERIALS) for _ in range(2)]
+    if space != "plane-stress" and rng.random() < 0.4:
+        materials[0] = INCOMPRESSIBLE
     links = []
     for name, at in skeleton.links.items():
         if name not in flexible:
@@ -194,9 +204,9 @@ def _hold_joint(rng: Random, draft: _Draft, joint: JointPlan, ways: tuple[str, .
             return replace(draft, motors=(*draft.motors, MotorPlan(joint.name, position)))
         case "spring":
             link = min((link for link in draft.links if link.centreline), key=bending_force)
-            stiffness = bending_force(link) * _length(link) ** (-1 if joint.kind == "prismatic" else 1)
-            rest = rng.choice((0.0, rng.uniform(-0.3, 0.3))) * (_length(link) if joint.kind == "prismatic" else 1.0)
-            spring = SpringPlan(joint.name, stiffness * _decade(rng, -1.0, 1.0), rest)
+            stiffness = bending_force(link) * length(link) ** (-1 if joint.kind == "prismatic" else 1)
+            rest = rng.choice((0.0, rng.uniform(-0.3, 0.3))) * (length(link) if joint.kind == "prismatic" else 1.0)
+            spring = SpringPlan(joint.name, stiffness * decade(rng, -1.0, 1.0), rest)
             return replace(draft, effects=(*draft.effects, spring))
 
 
@@ -220,22 +230,7 @@ def _effects(rng: Random, links: tuple[LinkPlan, ...], joints: tuple[JointPlan, 
     effects: list[EffectPlan] = []
     soft = min((link for link in links if link.centreline), key=bending_force)
     if rng.random() < 0.12:
-        # the weight of the softest link is a share of what bends it
-        area = soft.thickness * soft.depth
-        weight = bending_force(soft) / (area * _length(soft)) * _decade(rng, -3.0, 0.0)
-        angle = rng.uniform(-math.pi, math.pi)
-        effects.append(GravityPlan((9810.0 * math.cos(angle), 9810.0 * math.sin(angle)), weight / 9810.0))
-    if rng.random() < 0.12:
         pins = [joint for joint in joints if joint.kind in ("revolute", "weld")]
-        compliance = _length(soft) / bending_force(soft) * _decade(rng, -6.0, -1.0)
+        compliance = length(soft) / bending_force(soft) * decade(rng, -6.0, -1.0)
         effects.append(CompliancePlan(rng.choice(pins).name, compliance))
     return effects
-
-
-def _length(link: LinkPlan) -> float:
-    return sum(math.dist(a, b) for a, b in zip(link.centreline, link.centreline[1:], strict=False))
-
-
-def bending_force(link: LinkPlan) -> float:
-    """EI/ℓ², a force that bends the link a good way."""
-    return link.young * link.depth * link.thickness**3 / 12.0 / _length(link) ** 2

@@ -11,7 +11,7 @@ import fenicsmech as fm
 from fenicsmech import AssemblyError, DescriptionError, FenicsmechError, MeshingError
 
 from .blueprint import Blueprint, Clamp, ForcePlan, JointPlan, LinkPlan, MotorPlan, build
-from .generator import random_scene
+from .generator import planar_scene
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,10 @@ Spoiler = Callable[[Random, Blueprint], Spoiled]
 def spoiled_scene(seed: int) -> Spoiled:
     """The spoiled scene of a seed."""
     rng = Random(f"spoiled {seed}")
-    return rng.choice(SPOILERS)(rng, random_scene(rng.randrange(10**6)))
+    scene = planar_scene(rng, rng.choices(("plane-stress", "plane-strain", "3d"), (80, 12, 8))[0])
+    if scene.control == "path":
+        scene = replace(scene, control="displacements")
+    return rng.choice(SPOILERS)(rng, scene)
 
 
 def _refused(what: str, blueprint: Blueprint, *names: str, errors=(DescriptionError,)) -> Spoiled:

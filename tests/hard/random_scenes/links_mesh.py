@@ -1,12 +1,16 @@
 """The meshed links as plain arrays, with shape functions of their own.
 
 Only numbers are taken from the simulation: where nodes are, which nodes a cell has, which link and body it belongs to.
+Shape functions are combinations of products Π L_a^{α_a} of barycentric coordinates, Σ α_a the order, each one at its
+own node and zero at all others.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
-from itertools import combinations
+from functools import cached_property
+from itertools import combinations, product
 
 import basix
 import numpy as np
@@ -19,43 +23,123 @@ _CORRECTIONS = 30  # of a point's place in a curved cell
 
 
 @dataclass(frozen=True)
+class Elements:
+    """Lagrange elements on simplices.
+
+    Attributes:
+        order: of the polynomials.
+        places: barycentric coordinates of the nodes of a cell, in the order of ``exponents``, (k, dim + 1).
+    """
+
+    order: int
+    places: np.ndarray
+
+    @classmethod
+    def regular(cls, dim: int, order: int) -> Elements:
+        """Elements with nodes at equal distances."""
+        return cls(order, exponents(dim, order) / order)
+
+    def values(self, barycentric: np.ndarray) -> np.ndarray:
+        """N at points (q, dim + 1), (q, k)."""
+        return self._monomials(barycentric) @ self._coefficients.astype(float)
+
+    def slopes(self, barycentric: np.ndarray) -> np.ndarray:
+        """∂N/∂L_b at points (q, dim + 1), (q, k, dim + 1)."""
+        powers, slopes = self._powers, []
+        for b in range(powers.shape[1]):
+            lower = np.maximum(powers - np.eye(powers.shape[1], dtype=int)[b], 0)
+            grown = powers[:, b] * np.prod(barycentric[:, None].astype(REAL) ** lower, axis=-1)
+            slopes.append(grown @ self._coefficients)
+        return np.stack(slopes, axis=-1)
+
+    @cached_property
+    def _powers(self) -> np.ndarray:
+        return exponents(self.places.shape[1] - 1, self.order)
+
+    def _monomials(self, barycentric: np.ndarray) -> np.ndarray:
+        return np.prod(barycentric[:, None] ** self._powers, axis=-1)
+
+    @cached_property
+    def _coefficients(self) -> np.ndarray:
+        """Of the monomials in each N, (k, k), in extended precision."""
+        at_nodes = self._monomials(self.places.astype(REAL))
+        inverse = np.linalg.inv(at_nodes.astype(float)).astype(REAL)
+        for _ in range(2):
+            inverse = inverse @ (2 * np.eye(len(inverse), dtype=REAL) - at_nodes @ inverse)
+        return inverse
+
+
+def exponents(dim: int, order: int) -> np.ndarray:
+    """The powers α of each node's place, corners first, then edges, then faces, (k, dim + 1)."""
+    found = []
+    for count in range(1, min(dim + 1, order) + 1):
+        shares = sorted((s for s in product(range(1, order + 1), repeat=count) if sum(s) == order), reverse=True)
+        for corners in combinations(range(dim + 1), count):
+            for share in shares:
+                powers = np.zeros(dim + 1, dtype=int)
+                powers[list(corners)] = share
+                found.append(powers)
+    return np.array(found)
+
+
+@dataclass(frozen=True)
 class LinksMesh:
     """All flexible links.
 
     Attributes:
-        order: of the displacement, 1 or 2.
-        nodes: where they are drawn, (n, dim); edges with a midpoint are parabolas through it.
-        cells: corners first, then midpoints of the edges in the order of ``combinations``, (m, k).
+        elements: of the displacement.
+        nodes: where they are drawn, (n, dim); curved edges are polynomials through their nodes.
+        cells: nodes of each, in the order of ``exponents``, (m, k).
         link: index of the flexible link of each cell, (m,).
         body: index of the body that holds each cell, −1 if none does, (m,).
+        pressures: nodes of the pressure, one order lower, of each cell, (m, l); None where no link has one.
+        lower: elements of the pressure.
     """
 
-    order: int
+    elements: Elements
     nodes: np.ndarray
     cells: np.ndarray
     link: np.ndarray
     body: np.ndarray
+    pressures: np.ndarray | None = None
+    lower: Elements | None = None
 
     @property
     def dim(self) -> int:
         """Dimension of the space."""
         return self.nodes.shape[1]
 
+    @property
+    def order(self) -> int:
+        """Of the displacement."""
+        return self.elements.order
+
     def volumes(self, barycentric: np.ndarray) -> np.ndarray:
         """Area or volume of each cell if it were everywhere as at points (q, dim + 1), (m, q)."""
-        return np.abs(np.linalg.det(self._edges(barycentric))) / (2.0 if self.dim == 2 else 6.0)
+        return np.abs(np.linalg.det(self.edges(barycentric))) / (2.0 if self.dim == 2 else 6.0)
 
     def gradients(self, barycentric: np.ndarray) -> np.ndarray:
         """∂N/∂X at points (q, dim + 1) of all cells, (m, q, k, dim)."""
-        edges = self._edges(barycentric).astype(REAL)
+        edges = self.edges(barycentric).astype(REAL)
         inner = _dual(edges.reshape(-1, self.dim, self.dim)).reshape(edges.shape)
-        slopes = shape_slopes(barycentric, self.order)
+        slopes = self.elements.slopes(barycentric)
         return np.einsum("qka,mqad->mqkd", slopes[:, :, 1:] - slopes[:, :, :1], inner)
 
-    def _edges(self, barycentric: np.ndarray) -> np.ndarray:
+    def edges(self, barycentric: np.ndarray) -> np.ndarray:
         """∂X/∂L_a − ∂X/∂L₀, X = Σ N_k X_k, at points (q, dim + 1) of all cells, (m, q, dim, dim)."""
-        slopes = shape_slopes(barycentric, self.order)
+        slopes = self.elements.slopes(barycentric).astype(float)
         return np.einsum("qka,mki->mqai", slopes[:, :, 1:] - slopes[:, :, :1], self.nodes[self.cells])
+
+    def boundary(self, link: int) -> list[tuple[int, np.ndarray]]:
+        """Facets on the boundary of a link: the corner opposite, and the cells (…,) that have one there."""
+        cells = np.flatnonzero(self.link == link)
+        corners = self.cells[cells, : self.dim + 1]
+        sides = [np.sort(np.delete(corners, opposite, axis=1), axis=1) for opposite in range(self.dim + 1)]
+        count = Counter(tuple(side) for found in sides for side in found.tolist())
+        return [
+            (opposite, cells[[count[tuple(side)] == 1 for side in found.tolist()]])
+            for opposite, found in enumerate(sides)
+        ]
 
     def locate(self, cells: np.ndarray, at: np.ndarray) -> tuple[int, np.ndarray]:
         """The one of ``cells`` that holds a point (or comes nearest), and its barycentric coordinates there."""
@@ -66,10 +150,10 @@ class LinksMesh:
     def _inside(self, cell: int, at: np.ndarray) -> np.ndarray:
         """Barycentric coordinates of a point in a cell, by Newton's method from its middle."""
         inside = np.full(self.dim + 1, 1.0 / (self.dim + 1))
-        one = LinksMesh(self.order, self.nodes, self.cells[[cell]], self.link[[cell]], self.body[[cell]])
+        one = LinksMesh(self.elements, self.nodes, self.cells[[cell]], self.link[[cell]], self.body[[cell]])
         for _ in range(_CORRECTIONS):
-            gap = at - shape_functions(inside[None], self.order)[0] @ self.nodes[self.cells[cell]]
-            change = np.linalg.solve(one._edges(inside[None])[0, 0].T, gap)
+            gap = at - self.elements.values(inside[None])[0] @ self.nodes[self.cells[cell]]
+            change = np.linalg.solve(one.edges(inside[None])[0, 0].T, gap)
             change = change / max(1.0, np.abs(change).max())
             inside = inside + np.append(-change.sum(), change)
         return inside
@@ -84,68 +168,45 @@ def _dual(edges: np.ndarray) -> np.ndarray:
     return normals / np.sum(normals[:, 0] * edges[:, 0], axis=-1)[:, None, None]
 
 
-def shape_functions(barycentric: np.ndarray, order: int) -> np.ndarray:
-    """N at points (q, dim + 1), (q, k):  L_a, or L_a (2 L_a − 1) and 4 L_a L_b."""
-    if order == 1:
-        return barycentric
-    pairs = [4 * barycentric[:, a] * barycentric[:, b] for a, b in combinations(range(barycentric.shape[1]), 2)]
-    return np.column_stack([barycentric * (2 * barycentric - 1), *pairs])
-
-
-def shape_slopes(barycentric: np.ndarray, order: int) -> np.ndarray:
-    """∂N/∂L_b at points (q, dim + 1), (q, k, dim + 1)."""
-    count = barycentric.shape[1]
-    unit = np.eye(count)
-    if order == 1:
-        return np.broadcast_to(unit, (len(barycentric), count, count))
-    corner = [np.outer(4 * barycentric[:, a] - 1, unit[a]) for a in range(count)]
-    edge = [
-        4 * (np.outer(barycentric[:, b], unit[a]) + np.outer(barycentric[:, a], unit[b]))
-        for a, b in combinations(range(count), 2)
-    ]
-    return np.stack([*corner, *edge], axis=1)
-
-
 def quadrature(dim: int, degree: int) -> tuple[np.ndarray, np.ndarray]:
     """Barycentric points (q, dim + 1) and weights (q,) that sum to one.
 
     The rule is part of what a discrete energy is, so it is basix's, as the simulation's; a test integrates monomials.
     """
-    shape = basix.CellType.triangle if dim == 2 else basix.CellType.tetrahedron
+    shape = {1: basix.CellType.interval, 2: basix.CellType.triangle, 3: basix.CellType.tetrahedron}[dim]
     points, weights = basix.make_quadrature(shape, degree)
     return np.column_stack([1.0 - points.sum(axis=1), points]), weights / weights.sum()
 
 
 def gather(simulation: fm.Simulation) -> LinksMesh:
     """The mesh of a simulation on one process."""
-    model = simulation.model
-    space = model.elastic.u.function_space
-    dim, order = model.linkage.dim, simulation.fidelity.order
-    nodes = space.tabulate_dof_coordinates()[:, :dim].copy()
-    count = len(model.mesh.link)
-    dofs = np.array([space.dofmap.cell_dofs(cell) for cell in range(count)])
+    model, order = simulation.model, simulation.fidelity.order
     body = np.where(model.mesh.interface >= 0, model.mesh.interface + len(model.mechanism.rigid_links), -1)
-    cells = _ordered(nodes, dofs, dim, order)
-    return LinksMesh(order, model.elastic.drawn_nodes.copy(), cells, np.asarray(model.mesh.link), body)
+    elements, cells = _ordered(model.elastic.u.function_space, order, len(body))
+    lower, pressures = None, None
+    if model.elastic.pressure is not None:
+        lower, pressures = _ordered(model.elastic.pressure.p.function_space, order - 1, len(body))
+    nodes, link = model.elastic.drawn_nodes.copy(), np.asarray(model.mesh.link)
+    return LinksMesh(elements, nodes, cells, link, body, pressures, lower)
 
 
-def _ordered(nodes: np.ndarray, dofs: np.ndarray, dim: int, order: int) -> np.ndarray:
-    """Nodes of each cell in this module's order, known by where they are: midpoints lie between two corners."""
-    if order == 1:
-        return dofs
-    at, count = nodes[dofs], dofs.shape[1]
-
-    def halfway(pair: tuple[int, int], node: int) -> bool:
-        """Whether ``node`` lies halfway between two others, in all cells."""
-        gap = np.abs(at[:, node] - 0.5 * (at[:, pair[0]] + at[:, pair[1]])).max(axis=1)
-        return bool(np.all(gap <= 1e-9 * np.ptp(at, axis=1).max(axis=1)))
-
-    middle = {
-        pair: node
-        for pair in combinations(range(count), 2)
-        for node in range(count)
-        if node not in pair and halfway(pair, node)
-    }
-    corners = [node for node in range(count) if node not in middle.values()]
-    assert len(corners) == dim + 1
-    return dofs[:, [*corners, *(middle[pair] for pair in combinations(corners, 2))]]
+def _ordered(space, order: int, count: int) -> tuple[Elements, np.ndarray]:
+    """Elements and the nodes of each cell in this module's order, known by where they are in the straight cell."""
+    dim = space.mesh.geometry.dim
+    nodes = space.tabulate_dof_coordinates()[:, :dim]
+    dofs = np.array([space.dofmap.cell_dofs(cell) for cell in range(count)])
+    at = nodes[dofs]
+    corners = at[:, : dim + 1]
+    inner = np.linalg.solve(
+        np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)[:, None], (at - corners[:, :1])[..., None]
+    )[..., 0]
+    inside = np.concatenate([1.0 - inner.sum(axis=-1, keepdims=True), inner], axis=-1)
+    wanted, powers = exponents(dim, order), np.rint(order * inside).astype(int)
+    assert powers.shape[1] == len(wanted)
+    match = np.all(powers[:, None] == wanted[None, :, None], axis=-1)
+    assert np.all(match.sum(axis=2) == 1)
+    order_in_cell = np.argmax(match, axis=2)
+    places = np.take_along_axis(inside, order_in_cell[..., None], axis=1).mean(axis=0)
+    if order < 3:
+        places = wanted / order
+    return Elements(order, places), np.take_along_axis(dofs, order_in_cell, axis=1)

@@ -26,8 +26,9 @@ def null_motions(
     potential: Potential, places: list[Place], residual: Callable[[list[Place]], np.ndarray]
 ) -> np.ndarray:
     """Velocities of all bodies along which a dimensionless ``residual`` of their places stays, as ``body_modes``."""
-    count, size, length = len(places), (3 if potential.mesh.dim == 2 else 6), potential.blueprint.length
-    scale = np.array([1.0] * potential.mesh.dim + [1.0 / length] * (size - potential.mesh.dim))
+    count, size, length = len(places), (3 if potential.blueprint.dim == 2 else 6), potential.blueprint.length
+    dim = potential.blueprint.dim
+    scale = np.array([1.0] * dim + [1.0 / length] * (size - dim))
     columns, names = [], [i for i in range(count) if not potential.fixed[i]]
     for body in names:
         for k in range(size):

@@ -2,40 +2,35 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 import fenicsmech as fm
 
-from .blueprint import Blueprint, Built, GravityPlan, SpringPlan
-from .generator import bending_force
+from .blueprint import Blueprint, Built, SpringPlan
+from .draw import bending_force
 from .motions import body_modes, moved
 from .potential import Potential
 from .stability_check import eigenvalues
+from .thresholds import THRESHOLDS
 
 _STEP = 1e-30
-_IMMOBILE = 1e-9
-_SOFT = 0.1
-_HUGE = 10.0
-_UNREACHED = 1e3
-_ROUNDED = 1e-14
 
 
 def true_reason(blueprint: Blueprint, built: Built | None, failure: fm.FenicsmechError) -> str:
     """The reason why the error is right, empty if it is not."""
     if not isinstance(failure, fm.EquilibriumError):
         return ""
-    if blueprint.control == "displacements" and failure.last is not None and immobile(blueprint, built, failure.last):
+    displaced = blueprint.control in ("displacements", "path")
+    if displaced and failure.last is not None and immobile(blueprint, built, failure.last):
         return "the point cannot move that way"
-    if blueprint.control == "displacements" and failure.last is not None:
-        if abs(failure.last.force) > _UNREACHED * min(map(bending_force, blueprint.flexible)):
+    if displaced and failure.last is not None:
+        if abs(failure.last.force) > THRESHOLDS.unreached * min(map(bending_force, blueprint.flexible)):
             return "links stretched straight: a thousand times and more what bends the softest"
     if drowned(blueprint):
         return "springs softer than the rounding of stiff links"
     if adrift(blueprint):
         return "nothing but the force holds the mechanism"
-    if blueprint.control == "forces" and max(map(abs, blueprint.samples)) > _HUGE * min(
+    if blueprint.control == "forces" and max(map(abs, blueprint.samples)) > THRESHOLDS.huge * min(
         map(bending_force, blueprint.flexible)
     ):
         return "a load ten times and more what bends the softest link"
@@ -62,7 +57,7 @@ def drowned(blueprint: Blueprint) -> bool:
     for plan in blueprint.effects:
         if isinstance(plan, SpringPlan):
             arm = 1.0 if blueprint.joint(plan.joint).kind == "prismatic" else blueprint.length
-            if plan.stiffness < _ROUNDED * stiffest * arm**2:
+            if plan.stiffness < THRESHOLDS.drowned * stiffest * arm**2:
                 return True
     return False
 
@@ -70,39 +65,21 @@ def drowned(blueprint: Blueprint) -> bool:
 def immobile(blueprint: Blueprint, built: Built, frame: fm.Frame) -> bool:
     """Whether no admissible motion takes the force's point along its direction, by the geometry of joints alone."""
     potential = Potential.of(blueprint, built.simulation)
-    force, places = blueprint.forces[0], potential.places(frame.state.poses)
-    u = potential.nodal(np.array(frame.state.u).reshape(potential.mesh.nodes.shape), places)
-    if force.on in potential.rows:
-        free = (potential.held < 0)[:, None] * np.ones(u.shape)
-        if abs(potential.travel(force, u + 1j * _STEP * free, places).imag) > 0.0:
-            return False
+    places = potential.places(frame.state.poses)
+    u = potential.nodal(potential.fields(frame.state.u)[0], places)
+    if abs(potential.led_travel(u + 1j * _STEP * potential.free, places).imag) > 0.0:
+        return False
     rates = [
-        potential.travel(force, potential.nodal(u, there), there).imag / _STEP
+        potential.led_travel(potential.nodal(u, there), there).imag / _STEP
         for there in (moved(places, 1j * _STEP * mode) for mode in body_modes(potential, places))
     ]
-    return float(np.linalg.norm(rates)) < _IMMOBILE
+    return float(np.linalg.norm(rates)) < THRESHOLDS.immobile
 
 
 def at_limit(blueprint: Blueprint, built: Built, frame: fm.Frame) -> bool:
     """Whether the last equilibrium has all but lost the stiffness of its softest mode, that of the unloaded scene."""
-    share = frame.state.load_factor
-    loaded = Potential.of(_scaled(blueprint, share), built.simulation)
-    unloaded = Potential.of(_scaled(blueprint, 0.0), built.simulation)
+    loaded = Potential.of(blueprint, built.simulation, frame.state.load_factor)
+    unloaded = Potential.of(blueprint, built.simulation, 0.0)
     drawn = built.simulation.linkage.joints.drawn
     before = eigenvalues(unloaded, np.zeros(unloaded.mesh.nodes.size), drawn, 0.0)[0]
-    return eigenvalues(loaded, frame.state.u, frame.state.poses, frame.force)[0] < _SOFT * before
-
-
-def _scaled(blueprint: Blueprint, share: float) -> Blueprint:
-    """With a share of all constant loads; springs wind up with it."""
-    effects = []
-    for plan in blueprint.effects:
-        match plan:
-            case SpringPlan():
-                effects.append(replace(plan, rest=share * plan.rest))
-            case GravityPlan():
-                effects.append(replace(plan, density=share * plan.density))
-            case _:
-                effects.append(plan)
-    forces = tuple(replace(force, magnitude=share * force.magnitude) for force in blueprint.forces)
-    return replace(blueprint, effects=tuple(effects), forces=forces)
+    return eigenvalues(loaded, frame.state.u, frame.state.poses, frame.force)[0] < THRESHOLDS.soft * before

@@ -13,6 +13,7 @@ import numpy as np
 
 import fenicsmech as fm
 
+from .blueprint import LinkPlan, PressurePlan, PrestrainPlan
 from .closure import Place
 from .motions import body_modes, moved
 from .potential import Potential
@@ -60,8 +61,8 @@ def check(potential: Potential, frame: fm.Frame, origin: float, seed: int = 0) -
         origin: travel of the force's point in the unloaded configuration.
         seed: of random directions.
     """
-    mesh, state = potential.mesh, frame.state
-    u = np.array(state.u).reshape(mesh.nodes.shape)
+    state = frame.state
+    u, p = potential.fields(state.u)
     places = potential.places(state.poses)
     followed = potential.nodal(u, places)
     length = potential.blueprint.length
@@ -70,17 +71,17 @@ def check(potential: Potential, frame: fm.Frame, origin: float, seed: int = 0) -
     modes = body_modes(potential, places)
 
     def slope(du: np.ndarray, moved: list[Place]) -> float:
-        return float(np.imag(potential.value(potential.nodal(u + du, moved), moved, frame.force))) / _STEP
+        return float(np.imag(potential.value(potential.nodal(u + du, moved), moved, frame.force, p))) / _STEP
 
     rng = np.random.default_rng(seed)
-    free = (potential.held < 0)[:, None]
-    squares = [slope(1j * _STEP * rng.standard_normal(u.shape) * free, places) ** 2 for _ in range(_RANDOM)]
+    squares = [slope(1j * _STEP * rng.standard_normal(u.shape) * potential.free, places) ** 2 for _ in range(_RANDOM)]
+    if len(potential.free_pressures):
+        squares = [square + _volume_slope(potential, followed, p, rng) ** 2 for square in squares]
     along = [slope(np.zeros(u.shape), moved(places, 1j * _STEP * mode)) for mode in modes]
     force = float(np.sqrt(np.mean(squares) + np.sum(np.square(along))))
-    floor, scale = _floor(potential, u), _scale(potential, frame, u, places)
-    first = potential.blueprint.forces[0]
-    travel = float(np.real(potential.travel(first, followed, places))) - origin
-    energy = float(potential.strain_energy(followed))
+    floor, scale = _floor(potential, u), _scale(potential, frame, u, p, places)
+    travel = float(np.real(potential.led_travel(followed, places))) - origin
+    energy = float(potential.strain_energy(followed, p))
     return Residual(
         gap=float(max(gaps.max(initial=0.0), strayed)),
         force=force,
@@ -92,29 +93,54 @@ def check(potential: Potential, frame: fm.Frame, origin: float, seed: int = 0) -
     )
 
 
-def _scale(potential: Potential, frame: fm.Frame, u: np.ndarray, places: list[Place]) -> float:
-    """The largest force that acts: loads, weights, and what links exert on each body, by virtual work."""
-    dim, forces = potential.mesh.dim, [potential.weight]
+def _volume_slope(potential: Potential, u: np.ndarray, p: np.ndarray, rng: np.random.Generator) -> float:
+    """∂Π/∂p along random pressures as large as those that displacements of one lead to: a force."""
+    step, plans = np.zeros(p.shape), potential.blueprint.flexible
+    size = max(link.young / link.size for link in plans if potential.blueprint.mixed(link))
+    step[potential.free_pressures] = size * rng.standard_normal(len(potential.free_pressures))
+    return float(np.imag(potential.strain_energy(u, p + 1j * _STEP * step))) / _STEP
+
+
+def _scale(potential: Potential, frame: fm.Frame, u: np.ndarray, p: np.ndarray, places: list[Place]) -> float:
+    """The largest force that acts: loads, those of effects, and what links exert on each body, by virtual work."""
+    dim, forces = potential.blueprint.dim, [potential.weight]
     forces += [abs(size) for _, size in potential.acting(frame.force)]
+    for plan in potential.blueprint.effects:
+        match plan:
+            case PressurePlan(link=name, pressure=pressure):
+                link = potential.blueprint.link(name)
+                forces.append(abs(pressure) * link.depth * link.thickness)
+            case PrestrainPlan(link=name, stretch=stretch):
+                link = potential.blueprint.link(name)
+                forces.append(link.young * abs(stretch - 1.0) * link.depth * link.thickness)
     size = 3 if dim == 2 else 6
     for body in range(len(places)):
         for k in range(dim):
             velocity = np.zeros((len(places), size), dtype=complex)
             velocity[body, k] = 1j * _STEP
             there = moved(places, velocity)
-            work = potential.strain_energy(potential.nodal(u + 0j, there)) + potential.body_potential(u + 0j, there)
+            followed = potential.nodal(u + 0j, there)
+            work = potential.strain_energy(followed, p) + potential.effect_energy(followed, there)
             forces.append(abs(np.imag(work)) / _STEP)
     return float(max(forces))
 
 
 def _stiffness(potential: Potential) -> float:
-    """Largest stiffness of a node: E times depth (plane) or cell size (space)."""
-    return max(_stiffnesses(potential).values())
+    """Largest stiffness of a node: E times depth (plane) or cell size (space), more where nodes are closer."""
+    return max(_stiffnesses(potential).values()) * max(1.0, (potential.mesh.order / 2.0) ** 2)
 
 
 def _stiffnesses(potential: Potential) -> dict[str, float]:
     plans, flat = potential.blueprint.flexible, potential.mesh.dim == 2
-    return {link.name: link.young * (link.depth if flat else link.size) / (1 - 2 * link.poisson) for link in plans}
+    return {
+        link.name: link.young * (link.depth if flat else link.size) / (1 - 2 * _poisson(potential, link))
+        for link in plans
+    }
+
+
+def _poisson(potential: Potential, link: LinkPlan) -> float:
+    """ν of what displacements strain: changes of volume are resisted by a pressure where the link has one."""
+    return 0.0 if potential.blueprint.mixed(link) else link.poisson
 
 
 def _floor(potential: Potential, u: np.ndarray) -> float:
@@ -134,6 +160,6 @@ def _floor(potential: Potential, u: np.ndarray) -> float:
 
 def _energy_digits(potential: Potential) -> float:
     """Cancellation error of textbook energies: 1e-16 of the modulus, times the volume; kept below a millionth."""
-    volume = sum(link.young / (1 - 2 * link.poisson) for link in potential.blueprint.flexible)
+    volume = sum(link.young / (1 - 2 * _poisson(potential, link)) for link in potential.blueprint.flexible)
     thickest = max(link.depth for link in potential.blueprint.flexible) if potential.mesh.dim == 2 else 1.0
     return 1e-16 * volume * thickest * potential.volume * 1e6

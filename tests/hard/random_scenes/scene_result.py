@@ -8,24 +8,26 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
 import fenicsmech as fm
 
 from .blueprint import Blueprint, Built, build
+from .designs import design_scene, run
 from .generator import random_scene
 from .invalid import spoiled_scene
 from .potential import Potential
 from .reasons import true_reason
 from .residual_check import Residual, check
+from .stability_check import checkable, unstable_directions
+from .thresholds import THRESHOLDS
 
-TOLERANCE = 1e-6  # of the largest load or reaction
-ROUNDING = 10.0  # times the rounding of displacements
-BALANCED = 1e-5  # of what works along motions that deform no link
-CLOSED = 1e-9  # of the mechanism's length
 INVALID_SHARE = 3  # in ten
+DESIGNS = 40  # scenes for one design problem
+_CHECKED = 6  # frames of a path
 
 
 @dataclass(frozen=True)
@@ -35,11 +37,13 @@ class SceneResult:
     Attributes:
         seed: of the scene.
         scene: its topology, or its fault.
-        outcome: "equilibrium", "equilibrium to rounding", "refused", "true: …" or "wrong: …".
+        outcome: "equilibrium", "equilibrium to rounding", "designed: …", "refused", "true: …" or "wrong: …".
         detail: the error, or the figures.
         seconds: wall-clock time.
         frames: how many equilibria were checked.
         residual: the largest relative one.
+        iterations: of Newton's method, on the way to all frames.
+        unchecked: checks that are left out.
     """
 
     seed: int
@@ -49,6 +53,8 @@ class SceneResult:
     seconds: float
     frames: int = 0
     residual: float = 0.0
+    iterations: int = 0
+    unchecked: str = ""
 
     @property
     def wrong(self) -> bool:
@@ -60,14 +66,35 @@ class SceneResult:
         return asdict(self)
 
 
-def judge(seed: int) -> SceneResult:
-    """Runs the scene of a seed; three in ten make no sense."""
+@dataclass(frozen=True)
+class _Verdict:
+    """What frames and errors are worth; see ``SceneResult``."""
+
+    outcome: str
+    detail: str = ""
+    frames: int = 0
+    residual: float = 0.0
+    iterations: int = 0
+    unchecked: str = ""
+
+
+def judge(seed: int, *, quick: bool = False) -> SceneResult:
+    """Runs the scene of a seed; three in ten make no sense, one in forty is a design problem.
+
+    ``quick`` scenes have larger elements and fewer loads; design problems are what they are.
+    """
     start = time.perf_counter()
-    scene, outcome, detail, frames, residual = (_judge_spoiled if seed % 10 < INVALID_SHARE else _judge_sound)(seed)
-    return SceneResult(seed, scene, outcome, detail, time.perf_counter() - start, frames, residual)
+    if seed % DESIGNS == DESIGNS - 1:
+        scene, verdict = _judge_design(seed)
+    elif seed % 10 < INVALID_SHARE:
+        scene, verdict = _judge_spoiled(seed)
+    else:
+        blueprint = random_scene(seed)
+        scene, verdict = blueprint.summary, judge_sound(blueprint.coarsened() if quick else blueprint)
+    return SceneResult(seed, scene, seconds=time.perf_counter() - start, **asdict(verdict))
 
 
-def _judge_spoiled(seed: int) -> tuple[str, str, str, int, float]:
+def _judge_spoiled(seed: int) -> tuple[str, _Verdict]:
     spoiled = spoiled_scene(seed)
     try:
         spoiled.run()
@@ -78,50 +105,76 @@ def _judge_spoiled(seed: int) -> tuple[str, str, str, int, float]:
         elif not any(word in error.part for word in spoiled.names):
             complaint = f"names {error.part!r}, not {' or '.join(map(repr, spoiled.names))}"
         outcome = f"wrong: {complaint}" if complaint else f"refused: {type(error).__name__}"
-        return spoiled.what, outcome, str(error), 0, 0.0
+        return spoiled.what, _Verdict(outcome, str(error))
     except Exception as error:
-        return spoiled.what, f"wrong: {type(error).__name__} escaped", str(error), 0, 0.0
-    return spoiled.what, "wrong: accepted", "", 0, 0.0
+        return spoiled.what, _Verdict(f"wrong: {type(error).__name__} escaped", str(error))
+    return spoiled.what, _Verdict("wrong: accepted")
 
 
-def _judge_sound(seed: int) -> tuple[str, str, str, int, float]:
-    blueprint = random_scene(seed)
-    name = f"{blueprint.topology}, {blueprint.space}"
+def _judge_design(seed: int) -> tuple[str, _Verdict]:
+    problem = design_scene(seed)
+    try:
+        outcome, detail = run(problem)
+    except fm.FenicsmechError as error:
+        return problem.summary, _Verdict(f"wrong: {_unclear(error) or type(error).__name__}", str(error))
+    except Exception as error:
+        return problem.summary, _Verdict(f"wrong: {type(error).__name__} escaped", str(error))
+    return problem.summary, _Verdict(outcome, detail)
+
+
+def judge_sound(blueprint: Blueprint) -> _Verdict:
+    """Outcome of a scene that makes sense."""
     frames, failure, built = (), None, None
     try:
         built = build(blueprint)
-        frames = built.curve(blueprint).frames
+        curve = built.curve(blueprint)
+        frames = curve.frames
     except fm.EquilibriumError as error:
         frames, failure = error.frames, error
     except fm.FenicsmechError as error:
         failure = error
     except Exception as error:
-        return name, f"wrong: {type(error).__name__} escaped", str(error), 0, 0.0
-    outcome, figures, worst = judge_frames(blueprint, built, frames) if frames else ("", "", 0.0)
-    if failure is not None and not outcome.startswith("wrong"):
+        return _Verdict(f"wrong: {type(error).__name__} escaped", str(error))
+    verdict = judge_frames(blueprint, built, frames, ended=failure is None) if frames else _Verdict("")
+    if failure is not None and not verdict.outcome.startswith("wrong"):
         unclear, reason = _unclear(failure), true_reason(blueprint, built, failure)
         kind = type(failure).__name__
         outcome = f"wrong: {unclear}" if unclear else f"true: {kind}, {reason}" if reason else f"wrong: {kind}"
-        figures = str(failure)
-    return name, outcome, figures, len(frames), worst
+        verdict = replace(verdict, outcome=outcome, detail=str(failure))
+    return verdict
 
 
-def judge_frames(blueprint: Blueprint, built: Built, frames) -> tuple[str, str, float]:
-    """Outcome, figures and largest relative residual of the frames of a scene."""
+def judge_frames(blueprint: Blueprint, built: Built, frames: Sequence[fm.Frame], *, ended: bool) -> _Verdict:
+    """What the frames of a curve are worth, which has ``ended`` as it was to or by an error.
+
+    Of paths some frames are checked, spread evenly, and whether the last one is where they were to end.
+    """
     potential, worst, outcome = Potential.of(blueprint, built.simulation), None, "equilibrium"
-    origin = unloaded_travel(potential, built)
-    for frame, sample in zip(frames, blueprint.samples, strict=False):
+    origin, samples = unloaded_travel(potential, built), blueprint.samples
+    chosen = [*frames]
+    if blueprint.control == "path":
+        chosen = [frames[k] for k in np.unique(np.linspace(0, len(frames) - 1, _CHECKED).astype(int))]
+        stopped = len(frames) >= blueprint.most
+        samples = [None] * (len(chosen) - 1) + [samples[0] if ended and not stopped else None]
+    count, iterations = len(chosen), sum(frame.iterations for frame in frames)
+    for frame, sample in zip(chosen, samples, strict=False):
         if not _finite(frame):
-            return "wrong: NaN", repr(frame), math.inf
+            return _Verdict("wrong: NaN", repr(frame), count, math.inf, iterations)
         found = check(potential, frame, origin)
         error = _error(blueprint, frame, sample, found)
         if worst is None or found.relative > worst.relative:
             worst = found
         if error:
-            return f"wrong: {error}", str(found), found.relative
-        if found.force > TOLERANCE * found.scale:
+            return _Verdict(f"wrong: {error}", str(found), count, found.relative, iterations)
+        if found.force > THRESHOLDS.residual * found.scale:
             outcome = "equilibrium to rounding"
-    return outcome, str(worst), worst.relative
+    judged = checkable(potential)
+    if judged:
+        unstable = unstable_directions(potential, chosen[-1])
+        if unstable is not None and unstable != chosen[-1].unstable_modes:
+            detail = f"{chosen[-1].unstable_modes} unstable modes, and {unstable} by second differences"
+            return _Verdict("wrong: stability", detail, count, worst.relative, iterations)
+    return _Verdict(outcome, str(worst), count, worst.relative, iterations, "" if judged else "stability")
 
 
 def unloaded_travel(potential: Potential, built: Built) -> float:
@@ -131,21 +184,22 @@ def unloaded_travel(potential: Potential, built: Built) -> float:
     return math.nan
 
 
-def _error(blueprint: Blueprint, frame: fm.Frame, sample: float, found: Residual) -> str:
-    """The fault of a frame, empty if there is none."""
-    controlled = frame.force if blueprint.control == "forces" else frame.displacement
-    size = abs(sample) if blueprint.control == "forces" else blueprint.length
-    if abs(controlled - sample) > 1e-9 * size:
-        return "control missed"
-    if found.gap > CLOSED:
+def _error(blueprint: Blueprint, frame: fm.Frame, sample: float | None, found: Residual) -> str:
+    """The fault of a frame, empty if there is none; ``sample`` is what is prescribed."""
+    if sample is not None:
+        controlled = frame.force if blueprint.control == "forces" else frame.displacement
+        size = abs(sample) if blueprint.control == "forces" else blueprint.length
+        if abs(controlled - sample) > THRESHOLDS.reached * size:
+            return "control missed"
+    if found.gap > THRESHOLDS.closed:
         return "joints apart"
-    if found.force > max(TOLERANCE * found.scale, ROUNDING * found.floor):
+    if found.force > max(THRESHOLDS.residual * found.scale, THRESHOLDS.rounding * found.floor):
         return "no equilibrium"
-    if found.unstrained_work > BALANCED:
+    if found.unstrained_work > THRESHOLDS.balanced:
         return "motions that deform no link are out of balance"
-    if not math.isnan(found.travel_error) and found.travel_error > 1e-9:
+    if not math.isnan(found.travel_error) and found.travel_error > THRESHOLDS.reached:
         return "displacement"
-    if found.energy_error > 1e-6:
+    if found.energy_error > THRESHOLDS.energy:
         return "strain energy"
     return ""
 

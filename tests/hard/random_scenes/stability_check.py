@@ -10,27 +10,37 @@ from __future__ import annotations
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import eigsh
+from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 import fenicsmech as fm
 
 from .closure import Place
 from .motions import moved
 from .potential import Potential
+from .thresholds import THRESHOLDS
 
 _IMAGINARY, _REAL = 1e-30, 1e-5
-_DIGITS = 1e-10  # of the largest eigenvalue, after scaling: smaller ones have no sign
-_DENSE = 1500  # unknowns up to which all eigenvalues are found; beyond, the four nearest to zero
+_DENSE = 500  # unknowns up to which all eigenvalues are found; beyond, the four nearest to zero
+_MOST = 2500  # unknowns up to which they are
 
 
 def unstable_directions(potential: Potential, frame: fm.Frame) -> int | None:
-    """The number of negative eigenvalues; None if one is too small to have a sign."""
+    """The number of negative eigenvalues; None if one is too small to have a sign, or if all that are found are."""
     values = eigenvalues(potential, frame.state.u, frame.state.poses, frame.force)
-    return None if np.abs(values).min() < _DIGITS * values.max() else int(np.sum(values < 0.0))
+    signless = np.abs(values).min() < THRESHOLDS.signless * max(1.0, values.max())
+    return None if signless or values.max() < 0.0 else int(np.sum(values < 0.0))
+
+
+def checkable(potential: Potential) -> bool:
+    """Whether stability can be judged: pressures, at which potentials have saddles, are not eliminated here."""
+    return not len(potential.free_pressures) and int(potential.free.sum()) <= _MOST
 
 
 def eigenvalues(potential: Potential, u: np.ndarray, poses: np.ndarray, magnitude: float) -> np.ndarray:
     """Of the scaled second derivative on admissible directions, ascending; those nearest to zero of large scenes.
+
+    Idle spins are left out: as many eigenvalues as there are, those nearest to zero. Links in u–p form count with the
+    law in displacements.
 
     Args:
         potential: of the scene.
@@ -38,13 +48,13 @@ def eigenvalues(potential: Potential, u: np.ndarray, poses: np.ndarray, magnitud
         poses: of the bodies.
         magnitude: of the force that changes.
     """
-    mesh, places = potential.mesh, potential.places(poses)
-    u = potential.nodal(np.array(u).reshape(mesh.nodes.shape), places)
-    free = np.flatnonzero(np.repeat(potential.held < 0, mesh.dim))
+    places = potential.places(poses)
+    u = potential.nodal(potential.fields(u)[0], places)
+    free = np.flatnonzero(potential.free)
     bodies = [i for i, fixed in enumerate(potential.fixed) if not fixed]
     stiffness = _stiffness(potential, u)
     curvature, null = _body_curvature(potential, u, places, bodies, magnitude)
-    follow, curvature = _interface_motion(potential, places, bodies) @ null, null.T @ curvature @ null
+    follow = _interface_motion(potential, places, bodies) @ null
     stiff = stiffness[free]
     hessian = sparse.bmat(
         [[stiff[:, free], stiff @ follow], [follow.T @ stiff.T, follow.T @ (stiffness @ follow) + curvature]]
@@ -53,13 +63,19 @@ def eigenvalues(potential: Potential, u: np.ndarray, poses: np.ndarray, magnitud
     scale = sparse.diags(1.0 / np.sqrt(np.maximum(diagonal, 1e-14 * diagonal.max())))
     scaled = scale @ (0.5 * (hessian + hessian.T)) @ scale
     if scaled.shape[0] <= _DENSE:
-        return np.linalg.eigvalsh(scaled.toarray())
-    return np.sort(eigsh(scaled.tocsc(), k=4, sigma=0.0, return_eigenvectors=False))
+        values = np.linalg.eigvalsh(scaled.toarray())
+    else:
+        solve = splu(scaled.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve
+        inverse = LinearOperator(scaled.shape, matvec=solve)
+        count = 4 + potential.blueprint.idle_spins
+        values = eigsh(scaled, k=count, sigma=0.0, OPinv=inverse, return_eigenvectors=False)
+    return np.sort(values[np.argsort(np.abs(values))[potential.blueprint.idle_spins :]])
 
 
 def _motions(potential: Potential, bodies: list[int]) -> list[np.ndarray]:
     """Unit velocities of the free bodies, angles times length."""
-    size, dim = (3 if potential.mesh.dim == 2 else 6), potential.mesh.dim
+    dim = potential.blueprint.dim
+    size = 3 if dim == 2 else 6
     motions = []
     for body in bodies:
         for k in range(size):
@@ -82,8 +98,14 @@ def _interface_motion(potential: Potential, places: list[Place], bodies: list[in
 def _stiffness(potential: Potential, u: np.ndarray) -> sparse.csr_matrix:
     """∂²E/∂u² of all nodes, (n dim, n dim), cell by cell."""
     mesh, rows, columns, entries = potential.mesh, [], [], []
-    for cells, slopes, tangent in potential.tangents(u, imaginary=_IMAGINARY, real=_REAL):
-        block = np.einsum("mqka,mqiajb,mqlb->mkilj", slopes, tangent, slopes, optimize=True)
+    blocks = [
+        (cells, np.einsum("mqka,mqiajb,mqlb->mkilj", slopes, tangent, slopes, optimize=True))
+        for cells, slopes, tangent in potential.tangents(u, imaginary=_IMAGINARY, real=_REAL)
+    ]
+    for touch in potential.touches:
+        found = touch.tangents(mesh, u, imaginary=_IMAGINARY, real=_REAL)
+        blocks += [(cells, potential.load_factor * block) for cells, block in found]
+    for cells, block in blocks:
         dofs = (mesh.cells[cells][..., None] * mesh.dim + np.arange(mesh.dim)).reshape(len(cells), -1)
         size = dofs.shape[1]
         rows.append(np.repeat(dofs, size, axis=1).ravel())
@@ -96,26 +118,34 @@ def _stiffness(potential: Potential, u: np.ndarray) -> sparse.csr_matrix:
 def _body_curvature(
     potential: Potential, u: np.ndarray, places: list[Place], bodies: list[int], magnitude: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Second derivative of L by the motion of bodies alone, nodal forces frozen, and the null space of A."""
+    """Second derivative of L on the null space of A by the motion of bodies, nodal forces frozen; and that space."""
     motions = _motions(potential, bodies)
-    held = np.argwhere((potential.held >= 0)[:, None] & np.ones(u.shape, dtype=bool))
-    forces = np.zeros(u.shape)
-    for node, axis in held:
-        step = np.zeros(u.shape, dtype=complex)
-        step[node, axis] = 1j * _IMAGINARY
-        forces[node, axis] = potential.value(u + step, places, magnitude).imag / _IMAGINARY
+    dim = potential.blueprint.dim
+    # held nodes move by affine maps: resultants and first moments of the forces on them are enough
+    forces = {body: np.zeros((dim, dim + 1)) for body in np.unique(potential.held[potential.held >= 0])}
+    for body, sums in forces.items():
+        nodes = np.flatnonzero(potential.held == body)
+        arms = potential.mesh.nodes[nodes, :dim] - potential.centres[body]
+        for axis in range(dim):
+            for k, rate in enumerate([np.ones(len(nodes)), *arms.T]):
+                step = np.zeros(u.shape, dtype=complex)
+                step[nodes, axis] = 1j * _IMAGINARY * rate
+                sums[axis, k] = potential.value(u + step, places, magnitude, None).imag / _IMAGINARY
 
     def work(there: list[Place]) -> complex:
         """Part of Π that changes with bodies while nodal forces and effects on links stay."""
-        value = np.sum(forces * potential.nodal(np.zeros(u.shape), there))
-        value = value + potential.body_potential(np.zeros(u.shape), there)
+        value = 0.0
+        for body, sums in forces.items():
+            turn = there[body].turn - np.eye(dim)
+            value = value + sums[:, 0] @ there[body].shift + np.sum(sums[:, 1:] * turn)
+        value = value + potential.body_energy(there)
         for force, size in potential.acting(magnitude):
             if force.on not in potential.rows:
                 value = value - size * potential.travel(force, u, there)
         return value
 
-    def slopes(function, there: np.ndarray) -> np.ndarray:
-        """Derivatives along all motions, after real velocities ``there``."""
+    def slopes(function, motions: list[np.ndarray], there: np.ndarray) -> np.ndarray:
+        """Derivatives along motions, after real velocities ``there``."""
         return np.array(
             [
                 np.imag(function(moved(places, there + 1j * _IMAGINARY * motion))).astype(float) / _IMAGINARY
@@ -124,15 +154,14 @@ def _body_curvature(
         )
 
     still = np.zeros_like(motions[0])
-    jacobian = slopes(potential.closure.residual, still).T
-    multipliers = np.linalg.lstsq(jacobian.T, slopes(work, still), rcond=1e-10)[0]
+    jacobian = slopes(potential.closure.residual, motions, still).T
+    multipliers = np.linalg.lstsq(jacobian.T, slopes(work, motions, still), rcond=1e-10)[0]
     _, values, right = np.linalg.svd(jacobian, full_matrices=True)
     null = right[int(np.sum(values > 1e-9 * max(values.max(initial=0.0), 1e-300))) :].T
 
     def lagrangian(there: list[Place]) -> complex:
         return work(there) - multipliers @ potential.closure.residual(there)
 
-    rows = [
-        (slopes(lagrangian, _REAL * motion) - slopes(lagrangian, -_REAL * motion)) / (2 * _REAL) for motion in motions
-    ]
-    return np.array(rows), null
+    ways = [np.tensordot(way, motions, axes=1) for way in null.T]
+    rows = [(slopes(lagrangian, ways, _REAL * way) - slopes(lagrangian, ways, -_REAL * way)) for way in ways]
+    return np.array(rows).reshape(len(ways), len(ways)) / (2 * _REAL), null

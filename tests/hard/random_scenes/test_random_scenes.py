@@ -1,5 +1,6 @@
 """Random scenes end in equilibria that an independent check accepts, or in one clear, correct error."""
 
+import math
 from dataclasses import replace
 
 import hypothesis
@@ -7,13 +8,23 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from .blueprint import SpringPlan, build
+from .blueprint import Blueprint, SpringPlan, build
+from .draw import bending_force
 from .generator import random_scene
+from .known_scenes import (
+    CLAMPED_ARCH,
+    LIMIT_OF_A_CONSTANT_FORCE,
+    LIMIT_OF_A_LED_FORCE,
+    SOFT_SPRING,
+    STRETCHED_COUPLER,
+    STRETCHED_FOUR_BAR,
+)
 from .motions import STEP
 from .potential import Potential
 from .residual_check import check
-from .scene_result import BALANCED, TOLERANCE, judge
+from .scene_result import judge, judge_sound
 from .stability_check import unstable_directions
+from .thresholds import THRESHOLDS
 from .unstrained_check import unstrained_motions
 
 SOUND = st.integers(0, 10**6).map(lambda n: 10 * n + 5)
@@ -24,7 +35,8 @@ def small(seed: int) -> bool:
     """Whether a scene is quick: in the plane, under loads, with forms that other tests compile too."""
     scene = random_scene(seed)
     cells = sum(link.thickness / link.size**2 * scene.length for link in scene.flexible)
-    return scene.space == "plane-stress" and not scene.effects and scene.control == "forces" and cells < 300
+    plain = scene.space == "plane-stress" and scene.order == 2 and not scene.effects and len(scene.forces) == 1
+    return plain and scene.control == "forces" and cells < 300
 
 
 @hypothesis.given(SPOILED)
@@ -41,6 +53,14 @@ def test_scenes_that_make_sense_end_well(seed):
     assert not result.wrong, result
 
 
+@pytest.mark.parametrize("seed", [39, 639, 799])
+def test_designs_end_well(seed):
+    # a target that is met, links that do not carry the force, a force that moves nothing
+    result = judge(seed)
+    assert not result.wrong, result
+    assert result.scene.startswith("design")
+
+
 def test_every_seed_gives_the_same_scene_again():
     assert [random_scene(seed) for seed in range(50)] == [random_scene(seed) for seed in range(50)]
     assert len({repr(random_scene(seed)) for seed in range(50)}) == 50
@@ -48,36 +68,39 @@ def test_every_seed_gives_the_same_scene_again():
 
 @pytest.fixture(scope="module")
 def solved():
-    """A scene in equilibrium: its potential and its last frame."""
-    seed = next(seed for seed in range(5, 5000, 10) if small(seed) and not random_scene(seed).motors)
-    scene = random_scene(seed)
+    """A scene in equilibrium, bent: its potential and its last frame."""
+    scenes = (random_scene(seed) for seed in range(5, 20000, 10) if small(seed))
+    scene = next(scene for scene in scenes if not scene.motors and _bent(scene) and scene.topology == "two-link arch")
     scene = replace(scene, samples=(scene.samples[-1],))
     built = build(scene)
     return Potential.of(scene, built.simulation), built.curve(scene).frames[-1]
 
 
+def _bent(scene: Blueprint) -> bool:
+    return 1e-3 < abs(scene.samples[-1]) / min(map(bending_force, scene.flexible)) < 1.0
+
+
 def test_the_check_accepts_an_equilibrium_and_nothing_near_it(solved):
     potential, frame = solved
-    assert check(potential, frame, 0.0).relative < TOLERANCE
+    assert check(potential, frame, 0.0).relative < THRESHOLDS.residual
     doubled = replace(frame, force=1.001 * frame.force)
     assert check(potential, doubled, 0.0).relative > 1e-4
     moved = replace(frame, state=replace(frame.state, u=1.001 * frame.state.u))
-    assert check(potential, moved, 0.0).relative > TOLERANCE
+    assert check(potential, moved, 0.0).relative > THRESHOLDS.residual
 
 
 def test_imaginary_differences_of_the_potential_are_real_ones(solved):
     potential, frame = solved
     mesh, places = potential.mesh, potential.places(frame.state.poses)
     rng, size = np.random.default_rng(1), 1e-2 * min(link.size for link in potential.blueprint.flexible)
-    free = (potential.held < 0)[:, None]
-    strained = frame.state.u.reshape(mesh.nodes.shape) + size * rng.standard_normal(mesh.nodes.shape) * free
-    direction = rng.standard_normal(strained.shape) * free
+    strained = frame.state.u.reshape(mesh.nodes.shape) + size * rng.standard_normal(mesh.nodes.shape) * potential.free
+    direction = rng.standard_normal(strained.shape) * potential.free
 
     def value(step: complex) -> complex:
-        return potential.value(strained + step * direction, places, frame.force)
+        return potential.value(strained + step * direction, places, frame.force, None)
 
     exact = value(1e-30j).imag / 1e-30
-    coarse, fine = ((value(h) - value(-h)) / (2 * h) for h in (2e-1 * size, 1e-1 * size))
+    coarse, fine = ((value(h) - value(-h)) / (2 * h) for h in (4e-2 * size, 2e-2 * size))
     assert float((4 * fine - coarse) / 3) == pytest.approx(float(exact), rel=1e-7)
 
 
@@ -99,10 +122,24 @@ def test_stability_agrees_with_second_differences(solved):
 @pytest.fixture(scope="module")
 def sprung():
     """A six-bar whose freedom a spring holds under a load a millionth of what rounding is worth to its links."""
-    scene = random_scene(16)
-    assert [type(effect) for effect in scene.effects] == [SpringPlan]
+    scenes = (random_scene(seed) for seed in range(5, 20000, 10))
+    scene = next(scene for scene in scenes if "six-bar" in scene.topology and _hangs_on_a_soft_spring(scene))
     built = build(scene)
     return Potential.of(scene, built.simulation), built.curve(scene).frames[-1]
+
+
+def _hangs_on_a_soft_spring(scene: Blueprint) -> bool:
+    held = [type(effect) for effect in scene.effects] == [SpringPlan] and not scene.motors and len(scene.forces) == 1
+    plain = scene.space == "plane-stress" and scene.order == 2 and scene.control == "forces"
+    stiff = max(link.young * link.depth for link in scene.flexible) * scene.length
+    away = min(math.dist(scene.forces[0].at, joint.at) for joint in scene.joints if "base" in (joint.a, joint.b))
+    return (
+        held
+        and plain
+        and away > 0.2 * scene.length
+        and abs(scene.samples[-1]) < 1e-10 * stiff
+        and not scene.effects[0].rest
+    )
 
 
 def test_motions_that_deform_no_link_leave_the_strain_energy_as_it_is(sprung):
@@ -112,7 +149,7 @@ def test_motions_that_deform_no_link_leave_the_strain_energy_as_it_is(sprung):
     motions = list(unstrained_motions(potential, u, places))
     assert len(motions) == 1
     for du, _, _ in motions:
-        slope = potential.strain_energy(u + du).imag / STEP
+        slope = potential.strain_energy(u + du, None).imag / STEP
         speed = np.abs(du).max() / STEP
         assert abs(slope) < 1e-12 * abs(frame.force) * speed
 
@@ -120,34 +157,32 @@ def test_motions_that_deform_no_link_leave_the_strain_energy_as_it_is(sprung):
 def test_loads_and_springs_balance_however_stiff_the_links(sprung):
     potential, frame = sprung
     assert check(potential, frame, 0.0).unstrained_work < 1e-6
-    assert check(potential, replace(frame, force=1.01 * frame.force), 0.0).unstrained_work > 10.0 * BALANCED
+    assert check(potential, replace(frame, force=1.01 * frame.force), 0.0).unstrained_work > 10.0 * THRESHOLDS.balanced
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("seed", [17, 59, 538])
-def test_joints_are_not_opened_for_a_displacement_out_of_reach(seed):
+@pytest.mark.parametrize("scene", [STRETCHED_FOUR_BAR, STRETCHED_COUPLER, CLAMPED_ARCH])
+def test_joints_are_not_opened_for_a_displacement_out_of_reach(scene):
     # reactions grow out of all bounds there, and with them what a residual of a billionth of them may hide
-    result = judge(seed)
-    assert not result.wrong, result
-    assert result.outcome.startswith("true")
+    assert judge_sound(scene).outcome.startswith("true")
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("seed", [1097, pytest.param(3003, marks=pytest.mark.slow)])
-def test_a_limit_point_at_a_hundredth_of_the_load_is_reported_where_it_is(seed):
-    # of a led force, and of a constant one
-    result = judge(seed)
-    assert result.outcome == "true: EquilibriumError, at a limit point", result
+@pytest.mark.parametrize(
+    "scene", [LIMIT_OF_A_LED_FORCE, pytest.param(LIMIT_OF_A_CONSTANT_FORCE, marks=pytest.mark.slow)]
+)
+def test_a_limit_point_at_a_hundredth_of_the_load_is_reported_where_it_is(scene):
+    assert judge_sound(scene).outcome == "true: EquilibriumError, at a limit point"
 
 
 @pytest.mark.thorough
 def test_springs_hardly_stiffer_than_the_rounding_of_links_hold_whatever_the_last_digits_of_loads():
     # where rounding makes the inertia doubtful, shifted steps creep, which is no sign of convergence
-    scene, rng = random_scene(244), np.random.default_rng(0)
-    (spring,) = scene.effects
+    (spring,), rng = SOFT_SPRING.effects, np.random.default_rng(0)
     reached = []
     for load, stiffness in 1.0 + 1e-3 * rng.standard_normal((5, 2)):
-        samples = tuple(load * sample for sample in scene.samples)
-        near = replace(scene, samples=samples, effects=(replace(spring, stiffness=stiffness * spring.stiffness),))
-        reached.append(build(near).curve(near).displacements)
+        samples = tuple(load * sample for sample in SOFT_SPRING.samples)
+        effects = (replace(spring, stiffness=stiffness * spring.stiffness),)
+        scene = replace(SOFT_SPRING, samples=samples, effects=effects)
+        reached.append(build(scene).curve(scene).displacements)
     assert np.all(np.ptp(reached, axis=0) < 1e-3 * np.abs(reached[0]))

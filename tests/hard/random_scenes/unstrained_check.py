@@ -54,9 +54,9 @@ def unstrained_motions(
     for motion in null_motions(potential, places, stiff):
         there, du = moved(places, 1j * STEP * motion), np.zeros(u.shape, dtype=complex)
         for nodes, (first, *_) in groups:
-            spin = there[first].turn.imag @ places[first].turn.T
-            carried = (mesh.nodes + u)[nodes] - (places[first].centre + places[first].shift)
-            du[nodes] = 1j * (there[first].shift.imag + carried @ spin.T)
+            spin, dim = there[first].turn.imag @ places[first].turn.T, len(places[first].centre)
+            carried = (mesh.nodes + u)[nodes, :dim] - (places[first].centre + places[first].shift)
+            du[nodes, :dim] = 1j * (there[first].shift.imag + carried @ spin.T)
         opening = float(np.abs(stiff(there).imag).max()) / STEP * potential.blueprint.length
         yield du, there, opening
 
@@ -83,7 +83,7 @@ def unstrained_work(
         if potential.blueprint.control == "displacements":
             grain += floor * fastest
         for plan in potential.blueprint.effects:
-            part = float(np.imag(potential.alone(plan).body_potential(u + du, there))) / STEP
+            part = float(np.imag(potential.alone(plan).effect_energy(u + du, there))) / STEP
             work += part
             size += potential.weight * fastest if isinstance(plan, GravityPlan) else abs(part)
             grain += _grain(potential, plan, places, there) / STEP

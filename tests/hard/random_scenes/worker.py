@@ -16,10 +16,11 @@ class Worker:
 
     Args:
         limit: seconds after which a scene is taken to hang.
+        quick: whether scenes are simulated with larger elements and fewer loads.
     """
 
-    def __init__(self, limit: float) -> None:
-        self._limit = limit
+    def __init__(self, limit: float, *, quick: bool = False) -> None:
+        self._limit, self._quick = limit, quick
         self._process, self._pipe = None, None
 
     def judge(self, seed: int) -> SceneResult:
@@ -47,12 +48,12 @@ class Worker:
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
-        self._process = context.Process(target=_serve, args=(theirs,), daemon=True)
+        self._process = context.Process(target=_serve, args=(theirs, self._quick), daemon=True)
         self._process.start()
         theirs.close()
 
 
-def _serve(pipe: Connection) -> None:
+def _serve(pipe: Connection, quick: bool) -> None:
     logging.getLogger("fenicsmech").setLevel(logging.ERROR)
     while True:
         try:
@@ -60,4 +61,4 @@ def _serve(pipe: Connection) -> None:
         except EOFError:
             return
         with redirect_stderr(io.StringIO()):  # progress of curves
-            pipe.send(judge(seed))
+            pipe.send(judge(seed, quick=quick))

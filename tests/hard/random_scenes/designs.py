@@ -1,0 +1,157 @@
+"""Random design problems: some links of a random mechanism in plane stress, and one or two targets.
+
+The end of an optimisation is right if its targets are met, or if a second start, independent of the first, does not
+meet them either. In both cases the values reported must be those of a curve that starts unloaded.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from random import Random
+
+import numpy as np
+
+import fenicsmech as fm
+
+from .blueprint import Blueprint, Built, build
+from .draw import bending_force, decade
+from .generator import planar_scene
+from .thresholds import THRESHOLDS
+
+_DENSITY = 1e-9
+
+
+@dataclass(frozen=True)
+class DesignScene:
+    """A scene whose links are to be designed.
+
+    Attributes:
+        blueprint: of the mechanism as drawn; one force, one sample.
+        links: names of those that change, each within ``thickness`` times its own.
+        factor: wanted displacement over that of the drawn design.
+        light: whether the mass of these links is to be least, with the displacement at most as wanted.
+        thickness: least and largest, over the drawn one.
+        start: seed of the second start.
+    """
+
+    blueprint: Blueprint
+    links: tuple[str, ...]
+    factor: float
+    light: bool
+    thickness: tuple[float, float]
+    start: int
+
+    @property
+    def summary(self) -> str:
+        """In a few words."""
+        wanted = f"{self.factor:.2f} of the displacement{', least mass' if self.light else ''}"
+        return f"design of {len(self.links)} links of a {self.blueprint.topology}: {wanted}"
+
+
+def design_scene(seed: int) -> DesignScene:
+    """The design problem of a seed."""
+    rng = Random(f"design {seed}")
+    while True:
+        scene = planar_scene(rng, "plane-stress")
+        load = bending_force(min(scene.flexible, key=bending_force)) * decade(rng, -2.0, -0.3)
+        at_pin = any(joint.at == scene.forces[0].at for joint in scene.joints)
+        if (scene.motors or scene.topology == "two-link arch") and not at_pin:
+            break
+    motors = tuple(replace(motor, position=0.0) for motor in scene.motors)
+    links = tuple(replace(link, size=1.5 * link.thickness) if link.centreline else link for link in scene.links)
+    scene = replace(
+        scene,
+        links=links,
+        motors=motors,
+        forces=scene.forces[:1],
+        ratios=(1.0,),
+        order=2,
+        control="forces",
+        samples=(load,),
+    )
+    names = [link.name for link in scene.flexible]
+    return DesignScene(
+        blueprint=scene,
+        links=tuple(sorted(rng.sample(names, rng.randint(1, min(2, len(names)))))),
+        factor=rng.uniform(0.5, 2.0),
+        light=rng.random() < 0.3,
+        thickness=(rng.uniform(0.4, 0.8), rng.uniform(1.2, 2.0)),
+        start=rng.randrange(10**6),
+    )
+
+
+def run(scene: DesignScene) -> tuple[str, str]:
+    """Outcome and detail.
+
+    Raises:
+        FenicsmechError: of the drawn mechanism, or an optimisation.
+    """
+    built = build(scene.blueprint)
+    (frame,) = built.curve(scene.blueprint).frames
+    wanted = scene.factor * frame.displacement
+    if abs(frame.displacement) < THRESHOLDS.closed * scene.blueprint.length:
+        return "true: the force moves nothing", f"{frame.displacement:.3g}"
+    problem = _problem(scene, built, wanted)
+    try:
+        result = problem.optimise()
+    except fm.DescriptionError as error:
+        if _idle(scene, frame.displacement):
+            return "true: DescriptionError, the links do not carry the force", str(error)
+        raise
+    if error := _misreported(scene, built, result):
+        return "wrong: displacement of a design", error
+    if _met(result):
+        return "designed: targets met", result.reason
+    # an independent start, from shapes that differ by what the bounds allow
+    rng, initial = np.random.default_rng(scene.start), problem.initial
+    other = problem.optimise(start=initial + _spread(scene) * rng.uniform(-1.0, 1.0, initial.shape))
+    if _met(other):
+        return "wrong: a second start meets the targets", f"{result.reason}; {result.targets[0]}"
+    return "designed: two starts meet no target", f"{result.reason}; {', '.join(result.active)}; {result.targets[0]}"
+
+
+def _problem(scene: DesignScene, built: Built, wanted: float) -> fm.DesignProblem:
+    designs = []
+    for name in scene.links:
+        plan = scene.blueprint.link(name)
+        least, largest = (share * plan.thickness for share in scene.thickness)
+        designs.append(fm.SplineDesign(built.links[name], segments=2, thickness=(least, largest)))
+    force, (load,) = built.forces[scene.blueprint.forces[0].name], scene.blueprint.samples
+    sample = fm.Sample({force: load}, built.configuration)
+    if not scene.light:
+        targets = [fm.Target(fm.Displacement(force), sample, equals=wanted)]
+    else:
+        bound = {"at_most" if wanted > 0.0 else "at_least": wanted}
+        mass = fm.LinkMass(tuple(built.links[name] for name in scene.links), density=_DENSITY)
+        targets = [fm.Target(fm.Displacement(force), sample, **bound), fm.Target(mass, least=True)]
+    return fm.DesignProblem(built.simulation, designs, targets=targets)
+
+
+def _idle(scene: DesignScene, displacement: float) -> bool:
+    """Whether the displacement of the drawn design stays as it is when the links that may change are stiffer."""
+    links = tuple(
+        replace(link, young=2.0 * link.young) if link.name in scene.links else link for link in scene.blueprint.links
+    )
+    stiffer = replace(scene.blueprint, links=links)
+    (frame,) = build(stiffer).curve(stiffer).frames
+    return abs(frame.displacement - displacement) < THRESHOLDS.energy * abs(displacement)
+
+
+def _met(result: fm.DesignResult) -> bool:
+    return all(target.met for target in result.targets if target.wanted is not None)
+
+
+def _spread(scene: DesignScene) -> float:
+    """A share of the least thickness: parameters are lengths."""
+    return 0.2 * min(scene.thickness[0] * scene.blueprint.link(name).thickness for name in scene.links)
+
+
+def _misreported(scene: DesignScene, built: Built, result: fm.DesignResult) -> str:
+    """What a curve of the design says otherwise than the result, empty if nothing; unverified results say so."""
+    force = built.forces[scene.blueprint.forces[0].name]
+    curve = built.simulation.with_design(result).load_displacement(
+        force, forces=scene.blueprint.samples, configuration=built.configuration
+    )
+    found, told = curve.frames[-1].displacement, float(result.targets[0].reached)
+    off = abs(found - told) > THRESHOLDS.reached * scene.blueprint.length + THRESHOLDS.energy * abs(found)
+    return f"{told:.9g} reported, {found:.9g} on a curve from rest" if off and result.verified else ""
