@@ -283,7 +283,8 @@ class DesignProblem:
             finer: ratio of the simulation's element size to that of the parts.
 
         Raises:
-            DescriptionError: the result belongs to other links or targets.
+            DescriptionError: the result belongs to other links or targets, or an effect acts on a part of the boundary
+                of a link that may change that a predicate of drawn points chooses.
             MeshingError: a part cannot be written or meshed.
         """
         if [target.name for target in result.targets] != [target.name for target in self.targets]:

@@ -26,7 +26,7 @@ from fenicsmech.design.result import DesignResult, PartValue, component_values, 
 from fenicsmech.design.target import Comparison, Target
 from fenicsmech.design.transfer import WholeState
 from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, SPATIAL
-from fenicsmech.errors import MeshingError, positive
+from fenicsmech.errors import DescriptionError, MeshingError, positive
 from fenicsmech.export import write_step
 from fenicsmech.log import logger
 from fenicsmech.mechanism import FlexibleLink, Joint, MaterialPoint, in_dimension, step_file
@@ -58,10 +58,19 @@ def part_simulations(
         Simulations with elements as large as those of ``simulation``, and with ``finer`` ones; nothing is meshed yet.
 
     Raises:
-        DescriptionError: ``finer`` is not positive.
+        DescriptionError: ``finer`` is not positive, or an effect acts on a part of the boundary of a link that a
+            predicate of drawn points chooses.
         MeshingError: a part cannot be written or read.
     """
     finer = positive("refinement of the part's mesh", finer)
+    for effect in simulation.scene.effects:
+        for faces in effect.faces:
+            if faces.where is not None and faces.link in links:
+                raise DescriptionError(
+                    f"verification of {simulation.scene.mechanism.name!r}",
+                    f"{effect.explain()}: its predicate is one of drawn points, which the design moves",
+                    "Describe the part in a scene of its own, with fm.step_file(…) and a predicate of its points",
+                )
     on_one(simulation.comm, lambda: _write(folder, links, meshes, depths))
     files = zip(links, depths, strict=True)
     shapes = {link: step_file(solid_path(folder, link, ".step"), depth=depth) for link, depth in files}

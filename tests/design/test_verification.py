@@ -190,6 +190,16 @@ def test_forces_beside_the_mid_plane_twist_the_part_as_they_twist_the_design():
         assert part == pytest.approx(target.corrected, rel=0.02)
 
 
+def test_effects_on_a_part_of_the_drawn_boundary_are_refused():
+    case = bow(10.0)
+    (arch,) = case.scene.mechanism.flexible_links
+    scene = fm.Scene(case.scene.mechanism, [fm.Pressure(arch, 0.01, where=lambda x: x[:, 0] < 100.0)])
+    simulation = fm.Simulation(scene, space="plane-stress", size=3.0)
+    problem = fm.DesignProblem(simulation, case.designs, targets=case.targets)
+    result = problem.optimise(optimiser=fm.LevenbergMarquardt(iterations=1))
+    refused(lambda: problem.verify(result), part="bow", problem="predicate is one of drawn points", remedy="step_file")
+
+
 def flexure(size: float, shape: fm.Shape | None = None) -> tuple[fm.Simulation, fm.FlexibleLink, fm.Force]:
     """A slanting leaf whose end is pushed across on a rail; it snaps, under more in larger elements of degree one."""
     rig = fm.Mechanism("flexure")

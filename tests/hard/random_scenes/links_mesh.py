@@ -206,7 +206,8 @@ def _ordered(space, order: int, count: int) -> tuple[Elements, np.ndarray]:
     match = np.all(powers[:, None] == wanted[None, :, None], axis=-1)
     assert np.all(match.sum(axis=2) == 1)
     order_in_cell = np.argmax(match, axis=2)
-    places = np.take_along_axis(inside, order_in_cell[..., None], axis=1).mean(axis=0)
+    places = np.take_along_axis(inside, order_in_cell[..., None], axis=1).mean(axis=0).astype(REAL)
+    places = places / places.sum(axis=1, keepdims=True)  # N sum to one as precisely as strains are
     if order < 3:
         places = wanted / order
     return Elements(order, places), np.take_along_axis(dofs, order_in_cell, axis=1)

@@ -126,8 +126,8 @@ def _scale(potential: Potential, frame: fm.Frame, u: np.ndarray, p: np.ndarray, 
 
 
 def _stiffness(potential: Potential) -> float:
-    """Largest stiffness of a node: E times depth (plane) or cell size (space), more where nodes are closer."""
-    return max(_stiffnesses(potential).values()) * max(1.0, (potential.mesh.order / 2.0) ** 2)
+    """Largest stiffness of a node: E times depth (plane) or cell size (space)."""
+    return max(_stiffnesses(potential).values())
 
 
 def _stiffnesses(potential: Potential) -> dict[str, float]:

@@ -62,13 +62,12 @@ def eigenvalues(potential: Potential, u: np.ndarray, poses: np.ndarray, magnitud
     diagonal = np.abs(hessian.diagonal())
     scale = sparse.diags(1.0 / np.sqrt(np.maximum(diagonal, 1e-14 * diagonal.max())))
     scaled = scale @ (0.5 * (hessian + hessian.T)) @ scale
-    if scaled.shape[0] <= _DENSE:
+    if scaled.shape[0] <= _DENSE or potential.blueprint.idle_spins:  # a singular matrix has no inverse
         values = np.linalg.eigvalsh(scaled.toarray())
     else:
         solve = splu(scaled.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve
         inverse = LinearOperator(scaled.shape, matvec=solve)
-        count = 4 + potential.blueprint.idle_spins
-        values = eigsh(scaled, k=count, sigma=0.0, OPinv=inverse, return_eigenvectors=False)
+        values = eigsh(scaled, k=4, sigma=0.0, OPinv=inverse, return_eigenvectors=False)
     return np.sort(values[np.argsort(np.abs(values))[potential.blueprint.idle_spins :]])
 
 
