@@ -309,11 +309,10 @@ class CurveFollower:
     def _ended(self, failure: NotConverged) -> EquilibriumError:
         stepper, last = self._stepper, self._frames[-1]
         across, up = axes(stepper.request.part, stepper.discretisation.scene.units)
-        return EquilibriumError(
+        return stepper.error(
             f"path of {stepper.request.where}",
             f"it cannot be followed beyond {across.quantity} {across(last.displacement, 6)} at {up.quantity} "
             f"{up(last.force, 6)} ({failure})",
-            "End it earlier, allow smaller steps with ArcSteps(smallest=…), or use a finer mesh",
-            last=last,
-            frames=self._frames,
+            last,
+            otherwise="End it earlier, allow smaller steps with ArcSteps(smallest=…), or use a finer mesh",
         )

@@ -212,7 +212,7 @@ class CurveStepper:
             problem = (
                 f"the rest position of {names} at force {control.prescribed:g} is lost in the rounding of stiff links"
             )
-            raise self._error(self.request.where, problem, self.frames[-1] if self.frames else None)
+            raise self.error(self.request.where, problem, self.frames[-1] if self.frames else None)
         snapped_through, self._snaps = self._snaps + stepper.snaps > snaps, 0
         spent, phases = perf_counter() - start, clock.since(seconds)
         iterations = stepper.iterations - iterations
@@ -299,7 +299,7 @@ class CurveStepper:
         except LoadStepsFailed as failure:
             forces = [repr(force.name) for force, _ in self.request.others]
             names = ", ".join([*forces, *(effect.explain() for effect in self._model.effects)])
-            raise self._error(
+            raise self.error(
                 f"constant loads ({names}) in configuration {self.request.configuration.name!r}",
                 f"no equilibrium beyond {100.0 * failure.reached:.3g}% of them ({failure.reason})",
                 self._last(failure),
@@ -326,9 +326,9 @@ class CurveStepper:
             f"no equilibrium at {what} {control.prescribed - origin:g}; the last one is at {failure.reached - origin:g}"
             f"{force} ({failure.reason}; {len(failure.tried)} smaller steps were tried)"
         )
-        return self._error(where, problem, last)
+        return self.error(where, problem, last)
 
-    def _error(
+    def error(
         self,
         where: str,
         problem: str,

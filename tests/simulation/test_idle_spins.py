@@ -105,3 +105,46 @@ def test_points_of_a_link_follow_its_design_to_the_line():
     field[:, 1] = 2.0
     design = fm.Design(field.ravel(), {fm.JointPosition(*balls, direction=(0, 1, 0)): 2.0})
     assert not idle_hint(simulation.with_design(design), push)
+
+
+def sliding_rocker():
+    """A five-bar in space, held by two motors: crank, idle coupler, a link hinged to the rocker across it, rocker."""
+    m = fm.Mechanism("five-bar")
+    ground, crank, link, rocker = m.rigid("ground", fixed=True), *(m.rigid(n) for n in ("crank", "link", "rocker"))
+    coupler = m.flexible("coupler", fm.strip([(20, 0), (80, 0)], thickness=3.0, depth=3.0), fm.ONYX)
+    hinge = m.revolute(ground, crank, at=(0, 0, 0))
+    m.spherical(crank, coupler, at=(20, 0, 0), interface_radius=1.5)
+    m.spherical(coupler, link, at=(80, 0, 0), interface_radius=1.5)
+    m.motor(m.revolute(link, rocker, at=(80, 0, 20), axis=(1, 0, 0)))
+    m.revolute(rocker, ground, at=(80, 0, 40), axis=(0, 1, 0))
+    push = m.force(on=rocker, at=(80, 0, 30), direction=(-1, 0, 0))
+    return m, push, m.motor(hinge)
+
+
+def two_couplers():
+    """A crank, a lever and a rocker, with an idle coupler from each to the next."""
+    m = fm.Mechanism("two couplers")
+    ground, crank, lever, rocker = m.rigid("ground", fixed=True), *(m.rigid(n) for n in ("crank", "lever", "rocker"))
+    hinge = m.revolute(ground, crank, at=(0, 0, 0))
+    for name, a, b, x in (("first", crank, lever, 20), ("second", lever, rocker, 70)):
+        coupler = m.flexible(name, fm.strip([(x, 0), (x + 50, 0)], thickness=3.0, depth=3.0), fm.ONYX)
+        m.spherical(a, coupler, at=(x, 0, 0), interface_radius=1.5)
+        m.spherical(coupler, b, at=(x + 50, 0, 0), interface_radius=1.5)
+    m.revolute(lever, ground, at=(70, 0, 30), axis=(0, 1, 0))
+    m.revolute(rocker, ground, at=(120, 0, 40), axis=(0, 1, 0))
+    push = m.force(on=rocker, at=(120, 0, 10), direction=(-1, 0, 0))
+    return m, push, m.motor(hinge)
+
+
+@pytest.mark.parametrize(("describe", "spins"), [(sliding_rocker, 1), (two_couplers, 2)])
+@pytest.mark.parametrize("turn", [0.0, 0.6])
+def test_load_steps_agree_with_a_path_that_is_followed_whatever_spins_idly(describe, spins, turn):
+    mechanism, push, motor = describe()
+    simulation = fm.Simulation(fm.Scene(mechanism), space="3d", size=3.0)
+    configuration = fm.Configuration("turned", [(motor, turn)])
+    curve = simulation.load_displacement(push, forces=[5.0, 17.5, 35.0], configuration=configuration)
+    assert (curve.freedom.mobility, curve.freedom.zero_energy, curve.remarks) == (spins, (), ())
+    assert all(frame.stable and frame.iterations <= 4 for frame in curve.frames)
+    followed = simulation.follow(push, until=fm.Until(force=35.0), configuration=configuration)
+    assert curve.frames[-1].displacement == pytest.approx(followed.frames[-1].displacement, rel=1e-8)
+    assert followed.remarks == ()

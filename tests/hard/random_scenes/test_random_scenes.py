@@ -15,6 +15,7 @@ from .known_scenes import (
     CLAMPED_ARCH,
     LIMIT_OF_A_CONSTANT_FORCE,
     LIMIT_OF_A_LED_FORCE,
+    SOFT_SPRING,
     STRETCHED_COUPLER,
     STRETCHED_FOUR_BAR,
 )
@@ -172,3 +173,16 @@ def test_joints_are_not_opened_for_a_displacement_out_of_reach(scene):
 )
 def test_a_limit_point_at_a_hundredth_of_the_load_is_reported_where_it_is(scene):
     assert judge_sound(scene).outcome == "true: EquilibriumError, at a limit point"
+
+
+@pytest.mark.thorough
+def test_springs_hardly_stiffer_than_the_rounding_of_links_hold_whatever_the_last_digits_of_loads():
+    # where rounding makes the inertia doubtful, shifted steps creep, which is no sign of convergence
+    (spring,), rng = SOFT_SPRING.effects, np.random.default_rng(0)
+    reached = []
+    for load, stiffness in 1.0 + 1e-3 * rng.standard_normal((5, 2)):
+        samples = tuple(load * sample for sample in SOFT_SPRING.samples)
+        effects = (replace(spring, stiffness=stiffness * spring.stiffness),)
+        scene = replace(SOFT_SPRING, samples=samples, effects=effects)
+        reached.append(build(scene).curve(scene).displacements)
+    assert np.all(np.ptp(reached, axis=0) < 1e-3 * np.abs(reached[0]))
