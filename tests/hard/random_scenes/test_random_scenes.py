@@ -175,7 +175,7 @@ def test_a_limit_point_at_a_hundredth_of_the_load_is_reported_where_it_is(scene)
     assert judge_sound(scene).outcome == "true: EquilibriumError, at a limit point"
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_springs_hardly_stiffer_than_the_rounding_of_links_hold_whatever_the_last_digits_of_loads():
     # where rounding makes the inertia doubtful, shifted steps creep, which is no sign of convergence
     (spring,), rng = SOFT_SPRING.effects, np.random.default_rng(0)
