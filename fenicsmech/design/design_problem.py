@@ -299,7 +299,7 @@ class DesignProblem:
             placed = placed_points(self.simulation, links, self.targets)
         with TemporaryDirectory() as temporary:  # only the first process writes and reads
             folder, moved = Path(folder or temporary), self._moved(given[0])
-            coarse, fine = part_simulations(self.simulation, links, *solids, folder, finer, moved, placed)
+            coarse, fine = part_simulations(self.simulation, links, *solids, folder, finer, moved, placed, self.targets)
             verified = verified_parts(result, coarse, fine, self.targets, links)
         return self.simulation.comm.bcast(verified, root=0)
 

@@ -12,7 +12,7 @@ from fenicsmech.collective import on_one
 from fenicsmech.design.description import SplineDesign
 from fenicsmech.design.numbers import Number
 from fenicsmech.errors import DescriptionError, counted, expect, finite, positive, set_fields
-from fenicsmech.mechanism import DRAWN, Configuration, Force, Units
+from fenicsmech.mechanism import DRAWN, Configuration, Force, Scene, Units
 from fenicsmech.multibody import assemble
 from fenicsmech.quantities import Displacement, ForceMagnitude, Quantity, Sample
 from fenicsmech.simulation import CurveRequest, Simulation, read_request
@@ -127,6 +127,21 @@ class Target:
     def name(self) -> str:
         """The target in words."""
         return f"{self.quantity}{'' if self.sample is None else f' under {self.sample}'}"
+
+    def check(self, scene: Scene, dim: int) -> None:
+        """Checks the quantity, and the number of wanted values, in ``dim`` dimensions.
+
+        Raises:
+            DescriptionError: the scene has no such quantity, or it has other components than are wanted.
+        """
+        self.quantity.check(scene, dim)
+        size = self.quantity.size(dim)
+        if len(self.wanted) > size or self.size == 1 < size:
+            raise DescriptionError(
+                f"target of the {self.quantity}",
+                f"it has {counted(size, 'component')} and {counted(self.size, 'wanted value')}",
+                "Give as many numbers as it has",
+            )
 
     @property
     def on_curve(self) -> tuple[Force, float, float, Configuration] | None:
@@ -276,22 +291,15 @@ def check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
     dim = simulation.linkage.dim
     for target in targets:
         expect("design problem", target, Target, "a target", "Give Target(…)")
-        part, size = f"target of the {target.quantity}", target.quantity.size(dim)
         if target.sample is not None:
             sample_request(simulation, target.sample, [target.sample.value])
             on_one(simulation.comm, partial(assemble, simulation.linkage, target.sample.configuration))
-        target.quantity.check(simulation.scene, dim)
-        if len(target.wanted) > size or target.size == 1 < size:
-            raise DescriptionError(
-                part,
-                f"it has {counted(size, 'component')} and {counted(target.size, 'wanted value')}",
-                "Give as many numbers as it has",
-            )
+        target.check(simulation.scene, dim)
         if target.sample is not None and isinstance(target.quantity, ForceMagnitude):
             moved = target.sample.moved
             if moved is None or moved[0] != target.quantity.force:
                 raise DescriptionError(
-                    part,
+                    f"target of the {target.quantity}",
                     f"nothing prescribes the displacement of {target.quantity.force.name!r}",
                     "Give Sample({force: at(…)})",
                 )

@@ -48,11 +48,12 @@ def part_simulations(
     finer: float,
     moved: Mapping[Joint, JointChange],
     placed: Mapping[MaterialPoint, PlacedPoint],
+    targets: Sequence[Target],
 ) -> tuple[Simulation, Simulation]:
     """The scene with ``links`` read from the STEP files of their ``meshes``, which this writes to ``folder``.
 
     Joints are drawn where they are ``moved`` to, and points of links where they are ``placed`` (``placed_points``). In
-    space half the depth is meshed where the scene allows it: exported links are symmetric.
+    space half the depth is meshed where the scene and all ``targets`` allow it: exported links are symmetric.
 
     Returns:
         Simulations with elements as large as those of ``simulation``, and with ``finer`` ones; nothing is meshed yet.
@@ -74,8 +75,9 @@ def part_simulations(
     on_one(simulation.comm, lambda: _write(folder, links, meshes, depths))
     files = zip(links, depths, strict=True)
     shapes = {link: step_file(solid_path(folder, link, ".step"), depth=depth) for link, depth in files}
+    halved = _halved(simulation, targets)
     coarse, fine = (
-        simulation.with_shapes(shapes, fidelity=_finer(simulation, factor), moved=moved, placed=placed)
+        simulation.with_shapes(shapes, fidelity=_finer(simulation, factor, halved), moved=moved, placed=placed)
         for factor in (1.0, finer)
     )
     return coarse, fine
@@ -100,14 +102,27 @@ def _write(folder: Path, links: Sequence[FlexibleLink], meshes: Sequence[LinkMes
         write_step(solid_path(folder, link, ".step"), mesh, depth=depth, name=link.name)
 
 
-def _finer(simulation: Simulation, factor: float) -> Fidelity:
-    """The fidelity of a simulation with smaller elements, of half the depth where that is possible."""
+def _halved(simulation: Simulation, targets: Sequence[Target]) -> bool:
+    """Whether half the depth has all that the whole one has: nothing is beside the mid-plane, or moves out of it."""
+    scene = simulation.scene
+    points = [part.at for part in (*scene.mechanism.forces, *scene.mechanism.outputs)]
+    points += [at for target in targets for _, at, _ in target.quantity.material_points]
+    if any(in_dimension(at, 3)[2] for at in points) or not fits(scene, MID_PLANE_SYMMETRIC):
+        return False
+    try:
+        for target in targets:
+            target.check(scene, MID_PLANE_SYMMETRIC.mechanism_dim)
+    except DescriptionError:
+        return False
+    return True
+
+
+def _finer(simulation: Simulation, factor: float, halved: bool) -> Fidelity:
+    """The fidelity of a simulation with smaller elements; half the depth of one in space if ``halved``."""
     fidelity = simulation.fidelity
     layers = None if fidelity.layers is None else math.ceil(factor * fidelity.layers)
     sizes = {link: size / factor for link, size in fidelity.sizes.items()}
-    mechanism = simulation.scene.mechanism
-    off_plane = any(in_dimension(part.at, 3)[2] for part in (*mechanism.forces, *mechanism.outputs))
-    if fidelity.model is SPATIAL and fits(simulation.scene, MID_PLANE_SYMMETRIC) and not off_plane:
+    if fidelity.model is SPATIAL and halved:
         half = None if layers is None else math.ceil(0.5 * layers)
         return replace(fidelity, model=MID_PLANE_SYMMETRIC, sizes=sizes, layers=half)
     return replace(fidelity, sizes=sizes, layers=layers)

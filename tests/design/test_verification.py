@@ -190,6 +190,23 @@ def test_forces_beside_the_mid_plane_twist_the_part_as_they_twist_the_design():
         assert part == pytest.approx(target.corrected, rel=0.02)
 
 
+@pytest.mark.thorough
+def test_vectors_have_all_their_components_in_the_part():
+    mechanism = fm.Mechanism("cantilever")
+    base = mechanism.rigid("base", fixed=True)
+    strip = mechanism.flexible("strip", fm.strip([(0, 0), (40, 0)], thickness=6.0, depth=6.0), PLASTIC)
+    mechanism.weld(base, strip, at=(2, 0), region=fm.Rectangle(4, 8))
+    push = mechanism.force(on=strip, at=(38, 0), direction=(0, -1), region=fm.Disc(1.5))
+    target = fm.Target(fm.Displacement(strip, at=(30, 0)), fm.Sample({push: 5.0}), equals=(0.0, -1.0, 0.0))
+    sim = fm.Simulation(fm.Scene(mechanism), space="3d", size=6.0, layers=1)
+    problem = fm.DesignProblem(sim, [fm.SplineDesign(strip, 1)], targets=[target])
+    result = problem.verify(problem.optimise(optimiser=fm.LevenbergMarquardt(iterations=1), surrogate=None))
+    (found,) = result.targets
+    assert result.part_fidelity.startswith("3d,")
+    part = np.add(found.part.value, found.part.finer_elements_add)
+    assert part == pytest.approx(np.array(found.corrected), rel=0.05, abs=0.01 * abs(found.corrected[1]))
+
+
 def test_effects_on_a_part_of_the_drawn_boundary_are_refused():
     case = bow(10.0)
     (arch,) = case.scene.mechanism.flexible_links
