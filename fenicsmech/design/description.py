@@ -287,10 +287,13 @@ def _check_shifts(
         if len(unlike):
             site = linkage.bodies[linkage.interfaces[other][image.sites[unlike[0]]]].name
             pair = point_text(np.round(wanted[unlike[0]], 6)), point_text(given[unlike[0]])
+            remedy = f"Name this joint with the direction {pair[0]}: direction=[…] has one for each joint"
+            if not np.any(wanted[unlike[0]]):
+                remedy = f"Name the joint of {link.name!r} too that this one is the image of"
             raise DescriptionError(
                 str(number),
                 f"the image of {link.name!r} in {other.name!r} has {site!r} shifted along {pair[0]}, not {pair[1]}",
-                "Name this joint with its own direction, as JointPosition(left, right, direction=[(1, 0), (-1, 0)])",
+                remedy,
             )
 
 

@@ -35,12 +35,16 @@ class _OfJoints(NumberKind):
 
     def __init__(self, *parts: Joint, given: Sequence[float] | Sequence[Sequence[float]]) -> None:
         super().__init__(*parts)
-        each = given if isinstance(next(iter(given), None), Sequence | np.ndarray) else [given] * len(parts)
         where = f"direction of the {self.what}"
-        if len(each) != len(parts):
-            several = counted(len(each), "direction"), counted(len(parts), "joint")
+        lists = Sequence | np.ndarray
+        if not isinstance(given, lists) or not any(isinstance(own, lists) for own in given):
+            vectors = (direction(where, given),) * len(parts)  # type: ignore[arg-type]  # one for all
+        else:
+            vectors = tuple(direction(where, own) for own in given)  # type: ignore[arg-type]  # of each
+        if len(vectors) != len(parts):
+            several = counted(len(vectors), "direction"), counted(len(parts), "joint")
             raise DescriptionError(where, f"{several[0]} for {several[1]}", "Give one for all joints, or one for each")
-        set_fields(self, vectors=tuple(direction(where, own) for own in each))  # type: ignore[arg-type]  # of each joint
+        set_fields(self, vectors=vectors)
 
     @staticmethod
     def candidates(scene: Scene) -> Sequence[Joint]:
@@ -142,10 +146,11 @@ class JointPosition(_OfJoints):
         super().check(scene, dim)
         for vector in self.vectors:
             in_plane(f"direction of the {self.name}", vector, dim)
-        mechanism, along = scene.mechanism, dict(zip(self.parts, self.vectors, strict=True))
+        mechanism = scene.mechanism
+        along = {joint: in_dimension(own, 3) for joint, own in zip(self.parts, self.vectors, strict=True)}
         for joint, vector in along.items():
             held = [link for link in (joint.a, joint.b) if isinstance(link, FlexibleLink)]
-            if held and any(vector[2:]):
+            if held and vector[2]:
                 raise DescriptionError(
                     self.name,
                     f"{joint.name!r} holds {held[0].name!r}, which is flexible and follows joints in the plane alone",

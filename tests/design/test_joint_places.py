@@ -376,9 +376,16 @@ def test_invalid_places_are_refused():
         lambda: shifted(*feet, along=[(1, 0), (-1, 0)]),
         part="position",
         problem="the image of 'leg -20' in 'leg 20'",
-        remedy="direction=[(1, 0), (-1, 0)]",
+        remedy="with the direction (1, 0)",
     )
     refused(
         lambda: shifted(*feet, along=[(1, 0)]), part="direction", problem="1 direction for 2 joints", remedy="for each"
     )
+    for given in (1.0, None):
+        refused(
+            lambda given=given: fm.JointPosition(*feet, direction=given),
+            part="direction",
+            problem=str(given),
+            remedy="Give",
+        )
     assert len(tip) == 2 and diagonal in (tip[0].a, tip[0].b, tip[1].a, tip[1].b)
