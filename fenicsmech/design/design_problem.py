@@ -244,8 +244,8 @@ class DesignProblem:
     ) -> None:
         """Writes ``NAME.step`` and ``NAME.stl`` of every link whose shape or depth may change, in mm.
 
-        Each is at its place in the mechanism. ``parts.json`` lists how many to make of each part: links that share a
-        shape are the same part. Lengths in another unit are written as they are, with a warning.
+        Each is at its place in the mechanism. ``parts.json`` lists how many to make of each part: links that share
+        shape, material and depth are the same part. Lengths in another unit are written as they are, with a warning.
 
         Args:
             folder: where to; it is created.
@@ -260,14 +260,16 @@ class DesignProblem:
         if unit != "mm":
             _log.warning("STEP and STL files are in mm, and lengths of those in %s in %s: scale them", folder, unit)
         links, given = self._own.changed, self._own.given(design)
-        solids, mechanism = self._meshes(links, given), self.simulation.scene.mechanism
+        solids, mechanism, model = self._meshes(links, given), self.simulation.scene.mechanism, self.simulation.model
+        with model.shaped(self._own.rest.design(*given)):
+            materials = dict(zip(mechanism.flexible_links, model.materials, strict=True))
         linkage = build_linkage(mechanism, self.simulation.linkage.dim, self._moved(given[0]))
         shared = [own.links for own in self._own.shapes]
         alone = [(link,) for link in links if not any(link in own for own in shared)]
 
         def write() -> None:
             write_solids(folder, linkage, links, *solids, pin_diameter)
-            write_parts(folder, [*shared, *alone], dict(zip(links, solids[1], strict=True)))
+            write_parts(folder, [*shared, *alone], materials, dict(zip(links, solids[1], strict=True)))
 
         on_one(self.simulation.comm, write)
 

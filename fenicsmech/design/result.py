@@ -20,7 +20,7 @@ from fenicsmech.design.target import Comparison
 from fenicsmech.errors import DescriptionError, counted, point_text
 from fenicsmech.export import PinHole, write_step, write_stl
 from fenicsmech.files import atomic_write, read_json, write_json
-from fenicsmech.mechanism import Disc, FlexibleLink, Scene, Units
+from fenicsmech.mechanism import Disc, FlexibleLink, Material, Scene, Units
 from fenicsmech.meshing import Isometry, LinkMesh, boundary_polygons, section_of
 from fenicsmech.model import Design
 from fenicsmech.multibody import Linkage
@@ -479,7 +479,10 @@ def write_solids(
 
 
 def write_parts(
-    folder: str | Path, shapes: Sequence[Sequence[FlexibleLink]], depths: Mapping[FlexibleLink, float]
+    folder: str | Path,
+    shapes: Sequence[Sequence[FlexibleLink]],
+    materials: Mapping[FlexibleLink, Material],
+    depths: Mapping[FlexibleLink, float],
 ) -> None:
     """Local. Writes ``parts.json``: how many to make of each part, and the links that it is.
 
@@ -488,18 +491,20 @@ def write_parts(
     Args:
         folder: where to.
         shapes: the links that have each shape.
-        depths: of the links.
+        materials: of the links, as the design has them.
+        depths: likewise.
     """
     parts: dict[tuple, list[FlexibleLink]] = {}
     for number, links in enumerate(shapes):
         for link in links:
-            parts.setdefault((number, link.material, depths[link]), []).append(link)
+            parts.setdefault((number, materials[link], depths[link]), []).append(link)
     listed = [
         {
             "file": solid_path("", links[0], ".step").name,
             "count": len(links),
             "links": [link.name for link in links],
             "material": material.name,
+            "law": material.law.parameters,
             "depth": depth,
         }
         for (_, material, depth), links in parts.items()

@@ -276,6 +276,19 @@ def test_exports_count_the_links_that_are_one_part(tmp_path):
     assert volumes == pytest.approx([volumes[0]] * 4, rel=1e-6)
 
 
+def test_links_of_a_shape_that_a_design_makes_of_two_materials_are_two_parts(tmp_path):
+    own = case(mirrored)
+    one, other = own.scene.mechanism.flexible_links
+    stiffness = fm.Number(fm.LawParameter("E", other), 1000.0, 4000.0)
+    problem = Case(own.scene, [*own.designs, stiffness], own.targets).problem()
+    problem.export(tmp_path, np.append(problem.initial[:-1], 0.5))
+    parts = json.loads((tmp_path / "parts.json").read_text())["parts"]
+    assert [(part["links"], part["count"], part["law"]["E"]) for part in parts] == [
+        ([one.name], 1, 2000.0),
+        ([other.name], 1, 2500.0),
+    ]
+
+
 def _volume(file: Path) -> float:
     with gmsh_session("part"):
         (solid,) = gmsh.model.occ.importShapes(str(file))
