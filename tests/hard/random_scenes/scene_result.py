@@ -135,7 +135,9 @@ def judge_sound(blueprint: Blueprint) -> _Verdict:
         failure = error
     except Exception as error:
         return _Verdict(f"wrong: {type(error).__name__} escaped", str(error))
-    verdict = judge_frames(blueprint, built, frames, ended=failure is None) if frames else _Verdict("")
+    verdict = _Verdict("")
+    if frames or failure is None:
+        verdict = judge_frames(blueprint, built, frames, ended=failure is None)
     if failure is not None and not verdict.outcome.startswith("wrong"):
         unclear, reason = _unclear(failure), true_reason(blueprint, built, failure)
         kind = type(failure).__name__
@@ -149,6 +151,8 @@ def judge_frames(blueprint: Blueprint, built: Built, frames: Sequence[fm.Frame],
 
     Of paths some frames are checked, spread evenly, and whether the last one is where they were to end.
     """
+    if ended and len(frames) < (1 if blueprint.control == "path" else len(blueprint.samples)):
+        return _Verdict("wrong: frames missing", f"{len(frames)} of {len(blueprint.samples)}", len(frames))
     potential, worst, outcome = Potential.of(blueprint, built.simulation), None, "equilibrium"
     origin, samples = unloaded_travel(potential, built), blueprint.samples
     chosen = [*frames]
@@ -168,17 +172,16 @@ def judge_frames(blueprint: Blueprint, built: Built, frames: Sequence[fm.Frame],
             return _Verdict(f"wrong: {error}", str(found), count, found.relative, iterations)
         if found.force > THRESHOLDS.residual * found.scale:
             outcome = "equilibrium to rounding"
-    judged = checkable(potential)
-    if judged:
-        unstable = unstable_directions(potential, chosen[-1])
-        if unstable is not None and unstable != chosen[-1].unstable_modes:
-            detail = f"{chosen[-1].unstable_modes} unstable modes, and {unstable} by second differences"
-            return _Verdict("wrong: stability", detail, count, worst.relative, iterations)
-    return _Verdict(outcome, str(worst), count, worst.relative, iterations, "" if judged else "stability")
+    unstable = unstable_directions(potential, chosen[-1]) if checkable(potential) else None
+    if unstable is not None and unstable != chosen[-1].unstable_modes:
+        detail = f"{chosen[-1].unstable_modes} unstable modes, and {unstable} by second differences"
+        return _Verdict("wrong: stability", detail, count, worst.relative, iterations)
+    unchecked = [*(["displacement"] if math.isnan(origin) else []), *(["stability"] if unstable is None else [])]
+    return _Verdict(outcome, str(worst), count, worst.relative, iterations, " and ".join(unchecked))
 
 
 def unloaded_travel(potential: Potential, built: Built) -> float:
-    """Travel of the force's point in the configuration without loads: 0 as drawn; as the simulation has it if posed."""
+    """Travel of the force's point in the configuration without loads: 0 as drawn; not known, NaN, if posed."""
     if built.configuration is fm.DRAWN or not potential.blueprint.motors:
         return 0.0
     return math.nan

@@ -22,7 +22,7 @@ from .known_scenes import (
 from .motions import STEP
 from .potential import Potential
 from .residual_check import check
-from .scene_result import judge, judge_sound
+from .scene_result import judge, judge_frames, judge_sound
 from .stability_check import unstable_directions
 from .thresholds import THRESHOLDS
 from .unstrained_check import unstrained_motions
@@ -87,6 +87,13 @@ def test_the_check_accepts_an_equilibrium_and_nothing_near_it(solved):
     assert check(potential, doubled, 0.0).relative > 1e-4
     moved = replace(frame, state=replace(frame.state, u=1.001 * frame.state.u))
     assert check(potential, moved, 0.0).relative > THRESHOLDS.residual
+
+
+def test_curves_that_leave_loads_out_are_wrong(solved):
+    potential, frame = solved
+    more = replace(potential.blueprint, samples=(frame.force, 1.1 * frame.force))
+    assert judge_frames(more, None, [frame], ended=True).outcome == "wrong: frames missing"
+    assert judge_frames(replace(more, control="path"), None, [], ended=True).outcome == "wrong: frames missing"
 
 
 def test_imaginary_differences_of_the_potential_are_real_ones(solved):
