@@ -62,7 +62,10 @@ class _OfJoints(NumberKind):
     def read(cls, scene, words):
         parts = (cls._part(scene, word) for word in words[1:])
         vectors = [tuple(map(float, own.split())) for own in words[0].split(";")]
-        return cls._read(parts, vectors if len(vectors) > 1 else vectors[0])
+        kind = cls._read(parts, vectors if len(vectors) > 1 else vectors[0])
+        # to the last digit as written: a unit vector divided by its length may differ
+        set_fields(kind, vectors=tuple(vectors) if len(vectors) > 1 else tuple(vectors) * len(kind.parts))
+        return kind
 
     @classmethod
     @abstractmethod

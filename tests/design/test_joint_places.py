@@ -106,6 +106,18 @@ def test_shifted_joints_of_rigid_links_are_joints_drawn_there(space):
     assert np.abs(found - before).max() > 0.01 * np.abs(before).max()
 
 
+def test_places_in_files_are_those_written_to_the_last_digit():
+    machine, rng = Machine(), np.random.default_rng(7)
+    pair = machine.joints["pin"], machine.joints["axle"]
+    for way, other in rng.standard_normal((100, 2, 3)):
+        for kind in (
+            fm.JointPosition(*pair, direction=way),
+            fm.JointPosition(*pair, direction=[way, other]),
+            fm.JointAxis(*pair, about=way),
+        ):
+            assert type(kind).read(machine.scene, kind.words) == kind
+
+
 def test_joints_keep_their_places_when_links_are_made_of_another_material():
     drawn = Machine()
     moved = {drawn.joints[name]: fm.JointChange(np.array(by), np.zeros(1)) for name, by in SHIFTS.items()}
