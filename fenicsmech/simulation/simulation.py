@@ -275,7 +275,8 @@ class Simulation:
         # designs change the model's springs; those drawn need no mesh
         springs = self.model.spring_potentials if designed else spring_potentials(self.scene.effects, linkage)
         with self._shaped():
-            rest = self.model.rest_position(part) if designed else np.array(in_dimension(part.at, linkage.dim))
+            elsewhere = designed or part.material in self._discretisation.placed
+            rest = self.model.rest_position(part) if elsewhere else np.array(in_dimension(part.at, linkage.dim))
         point, positions = linkage.point(part.on, rest.tolist()), []
         for configuration in configurations:
             with self._shaped():

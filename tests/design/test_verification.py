@@ -146,6 +146,17 @@ def test_points_and_regions_of_designed_links_move_in_the_part_as_in_the_design(
         assert part == pytest.approx(np.array(target.corrected), rel=0.01)
 
 
+def test_points_placed_elsewhere_are_where_paths_and_curves_have_them():
+    (case, other), place = (bow(10.0), bow(10.0)), (40.0, 12.0)
+    (push,), mechanism = case.scene.mechanism.forces, other.scene.mechanism
+    drawn = mechanism.force(on=mechanism.flexible_links[0], at=place, direction=push.direction, name="there")
+    placed = {push.material: fm.PlacedPoint(np.array([place]), np.ones(1))}
+    sim = case.simulate().with_shapes({}, placed=placed)
+    assert sim.path(push, [fm.DRAWN])[0] == pytest.approx(place, abs=1e-12)
+    found, wanted = (s.load_displacement(p, forces=[5.0]) for s, p in ((sim, push), (other.simulate(), drawn)))
+    assert found.displacements == pytest.approx(wanted.displacements, rel=1e-9)
+
+
 def thorough(region: fm.Region | fm.Face):
     return pytest.param(region, marks=pytest.mark.thorough)
 
