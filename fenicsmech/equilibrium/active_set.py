@@ -113,10 +113,13 @@ class ActiveSet:
             if len(self._corrected) + len(new) > _MOST:
                 break
             for number in new:
-                z = solve(self._force(np.array([number]), np.ones(1)))
+                unit = self._force(np.array([number]), np.ones(1))
+                z = solve(unit)
+                unit.destroy()  # petsc4py destroys its objects late, and there may be many points
                 if z is None:
                     return None
                 self._columns = np.column_stack([self._columns, self._rates(z)])
+                z.destroy()
                 self._corrected = np.append(self._corrected, number)
             found = self._settled(fixed, stiffness)
             if found is None:

@@ -30,6 +30,7 @@ Where links may touch obstacles a step linearises the gaps and finds the points 
 
 Across a path (see ``control``) equilibria of any stability are wanted and a good guess is near: steps are taken in
 full, moved into the plane by bordering; where they diverge, a shorter step along the path is tried instead of descent.
+There the points that touch are those of the state, and paths go in short steps where points come and go.
 
 Sources: Nocedal & Wright, Numerical Optimization (doi:10.1007/978-0-387-40065-5), chapters 17–19; Chamberlain et al. on
 the watchdog (Mathematical Programming Studies 16, 1982); Deuflhard on the simplified Newton method
@@ -129,7 +130,9 @@ class NewtonSolver(EquilibriumSolver):
             system.linearise(state, control, residual, last if predicted else None, contact)
             x, shift = self._direction(residual, least, last=shift, any_stability=near)
             if contact is not None:
-                x = self._with_contact(contact, x, residual, iteration + 1)
+                x = self._with_contact(contact, x, residual)
+            if x is None:
+                raise NotConverged("the linear solver stalled", iteration + 1)
             step = self.newton_step(x, state, control, residual)
             _log.debug("iteration %d: residual %.2e, shift %.1e", iteration, residuals[-1], shift)
             if path:
@@ -162,13 +165,10 @@ class NewtonSolver(EquilibriumSolver):
                 residual = self._again(state, control)
         return self.accept_best(*best, control, residuals, self.exhausted(residuals, limit))
 
-    def _with_contact(self, contact: ActiveSet, x: PETSc.Vec, residual: Residual, iterations: int) -> PETSc.Vec:
-        """The solution ``x`` with gaps linearised in place of the points that touch."""
+    def _with_contact(self, contact: ActiveSet, x: PETSc.Vec, residual: Residual) -> PETSc.Vec | None:
+        """The solution ``x`` with gaps linearised in place of the points that touch; None if a solve fails."""
         accuracy = self.step_accuracy(residual)
-        corrected = contact.corrected(x, residual.vector, lambda right: self.try_solve(right, accuracy))
-        if corrected is None:
-            raise NotConverged("the linear solver stalled", iterations)
-        return corrected
+        return contact.corrected(x, residual.vector, lambda right: self.try_solve(right, accuracy))
 
     def _again(self, state: State, control: Control) -> Residual:
         """The residual at an earlier ``state``, from which iterations go on."""
@@ -221,10 +221,10 @@ class NewtonSolver(EquilibriumSolver):
         system, size = self.system, self.system.size(step)
         while not self.converged(residual, before):
             x = self.try_solve(residual.vector, self.step_accuracy(residual))
+            if x is not None and system.contact is not None:
+                x = self._with_contact(system.contact, x, residual)
             if x is None:
                 break
-            if system.contact is not None:
-                x = self._with_contact(system.contact, x, residual, 0)
             correction = self.newton_step(x, state, control, residual)
             length = system.size(correction)
             if not length <= self.options.reuse_factor * size:

@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 import fenicsmech as fm
 from fenicsmech.effects import Contact, Cylinder, HalfPlane
-from fenicsmech.equilibrium import LoadControl
+from fenicsmech.equilibrium import ActiveSet, LoadControl, NewtonSolver
 from fenicsmech.quantities import Sensitivity
 
 from ..design.in_plane import design_field
@@ -111,6 +111,47 @@ def test_wrapping_is_equal_on_all_ranks():
         (frame,) = case.simulation.load_displacement(case.force, forces=[wrapping_force(0.05)]).frames
         found.append(frame.displacement)
     assert found[0] == pytest.approx(found[1], rel=1e-8)
+
+
+def test_solves_for_points_that_touch_leave_no_vectors_behind(monkeypatch):
+    vectors, try_solve = [], NewtonSolver.try_solve
+
+    def solve(self, right, tolerance):
+        vectors.append((right, try_solve(self, right, tolerance)))
+        return vectors[-1][1]
+
+    monkeypatch.setattr(NewtonSolver, "try_solve", solve)
+    case = wrapped()
+    (frame,) = case.simulation.load_displacement(case.force, forces=[wrapping_force(0.1)]).frames
+    most = 4 * frame.iterations  # solves: with the residual, for the step with contact, and the same for corrections
+    assert len(vectors) > 2 * most  # most were for points
+    assert sum(bool(right) or bool(x) for right, x in vectors) <= most
+
+
+def test_corrections_that_stall_with_the_factor_at_hand_are_left_to_the_next_one(monkeypatch):
+    stalled, fresh = [], []
+    add_stiffness, corrected = ActiveSet.add_stiffness, ActiveSet.corrected
+
+    def add(self, matrix):
+        fresh.append(True)
+        add_stiffness(self, matrix)
+
+    def correct(self, x, residual, solve):
+        if fresh:
+            fresh.clear()
+            return corrected(self, x, residual, solve)
+        stalled.append(True)
+        return None
+
+    case = finger("plane-stress")
+    (start,) = case.simulation.load_displacement(case.force, forces=[0.2]).frames
+    newton, control = case.simulation.solver(case.force), LoadControl(0.201)
+    expected = newton.solve(start.state, control).state.u
+    monkeypatch.setattr(ActiveSet, "add_stiffness", add)
+    monkeypatch.setattr(ActiveSet, "corrected", correct)
+    found = newton.solve(start.state, control).state.u
+    assert stalled
+    assert np.abs(found - expected).max() < 1e-8 * np.abs(expected).max()
 
 
 @pytest.mark.parametrize("stiffness", [None, 10.0, 1000.0])
