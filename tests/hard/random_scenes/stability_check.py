@@ -20,15 +20,18 @@ from .potential import Potential
 from .thresholds import THRESHOLDS
 
 _IMAGINARY, _REAL = 1e-30, 1e-5
-_DENSE = 500  # unknowns up to which all eigenvalues are found; beyond, the four nearest to zero
+_DENSE = (
+    500  # unknowns up to which all eigenvalues are found; beyond, the four nearest to zero, unless some are negative
+)
 _MOST = 2500  # unknowns up to which they are
 
 
 def unstable_directions(potential: Potential, frame: fm.Frame) -> int | None:
-    """The number of negative eigenvalues; None if one is too small to have a sign, or if all that are found are."""
-    values = eigenvalues(potential, frame.state.u, frame.state.poses, frame.force)
+    """The number of negative eigenvalues; None if one is too small to have a sign."""
+    every = bool(frame.unstable_modes)
+    values = eigenvalues(potential, frame.state.u, frame.state.poses, frame.force, every=every)
     signless = np.abs(values).min() < THRESHOLDS.signless * max(1.0, values.max())
-    return None if signless or values.max() < 0.0 else int(np.sum(values < 0.0))
+    return None if signless else int(np.sum(values < 0.0))
 
 
 def checkable(potential: Potential) -> bool:
@@ -36,8 +39,11 @@ def checkable(potential: Potential) -> bool:
     return not len(potential.free_pressures) and int(potential.free.sum()) <= _MOST
 
 
-def eigenvalues(potential: Potential, u: np.ndarray, poses: np.ndarray, magnitude: float) -> np.ndarray:
-    """Of the scaled second derivative on admissible directions, ascending; those nearest to zero of large scenes.
+def eigenvalues(
+    potential: Potential, u: np.ndarray, poses: np.ndarray, magnitude: float, *, every: bool = False
+) -> np.ndarray:
+    """Of the scaled second derivative on admissible directions, ascending; of large scenes those nearest to zero,
+    unless ``every`` one is wanted or some of these are negative.
 
     Idle spins are left out: as many eigenvalues as there are, those nearest to zero. Links in u–p form count with the
     law in displacements.
@@ -47,6 +53,7 @@ def eigenvalues(potential: Potential, u: np.ndarray, poses: np.ndarray, magnitud
         u: nodal displacements, flat, (n dim,).
         poses: of the bodies.
         magnitude: of the force that changes.
+        every: whether all are wanted.
     """
     places = potential.places(poses)
     u = potential.nodal(potential.fields(u)[0], places)
@@ -62,13 +69,17 @@ def eigenvalues(potential: Potential, u: np.ndarray, poses: np.ndarray, magnitud
     diagonal = np.abs(hessian.diagonal())
     scale = sparse.diags(1.0 / np.sqrt(np.maximum(diagonal, 1e-14 * diagonal.max())))
     scaled = scale @ (0.5 * (hessian + hessian.T)) @ scale
-    if scaled.shape[0] <= _DENSE or potential.blueprint.idle_spins:  # a singular matrix has no inverse
+    # a singular matrix has no inverse
+    values = None if every or scaled.shape[0] <= _DENSE or potential.blueprint.idle_spins else _nearest_to_zero(scaled)
+    if values is None or values.min() < 0.0:
         values = np.linalg.eigvalsh(scaled.toarray())
-    else:
-        solve = splu(scaled.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve
-        inverse = LinearOperator(scaled.shape, matvec=solve)
-        values = eigsh(scaled, k=4, sigma=0.0, OPinv=inverse, return_eigenvectors=False)
     return np.sort(values[np.argsort(np.abs(values))[potential.blueprint.idle_spins :]])
+
+
+def _nearest_to_zero(matrix: sparse.csc_matrix) -> np.ndarray:
+    """Four eigenvalues."""
+    solve = splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve
+    return eigsh(matrix, k=4, sigma=0.0, OPinv=LinearOperator(matrix.shape, matvec=solve), return_eigenvectors=False)
 
 
 def _motions(potential: Potential, bodies: list[int]) -> list[np.ndarray]:
