@@ -284,11 +284,10 @@ class OneSided:
         depth = self._body.model.multiplier(self._body.depth.x.array[self._boundary.cells])
         weights = np.outer(depth * np.ones(len(places)), self._weights).ravel()
         self.weights = weights * np.linalg.norm(area, axis=1)
-        moved = rest + self._nodes @ self._body.u.x.array.reshape(-1, dim)
+        self._places = rest + self._nodes @ self._body.u.x.array.reshape(-1, dim)
         numbers = np.array([self._obstacle.numbers])
-        self.gaps = self._gap.value(moved, numbers)[:, 0]
-        self._normals = self._gap.gradient(moved, numbers)[:, 0]
-        self._curvatures = self._gap.hessian(moved, numbers, np.ones((len(moved), 1)))
+        self.gaps = self._gap.value(self._places, numbers)[:, 0]
+        self._normals = self._gap.gradient(self._places, numbers)[:, 0]
 
     def rates(self, motion: np.ndarray) -> np.ndarray:
         """∇g · δu at the points, (n,), from δu of this rank's owned nodes, flat."""
@@ -320,7 +319,8 @@ class OneSided:
         if not count:
             return
         blocks = stiffness[points, None, None] * normals[:, :, None] * normals[:, None, :]
-        blocks = self.weights[points, None, None] * (blocks - pressures[points, None, None] * self._curvatures[points])
+        curvatures = self._gap.hessian(self._places[points], np.array([self._obstacle.numbers]), np.ones((count, 1)))
+        blocks = self.weights[points, None, None] * (blocks - pressures[points, None, None] * curvatures)
         shape = self._nodes[points]
         used = np.unique(shape.indices)
         nodes = kron(shape[:, used], identity(normals.shape[1]), format="csr")
