@@ -27,6 +27,7 @@ Newton's method for generalised equations; Lawson & Hanson, Solving Least Square
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
@@ -36,18 +37,30 @@ from scipy.optimize import nnls
 from fenicsmech.collective import from_one
 from fenicsmech.effects import OneSided
 from fenicsmech.equilibrium.unknowns import ScaledUnknowns
+from fenicsmech.errors import set_options
 
-_FIRST = 8
-"""Points that are corrected at first."""
 
-_MOST = 1000
-"""Points above which a step leaves the others to the next one: solves for more would cost more than that."""
+@dataclass(frozen=True)
+class ActiveSetOptions:
+    """Options of the search for the points that touch.
 
-_NEWTON = 10
-"""Newton steps after which the equation of the points is taken for one that does not settle."""
+    Attributes:
+        first: points that are corrected at first.
+        most: points above which a step leaves the others to the next one: solves for more would cost more than that.
+        iterations: Newton steps after which the equation of the points is taken for one that does not settle.
+        rounding: missed force, over the largest, that is left to the next step.
 
-_ROUNDING = 1e-10
-"""Missed force, over the largest, that is left to the next step."""
+    Raises:
+        DescriptionError: a number is out of its range.
+    """
+
+    first: int = 8
+    most: int = 1000
+    iterations: int = 10
+    rounding: float = 1e-10
+
+    def __post_init__(self) -> None:
+        set_options(self, "points that touch", below_one=("rounding",), first=1, most=1, iterations=1)
 
 
 class ActiveSet:
@@ -60,7 +73,7 @@ class ActiveSet:
     """
 
     def __init__(self, surfaces: Sequence[OneSided], unknowns: ScaledUnknowns, comm: MPI.Comm) -> None:
-        self._surfaces, self._unknowns, self._comm = surfaces, unknowns, comm
+        self._surfaces, self._unknowns, self._comm, self._options = surfaces, unknowns, comm, ActiveSetOptions()
         self._compliances = self._joined(lambda surface: surface.compliances)
         self._sections = np.cumsum([len(surface.compliances) for surface in surfaces])[:-1]
         counts = comm.allgather(len(self._compliances))
@@ -110,7 +123,7 @@ class ActiveSet:
         fixed = gaps = self._gaps - self._rates(x)
         a, solved = np.zeros(len(self._corrected)), False
         while len(new := self._missed(gaps, stiffness)) or (len(self._corrected) and not solved):
-            if len(self._corrected) + len(new) > _MOST:
+            if len(self._corrected) + len(new) > self._options.most:
                 break
             for number in new:
                 unit = self._force(np.array([number]), np.ones(1))
@@ -159,12 +172,12 @@ class ActiveSet:
         """Numbers of the points to correct next: those of the largest a among the others, as many as so far."""
         a = np.abs(_missing(gaps, self._gaps, stiffness, self._active))
         forces = stiffness * np.maximum(-gaps, 0.0)
-        least = _ROUNDING * self._comm.allreduce(float(np.max([a, forces], initial=0.0)), op=MPI.MAX)
+        least = self._options.rounding * self._comm.allreduce(float(np.max([a, forces], initial=0.0)), op=MPI.MAX)
         own = np.flatnonzero(a > least)
         numbers, sizes = (np.concatenate(self._comm.allgather(part)) for part in (self._first + own, a[own]))
         others = ~np.isin(numbers, self._corrected)
         order = np.argsort(-sizes[others], kind="stable")
-        return numbers[others][order][: max(_FIRST, len(self._corrected))]
+        return numbers[others][order][: max(self._options.first, len(self._corrected))]
 
     def _settled(self, fixed: np.ndarray, stiffness: np.ndarray) -> np.ndarray | None:
         """a of the points corrected, None if it is not found."""
@@ -178,7 +191,8 @@ class ActiveSet:
             places, columns, known = (np.concatenate(part) for part in zip(*parts, strict=True))
             order = np.argsort(places)
             compliance, (gaps, present, d, active) = columns[order], known[order].T
-            return _forces(0.5 * (compliance + compliance.T), gaps, present, d, active > 0.0)
+            S = 0.5 * (compliance + compliance.T)
+            return _forces(S, gaps, present, d, active > 0.0, self._options.iterations)
 
         # of one process: which points touch is a decision that depends on rounding
         return from_one(self._comm, solution)
@@ -195,18 +209,21 @@ def _missing(gaps: np.ndarray, present: np.ndarray, d: np.ndarray, active: np.nd
     return d * (np.maximum(-gaps, 0.0) - np.maximum(-present, 0.0) + active * (gaps - present))
 
 
-def _forces(S: np.ndarray, fixed: np.ndarray, present: np.ndarray, d: np.ndarray, active: np.ndarray):
+def _forces(
+    S: np.ndarray, fixed: np.ndarray, present: np.ndarray, d: np.ndarray, active: np.ndarray, iterations: int
+) -> np.ndarray | None:
     """a with γ = γ₀ + S a, γ₀ the ``fixed`` gaps; None if it is not found."""
     try:
-        found = _by_newton(S, fixed, present, d, active, np.zeros(len(d)))
+        found = _by_newton(S, fixed, present, d, active, np.zeros(len(d)), iterations)
         if found is None:
-            found = _by_newton(S, fixed, present, d, active, _by_least_squares(S, fixed, present, d, active))
+            start = _by_least_squares(S, fixed, present, d, active)
+            found = _by_newton(S, fixed, present, d, active, start, iterations)
     except (np.linalg.LinAlgError, RuntimeError):  # not convex; too many iterations of nnls
         return None
     return found
 
 
-def _by_newton(S, fixed, present, d, active, a):
+def _by_newton(S, fixed, present, d, active, a, iterations):
     """From the points that touch with ``a``.
 
     With σ = 1 in A, −1 elsewhere, a = d (⟨σ γ⟩ − ⟨σ g⟩), linear where σ γ > 0 and constant elsewhere.
@@ -214,7 +231,7 @@ def _by_newton(S, fixed, present, d, active, a):
     sign = np.where(active, 1.0, -1.0)
     before = np.maximum(sign * present, 0.0)
     on = sign * (fixed + S @ a) > 0.0
-    for _ in range(_NEWTON):
+    for _ in range(iterations):
         a = -d * before
         right = fixed[on] - sign[on] * before[on] + S[np.ix_(on, ~on)] @ a[~on]
         a[on] = np.linalg.solve(np.diag(sign[on] / d[on]) - S[np.ix_(on, on)], right)
