@@ -36,6 +36,7 @@ from scipy.optimize import nnls
 
 from fenicsmech.collective import from_one
 from fenicsmech.effects import OneSided
+from fenicsmech.equilibrium.control import Plane
 from fenicsmech.equilibrium.unknowns import ScaledUnknowns
 from fenicsmech.errors import set_options
 
@@ -112,15 +113,22 @@ class ActiveSet:
             surface.add_stiffness(matrix, self._unknowns.numbering.rows_of, own, pressure)
 
     def corrected(
-        self, x: PETSc.Vec, residual: PETSc.Vec, solve: Callable[[PETSc.Vec], PETSc.Vec | None]
+        self,
+        x: PETSc.Vec,
+        residual: PETSc.Vec,
+        solve: Callable[[PETSc.Vec], PETSc.Vec | None],
+        plane: Plane | None = None,
     ) -> PETSc.Vec | None:
         """The solution ``x`` of K x = ``residual`` with contact linearised; None if a solve fails.
 
-        ``solve`` solves with the last factor of the matrix with ``add_stiffness``.
+        ``solve`` solves with the last factor of the matrix with ``add_stiffness``; steps lead into ``plane``, if any.
         """
         self._update()
         stiffness = self._load_factor * self._joined(lambda surface: surface.weights) / self._compliances
         fixed = gaps = self._gaps - self._rates(x)
+        if plane is not None:
+            forward = self._rates(plane.x)
+            fixed = gaps = gaps + (plane.missing - plane.along(x)) * forward
         a, solved = np.zeros(len(self._corrected)), False
         while len(new := self._missed(gaps, stiffness)) or (len(self._corrected) and not solved):
             if len(self._corrected) + len(new) > self._options.most:
@@ -131,10 +139,13 @@ class ActiveSet:
                 unit.destroy()  # petsc4py destroys its objects late, and there may be many points
                 if z is None:
                     return None
-                self._columns = np.column_stack([self._columns, self._rates(z)])
+                rates = self._rates(z)
+                if plane is not None:
+                    rates += plane.along(z) * forward
+                self._columns = np.column_stack([self._columns, rates])
                 z.destroy()
                 self._corrected = np.append(self._corrected, number)
-            found = self._settled(fixed, stiffness)
+            found = self._settled(fixed, stiffness, symmetric=plane is None)
             if found is None:
                 self._expected = None
                 return x
@@ -179,8 +190,8 @@ class ActiveSet:
         order = np.argsort(-sizes[others], kind="stable")
         return numbers[others][order][: max(self._options.first, len(self._corrected))]
 
-    def _settled(self, fixed: np.ndarray, stiffness: np.ndarray) -> np.ndarray | None:
-        """a of the points corrected, None if it is not found."""
+    def _settled(self, fixed: np.ndarray, stiffness: np.ndarray, *, symmetric: bool) -> np.ndarray | None:
+        """a of the points corrected, None if it is not found; S is ``symmetric`` but in a plane across a path."""
         points = self._corrected
         own = np.flatnonzero((points >= self._first) & (points < self._first + len(fixed)))
         rows = points[own] - self._first
@@ -190,8 +201,9 @@ class ActiveSet:
         def solution() -> np.ndarray | None:
             places, columns, known = (np.concatenate(part) for part in zip(*parts, strict=True))
             order = np.argsort(places)
-            compliance, (gaps, present, d, active) = columns[order], known[order].T
-            S = 0.5 * (compliance + compliance.T)
+            S, (gaps, present, d, active) = columns[order], known[order].T
+            if symmetric:
+                S = 0.5 * (S + S.T)
             return _forces(S, gaps, present, d, active > 0.0, self._options.iterations)
 
         # of one process: which points touch is a decision that depends on rounding
