@@ -12,6 +12,8 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from fenicsmech.continuation.stepper import ParabolaPredictor, Stepper, on_cubic
 from fenicsmech.equilibrium import (
     ArcLengthControl,
@@ -191,7 +193,7 @@ class ArcLengthStepper(Stepper):
                 found = self.correct(self._predict(self.length), point.tangent, point)
                 turn = self._turn(point, found)
                 _log.debug("arc %.2e: turn %.2f, %d iterations", self.length, turn, found.iterations)
-                if turn <= steps.largest_turn:
+                if turn <= steps.largest_turn or (turn < 0.5 * math.pi and self._touches_elsewhere(point, found)):
                     growth = min(steps.turn / max(turn, 1e-12), math.sqrt(steps.iterations / found.iterations))
                     self.length *= min(max(growth, 0.5), 2.0)
                     self._accept(found, self.metric.norm(self.chord(point, found)))
@@ -201,6 +203,16 @@ class ArcLengthStepper(Stepper):
             self.length *= 0.5
             if self.length < steps.smallest * min(longest / steps.largest, 1.0):
                 raise NotConverged(reason)
+
+    def _touches_elsewhere(self, before: EquilibriumPoint, after: EquilibriumPoint) -> bool:
+        """Whether other points touch obstacles after a step than before, where paths have corners."""
+        system, touching = self.system, []
+        if system.contact is None:
+            return False
+        for point in (before, after):
+            system.load(point.state)
+            touching.append(system.contact.touching())
+        return system.comm.allreduce(int(np.any(touching[0] != touching[1]))) > 0
 
     def _longest(self, point: EquilibriumPoint) -> float:
         """The longest arc within the limits on the value, its conjugate and motions."""
