@@ -25,10 +25,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from fenicsmech.continuation.stepper import Predictor, Stepper, TangentPredictor
-from fenicsmech.equilibrium import ActiveSet, Control, EquilibriumPoint, EquilibriumSolver, NotConverged, State, Step
+from fenicsmech.equilibrium import Control, EquilibriumPoint, EquilibriumSolver, NotConverged, State, Step
 from fenicsmech.errors import not_negative, set_fields, set_options
 from fenicsmech.log import logger
 
@@ -186,11 +184,10 @@ class LoadStepper(Stepper):
     def _guess(self, control: Control) -> State:
         """The prediction; the last equilibrium where the prediction runs into obstacles, or comes off them."""
         guess = self._predict(control.prescribed - self._value)
-        contact = self.system.contact
-        if contact is None or not self._points:
+        if not self._points:
             return guess
         last = self._points[-1].state
-        return last if self._leaves_contact(contact, last, guess, control) else guess
+        return last if self._leaves_contact(last, guess, control) else guess
 
     def _predict(self, ahead: float) -> State:
         """The prediction; where it moves too far that of the tangent, then the last equilibrium."""
@@ -203,19 +200,19 @@ class LoadStepper(Stepper):
                 return guess
         return last
 
-    def _leaves_contact(self, contact: ActiveSet, last: State, guess: State, control: Control) -> bool:
+    def _leaves_contact(self, last: State, guess: State, control: Control) -> bool:
         """Whether other points touch in ``guess`` than in ``last``, and its residual under ``control`` is far larger.
 
         The tangent holds as long as the same points touch. Elsewhere the first step from the last equilibrium, with
         gaps linearised, is the prediction that keeps links outside obstacles.
         """
-        system, norms, touching = self.system, [], []
+        if not self._other_points_touch(last, guess):
+            return False
+        norms = []
         for state in (control.prepare(last), control.prepare(guess)):
-            system.load(state)
-            norms.append(system.residual(state, control).norm)
-            touching.append(contact.touching())
-        changed = system.comm.allreduce(int(np.any(touching[0] != touching[1]))) > 0
-        return changed and not norms[1] <= self._steps.contact_residual * norms[0]  # NaN where elements are inverted
+            self.system.load(state)
+            norms.append(self.system.residual(state, control).norm)
+        return not norms[1] <= self._steps.contact_residual * norms[0]  # NaN where elements are inverted
 
     def _limited(self, step: float, distance: float) -> float:
         """``step``, shortened to the largest ``motion`` unless that would leave too little of the ``distance``."""

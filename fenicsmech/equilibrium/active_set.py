@@ -16,6 +16,10 @@ the forces p = f(γ) ≥ 0 at these points are the least of ½ p · (S₀ + 1/d)
 problem if contact at others keeps the links stable; S₀ and γ₀₀ are S and γ₀ without the springs d. If it does not, the
 step stays that of K.
 
+Steps into a plane across a path (see ``control``) add τ x₁, so that gaps also change by τ b · x₁; forces a that lead
+out of the plane change τ by t · a. Least squares are then solved for given τ, and the τ that leads into the plane is
+found by Brent's method.
+
 Iterations thus depend on how far from linear links and gaps are, not on how many points touch or come and go. The next
 matrix takes the points and pressures of the linearised gaps, not those of the state, whose gaps are of second order.
 

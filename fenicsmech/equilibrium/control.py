@@ -325,7 +325,6 @@ class ArcLengthControl(Control):
         return self.held.stability(excess, tangent, held_rate)
 
 
-
 class Plane:
     """The plane of an ``ArcLengthControl``, into which steps from one state are moved along x₁.
 

@@ -30,7 +30,6 @@ Where links may touch obstacles a step linearises the gaps and finds the points 
 
 Across a path (see ``control``) equilibria of any stability are wanted and a good guess is near: steps are taken in
 full, moved into the plane by bordering; where they diverge, a shorter step along the path is tried instead of descent.
-There the points that touch are those of the state, and paths go in short steps where points come and go.
 
 Sources: Nocedal & Wright, Numerical Optimization (doi:10.1007/978-0-387-40065-5), chapters 17–19; Chamberlain et al. on
 the watchdog (Mathematical Programming Studies 16, 1982); Deuflhard on the simplified Newton method
