@@ -22,6 +22,9 @@ class Thresholds:
         huge: load over what bends the softest link at which equilibria need not exist.
         unreached: force over what bends the softest link at which links are stretched straight.
         drowned: stiffness of a spring over that of the stiffest link at which rounding hides it.
+        effectivity: largest factor between an error estimate and the true difference.
+        told: difference over the value below which it counts as rounding and tolerance.
+        rounded: displacement over the mechanism's length below which it counts as rounding.
     """
 
     residual: float = 1e-6
@@ -36,6 +39,9 @@ class Thresholds:
     huge: float = 10.0
     unreached: float = 1e3
     drowned: float = 1e-14
+    effectivity: float = 2.0
+    told: float = 1e-6
+    rounded: float = 1e-13
 
 
 THRESHOLDS = Thresholds()
