@@ -3,9 +3,10 @@
 Estimates η are of first order, sums over cells, and of quantities that converge. Each of these may fail:
 
 - η is above a tenth of the largest value of its curve.
-- The compliance c = du/df of the controlled force changes much over the error itself: with the rate y′ = dy/df of the
-  equilibrium y, c at y + (η/c) y′, where the displacement is larger by η, differs by more than a factor of two. A limit
-  point is near.
+- The compliance c = du/df of the controlled force changes much over the error itself: with its derivative c′ by the
+  displacement u along the path, |η c′ / c| > 0.4. Where a limit point is at the distance d in u, c ~ 1/d, and the
+  error is d − √(d² − 2 d η): twice η at η = d/2, and beyond it finer elements have no equilibrium near. c′ is a
+  difference over a small part of η along the tangent.
 - Contributions of cells cancel: |η| < ½ Σ |η_K|, those of the unloaded configuration, from which displacements count,
   included. Then errors of a quarter in those of either sign make one of a half in η.
 - The force acts at a point of a flexible link, whose displacement has no limit (``point_forces``).
@@ -26,7 +27,8 @@ class DoubtOptions:
     """When estimates are in doubt.
 
     Attributes:
-        compliance: largest factor between compliances where the displacement differs by the estimate.
+        compliance: largest change of the compliance over the error, relative, to first order.
+        step: displacement over the estimate for differences of the compliance.
         cancelled: least estimate over the sum of the absolute contributions of cells.
         growth: largest growth with each halving of the elements, by forces at points, over the estimate.
 
@@ -34,7 +36,8 @@ class DoubtOptions:
         DescriptionError: a number is not positive.
     """
 
-    compliance: float = 2.0
+    compliance: float = 0.4
+    step: float = 0.05
     cancelled: float = 0.5
     growth: float = 0.2
 
@@ -55,11 +58,11 @@ def near_limit_point(
             compliance = here.by_control()
             if compliance == 0.0:
                 return False
-            there = system.moved(state, here.at.tangent().scaled(error / compliance))
+            there = system.moved(state, here.at.tangent().scaled(options.step * error / compliance))
             beyond = solver.linearise(there, LoadControl(there.force))
             ratio = Adjoint.of(beyond, beyond.travel_gradient(system.controlled)).by_control() / compliance
         except (EquilibriumError, NotConverged):
             return True
         finally:
             system.load(state)
-    return not 1.0 / options.compliance < ratio < options.compliance
+    return not abs(ratio - 1.0) < options.step * options.compliance
