@@ -177,7 +177,7 @@ def _compared(seed: int, scene: Blueprint, curve: fm.Curve, fine: fm.Curve, deep
     value = float(curve.values[-1])
     told = THRESHOLDS.told * abs(value)
     if scene.control == "forces":
-        told += THRESHOLDS.rounded * scene.length
+        told += THRESHOLDS.still * scene.length
     found = float(curve.error_estimates()[-1]), float(fine.values[-1]) - value
     elements, plane_stress = Estimate(*found, told, "; ".join(curve.doubts()[-1])), None
     if deep is not None:

@@ -36,7 +36,7 @@ class Thresholds:
         spare: scenes that each may let off besides, for small samples.
         effectivity: largest factor between an error estimate and the true difference.
         told: difference over the value below which it counts as rounding and tolerance.
-        rounded: displacement over the mechanism's length below which it counts as rounding.
+        still: displacement over the mechanism's length below which differences count as rounding.
     """
 
     residual: float = 1e-6
@@ -64,7 +64,7 @@ class Thresholds:
     spare: int = 5
     effectivity: float = 2.0
     told: float = 1e-6
-    rounded: float = 1e-13
+    still: float = 1e-13
 
 
 THRESHOLDS = Thresholds()
