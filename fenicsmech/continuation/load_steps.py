@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from fenicsmech.collective import agreed
 from fenicsmech.continuation.stepper import Predictor, Stepper, TangentPredictor
 from fenicsmech.equilibrium import Control, EquilibriumPoint, EquilibriumSolver, NotConverged, State, Step
 from fenicsmech.errors import not_negative, set_fields, set_options
@@ -110,7 +111,8 @@ class LoadStepper(Stepper):
 
     def __init__(self, solver: EquilibriumSolver, start: State, control: Control, *, predictor: Predictor) -> None:
         super().__init__(solver, predictor, start)
-        self._steps, self._value = LoadSteps(), control.value(solver.system, start)
+        self._steps = LoadSteps()
+        self._value = agreed(solver.system.comm, control.value(solver.system, start))
         self._origin, self._covered = self._value, 0.0  # farthest from there so far
         factors = self._steps.shift_factors if start.minimum_shift else (0.0,)
         self._shifts = tuple(factor * start.minimum_shift for factor in factors)

@@ -44,6 +44,7 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
+from fenicsmech.collective import agreed
 from fenicsmech.equilibrium.active_set import ActiveSet
 from fenicsmech.equilibrium.control import Control, Plane
 from fenicsmech.equilibrium.linearisation import EquilibriumPoint, NotConverged
@@ -281,4 +282,4 @@ class NewtonSolver(EquilibriumSolver):
         if control.constrained:
             gap = control.gap(system, state) / system.joints.length
             value += force * control.prescribed + 0.5 * stiffness * gap**2
-        return value
+        return agreed(system.comm, value)

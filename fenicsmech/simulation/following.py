@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from time import perf_counter
 
+from fenicsmech.collective import agreed
 from fenicsmech.continuation import (
     ArcLengthStepper,
     ArcSteps,
@@ -276,7 +277,8 @@ class CurveFollower:
 
     def _path(self, state: State) -> ArcLengthStepper:
         """The path through ``state``, in units of its ends."""
-        until, value, conjugate = self._until, self._followed.value(self._system, state), self._conjugate(state)
+        until, conjugate = self._until, self._conjugate(state)
+        value = agreed(self._system.comm, self._followed.value(self._system, state))
         values, conjugates = until.displacements, until.forces
         if not self._followed.displaces:
             values, conjugates = conjugates, values
@@ -301,10 +303,11 @@ class CurveFollower:
         ]
 
     def _conjugate(self, state: State) -> float:
-        """The conjugate of the followed value; displacements count from the unloaded configuration."""
+        """The conjugate of the followed value, the same on all processes; displacements count from the unloaded
+        configuration."""
         self._system.load(state)
         origin = 0.0 if self._followed.displaces else self._stepper.origin
-        return self._followed.conjugate(self._system, state) - origin
+        return agreed(self._system.comm, self._followed.conjugate(self._system, state) - origin)
 
     def _ended(self, failure: NotConverged) -> EquilibriumError:
         stepper, last = self._stepper, self._frames[-1]
