@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+from fenicsmech.collective import agreed
 from fenicsmech.continuation.stepper import ParabolaPredictor, Stepper, on_cubic
 from fenicsmech.equilibrium import (
     ArcLengthControl,
@@ -127,8 +128,8 @@ class ArcLengthStepper(Stepper):
     # -- points ------------------------------------------------------------------------------------------------
 
     def value(self, point: EquilibriumPoint) -> float:
-        """The followed value."""
-        return self.followed.value(self.system, point.state)
+        """The followed value, the same on all processes."""
+        return agreed(self.system.comm, self.followed.value(self.system, point.state))
 
     def value_rate(self, point: EquilibriumPoint) -> float:
         """Rate of the followed value along the path."""

@@ -27,6 +27,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fenicsmech.collective import agreed
 from fenicsmech.continuation.stepper import Predictor, Stepper, TangentPredictor
 from fenicsmech.equilibrium import ActiveSet, Control, EquilibriumPoint, EquilibriumSolver, NotConverged, State, Step
 from fenicsmech.errors import not_negative, set_fields, set_options
@@ -116,8 +117,8 @@ class LoadStepper(Stepper):
         self, solver: EquilibriumSolver, start: State, control: Control, *, predictor: Predictor, held: bool = False
     ) -> None:
         super().__init__(solver, predictor, start)
-        self._held = held
-        self._steps, self._value = LoadSteps(), control.value(solver.system, start)
+        self._held, self._steps = held, LoadSteps()
+        self._value = agreed(solver.system.comm, control.value(solver.system, start))
         self._origin, self._covered = self._value, 0.0  # farthest from there so far
         factors = self._steps.shift_factors if start.minimum_shift else (0.0,)
         self._shifts = tuple(factor * start.minimum_shift for factor in factors)

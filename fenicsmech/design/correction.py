@@ -102,7 +102,9 @@ def carried(
         Infeasible: loading leads elsewhere.
     """
     try:
-        return equilibria.from_other(surrogate()) if solved is None else equilibria.from_design(solved)
+        if solved is None:
+            return equilibria.from_other(surrogate(), estimated=True)
+        return equilibria.from_design(solved, estimated=True)
     except Infeasible as failure:
         before = "the surrogate" if solved is None else "the last round"
         _log.info("equilibria of %s do not lead to those of this one: %s", before, failure)

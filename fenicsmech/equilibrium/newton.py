@@ -45,6 +45,7 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
+from fenicsmech.collective import agreed
 from fenicsmech.equilibrium.active_set import ActiveSet
 from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.linearisation import EquilibriumPoint, NotConverged
@@ -279,4 +280,4 @@ class NewtonSolver(EquilibriumSolver):
         if control.constrained:
             gap = control.gap(system, state) / system.joints.length
             value += force * control.prescribed + 0.5 * stiffness * gap**2
-        return value
+        return agreed(system.comm, value)

@@ -405,7 +405,7 @@ class MechanismMesh:
         link: index of the flexible link of each cell on this rank (ghosts last), (cells,).
         interface: index among all interfaces of the mechanism, −1 in free cells, (cells,).
         vertices, cells: the whole mesh as one array each, on every rank: (n, dim), (m, dim + 1).
-        link_of_cell: index of the flexible link of each of ``cells``, (m,).
+        link_of_cell, interface_of_cell: as ``link`` and ``interface`` of each of ``cells``, (m,).
         curved: edges of the whole mesh that follow curves, on every rank.
         comm: the communicator; the mesh itself keeps a duplicate.
     """
@@ -416,8 +416,14 @@ class MechanismMesh:
     vertices: np.ndarray
     cells: np.ndarray
     link_of_cell: np.ndarray
+    interface_of_cell: np.ndarray
     curved: CurvedEdges
     comm: MPI.Comm
+
+    def on(self, comm: MPI.Comm) -> MechanismMesh:
+        """The same mesh, distributed over ``comm``."""
+        whole = self.vertices, self.cells, self.link_of_cell, self.interface_of_cell, self.curved
+        return _distributed(comm, *whole)
 
     def corners(self, cells: np.ndarray) -> np.ndarray:
         """Corner coordinates of local ``cells``, (cells, dim + 1, dim)."""
@@ -426,11 +432,22 @@ class MechanismMesh:
 
 def distribute(comm: MPI.Comm, link_meshes: Sequence[LinkMesh] | None) -> MechanismMesh:
     """Distributes ``link_meshes`` (given on rank 0 only) over ``comm``; interfaces are numbered link after link."""
-    vertices, cells, link, interface, curved = from_one(comm, lambda: _joined(link_meshes or ()))
+    return _distributed(comm, *from_one(comm, lambda: _joined(link_meshes or ())))
+
+
+def _distributed(
+    comm: MPI.Comm,
+    vertices: np.ndarray,
+    cells: np.ndarray,
+    link: np.ndarray,
+    interface: np.ndarray,
+    curved: CurvedEdges,
+) -> MechanismMesh:
+    """The whole mesh, known on every rank, distributed over ``comm``."""
     here = slice(None) if comm.rank == 0 else slice(0)
     mesh = create_mesh(comm, cells[here], vertices[here])
     own = original_cells(mesh)
-    return MechanismMesh(mesh, link[own], interface[own], vertices, cells, link, curved, comm)
+    return MechanismMesh(mesh, link[own], interface[own], vertices, cells, link, interface, curved, comm)
 
 
 def _joined(meshes: Sequence[LinkMesh]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, CurvedEdges]:

@@ -17,7 +17,7 @@ from fenicsmech.errors import DescriptionError, EquilibriumError, counted
 from fenicsmech.estimates import AccuracyOptions, Equilibrium, ErrorKind, cause_of_growth, growth_by_halving
 from fenicsmech.files import write_csv
 from fenicsmech.log import logger
-from fenicsmech.mechanism import Configuration, Force, ForceGroup, Joint, Output, PrescribedPart, Units
+from fenicsmech.mechanism import DRAWN, Configuration, Force, ForceGroup, Joint, Output, PrescribedPart, Units
 from fenicsmech.multibody import Freedom
 from fenicsmech.plot import Arrow, CurveSeries, Panel, Trace, draw_configurations, plot_curve
 from fenicsmech.simulation.discretisation import Discretisation
@@ -331,6 +331,8 @@ class Curve:
         first, last = (gather(model, self.frames[k]) for k in (0, -1))
         forces = self.part.ratios if isinstance(self.part, Force | ForceGroup) else ()
         places = [position(model, force, end)[:2] for force, _ in forces]
+        # an optimised design in the drawn configuration is not the drawn design
+        name = "" if self.configuration == DRAWN else f"{self.configuration.name}: "
 
         def draw() -> Panel:
             assert first is not None and last is not None  # on rank 0
@@ -343,7 +345,7 @@ class Curve:
                 (plotter.shape(last, stress=stress),),
                 tuple(arrows),
                 tuple(traces),
-                f"{self.configuration.name}: {up(end.force)}, {across(end.displacement)}",
+                f"{name}{up(end.force)}, {across(end.displacement)}",
             )
 
         return on_one(self.discretisation.comm, draw)

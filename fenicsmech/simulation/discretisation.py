@@ -84,6 +84,13 @@ class Discretisation:
         other.materials = self.materials
         return other
 
+    def on(self, comm: MPI.Comm, clock: Clock) -> Discretisation:
+        """The same scene on the same mesh, distributed over other processes; collective on these alone."""
+        other = self.at(self.fidelity, clock, comm)
+        if "mesh" in vars(self):
+            other.mesh = self.mesh.on(comm)
+        return other
+
     def with_material(self, drawn: Material, other: Material) -> Discretisation:
         """The same scene on the same mesh, with links of another material instead of ``drawn``."""
         if drawn not in self.materials:

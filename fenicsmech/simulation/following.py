@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
 
+from fenicsmech.collective import agreed
 from fenicsmech.continuation import (
     ArcLengthStepper,
     ArcSteps,
@@ -217,11 +218,12 @@ class CurveFollower:
         self._frames.append(self._stepper.frame(LoadControl(0.0)))
         try:
             state = self._frames[0].state
-            if self._stepper.adrift and not self._followed.displaces:
+            if self._drifts:
                 state = self._stepper.start_from_rest(LoadControl(self._sense()))
                 if free := self._within(self._conjugate(state)):
                     return self._moved_freely(free, watch)
-                state = self._held(state)
+                self._frames.append(self._held(state))
+                state = self._frames[-1].state
             path = self._path(state)
         except NotConverged as failure:
             raise self._ended(failure) from failure
@@ -231,6 +233,11 @@ class CurveFollower:
         if wanted and (wanted.end - wanted.value(start)) * wanted.rate(start) < 0.0:
             start = start.scaled(-1.0)
         return self._follow(path, start, watch)
+
+    @property
+    def _drifts(self) -> bool:
+        """Whether nothing but loads holds the mechanism, and a force is followed."""
+        return self._stepper.adrift and not self._followed.displaces
 
     def _sense(self) -> float:
         """Sign of the force towards the first displacement that is wanted, or else the first force."""
@@ -247,17 +254,18 @@ class CurveFollower:
         moved = CurveStepper(stepper.discretisation, replace(stepper.request, controls=controls))
         return self._curve(moved.curve(watch).frames)
 
-    def _held(self, state: State) -> State:
+    def _held(self, state: State) -> Frame:
         """An equilibrium near ``state``, at rest without the force, that a small part of the force holds."""
         small = math.copysign(self._HELD * self._path(state).metric.value, self._sense())
-        self._frames.append(self._stepper.frame(LoadControl(small)))
-        return self._frames[-1].state
+        return self._stepper.frame(LoadControl(small))
 
     def from_bifurcation(self, event: PathEvent, mode: ModeShape, sense: Sense) -> FollowedCurve:
         """The curve that crosses another one at ``event`` along ``mode``."""
         rest = self._stepper.frame(LoadControl(0.0))  # the tangent at the bifurcation has no scale
         self._frames.append(event.frame)
         try:
+            if self._drifts:
+                rest = self._held(self._stepper.start_from_rest(LoadControl(self._sense())))
             path = self._path(rest.state)
             first = crossing(path, event.critical, mode.step, sense)
         except NotConverged as failure:
@@ -312,7 +320,8 @@ class CurveFollower:
 
     def _path(self, state: State) -> ArcLengthStepper:
         """The path through ``state``, in units of its ends."""
-        until, value, conjugate = self._until, self._followed.value(self._system, state), self._conjugate(state)
+        until, conjugate = self._until, self._conjugate(state)
+        value = agreed(self._system.comm, self._followed.value(self._system, state))
         values, conjugates = until.displacements, until.forces
         if not self._followed.displaces:
             values, conjugates = conjugates, values
@@ -337,10 +346,11 @@ class CurveFollower:
         ]
 
     def _conjugate(self, state: State) -> float:
-        """The conjugate of the followed value; displacements count from the unloaded configuration."""
+        """The conjugate of the followed value, the same on all processes; displacements count from the unloaded
+        configuration."""
         self._system.load(state)
         origin = 0.0 if self._followed.displaces else self._stepper.origin
-        return self._followed.conjugate(self._system, state) - origin
+        return agreed(self._system.comm, self._followed.conjugate(self._system, state) - origin)
 
     def _ended(self, failure: NotConverged) -> EquilibriumError:
         stepper, last = self._stepper, self._frames[-1]

@@ -385,7 +385,7 @@ class Simulation:
         """
         other = self._derived()
         other.comm, other.clock, other._design = comm, Clock(), None
-        other._discretisation = self._discretisation.at(self.fidelity, other.clock, comm)
+        other._discretisation = self._discretisation.on(comm, other.clock)
         return other
 
     def _derived(self) -> Simulation:

@@ -19,7 +19,7 @@ from time import perf_counter
 import numpy as np
 from mpi4py import MPI
 
-from fenicsmech.collective import from_one
+from fenicsmech.collective import agreed, from_one
 from fenicsmech.continuation import LoadStepper, LoadSteps, LoadStepsFailed, MotorStepper
 from fenicsmech.equilibrium import (
     Control,
@@ -166,7 +166,7 @@ class CurveStepper:
         self.adrift = bool(self.freedom.zero_energy) and not state.has_reactions and self._system.contact is None
         self._system.load(state)
         if not self.followed.displaces:  # motors count from where they were drawn
-            self.origin = self.followed.conjugate(self._system, state)
+            self.origin = agreed(comm, self.followed.conjugate(self._system, state))
         self._origins = {output: model.travel(output, state) for output in model.mechanism.outputs}
 
     @cached_property
@@ -191,7 +191,8 @@ class CurveStepper:
         rest = self._at_rest(control)
         state = self._state = self._under_constant_loads(rest.state)
         self._system.load(state)
-        self.adrift = control.constrained and abs(control.gap(self._system, state)) <= 1e-9 * self._joints.length
+        short = agreed(self.discretisation.comm, control.gap(self._system, state))
+        self.adrift = control.constrained and abs(short) <= 1e-9 * self._joints.length
         self._stepper = self._steps_from(state, held=rest.held and not self.adrift)
         return state
 
@@ -263,6 +264,9 @@ class CurveStepper:
         with model.clock.phase("measure"):
             stress = float(model.elastic.von_mises().max(initial=0.0))
             value, conjugate = followed.value(self._system, state), followed.conjugate(self._system, state)
+            travels = [model.travel(output, state) for output in self._origins]
+            value, conjugate, *travels = agreed(self.discretisation.comm, [value, conjugate, *travels])
+            outputs = {output: end - zero for (output, zero), end in zip(self._origins.items(), travels, strict=True)}
             displacement, force = (value, conjugate) if followed.displaces else (conjugate, value)
             return Frame(
                 force=force,
@@ -272,7 +276,7 @@ class CurveStepper:
                 stable_under_control=point.unstable_under_control == 0,
                 strain_energy=model.elastic.strain_energy(),
                 max_stress=model.mesh.mesh.comm.allreduce(stress, op=MPI.MAX),
-                outputs={output: model.travel(output, state) - zero for output, zero in self._origins.items()},
+                outputs=outputs,
                 reactions=joint_reactions(self._joints, state),
                 motors=motor_torques(self._joints, state),
                 iterations=point.iterations,
@@ -342,7 +346,7 @@ class CurveStepper:
 
     def _unreached(self, control: Control, failure: LoadStepsFailed) -> EquilibriumError:
         last, where = self._last(failure), self.request.where
-        if control.constrained and self._is_held():
+        if control.constrained and from_one(self.discretisation.comm, self._is_held):
             return EquilibriumError(
                 where,
                 f"no equilibrium at displacement {control.prescribed - self.origin:g}: joints and motors hold its "
@@ -417,7 +421,7 @@ class CurveStepper:
         for motion in from_one(comm, lambda: stiff_motions(model.linkage, state.poses, state.motors)):
             rounding = 1e-12 * float(reactions @ np.abs(motion.z))
             worst = max(worst, (self._work(residual, state, motion) - rounding) / motion.fastest(model.linkage.length))
-        return worst / loads if loads > 0.0 else 0.0
+        return agreed(comm, worst / loads if loads > 0.0 else 0.0)
 
     def _work(self, residual: Residual, state: State, motion: Motion) -> float:
         """|r · u̇ + ∂L/∂z · ż| of a motion."""
