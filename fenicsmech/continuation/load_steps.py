@@ -103,15 +103,19 @@ class LoadStepper(Stepper):
         start: first guess of the equilibrium at which steps begin; the control's value there is the first one.
         control: whose prescribed value changes.
         predictor: of the next equilibrium.
+        held: whether the prescribed value itself holds all zero-energy modes, as soon as it is not zero: matrices need
+            a least shift at the start only, and later ones would hide how stable equilibria are.
 
     Attributes:
         iterations: KKT systems factored and solved so far.
         snaps: number of times the path turned back and an equilibrium on another one was reached.
     """
 
-    def __init__(self, solver: EquilibriumSolver, start: State, control: Control, *, predictor: Predictor) -> None:
+    def __init__(
+        self, solver: EquilibriumSolver, start: State, control: Control, *, predictor: Predictor, held: bool = False
+    ) -> None:
         super().__init__(solver, predictor, start)
-        self._steps = LoadSteps()
+        self._held, self._steps = held, LoadSteps()
         self._value = agreed(solver.system.comm, control.value(solver.system, start))
         self._origin, self._covered = self._value, 0.0  # farthest from there so far
         factors = self._steps.shift_factors if start.minimum_shift else (0.0,)
@@ -128,6 +132,8 @@ class LoadStepper(Stepper):
         """
         if not self._points:
             self._settle(control.at(self._value))
+            if self._held:
+                self._shifts = self._shifts[::-1]
         steps, distance = self._steps, control.prescribed - self._value
         step, tried = distance, []
         while True:
@@ -170,7 +176,7 @@ class LoadStepper(Stepper):
             pass
 
     def _correct(self, guess: State, control: Control) -> EquilibriumPoint:
-        """The equilibrium near ``guess``, with the largest shift for zero-energy modes that leads there."""
+        """The equilibrium near ``guess``, with the first shift for zero-energy modes that leads there."""
         for place, shift in enumerate(self._shifts):
             try:
                 point = self.solver.solve(replace(guess, minimum_shift=shift), control)
