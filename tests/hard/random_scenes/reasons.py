@@ -14,6 +14,7 @@ import numpy as np
 
 import fenicsmech as fm
 
+from .assembly_check import smallest_gap
 from .blueprint import Blueprint, Built, CompliancePlan, GravityPlan, SpringPlan
 from .closure import Place
 from .motions import STEP, body_modes, moved
@@ -39,6 +40,8 @@ class Excuse:
 
 def true_reason(blueprint: Blueprint, built: Built | None, failure: fm.FenicsmechError) -> Excuse | None:
     """Why the error is right; None if it is not."""
+    if isinstance(failure, fm.AssemblyError):
+        return unassembled(blueprint)
     if not isinstance(failure, fm.EquilibriumError):
         return None
     last = failure.last
@@ -47,13 +50,23 @@ def true_reason(blueprint: Blueprint, built: Built | None, failure: fm.Fenicsmec
             return excuse
     if last is None or not _proven(blueprint, built, last):
         return None
-    return next((excuse for excuse in (reason(blueprint, built, last) for reason in _BY_STATE) if excuse), None)
+    for reason in _BY_STATE:
+        if excuse := reason(blueprint, built, last):
+            return excuse
+    return turned_back(blueprint, built, failure)
 
 
 def _proven(blueprint: Blueprint, built: Built, last: fm.Frame) -> bool:
     """Whether the last equilibrium is one, with the share of constant loads that it has."""
     potential = Potential.of(blueprint, built.simulation, last.state.load_factor)
     return not fault(blueprint, last, None, check(potential, last, math.nan))
+
+
+def unassembled(blueprint: Blueprint) -> Excuse | None:
+    """Rigid links cannot be joined where motors are to take them, whatever shape the flexible ones have."""
+    if blueprint.idle_spins:
+        return None
+    return _excuse("rigid links cannot be joined", "gap over length", smallest_gap(blueprint), above=THRESHOLDS.joined)
 
 
 def immobile(blueprint: Blueprint, built: Built, last: fm.Frame | None) -> Excuse | None:
@@ -156,6 +169,26 @@ def overstrained(blueprint: Blueprint, built: Built, last: fm.Frame) -> Excuse |
     return _excuse("elements strained out of shape", "stretch or its inverse", stretch, above=THRESHOLDS.strained)
 
 
+def turned_back(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError) -> Excuse | None:
+    """A path followed from rest through equilibria that pass the checks turns back before what is asked for."""
+    if blueprint.control == "path" or failure.last.state.load_factor < 1.0 or built.configuration is not fm.DRAWN:
+        return None
+    asked = blueprint.samples[len(failure.frames)]
+    name = blueprint.control.removesuffix("s")
+    until = fm.Until(**{name: asked}, frames=THRESHOLDS.followed)
+    try:
+        frames = built.follow(blueprint, until).frames
+    except fm.EquilibriumError as error:
+        frames = error.frames
+    shares = [getattr(frame, name) / asked for frame in frames]
+    top = int(np.argmax(shares)) if shares else 0
+    if top == 0 or top == len(frames) - 1 or shares[top] >= 1.0:
+        return None
+    if not all(_proven(blueprint, built, frame) for frame in frames[top - 1 : top + 2]):
+        return None
+    return Excuse("a path of equilibria turns back", f"largest {name} over that asked for {shares[top]:.1e}")
+
+
 _BY_GEOMETRY: tuple[Callable[[Blueprint, Built, fm.Frame | None], Excuse | None], ...] = (immobile, adrift, drowned)
 _BY_STATE: tuple[Callable[[Blueprint, Built, fm.Frame], Excuse | None], ...] = (at_limit, out_of_reach, overstrained)
 
@@ -200,6 +233,6 @@ def _split(rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Orthonormal combinations of motions along which all rates vanish, and those along which they do not."""
     if not rates.shape[1]:
         return np.zeros((0, 0)), np.zeros((0, 0))
-    _, values, right = np.linalg.svd(rates, full_matrices=True)
+    _, values, right = np.linalg.svd(rates.astype(float), full_matrices=True)
     rank = int(np.sum(values > THRESHOLDS.rank * max(values.max(initial=0.0), 1.0)))
     return right[rank:], right[:rank]
