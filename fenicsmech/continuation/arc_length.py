@@ -45,8 +45,9 @@ class ArcSteps:
         tolerance: of the location of limit points and bifurcations, over the step they lie in.
         turn: angle between the tangents at both ends of a step that step sizes aim at, rad.
         largest_turn: angle above which a step is repeated with a smaller length: it jumps to another branch, or cuts
-            off a bend.
+            off a bend. Where other points touch an obstacle at its end, paths have corners, up to a right angle.
         iterations: number per step that step sizes aim at; the last one only determines the stability.
+        contact_iterations: the same where other points touch at the end of a step: it hardly depends on its length.
 
     Raises:
         DescriptionError: a number is not positive, the tolerance not below 1, or the number of iterations not whole.
@@ -60,9 +61,10 @@ class ArcSteps:
     turn: float = 0.25
     largest_turn: float = 0.9
     iterations: int = 5
+    contact_iterations: int = 7
 
     def __post_init__(self) -> None:
-        set_options(self, "arc-length steps", below_one=("tolerance",), iterations=1)
+        set_options(self, "arc-length steps", below_one=("tolerance",), iterations=1, contact_iterations=1)
 
 
 @dataclass(frozen=True)
@@ -193,8 +195,10 @@ class ArcLengthStepper(Stepper):
                 found = self.correct(self._predict(self.length), point.tangent, point)
                 turn = self._turn(point, found)
                 _log.debug("arc %.2e: turn %.2f, %d iterations", self.length, turn, found.iterations)
-                if turn <= steps.largest_turn:
-                    growth = min(steps.turn / max(turn, 1e-12), math.sqrt(steps.iterations / found.iterations))
+                touched = self._other_points_touch(point.state, found.state)
+                if turn <= steps.largest_turn or (touched and turn < 0.5 * math.pi):
+                    iterations = steps.contact_iterations if touched else steps.iterations
+                    growth = min(steps.turn / max(turn, 1e-12), math.sqrt(iterations / found.iterations))
                     self.length *= min(max(growth, 0.5), 2.0)
                     self._accept(found, self.metric.norm(self.chord(point, found)))
                     return found

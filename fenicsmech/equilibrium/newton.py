@@ -30,7 +30,6 @@ Where links may touch obstacles a step linearises the gaps and finds the points 
 
 Across a path (see ``control``) equilibria of any stability are wanted and a good guess is near: steps are taken in
 full, moved into the plane by bordering; where they diverge, a shorter step along the path is tried instead of descent.
-There the points that touch are those of the state, and paths go in short steps where points come and go.
 
 Sources: Nocedal & Wright, Numerical Optimization (doi:10.1007/978-0-387-40065-5), chapters 17–19; Chamberlain et al. on
 the watchdog (Mathematical Programming Studies 16, 1982); Deuflhard on the simplified Newton method
@@ -47,7 +46,7 @@ from petsc4py import PETSc
 
 from fenicsmech.collective import agreed
 from fenicsmech.equilibrium.active_set import ActiveSet
-from fenicsmech.equilibrium.control import Control
+from fenicsmech.equilibrium.control import Control, Plane
 from fenicsmech.equilibrium.linearisation import EquilibriumPoint, NotConverged
 from fenicsmech.equilibrium.solver import EquilibriumMethod, EquilibriumSolver
 from fenicsmech.equilibrium.state import State, Step
@@ -121,7 +120,7 @@ class NewtonSolver(EquilibriumSolver):
         last: tuple[State, np.ndarray] | None = None  # where the last step began, and its motion of the nodes
         residuals, shift, any_stability, predicted, norm = [], least, True, False, math.inf
         most = self.factorisations + options.factorisations
-        contact = None if path else system.contact
+        contact = system.contact
         if contact is not None:
             contact.start(start.load_factor)
         for iteration in range(limit + 1):
@@ -140,11 +139,12 @@ class NewtonSolver(EquilibriumSolver):
             predicted = last is not None and not near
             system.linearise(state, control, residual, last if predicted else None, contact)
             x, shift = self._direction(residual, least, last=shift, any_stability=near)
+            plane = self.plane(state, control, residual)
             if contact is not None:
-                x = self._with_contact(contact, x, residual)
+                x = self._with_contact(contact, x, residual, plane)
             if x is None:
                 raise NotConverged("the linear solver stalled", iteration + 1)
-            step = self.newton_step(x, state, control, residual)
+            step = self.newton_step(x, plane)
             _log.debug("iteration %d: residual %.2e, shift %.1e", iteration, residuals[-1], shift)
             if path:
                 norm = residual.norm
@@ -176,10 +176,12 @@ class NewtonSolver(EquilibriumSolver):
                 residual = self._again(state, control)
         return self.accept_best(*best, control, residuals, self.exhausted(residuals, iteration))
 
-    def _with_contact(self, contact: ActiveSet, x: PETSc.Vec, residual: Residual) -> PETSc.Vec | None:
+    def _with_contact(
+        self, contact: ActiveSet, x: PETSc.Vec, residual: Residual, plane: Plane | None = None
+    ) -> PETSc.Vec | None:
         """The solution ``x`` with gaps linearised in place of the points that touch; None if a solve fails."""
         accuracy = self.step_accuracy(residual)
-        return contact.corrected(x, residual.vector, lambda right: self.try_solve(right, accuracy))
+        return contact.corrected(x, residual.vector, lambda right: self.try_solve(right, accuracy), plane)
 
     def _again(self, state: State, control: Control) -> Residual:
         """The residual at an earlier ``state``, from which iterations go on."""
@@ -236,7 +238,7 @@ class NewtonSolver(EquilibriumSolver):
                 x = self._with_contact(system.contact, x, residual)
             if x is None:
                 break
-            correction = self.newton_step(x, state, control, residual)
+            correction = self.newton_step(x, None)
             length = system.size(correction)
             if not length <= self.options.reuse_factor * size:
                 break

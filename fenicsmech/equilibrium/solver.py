@@ -10,7 +10,7 @@ from functools import cached_property
 
 from petsc4py import PETSc
 
-from fenicsmech.equilibrium.control import ArcLengthControl, Control
+from fenicsmech.equilibrium.control import ArcLengthControl, Control, Plane
 from fenicsmech.equilibrium.linearisation import (
     EquilibriumPoint,
     Linearisation,
@@ -130,15 +130,18 @@ class EquilibriumSolver(ABC):
             x = right.duplicate()
             return x if self.linear.solve(right, x, tolerance) else None
 
-    def newton_step(self, x: PETSc.Vec, state: State, control: Control, residual: Residual) -> Step:
-        """The step −``x`` with K x the residual; across a path it is moved into the plane."""
-        step = self.system.unknowns.step(x).scaled(-1.0)
+    def plane(self, state: State, control: Control, residual: Residual) -> Plane | None:
+        """The plane across a path, for steps with the matrix last factored; None for other controls."""
         if not isinstance(control, ArcLengthControl):
-            return step
+            return None
         rate = self.try_solve(control.rate(self.system, state), self.step_accuracy(residual))
         if rate is None:
             raise NotConverged("the linear solver stalled")
-        return control.into_plane(self.system, state, step, rate)
+        return Plane(control, self.system, state, rate)
+
+    def newton_step(self, x: PETSc.Vec, plane: Plane | None) -> Step:
+        """The step −``x`` with K x the residual, moved into the ``plane`` across a path."""
+        return self.system.unknowns.step(x).scaled(-1.0) if plane is None else plane.reached(-x)
 
     def descends(self) -> bool:
         """Whether the inertia known from the last solve guarantees that its solution is a descent direction."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
 
@@ -18,7 +19,7 @@ from fenicsmech.continuation import (
     locate,
     null_space,
 )
-from fenicsmech.equilibrium import EquilibriumPoint, LoadControl, NotConverged, State, Unknown
+from fenicsmech.equilibrium import DisplacementControl, EquilibriumPoint, LoadControl, NotConverged, State, Unknown
 from fenicsmech.errors import DescriptionError, EquilibriumError, finite, set_fields, whole
 from fenicsmech.mechanism import Configuration, Drive, Force, ForceGroup, Mechanism, Motor, PrescribedPart
 from fenicsmech.plot import CurveMark, CurveSeries
@@ -203,6 +204,10 @@ def branches(
 class CurveFollower:
     """The path of one request, until an end."""
 
+    _HELD = (
+        1e-3  # force at which a path starts if nothing else holds the mechanism, over that of a linear one at its end
+    )
+
     def __init__(self, discretisation: Discretisation, request: CurveRequest, until: Until, steps: ArcSteps) -> None:
         self._stepper, self._until, self._steps = CurveStepper(discretisation, request), until, steps
         self._followed, self._system = self._stepper.followed, self._stepper.solver.system
@@ -212,7 +217,14 @@ class CurveFollower:
         """The curve from the configuration without the controlled force; ``watch`` gets the number of frames so far."""
         self._frames.append(self._stepper.frame(LoadControl(0.0)))
         try:
-            path = self._path(self._frames[0].state)
+            state = self._frames[0].state
+            if self._drifts:
+                state = self._stepper.start_from_rest(LoadControl(self._sense()))
+                if free := self._within(self._conjugate(state)):
+                    return self._moved_freely(free, watch)
+                self._frames.append(self._held(state))
+                state = self._frames[-1].state
+            path = self._path(state)
         except NotConverged as failure:
             raise self._ended(failure) from failure
         start, finishes = path.start, self._finishes(path)
@@ -222,11 +234,38 @@ class CurveFollower:
             start = start.scaled(-1.0)
         return self._follow(path, start, watch)
 
+    @property
+    def _drifts(self) -> bool:
+        """Whether nothing but loads holds the mechanism, and a force is followed."""
+        return self._stepper.adrift and not self._followed.displaces
+
+    def _sense(self) -> float:
+        """Sign of the force towards the first displacement that is wanted, or else the first force."""
+        return next((end for end in (*self._until.displacements, *self._until.forces) if end), 1.0)
+
+    def _within(self, travel: float) -> tuple[float, ...]:
+        """The wanted displacements that the point reaches without a force, which moves freely as far as ``travel``."""
+        return tuple(end for end in self._until.displacements if end * travel > 0.0 and abs(end) < abs(travel))
+
+    def _moved_freely(self, ends: Sequence[float], watch: Callable[[int], None]) -> FollowedCurve:
+        """The curve on which nothing resists, until the first of ``ends``."""
+        stepper = self._stepper
+        controls = (DisplacementControl(0.0), DisplacementControl(min(ends, key=abs)))
+        moved = CurveStepper(stepper.discretisation, replace(stepper.request, controls=controls))
+        return self._curve(moved.curve(watch).frames)
+
+    def _held(self, state: State) -> Frame:
+        """An equilibrium near ``state``, at rest without the force, that a small part of the force holds."""
+        small = math.copysign(self._HELD * self._path(state).metric.value, self._sense())
+        return self._stepper.frame(LoadControl(small))
+
     def from_bifurcation(self, event: PathEvent, mode: ModeShape, sense: Sense) -> FollowedCurve:
         """The curve that crosses another one at ``event`` along ``mode``."""
         rest = self._stepper.frame(LoadControl(0.0))  # the tangent at the bifurcation has no scale
         self._frames.append(event.frame)
         try:
+            if self._drifts:
+                rest = self._held(self._stepper.start_from_rest(LoadControl(self._sense())))
             path = self._path(rest.state)
             first = crossing(path, event.critical, mode.step, sense)
         except NotConverged as failure:
@@ -235,8 +274,7 @@ class CurveFollower:
         return self._follow(path, first, lambda done: None)
 
     def _follow(self, path: ArcLengthStepper, start: EquilibriumPoint, watch: Callable[[int], None]) -> FollowedCurve:
-        stepper, request = self._stepper, self._stepper.request
-        clock = stepper.discretisation.clock
+        stepper, clock = self._stepper, self._stepper.discretisation.clock
         steps = path.follow(start, self._finishes(path), most=self._until.frames - len(self._frames))
         while True:
             began, seconds = perf_counter(), dict(clock.seconds)
@@ -251,11 +289,16 @@ class CurveFollower:
             frame = stepper.record(ends[1])
             self._frames.append(replace(frame, seconds=perf_counter() - began, phases=clock.since(seconds)))
             watch(min(len(self._frames), self._until.frames))  # critical points are additional frames
+        return self._curve(self._frames)
+
+    def _curve(self, frames: Sequence[Frame]) -> FollowedCurve:
+        """The curve of ``frames``, with the events so far."""
+        stepper, request = self._stepper, self._stepper.request
         return FollowedCurve(
             request.part,
             request.configuration,
             stepper.freedom,
-            tuple(self._frames),
+            tuple(frames),
             stepper.discretisation,
             stepper.unloaded,
             others=request.others,

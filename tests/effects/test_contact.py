@@ -136,10 +136,10 @@ def test_corrections_that_stall_with_the_factor_at_hand_are_left_to_the_next_one
         fresh.append(True)
         add_stiffness(self, matrix)
 
-    def correct(self, x, residual, solve):
+    def correct(self, x, residual, solve, plane=None):
         if fresh:
             fresh.clear()
-            return corrected(self, x, residual, solve)
+            return corrected(self, x, residual, solve, plane)
         stalled.append(True)
         return None
 

@@ -130,6 +130,33 @@ def wrapping_force(load: float, *, unit: float = 1.0, stress: float = 1.0) -> fl
     return load * 2000.0 * stress * 10.0 * unit * (0.5 * unit) ** 3 / 12.0 / (100.0 * unit) ** 2
 
 
+def channel() -> Touching:
+    """A nearly straight strip, pressed along its axis by a slide, between walls 3 above and 2 below its ends."""
+    mechanism = fm.Mechanism("channel")
+    base, slide = mechanism.rigid("base", fixed=True), mechanism.rigid("slide")
+    shape = fm.strip([(0, 0), (50, 0.6), (100, 0)], thickness=1.5, depth=5.0)
+    strip = mechanism.flexible("strip", shape, fm.Material("nylon", 2000.0, 0.35))
+    mechanism.weld(base, strip, at=(0, 0), interface_radius=0.7)
+    mechanism.weld(strip, slide, at=(100, 0), interface_radius=0.7)
+    mechanism.prismatic(base, slide, at=(100, 0), axis=(1, 0))
+    push = mechanism.force(on=slide, at=(100, 0), direction=(-1, 0))
+    above, below = Contact(strip, HalfPlane((0, 3), (0, -1))), Contact(strip, HalfPlane((0, -2), (0, 1)))
+    return Touching(_simulation(mechanism, [above, below], "plane-stress", 2.0), push, above)
+
+
+def arch_over_floor() -> Touching:
+    """A shallow arch, pushed down beside its crown, that snaps through onto a plane 3 below its ends."""
+    mechanism = fm.Mechanism("arch over a floor")
+    base = mechanism.rigid("base", fixed=True)
+    shape = fm.strip([(-40, 0), (-20, 3), (0, 4), (20, 3), (40, 0)], thickness=1.0, depth=5.0)
+    arch = mechanism.flexible("arch", shape, fm.Material("nylon", 2000.0, 0.35))
+    for end in (-40, 40):
+        mechanism.weld(base, arch, at=(end, 0), interface_radius=0.45)
+    push = mechanism.force(on=arch, at=(1, 4), direction=(0, -1))
+    floor = Contact(arch, HalfPlane((0, -3), (0, 1)))
+    return Touching(_simulation(mechanism, [floor], "plane-stress", 1.5), push, floor)
+
+
 def block(space: str, stiffness: float) -> Touching:
     """A block of 10 × 8 × 5 on a plane, pressed by a rigid plate on a slider."""
     mechanism = fm.Mechanism("block")

@@ -91,7 +91,7 @@ def run(scene: DesignScene) -> tuple[str, str]:
     wanted = scene.factor * frame.displacement
     if abs(frame.displacement) < THRESHOLDS.closed * scene.blueprint.length:
         return "true: the force moves nothing", f"{frame.displacement:.3g}"
-    problem = _problem(scene, built, wanted)
+    problem = design_problem(scene, built, wanted)
     try:
         result = problem.optimise()
     except fm.DescriptionError as error:
@@ -111,7 +111,8 @@ def run(scene: DesignScene) -> tuple[str, str]:
     return "designed: two starts meet no target", f"{result.reason}; {', '.join(result.active)}; {result.targets[0]}"
 
 
-def _problem(scene: DesignScene, built: Built, wanted: float) -> fm.DesignProblem:
+def design_problem(scene: DesignScene, built: Built, wanted: float) -> fm.DesignProblem:
+    """The optimisation to a ``wanted`` displacement."""
     designs = []
     for name in scene.links:
         plan = scene.blueprint.link(name)

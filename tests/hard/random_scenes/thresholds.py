@@ -34,6 +34,9 @@ class Thresholds:
         drowned: stiffness of springs over that of the stiffest link at which rounding hides it.
         excused: share of all scenes that each excuse may let off.
         spare: scenes that each may let off besides, for small samples.
+        effectivity: largest factor between an error estimate and the true difference.
+        told: difference over the value below which it counts as rounding and tolerance.
+        still: displacement over the mechanism's length below which differences count as rounding.
     """
 
     residual: float = 1e-6
@@ -59,6 +62,9 @@ class Thresholds:
     drowned: float = 1e-14
     excused: float = 0.03
     spare: int = 5
+    effectivity: float = 2.0
+    told: float = 1e-6
+    still: float = 1e-13
 
 
 THRESHOLDS = Thresholds()
