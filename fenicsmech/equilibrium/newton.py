@@ -99,8 +99,18 @@ class PrimalDualNewton(EquilibriumMethod):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        counts = dict.fromkeys(("iterations", "factorisations", "shifts", "halvings", "halvings_inverted"), 1)
-        set_options(self, "Newton's method", free=("reuse_factor",), **counts, watchdog=0, path_iterations=1)
+        set_options(
+            self,
+            "Newton's method",
+            free=("reuse_factor",),
+            iterations=1,
+            factorisations=1,
+            shifts=1,
+            halvings=1,
+            halvings_inverted=1,
+            watchdog=0,
+            path_iterations=1,
+        )
         not_negative("reuse_factor of Newton's method", self.reuse_factor)
 
     def solver(self, system: EquilibriumSystem) -> NewtonSolver:
