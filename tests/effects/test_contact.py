@@ -7,8 +7,8 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.effects import Contact, Cylinder, HalfPlane
-from fenicsmech.equilibrium import ActiveSet, LoadControl, NewtonSolver
+from fenicsmech.effects import Contact, Cylinder, HalfPlane, OneSided
+from fenicsmech.equilibrium import ActiveSet, EquilibriumSystem, LoadControl, NewtonSolver
 from fenicsmech.quantities import Sensitivity
 
 from ..design.in_plane import design_field
@@ -189,8 +189,29 @@ def test_a_wrapped_cantilever_is_differentiated_by_the_design_field():
     assert gradient.design @ direction[: len(gradient.design)] == pytest.approx(slope, rel=1e-4)
 
 
+def test_gaps_are_computed_once_for_each_state(monkeypatch):
+    computed, states, value, load = [], [], OneSided.update, EquilibriumSystem.load
+
+    def update(self):
+        before = getattr(self, "gaps", None)
+        value(self)
+        computed.append(self.gaps is not before)
+
+    def count(self, state):
+        states.append(state)
+        load(self, state)
+
+    monkeypatch.setattr(OneSided, "update", update)
+    monkeypatch.setattr(EquilibriumSystem, "load", count)
+    case = finger("plane-stress")
+    case.simulation.load_displacement(case.force, forces=PULLS)
+    assert 0 < sum(computed) <= len(states)
+    assert sum(computed) < 0.5 * len(computed)
+
+
 def test_without_contact_no_boundary_is_looked_for():
     case = finger("plane-stress", active=False)
+    assert case.simulation.solver(case.force).system.contact is None
     assert case.simulation.model.fields.boundaries == {}
     kinds = {integral.integral_type() for integral in case.simulation.model.elastic.energy_ufl.integrals()}
     assert kinds == {"cell"}
