@@ -62,10 +62,11 @@ class EquilibriumSolver(ABC):
     Attributes:
         system: the equations.
         options: of the method.
+        factorisations: of KKT matrices so far.
     """
 
     def __init__(self, system: EquilibriumSystem, options: EquilibriumMethod) -> None:
-        self.system, self.options = system, options
+        self.system, self.options, self.factorisations = system, options, 0
 
     @cached_property
     def linear(self) -> LinearSolver:
@@ -118,6 +119,7 @@ class EquilibriumSolver(ABC):
 
     def factor(self, shift: float) -> bool:
         """Factors the KKT matrix last linearised with a ``shift``; whether that could be done."""
+        self.factorisations += 1
         with self.system.clock.phase("factor"):
             self.system.kkt.shift(shift)
             return self.linear.refactor()
