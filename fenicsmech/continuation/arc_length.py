@@ -1,7 +1,8 @@
 """Arc-length continuation: steps along a path that may turn back in load and in displacement.
 
 An equilibrium is predicted along the tangent y′ and its curvature, corrected in the plane ⟨y₁′, y₂ − y⟩ = 0 through the
-prediction y, and accepted if the path turns little enough; steps are as long as its curvature allows.
+prediction y, and accepted if the path turns little enough; steps are as long as its curvature allows. The only fallback
+is half the step, as long as that is not the shortest one: with the default lengths, seventeen solves at most.
 
 Sources: Riks (doi:10.1016/0020-7683(79)90081-7), Crisfield (doi:10.1016/0045-7949(81)90108-5).
 """

@@ -7,6 +7,22 @@ towards a limit load p*, and the last equilibrium, at p* − 2 p* / 1024 or near
 moves a coordinate outside the range of the tangents at its ends may have snapped over a fold, where the path turns
 back: it is halved too, and if that does not help the snap is accepted and counted.
 
+Where an equilibrium is not found at once, fallbacks follow in this order. All of them are bounded by counts, which are
+the same on all processes and machines, and not by time:
+
+    fallback                                                   ends after
+    1. the tangent's prediction, then the last equilibrium,    one each; where other points touch, the latter at once
+       where a prediction moves too far
+    2. shifts of the KKT matrix until steps descend            ``PrimalDualNewton.shifts`` an iteration
+    3. shorter steps where elements are inverted               its ``halvings_inverted`` an iteration
+    4. line search, from the best state so far                 its ``iterations`` and ``factorisations``, with 2 and 3
+    5. other least shifts of zero-energy modes                 ``LoadSteps.shift_factors``, a solve each
+    6. half the step                                           ``LoadSteps.smallest``, or ``failures`` such steps
+    7. of motors: links that strain beyond a dead centre       ten halvings; then load steps once more
+
+Then the last equilibrium and the values without one are reported. The control stays the one that was asked for: under
+a dead load the equilibria past a limit point are not those that the mechanism would take.
+
 Motors may go beyond a dead centre, where the slack of the joints ends and links must strain. Towards it a
 coordinate x moves ever faster while the links are free of strain: close by, in units of x,
 
@@ -41,6 +57,8 @@ class LoadSteps:
     Attributes:
         smallest: smallest step, over the distance to the end, or the distance covered if that is less.
         motion: largest motion of a step along the tangent (measured).
+        failures: steps without equilibrium on the way to one prescribed value after which stepping fails. Locating a
+            limit load takes ten to twelve, equilibria that are found take three at most (measured).
         smallest_limited: smallest step that ``motion`` may impose, over the distance to the end; smaller ones arise
             in singular positions, where the tangent is ignored.
         largest_prediction: motion above which a prediction is discarded.
@@ -65,6 +83,7 @@ class LoadSteps:
 
     smallest: float = 1.0 / 1024.0
     motion: float = 0.2
+    failures: int = 20
     smallest_limited: float = 1e-6
     largest_prediction: float = 1.0
     contact_residual: float = 10.0
@@ -79,7 +98,7 @@ class LoadSteps:
     shift_factors: tuple[float, ...] = (1.0, 1e-3, 0.0)
 
     def __post_init__(self) -> None:
-        set_options(self, "load steps", iterations=1)
+        set_options(self, "load steps", failures=1, iterations=1)
         factors = tuple(not_negative("shift factor of load steps", factor) for factor in self.shift_factors)
         set_fields(self, shift_factors=factors)
 
@@ -139,7 +158,7 @@ class LoadStepper(Stepper):
         """The equilibrium at ``control``'s prescribed value, reached in as many steps as needed.
 
         Raises:
-            LoadStepsFailed: the smallest step failed.
+            LoadStepsFailed: the smallest step failed, or too many.
             EquilibriumError: a potential does not hold for a step.
         """
         if not self._points:
@@ -158,7 +177,7 @@ class LoadStepper(Stepper):
             except NotConverged as failure:
                 tried.append(value)
                 step = 0.5 * (value - self._value)
-                if abs(step) <= steps.smallest * self._scale(distance):
+                if abs(step) <= steps.smallest * self._scale(distance) or len(tried) == steps.failures:
                     fold = self._fold(tried[-1])
                     raise LoadStepsFailed(self._last, self._value, failure.reason, tuple(tried), fold) from failure
                 continue
