@@ -51,7 +51,7 @@ from fenicsmech.equilibrium.linearisation import EquilibriumPoint, NotConverged
 from fenicsmech.equilibrium.solver import EquilibriumMethod, EquilibriumSolver
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
-from fenicsmech.errors import not_negative, set_options
+from fenicsmech.errors import not_negative
 from fenicsmech.log import logger
 
 _log = logger(__name__)
@@ -66,6 +66,10 @@ class PrimalDualNewton(EquilibriumMethod):
         near: residual over the forces below which any equilibrium, unstable ones too, is converged to; farther
             off, steps descend.
         iterations: maximum number of iterations.
+        factorisations: after as many no iteration begins: thirty times those of an ordinary solve, which has five.
+        shifts: δ of one iteration that may be tried.
+        halvings: of a step along which the line search looks for descent.
+        halvings_inverted: of a whole step that inverts elements.
         watchdog: iterations in a row that may fail to improve on the best residual.
         predicted_stress: whether K_uu, as long as the residual is large, holds the stress that the last step solved
             for instead of the one it led to.
@@ -82,6 +86,10 @@ class PrimalDualNewton(EquilibriumMethod):
 
     near: float = 1e-2
     iterations: int = 25
+    factorisations: int = 150
+    shifts: int = 20
+    halvings: int = 20
+    halvings_inverted: int = 12
     watchdog: int = 12
     predicted_stress: bool = True
     largest_turn: float = 0.5
@@ -90,8 +98,16 @@ class PrimalDualNewton(EquilibriumMethod):
     divergence: float = 1e3
 
     def __post_init__(self) -> None:
-        super().__post_init__()
-        set_options(self, "Newton's method", free=("reuse_factor",), iterations=1, watchdog=0, path_iterations=1)
+        super().__post_init__(
+            free=("reuse_factor",),
+            iterations=1,
+            factorisations=1,
+            shifts=1,
+            halvings=1,
+            halvings_inverted=1,
+            watchdog=0,
+            path_iterations=1,
+        )
         not_negative("reuse_factor of Newton's method", self.reuse_factor)
 
     def solver(self, system: EquilibriumSystem) -> NewtonSolver:
@@ -110,6 +126,7 @@ class NewtonSolver(EquilibriumSolver):
         best, not_better, line_search, diverged = (state, residual), 0, False, None
         last: tuple[State, np.ndarray] | None = None  # where the last step began, and its motion of the nodes
         residuals, shift, any_stability, predicted, norm = [], least, True, False, math.inf
+        most = self.factorisations + options.factorisations
         contact = system.contact
         if contact is not None:
             contact.start(start.load_factor)
@@ -123,7 +140,7 @@ class NewtonSolver(EquilibriumSolver):
                 if not current or options.reuse_factor == 0.0:  # stability is of the true matrix
                     self.linearise(state, control, residual, iterations=iteration)
                 return self.accept(state, control, residual, residuals, iteration)
-            if iteration == limit:
+            if iteration == limit or self.factorisations >= most:
                 break
             near = path or (any_stability and residuals[-1] < options.near)
             predicted = last is not None and not near
@@ -164,7 +181,7 @@ class NewtonSolver(EquilibriumSolver):
             if not_better > options.watchdog and not line_search:
                 state, line_search, last = best[0], True, None
                 residual = self._again(state, control)
-        return self.accept_best(*best, control, residuals, self.exhausted(residuals, limit))
+        return self.accept_best(*best, control, residuals, self.exhausted(residuals, iteration))
 
     def _with_contact(
         self, contact: ActiveSet, x: PETSc.Vec, residual: Residual, plane: Plane | None = None
@@ -189,7 +206,7 @@ class NewtonSolver(EquilibriumSolver):
         δ = ``least`` is tried first; then a third of the ``last`` successful one, and eight times that, …
         """
         shift, following = least, max(_LEAST_SHIFT, last / 3.0)
-        for _ in range(20):
+        for _ in range(self.options.shifts):
             x = self.try_solve(residual.vector, self.step_accuracy(residual)) if self.factor(shift) else None
             if x is not None and (any_stability or self.descends()):
                 break
@@ -246,7 +263,7 @@ class NewtonSolver(EquilibriumSolver):
         """The whole step, shortened only where it turns too far or inverts elements."""
         system = self.system
         length = min(1.0, self.options.largest_turn / max(system.size(step), 1e-300))
-        for _ in range(12):
+        for _ in range(self.options.halvings_inverted):
             trial = system.moved(state, step.scaled(length))
             if math.isfinite(system.elastic_energy()):
                 return trial, system.residual(trial, control), length
@@ -263,7 +280,7 @@ class NewtonSolver(EquilibriumSolver):
         towards = (state.multipliers + step.multipliers, state.force + step.force)
         before = self._merit(state, control, *towards)
         length = min(1.0, self.options.largest_turn / max(system.size(step), 1e-300))
-        for _ in range(20):
+        for _ in range(self.options.halvings):
             trial = system.moved(state, step.scaled(length))
             after = self._merit(trial, control, *towards)
             if math.isfinite(after):

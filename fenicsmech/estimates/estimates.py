@@ -40,6 +40,8 @@ the energy that 3D adds. It changes a quantity, to first order with its adjoint 
     Q(space) − Q(plane stress) ≈ −∂V/∂u · z     at these a and v.
 
 Where all contraction is blocked V = ½ ∫ E h² dV, to first order the difference between plane strain and plane stress.
+h includes what prestrain in all directions adds to the depth; pressure P on the whole boundary of a link also acts on
+the faces across its depth, and adds ∫ P a det F dV to V.
 A strip of thickness t bent from curvature κ₀ to κ stores, far from its ends and per length,
 
     V = ½ ν² E I (κ − κ₀)² β² / (60 + β²),     β = b² κ / t,
@@ -408,7 +410,11 @@ class PlaneStressError:
         a, v = fem.Function(V, name="contraction"), fem.Function(elastic.u.function_space, name="curling")
         p, q = (fem.Function(smooth, name=name) for name in ("free_contraction", "blocked_contraction"))
         self._fields, self._projected = (a, v), (p, q)
-        energy = elastic.contraction_energy(a, v, p, q, degree=2 * elastic.order)
+        pressures = [
+            sum(effect.across_depth.get(link, 0.0) for effect in model.effects)
+            for link in model.mechanism.flexible_links
+        ]
+        energy = elastic.contraction_energy(a, v, p, q, pressures, degree=2 * elastic.order)
         by_a, by_v, by_p, by_q, by_u = (ufl.derivative(energy, part) for part in (a, v, p, q, elastic.u))
         self._by_a, self._by_p, self._by_q, self._force = (compile_form(row) for row in (by_a, by_p, by_q, by_u))
         self._mass = compile_form(ufl.derivative(by_p, p))
