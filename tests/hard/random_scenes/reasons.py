@@ -25,6 +25,9 @@ from .thresholds import THRESHOLDS
 from .unstrained_check import unstrained_motions
 
 
+HELD = "the point cannot move that way"
+
+
 @dataclass(frozen=True)
 class Excuse:
     """Why an error is true.
@@ -83,7 +86,7 @@ def immobile(blueprint: Blueprint, built: Built, last: fm.Frame | None) -> Excus
         for there in (moved(places, 1j * STEP * mode) for mode in body_modes(potential, places))
     ]
     rate = float(np.linalg.norm(rates))
-    return _excuse("the point cannot move that way", "travel per motion of bodies", rate, below=THRESHOLDS.immobile)
+    return _excuse(HELD, "travel per motion of bodies", rate, below=THRESHOLDS.immobile)
 
 
 def adrift(blueprint: Blueprint, built: Built, last: fm.Frame | None) -> Excuse | None:

@@ -35,6 +35,7 @@ class Thresholds:
         followed: most frames of a path that is to turn back.
         drowned: stiffness of springs over that of the stiffest link at which rounding hides it.
         excused: share of all scenes that each excuse may let off.
+        held: share of those in which joints and motors hold the point, which is exact.
         spare: scenes that each may let off besides, for small samples.
         effectivity: largest factor between an error estimate and the true difference.
         told: difference over the value below which it counts as rounding and tolerance.
@@ -65,6 +66,7 @@ class Thresholds:
     followed: int = 150
     drowned: float = 1e-14
     excused: float = 0.03
+    held: float = 0.1
     spare: int = 5
     effectivity: float = 2.0
     told: float = 1e-6
