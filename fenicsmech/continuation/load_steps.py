@@ -206,12 +206,15 @@ class LoadStepper(Stepper):
         Tangents grow towards a fold, |y′| ~ 1 / √(v* − v). From those at the last two points,
 
             v* = v₁ + (v₁ − v₀) / (g² − 1),     g = |y₁′| / |y₀′|.
+
+        Where links stretch straight, motions grow so too, and the force far more: nothing turns back there.
         """
         if len(self._points) < 2:
             return None
         before, last = (self.system.size(point.tangent) for point in self._points)
         growth, beyond = last / before if before else 1.0, tried - self._value
-        if not growth > self._steps.fold_growth:
+        rates = agreed(self.system.comm, [abs(point.conjugate_rate) for point in self._points])
+        if not (growth > self._steps.fold_growth and rates[1] <= growth**2 * rates[0]):
             return None
         ahead = self._width / (growth**2 - 1.0)
         return self._value + ahead if 0.0 < ahead / beyond <= self._steps.fold_ahead else None
