@@ -24,7 +24,6 @@ from .stability_check import eigenvalues, led_stiffness
 from .thresholds import THRESHOLDS
 from .unstrained_check import unstrained_motions
 
-
 HELD = "the point cannot move that way"
 
 
