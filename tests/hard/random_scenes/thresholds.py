@@ -35,7 +35,8 @@ class Thresholds:
         excused: share of all scenes that each excuse may let off.
         spare: scenes that each may let off besides, for small samples.
         effectivity: largest factor between an error estimate and the true difference.
-        told: difference over the value below which it counts as rounding and tolerance.
+        effective: least share of estimates within it, of those whose difference is above resolution.
+        resolved: difference over the value below which it counts as rounding and tolerance.
         still: displacement over the mechanism's length below which differences count as rounding.
     """
 
@@ -63,7 +64,8 @@ class Thresholds:
     excused: float = 0.03
     spare: int = 5
     effectivity: float = 2.0
-    told: float = 1e-6
+    effective: float = 0.95
+    resolved: float = 1e-6
     still: float = 1e-13
 
 
