@@ -71,6 +71,8 @@ class LoadSteps:
         branching_rate: largest rate of a step off a bifurcation, over the rate at its end.
         smallest_snap: smallest motion that counts as a snap; that at bifurcations is smaller.
         smallest_snap_step: smallest step, measured like ``smallest``, that is halved because of a snap.
+        fold_growth: growth of the tangent over the last step from which the path counts as turning back.
+        fold_ahead: largest distance ahead at which it does, over the last step that failed.
         minimum_shift: least shift of the KKT matrix, in units of the mean stiffness, where a mechanism has zero-energy
             modes, which would leave it singular.
         shift_factors: of ``minimum_shift``, tried in order: a shift slows Newton's method down where soft springs or
@@ -91,6 +93,8 @@ class LoadSteps:
     branching_rate: float = 2.2
     smallest_snap: float = 1e-4
     smallest_snap_step: float = 1.0 / 64.0
+    fold_growth: float = 1.1
+    fold_ahead: float = 4.0
     minimum_shift: float = 1e-10
     shift_factors: tuple[float, ...] = (1.0, 1e-3, 0.0)
 
@@ -108,11 +112,19 @@ class LoadStepsFailed(Exception):
         reached: its control value.
         reason: the solver's message.
         tried: control values without equilibrium.
+        fold: the control value at which the path turns back, None if it does not.
     """
 
-    def __init__(self, last: EquilibriumPoint | None, reached: float, reason: str, tried: tuple[float, ...]) -> None:
+    def __init__(
+        self,
+        last: EquilibriumPoint | None,
+        reached: float,
+        reason: str,
+        tried: tuple[float, ...],
+        fold: float | None = None,
+    ) -> None:
         super().__init__(reason)
-        self.last, self.reached, self.reason, self.tried = last, reached, reason, tried
+        self.last, self.reached, self.reason, self.tried, self.fold = last, reached, reason, tried, fold
 
 
 class LoadStepper(Stepper):
@@ -168,7 +180,8 @@ class LoadStepper(Stepper):
                 failed += 1
                 step = 0.5 * (value - self._value)
                 if abs(step) <= steps.smallest * self._scale(distance) or failed == steps.failures:
-                    raise LoadStepsFailed(self._last, self._value, failure.reason, tuple(tried)) from failure
+                    fold = self._fold(tried[-1])
+                    raise LoadStepsFailed(self._last, self._value, failure.reason, tuple(tried), fold) from failure
                 continue
             if self._snapped(point):
                 if abs(value - self._value) > steps.smallest_snap_step * self._scale(distance):
@@ -190,6 +203,25 @@ class LoadStepper(Stepper):
     @property
     def _last(self) -> EquilibriumPoint | None:
         return self._points[-1] if self._points else None
+
+    def _fold(self, tried: float) -> float | None:
+        """The value v* at which the path turns back, if it does before ``tried`` or about there.
+
+        Tangents grow towards a fold, |y′| ~ 1 / √(v* − v). From those at the last two points,
+
+            v* = v₁ + (v₁ − v₀) / (g² − 1),     g = |y₁′| / |y₀′|.
+
+        Where links stretch straight, motions grow so too, and the force far more: nothing turns back there.
+        """
+        if len(self._points) < 2:
+            return None
+        before, last = (self.system.size(point.tangent) for point in self._points)
+        growth, beyond = last / before if before else 1.0, tried - self._value
+        rates = agreed(self.system.comm, [abs(point.conjugate_rate) for point in self._points])
+        if not (growth > self._steps.fold_growth and rates[1] <= growth**2 * rates[0]):
+            return None
+        ahead = self._width / (growth**2 - 1.0)
+        return self._value + ahead if 0.0 < ahead / beyond <= self._steps.fold_ahead else None
 
     def _settle(self, control: Control) -> None:
         """The equilibrium at the start, whose tangent limits the first step."""
