@@ -1,9 +1,10 @@
 """Load steps (natural continuation): from a known equilibrium to the wanted value of a control.
 
 An equilibrium is predicted from those before, corrected, and accepted. Steps halve when the solver fails and double
-when it took few iterations; the tangent bounds their motion; equilibria reached are kept. Stepping fails once steps are
-small relative to the distance covered, however far the prescribed value: the softest stiffness falls as √(1 − p / p*)
-towards a limit load p*, and the last equilibrium, at p* − 2 p* / 1024 or nearer, keeps at most 5 % of it. A step that
+when it took few iterations, but not right after a failure; the tangent bounds their motion; equilibria reached are
+kept. Stepping fails once steps are small relative to the distance covered, however far the prescribed value: the
+softest stiffness falls as √(1 − p / p*) towards a limit load p*, and the last equilibrium, at p* − 2 p* / 1024 or
+nearer, keeps at most 5 % of it. A step that
 moves a coordinate outside the range of the tangents at its ends may have snapped over a fold, where the path turns
 back: it is halved too, and if that does not help the snap is accepted and counted.
 
@@ -17,7 +18,7 @@ the same on all processes and machines, and not by time:
     3. shorter steps where elements are inverted               its ``halvings_inverted`` an iteration
     4. line search, from the best state so far                 its ``iterations`` and ``factorisations``, with 2 and 3
     5. other least shifts of zero-energy modes                 ``LoadSteps.shift_factors``, a solve each
-    6. half the step                                           ``LoadSteps.smallest``, or ``failures`` such steps
+    6. half the step                                           ``LoadSteps.smallest``, or ``failures`` in a row
     7. of motors: links that strain beyond a dead centre       ten halvings; then load steps once more
 
 Then the last equilibrium and the values without one are reported. The control stays the one that was asked for: under
@@ -57,8 +58,8 @@ class LoadSteps:
     Attributes:
         smallest: smallest step, over the distance to the end, or the distance covered if that is less.
         motion: largest motion of a step along the tangent (measured).
-        failures: steps without equilibrium on the way to one prescribed value after which stepping fails. Locating a
-            limit load takes ten to twelve, equilibria that are found take three at most (measured).
+        failures: steps in a row without equilibrium after which stepping fails: halved as often, a step is 1e-12 of
+            itself. Those before an equilibrium that was reached do not count.
         smallest_limited: smallest step that ``motion`` may impose, over the distance to the end; smaller ones arise
             in singular positions, where the tangent is ignored.
         largest_prediction: motion above which a prediction is discarded.
@@ -83,7 +84,7 @@ class LoadSteps:
 
     smallest: float = 1.0 / 1024.0
     motion: float = 0.2
-    failures: int = 20
+    failures: int = 40
     smallest_limited: float = 1e-6
     largest_prediction: float = 1.0
     contact_residual: float = 10.0
@@ -166,7 +167,7 @@ class LoadStepper(Stepper):
             if self._held:
                 self._shifts = self._shifts[::-1]
         steps, distance = self._steps, control.prescribed - self._value
-        step, tried = distance, []
+        step, tried, failed = distance, [], 0  # failed: steps since the last equilibrium
         while True:
             remaining = control.prescribed - self._value
             step = self._limited(step, distance)
@@ -176,8 +177,9 @@ class LoadStepper(Stepper):
                 point = self._correct(self._guess(control.at(value)), control.at(value))
             except NotConverged as failure:
                 tried.append(value)
+                failed += 1
                 step = 0.5 * (value - self._value)
-                if abs(step) <= steps.smallest * self._scale(distance) or len(tried) == steps.failures:
+                if abs(step) <= steps.smallest * self._scale(distance) or failed == steps.failures:
                     fold = self._fold(tried[-1])
                     raise LoadStepsFailed(self._last, self._value, failure.reason, tuple(tried), fold) from failure
                 continue
@@ -193,8 +195,10 @@ class LoadStepper(Stepper):
             self._accept_at(point)
             if arrives:
                 return point
-            if point.iterations <= steps.iterations:
+            # a step twice as long as one that is reached after a failure has just failed
+            if point.iterations <= steps.iterations and not failed:
                 step *= 2.0
+            failed = 0
 
     @property
     def _last(self) -> EquilibriumPoint | None:

@@ -38,7 +38,8 @@ class Thresholds:
         held: share of those in which joints and motors hold the point, which is exact.
         spare: scenes that each may let off besides, for small samples.
         effectivity: largest factor between an error estimate and the true difference.
-        told: difference over the value below which it counts as rounding and tolerance.
+        effective: least share of estimates within it, of those whose difference is above resolution.
+        resolved: difference over the value below which it counts as rounding and tolerance.
         still: displacement over the mechanism's length below which differences count as rounding.
     """
 
@@ -69,7 +70,8 @@ class Thresholds:
     held: float = 0.1
     spare: int = 5
     effectivity: float = 2.0
-    told: float = 1e-6
+    effective: float = 0.95
+    resolved: float = 1e-6
     still: float = 1e-13
 
 
