@@ -31,6 +31,7 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
+from fenicsmech.collective import agreed
 from fenicsmech.design.optimisers.problem import Infeasible
 from fenicsmech.design.target import Target, sample_request
 from fenicsmech.design.transfer import WholeState, guess, whole_state
@@ -153,7 +154,8 @@ class _Path:
         if self.moved is None:
             return LoadControl(self.sample.magnitude)
         self._model.load(unloaded)
-        return DisplacementControl(self.sample.value + float(self.moved.values(unloaded)[0]))
+        origin = agreed(self._model.mesh.comm, float(self.moved.values(unloaded)[0]))
+        return DisplacementControl(self.sample.value + origin)
 
 
 class SampleEquilibria:
