@@ -51,7 +51,7 @@ from fenicsmech.equilibrium.linearisation import EquilibriumPoint, NotConverged
 from fenicsmech.equilibrium.solver import EquilibriumMethod, EquilibriumSolver
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
-from fenicsmech.errors import not_negative, set_options
+from fenicsmech.errors import not_negative
 from fenicsmech.log import logger
 
 _log = logger(__name__)
@@ -98,10 +98,7 @@ class PrimalDualNewton(EquilibriumMethod):
     divergence: float = 1e3
 
     def __post_init__(self) -> None:
-        super().__post_init__()
-        set_options(
-            self,
-            "Newton's method",
+        super().__post_init__(
             free=("reuse_factor",),
             iterations=1,
             factorisations=1,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -21,7 +21,7 @@ from fenicsmech.equilibrium.linearisation import (
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 from fenicsmech.equilibrium.two_level import BySize
-from fenicsmech.errors import counted, expect, positive, set_fields
+from fenicsmech.errors import counted, expect, set_options
 
 _STEP = 1e-6  # relative error that iterative solvers may leave in steps and tangents: the next iteration corrects it
 
@@ -44,9 +44,9 @@ class EquilibriumMethod(ABC):
     roundoff: float = 1e-14
     linear: LinearMethod = field(default_factory=BySize)
 
-    def __post_init__(self) -> None:
-        for name in ("tolerance", "roundoff"):
-            set_fields(self, **{name: positive(f"{name} of Newton's method", getattr(self, name))})
+    def __post_init__(self, *, free: Collection[str] = (), **least: int) -> None:
+        """Checks all numbers; subclasses give those that may be any, and the least of whole ones (``set_options``)."""
+        set_options(self, "Newton's method", free=free, below_one=(), **least)
         expect("linear systems", self.linear, LinearMethod, "a method", "Give BySize(…), Direct() or TwoLevel(…)")
 
     @abstractmethod
