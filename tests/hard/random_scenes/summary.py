@@ -64,7 +64,7 @@ def _coverage(results: list[SceneResult]) -> list[str]:
     sound = [
         result for result in results if result.seed % 10 >= INVALID_SHARE and not result.scene.startswith("design")
     ]
-    counts = Counter(word for result in sound for word in set(result.scene.split(", ")))
+    counts = Counter(word for result in sound for word in set(result.scene.split(", ")) if word)
     kinds = sorted(counts.items(), key=lambda item: (-item[1], item[0]))
     designs = sum(result.scene.startswith("design") for result in results)
     return [
