@@ -1,10 +1,9 @@
 """Load steps (natural continuation): from a known equilibrium to the wanted value of a control.
 
 An equilibrium is predicted from those before, corrected, and accepted. Steps halve when the solver fails and double
-when it took few iterations, but not right after a failure; the tangent bounds their motion; equilibria reached are
-kept. Stepping fails once steps are small relative to the distance covered, however far the prescribed value: the
-softest stiffness falls as √(1 − p / p*) towards a limit load p*, and the last equilibrium, at p* − 2 p* / 1024 or
-nearer, keeps at most 5 % of it. A step that
+when it took few iterations; the tangent bounds their motion; equilibria reached are kept. Stepping fails once steps are
+small relative to the distance covered, however far the prescribed value: the softest stiffness falls as √(1 − p / p*)
+towards a limit load p*, and the last equilibrium, at p* − 2 p* / 1024 or nearer, keeps at most 5 % of it. A step that
 moves a coordinate outside the range of the tangents at its ends may have snapped over a fold, where the path turns
 back: it is halved too, and if that does not help the snap is accepted and counted.
 
