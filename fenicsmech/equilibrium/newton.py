@@ -171,7 +171,8 @@ class NewtonSolver(EquilibriumSolver):
                 else:
                     # no contraction: near a limit or bifurcation point, where only descent makes progress
                     state, any_stability, line_search, last = diverged or before, False, True, None
-                    residual = self._again(state, control)
+                    # no step led to this residual: as large as before does not mean that it no longer falls
+                    residual, norm = self._again(state, control), math.inf
             elif near and shift == least and length == 1.0:
                 state, residual, norm = self._finish(state, control, residual, norm, step)
             if residual.norm < best[1].norm:
@@ -180,7 +181,7 @@ class NewtonSolver(EquilibriumSolver):
                 not_better += 1
             if not_better > options.watchdog and not line_search:
                 state, line_search, last = best[0], True, None
-                residual = self._again(state, control)
+                residual, norm = self._again(state, control), math.inf
         return self.accept_best(*best, control, residuals, self.exhausted(residuals, iteration))
 
     def _with_contact(
