@@ -1,4 +1,4 @@
-"""Springs far softer than the links they move: equilibria balance them although the links round by more than they do."""
+"""Springs far softer than the links they move: equilibria balance them although links round by more than they do."""
 
 from __future__ import annotations
 
