@@ -125,7 +125,7 @@ class NewtonSolver(EquilibriumSolver):
         state, residual = start, system.residual(start, control)
         best, not_better, line_search, diverged = (state, residual), 0, False, None
         last: tuple[State, np.ndarray] | None = None  # where the last step began, and its motion of the nodes
-        residuals, shift, any_stability, predicted, norm = [], least, True, False, math.inf
+        residuals, shift, any_stability, predicted, norm, singular = [], least, True, False, math.inf, False
         most = self.factorisations + options.factorisations
         contact = system.contact
         if contact is not None:
@@ -145,7 +145,7 @@ class NewtonSolver(EquilibriumSolver):
             near = path or (any_stability and residuals[-1] < options.near)
             predicted = last is not None and not near
             system.linearise(state, control, residual, last if predicted else None, contact)
-            x, shift = self._direction(residual, least, last=shift, any_stability=near)
+            x, shift, singular = self._direction(residual, least, last=shift, any_stability=near)
             plane = self.plane(state, control, residual)
             if contact is not None:
                 x = self._with_contact(contact, x, residual, plane)
@@ -162,7 +162,7 @@ class NewtonSolver(EquilibriumSolver):
             try:
                 state, residual, length = advance(state, control, step, residual, iteration)
             except NotConverged as failure:
-                return self.accept_best(*best, control, residuals, failure)
+                return self.accept_best(*best, control, residuals, _explained(failure, singular))
             # pressures of mixed elements are stresses that the step solves for already
             last = (before, -length * motion) if options.predicted_stress and not system.blocks.pressures.size else None
             if near and residual.norm > norm and not self.converged(residual, norm):
@@ -171,7 +171,8 @@ class NewtonSolver(EquilibriumSolver):
                 else:
                     # no contraction: near a limit or bifurcation point, where only descent makes progress
                     state, any_stability, line_search, last = diverged or before, False, True, None
-                    residual = self._again(state, control)
+                    # no step led to this residual: as large as before does not mean that it no longer falls
+                    residual, norm = self._again(state, control), math.inf
             elif near and shift == least and length == 1.0:
                 state, residual, norm = self._finish(state, control, residual, norm, step)
             if residual.norm < best[1].norm:
@@ -180,8 +181,8 @@ class NewtonSolver(EquilibriumSolver):
                 not_better += 1
             if not_better > options.watchdog and not line_search:
                 state, line_search, last = best[0], True, None
-                residual = self._again(state, control)
-        return self.accept_best(*best, control, residuals, self.exhausted(residuals, iteration))
+                residual, norm = self._again(state, control), math.inf
+        return self.accept_best(*best, control, residuals, _explained(self.exhausted(residuals, iteration), singular))
 
     def _with_contact(
         self, contact: ActiveSet, x: PETSc.Vec, residual: Residual, plane: Plane | None = None
@@ -200,20 +201,24 @@ class NewtonSolver(EquilibriumSolver):
 
     def _direction(
         self, residual: Residual, least: float, *, last: float, any_stability: bool
-    ) -> tuple[PETSc.Vec, float]:
+    ) -> tuple[PETSc.Vec, float, bool]:
         """x with K x the residual, and δ, raised until the inertia guarantees descent unless ``any_stability`` will do.
+
+        Also returns whether K with the ``least`` δ has pivots that are zero but for rounding.
 
         δ = ``least`` is tried first; then a third of the ``last`` successful one, and eight times that, …
         """
-        shift, following = least, max(_LEAST_SHIFT, last / 3.0)
+        shift, following, singular = least, max(_LEAST_SHIFT, last / 3.0), False
         for _ in range(self.options.shifts):
             x = self.try_solve(residual.vector, self.step_accuracy(residual)) if self.factor(shift) else None
+            if x is not None and shift == least:
+                singular = self.linear.known_inertia().zero > 0
             if x is not None and (any_stability or self.descends()):
                 break
             shift, following = following, 8.0 * following
         else:
             raise NotConverged("no shift of the KKT matrix gives a direction of descent", 0)
-        return x, shift
+        return x, shift, singular
 
     def _path_step(self, state: State, control: Control, step: Step, residuals: list[float]) -> tuple[State, Residual]:
         """The whole step across a path, unless it is too large or diverges: then a shorter one along it is due."""
@@ -300,3 +305,11 @@ class NewtonSolver(EquilibriumSolver):
             gap = control.gap(system, state) / system.joints.length
             value += force * control.prescribed + 0.5 * stiffness * gap**2
         return agreed(system.comm, value)
+
+
+def _explained(failure: NotConverged, singular: bool) -> NotConverged:
+    """The ``failure`` with its cause where the KKT matrix is ``singular`` but for rounding: steps lose their digits."""
+    if not singular:
+        return failure
+    cause = "less than the rounding of the stiffest link resists some motion"
+    return NotConverged(f"{cause}; {failure.reason}", failure.iterations)

@@ -23,6 +23,8 @@ from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 from fenicsmech.equilibrium.two_level import BySize
 from fenicsmech.errors import counted, expect, set_options
 
+_NO_MOTION = 1e-9  # over the mechanism's length, or rad, that counts as none
+_ROUNDING = 1e-4  # residual over the forces that may be rounding where the KKT matrix is nearly singular
 _STEP = 1e-6  # relative error that iterative solvers may leave in steps and tangents: the next iteration corrects it
 
 
@@ -186,12 +188,20 @@ class EquilibriumSolver(ABC):
     ) -> EquilibriumPoint:
         """The ``best`` state if its residual is rounding, as at a bifurcation; else raises the ``failure``.
 
-        Rounding is up to 1e-4 of the forces where the KKT matrix is nearly singular.
+        Rounding is up to 1e-4 of the forces where the KKT matrix is nearly singular, also along the step x that the
+        residual r still asks for, of largest motion |x|: soft springs may be out of balance by less than |r| tells,
+
+            r · x ≤ 1e-4 forces |x|,     K x = r.
         """
-        limit = min(1e-4 * residual.forces, self.options.roundoff * self.system.unknowns.unit)
+        limit = min(_ROUNDING * residual.forces, self.options.roundoff * self.system.unknowns.unit)
         if not residual.norm <= limit < math.inf:
             raise failure
         at = self.linearise(best, control, iterations=failure.iterations)
+        x = at.solve(at.residual.vector)
+        motion = self.system.size(self.system.unknowns.step(x))
+        work = abs(x.dot(at.residual.vector)) / self.system.unknowns.unit
+        if not (motion <= _NO_MOTION or work <= _ROUNDING * at.residual.forces * motion):
+            raise failure
         residuals = [*residuals[: failure.iterations], self.relative(at.residual)]
         return at.point(residuals, failure.iterations, tolerance=_STEP)
 
@@ -204,6 +214,6 @@ class EquilibriumSolver(ABC):
     def _rounding(self, residual: Residual) -> float:
         """Rounding of displacements and rotations, which are counted from the drawn configuration.
 
-        Less than 1e-9 of the mechanism's length counts as no displacement.
+        Less than ``_NO_MOTION`` of the mechanism's length counts as no displacement.
         """
-        return self.options.roundoff * self.system.unknowns.unit * max(residual.motion, 1e-9)
+        return self.options.roundoff * self.system.unknowns.unit * max(residual.motion, _NO_MOTION)

@@ -121,3 +121,20 @@ def test_too_few_iterations_are_given_as_the_reason():
     simulation, push = finger("plane-stress", solver=fm.PrimalDualNewton(iterations=1))
     with pytest.raises(fm.EquilibriumError, match="after 1 iteration"):
         simulation.load_displacement(push, forces=[5.0])
+
+
+def test_failure_names_a_link_softer_than_the_rounding_of_the_one_it_carries_as_its_cause():
+    mechanism = fm.Mechanism("anvil on a feather")
+    base = mechanism.rigid("base", fixed=True)
+    feather = mechanism.flexible(
+        "feather", fm.strip([(0, 0), (40, 0)], thickness=4.0, depth=4.0), fm.Material("down", 2e-13, 0.3)
+    )
+    anvil = mechanism.flexible(
+        "anvil", fm.strip([(40, 0), (80, 0)], thickness=4.0, depth=4.0), fm.Material("steel", 2e5, 0.3)
+    )
+    mechanism.weld(base, feather, at=(1.5, 0), interface_radius=1.0)
+    mechanism.weld(feather, anvil, at=(40, 0), interface_radius=1.0)
+    push = mechanism.force(on=anvil, at=(80, 0), direction=(0, -1))
+    simulation = fm.Simulation(fm.Scene(mechanism), space="plane-stress", order=1, size=2.0, comm=MPI.COMM_SELF)
+    with pytest.raises(fm.EquilibriumError, match="less than the rounding of the stiffest link resists some motion"):
+        simulation.load_displacement(push, forces=[1e-14])
