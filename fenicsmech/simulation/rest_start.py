@@ -1,9 +1,9 @@
 """Where load steps start; if nothing but loads holds a mechanism, in the rigid pose that these prefer (``RestSearch``).
 
-Dead loads on a flexible link are replaced by their potential as the link moves rigidly, from their sum and moments.
-Loads that turn with their link, as pressure does, prefer none if they balance, like that on a closed part. The pose as
-drawn remains the start, and the log says so, where such a load does not balance, loads drive the mechanism on without
-end, no pose is found, or a flexible link meets an obstacle on the way.
+Dead loads on a flexible link, those whose energy is linear in displacements, are replaced by their potential as the
+link moves rigidly, from their sum and moments. Other loads prefer no pose if they balance on each link, as pressure on
+a closed part does, and contact as long as nothing touches. The pose as drawn remains the start, and the log says so,
+where they do not on the way, loads drive the mechanism on without end, or no pose is found.
 """
 
 from __future__ import annotations
@@ -133,8 +133,6 @@ class RestPoses:
 
     def _turned(self, constrained: bool, wanted: float) -> RestPose:
         model, rigid, unloaded = self._model, self._model.linkage.rigid, self._unloaded
-        if self._constant is None:
-            return RestPose(unloaded)
         spring = TravelSpring([*self._dead(self._ratios)], wanted)
         weak: list[PosePotential] = [spring] if constrained else [*self._dead(self._ratios, wanted)]
         levels = (model.spring_potentials, self._constant, weak)
@@ -148,26 +146,38 @@ class RestPoses:
 
         # of one process: decisions that depend on rounding are the same on all
         turn, resist, reached = from_one(model.mesh.mesh.comm, search)
-        poses = turn.way[-1]
         if turn.ending is not RestEnding.AT_REST:
             unsettled = turn.ending is RestEnding.NOT_CONVERGED
             (_log.warning if unsettled else _log.info)("load steps start from the pose as drawn: %s", turn.ending.value)
             return RestPose(unloaded)
-        if np.array_equal(poses, unloaded.poses):
+        if np.array_equal(turn.way[-1], unloaded.poses):
             return RestPose(unloaded, resist, reached)
-        if any(self._touches(pose) for pose in turn.way[1:]):
-            _log.info("load steps start from the pose as drawn: obstacles are on the way to the one that loads prefer")
+        states = [unloaded, *map(self._at, turn.way[1:])]
+        if (link := next((link for state in states if (link := self._disturbed(state))), None)) is not None:
+            _log.info("load steps start from the pose as drawn: on the way, %r meets loads that are not dead", link)
             return RestPose(unloaded)
-        return RestPose(self._at(poses), resist, reached)
+        return RestPose(states[-1], resist, reached)
 
     def _at(self, poses: np.ndarray) -> State:
         rest = self._model.assembled_state(poses, self._unloaded.motors)
         return replace(self._unloaded, u=rest.u, poses=poses)
 
-    def _touches(self, poses: np.ndarray) -> bool:
-        """Whether a flexible link touches an obstacle at ``poses``."""
-        own = int(np.any(self._system.touching(self._at(poses))))
-        return self._system.comm.allreduce(own, op=MPI.MAX) > 0
+    def _disturbed(self, state: State) -> str | None:
+        """The first flexible link on which loads that are not dead, of obstacles too, do not balance in a loaded
+        ``state``."""
+        model, dim = self._model, self._model.linkage.dim
+        if model.elastic.effects_ufl is None:
+            return None
+        model.load(state)
+        _, others = model.elastic.effect_loads()
+        moved = state.u[: model.interfaces.owned * model.interfaces.block].reshape(model.interfaces.owned, -1)
+        for link, (_, force, moments, size) in zip(
+            model.linkage.interfaces, self._resultants(others, moved[:, :dim]), strict=True
+        ):
+            largest = max(np.linalg.norm(force), np.linalg.norm(moments - moments.T) / model.linkage.length)
+            if largest > self._search.balanced * size:
+                return link.name
+        return None
 
     def _dead(self, forces: Mapping[Force, float], factor: float = 1.0) -> Iterator[DeadLoad]:
         model, dim = self._model, self._model.linkage.dim
@@ -177,33 +187,26 @@ class RestPoses:
                 yield DeadLoad.at(point, factor * magnitude * np.array(in_dimension(force.direction, dim)))
 
     @cached_property
-    def _constant(self) -> list[PosePotential] | None:
-        """Potentials of loads that grow with the load factor; None if one turns with its link and does not balance."""
-        model, link_names = self._model, [link.name for link in self._model.mechanism.flexible_links]
+    def _constant(self) -> list[PosePotential]:
+        """Potentials of dead loads that grow with the load factor, and of poses."""
+        model = self._model
         found = [*self._dead(self._others), *(potential for potential in model.potentials if not potential.holds)]
         if model.elastic.effects_ufl is None:
             return found
-        model.load(self._unloaded)
-        dead, others = model.elastic.effect_loads()
-        for name, (_, force, moments, size) in zip(link_names, self._resultants(others), strict=True):
-            largest = max(np.linalg.norm(force), np.linalg.norm(moments - moments.T) / model.linkage.length)
-            if largest > self._search.balanced * size:
-                _log.info("load steps start from the pose as drawn: loads that turn with it act on %r", name)
-                return None
-        for body, force, moments, size in self._resultants(dead):
-            if size:
-                found.append(DeadLoad(body, force, moments, model.linkage.joints.space))
-        return found
+        loads = self._resultants(model.elastic.effect_loads()[0])
+        space = model.linkage.joints.space
+        return found + [DeadLoad(body, force, moments, space) for body, force, moments, size in loads if size]
 
-    def _resultants(self, loads: np.ndarray) -> Iterator[tuple[int, np.ndarray, np.ndarray, float]]:
-        """Of each flexible link with nodal ``loads`` f_i, flat: the body that moves with it, Σ f_i, Σ f_i ⊗ (X_i − c),
-        with the centre c of the body, and Σ |f_i|."""
+    def _resultants(
+        self, loads: np.ndarray, moved: np.ndarray | float = 0.0
+    ) -> Iterator[tuple[int, np.ndarray, np.ndarray, float]]:
+        """Of each flexible link with nodal ``loads`` f_i, flat: the body with the centre c that moves with it, Σ f_i,
+        Σ f_i ⊗ (X_i + u_i − c), u_i as ``moved`` (owned nodes, dim), and Σ |f_i|."""
         model, linkage = self._model, self._model.linkage
         owned, dim, comm = model.interfaces.owned, linkage.dim, model.mesh.mesh.comm
         nodal = loads.reshape(owned, -1)[:, :dim]
-        positions = (
-            model.elastic.drawn_nodes[:owned, :dim] + model.design_nodes.values(model.elastic.design)[:owned, :dim]
-        )
+        drawn = model.elastic.drawn_nodes + model.design_nodes.values(model.elastic.design)
+        positions = drawn[:owned, :dim] + moved
         for index, (body, *_) in enumerate(linkage.interfaces.values()):
             nodes = np.flatnonzero(model.node_link[:owned] == index)
             own, offsets = nodal[nodes], positions[nodes] - np.array(linkage.bodies[body].centre)

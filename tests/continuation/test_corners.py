@@ -1,9 +1,9 @@
-"""Steps along the arc go round corners, where other points touch, and neither cut off bends nor jump to other branches."""
+"""Steps along the arc go round corners, where other points touch, and do not jump to branches on which others do."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
