@@ -9,6 +9,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
+from fenicsmech.continuation import ArcLengthStepper
 from fenicsmech.equilibrium import EquilibriumSolver
 from fenicsmech.multibody import PosePotential
 
@@ -245,3 +246,17 @@ def test_obstacle_on_the_way_keeps_the_pose_as_drawn_for_a_start_and_the_log_say
             frames = error.frames
     assert "start from the pose as drawn" in caplog.text and "'rod' meets" in caplog.text
     assert all(frame.displacement < 22.0 for frame in frames)
+
+
+def test_path_until_a_force_begins_at_a_part_of_it_and_is_the_only_one_that_is_set_up(monkeypatch):
+    made, set_up = [], ArcLengthStepper.__init__
+
+    def counted(self, *given, **options):
+        made.append(self)
+        set_up(self, *given, **options)
+
+    monkeypatch.setattr(ArcLengthStepper, "__init__", counted)
+    simulation, pull = pendulum((1, 0))
+    curve = simulation.follow(pull, until=fm.Until(force=2.0), steps=fm.ArcSteps(first_load=0.05))
+    assert curve.forces[:2] == pytest.approx([0.0, 0.1]) and curve.forces[-1] == pytest.approx(2.0)
+    assert len(made) == 1
