@@ -10,6 +10,7 @@ import pytest
 import fenicsmech as fm
 from fenicsmech.continuation import LoadSteps
 from fenicsmech.estimates import AccuracyOptions
+from fenicsmech.multibody import RestSearch
 
 RECORDS = (
     fm.ArcSteps,
@@ -26,6 +27,7 @@ RECORDS = (
     fm.Scatter,
     fm.MeshQuality,
     AccuracyOptions,
+    RestSearch,
 )
 NUMBERS = [
     (record, field.name, field.default)

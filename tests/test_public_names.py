@@ -39,7 +39,7 @@ INNER = {
     "OneSided",
     "Panel",
     "ParametricShape",
-    "Plane",
+    "PathPlane",
     "PointLoad",
     "Quadratic",
     "Residual",

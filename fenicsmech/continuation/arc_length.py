@@ -4,6 +4,11 @@ An equilibrium is predicted along the tangent y′ and its curvature, corrected 
 prediction y, and accepted if the path turns little enough; steps are as long as its curvature allows. The only fallback
 is half the step, as long as that is not the shortest one: with the default lengths, seventeen solves at most.
 
+Where other points come to touch an obstacle, the stiffness jumps and the path has a corner. What tells it from a bend
+and from a jump to another branch is the step bisected towards the larger turn: a bend turns less in each half, and the
+ends of a jump stay apart, while a corner keeps its angle however near its ends are. Both tangents then point along the
+chord across it.
+
 Sources: Riks (doi:10.1016/0020-7683(79)90081-7), Crisfield (doi:10.1016/0045-7949(81)90108-5).
 """
 
@@ -44,11 +49,15 @@ class ArcSteps:
         motion: largest motion of a step, in lengths of the mechanism or rad.
         tolerance: of the location of limit points and bifurcations, over the step they lie in.
         turn: angle between the tangents at both ends of a step that step sizes aim at, rad.
-        largest_turn: angle above which a step is repeated with a smaller length: it jumps to another branch, or cuts
-            off a bend. Where other points touch an obstacle at its end, paths have corners, up to a right angle.
+        largest_turn: angle above which a step is repeated with a smaller length, unless that is the angle of a corner:
+            it jumps to another branch, or cuts off a bend.
+        largest_corner: angle, likewise, of a corner where other points come to touch an obstacle.
         gap: between two paths that pass each other, over the step, from which the step is repeated with a smaller
-            length; closer ones count as one bifurcation.
-        bisections: of a step in which the stability changes and the path turns, to tell that gap.
+            length; closer ones count as one bifurcation. Between the ends of a corner, likewise.
+        bisections: of a step in which the stability changes and the path turns, to tell that gap, and of one with a
+            corner.
+        first_load: force at which a path starts where nothing but loads holds the mechanism, over that at which a
+            linear one is at its end.
         iterations: number per step that step sizes aim at; the last one only determines the stability.
         contact_iterations: the same where other points touch at the end of a step: it hardly depends on its length.
 
@@ -63,8 +72,10 @@ class ArcSteps:
     tolerance: float = 1e-4
     turn: float = 0.25
     largest_turn: float = 0.9
+    largest_corner: float = 0.5 * math.pi
     gap: float = 0.2
     bisections: int = 5
+    first_load: float = 1e-3
     iterations: int = 5
     contact_iterations: int = 7
 
@@ -87,6 +98,22 @@ class Finish:
         """Whether the end lies between two neighbouring points."""
         a, b = self.value(before) - self.end, self.value(after) - self.end
         return a * b < 0.0 or (b == 0.0 and a != 0.0)
+
+
+def equilibrium_at(solver: EquilibriumSolver, followed: LoadControl | MotorControl, state: State) -> EquilibriumPoint:
+    """The point at an equilibrium, with its tangent by the followed value.
+
+    Raises:
+        NotConverged: the KKT matrix is singular.
+    """
+    at = solver.linearise(state, followed.at(followed.value(solver.system, state)))
+    return at.point((solver.relative(at.residual),), 0)
+
+
+def linear_reach(point: EquilibriumPoint, *, value: float | None, conjugate: float | None) -> float:
+    """Change of the followed value with which a linear mechanism reaches the first of two changes; infinite if none."""
+    speed = abs(point.conjugate_rate)
+    return min(abs(value) if value else math.inf, abs(conjugate) / speed if conjugate and speed else math.inf)
 
 
 class ArcLengthStepper(Stepper):
@@ -123,12 +150,11 @@ class ArcLengthStepper(Stepper):
     ) -> None:
         system, self.followed, self.steps, self.length = solver.system, followed, steps, steps.first
         self._conjugate_reference = conjugate or math.inf
-        at = solver.linearise(state, followed.at(followed.value(system, state)))
-        point = at.point((solver.relative(at.residual),), 0)
+        point = equilibrium_at(solver, followed, state)
         speed, motion = abs(point.conjugate_rate), math.sqrt(system.mean_product(point.tangent, point.tangent))
         if not followed.moves(system, point.tangent) or not (followed.displaces or value or speed > 0.0):
             raise NotConverged("it moves nothing")
-        reach = min(abs(value) if value else math.inf, abs(conjugate) / speed if conjugate and speed else math.inf)
+        reach = linear_reach(point, value=value, conjugate=conjugate)
         if math.isinf(reach):
             reach = 0.01 / motion  # neither sets a unit: a motion of 1 % of the mechanism's length, or 0.01 rad, does
         self.metric = ArcMetric(system, followed, reach * motion, reach, reach * speed or math.inf)
@@ -148,12 +174,12 @@ class ArcLengthStepper(Stepper):
     def correct(self, guess: State, normal: Step, near: EquilibriumPoint) -> EquilibriumPoint:
         """The equilibrium in the plane through ``guess`` across ``normal``, its tangent oriented along that.
 
-        Solves hold the value or its conjugate, whichever changes more along the path at ``near``, a nearby equilibrium.
+        The local parameter is that at ``near``, a nearby equilibrium.
         """
-        return self.solver.solve(guess, ArcLengthControl(0.0, self.metric, guess, normal, self.held(near)))
+        return self.solver.solve(guess, ArcLengthControl(0.0, self.metric, guess, normal, self.local_parameter(near)))
 
-    def held(self, near: EquilibriumPoint) -> LoadControl | DisplacementControl | MotorControl:
-        """The control that leaves K regular: whichever value changes more along the path at ``near``."""
+    def local_parameter(self, near: EquilibriumPoint) -> LoadControl | DisplacementControl | MotorControl:
+        """The control that leaves K regular: of the value or its conjugate, whichever changes more along the path."""
         conjugate = abs(near.conjugate_rate) / self.metric.conjugate
         if self.followed.opposite and conjugate > abs(self.value_rate(near)) / self.metric.value:
             return self.followed.opposite
@@ -202,10 +228,8 @@ class ArcLengthStepper(Stepper):
                 found = self.correct(self._predict(self.length), point.tangent, point)
                 turn = self._turn(point, found)
                 _log.debug("arc %.2e: turn %.2f, %d iterations", self.length, turn, found.iterations)
-                touched = self._other_points_touch(point.state, found.state)
-                # a straight path that goes on straight is the same one
-                jumps = turn > 0.1 * steps.gap and not touched and self._jumps(point, found)
-                if (turn <= steps.largest_turn and not jumps) or (touched and turn < 0.5 * math.pi):
+                touched = self._others_touch(point.touching, found.touching)
+                if self._stays_on_path(point, found, turn, touched):
                     iterations = steps.contact_iterations if touched else steps.iterations
                     growth = min(steps.turn / max(turn, 1e-12), math.sqrt(iterations / found.iterations))
                     self.length *= min(max(growth, 0.5), 2.0)
@@ -216,6 +240,30 @@ class ArcLengthStepper(Stepper):
             self.length *= 0.5
             if self.length < steps.smallest * min(longest / steps.largest, 1.0):
                 raise NotConverged(reason)
+
+    def _stays_on_path(self, start: EquilibriumPoint, end: EquilibriumPoint, turn: float, touched: bool) -> bool:
+        """Whether the path through ``start`` leads to ``end``, with a ``turn`` that steps may have; ``touched`` is
+        whether other points touch there."""
+        steps = self.steps
+        if turn > steps.largest_turn:
+            return touched and turn < steps.largest_corner and self._is_corner(start, end)
+        # a straight path that goes on straight is the same one
+        return turn <= 0.1 * steps.gap or not self._jumps(start, end)
+
+    def _is_corner(self, start: EquilibriumPoint, end: EquilibriumPoint) -> bool:
+        """Whether the path turns by more than ``largest_turn`` at one point of the step, at which it is continuous."""
+        steps, low, high = self.steps, start, end
+        near, far = 0.0, self.along(start, end)
+        part = far * 0.5**steps.bisections
+        while far - near > 1.5 * part:
+            middle = 0.5 * (near + far)
+            found = self.between(start, end, middle)
+            if self._turn(low, found) > self._turn(found, high):
+                high, far = found, middle
+            else:
+                low, near = found, middle
+        apart = self.metric.norm(self.chord(low, high)) / self.metric.norm(self.chord(start, end))
+        return steps.largest_turn < self._turn(low, high) < steps.largest_corner and apart <= steps.gap
 
     def _jumps(self, start: EquilibriumPoint, end: EquilibriumPoint) -> bool:
         """Whether another path that comes near, as beside an imperfect bifurcation, is taken in the step.

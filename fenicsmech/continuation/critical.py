@@ -142,11 +142,11 @@ class _Piece:
 
     def ends(self) -> tuple[_PiecePoint, _PiecePoint]:
         """Both ends."""
-        path, held = self.path, self.path.held(self.before)
+        path, local = self.path, self.path.local_parameter(self.before)
 
         def end(distance: float, point: EquilibriumPoint) -> _PiecePoint:
             path.system.load(point.state)
-            at = path.solver.linearise(point.state, held.at(held.value(path.system, point.state)))
+            at = path.solver.linearise(point.state, local.at(local.value(path.system, point.state)))
             return _PiecePoint(distance, point, self._stiffness(at))
 
         return end(0.0, self.before), end(self.width, self.after)

@@ -102,6 +102,27 @@ class LoadSteps:
         factors = tuple(not_negative("shift factor of load steps", factor) for factor in self.shift_factors)
         set_fields(self, shift_factors=factors)
 
+    def least_shifts(self, largest: float, *, loads_resist: bool = False) -> LeastShifts:
+        """Multiples of ``largest`` by ``shift_factors``; smallest first away from the start if ``loads_resist``.
+
+        There the prescribed value itself resists all zero-energy modes, which a shift would hide.
+        """
+        falling = tuple(factor * largest for factor in self.shift_factors) if largest else (0.0,)
+        return LeastShifts(falling, falling[::-1] if loads_resist else falling)
+
+
+@dataclass(frozen=True)
+class LeastShifts:
+    """Least shifts of the KKT matrix, in the order in which they are tried, in units of the mean stiffness.
+
+    Attributes:
+        at_start: at the value at which steps begin.
+        elsewhere: at others.
+    """
+
+    at_start: tuple[float, ...]
+    elsewhere: tuple[float, ...]
+
 
 class LoadStepsFailed(Exception):
     """Load stepping ended before the prescribed value.
@@ -134,8 +155,7 @@ class LoadStepper(Stepper):
         start: first guess of the equilibrium at which steps begin; the control's value there is the first one.
         control: whose prescribed value changes.
         predictor: of the next equilibrium.
-        held: whether the prescribed value itself holds all zero-energy modes, as soon as it is not zero: matrices need
-            a least shift at the start only, and later ones would hide how stable equilibria are.
+        shifts: for zero-energy modes; by default those of the start's least shift, the largest first.
 
     Attributes:
         iterations: KKT systems factored and solved so far.
@@ -143,14 +163,19 @@ class LoadStepper(Stepper):
     """
 
     def __init__(
-        self, solver: EquilibriumSolver, start: State, control: Control, *, predictor: Predictor, held: bool = False
+        self,
+        solver: EquilibriumSolver,
+        start: State,
+        control: Control,
+        *,
+        predictor: Predictor,
+        shifts: LeastShifts | None = None,
     ) -> None:
         super().__init__(solver, predictor, start)
-        self._held, self._steps = held, LoadSteps()
+        self._steps = LoadSteps()
+        self._shifts = shifts or self._steps.least_shifts(start.minimum_shift)
         self._value = agreed(solver.system.comm, control.value(solver.system, start))
         self._origin, self._covered = self._value, 0.0  # farthest from there so far
-        factors = self._steps.shift_factors if start.minimum_shift else (0.0,)
-        self._shifts = tuple(factor * start.minimum_shift for factor in factors)
         self._rate: Step | None = None  # of the last step, by the control value
         self.iterations = self.snaps = 0
 
@@ -163,8 +188,6 @@ class LoadStepper(Stepper):
         """
         if not self._points:
             self._settle(control.at(self._value))
-            if self._held:
-                self._shifts = self._shifts[::-1]
         steps, distance = self._steps, control.prescribed - self._value
         step, tried, failed = distance, [], 0  # failed: steps since the last equilibrium
         while True:
@@ -230,7 +253,9 @@ class LoadStepper(Stepper):
 
     def _correct(self, guess: State, control: Control) -> EquilibriumPoint:
         """The equilibrium near ``guess``, with the first shift for zero-energy modes that leads there."""
-        for place, shift in enumerate(self._shifts):
+        at_start = control.prescribed == self._origin
+        shifts = self._shifts.at_start if at_start else self._shifts.elsewhere
+        for place, shift in enumerate(shifts):
             try:
                 point = self.solver.solve(replace(guess, minimum_shift=shift), control)
             except NotConverged as failure:
@@ -238,7 +263,8 @@ class LoadStepper(Stepper):
                 reason = failure.reason
                 continue
             self.iterations += point.iterations
-            self._shifts = self._shifts[place:]
+            left = {"at_start" if at_start else "elsewhere": shifts[place:]}  # the others would fail again
+            self._shifts = replace(self._shifts, **left)
             return point
         raise NotConverged(reason)
 
@@ -247,8 +273,8 @@ class LoadStepper(Stepper):
         guess = self._predict(control.prescribed - self._value)
         if not self._points:
             return guess
-        last = self._points[-1].state
-        return last if self._leaves_contact(last, guess, control) else guess
+        last = self._points[-1]
+        return last.state if self._leaves_contact(last, guess, control) else guess
 
     def _predict(self, ahead: float) -> State:
         """The prediction; where it moves too far that of the tangent, then the last equilibrium."""
@@ -261,16 +287,19 @@ class LoadStepper(Stepper):
                 return guess
         return last
 
-    def _leaves_contact(self, last: State, guess: State, control: Control) -> bool:
+    def _leaves_contact(self, last: EquilibriumPoint, guess: State, control: Control) -> bool:
         """Whether other points touch in ``guess`` than in ``last``, and its residual under ``control`` is far larger.
 
         The tangent holds as long as the same points touch. Elsewhere the first step from the last equilibrium, with
         gaps linearised, is the prediction that keeps links outside obstacles.
         """
-        if not self._other_points_touch(last, guess):
+        if self.system.contact is None:
+            return False
+        self.system.load(guess)
+        if not self._others_touch(last.touching, self.system.contact.touching()):
             return False
         norms = []
-        for state in (control.prepare(last), control.prepare(guess)):
+        for state in (control.prepare(last.state), control.prepare(guess)):
             self.system.load(state)
             norms.append(self.system.residual(state, control).norm)
         return not norms[1] <= self._steps.contact_residual * norms[0]  # NaN where elements are inverted
@@ -344,7 +373,7 @@ class MotorStepper(LoadStepper):
         """Continues from the ``last`` equilibrium by straining links; whether this succeeded."""
         system, steps, distance = self.system, self._steps, control.prescribed - self._value
         try:
-            rate = self._held_rate(last, control.at(self._value))
+            rate = self._straining_rate(last, control.at(self._value))
         except NotConverged:
             return False
         step = distance * min(1.0, steps.motion / max(system.size(rate) * abs(distance), steps.motion))
@@ -363,14 +392,15 @@ class MotorStepper(LoadStepper):
             return True
         return False
 
-    def _left_path(self, last: EquilibriumPoint, held: Step, step: float, point: EquilibriumPoint) -> bool:
-        """Whether a coordinate's rate over ``step`` lies outside the range of ``held`` and the tangents at its ends."""
+    def _left_path(self, last: EquilibriumPoint, straining: Step, step: float, point: EquilibriumPoint) -> bool:
+        """Whether a coordinate's rate over ``step`` lies outside the range of the ``straining`` one and the tangents at
+        its ends."""
         rate = self.system.difference(point.state, last.state).scaled(1.0 / step)
-        largest = max(self.system.size(held), self.system.size(point.tangent))
-        return self._beyond(rate, (held, last.tangent, point.tangent)) > self._steps.deviation * largest
+        largest = max(self.system.size(straining), self.system.size(point.tangent))
+        return self._beyond(rate, (straining, last.tangent, point.tangent)) > self._steps.deviation * largest
 
-    def _held_rate(self, last: EquilibriumPoint, control: Control) -> Step:
-        """Rate of the state with the value of ``control``, the dominant motion x held.
+    def _straining_rate(self, last: EquilibriumPoint, control: Control) -> Step:
+        """Rate of the state with the value of ``control`` that strains links instead of the dominant motion x.
 
         Raises:
             NotConverged: the KKT matrix cannot be factored or solved with, or is not positive along the motion.

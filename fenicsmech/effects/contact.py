@@ -156,7 +156,8 @@ class Contact(Effect):
 
     Penetration falls as 1 / stiffness; iterations hardly depend on it. Obstacles act only after the motors have moved:
     a configuration whose rigid assembly is on the far side of an obstacle stays there. From then on flexible links
-    cannot slip through a cylinder: states with a penetration of a quarter of its radius are rejected. In space a
+    cannot slip through a cylinder: states with a penetration of a quarter of its radius are rejected. Mechanisms that
+    nothing but loads holds start as drawn where an obstacle is on the way to the pose that loads prefer. In space a
     pressed edge is also pressed on its flat faces inside the obstacle, with an error of the order of penetration over
     depth.
 

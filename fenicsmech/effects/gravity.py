@@ -15,7 +15,7 @@ import ufl
 
 from fenicsmech.errors import DescriptionError, expect, in_plane, point, positive, set_fields
 from fenicsmech.mechanism import Effect, RigidLink, in_dimension
-from fenicsmech.multibody import DeadForce
+from fenicsmech.multibody import DeadLoad
 
 
 @dataclass(frozen=True)
@@ -81,4 +81,4 @@ class Gravity(Effect):
 
     def pose_potentials(self, linkage):
         g = np.array(in_dimension(self.acceleration, linkage.dim))
-        return [DeadForce(linkage.point(link, mass.at), mass.mass * g) for link, mass in self.masses.items()]
+        return [DeadLoad.at(linkage.point(link, mass.at), mass.mass * g) for link, mass in self.masses.items()]

@@ -30,6 +30,7 @@ import ufl
 from dolfinx import fem
 from dolfinx.fem import petsc
 from petsc4py import PETSc
+from ufl.algorithms import expand_derivatives
 
 from fenicsmech.compat import (
     add_blocks,
@@ -57,8 +58,11 @@ class ElasticBody(BodyFields):
     @cached_property
     def effects_ufl(self) -> ufl.Form | None:
         """The energy of all effects, None if there are none."""
-        terms = [term for effect in self.effects if (term := effect(self)) is not None]
-        return _sum(terms) if terms else None
+        return _sum(self._effect_terms) if self._effect_terms else None
+
+    @cached_property
+    def _effect_terms(self) -> list[ufl.Form]:
+        return [term for effect in self.effects if (term := effect(self)) is not None]
 
     @cached_property
     def _strain_ufl(self) -> ufl.Form:
@@ -163,6 +167,16 @@ class ElasticBody(BodyFields):
         return [compile_form(ufl.derivative(_sum(terms), field)) for field in concerned]
 
     @cached_property
+    def _effect_load_forms(self) -> list:
+        """The gradients by u of effects' energies that are linear in u, and of the others; None where none is."""
+        dead: list[ufl.Form] = []
+        others: list[ufl.Form] = []
+        for term in self._effect_terms:
+            curvature = ufl.derivative(ufl.derivative(term, self.u), self.u)
+            (dead if expand_derivatives(curvature).empty() else others).append(term)
+        return [compile_form(ufl.derivative(_sum(terms), self.u)) if terms else None for terms in (dead, others)]
+
+    @cached_property
     def _sums(self) -> list[fem.Function]:
         """Functions on the spaces of ``fields`` in which vectors are assembled."""
         return [fem.Function(field.function_space) for field in self.fields]
@@ -200,6 +214,15 @@ class ElasticBody(BodyFields):
         for part, form, work in zip(self.split(found), self._load_factor_forms, self._sums, strict=False):
             part[:] = assemble_vector(form, work)
         return found
+
+    def effect_loads(self) -> tuple[np.ndarray, np.ndarray]:
+        """Nodal forces of effects at load factor 1: of dead loads, and of others, which change with u.
+
+        Each of this rank's owned values of u, flat.
+        """
+        dead, others = self._effect_load_forms
+        none = np.zeros(len(owned_values(self.u)))
+        return none if dead is None else -self.assembled(dead), none if others is None else -self.assembled(others)
 
     def create_stiffness(self) -> PETSc.Mat:
         """An empty matrix for ``add_stiffness``: per rank, the owned values of u, then those of p."""

@@ -23,7 +23,7 @@ from fenicsmech.equilibrium.control import (
     LoadControl,
     LoadFactorControl,
     MotorControl,
-    Plane,
+    PathPlane,
     Stability,
 )
 from fenicsmech.equilibrium.kkt import EntryCopy, KktMatrix

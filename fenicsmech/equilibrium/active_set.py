@@ -40,7 +40,7 @@ from scipy.optimize import brentq, nnls
 
 from fenicsmech.collective import from_one
 from fenicsmech.effects import OneSided
-from fenicsmech.equilibrium.control import Plane
+from fenicsmech.equilibrium.control import PathPlane
 from fenicsmech.equilibrium.unknowns import ScaledUnknowns
 from fenicsmech.errors import set_options
 
@@ -121,7 +121,7 @@ class ActiveSet:
         x: PETSc.Vec,
         residual: PETSc.Vec,
         solve: Callable[[PETSc.Vec], PETSc.Vec | None],
-        plane: Plane | None = None,
+        plane: PathPlane | None = None,
     ) -> PETSc.Vec | None:
         """The solution ``x`` of K x = ``residual`` with contact linearised; None if a solve fails.
 

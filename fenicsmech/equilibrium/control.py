@@ -16,11 +16,11 @@ A path may turn back in v and in q. Its arc length s is a control as well, with 
 
     ⟨n, y − y₀⟩ − s,      y the state with the value v of the control that is followed,
 
-in place of the equation that prescribes v. It needs no row of the matrix: solves hold v, or q where that changes more
+in place of the equation that prescribes v. It needs no row of the matrix: that prescribes v, or q where it changes more
 (Rheinboldt & Burkardt, doi:10.1145/357456.357460), which leaves K regular at limit points of the other, and the Newton
-step is moved into the plane by bordering, with r the right-hand side of the control that is held,
+step is moved into the plane by bordering, with r the right-hand side of the control of v or q, the local parameter,
 
-    K x₀ = −R,    K x₁ = r,    x = x₀ + τ x₁,    τ such that y + x lies in the plane (``Plane``).
+    K x₀ = −R,    K x₁ = r,    x = x₀ + τ x₁,    τ such that y + x lies in the plane (``PathPlane``).
 
 Sources: Riks (doi:10.1016/0020-7683(79)90081-7), Crisfield (doi:10.1016/0045-7949(81)90108-5).
 """
@@ -287,45 +287,45 @@ class ArcLengthControl(Control):
         metric: ⟨·, ·⟩.
         origin: y₀.
         normal: n; the path's tangent, of norm one, is oriented along it.
-        held: the control that solves hold, which the equation of the plane replaces: of the followed value, or of its
-            conjugate.
+        local: the control of the local parameter, the followed value or its conjugate, which K prescribes in place of
+            the plane.
     """
 
     prescribed: float
     metric: ArcMetric
     origin: State
     normal: Step
-    held: LoadControl | DisplacementControl | MotorControl
+    local: LoadControl | DisplacementControl | MotorControl
     along_path = True
 
     @property
     def constrained(self) -> bool:
-        return self.held.constrained
+        return self.local.constrained
 
     def value(self, system, state):
         return self.metric.dot(self.normal, system.difference(state, self.origin))
 
     def gap(self, system, state):
-        return 0.0  # held where it is
+        return 0.0  # the local parameter stays where it is
 
     def rate(self, system, state):
-        return self.held.rate(system, state)
+        return self.local.rate(system, state)
 
     def rates(self, system, right, x):
-        tangent, rate = self.held.rates(system, right, x)
-        if not isinstance(self.held, type(self.metric.followed)):
-            rate = 1.0  # of the conjugate, which is held itself
+        tangent, rate = self.local.rates(system, right, x)
+        if not isinstance(self.local, type(self.metric.followed)):
+            rate = 1.0  # of the conjugate, which is the local parameter itself
         scale = 1.0 / self.metric.norm(tangent)
         if not self.metric.dot(tangent, self.normal) > 0.0:
             scale = -scale
         return tangent.scaled(scale), scale * rate
 
     def stability(self, excess, tangent, conjugate_rate):
-        held_rate = tangent.force * conjugate_rate  # of the same sign
-        return self.held.stability(excess, tangent, held_rate)
+        local_rate = tangent.force * conjugate_rate  # of the same sign
+        return self.local.stability(excess, tangent, local_rate)
 
 
-class Plane:
+class PathPlane:
     """The plane of an ``ArcLengthControl``, into which steps from one state are moved along x₁.
 
     Args:
@@ -337,7 +337,7 @@ class Plane:
 
     def __init__(self, control: ArcLengthControl, system, state: State, x: PETSc.Vec) -> None:
         self._control, self._system, self.x = control, system, x
-        self._rate = control.held.tangent(system.unknowns.step(x))
+        self._rate = control.local.tangent(system.unknowns.step(x))
         self._slope = control.metric.dot(control.normal, self._rate)
         self._gap = control.value(system, state) - control.prescribed
 

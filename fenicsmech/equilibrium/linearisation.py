@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 import numpy as np
@@ -216,6 +216,7 @@ class EquilibriumPoint:
         iterations: KKT systems factored and solved on the way.
         residuals: relative residual before each iteration and at the end.
         linearisation: K, last factored on the way, of which stability and tangent are.
+        touching: whether each of this rank's points touches an obstacle, (n,); empty where none may.
     """
 
     state: State
@@ -226,6 +227,7 @@ class EquilibriumPoint:
     iterations: int
     residuals: tuple[float, ...]
     linearisation: Linearisation
+    touching: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
 
     @property
     def unstable_modes(self) -> int:
@@ -300,7 +302,8 @@ class Linearisation:
         tangent, rate = control.rates(system, right, x)
         stability = control.stability(inertia.negative - system.negative_where_stable, tangent, rate)
         state = system.without_self_stress(self.state)
-        return EquilibriumPoint(state, control, tangent, rate, stability, iterations, tuple(residuals), self)
+        touching = system.touching(self.state)
+        return EquilibriumPoint(state, control, tangent, rate, stability, iterations, tuple(residuals), self, touching)
 
     def travel_gradient(self, load: PointLoad) -> PETSc.Vec:
         """∂(a · u_P)/∂x of a load's travel."""

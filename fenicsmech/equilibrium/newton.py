@@ -46,7 +46,7 @@ from petsc4py import PETSc
 
 from fenicsmech.collective import agreed
 from fenicsmech.equilibrium.active_set import ActiveSet
-from fenicsmech.equilibrium.control import Control, Plane
+from fenicsmech.equilibrium.control import Control, PathPlane
 from fenicsmech.equilibrium.linearisation import EquilibriumPoint, NotConverged
 from fenicsmech.equilibrium.solver import EquilibriumMethod, EquilibriumSolver
 from fenicsmech.equilibrium.state import State, Step
@@ -185,7 +185,7 @@ class NewtonSolver(EquilibriumSolver):
         return self.accept_best(*best, control, residuals, _explained(self.exhausted(residuals, iteration), singular))
 
     def _with_contact(
-        self, contact: ActiveSet, x: PETSc.Vec, residual: Residual, plane: Plane | None = None
+        self, contact: ActiveSet, x: PETSc.Vec, residual: Residual, plane: PathPlane | None = None
     ) -> PETSc.Vec | None:
         """The solution ``x`` with gaps linearised in place of the points that touch; None if a solve fails."""
         accuracy = self.step_accuracy(residual)

@@ -10,7 +10,7 @@ from functools import cached_property
 
 from petsc4py import PETSc
 
-from fenicsmech.equilibrium.control import ArcLengthControl, Control, Plane
+from fenicsmech.equilibrium.control import ArcLengthControl, Control, PathPlane
 from fenicsmech.equilibrium.linearisation import (
     EquilibriumPoint,
     Linearisation,
@@ -132,16 +132,16 @@ class EquilibriumSolver(ABC):
             x = right.duplicate()
             return x if self.linear.solve(right, x, tolerance) else None
 
-    def plane(self, state: State, control: Control, residual: Residual) -> Plane | None:
+    def plane(self, state: State, control: Control, residual: Residual) -> PathPlane | None:
         """The plane across a path, for steps with the matrix last factored; None for other controls."""
         if not isinstance(control, ArcLengthControl):
             return None
         rate = self.try_solve(control.rate(self.system, state), self.step_accuracy(residual))
         if rate is None:
             raise NotConverged("the linear solver stalled")
-        return Plane(control, self.system, state, rate)
+        return PathPlane(control, self.system, state, rate)
 
-    def newton_step(self, x: PETSc.Vec, plane: Plane | None) -> Step:
+    def newton_step(self, x: PETSc.Vec, plane: PathPlane | None) -> Step:
         """The step −``x`` with K x the residual, moved into the ``plane`` across a path."""
         return self.system.unknowns.step(x).scaled(-1.0) if plane is None else plane.reached(-x)
 

@@ -164,6 +164,13 @@ class EquilibriumSystem:
         """Makes the finite-element fields hold ``state``."""
         load_fields(self.elastic, self.interfaces, state)
 
+    def touching(self, state: State) -> np.ndarray:
+        """Loads ``state``, and says whether each of this rank's points touches an obstacle there, (n,). Local."""
+        if self.contact is None:
+            return np.zeros(0, bool)
+        self.load(state)
+        return self.contact.touching()
+
     def difference(self, later: State, earlier: State) -> Step:
         """``later`` − ``earlier``. Local."""
         z = self.joints.unknowns(later.poses) - self.joints.unknowns(earlier.poses)

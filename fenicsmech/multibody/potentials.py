@@ -13,7 +13,7 @@ from types import MappingProxyType
 import numpy as np
 
 from fenicsmech.errors import EquilibriumError
-from fenicsmech.joints import coordinate_rate, free_coordinate
+from fenicsmech.joints import RigidSpace, coordinate_rate, free_coordinate
 from fenicsmech.mechanism import Effect, Joint
 from fenicsmech.multibody.linkage import Linkage
 from fenicsmech.multibody.places import JointChange
@@ -80,34 +80,52 @@ def spring_potentials(effects: Sequence[Effect], linkage: Linkage) -> tuple[Pose
     return tuple(found for effect in effects for found in effect.pose_potentials(linkage) if found.holds)
 
 
-class DeadForce(PosePotential):
-    """−F · u of a point that moves with a body."""
+class DeadLoad(PosePotential):
+    """The potential of dead forces f_i at points X_i of one rigid body with the pose (t, R) and the centre c:
 
-    def __init__(self, point: BodyPoint, force: np.ndarray) -> None:
-        self.bodies, self._point, self._force = (point.body,), point, force
+        −Σ f_i · u_i = −F · t − M : (R − I),     F = Σ f_i,     M = Σ f_i ⊗ (X_i − c).
+
+    Args:
+        body: its index.
+        force: F, (dim,).
+        moments: M, (dim, dim).
+        space: rigid-body coordinates.
+    """
+
+    def __init__(self, body: int, force: np.ndarray, moments: np.ndarray, space: RigidSpace) -> None:
+        self.bodies, self._force, self._moments, self._space = (body,), force, moments, space
+        # the centre, and the points at unit distances from it along the axes
+        self._points = np.vstack([np.zeros(len(force)), np.eye(len(force))])
+
+    @classmethod
+    def at(cls, point: BodyPoint, force: np.ndarray) -> DeadLoad:
+        """That of one ``force`` at a ``point``."""
+        return cls(point.body, force, np.outer(force, point.offset), point.space)
 
     def value(self, poses):
-        return -float(self._force @ self._point.displacement(None, poses))
+        t, *turned = self._space.displace(poses[self.bodies[0]], self._points)
+        return -float(self._force @ t + np.sum(self._moments.T * (np.array(turned) - t)))
 
     def gradient(self, poses):
-        return -self._force @ self._point.gradient(poses)
+        t, *turned = self._space.displacement_gradient(poses[self.bodies[0]], self._points)
+        return -(self._force @ t + np.einsum("ab,bac->c", self._moments, np.array(turned) - t))
 
     def hessian(self, poses):
-        return -self._point.hessian(poses, self._force)
+        return -self._space.displacement_hessian(poses[self.bodies[0]], self._moments)
 
 
 class TravelSpring(PosePotential):
-    """½ (w − d)², w = −V the work of dead forces of magnitude one: least where w is nearest to d."""
+    """½ (w − d)², w = −V the work of dead loads of magnitude one: least where w is nearest to d."""
 
-    def __init__(self, forces: Sequence[DeadForce], travel: float) -> None:
+    def __init__(self, forces: Sequence[DeadLoad], travel: float) -> None:
         self.bodies = tuple(sorted({body for force in forces for body in force.bodies}))
         self._forces, self._travel = forces, travel
 
     def value(self, poses):
-        return 0.5 * self._short(poses) ** 2
+        return 0.5 * self.short(poses) ** 2
 
     def gradient(self, poses):
-        return self._short(poses) * sum(self._spread(force, force.gradient(poses)) for force in self._forces)
+        return self.short(poses) * sum(self._spread(force, force.gradient(poses)) for force in self._forces)
 
     def hessian(self, poses):
         slope = sum(self._spread(force, force.gradient(poses)) for force in self._forces)
@@ -115,19 +133,19 @@ class TravelSpring(PosePotential):
         for force in self._forces:
             own = self._own(force, poses)
             curvature[own, own] += force.hessian(poses)
-        return np.outer(slope, slope) + self._short(poses) * curvature
+        return np.outer(slope, slope) + self.short(poses) * curvature
 
-    def _short(self, poses: np.ndarray) -> float:
-        """d − w."""
+    def short(self, poses: np.ndarray) -> float:
+        """d − w at the ``poses`` of all bodies."""
         return self._travel + sum(force.value(poses) for force in self._forces)
 
-    def _spread(self, force: DeadForce, slope: np.ndarray) -> np.ndarray:
+    def _spread(self, force: DeadLoad, slope: np.ndarray) -> np.ndarray:
         """A slope by the pose of one force's body, among those of all ``bodies``."""
         spread = np.zeros((len(self.bodies), len(slope)))
         spread[self.bodies.index(force.bodies[0])] = slope
         return spread.ravel()
 
-    def _own(self, force: DeadForce, poses: np.ndarray) -> slice:
+    def _own(self, force: DeadLoad, poses: np.ndarray) -> slice:
         first = poses.shape[1] * self.bodies.index(force.bodies[0])
         return slice(first, first + poses.shape[1])
 

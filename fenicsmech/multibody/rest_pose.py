@@ -19,12 +19,35 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 
+from fenicsmech.errors import set_options
 from fenicsmech.multibody.assembly import Assembler, free_motions
 from fenicsmech.multibody.linkage import JointSystem
 from fenicsmech.multibody.potentials import PosePotential
+
+
+class RestEnding(Enum):
+    """How a search for the pose that loads prefer ends."""
+
+    AT_REST = "a pose was found"
+    DRIVEN_ON = "loads drive the mechanism on without end"
+    NOT_CONVERGED = "no pose was found in the steps allowed"
+
+
+@dataclass(frozen=True, eq=False)
+class RestTurn:
+    """The way to the pose that loads prefer.
+
+    Attributes:
+        way: poses of all bodies from the given ones to the last, each (bodies, pose_size).
+        ending: of the search.
+    """
+
+    way: tuple[np.ndarray, ...]
+    ending: RestEnding
 
 
 @dataclass(frozen=True)
@@ -34,18 +57,30 @@ class RestSearch:
     Attributes:
         steps: maximum number for each level.
         radius: largest step, within which the potential is about quadratic.
-        near: size of a step at which a level is at its minimum. A pose that near to it stays as it is: dead centres,
-            drawn as such, too.
+        near: size of a step at which a level is at its minimum, and distance of a prescribed displacement that counts
+            as reached. A pose that near to it stays as it is: dead centres, drawn as such, too.
+        reach: distance from the given pose beyond which loads drive the mechanism on without end.
+        same: largest distance between two poses that count as one.
+        balanced: resultants of loads that turn with their link, over the sizes of these loads, that count as none.
+
+    Raises:
+        DescriptionError: a number is not positive, or that of steps not whole.
     """
 
     steps: int = 200
     radius: float = 0.3
     near: float = 1e-9
+    reach: float = 30.0
+    same: float = 1e-6
+    balanced: float = 1e-9
+
+    def __post_init__(self) -> None:
+        set_options(self, "the search for a pose at rest", steps=1)
 
     def pose(
         self, system: JointSystem, poses: np.ndarray, motors: np.ndarray, levels: Sequence[Sequence[PosePotential]]
-    ) -> np.ndarray | None:
-        """The rest pose, (bodies, pose_size), or None if loads drive the mechanism on without end.
+    ) -> RestTurn:
+        """The way to the rest pose.
 
         Args:
             system: joints and links as rigid bodies.
@@ -53,34 +88,47 @@ class RestSearch:
             motors: at ``motors`` (connections,).
             levels: potentials, each level far stronger than the next.
         """
-        stronger: tuple[PosePotential, ...] = tuple(levels[0])
+        stronger, way = tuple(levels[0]), [poses]
         for level in levels[1:]:
-            found = self._minimum(Assembler(system, stronger), poses, motors, level) if level else poses
-            if found is None:
-                return None
-            poses, stronger = found, (*stronger, *level)
-        return poses
+            if level:
+                ending = self._descend(Assembler(system, stronger), way, motors, level)
+                if ending is not RestEnding.AT_REST:
+                    return RestTurn(tuple(way), ending)
+            stronger = (*stronger, *level)
+        return RestTurn(tuple(way), RestEnding.AT_REST)
 
-    def _minimum(
-        self, assembler: Assembler, poses: np.ndarray, motors: np.ndarray, level: Sequence[PosePotential]
-    ) -> np.ndarray | None:
-        """The pose where ``level`` is least among those in which the assembler's springs are; None if there is none."""
+    def distance(self, system: JointSystem, a: np.ndarray, b: np.ndarray) -> float:
+        """The largest change of a coordinate between two poses of all bodies, (bodies, pose_size)."""
+        change = (system.unknowns(b) - system.unknowns(a)) / system.pose_scale
+        return float(np.max(np.abs(change), initial=0.0))
+
+    def _descend(
+        self, assembler: Assembler, way: list[np.ndarray], motors: np.ndarray, level: Sequence[PosePotential]
+    ) -> RestEnding:
+        """Goes on along ``way`` to where ``level`` is least among the poses in which the assembler's springs are.
+
+        Steps may rise by rounding, each time from the least value so far: rises do not add up.
+        """
         system, radius = assembler.system, self.radius
-        value = sum(potential.value(poses) for potential in level)
+        least = sum(potential.value(way[-1]) for potential in level)
         for _ in range(self.steps):
+            poses = way[-1]
             step, rounding = _step(assembler, poses, motors, level)
             size = float(np.max(np.abs(step), initial=0.0))
             if size <= self.near:
-                return poses
+                return RestEnding.AT_REST
             moved = system.unknowns(poses) + system.pose_scale * step * min(1.0, radius / size)
             trial, missed = assembler.close(system.with_unknowns(poses, moved), motors)
             trial, missed = assembler.relax(trial, missed, motors)
             after = sum(potential.value(trial) for potential in level)
-            if assembler.is_closed(missed) and after <= value + rounding:
-                poses, value, radius = trial, after, min(self.radius, 2.0 * radius)
+            if assembler.is_closed(missed) and after <= least + rounding:
+                way.append(trial)
+                least, radius = min(least, after), min(self.radius, 2.0 * radius)
+                if self.distance(system, way[0], trial) > self.reach:
+                    return RestEnding.DRIVEN_ON
             else:
                 radius = 0.25 * min(radius, size)
-        return None
+        return RestEnding.NOT_CONVERGED
 
 
 def _step(
@@ -88,10 +136,10 @@ def _step(
 ) -> tuple[np.ndarray, float]:
     """The Newton step of ``level`` along flat motions, in units of ``JointSystem.pose_scale``, (size,); and the
     rounding of its potential."""
-    held = free_motions(assembler.system, poses, motors, assembler.springs)
+    stronger = free_motions(assembler.system, poses, motors, assembler.springs)
     own = free_motions(assembler.system, poses, motors, level)
-    curvatures, modes = np.linalg.eigh(held.curvature)
-    flat = modes[:, np.abs(curvatures) <= held.rounding].T
+    curvatures, modes = np.linalg.eigh(stronger.curvature)
+    flat = modes[:, np.abs(curvatures) <= stronger.rounding].T
     stiffness, ways = np.linalg.eigh(flat @ own.curvature @ flat.T)
     slope = ways.T @ flat @ own.slope
     slope[np.abs(slope) <= own.rounding] = 0.0

@@ -16,6 +16,8 @@ from fenicsmech.continuation import (
     Finish,
     Sense,
     crossing,
+    equilibrium_at,
+    linear_reach,
     locate,
     null_space,
 )
@@ -204,9 +206,6 @@ def branches(
 class CurveFollower:
     """The path of one request, until an end."""
 
-    # force at which a path starts if nothing else holds the mechanism, over that of a linear one at its end
-    _HELD = 1e-3
-
     def __init__(self, discretisation: Discretisation, request: CurveRequest, until: Until, steps: ArcSteps) -> None:
         self._stepper, self._until, self._steps = CurveStepper(discretisation, request), until, steps
         self._followed, self._system = self._stepper.followed, self._stepper.solver.system
@@ -218,10 +217,10 @@ class CurveFollower:
         try:
             state = self._frames[0].state
             if self._drifts:
-                state = self._stepper.start_from_rest(LoadControl(self._sense()))
+                state = self._stepper.start(LoadControl(self._sense())).state
                 if free := self._within(self._conjugate(state)):
                     return self._moved_freely(free, watch)
-                self._frames.append(self._held(state))
+                self._frames.append(self._first_loaded(state))
                 state = self._frames[-1].state
             path = self._path(state)
         except NotConverged as failure:
@@ -253,10 +252,13 @@ class CurveFollower:
         moved = CurveStepper(stepper.discretisation, replace(stepper.request, controls=controls))
         return self._curve(moved.curve(watch).frames)
 
-    def _held(self, state: State) -> Frame:
-        """An equilibrium near ``state``, at rest without the force, that a small part of the force holds."""
-        small = math.copysign(self._HELD * self._path(state).metric.value, self._sense())
-        return self._stepper.frame(LoadControl(small))
+    def _first_loaded(self, state: State) -> Frame:
+        """An equilibrium near ``state``, at rest without the force, under a small part of that at the path's end."""
+        reach, conjugate = self._changes(state)
+        if conjugate:
+            point = equilibrium_at(self._stepper.solver, self._followed, state)
+            reach = linear_reach(point, value=reach, conjugate=conjugate)
+        return self._stepper.frame(LoadControl(math.copysign(self._steps.first_load * reach, self._sense())))
 
     def from_bifurcation(self, event: PathEvent, mode: ModeShape, sense: Sense) -> FollowedCurve:
         """The curve that crosses another one at ``event`` along ``mode``."""
@@ -264,7 +266,7 @@ class CurveFollower:
         self._frames.append(event.frame)
         try:
             if self._drifts:
-                rest = self._held(self._stepper.start_from_rest(LoadControl(self._sense())))
+                rest = self._first_loaded(self._stepper.start(LoadControl(self._sense())).state)
             path = self._path(rest.state)
             first = crossing(path, event.critical, mode.step, sense)
         except NotConverged as failure:
@@ -319,19 +321,20 @@ class CurveFollower:
 
     def _path(self, state: State) -> ArcLengthStepper:
         """The path through ``state``, in units of its ends."""
+        value, conjugate = self._changes(state)
+        solver, steps = self._stepper.solver, self._steps
+        return ArcLengthStepper(solver, self._followed, state, steps=steps, value=value, conjugate=conjugate)
+
+    def _changes(self, state: State) -> tuple[float, float]:
+        """Largest changes from ``state`` to wanted values of the followed control, and of its conjugate; 0 if none is
+        wanted."""
         until, conjugate = self._until, self._conjugate(state)
         value = agreed(self._system.comm, self._followed.value(self._system, state))
         values, conjugates = until.displacements, until.forces
         if not self._followed.displaces:
             values, conjugates = conjugates, values
-        return ArcLengthStepper(
-            self._stepper.solver,
-            self._followed,
-            state,
-            steps=self._steps,
-            value=max((abs(end - value) for end in values), default=0.0),
-            conjugate=max((abs(end - conjugate) for end in conjugates), default=0.0),
-        )
+        farthest = max((abs(end - value) for end in values), default=0.0)
+        return farthest, max((abs(end - conjugate) for end in conjugates), default=0.0)
 
     def _finishes(self, path: ArcLengthStepper) -> list[Finish]:
         """Displacements or positions first, then forces."""

@@ -1,117 +1,215 @@
-"""Where load steps start if nothing but loads holds a mechanism: the rigid pose that these prefer (``RestSearch``).
+"""Where load steps start; if nothing but loads holds a mechanism, in the rigid pose that these prefer (``RestSearch``).
 
-Loads on flexible links are replaced by the dead force, at one point, that does their work in rigid motions.
+Dead loads on a flexible link, those whose energy is linear in displacements, are replaced by their potential as the
+link moves rigidly, from their sum and moments. Other loads prefer no pose if they balance on each link, as pressure on
+a closed part does, and contact as long as nothing touches. The pose as drawn remains the start, and the log says so,
+where they do not on the way, loads drive the mechanism on without end, or no pose is found.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
 
 from fenicsmech.collective import from_one
-from fenicsmech.equilibrium import Control, State
-from fenicsmech.mechanism import Force, in_dimension
+from fenicsmech.continuation import LoadStepper
+from fenicsmech.equilibrium import Control, EquilibriumSystem, State
+from fenicsmech.log import logger
+from fenicsmech.mechanism import Force, ForceGroup, PrescribedPart, in_dimension
 from fenicsmech.model import MechanismModel
-from fenicsmech.multibody import BodyPoint, DeadForce, IdleSpin, PosePotential, RestSearch, TravelSpring, count_freedom
+from fenicsmech.multibody import DeadLoad, PosePotential, RestEnding, RestSearch, TravelSpring, count_freedom
 
-_BALANCED = 1e-9  # sum of the forces on a link, over that of their sizes, that counts as none
+_log = logger(__name__)
 
 
-@dataclass(frozen=True)
-class RestStart:
-    """Where load steps start.
+@dataclass(frozen=True, eq=False)
+class RestPose:
+    """A configuration without loads.
 
     Attributes:
-        state: without loads.
-        held: whether the loads hold all zero-energy modes there, once they are not zero.
+        state: the equilibrium there.
+        loads_resist: whether loads resist all zero-energy modes there, once they are not zero.
+        reached: whether a prescribed displacement is reached there, without force.
     """
 
     state: State
-    held: bool
+    loads_resist: bool = False
+    reached: bool = False
 
 
-def rest_start(
-    model: MechanismModel,
-    unloaded: State,
-    motors: np.ndarray,
-    constant: Sequence[tuple[Force, float]],
-    ratios: Mapping[Force, float],
-    control: Control,
-    idle: Sequence[IdleSpin],
-) -> RestStart:
-    """``unloaded`` in the pose that constant loads prefer, and the controlled force as it starts from zero.
+@dataclass(frozen=True)
+class Effort:
+    """What steps on the way to a frame took.
 
-    Where a displacement is prescribed, it is the pose nearest to it.
+    Attributes:
+        iterations: KKT systems factored and solved.
+        snaps: number of times the path turned back.
+        seconds: wall-clock time.
+        phases: wall-clock time by phase.
+    """
 
-    It stays as it is where loads drive the mechanism on without end.
+    iterations: int = 0
+    snaps: int = 0
+    seconds: float = 0.0
+    phases: Mapping[str, float] = field(default_factory=dict)
+
+    def __add__(self, other: Effort) -> Effort:
+        names = {**self.phases, **other.phases}
+        phases = {name: self.phases.get(name, 0.0) + other.phases.get(name, 0.0) for name in names}
+        seconds = self.seconds + other.seconds
+        return Effort(self.iterations + other.iterations, self.snaps + other.snaps, seconds, phases)
+
+
+@dataclass(frozen=True, eq=False)
+class CurveStart:
+    """Where load steps start.
+
+    Attributes:
+        rest: the pose without loads.
+        state: the equilibrium there under constant loads.
+        steps: load steps from there.
+        effort: on the way to the state.
+    """
+
+    rest: RestPose
+    state: State
+    steps: LoadStepper
+    effort: Effort
+
+
+class RestPoses:
+    """The poses of one configuration that loads prefer.
 
     Args:
         model: of the mechanism.
-        unloaded: its rigid assembly, loaded.
+        system: its equations.
+        unloaded: its rigid assembly.
         motors: of the linkage with rigid links, (connections,).
         constant: other forces and their magnitudes, which act as effects do.
-        ratios: of forces to the controlled one.
-        control: a force, of which the sign counts, or the displacement of its point from the drawing.
-        idle: spins that nothing resists.
+        part: the controlled force, or motors.
+        search: for the poses.
     """
-    rigid = model.linkage.rigid
-    strong = [*_dead_forces(model, dict(constant)), *_effects(model)]
-    weak: list[PosePotential] = []
-    if control.constrained:
-        weak = [TravelSpring([*_dead_forces(model, ratios)], control.prescribed)]
-    elif control.prescribed:
-        sense = math.copysign(1.0, control.prescribed)
-        weak = [*_dead_forces(model, {force: sense * ratio for force, ratio in ratios.items()})]
-    levels = (model.spring_potentials, strong, weak)
 
-    def search() -> tuple[np.ndarray | None, bool]:
-        poses = RestSearch().pose(rigid, unloaded.poses, motors, levels)
-        if poses is None:
-            return None, False
+    def __init__(
+        self,
+        model: MechanismModel,
+        system: EquilibriumSystem,
+        unloaded: State,
+        motors: np.ndarray,
+        constant: Iterable[tuple[Force, float]],
+        part: PrescribedPart,
+        search: RestSearch | None = None,
+    ) -> None:
+        self._model, self._system, self._unloaded, self._motors = model, system, unloaded, motors
+        self._others, self._search = dict(constant), search or RestSearch()
+        self._ratios = dict(part.ratios) if isinstance(part, Force | ForceGroup) else {}
+        self._found: dict[tuple[bool, float], RestPose] = {}
+
+    def under(self, control: Control) -> RestPose:
+        """The pose that constant loads prefer, and the controlled force as it starts from zero, by its sign.
+
+        Where a displacement is prescribed, from the drawing, it is the pose nearest to it.
+        """
+        wanted = control.prescribed
+        if not control.constrained:
+            wanted = math.copysign(1.0, wanted) if wanted else 0.0
+        key = control.constrained, wanted
+        if key not in self._found:
+            self._found[key] = self._turned(*key)
+        return self._found[key]
+
+    def same(self, a: RestPose, b: RestPose) -> bool:
+        """Whether steps under load that start from one may start from the other as well."""
+        if a.reached or b.reached or a.loads_resist != b.loads_resist:
+            return False
+        rigid, poses = self._model.linkage.rigid, (a.state.poses, b.state.poses)
+        apart = from_one(self._model.mesh.mesh.comm, lambda: self._search.distance(rigid, *poses))
+        return apart <= self._search.same
+
+    def _turned(self, constrained: bool, wanted: float) -> RestPose:
+        model, rigid, unloaded = self._model, self._model.linkage.rigid, self._unloaded
+        spring = TravelSpring([*self._dead(self._ratios)], wanted)
+        weak: list[PosePotential] = [spring] if constrained else [*self._dead(self._ratios, wanted)]
+        levels = (model.spring_potentials, self._constant, weak)
         loads = [potential for level in levels for potential in level]
-        return poses, not count_freedom(rigid, poses, motors, loads, idle).zero_energy
 
-    # of one process: decisions that depend on rounding are the same on all
-    poses, held = from_one(model.mesh.mesh.comm, search)
-    if poses is None or np.array_equal(poses, unloaded.poses):
-        return RestStart(unloaded, held)
-    rest = model.assembled_state(poses, unloaded.motors)
-    return RestStart(replace(unloaded, u=rest.u, poses=poses), held)
+        def search():
+            turn = self._search.pose(rigid, unloaded.poses, self._motors, levels)
+            free = count_freedom(rigid, turn.way[-1], self._motors, loads, self._system.idle).zero_energy
+            near = self._search.near * model.linkage.length
+            return turn, not free, constrained and abs(spring.short(turn.way[-1])) <= near
 
+        # of one process: decisions that depend on rounding are the same on all
+        turn, resist, reached = from_one(model.mesh.mesh.comm, search)
+        if turn.ending is not RestEnding.AT_REST:
+            unsettled = turn.ending is RestEnding.NOT_CONVERGED
+            (_log.warning if unsettled else _log.info)("load steps start from the pose as drawn: %s", turn.ending.value)
+            return RestPose(unloaded)
+        if np.array_equal(turn.way[-1], unloaded.poses):
+            return RestPose(unloaded, resist, reached)
+        states = [unloaded, *map(self._at, turn.way[1:])]
+        if (link := next((link for state in states if (link := self._disturbed(state))), None)) is not None:
+            _log.info("load steps start from the pose as drawn: on the way, %r meets loads that are not dead", link)
+            return RestPose(unloaded)
+        return RestPose(states[-1], resist, reached)
 
-def _dead_forces(model: MechanismModel, forces: Mapping[Force, float]) -> Iterator[DeadForce]:
-    for force, magnitude in forces.items():
-        if magnitude:
-            point = model.linkage.point(force.on, model.rest_position(force).tolist())
-            yield DeadForce(point, magnitude * np.array(in_dimension(force.direction, model.linkage.dim)))
+    def _at(self, poses: np.ndarray) -> State:
+        rest = self._model.assembled_state(poses, self._unloaded.motors)
+        return replace(self._unloaded, u=rest.u, poses=poses)
 
+    def _disturbed(self, state: State) -> str | None:
+        """The first flexible link on which loads that are not dead, of obstacles too, do not balance in a loaded
+        ``state``."""
+        model, dim = self._model, self._model.linkage.dim
+        if model.elastic.effects_ufl is None:
+            return None
+        model.load(state)
+        _, others = model.elastic.effect_loads()
+        moved = state.u[: model.interfaces.owned * model.interfaces.block].reshape(model.interfaces.owned, -1)
+        for link, (_, force, moments, size) in zip(
+            model.linkage.interfaces, self._resultants(others, moved[:, :dim]), strict=True
+        ):
+            largest = max(np.linalg.norm(force), np.linalg.norm(moments - moments.T) / model.linkage.length)
+            if largest > self._search.balanced * size:
+                return link.name
+        return None
 
-def _effects(model: MechanismModel) -> Iterator[PosePotential]:
-    """Potentials of effects that grow with the load factor: on poses, and on links.
+    def _dead(self, forces: Mapping[Force, float], factor: float = 1.0) -> Iterator[DeadLoad]:
+        model, dim = self._model, self._model.linkage.dim
+        for force, magnitude in forces.items():
+            if factor * magnitude:
+                point = model.linkage.point(force.on, model.rest_position(force).tolist())
+                yield DeadLoad.at(point, factor * magnitude * np.array(in_dimension(force.direction, dim)))
 
-    Nodal forces f_i of a link act as their sum F, at the point whose work is theirs if all have one direction:
+    @cached_property
+    def _constant(self) -> list[PosePotential]:
+        """Potentials of dead loads that grow with the load factor, and of poses."""
+        model = self._model
+        found = [*self._dead(self._others), *(potential for potential in model.potentials if not potential.holds)]
+        if model.elastic.effects_ufl is None:
+            return found
+        loads = self._resultants(model.elastic.effect_loads()[0])
+        space = model.linkage.joints.space
+        return found + [DeadLoad(body, force, moments, space) for body, force, moments, size in loads if size]
 
-        Σ f_i ⊗ (X_i − c) = F ⊗ d,     d = (Σ f_i ⊗ (X_i − c))ᵀ F / |F|².
-    """
-    yield from (potential for potential in model.potentials if not potential.holds)
-    elastic, linkage = model.elastic, model.linkage
-    if not elastic.depends_on_load_factor:
-        return
-    owned, dim, comm = model.interfaces.owned, linkage.dim, model.mesh.mesh.comm
-    nodal = -elastic.load_factor_residuals()[: owned * model.interfaces.block].reshape(owned, -1)[:, :dim]
-    positions = elastic.drawn_nodes[:owned, :dim] + model.design_nodes.values(elastic.design)[:owned, :dim]
-    for index, (body, *_) in enumerate(linkage.interfaces.values()):
-        nodes = np.flatnonzero(model.node_link[:owned] == index)
-        offsets = positions[nodes] - np.array(linkage.bodies[body].centre)
-        own = np.concatenate(
-            [nodal[nodes].sum(axis=0), (nodal[nodes].T @ offsets).ravel(), [np.abs(nodal[nodes]).sum()]]
-        )
-        total = comm.allreduce(own, op=MPI.SUM)
-        force, moment = total[:dim], total[dim:-1].reshape(dim, dim)
-        if np.linalg.norm(force) > _BALANCED * total[-1]:
-            at = BodyPoint(body, moment.T @ force / (force @ force), linkage.joints.space)
-            yield DeadForce(at, force)
+    def _resultants(
+        self, loads: np.ndarray, moved: np.ndarray | float = 0.0
+    ) -> Iterator[tuple[int, np.ndarray, np.ndarray, float]]:
+        """Of each flexible link with nodal ``loads`` f_i, flat: the body with the centre c that moves with it, Σ f_i,
+        Σ f_i ⊗ (X_i + u_i − c), u_i as ``moved`` (owned nodes, dim), and Σ |f_i|."""
+        model, linkage = self._model, self._model.linkage
+        owned, dim, comm = model.interfaces.owned, linkage.dim, model.mesh.mesh.comm
+        nodal = loads.reshape(owned, -1)[:, :dim]
+        drawn = model.elastic.drawn_nodes + model.design_nodes.values(model.elastic.design)
+        positions = drawn[:owned, :dim] + moved
+        for index, (body, *_) in enumerate(linkage.interfaces.values()):
+            nodes = np.flatnonzero(model.node_link[:owned] == index)
+            own, offsets = nodal[nodes], positions[nodes] - np.array(linkage.bodies[body].centre)
+            sums = np.concatenate([own.sum(axis=0), (own.T @ offsets).ravel(), [np.abs(own).sum()]])
+            total = comm.allreduce(sums, op=MPI.SUM)
+            yield body, total[:dim], total[dim:-1].reshape(dim, dim), float(total[-1])

@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import cached_property
 from time import perf_counter
 
 import numpy as np
@@ -49,7 +48,7 @@ from fenicsmech.multibody import (
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.rest_start import RestStart, rest_start
+from fenicsmech.simulation.rest_start import CurveStart, Effort, RestPose, RestPoses
 
 
 @dataclass(frozen=True)
@@ -142,7 +141,7 @@ class CurveStepper:
         unloaded: the equilibrium without forces, effects at load factor 0.
         followed: the control whose value changes along the curve.
         origin: zero of displacements: that of the force's point in the unloaded configuration.
-        adrift: whether nothing but loads holds the mechanism, which has turned freely at most until now.
+        adrift: whether nothing but loads holds the mechanism.
     """
 
     def __init__(self, discretisation: Discretisation, request: CurveRequest) -> None:
@@ -159,52 +158,43 @@ class CurveStepper:
         self.freedom = from_one(comm, lambda: count_freedom(rigid, assembly.poses, motors, springs, idle))
         self.followed = discretisation.followed_control(request.part)
         self.origin, self._origins = 0.0, dict.fromkeys(model.mechanism.outputs, 0.0)
-        self._snaps = 0  # so far, which no frame reports yet
         self._poses, self._rigid_motors = assembly.poses, motors
-        state = self.unloaded = self._unloaded(assembly)
-        # obstacles may keep the mechanism from turning as loads prefer
-        self.adrift = bool(self.freedom.zero_energy) and not state.has_reactions and self._system.contact is None
+        state, self._motor_snaps = self._unloaded(assembly)
+        self.unloaded = state
+        self.adrift = bool(self.freedom.zero_energy) and not state.has_reactions
+        self._rest_poses = RestPoses(model, self._system, state, motors, request.others, request.part)
+        self._start: CurveStart | None = None  # of the last load steps
+        self._framed: CurveStart | None = None  # of the last frame
         self._system.load(state)
         if not self.followed.displaces:  # motors count from where they were drawn
             self.origin = agreed(comm, self.followed.conjugate(self._system, state))
         self._origins = {output: model.travel(output, state) for output in model.mechanism.outputs}
 
-    @cached_property
-    def _state(self) -> State:
-        """The configuration under constant loads, where load steps start as long as no force is prescribed."""
-        return self._under_constant_loads(self._at_rest(LoadControl(0.0)).state)
+    def start(self, control: Control) -> CurveStart:
+        """Where load steps to ``control`` start: the present start, unless loads prefer another pose than its own.
 
-    @cached_property
-    def _stepper(self) -> LoadStepper:
-        return self._steps_from(self._state, held=False)
-
-    def _steps_from(self, state: State, *, held: bool) -> LoadStepper:
-        self._system.load(state)
-        control = DisplacementControl() if any(c.constrained for c in self.request.controls) else LoadControl()
-        return LoadStepper(self.solver, state, control, predictor=self.discretisation.predictor, held=held)
-
-    def start_from_rest(self, control: Control) -> State:
-        """Takes load steps, which stand at no force yet, to where ``control`` begins to resist, and gives the state.
-
-        That is the pose that a force of this sign prefers; a displacement may be reached before, without force.
+        Forces of one sign prefer one pose, a force of zero prefers none, and displacements that are reached without
+        force have a pose each.
         """
-        rest = self._at_rest(control)
-        state = self._state = self._under_constant_loads(rest.state)
-        self._system.load(state)
-        short = agreed(self.discretisation.comm, control.gap(self._system, state))
-        self.adrift = control.constrained and abs(short) <= 1e-9 * self._joints.length
-        self._stepper = self._steps_from(state, held=rest.held and not self.adrift)
-        return state
+        present, loaded = self._start, control.constrained or control.prescribed
+        if present is None or (self.adrift and loaded):
+            rest = self._rest_poses.under(control) if self.adrift else RestPose(self.unloaded)
+            if present is None or not self._rest_poses.same(rest, present.rest):
+                self._start = present = self._started(rest, control)
+        return present
 
-    def _at_rest(self, control: Control) -> RestStart:
-        """The unloaded configuration, in the pose that loads prefer where nothing else holds the mechanism."""
-        state, part = self.unloaded, self.request.part
-        if not self.adrift:
-            return RestStart(state, held=False)
+    def _started(self, rest: RestPose, control: Control) -> CurveStart:
+        clock = self._model.clock
+        began, seconds = perf_counter(), dict(clock.seconds)
+        state, steps = self._under_constant_loads(rest.state)
         self._system.load(state)
-        ratios = dict(part.ratios) if isinstance(part, Force | ForceGroup) else {}
-        others, idle = self.request.others, self._system.idle
-        return rest_start(self._model, state, self._rigid_motors, others, ratios, control, idle)
+        shifts = LoadSteps().least_shifts(state.minimum_shift, loads_resist=rest.loads_resist and not rest.reached)
+        kind = DisplacementControl() if control.constrained else LoadControl()
+        predictor = self.discretisation.predictor
+        stepper = LoadStepper(self.solver, state, kind, predictor=predictor, shifts=shifts)
+        counts = (steps.iterations, steps.snaps) if steps else (0, 0)
+        effort = Effort(*counts, perf_counter() - began, clock.since(seconds))
+        return CurveStart(rest, state, stepper, effort)
 
     def curve(self, watch: Callable[[int], None]) -> Curve:
         """The frames of all prescribed values; ``watch`` is called with the number of frames so far."""
@@ -227,13 +217,14 @@ class CurveStepper:
         """The equilibrium under ``control``."""
         if control.constrained:
             control = control.at(control.prescribed + self.origin)
-        if self.adrift and (control.constrained or control.prescribed):
-            self.start_from_rest(control)
-        clock, stepper = self._model.clock, self._stepper
-        start, seconds, iterations, snaps = perf_counter(), dict(clock.seconds), stepper.iterations, stepper.snaps
+        start, clock = self.start(control), self._model.clock
+        steps, effort = start.steps, Effort() if start is self._framed else start.effort
+        if not self.frames:
+            effort += Effort(snaps=self._motor_snaps)
+        began, seconds, iterations, snaps = perf_counter(), dict(clock.seconds), steps.iterations, steps.snaps
         try:
             with self.keeping_frames():
-                point = stepper.advance(control)
+                point = steps.advance(control)
         except LoadStepsFailed as failure:
             raise self._unreached(control, failure) from failure
         record = self.record(point)
@@ -243,10 +234,15 @@ class CurveStepper:
                 f"the rest position of {names} at force {control.prescribed:g} is lost in the rounding of stiff links"
             )
             raise self.error(self.request.where, problem, self.frames[-1] if self.frames else None)
-        snapped_through, self._snaps = self._snaps + stepper.snaps > snaps, 0
-        spent, phases = perf_counter() - start, clock.since(seconds)
-        iterations = stepper.iterations - iterations
-        return replace(record, snapped_through=snapped_through, iterations=iterations, seconds=spent, phases=phases)
+        spent = Effort(steps.iterations - iterations, steps.snaps - snaps, perf_counter() - began, clock.since(seconds))
+        self._framed, effort = start, effort + spent
+        return replace(
+            record,
+            snapped_through=effort.snaps > 0,
+            iterations=effort.iterations,
+            seconds=effort.seconds,
+            phases=effort.phases,
+        )
 
     @contextmanager
     def keeping_frames(self) -> Iterator[None]:
@@ -287,8 +283,8 @@ class CurveStepper:
                 design=model.design,
             )
 
-    def _unloaded(self, assembly: Assembly) -> State:
-        """The equilibrium without forces, effects at load factor 0.
+    def _unloaded(self, assembly: Assembly) -> tuple[State, int]:
+        """The equilibrium without forces, effects at load factor 0, and how often motors snapped on the way.
 
         It is the rigid assembly unless motors strain links, or wind up springs that do.
         """
@@ -302,7 +298,7 @@ class CurveStepper:
         )
         wound = bool(self._model.spring_potentials) and not np.array_equal(drawn, there)
         if fraction == 1.0 and not wound:
-            return state
+            return state, 0
         control = MotorControl(fraction, there - drawn, origin=drawn)
         stepper = MotorStepper(self.solver, state, control, predictor=self.discretisation.predictor)
         # a quarter of a radian, or of the mechanism's length: in space a motor's equation is periodic
@@ -310,7 +306,6 @@ class CurveStepper:
         try:
             for value in np.linspace(fraction, 1.0, steps + 1)[1:]:
                 state = stepper.advance(control.at(float(value))).state
-            self._snaps += stepper.snaps
         except LoadStepsFailed as failure:
             strained = "links and springs" if wound else "the links"
             beyond = "there" if fraction == 1.0 else f"beyond {failure.reached:.1%} of their way"
@@ -320,17 +315,18 @@ class CurveStepper:
                 "Choose motor positions nearer to the drawn ones, or a softer link or spring",
                 last=self._last(failure),
             ) from failure
-        return state
+        return state, stepper.snaps
 
-    def _under_constant_loads(self, state: State) -> State:
-        """The configuration under the request's constant forces and the scene's effects, which grow together."""
+    def _under_constant_loads(self, state: State) -> tuple[State, LoadStepper | None]:
+        """The configuration under the request's constant forces and the scene's effects, which grow together, and the
+        steps that led there, if any."""
         if not (self.request.others or self._model.effects):
-            return state
+            return state, None
         control = LoadFactorControl()
         stepper = LoadStepper(self.solver, control.prepare(state), control, predictor=self.discretisation.predictor)
         try:
-            state = stepper.advance(control.at(1.0)).state
-            self._snaps += stepper.snaps
+            with self.keeping_frames():
+                return stepper.advance(control.at(1.0)).state, stepper
         except LoadStepsFailed as failure:
             forces = [repr(force.name) for force, _ in self.request.others]
             names = ", ".join([*forces, *(effect.explain() for effect in self._model.effects)])
@@ -340,7 +336,6 @@ class CurveStepper:
                 self._last(failure),
                 otherwise="Choose smaller ones",
             ) from failure
-        return state
 
     # -- failures ----------------------------------------------------------------------------------------------
 
@@ -393,13 +388,14 @@ class CurveStepper:
 
     def _is_held(self) -> bool:
         """Whether no motion of the joints moves the force's point along its direction."""
-        joints, poses = self._joints, self._state.poses
+        assert self._start is not None, "steps that fail have started"
+        joints, state = self._joints, self._start.state
         rate = np.zeros(joints.size)
         for point, direction in self._system.controlled.acting:
             if not isinstance(point, BodyPoint):
                 return False
-            rate[joints.columns[point.body]] += direction @ point.gradient(poses)
-        return is_held(joints, poses, self._state.motors, rate, self._system.rigid_rows)
+            rate[joints.columns[point.body]] += direction @ point.gradient(state.poses)
+        return is_held(joints, state.poses, state.motors, rate, self._system.rigid_rows)
 
     def _has_springs_below_rounding(self) -> bool:
         """Whether some freedom is held by springs softer than rounding, 1e-15 of the links' stiffness."""

@@ -68,6 +68,25 @@ def test_smaller_shifts_come_before_half_the_step():
     assert failure.value.tried == tuple(values) and failure.value.reached == 0.0
 
 
+def test_shifts_where_loads_resist_are_the_smallest_first_away_from_the_start_and_stay_so_after_failures():
+    path, largest = Stubborn(0.0), LoadSteps().minimum_shift
+    shifts = LoadSteps().least_shifts(largest, loads_resist=True)
+    walk = LoadStepper(path, start(), LoadControl(), predictor=HermitePredictor(), shifts=shifts)
+    path.reached = 1.0  # the start fails as well
+    for wanted in (0.1, 0.1):
+        with pytest.raises(LoadStepsFailed):
+            walk.advance(LoadControl(wanted))
+    for value, tried in ((0.0, shifts.at_start), (0.1, shifts.elsewhere)):
+        used = [shift for prescribed, shift in path.tried if prescribed == value]
+        assert used == [*tried] * 2
+    assert shifts.at_start[0] == shifts.elsewhere[-1] == largest and shifts.at_start[-1] == shifts.elsewhere[0] == 0.0
+    path.longest = math.inf
+    walk.advance(LoadControl(0.1))
+    assert path.tried[-1] == (0.1, 0.0)
+    walk.advance(LoadControl(0.0))
+    assert path.tried[-1] == (0.0, largest)
+
+
 @pytest.mark.parametrize("part", [2.0 * LoadSteps().smallest, 1.1 / 64.0, 0.1])  # halves of these are not too small
 def test_a_path_on_which_only_steps_of_one_length_succeed_is_walked_to_its_end(part):
     path = Stubborn(0.1 * part)

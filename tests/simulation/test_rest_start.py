@@ -1,30 +1,39 @@
 """Mechanisms that nothing but loads holds: equilibria start from the rigid pose that the loads prefer."""
 
+import logging
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
+from fenicsmech.continuation import ArcLengthStepper
+from fenicsmech.equilibrium import EquilibriumSolver
+from fenicsmech.multibody import PosePotential
 
 LENGTH = 60.0
 WIDTH, DEPTH = 2.0, 5.0
 
 
-def simulated(mechanism: fm.Mechanism, *effects: fm.Effect, space: str = "plane-stress") -> fm.Simulation:
-    return fm.Simulation(fm.Scene(mechanism, effects=effects), space=space, size=2.0, comm=MPI.COMM_SELF)
+def simulated(mechanism: fm.Mechanism, *effects: fm.Effect, comm: MPI.Comm = MPI.COMM_SELF) -> fm.Simulation:
+    return fm.Simulation(fm.Scene(mechanism, effects=effects), space="plane-stress", size=2.0, comm=comm)
 
 
-def pendulum(direction, *effects_of_gravity):
-    """A rod that hangs from a hinge, drawn straight down, with a force at its lower end."""
+def pendulum(direction, *effects, comm: MPI.Comm = MPI.COMM_SELF):
+    """A rod that hangs from a hinge, drawn straight down, with a force at its lower end.
+
+    effects: or functions that make them for the rod.
+    """
     mechanism = fm.Mechanism("pendulum")
     base = mechanism.rigid("base", fixed=True)
     material = fm.Material("nylon", 1770.0, 0.42, density=1e-6)
     rod = mechanism.flexible("rod", fm.strip([(0, 0), (0, -LENGTH)], thickness=WIDTH, depth=DEPTH), material)
     mechanism.revolute(base, rod, at=(0, 0), interface_radius=1.0)
     pull = mechanism.force(on=rod, at=(0, -LENGTH), direction=direction, name="pull")
-    return simulated(mechanism, *effects_of_gravity), pull
+    own = [effect if isinstance(effect, fm.Effect) else effect(rod) for effect in effects]
+    return simulated(mechanism, *own, comm=comm), pull
 
 
 def four_bar(direction=(1, 0)):
@@ -114,3 +123,140 @@ def test_weight_holds_a_rod_before_the_force_begins(sense):
     assert curve.displacements == pytest.approx([LENGTH, LENGTH], rel=1e-3)
     assert not curve.snapped_through.any() and curve.frames[0].stable
     assert max(frame.iterations for frame in curve.frames) <= 5
+
+
+@pytest.mark.parametrize(
+    "comm", [MPI.COMM_SELF, pytest.param(MPI.COMM_WORLD, marks=pytest.mark.parallel)], ids=["alone", "ranks"]
+)
+def test_force_that_returns_to_zero_and_changes_sign_pulls_the_rod_to_the_other_side(comm):
+    simulation, pull = pendulum((1, 0), comm=comm)
+    curve = simulation.load_displacement(pull, forces=[1.0, 0.0, -1.0])
+    there, back, opposite = curve.displacements
+    assert there > LENGTH
+    assert back == pytest.approx(LENGTH, rel=1e-9)
+    assert opposite == pytest.approx(-there, rel=1e-9)
+    assert curve.stable.all() and not curve.snapped_through.any()
+    assert max(frame.iterations for frame in curve.frames) <= 5
+
+
+def test_displacements_that_return_into_free_reach_need_no_force_again():
+    simulation, pull = pendulum((1, 0))
+    curve = simulation.load_displacement(pull, displacements=[1.001 * LENGTH, 0.5 * LENGTH])
+    assert curve.forces[0] > 1.0
+    assert abs(curve.forces[1]) < 1e-9 and curve.frames[1].stable
+
+
+def test_iterations_and_time_of_constant_loads_are_those_of_the_frame_that_they_lead_to(monkeypatch):
+    solved, solve = [], EquilibriumSolver.solve
+
+    def counted(self, start, control):
+        solved.append(solve(self, start, control))
+        return solved[-1]
+
+    monkeypatch.setattr(EquilibriumSolver, "solve", counted)
+    simulation, pull = pendulum((1, 0), fm.Gravity((9810.0, 0.0)))
+    frames = simulation.load_displacement(pull, forces=[0.0, 0.01]).frames
+    assert sum(frame.iterations for frame in frames) == sum(point.iterations for point in solved)
+    assert len(solved) > 3  # load steps of the weight, the settled start, and one of each force
+
+
+class Tripwire(PosePotential):
+    """No potential, but one that does not hold once its body has turned."""
+
+    def __init__(self, body: int) -> None:
+        self.bodies = (body,)
+
+    def value(self, poses):
+        return 0.0
+
+    def gradient(self, poses):
+        return np.zeros(poses.shape[1])
+
+    def hessian(self, poses):
+        return np.zeros(2 * poses.shape[1:])
+
+    def check_step(self, before, after):
+        if abs(after[self.bodies[0], 2]) > 1.0:
+            raise fm.EquilibriumError("tripwire", "the rod has turned", "Turn it less")
+
+
+@dataclass(frozen=True)
+class Wired(fm.Effect):
+    """A tripwire on a link."""
+
+    link: object
+
+    def explain(self):
+        return "a tripwire"
+
+    def pose_potentials(self, linkage):
+        return [Tripwire(linkage.interfaces[self.link][0])]
+
+
+def test_frames_so_far_are_kept_where_constant_loads_cannot_be_applied_in_the_pose_of_the_next():
+    simulation, pull = pendulum((1, 0), Wired)
+    with pytest.raises(fm.EquilibriumError, match="tripwire") as caught:
+        simulation.load_displacement(pull, forces=[0.0, 1.0])
+    assert [frame.force for frame in caught.value.frames] == [0.0]
+
+
+@dataclass(frozen=True)
+class Couple(fm.Effect):
+    """Body forces along x that grow from the rod's middle towards both ends, in opposite senses: they have no sum."""
+
+    link: object
+
+    def explain(self):
+        return "a couple"
+
+    def link_energy(self, fields):
+        along = -fields.body.rest[1] - 0.5 * LENGTH  # from the middle towards the lower end
+        return fields.integral(-1e-3 * along * fields.u[0], degree=1 + fields.order)
+
+
+def test_body_forces_without_a_sum_turn_a_rod_by_their_moments():
+    simulation, pull = pendulum((1, 0), Couple)
+    (frame,) = simulation.load_displacement(pull, forces=[0.0]).frames
+    # opposite dead forces along x, at both halves, are in equilibrium with the rod along x
+    assert frame.displacement == pytest.approx(LENGTH, rel=1e-3)
+    assert frame.stable and not frame.snapped_through
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        pytest.param(lambda rod: fm.Pressure(rod, 1e-3), id="pressure all round"),
+        pytest.param(lambda rod: fm.Prestrain(rod, 1.001), id="prestrain"),
+        pytest.param(lambda rod: fm.Contact(rod, fm.HalfPlane((0, 10), (0, -1))), id="obstacle out of reach"),
+    ],
+)
+def test_loads_that_prefer_no_pose_leave_that_to_the_force(effect):
+    simulation, pull = pendulum((1, 0), effect)
+    (frame,) = simulation.load_displacement(pull, forces=[1e-3]).frames
+    assert frame.displacement == pytest.approx(LENGTH, rel=2e-3)
+    assert frame.stable and not frame.snapped_through
+
+
+def test_obstacle_on_the_way_keeps_the_pose_as_drawn_for_a_start_and_the_log_says_so(caplog):
+    simulation, pull = pendulum((1, 0), lambda rod: fm.Contact(rod, fm.HalfPlane((20, 0), (-1, 0))))
+    with caplog.at_level(logging.INFO, logger="fenicsmech"):
+        try:
+            frames = simulation.load_displacement(pull, forces=[1e-2]).frames
+        except fm.EquilibriumError as error:
+            frames = error.frames
+    assert "start from the pose as drawn" in caplog.text and "'rod' meets" in caplog.text
+    assert all(frame.displacement < 22.0 for frame in frames)
+
+
+def test_path_until_a_force_begins_at_a_part_of_it_and_is_the_only_one_that_is_set_up(monkeypatch):
+    made, set_up = [], ArcLengthStepper.__init__
+
+    def counted(self, *given, **options):
+        made.append(self)
+        set_up(self, *given, **options)
+
+    monkeypatch.setattr(ArcLengthStepper, "__init__", counted)
+    simulation, pull = pendulum((1, 0))
+    curve = simulation.follow(pull, until=fm.Until(force=2.0), steps=fm.ArcSteps(first_load=0.05))
+    assert curve.forces[:2] == pytest.approx([0.0, 0.1]) and curve.forces[-1] == pytest.approx(2.0)
+    assert len(made) == 1

@@ -1,0 +1,124 @@
+"""Steps along the arc go round corners, where other points touch, and do not jump to branches on which others do."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import fenicsmech as fm
+from fenicsmech.continuation import ArcLengthStepper, Finish
+from fenicsmech.equilibrium import EquilibriumPoint, LoadControl, NotConverged, Stability, State, Step
+
+SHARP = math.radians(75.0)  # more than steps along smooth paths may turn
+
+
+@dataclass
+class Plate:
+    """Paths in the plane of a displacement and a force, given by their points, as ``ArcLengthStepper`` sees them.
+
+    Args:
+        paths: points of each, (n, 2), and whether something touches on the piece that begins at each of them.
+        first: the path that solves prefer up to the displacement ``until``; the other one beyond.
+    """
+
+    paths: list[tuple[np.ndarray, np.ndarray]]
+    until: float = math.inf
+    potentials, comm = (), MPI.COMM_SELF
+
+    def __post_init__(self) -> None:
+        self.system = self.contact = self
+        self.joints = self.unknowns = self
+        self.length, self.unit = 1.0, 1e3
+
+    # -- a system with one displacement ---------------------------------------------------------------------------
+
+    def size(self, step: Step) -> float:
+        return float(np.abs(step.u).max())
+
+    def mean_product(self, a: Step, b: Step) -> float:
+        return float(a.u @ b.u)
+
+    def difference(self, later: State, earlier: State) -> Step:
+        return Step(later.u - earlier.u, np.zeros(0), np.zeros(0), later.force - earlier.force)
+
+    def moved(self, state: State, step: Step) -> State:
+        return State(state.u + step.u, state.poses, state.multipliers, state.force + step.force, state.motors)
+
+    # -- a solver in closed form ----------------------------------------------------------------------------------
+
+    def point(self, place: np.ndarray, way: np.ndarray, touches: bool, control) -> EquilibriumPoint:
+        tangent = Step(way[:1], np.zeros(0), np.zeros(0), float(way[1]))
+        state = State(place[:1], np.zeros((0, 1)), np.zeros(0), float(place[1]), np.zeros(0))
+        rate = float(way[0])
+        return EquilibriumPoint(state, control, tangent, rate, Stability(0, 0), 1, (0.0,), None, np.array([touches]))
+
+    def linearise(self, state: State, control: LoadControl):
+        places, touches = self.paths[0]
+        way = (places[1] - places[0]) / (places[1] - places[0])[1]
+        found = self.point(places[0], way, bool(touches[0]), control)
+        return type("At", (), {"residual": None, "point": staticmethod(lambda residuals, iterations: found)})
+
+    def relative(self, residual: None) -> float:
+        return 0.0
+
+    def solve(self, guess: State, control) -> EquilibriumPoint:
+        """Where the plane through the guess meets the path."""
+        metric, normal = control.metric, control.normal
+        places, touches = self.paths[int(guess.u[0] > self.until)]
+        scale = np.array([1.0 / metric.motion**2, 1.0 / metric.value**2])
+        across = np.array([normal.u[0], normal.force]) * scale
+        heights = (places - [guess.u[0], guess.force]) @ across
+        for k in range(len(places) - 1):
+            if heights[k] * heights[k + 1] <= 0.0 and heights[k] != heights[k + 1]:
+                part = heights[k] / (heights[k] - heights[k + 1])
+                way = places[k + 1] - places[k]
+                way = way / math.sqrt(way**2 @ scale) * (1.0 if way @ across > 0.0 else -1.0)
+                place = places[k] + part * (places[k + 1] - places[k])
+                return self.point(place, way, bool(touches[k]), control)
+        raise NotConverged("the plane meets no path", 1)
+
+
+def stepper(plate: Plate, **options: float) -> ArcLengthStepper:
+    start = State(plate.paths[0][0][0][:1], np.zeros((0, 1)), np.zeros(0), 0.0, np.zeros(0))
+    return ArcLengthStepper(plate, LoadControl(), start, steps=fm.ArcSteps(**options), value=1.0, conjugate=None)
+
+
+def walked(path: ArcLengthStepper, end: float) -> np.ndarray:
+    """Displacements and forces of points of a path until a force."""
+    finish = Finish(path.value, path.value_rate, end, 1.0)
+    ends = list(path.follow(path.start, [finish], most=200))
+    return np.array([[point.state.u[0], point.state.force] for _, point in ends])
+
+
+def turned(places: list[tuple[float, float]], touching: list[bool]) -> tuple[np.ndarray, np.ndarray]:
+    return np.array(places), np.array(touching)
+
+
+def corner(angle: float) -> tuple[np.ndarray, np.ndarray]:
+    """A path along the displacement axis's diagonal that turns by ``angle`` towards the force where it touches."""
+    way = math.radians(45.0)
+    met = np.array([0.303, 0.303])
+    before = np.array([0.0, 0.0])
+    after = met + 5.0 * np.array([math.cos(way + angle), math.sin(way + angle)])
+    return turned([before, met, after], [False, True, True])
+
+
+def test_a_corner_where_something_touches_is_passed_in_whole_steps():
+    path = stepper(Plate([corner(math.radians(60.0))]))
+    places = walked(path, 1.0)
+    assert len(places) < 60 and places[-1][1] == pytest.approx(1.0)
+
+
+def test_no_step_takes_another_branch_on_which_something_touches():
+    # beside the corner that the path would have, another path passes at a distance of a fifth of a step
+    straight = turned([(0.0, 0.0), (0.303, 0.303), (2.0, 2.0)], [False, False, False])
+    other = np.array([0.33, 0.28])
+    way = math.radians(45.0) + SHARP
+    branch = turned([other, other + 5.0 * np.array([math.cos(way), math.sin(way)])], [True, True])
+    path = stepper(Plate([straight, branch], until=0.32))
+    with pytest.raises(NotConverged):
+        walked(path, 1.0)
