@@ -18,6 +18,7 @@ from .draw import bending_force, decade
 from .generator import planar_scene
 from .thresholds import THRESHOLDS
 
+UNMET = "designed: two starts meet no target"
 _DENSITY = 1e-9
 
 
@@ -106,9 +107,11 @@ def run(scene: DesignScene) -> tuple[str, str]:
     # an independent start, from shapes that differ by what the bounds allow
     rng, initial = np.random.default_rng(scene.start), problem.initial
     other = problem.optimise(start=initial + _spread(scene) * rng.uniform(-1.0, 1.0, initial.shape))
-    if _met(other) and _misreported(scene, built, other) is None:
+    if (told := _misreported(scene, built, other)) is not None:
+        return told
+    if _met(other):
         return "wrong: a second start meets the targets", f"{result.reason}; {result.targets[0]}"
-    return "designed: two starts meet no target", f"{result.reason}; {', '.join(result.active)}; {result.targets[0]}"
+    return UNMET, f"{result.reason}; {', '.join(result.active)}; {result.targets[0]}"
 
 
 def design_problem(scene: DesignScene, built: Built, wanted: float) -> fm.DesignProblem:
