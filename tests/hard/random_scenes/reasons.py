@@ -66,7 +66,7 @@ def _proven(blueprint: Blueprint, built: Built, last: fm.Frame) -> bool:
 
 def unassembled(blueprint: Blueprint) -> Excuse | None:
     """Rigid links cannot be joined where motors are to take them, whatever shape the flexible ones have."""
-    if blueprint.idle_spins:
+    if blueprint.spins:  # in space
         return None
     return _excuse("rigid links cannot be joined", "gap over length", smallest_gap(blueprint), above=THRESHOLDS.joined)
 

@@ -17,7 +17,7 @@ import numpy as np
 import fenicsmech as fm
 
 from .blueprint import Blueprint, Built, build
-from .designs import design_scene, run
+from .designs import design_scene, run, with_goal
 from .generator import random_scene
 from .invalid import spoiled_scene
 from .potential import Potential
@@ -124,7 +124,7 @@ def _judge_spoiled(seed: int) -> tuple[str, _Verdict]:
 
 
 def _judge_design(seed: int) -> tuple[str, _Verdict]:
-    problem = design_scene(seed)
+    problem = with_goal(design_scene(seed), seed)
     try:
         outcome, detail = run(problem)
     except fm.FenicsmechError as error:

@@ -122,7 +122,7 @@ def _lowest(
     scaled = (sparse.diags(scale) @ second.hessian @ sparse.diags(scale)).tocsc()
     slope = scale * second.slope if led else None
     # a singular matrix has no inverse
-    values = None if every or scaled.shape[0] <= _DENSE or potential.blueprint.idle_spins else _nearest(scaled, slope)
+    values = None if every or scaled.shape[0] <= _DENSE or potential.blueprint.spins else _nearest(scaled, slope)
     if values is None or values.min() < 0.0:
         values = np.linalg.eigvalsh(_restricted(scaled.toarray(), slope))
     return np.sort(values[np.argsort(np.abs(values))[potential.blueprint.idle_spins :]])

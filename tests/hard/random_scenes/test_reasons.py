@@ -1,6 +1,5 @@
 """Excuses of the judge, and where each of them ends: a scene or a constructed state on either side."""
 
-import signal
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -246,9 +245,8 @@ def test_rounding_of_nodal_forces_grows_with_the_order_of_elements():
     for order in (1, 2):
         scene = arch("plane-stress", order)
         potential = Potential.of(scene, build(scene).simulation)
-        by_node, by_point = potential.rounding(scene.links[1])
-        gains.append((by_node / np.sqrt(potential.mesh.nodes.size), by_point))
-    assert gains[0][0] < gains[1][0] and gains[0][1] < gains[1][1]
+        gains.append(potential.rounding(scene.links[1])[0] / np.sqrt(potential.mesh.nodes.size))
+    assert 1.2 * gains[0] < gains[1] < 2.0 * gains[0]
 
 
 def test_scenes_that_use_a_processor_for_too_long_hang():
@@ -257,4 +255,3 @@ def test_scenes_that_use_a_processor_for_too_long_hang():
         assert worker.judge(5).outcome == "wrong: hangs"
     finally:
         worker.close()
-    assert hasattr(signal, "SIGPROF")

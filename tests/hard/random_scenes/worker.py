@@ -16,7 +16,7 @@ from multiprocessing.connection import Connection
 
 from .scene_result import SceneResult, judge
 
-_WAITING = 20.0  # limit by the clock, over that of the processor
+_WAITING = 3600.0  # seconds by the clock, also for what uses no processor
 
 
 class Worker:
@@ -38,14 +38,16 @@ class Worker:
         start = time.perf_counter()
         self._pipe.send(seed)
         try:
-            if self._pipe.poll(_WAITING * self._limit):
+            if self._pipe.poll(_WAITING):
                 return self._pipe.recv()
             end = "wrong: waits"
         except (EOFError, ConnectionError):
             self._process.join()
             end = "wrong: hangs" if self._process.exitcode == -signal.SIGPROF else "wrong: crashes"
         self.close()
-        return SceneResult(seed, "", end, f"limit {self._limit:g} s", time.perf_counter() - start)
+        return SceneResult(
+            seed, "", end, f"limit {self._limit:g} s of a processor, {_WAITING:g} s in all", time.perf_counter() - start
+        )
 
     def close(self) -> None:
         """Ends the process."""
