@@ -104,6 +104,8 @@ def adrift(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError) -> 
         return None
     potential = Potential.of(blueprint, built.simulation)
     motions = _drawn_motions(potential)
+    if not motions:
+        return None
     sample = _asked(blueprint, failure) if blueprint.control == "forces" else 0.0
     turns = [
         [blueprint.length * there[body].turn.imag.ravel() / STEP for body in range(len(potential.fixed))]
@@ -198,14 +200,17 @@ def overstrained(blueprint: Blueprint, built: Built, failure: fm.EquilibriumErro
 
 
 def turned_back(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError) -> Excuse | None:
-    """A path followed from rest through equilibria that pass the checks turns back before what is asked for.
+    """A path followed from rest through equilibria that pass the checks turns back before what is asked for, and the
+    curve got as far as that.
 
-    Where constant loads stop the curve, the path is that of these, if they are forces alone.
+    Beyond the turn loads and displacements snap, wherever the path goes then. Where constant loads stop the curve, the
+    path is that of these, if they are forces alone.
     """
     if built.configuration is not fm.DRAWN:
         return None
-    if failure.last.state.load_factor < 1.0:
-        blueprint = _constant_forces(blueprint)
+    last = failure.last
+    if last.state.load_factor < 1.0:
+        blueprint, reached = _constant_forces(blueprint), last.state.load_factor
         if blueprint is None:
             return None
         asked = blueprint.samples[0]
@@ -213,6 +218,7 @@ def turned_back(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError
         return None
     else:
         asked = _asked(blueprint, failure)
+        reached = (last.force if blueprint.control == "forces" else last.displacement) / asked
     name = blueprint.control.removesuffix("s")
     until = fm.Until(**{name: asked}, frames=THRESHOLDS.followed)
     try:
@@ -220,12 +226,12 @@ def turned_back(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError
     except fm.EquilibriumError as error:
         frames = error.frames
     shares = [getattr(frame, name) / asked for frame in frames]
-    top = int(np.argmax(shares)) if shares else 0
-    if top == 0 or top == len(frames) - 1 or shares[top] >= 1.0:
+    turn = next((k for k in range(1, len(shares) - 1) if shares[k - 1] < shares[k] > shares[k + 1]), None)
+    if turn is None or shares[turn] >= 1.0 or reached < THRESHOLDS.turned * shares[turn]:
         return None
-    if not all(_proven(blueprint, built, frame) for frame in frames[top - 1 : top + 2]):
+    if not all(_proven(blueprint, built, frame) for frame in frames[turn - 1 : turn + 2]):
         return None
-    return Excuse("a path of equilibria turns back", f"largest share of what is asked for {shares[top]:.1e}")
+    return Excuse("a path of equilibria turns back", f"share of what is asked for {shares[turn]:.1e}")
 
 
 def _constant_forces(blueprint: Blueprint) -> Blueprint | None:

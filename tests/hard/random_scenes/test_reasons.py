@@ -13,7 +13,7 @@ from .blueprint import Blueprint, ContactPlan, ForcePlan, JointPlan, LinkPlan, P
 from .designs import UNMET
 from .potential import Potential
 from .reach import least_stretch
-from .reasons import adrift, inverted, out_of_reach, overstrained, turned_back
+from .reasons import _constant_forces, adrift, inverted, out_of_reach, overstrained, turned_back
 from .residual_check import check, fault
 from .scene_result import ROUNDED, SceneResult
 from .stability_check import stiffness_left
@@ -146,15 +146,28 @@ def test_a_path_turns_back_between_equilibria_and_before_the_load(raised, monkey
     torn = replace(middle, state=replace(middle.state, u=1.01 * middle.state.u))
     asked = replace(scene, samples=(0.3,))
 
-    def turned(frames: list[fm.Frame], scene: Blueprint = asked) -> bool:
+    def turned(frames: list[fm.Frame], scene: Blueprint = asked, last: fm.Frame = frame) -> bool:
         monkeypatch.setattr(built, "follow", lambda *_: SimpleNamespace(frames=frames))
-        return turned_back(scene, built, failed(frame)) is not None
+        return turned_back(scene, built, failed(last)) is not None
 
     assert turned([low, high, middle])
+    assert turned([low, high, middle, high])  # whatever comes after a snap
     assert not turned([low, middle, high])
     assert not turned([low, high, torn])
+    assert not turned([low, high, middle], last=low)  # the curve did not get there
     assert not turned([low, high, middle], replace(scene, samples=(0.2,)))
     assert not turned([low, high, middle], replace(asked, control="path"))
+
+
+def test_constant_forces_alone_are_followed():
+    scene = replace(arch("plane-stress", 2), ratios=(1.0,))
+    first, second = scene.forces
+    scene = replace(scene, control="displacements", forces=(first, replace(second, magnitude=0.7)))
+    path = _constant_forces(scene)
+    assert (path.control, path.samples, [force.name for force in path.forces]) == ("forces", (0.7,), ["other"])
+    assert _constant_forces(replace(scene, effects=(SpringPlan("A", 5.0, 0.0),))) is not None
+    assert _constant_forces(replace(scene, effects=(SpringPlan("A", 5.0, 0.2),))) is None
+    assert _constant_forces(replace(scene, forces=(first,))) is None
 
 
 @pytest.mark.parametrize(

@@ -38,6 +38,7 @@ class Thresholds:
         strained: principal stretch, or its inverse, of what is strained out of shape.
         strained_share: of the links' volume, beyond which this is the reason.
         followed: most frames of a path that is to turn back.
+        turned: what a curve has reached over where the path turns back, at least.
         drowned: stiffness of springs over that of the stiffest link at which rounding hides it.
         excused: share of the scenes that make sense that each excuse may let off.
         held: share of those in which joints and motors hold the point, which is exact.
@@ -78,6 +79,7 @@ class Thresholds:
     strained: float = 2.0
     strained_share: float = 0.05
     followed: int = 150
+    turned: float = 0.9
     drowned: float = 1e-14
     excused: float = 0.03
     held: float = 0.12
