@@ -147,7 +147,7 @@ def design_problem(scene: DesignScene, built: Built, wanted: float, displacement
 
 def _reached(scene: DesignScene, frame: fm.Frame) -> float:
     """The value of the goal at an equilibrium."""
-    return {"displacement": frame.displacement, "strain energy": frame.strain_energy, "force": frame.force}[scene.goal]
+    return float(getattr(frame, scene.goal.replace(" ", "_")))
 
 
 def _idle(scene: DesignScene, displacement: float) -> bool:
