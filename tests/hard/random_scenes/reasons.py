@@ -206,8 +206,6 @@ def turned_back(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError
     Beyond the turn loads and displacements snap, wherever the path goes then. Where constant loads stop the curve, the
     path is that of these, if they are forces alone.
     """
-    if built.configuration is not fm.DRAWN:
-        return None
     last = failure.last
     if last.state.load_factor < 1.0:
         blueprint, reached = _constant_forces(blueprint), last.state.load_factor
