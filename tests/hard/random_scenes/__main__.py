@@ -25,7 +25,7 @@ def main() -> int:
     parser = command(__doc__)
     parser.add_argument("--count", type=int, default=1000, help="number of scenes")
     parser.add_argument("--seed", type=int, default=0, help="the first scene")
-    parser.add_argument("--limit", type=float, default=300.0, help="seconds after which a scene hangs")
+    parser.add_argument("--limit", type=float, default=300.0, help="seconds of a processor after which a scene hangs")
     parser.add_argument("--quick", action="store_true", help="larger elements and fewer loads")
     parser.add_argument("--out", type=Path, default=Path("results/random-scenes"), metavar="DIR")
     options = parser.parse_args()

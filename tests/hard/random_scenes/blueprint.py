@@ -196,10 +196,20 @@ class Blueprint:
         return self.order > 1 and self.space != "plane-stress" and link.poisson > 0.49
 
     @property
+    def spins(self) -> tuple[LinkPlan, ...]:
+        """The links that turn between two ball joints."""
+        found = []
+        for link in self.links:
+            kinds = {joint.kind for joint in self.joints if link.name in (joint.a, joint.b)}
+            found += [link] if not link.fixed and kinds == {"spherical"} else []
+        return tuple(found)
+
+    @property
     def idle_spins(self) -> int:
-        """Number of links that turn idly between two ball joints."""
-        kinds = [[j.kind for j in self.joints if link.name in (j.a, j.b)] for link in self.links if not link.fixed]
-        return sum(set(found) == {"spherical"} for found in kinds)
+        """Number of links that turn idly between two ball joints: neither a force nor an effect acts on them."""
+        acted_on = {force.on for force in self.forces} | {getattr(plan, "link", None) for plan in self.effects}
+        heavy = any(isinstance(plan, GravityPlan) for plan in self.effects)
+        return sum(link.name not in acted_on and not (heavy and link.centreline) for link in self.spins)
 
     @property
     def flexible(self) -> tuple[LinkPlan, ...]:

@@ -18,6 +18,7 @@ from .draw import bending_force, decade
 from .generator import planar_scene
 from .thresholds import THRESHOLDS
 
+UNMET = "designed: two starts meet no target"
 _DENSITY = 1e-9
 
 
@@ -28,10 +29,11 @@ class DesignScene:
     Attributes:
         blueprint: of the mechanism as drawn; one force, one sample.
         links: names of those that change, each within ``thickness`` times its own.
-        factor: wanted displacement over that of the drawn design.
+        factor: wanted displacement, or what else is wanted, over that of the drawn design.
         light: whether the mass of these links is to be least, with the displacement at most as wanted.
         thickness: least and largest, over the drawn one.
         start: seed of the second start.
+        goal: what is wanted: "displacement", "strain energy" or, at the drawn displacement, "force".
     """
 
     blueprint: Blueprint
@@ -40,11 +42,12 @@ class DesignScene:
     light: bool
     thickness: tuple[float, float]
     start: int
+    goal: str = "displacement"
 
     @property
     def summary(self) -> str:
         """In a few words."""
-        wanted = f"{self.factor:.2f} of the displacement{', least mass' if self.light else ''}"
+        wanted = f"{self.factor:.2f} of the {self.goal}{', least mass' if self.light else ''}"
         return f"design of {len(self.links)} links of a {self.blueprint.topology}: {wanted}"
 
 
@@ -80,6 +83,13 @@ def design_scene(seed: int) -> DesignScene:
     )
 
 
+def with_goal(scene: DesignScene, seed: int) -> DesignScene:
+    """The design problem of a seed with any goal."""
+    rng = Random(f"goal {seed}")
+    goal = rng.choices(("displacement", "strain energy", "force"), (5, 3, 2))[0]
+    return replace(scene, goal=goal, light=scene.light and goal == "displacement")
+
+
 def run(scene: DesignScene) -> tuple[str, str]:
     """Outcome and detail.
 
@@ -88,17 +98,16 @@ def run(scene: DesignScene) -> tuple[str, str]:
     """
     built = build(scene.blueprint)
     (frame,) = built.curve(scene.blueprint).frames
-    wanted = scene.factor * frame.displacement
     if abs(frame.displacement) < THRESHOLDS.closed * scene.blueprint.length:
         return "true: the force moves nothing", f"{frame.displacement:.3g}"
-    problem = design_problem(scene, built, wanted)
+    problem = design_problem(scene, built, scene.factor * _reached(scene, frame), frame.displacement)
     try:
         result = problem.optimise()
     except fm.DescriptionError as error:
         if _idle(scene, frame.displacement):
             return "true: DescriptionError, the links do not carry the force", str(error)
         raise
-    told = _misreported(scene, built, result)
+    told = _misreported(scene, built, result, frame.displacement)
     if told is not None:
         return told
     if _met(result):
@@ -106,13 +115,15 @@ def run(scene: DesignScene) -> tuple[str, str]:
     # an independent start, from shapes that differ by what the bounds allow
     rng, initial = np.random.default_rng(scene.start), problem.initial
     other = problem.optimise(start=initial + _spread(scene) * rng.uniform(-1.0, 1.0, initial.shape))
-    if _met(other) and _misreported(scene, built, other) is None:
+    if (told := _misreported(scene, built, other, frame.displacement)) is not None:
+        return told
+    if _met(other):
         return "wrong: a second start meets the targets", f"{result.reason}; {result.targets[0]}"
-    return "designed: two starts meet no target", f"{result.reason}; {', '.join(result.active)}; {result.targets[0]}"
+    return UNMET, f"{result.reason}; {', '.join(result.active)}; {result.targets[0]}"
 
 
-def design_problem(scene: DesignScene, built: Built, wanted: float) -> fm.DesignProblem:
-    """The optimisation to a ``wanted`` displacement."""
+def design_problem(scene: DesignScene, built: Built, wanted: float, displacement: float = 0.0) -> fm.DesignProblem:
+    """The optimisation to a ``wanted`` value of the goal, that of a force at a ``displacement``."""
     designs = []
     for name in scene.links:
         plan = scene.blueprint.link(name)
@@ -120,13 +131,23 @@ def design_problem(scene: DesignScene, built: Built, wanted: float) -> fm.Design
         designs.append(fm.SplineDesign(built.links[name], segments=2, thickness=(least, largest)))
     force, (load,) = built.forces[scene.blueprint.forces[0].name], scene.blueprint.samples
     sample = fm.Sample({force: load}, built.configuration)
-    if not scene.light:
+    if scene.goal == "strain energy":
+        targets = [fm.Target(fm.StrainEnergy(), sample, equals=wanted)]
+    elif scene.goal == "force":
+        there = fm.Sample({force: fm.at(displacement)}, built.configuration)
+        targets = [fm.Target(fm.ForceMagnitude(force), there, equals=wanted)]
+    elif not scene.light:
         targets = [fm.Target(fm.Displacement(force), sample, equals=wanted)]
     else:
         bound = {"at_most" if wanted > 0.0 else "at_least": wanted}
         mass = fm.LinkMass(tuple(built.links[name] for name in scene.links), density=_DENSITY)
         targets = [fm.Target(fm.Displacement(force), sample, **bound), fm.Target(mass, least=True)]
     return fm.DesignProblem(built.simulation, designs, targets=targets)
+
+
+def _reached(scene: DesignScene, frame: fm.Frame) -> float:
+    """The value of the goal at an equilibrium."""
+    return float(getattr(frame, scene.goal.replace(" ", "_")))
 
 
 def _idle(scene: DesignScene, displacement: float) -> bool:
@@ -148,17 +169,21 @@ def _spread(scene: DesignScene) -> float:
     return 0.2 * min(scene.thickness[0] * scene.blueprint.link(name).thickness for name in scene.links)
 
 
-def _misreported(scene: DesignScene, built: Built, result: fm.DesignResult) -> tuple[str, str] | None:
+def _misreported(
+    scene: DesignScene, built: Built, result: fm.DesignResult, displacement: float
+) -> tuple[str, str] | None:
     """Outcome and detail if a curve of the design says otherwise than the result, or does not get there."""
     force = built.forces[scene.blueprint.forces[0].name]
     simulation, (load,) = built.simulation.with_design(result), scene.blueprint.samples
+    sample = {"displacements": [displacement]} if scene.goal == "force" else {"forces": [load]}
     try:
-        curve = simulation.load_displacement(force, forces=[load], configuration=built.configuration)
+        curve = simulation.load_displacement(force, **sample, configuration=built.configuration)
     except fm.EquilibriumError as error:
         if result.verified:
             raise
         return "designed: not verified, and not reached from rest", str(error)
-    found, told = curve.frames[-1].displacement, float(result.targets[0].reached)
-    if abs(found - told) > THRESHOLDS.reached * scene.blueprint.length + THRESHOLDS.energy * abs(found):
-        return "wrong: displacement of a design", f"{told:.9g} reported, {found:.9g} on a curve from rest"
+    found, told = _reached(scene, curve.frames[-1]), float(result.targets[0].reached)
+    grain = THRESHOLDS.reached * scene.blueprint.length if scene.goal == "displacement" else 0.0
+    if abs(found - told) > grain + THRESHOLDS.energy * abs(found):
+        return f"wrong: {scene.goal} of a design", f"{told:.9g} reported, {found:.9g} on a curve from rest"
     return None

@@ -22,7 +22,7 @@ from .blueprint import (
     SpringPlan,
 )
 from .draw import INCOMPRESSIBLE, LAWS, MATERIALS, bending_force, decade, length
-from .link_effects import with_link_effect
+from .link_effects import with_link_effects
 from .spatial import spatial_scene
 from .topologies import TOPOLOGIES, Point, Skeleton, chain
 
@@ -34,8 +34,8 @@ def random_scene(seed: int) -> Blueprint:
     rng = Random(f"scene {seed}")
     space = rng.choices(("plane-stress", "plane-strain", "3d", "3d-symmetric"), (62, 12, 15, 11))[0]
     if space == "3d" and rng.random() < 0.4:
-        return spatial_scene(rng)
-    return with_link_effect(rng, planar_scene(rng, space))
+        return with_link_effects(rng, spatial_scene(rng))
+    return with_link_effects(rng, planar_scene(rng, space))
 
 
 def planar_scene(rng: Random, space: str) -> Blueprint:

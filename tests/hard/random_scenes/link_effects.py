@@ -1,6 +1,6 @@
 """Effects on the flexible links of random scenes: weight, pressure, prestrain, or contact with an obstacle.
 
-One a scene: forms of each kind must be compiled.
+One or two a scene: forms of each kind must be compiled.
 """
 
 from __future__ import annotations
@@ -24,9 +24,19 @@ from .blueprint import (
 from .draw import bending_force, decade, length
 
 
-def with_link_effect(rng: Random, scene: Blueprint) -> Blueprint:
-    """Some of the scenes with one of the effects; a contact stands in the way of the first force."""
-    match rng.choices(("none", "gravity", "pressure", "prestrain", "contact"), (52, 12, 10, 10, 16))[0]:
+def with_link_effects(rng: Random, scene: Blueprint) -> Blueprint:
+    """Some of the scenes with one of the effects, some of these with another; a contact stands in the way of the first
+    force."""
+    kind = rng.choices(("none", "gravity", "pressure", "prestrain", "contact"), (52, 12, 10, 10, 16))[0]
+    scene = _with_effect(rng, scene, kind)
+    if kind != "none" and rng.random() < 0.3:
+        others = [other for other in ("gravity", "pressure", "prestrain") if other != kind]
+        scene = _with_effect(rng, scene, rng.choice(others))
+    return scene
+
+
+def _with_effect(rng: Random, scene: Blueprint, kind: str) -> Blueprint:
+    match kind:
         case "gravity":
             return _with(scene, _gravity(rng, scene))
         case "pressure":

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy import sparse
 
 import fenicsmech as fm
 
@@ -159,6 +160,22 @@ class Potential:
         """∫ b density dX over cells."""
         return self.factor(link) * np.einsum("mq,q,mq->", density, self._rule[1], self._volumes[cells])
 
+    def rounding(self, link: LinkPlan) -> tuple[float, float]:
+        """Norms of the nodal forces of a link of unit modulus, stress ∇u, from independent errors of one.
+
+        Returns:
+            By errors of the displacements of nodes, the Frobenius norm of K = ∫ b ∇N · ∇N dX; and by those of ∇u at
+            quadrature points.
+        """
+        cells = np.flatnonzero(self.mesh.link == self.rows[link.name])
+        slopes = self._slopes[cells].astype(float)
+        size = self.factor(link) * self._rule[1] * self._volumes[cells]
+        blocks = np.einsum("mq,mqkd,mqld->mkl", size, slopes, slopes, optimize=True)
+        rows, columns = np.broadcast_arrays(self.mesh.cells[cells][:, :, None], self.mesh.cells[cells][:, None])
+        stiffness = sparse.coo_matrix((blocks.ravel(), (rows.ravel(), columns.ravel()))).tocsr()
+        by_node = float(np.sqrt(self.mesh.dim * stiffness.multiply(stiffness).sum()))
+        return by_node, float(np.sqrt(self.mesh.dim * np.sum((size[..., None, None] * slopes) ** 2)))
+
     def factor(self, link: LinkPlan) -> float:
         """From integrals over the mesh to those over the link: depth in the plane, 2 where half is meshed."""
         return link.depth if self.mesh.dim == 2 else 2.0 if self.blueprint.half else 1.0
@@ -197,13 +214,18 @@ class Potential:
         """Of all effects but prestrain, which changes the strain energy."""
         return self.link_energy(u) + self.body_energy(places)
 
-    def largest_stretch(self, u: np.ndarray) -> float:
-        """Largest principal stretch or inverse of one at the quadrature points of a state's ``u``, flat."""
-        stretches = [
-            np.linalg.svd(self._gradient(self.fields(u)[0], cells).astype(float), compute_uv=False)
-            for _, cells in self._groups
-        ]
-        return float(max(np.maximum(found, 1.0 / found).max() for found in stretches))
+    def strained(self, u: np.ndarray, stretch: float) -> tuple[float, float]:
+        """Share of the volume with a principal stretch, or the inverse of one, above ``stretch`` in a state's ``u``,
+        flat; and the least det F."""
+        volume, strained, least = 0.0, 0.0, np.inf
+        for link, cells in self._groups:
+            F = self._gradient(self.fields(u)[0], cells).astype(float)
+            stretches = np.linalg.svd(F, compute_uv=False)
+            above = np.maximum(stretches.max(axis=-1), 1.0 / stretches.min(axis=-1)) > stretch
+            volume += float(self._integral(link, np.ones(above.shape), cells))
+            strained += float(self._integral(link, above.astype(float), cells))
+            least = min(least, float(np.linalg.det(F).min()))
+        return strained / volume, least
 
     def link_energy(self, u: np.ndarray) -> complex:
         """Of effects on flexible links: weight, contact, pressure."""
@@ -260,8 +282,12 @@ class Potential:
         direction = direction / np.linalg.norm(direction)
         if force.on not in self.rows:
             return direction @ places[self._names.index(force.on)].displacement(at)
+        return direction @ self.moved(force, u)
+
+    def moved(self, force: ForcePlan, u: np.ndarray) -> np.ndarray:
+        """u(P) of a force on a flexible link, (dim,)."""
         cell, inside = self._located[force.name]
-        return direction @ (self.mesh.elements.values(inside[None])[0] @ u[self.mesh.cells[cell]])
+        return self.mesh.elements.values(inside[None])[0] @ u[self.mesh.cells[cell]]
 
     def led_travel(self, u: np.ndarray, places: Sequence[Place]) -> complex:
         """Σ ratio d · u(P) of the forces that change."""

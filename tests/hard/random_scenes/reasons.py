@@ -8,19 +8,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 import fenicsmech as fm
 
 from .assembly_check import smallest_gap
-from .blueprint import Blueprint, Built, CompliancePlan, GravityPlan, SpringPlan
+from .blueprint import Blueprint, Built, CompliancePlan, ContactPlan, GravityPlan, SpringPlan
 from .closure import Place
 from .motions import STEP, body_modes, moved
 from .potential import Potential
+from .reach import least_stretch
 from .residual_check import check, fault
-from .stability_check import eigenvalues, led_stiffness
+from .stability_check import stiffness_left
 from .thresholds import THRESHOLDS
 from .unstrained_check import unstrained_motions
 
@@ -46,16 +47,15 @@ def true_reason(blueprint: Blueprint, built: Built | None, failure: fm.Fenicsmec
         return unassembled(blueprint)
     if not isinstance(failure, fm.EquilibriumError):
         return None
-    last = failure.last
     for reason in _BY_GEOMETRY:
-        if excuse := reason(blueprint, built, last):
+        if excuse := reason(blueprint, built, failure):
             return excuse
-    if last is None or not _proven(blueprint, built, last):
+    if failure.last is None or not _proven(blueprint, built, failure.last):
         return None
     for reason in _BY_STATE:
-        if excuse := reason(blueprint, built, last):
+        if excuse := reason(blueprint, built, failure):
             return excuse
-    return turned_back(blueprint, built, failure)
+    return None
 
 
 def _proven(blueprint: Blueprint, built: Built, last: fm.Frame) -> bool:
@@ -66,13 +66,14 @@ def _proven(blueprint: Blueprint, built: Built, last: fm.Frame) -> bool:
 
 def unassembled(blueprint: Blueprint) -> Excuse | None:
     """Rigid links cannot be joined where motors are to take them, whatever shape the flexible ones have."""
-    if blueprint.idle_spins:
+    if blueprint.spins:  # in space
         return None
     return _excuse("rigid links cannot be joined", "gap over length", smallest_gap(blueprint), above=THRESHOLDS.joined)
 
 
-def immobile(blueprint: Blueprint, built: Built, last: fm.Frame | None) -> Excuse | None:
+def immobile(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError) -> Excuse | None:
     """No admissible motion takes the force's point along its direction, by the geometry of joints alone."""
+    last = failure.last
     if blueprint.control == "forces" or last is None:
         return None
     potential = Potential.of(blueprint, built.simulation)
@@ -88,15 +89,29 @@ def immobile(blueprint: Blueprint, built: Built, last: fm.Frame | None) -> Excus
     return _excuse(HELD, "travel per motion of bodies", rate, below=THRESHOLDS.immobile)
 
 
-def adrift(blueprint: Blueprint, built: Built, last: fm.Frame | None) -> Excuse | None:
-    """Loads work along a motion of the drawn mechanism that deforms neither links nor springs and is not prescribed.
+def adrift(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError) -> Excuse | None:
+    """Loads work along a translation of drawn bodies that nothing resists: joints stay closed, work grows for ever.
 
-    Then no equilibrium is near the drawn configuration, however small the load.
+    Any other free motion ends: bodies that turn about joints stay within reach of the ground, where the work of dead
+    loads has a maximum, an equilibrium. Nor is there an excuse where an obstacle may end the translation, or where an
+    equilibrium with all loads refutes it.
     """
+    last = failure.last
+    balanced = last is not None and last.state.load_factor == 1.0
+    if balanced and (blueprint.control != "forces" or last.force):
+        return None
+    if any(isinstance(plan, ContactPlan) for plan in blueprint.effects):
+        return None
     potential = Potential.of(blueprint, built.simulation)
     motions = _drawn_motions(potential)
-    sample = blueprint.samples[-1] if blueprint.control == "forces" else 0.0
-    rates, _ = _resistance(potential, motions)
+    if not motions:
+        return None
+    sample = _asked(blueprint, failure) if blueprint.control == "forces" else 0.0
+    turns = [
+        [blueprint.length * there[body].turn.imag.ravel() / STEP for body in range(len(potential.fixed))]
+        for _, there in motions
+    ]
+    rates = np.vstack([_resistance(potential, motions)[0], np.reshape(turns, (len(motions), -1)).T.astype(float)])
     if blueprint.control != "forces":
         rates = np.vstack([rates, [potential.led_travel(du, there).imag / STEP for du, there in motions]])
     free, _ = _split(rates)
@@ -109,11 +124,11 @@ def adrift(blueprint: Blueprint, built: Built, last: fm.Frame | None) -> Excuse 
         work[k] = np.imag(done) / STEP
     size = sum(abs(amount) for _, amount in potential.acting(sample)) + potential.weight
     share = float(np.linalg.norm(free @ work)) / max(size, 1e-300)
-    reason = "nothing but the force holds the mechanism"
-    return _excuse(reason, "work of loads along a free motion", share, above=THRESHOLDS.adrift)
+    reason = "nothing but loads holds the mechanism, and they drive it on without end"
+    return _excuse(reason, "work of loads along a free translation", share, above=THRESHOLDS.adrift)
 
 
-def drowned(blueprint: Blueprint, built: Built, last: fm.Frame | None) -> Excuse | None:
+def drowned(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError) -> Excuse | None:
     """A motion of the drawn mechanism that deforms no link is resisted by springs softer than the rounding of links.
 
     A link of width b and modulus E, in elements about as long as thick, has nodal stiffnesses of E b, each rounded to
@@ -131,55 +146,77 @@ def drowned(blueprint: Blueprint, built: Built, last: fm.Frame | None) -> Excuse
     return _excuse(reason, "stiffness over the stiffest link's", share, below=THRESHOLDS.drowned)
 
 
-def at_limit(blueprint: Blueprint, built: Built, last: fm.Frame) -> Excuse | None:
-    """The last equilibrium has all but lost the stiffness of its softest mode, that of the unloaded scene.
+def at_limit(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError) -> Excuse | None:
+    """The last equilibrium, a stable one, has all but lost the stiffness of the softest mode of the unloaded scene.
 
     Modes are those at the prescribed force or displacement; constant loads are raised before either. Paths go on past
     limit points.
     """
+    last = failure.last
     constant = last.state.load_factor < 1.0
     if blueprint.control == "path" and not constant:
         return None
     led = blueprint.control == "displacements" and not constant
     loaded = Potential.of(blueprint, built.simulation, last.state.load_factor)
     unloaded = Potential.of(blueprint, built.simulation, 0.0)
-    drawn = built.simulation.linkage.joints.drawn
-    before = eigenvalues(unloaded, np.zeros(unloaded.mesh.nodes.size), drawn, 0.0, led=led)[0]
-    now = eigenvalues(loaded, last.state.u, last.state.poses, last.force, led=led)[0]
-    return _excuse("at a limit point", "stiffness left", now / abs(before), below=THRESHOLDS.soft)
+    left = stiffness_left(loaded, last, unloaded, built.simulation.linkage.joints.drawn, led=led)
+    if left is None or left < 0.0:
+        return None
+    return _excuse("at a limit point", "stiffness left", left, below=THRESHOLDS.soft)
 
 
-def out_of_reach(blueprint: Blueprint, built: Built, last: fm.Frame) -> Excuse | None:
-    """The displacement takes many times the force that would double the weakest link's length, E b t.
+def out_of_reach(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError) -> Excuse | None:
+    """Rigid links and joints take the point where it is prescribed to be only if flexible links are drawn out of shape.
 
-    Links stretched straight stiffen: by the tangent of the last equilibrium it takes less than in truth.
+    Displacements count from the unloaded configuration, travels from the drawn one.
     """
-    if blueprint.control != "displacements" or last.state.load_factor < 1.0:
+    last = failure.last
+    if blueprint.control == "forces" or last.state.load_factor < 1.0:
         return None
     potential = Potential.of(blueprint, built.simulation)
-    stiffness = led_stiffness(potential, last.state.u, last.state.poses, last.force)
-    needed = max(abs(last.force + stiffness * (sample - last.displacement)) for sample in blueprint.samples)
-    share = needed / min(link.young * link.depth * link.thickness for link in blueprint.flexible)
-    return _excuse("links stretched straight", "force needed over E b t", share, above=THRESHOLDS.unreached)
+    places = potential.places(last.state.poses)
+    travel = float(np.real(potential.led_travel(potential.nodal(potential.fields(last.state.u)[0], places), places)))
+    wanted = travel + _asked(blueprint, failure) - last.displacement
+    stretch = least_stretch(potential, last.state.u, last.state.poses, wanted)
+    return _excuse("out of reach", "stretch that links need", stretch, above=THRESHOLDS.unreached)
 
 
-def overstrained(blueprint: Blueprint, built: Built, last: fm.Frame) -> Excuse | None:
-    """Under a force the last equilibrium has elements at a multiple of their size, or a fraction of it."""
+def inverted(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError) -> Excuse | None:
+    """Under a force an element of the last equilibrium is all but turned inside out."""
     if blueprint.control != "forces":
         return None
-    stretch = Potential.of(blueprint, built.simulation, last.state.load_factor).largest_stretch(last.state.u)
-    return _excuse("elements strained out of shape", "stretch or its inverse", stretch, above=THRESHOLDS.strained)
+    potential = Potential.of(blueprint, built.simulation, failure.last.state.load_factor)
+    _, least = potential.strained(failure.last.state.u, THRESHOLDS.strained)
+    return _excuse("an element all but inverted", "least det F", least, below=THRESHOLDS.inverted)
+
+
+def overstrained(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError) -> Excuse | None:
+    """Under a force part of the links is at a multiple of its length in the last equilibrium, or a fraction of it."""
+    if blueprint.control != "forces":
+        return None
+    potential = Potential.of(blueprint, built.simulation, failure.last.state.load_factor)
+    share, _ = potential.strained(failure.last.state.u, THRESHOLDS.strained)
+    return _excuse("links strained out of shape", "share of their volume", share, above=THRESHOLDS.strained_share)
 
 
 def turned_back(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError) -> Excuse | None:
-    """A path followed from rest through equilibria that pass the checks turns back before what is asked for.
+    """A path followed from rest through equilibria that pass the checks turns back before what is asked for, and the
+    curve got as far as that.
 
-    The first turn counts, and only if the last equilibrium lies before it: what the path may reach after a snap is not
-    what loads that grow lead to, and the error names the turn.
+    Beyond the turn loads and displacements snap, wherever the path goes then. Where constant loads stop the curve, the
+    path is that of these, if they are forces alone.
     """
-    if blueprint.control == "path" or failure.last.state.load_factor < 1.0 or built.configuration is not fm.DRAWN:
+    last = failure.last
+    if last.state.load_factor < 1.0:
+        blueprint, reached = _constant_forces(blueprint), last.state.load_factor
+        if blueprint is None:
+            return None
+        asked = blueprint.samples[0]
+    elif blueprint.control == "path":
         return None
-    asked = blueprint.samples[len(failure.frames)]
+    else:
+        asked = _asked(blueprint, failure)
+        reached = (last.force if blueprint.control == "forces" else last.displacement) / asked
     name = blueprint.control.removesuffix("s")
     until = fm.Until(**{name: asked}, frames=THRESHOLDS.followed)
     try:
@@ -187,16 +224,36 @@ def turned_back(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError
     except fm.EquilibriumError as error:
         frames = error.frames
     shares = [getattr(frame, name) / asked for frame in frames]
-    top = next((k for k in range(len(shares) - 1) if shares[k] > shares[k + 1]), 0)
-    if top == 0 or not getattr(failure.last, name) / asked <= shares[top] < 1.0 or "turns back" not in str(failure):
+    turn = next((k for k in range(1, len(shares) - 1) if shares[k - 1] < shares[k] > shares[k + 1]), None)
+    if turn is None or shares[turn] >= 1.0 or reached < THRESHOLDS.turned * shares[turn]:
         return None
-    if not all(_proven(blueprint, built, frame) for frame in frames[top - 1 : top + 2]):
+    if not all(_proven(blueprint, built, frame) for frame in frames[turn - 1 : turn + 2]):
         return None
-    return Excuse("a path of equilibria turns back", f"{name} there over that asked for {shares[top]:.1e}")
+    return Excuse("a path of equilibria turns back", f"share of what is asked for {shares[turn]:.1e}")
 
 
-_BY_GEOMETRY: tuple[Callable[[Blueprint, Built, fm.Frame | None], Excuse | None], ...] = (immobile, adrift, drowned)
-_BY_STATE: tuple[Callable[[Blueprint, Built, fm.Frame], Excuse | None], ...] = (at_limit, out_of_reach, overstrained)
+def _constant_forces(blueprint: Blueprint) -> Blueprint | None:
+    """The scene whose constant forces are those that change, up to what they are; None if other loads are constant."""
+    for plan in blueprint.effects:
+        if not isinstance(plan, CompliancePlan) and not (isinstance(plan, SpringPlan) and not plan.rest):
+            return None
+    forces = blueprint.forces[len(blueprint.ratios) :]
+    sizes = tuple(force.magnitude for force in forces)
+    if not forces:
+        return None
+    if len(forces) == 1:
+        return replace(blueprint, forces=forces, ratios=(1.0,), control="forces", samples=sizes)
+    return replace(blueprint, forces=forces, ratios=sizes, control="forces", samples=(1.0,))
+
+
+_Reason = Callable[[Blueprint, Built, fm.EquilibriumError], Excuse | None]
+_BY_GEOMETRY: tuple[_Reason, ...] = (immobile, adrift, drowned)
+_BY_STATE: tuple[_Reason, ...] = (at_limit, out_of_reach, inverted, overstrained, turned_back)
+
+
+def _asked(blueprint: Blueprint, failure: fm.EquilibriumError) -> float:
+    """The sample at which the curve failed; that of a path is its end."""
+    return blueprint.samples[0 if blueprint.control == "path" else len(failure.frames)]
 
 
 def _excuse(

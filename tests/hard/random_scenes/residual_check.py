@@ -83,7 +83,7 @@ def check(potential: Potential, frame: fm.Frame, origin: float, seed: int = 0) -
         squares = [square + _volume_slope(potential, followed, p, rng) ** 2 for square in squares]
     along = [slope(np.zeros(u.shape), moved(places, 1j * _STEP * mode)) for mode in modes]
     force = float(np.sqrt(np.mean(squares) + np.sum(np.square(along))))
-    floor, scale = _floor(potential, u), _scale(potential, frame, u, p, places)
+    floor, scale = _floor(potential, u, places), _scale(potential, frame, u, p, places)
     travel = float(np.real(potential.led_travel(followed, places))) - origin
     energy = float(potential.strain_energy(followed, p))
     return Residual(
@@ -149,37 +149,31 @@ def _scale(potential: Potential, frame: fm.Frame, u: np.ndarray, p: np.ndarray, 
     return float(max(forces))
 
 
-def _stiffness(potential: Potential) -> float:
-    """Largest stiffness of a node: E times depth (plane) or cell size (space)."""
-    return max(_stiffnesses(potential).values())
-
-
-def _stiffnesses(potential: Potential) -> dict[str, float]:
-    plans, flat = potential.blueprint.flexible, potential.mesh.dim == 2
-    return {
-        link.name: link.young * (link.depth if flat else link.size) / (1 - 2 * _poisson(potential, link))
-        for link in plans
-    }
-
-
 def _poisson(potential: Potential, link: LinkPlan) -> float:
     """ν of what displacements strain: changes of volume are resisted by a pressure where the link has one."""
     return 0.0 if potential.blueprint.mixed(link) else link.poisson
 
 
-def _floor(potential: Potential, u: np.ndarray) -> float:
+def _floor(potential: Potential, u: np.ndarray, places: list[Place]) -> float:
     """Residual from rounding alone, of what is checked and of the check.
 
     Displacements are rounded to 1e-16 of the largest one, all nodes independently. Here F = 1 + ∇u is rounded to half
-    the ε of ``REAL`` whatever ∇u is, stresses by that much of the modulus, and nodal forces by stress times cell size.
+    the ε of ``REAL`` whatever ∇u is, stresses by that much of the modulus, at all quadrature points independently. Both
+    lead to nodal forces by the gradients of shape functions, which grow with their order (``Potential.rounding``).
+    The ends of joints that give way are rounded to 1e-16 of their displacements.
     """
-    mesh, stiffnesses = potential.mesh, _stiffnesses(potential)
-    displacements = 1e-16 * _stiffness(potential) * np.abs(u).max() * np.sqrt(mesh.nodes.size)
     squares = 0.0
     for link in potential.blueprint.flexible:
-        count = len(np.unique(mesh.cells[mesh.link == potential.rows[link.name]])) * mesh.dim
-        squares += count * (0.5 * np.finfo(REAL).eps * stiffnesses[link.name] * link.size) ** 2
-    return float(displacements + np.sqrt(squares))
+        modulus = link.young / (1 - 2 * _poisson(potential, link))
+        by_node, by_point = potential.rounding(link)
+        squares += (modulus * by_node * 1e-16 * np.abs(u).max()) ** 2
+        squares += (modulus * by_point * 0.5 * float(np.finfo(REAL).eps)) ** 2
+    for name, compliance in potential.closure.soft.items():
+        joint = potential.blueprint.joint(name)
+        at = np.array((*joint.at, 0.0)[: potential.blueprint.dim])
+        for body in potential.closure.ends[name]:
+            squares += float(np.sum((places[body].displacement(at).real * 1e-16 / compliance) ** 2))
+    return float(np.sqrt(squares))
 
 
 def _energy_digits(potential: Potential) -> float:

@@ -17,7 +17,7 @@ import numpy as np
 import fenicsmech as fm
 
 from .blueprint import Blueprint, Built, build
-from .designs import design_scene, run
+from .designs import design_scene, run, with_goal
 from .generator import random_scene
 from .invalid import spoiled_scene
 from .potential import Potential
@@ -28,6 +28,7 @@ from .thresholds import THRESHOLDS
 
 INVALID_SHARE = 3  # in ten
 DESIGNS = 40  # scenes for one design problem
+ROUNDED = "equilibrium to rounding"
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,7 @@ def _judge_spoiled(seed: int) -> tuple[str, _Verdict]:
 
 
 def _judge_design(seed: int) -> tuple[str, _Verdict]:
-    problem = design_scene(seed)
+    problem = with_goal(design_scene(seed), seed)
     try:
         outcome, detail = run(problem)
     except fm.FenicsmechError as error:
@@ -184,7 +185,7 @@ def judge_frames(blueprint: Blueprint, built: Built, frames: Sequence[fm.Frame],
         if error:
             return _Verdict(f"wrong: {error}", str(found), count, found.relative, iterations)
         if found.force > THRESHOLDS.residual * found.scale:
-            outcome = "equilibrium to rounding"
+            outcome = ROUNDED
     unstable = unstable_directions(potential, chosen[-1]) if checkable(potential) else None
     if unstable is not None and unstable != chosen[-1].unstable_modes:
         detail = f"{chosen[-1].unstable_modes} unstable modes, and {unstable} by second differences"

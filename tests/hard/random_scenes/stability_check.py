@@ -8,8 +8,8 @@ has a negative eigenvalue for each. Congruence with a diagonal keeps the signs a
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
@@ -25,6 +25,27 @@ from .thresholds import THRESHOLDS
 _IMAGINARY, _REAL = 1e-30, 1e-5
 # unknowns up to which all eigenvalues are found; beyond, the four nearest to zero, unless some are negative
 _DENSE = 500
+
+
+@dataclass(frozen=True)
+class _Second:
+    """Second derivative of L on admissible directions.
+
+    Attributes:
+        hessian: by displacements of free nodes, then motions of bodies.
+        slope: of the travel that is led, by the same.
+        motions: basis of the motions that keep joints closed, (motions of all free bodies, ways).
+    """
+
+    hessian: sparse.csc_matrix
+    slope: np.ndarray
+    motions: np.ndarray
+
+    @property
+    def scale(self) -> np.ndarray:
+        """1 / √ of the diagonal."""
+        diagonal = np.abs(self.hessian.diagonal())
+        return 1.0 / np.sqrt(np.maximum(diagonal, THRESHOLDS.scaled * diagonal.max()))
 
 
 def unstable_directions(potential: Potential, frame: fm.Frame) -> int | None:
@@ -57,35 +78,70 @@ def eigenvalues(
         every: whether all are wanted.
         led: whether directions that take the force's point along are left out, as where its displacement is prescribed.
     """
-    scaled, slope = _scaled(potential, u, poses, magnitude)
-    slope = slope if led else None
+    second = _second(potential, u, poses, magnitude)
+    return _lowest(potential, second, second.scale, every=every, led=led)
+
+
+def stiffness_left(
+    potential: Potential, frame: fm.Frame, unloaded: Potential, drawn: np.ndarray, *, led: bool
+) -> float | None:
+    """Stiffness of the softest mode of a frame over that of the softest one of the unloaded scene; ``led`` as in
+    ``eigenvalues``.
+
+    Both are those of matrices scaled by the diagonal of the latter, the bases of motions as near each other as may be.
+
+    Returns:
+        None where a number says nothing: the unloaded scene has a mode without stiffness, or other freedoms; or the
+        frame is unstable, or second differences count other modes than it does.
+
+    Args:
+        potential: of the scene as it is loaded.
+        frame: what was found.
+        unloaded: the scene without loads.
+        drawn: poses of bodies as drawn.
+        led: whether the displacement is prescribed.
+    """
+    if not checkable(potential) or not frame.stable_under_control:
+        return None
+    if unstable_directions(potential, frame) not in (None, frame.unstable_modes):  # near a limit one is signless
+        return None
+    at_rest = _second(unloaded, np.zeros(unloaded.mesh.nodes.size), drawn, 0.0)
+    loaded = _second(potential, frame.state.u, frame.state.poses, frame.force, near=at_rest.motions)
+    if loaded.hessian.shape != at_rest.hessian.shape:
+        return None
+    before = _lowest(unloaded, at_rest, at_rest.scale, led=led)
+    if before[0] <= THRESHOLDS.signless * max(1.0, before[-1]):
+        return None
+    return float(_lowest(potential, loaded, at_rest.scale, led=led)[0] / before[0])
+
+
+def _lowest(
+    potential: Potential, second: _Second, scale: np.ndarray, *, every: bool = False, led: bool = False
+) -> np.ndarray:
+    """``eigenvalues`` of a second derivative, scaled."""
+    scaled = (sparse.diags(scale) @ second.hessian @ sparse.diags(scale)).tocsc()
+    slope = scale * second.slope if led else None
     # a singular matrix has no inverse
-    values = None if every or scaled.shape[0] <= _DENSE or potential.blueprint.idle_spins else _nearest(scaled, slope)
+    values = None if every or scaled.shape[0] <= _DENSE or potential.blueprint.spins else _nearest(scaled, slope)
     if values is None or values.min() < 0.0:
         values = np.linalg.eigvalsh(_restricted(scaled.toarray(), slope))
     return np.sort(values[np.argsort(np.abs(values))[potential.blueprint.idle_spins :]])
 
 
-def led_stiffness(potential: Potential, u: np.ndarray, poses: np.ndarray, magnitude: float) -> float:
-    """Change of the force that leads by the travel of its point, in equilibrium, infinite if that is held; see
-    ``eigenvalues``."""
-    scaled, slope = _scaled(potential, u, poses, magnitude)
-    try:
-        return float(-_bordered(scaled, slope)(np.append(np.zeros(len(slope)), 1.0))[-1])
-    except RuntimeError:  # singular
-        return math.inf
-
-
-def _scaled(
-    potential: Potential, u: np.ndarray, poses: np.ndarray, magnitude: float
-) -> tuple[sparse.csc_matrix, np.ndarray]:
-    """Second derivative of L on admissible directions, and the slope of the travel that is led there, both scaled."""
+def _second(
+    potential: Potential, u: np.ndarray, poses: np.ndarray, magnitude: float, near: np.ndarray | None = None
+) -> _Second:
+    """Second derivative of L; the basis of motions is the one next to ``near``, if given."""
     places = potential.places(poses)
     u = potential.nodal(potential.fields(u)[0], places)
     free = np.flatnonzero(potential.free)
     bodies = [i for i, fixed in enumerate(potential.fixed) if not fixed]
     stiffness = _stiffness(potential, u)
     curvature, null = _body_curvature(potential, u, places, bodies, magnitude)
+    if near is not None and near.shape == null.shape:
+        left, _, right = np.linalg.svd(null.T @ near)  # the rotation that takes one basis next to the other
+        turn = left @ right
+        curvature, null = turn.T @ curvature @ turn, null @ turn
     follow = _interface_motion(potential, places, bodies) @ null
     stiff = stiffness[free]
     hessian = sparse.bmat(
@@ -93,10 +149,7 @@ def _scaled(
     ).tocsc()
     ways = np.tensordot(null.T, np.array(_motions(potential, bodies)), axes=1)
     slope = np.concatenate([potential.led_slope().ravel()[free], _travel_rates(potential, u, places, ways)])
-    diagonal = np.abs(hessian.diagonal())
-    scale = 1.0 / np.sqrt(np.maximum(diagonal, 1e-14 * diagonal.max()))
-    scaled = sparse.diags(scale) @ (0.5 * (hessian + hessian.T)) @ sparse.diags(scale)
-    return scaled.tocsc(), scale * slope
+    return _Second((0.5 * (hessian + hessian.T)).tocsc(), slope, null)
 
 
 def _travel_rates(potential: Potential, u: np.ndarray, places: list[Place], ways: np.ndarray) -> np.ndarray:
@@ -218,9 +271,9 @@ def _body_curvature(
 
     still = np.zeros_like(motions[0])
     jacobian = slopes(potential.closure.residual, motions, still).T
-    multipliers = np.linalg.lstsq(jacobian.T, slopes(work, motions, still), rcond=1e-10)[0]
+    multipliers = np.linalg.lstsq(jacobian.T, slopes(work, motions, still), rcond=THRESHOLDS.rank)[0]
     _, values, right = np.linalg.svd(jacobian, full_matrices=True)
-    null = right[int(np.sum(values > 1e-9 * max(values.max(initial=0.0), 1e-300))) :].T
+    null = right[int(np.sum(values > THRESHOLDS.rank * max(values.max(initial=0.0), 1e-300))) :].T
 
     def lagrangian(there: list[Place]) -> complex:
         return work(there) - multipliers @ potential.closure.residual(there)

@@ -7,8 +7,9 @@ import io
 from collections import Counter
 from collections.abc import Iterable
 
+from .designs import UNMET
 from .reasons import HELD
-from .scene_result import INVALID_SHARE, SceneResult
+from .scene_result import DESIGNS, INVALID_SHARE, ROUNDED, SceneResult
 from .thresholds import THRESHOLDS
 
 _EXCUSED = ("true", "designed: not verified")
@@ -40,15 +41,39 @@ def table(results: Iterable[SceneResult]) -> str:
 
 
 def excessive(results: Iterable[SceneResult]) -> list[str]:
-    """Excuses that let off more scenes than they may."""
+    """Excuses, and checks left out, that let off more scenes than they may: alone, and excuses all together.
+
+    Shares are those of scenes that make sense; of designs, of these.
+    """
     results, found = list(results), []
-    counts = Counter(result.outcome for result in results if result.outcome.startswith(_EXCUSED))
-    for outcome, count in counts.items():
-        share = THRESHOLDS.held if outcome.endswith(HELD) else THRESHOLDS.excused
-        most = THRESHOLDS.spare + share * len(results)
-        if count > most:
-            found.append(f"{outcome!r} lets off {count} scenes, more than {most:.0f}")
+    sound = [result for result in results if _sound(result)]
+    designs = [result for result in sound if _design(result)]
+    excused = Counter(result.outcome for result in sound if result.outcome.startswith(_EXCUSED))
+    held = sum(count for outcome, count in excused.items() if outcome.endswith(HELD))
+    lets_off = [(repr(outcome), count, THRESHOLDS.excused) for outcome, count in excused.items() if HELD not in outcome]
+    lets_off += [
+        (f"{HELD!r}", held, THRESHOLDS.held),
+        ("the sum of all other excuses", excused.total() - held, THRESHOLDS.excused_together),
+        (f"{ROUNDED!r}", sum(result.outcome == ROUNDED for result in sound), THRESHOLDS.rounded_share),
+    ]
+    unchecked = Counter(word for result in sound for word in result.unchecked.split(" and ") if word)
+    lets_off += [(f"no check of the {word}", count, THRESHOLDS.unchecked[word]) for word, count in unchecked.items()]
+    for what, count, share in lets_off:
+        if count > (most := THRESHOLDS.spare + share * len(sound)):
+            found.append(f"{what} lets off {count} scenes of {len(sound)}, more than {most:.0f}")
+    unmet = sum(result.outcome == UNMET for result in designs)
+    if unmet > (most := THRESHOLDS.spare + THRESHOLDS.unmet * len(designs)):
+        found.append(f"{UNMET!r} lets off {unmet} designs of {len(designs)}, more than {most:.0f}")
     return found
+
+
+def _sound(result: SceneResult) -> bool:
+    """Whether a scene makes sense."""
+    return _design(result) or result.seed % 10 >= INVALID_SHARE
+
+
+def _design(result: SceneResult) -> bool:
+    return result.seed % DESIGNS == DESIGNS - 1
 
 
 def _range(proofs: list[str]) -> str:
@@ -61,12 +86,10 @@ def _range(proofs: list[str]) -> str:
 
 def _coverage(results: list[SceneResult]) -> list[str]:
     """How many of the scenes that make sense have each space, order, control, effect and so on."""
-    sound = [
-        result for result in results if result.seed % 10 >= INVALID_SHARE and not result.scene.startswith("design")
-    ]
+    sound = [result for result in results if _sound(result) and not _design(result)]
     counts = Counter(word for result in sound for word in set(result.scene.split(", ")) if word)
     kinds = sorted(counts.items(), key=lambda item: (-item[1], item[0]))
-    designs = sum(result.scene.startswith("design") for result in results)
+    designs = sum(map(_design, results))
     return [
         f"Of {len(sound)} scenes that make sense, besides {designs} designs, so many have",
         "",

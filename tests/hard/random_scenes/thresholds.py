@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True)
@@ -21,21 +22,30 @@ class Thresholds:
         energy: the strain energy reported, over itself.
         digits: strain energy over its rounding in double precision below which it is not compared.
         signless: eigenvalue over the largest below which a direction counts as neither stable nor unstable.
+        scaled: diagonal entry of a stiffness over the largest one, up to which directions are scaled.
         unknowns: displacements up to which stability is checked.
         rank: singular value over the largest below which motions count as free.
         frames: of a path that are checked.
         directions: at random, along which the potential must be stationary.
         joined: gap over the mechanism's length, rad, above which rigid links cannot be joined.
         immobile: travel of the force's point per unit motion of bodies at which it cannot be displaced.
-        adrift: work of loads along a free motion, over loads times the velocity of what moves fastest, at which no
-            equilibrium is near the drawn configuration.
+        adrift: work of loads along a free translation, over loads times the velocity of what moves fastest, at which
+            it has no bound.
         soft: stiffness of the softest mode over that of the unloaded scene at which a limit point is near.
-        unreached: force that a displacement takes, over E b t of the weakest link, at which it is out of reach.
-        strained: principal stretch, or its inverse, of elements out of shape.
+        unreached: stretch of links that a displacement needs at least, at which it is out of reach.
+        tied: weight of gaps, over the mechanism's length, beside stretches in the search for the latter.
+        inverted: det F of an element that is all but inverted.
+        strained: principal stretch, or its inverse, of what is strained out of shape.
+        strained_share: of the links' volume, beyond which this is the reason.
         followed: most frames of a path that is to turn back.
+        turned: what a curve has reached over where the path turns back, at least.
         drowned: stiffness of springs over that of the stiffest link at which rounding hides it.
-        excused: share of all scenes that each excuse may let off.
+        excused: share of the scenes that make sense that each excuse may let off.
         held: share of those in which joints and motors hold the point, which is exact.
+        excused_together: share that all other excuses may let off.
+        rounded_share: share of equilibria that are only as good as rounding.
+        unmet: share of designs whose targets two starts miss.
+        unchecked: shares of scenes in which a check is left out.
         spare: scenes that each may let off besides, for small samples.
         effectivity: largest factor between an error estimate and the true difference.
         effective: least share of estimates within it, of those whose difference is above resolution.
@@ -44,7 +54,7 @@ class Thresholds:
     """
 
     residual: float = 1e-6
-    rounding: float = 10.0
+    rounding: float = 2.0
     balanced: float = 1e-5
     grain: float = 1e-7
     rounded: float = 1e-14
@@ -54,6 +64,7 @@ class Thresholds:
     energy: float = 1e-6
     digits: float = 1e6
     signless: float = 1e-10
+    scaled: float = 1e-14
     unknowns: int = 2500
     rank: float = 1e-9
     frames: int = 6
@@ -62,12 +73,20 @@ class Thresholds:
     immobile: float = 1e-9
     adrift: float = 1e-6
     soft: float = 0.1
-    unreached: float = 10.0
+    unreached: float = 2.0
+    tied: float = 1e4
+    inverted: float = 0.1
     strained: float = 2.0
+    strained_share: float = 0.05
     followed: int = 150
+    turned: float = 0.9
     drowned: float = 1e-14
     excused: float = 0.03
-    held: float = 0.1
+    held: float = 0.12
+    excused_together: float = 0.06
+    rounded_share: float = 0.3
+    unmet: float = 0.4
+    unchecked: Mapping[str, float] = field(default_factory=lambda: {"displacement": 0.6, "stability": 0.3})
     spare: int = 5
     effectivity: float = 2.0
     effective: float = 0.95

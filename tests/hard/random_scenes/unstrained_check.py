@@ -64,8 +64,9 @@ def unstrained_work(
     """Largest work of all that acts along a motion that deforms no link, over loads and torques times velocities.
 
     Loads count with the velocity of what moves fastest: in a dead centre their own points stand still. What rounding
-    does to springs' coordinates is left out, what it does to the force under displacement control, which takes all that
-    it leaves (``floor``), and the work of the largest ``reaction`` where joints open by rounding.
+    does to springs' coordinates is left out, what it does to the force where displacements are prescribed or followed
+    to, which takes all that it leaves (``floor``), and the work of the largest ``reaction`` where joints open by
+    rounding.
     """
     shares = []
     for du, there, opening in unstrained_motions(potential, u, places):
@@ -77,7 +78,7 @@ def unstrained_work(
         for force, amount in potential.acting(magnitude):
             work -= amount * float(np.imag(potential.travel(force, u + du, there))) / STEP
             size += abs(amount) * fastest
-        if potential.blueprint.control == "displacements":
+        if potential.blueprint.control != "forces":
             grain += floor * fastest
         for plan in potential.blueprint.effects:
             part = float(np.imag(potential.alone(plan).effect_energy(u + du, there))) / STEP

@@ -1,0 +1,121 @@
+"""How far flexible links must be stretched at least for the force's point to get where it is prescribed to be.
+
+A link is replaced by strings between its joints and the point of the force, s the length of link between the ends of a
+string and d their distance: nothing resists while d < s. Rigid links, joints and motors are as they are; springs are
+left out. Then the minimum over all poses, m strings,
+
+    c = min Σ ⟨d / s − 1⟩² + w² (|gaps of joints|² + |travel − wanted|²)
+
+is zero or else at least one link is stretched by 1 + √(c / m), wherever the equilibrium is: where joints are closed and
+the travel is as wanted, the second term vanishes, and the first one is no less than c. It is found by least squares
+from a known pose on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from .blueprint import LinkPlan
+from .closure import Place
+from .potential import Potential
+from .thresholds import THRESHOLDS
+
+_STEPS = 8  # from the travel that is known to the wanted one
+
+
+@dataclass(frozen=True)
+class _String:
+    """Between two points, each a body's centre (0, index) or a force's point (1, index), ``length`` apart at most."""
+
+    ends: tuple[tuple[int, int], tuple[int, int]]
+    length: float
+
+
+def least_stretch(potential: Potential, u: np.ndarray, poses: np.ndarray, travel: float) -> float:
+    """The least stretch 1 + √(c / m) of the links that is found; one if they need none.
+
+    Args:
+        potential: of the scene.
+        u: nodal displacements of a known state, flat.
+        poses: of its bodies.
+        travel: of the force's point from the drawn configuration, wanted.
+    """
+    dim, length = potential.blueprint.dim, potential.blueprint.length
+    turns = 1 if dim == 2 else 3
+    start = potential.places(poses)
+    nodal = potential.nodal(potential.fields(u)[0], start)
+    known = float(np.real(potential.led_travel(nodal, start)))
+    forces = potential.blueprint.forces[: len(potential.blueprint.ratios)]
+    free = [i for i, fixed in enumerate(potential.fixed) if not fixed]
+    loose = [k for k, force in enumerate(forces) if force.on in potential.rows]
+    drawn = {k: np.array((*forces[k].at, 0.0)[:dim]) for k in loose}
+    moved = {k: potential.moved(forces[k], nodal)[:dim] for k in loose}
+    strings = _strings(potential)
+
+    def pose(unknowns: np.ndarray) -> tuple[list[Place], dict[tuple[int, int], np.ndarray]]:
+        """Bodies, and where the ends of strings are."""
+        places, parts = list(start), unknowns[: len(free) * (dim + turns)].reshape(len(free), dim + turns)
+        for body, part in zip(free, parts, strict=True):
+            vector, old = np.zeros(3), start[body]
+            vector[3 - turns :] = part[dim:]
+            turn = Rotation.from_rotvec(vector).as_matrix()[:dim, :dim] @ old.turn
+            places[body] = Place(old.centre, old.shift + length * part[:dim], turn, old.angle + vector[2])
+        ends = {(0, i): np.array(body.centre + body.shift, dtype=float) for i, body in enumerate(places)}
+        shifts = unknowns[len(free) * (dim + turns) :].reshape(len(loose), dim)
+        for k, shift in zip(loose, shifts, strict=True):
+            ends[1, k] = drawn[k] + moved[k] + length * shift
+        return places, ends
+
+    def residual(unknowns: np.ndarray, wanted: float) -> np.ndarray:
+        places, ends = pose(unknowns)
+        way = 0.0
+        for k, (ratio, force) in enumerate(zip(potential.blueprint.ratios, forces, strict=True)):
+            direction = np.array((*force.direction, 0.0)[:dim])
+            if k in loose:
+                way += ratio * (direction / np.linalg.norm(direction)) @ (ends[1, k] - drawn[k])
+            else:
+                way += ratio * float(np.real(potential.travel(force, nodal, places)))
+        slack = [np.linalg.norm(ends[s.ends[0]] - ends[s.ends[1]]) / s.length - 1.0 for s in strings]
+        held = np.append(potential.closure.residual(places).astype(float), (way - wanted) / length)
+        return np.concatenate([np.maximum(slack, 0.0), THRESHOLDS.tied * held])
+
+    unknowns = np.zeros(len(free) * (dim + turns) + len(loose) * dim)
+    for share in np.linspace(0.0, 1.0, _STEPS + 1)[1:]:
+        wanted = known + share * (travel - known)
+        unknowns = least_squares(residual, unknowns, args=(wanted,), xtol=1e-12, ftol=1e-12, max_nfev=100).x
+    cost = float(np.sum(residual(unknowns, travel) ** 2))
+    return 1.0 + float(np.sqrt(cost / max(len(strings), 1)))
+
+
+def _strings(potential: Potential) -> list[_String]:
+    """Between all joints of a link, and points of forces on it."""
+    strings, led = [], potential.blueprint.forces[: len(potential.blueprint.ratios)]
+    for link in potential.blueprint.flexible:
+        ends = []
+        for joint in potential.blueprint.joints:
+            if link.name in (joint.a, joint.b):
+                body = potential.closure.ends[joint.name][int(link.name == joint.b)]
+                ends.append(((0, body), _along(link, joint.at)))
+        ends += [((1, k), _along(link, force.at)) for k, force in enumerate(led) if force.on == link.name]
+        for (a, first), (b, second) in combinations(ends, 2):
+            # arcs through the points of a centreline are longer than the polygon, by less than a fifth
+            length = 1.2 * abs(second - first) + link.thickness
+            strings.append(_String((a, b), length))
+    return strings
+
+
+def _along(link: LinkPlan, at: tuple[float, ...]) -> float:
+    """Where a point is along the polygon through the points of a centreline."""
+    point, nearest, where, passed = np.array(at[:2]), np.inf, 0.0, 0.0
+    for a, b in zip(link.centreline, link.centreline[1:], strict=False):
+        start, side = np.array(a[:2]), np.array(b[:2]) - np.array(a[:2])
+        share = float(np.clip((point - start) @ side / (side @ side), 0.0, 1.0))
+        if (distance := float(np.linalg.norm(point - start - share * side))) < nearest:
+            nearest, where = distance, passed + share * float(np.linalg.norm(side))
+        passed += float(np.linalg.norm(side))
+    return where

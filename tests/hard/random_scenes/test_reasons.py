@@ -1,0 +1,270 @@
+"""Excuses of the judge, and where each of them ends: a scene or a constructed state on either side."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import fenicsmech as fm
+
+from . import designs
+from .blueprint import Blueprint, ContactPlan, ForcePlan, JointPlan, LinkPlan, PlanePlan, SpringPlan, build
+from .designs import UNMET
+from .potential import Potential
+from .reach import least_stretch
+from .reasons import _constant_forces, adrift, inverted, out_of_reach, overstrained, turned_back
+from .residual_check import check, fault
+from .scene_result import ROUNDED, SceneResult
+from .stability_check import stiffness_left
+from .summary import excessive
+from .test_checks import arch
+from .thresholds import THRESHOLDS
+from .worker import Worker
+
+
+def slider(*effects, angle: float = 0.0, control: str = "forces") -> Blueprint:
+    """A slider with a strip welded to it, on which a force pulls at an ``angle`` to the slide."""
+    return Blueprint(
+        topology="slider",
+        links=(
+            LinkPlan("base", fixed=True),
+            LinkPlan("slider"),
+            LinkPlan("strip", False, ((0.0, 0.0), (30.0, 0.0)), 2.0, 3.0, 1770.0, 0.4, size=2.5),
+        ),
+        joints=(
+            JointPlan("S", "prismatic", "base", "slider", (-5.0, 0.0), axis=(1.0, 0.0)),
+            JointPlan("A", "weld", "slider", "strip", (0.0, 0.0), interface=1.4),
+        ),
+        motors=(),
+        forces=(ForcePlan("load", "strip", (30.0, 0.0), (np.cos(angle), np.sin(angle))),),
+        effects=effects,
+        space="plane-stress",
+        order=2,
+        control=control,
+        samples=(0.01,),
+    )
+
+
+def pendulum(control: str = "forces") -> Blueprint:
+    """A strip that hangs on a pin, a force at its end across it."""
+    return replace(
+        slider(angle=np.pi / 2, control=control),
+        topology="pendulum",
+        links=(LinkPlan("base", fixed=True), LinkPlan("bob"), slider().links[2]),
+        joints=(
+            JointPlan("A", "revolute", "base", "strip", (0.0, 0.0), interface=1.4),
+            JointPlan("B", "weld", "strip", "bob", (30.0, 0.0), interface=1.4),
+        ),
+    )
+
+
+def failed(last: object = None, frames: tuple = ()) -> fm.EquilibriumError:
+    return fm.EquilibriumError("load", "not found", "Give up", last=last, frames=frames)
+
+
+def balanced(load_factor: float, force: float) -> SimpleNamespace:
+    return SimpleNamespace(state=SimpleNamespace(load_factor=load_factor), force=force)
+
+
+@pytest.mark.parametrize(
+    "scene, last, excused",
+    [
+        pytest.param(slider(), None, True, id="nothing ends the translation"),
+        pytest.param(slider(), balanced(1.0, 0.0), True, id="an equilibrium without the force says nothing"),
+        pytest.param(slider(), balanced(1.0, 0.004), False, id="an equilibrium with the force refutes it"),
+        pytest.param(slider(angle=np.pi / 2), None, False, id="no work along the slide"),
+        pytest.param(slider(SpringPlan("S", 1e-3, 0.0)), None, False, id="a spring ends the translation"),
+        pytest.param(
+            slider(ContactPlan("strip", PlanePlan((40.0, 0.0), (-1.0, 0.0)))), None, False, id="so does an obstacle"
+        ),
+        pytest.param(slider(control="displacements"), None, False, id="the displacement is prescribed"),
+        pytest.param(pendulum(), None, False, id="a turn has an end"),
+    ],
+)
+def test_loads_drive_a_mechanism_on_without_end_along_free_translations_only(scene, last, excused):
+    assert (adrift(scene, build(scene), failed(last)) is not None) == excused
+
+
+@pytest.fixture(scope="module")
+def raised():
+    """An arch whose top is raised, bent by its load: its scene, simulation, potential and frame."""
+    scene = arch("plane-stress", 2)
+    scene = replace(scene, forces=(ForcePlan("load", "left", (30.0, 10.0), (0.0, 1.0)),), ratios=(1.0,))
+    built = build(scene)
+    (frame,) = built.curve(scene).frames
+    return scene, built, Potential.of(scene, built.simulation), frame
+
+
+# the top, at a height of 10 over supports 60 apart, by strips that may be 1.2 times their length without a force
+@pytest.mark.parametrize("displacement, excused", [(-20.0, False), (62.0, False), (80.0, True)])
+def test_a_displacement_is_out_of_reach_where_links_must_be_twice_as_long(raised, displacement, excused):
+    scene, built, potential, frame = raised
+    led = replace(scene, control="displacements", samples=(displacement,))
+    assert (out_of_reach(led, built, failed(frame)) is not None) == excused
+    stretch = least_stretch(potential, frame.state.u, frame.state.poses, displacement)
+    assert abs(stretch - THRESHOLDS.unreached) < 0.4 or displacement < 0.0 and stretch < 1.0 + 1e-6
+    # of two samples the first failed
+    assert out_of_reach(replace(led, samples=(0.0, displacement)), built, failed(frame)) is None
+
+
+def test_stiffness_is_compared_at_stable_equilibria_that_second_differences_confirm(raised):
+    _, built, potential, frame = raised
+    unloaded, drawn = replace(potential, load_factor=0.0), built.simulation.linkage.joints.drawn
+    left = stiffness_left(potential, frame, unloaded, drawn, led=False)
+    assert 0.5 < left < 2.0
+    rest = replace(frame, force=0.0, state=replace(frame.state, u=0.0 * frame.state.u, poses=drawn))
+    assert stiffness_left(potential, rest, unloaded, drawn, led=False) == pytest.approx(1.0, rel=1e-6)
+    for other in (replace(frame, stable_under_control=False), replace(frame, unstable_modes=1)):
+        assert stiffness_left(potential, other, unloaded, drawn, led=False) is None
+
+
+def test_links_are_strained_out_of_shape_by_volume_not_by_a_point(raised):
+    scene, built, potential, frame = raised
+    nodes = potential.mesh.nodes
+
+    def at(gradient) -> fm.EquilibriumError:
+        return failed(replace(frame, state=replace(frame.state, u=(nodes @ np.array(gradient).T).ravel())))
+
+    for factor, excused in ((0.9, False), (1.1, True)):
+        assert (overstrained(scene, built, at(factor * np.eye(2))) is not None) == excused
+    for squeeze, excused in ((-0.85, False), (-0.95, True)):  # det F = 0.15 and 0.05
+        assert (inverted(scene, built, at([[squeeze, 0.0], [0.0, 0.0]])) is not None) == excused
+    alone = np.zeros(nodes.shape)
+    corner = potential.mesh.cells[np.flatnonzero(potential.mesh.body < 0)[0], 0]
+    alone[corner] = 3.0 * scene.links[1].size
+    torn = failed(replace(frame, state=replace(frame.state, u=alone.ravel())))
+    share, _ = potential.strained(alone.ravel(), THRESHOLDS.strained)
+    assert 0.0 < share < THRESHOLDS.strained_share
+    assert overstrained(scene, built, torn) is None
+
+
+def test_a_path_turns_back_between_equilibria_and_before_the_load(raised, monkeypatch):
+    scene, built, _, frame = raised
+    loads = replace(scene, samples=(0.1, 0.15, 0.2))
+    low, middle, high = built.curve(loads).frames
+    torn = replace(middle, state=replace(middle.state, u=1.01 * middle.state.u))
+    asked = replace(scene, samples=(0.3,))
+
+    def turned(frames: list[fm.Frame], scene: Blueprint = asked, last: fm.Frame = frame) -> bool:
+        monkeypatch.setattr(built, "follow", lambda *_: SimpleNamespace(frames=frames))
+        return turned_back(scene, built, failed(last)) is not None
+
+    assert turned([low, high, middle])
+    assert turned([low, high, middle, high])  # whatever comes after a snap
+    assert not turned([low, middle, high])
+    assert not turned([low, high, torn])
+    assert not turned([low, high, middle], last=low)  # the curve did not get there
+    assert not turned([low, high, middle], replace(scene, samples=(0.2,)))
+    assert not turned([low, high, middle], replace(asked, control="path"))
+
+
+def test_constant_forces_alone_are_followed():
+    scene = replace(arch("plane-stress", 2), ratios=(1.0,))
+    first, second = scene.forces
+    scene = replace(scene, control="displacements", forces=(first, replace(second, magnitude=0.7)))
+    path = _constant_forces(scene)
+    assert (path.control, path.samples, [force.name for force in path.forces]) == ("forces", (0.7,), ["other"])
+    assert _constant_forces(replace(scene, effects=(SpringPlan("A", 5.0, 0.0),))) is not None
+    assert _constant_forces(replace(scene, effects=(SpringPlan("A", 5.0, 0.2),))) is None
+    assert _constant_forces(replace(scene, forces=(first,))) is None
+
+
+@pytest.mark.parametrize(
+    "first, second, outcome",
+    [
+        ((False, 1.0, 1.0), (False, 1.0, 1.0), UNMET),
+        ((False, 1.0, 1.0), (True, 1.0, 1.0), "wrong: a second start meets the targets"),
+        ((False, 1.0, 1.0), (True, 1.0, 1.1), "wrong: displacement of a design"),
+        ((False, 1.0, 1.0), (False, 1.0, 1.1), "wrong: displacement of a design"),
+        ((True, 1.0, 1.1), (True, 1.0, 1.0), "wrong: displacement of a design"),
+        ((True, 1.0, 1.0), (True, 1.0, 1.1), "designed: targets met"),
+    ],
+)
+def test_results_of_either_start_are_wrong_where_a_curve_differs(first, second, outcome, monkeypatch):
+    def result(met: bool, reported: float, found: float) -> SimpleNamespace:
+        target = SimpleNamespace(met=met, wanted=1.0, reached=reported)
+        return SimpleNamespace(targets=[target], reason="", active=(), verified=True, found=found)
+
+    starts = iter([result(*first), result(*second)])
+    problem = SimpleNamespace(initial=np.zeros(3), optimise=lambda **_: next(starts))
+    monkeypatch.setattr(designs, "design_problem", lambda *_: problem)
+    monkeypatch.setattr(designs, "build", lambda _: built)
+
+    def curve(displacement: float) -> SimpleNamespace:
+        return SimpleNamespace(frames=[SimpleNamespace(displacement=displacement)])
+
+    simulation = SimpleNamespace(
+        with_design=lambda design: SimpleNamespace(load_displacement=lambda *_, **__: curve(design.found))
+    )
+    built = SimpleNamespace(
+        curve=lambda _: curve(1.0), simulation=simulation, forces={"load": None}, configuration=None
+    )
+    scene = designs.DesignScene(slider(), ("strip",), 1.0, False, (0.5, 1.5), 0)
+    assert designs.run(scene)[0] == outcome
+
+
+def results(outcomes: dict[str, int], total: int, unchecked: str = "") -> list[SceneResult]:
+    """Results of ``total`` scenes that make sense; those not listed are equilibria."""
+    seeds = iter(seed for seed in range(10 * total) if seed % 10 >= 3 and seed % 40 != 39)
+    listed = [outcome for outcome, count in outcomes.items() for _ in range(count)]
+    listed += ["equilibrium"] * (total - len(listed))
+    return [SceneResult(next(seeds), "four-bar", outcome, "", 1.0, unchecked=unchecked) for outcome in listed]
+
+
+@pytest.mark.parametrize(
+    "outcomes, told",
+    [
+        ({"true: EquilibriumError, at a limit point": 35}, 0),
+        ({"true: EquilibriumError, at a limit point": 36}, 1),
+        ({"true: a": 22, "true: b": 21, "true: c": 22}, 0),
+        ({"true: a": 22, "true: b": 22, "true: c": 22}, 1),
+        ({"true: EquilibriumError, the point cannot move that way": 125}, 0),
+        ({"true: EquilibriumError, the point cannot move that way": 126}, 1),
+        ({ROUNDED: 305}, 0),
+        ({ROUNDED: 306}, 1),
+    ],
+)
+def test_excuses_are_bounded_alone_and_together(outcomes, told):
+    assert len(excessive(results(outcomes, 1000))) == told
+
+
+def test_checks_left_out_and_designs_without_an_end_are_bounded():
+    some = results({}, 100)
+    some[:35] = results({}, 35, unchecked="stability")
+    assert not excessive(some)
+    some[:36] = results({}, 36, unchecked="displacement and stability")
+    assert len(excessive(some)) == 1
+    ends = [
+        SceneResult(40 * k + 39, "design", UNMET if k < 13 else "designed: targets met", "", 1.0) for k in range(20)
+    ]
+    assert not excessive(ends)
+    assert len(excessive([replace(end, outcome=UNMET) for end in ends])) == 1
+
+
+def test_motions_without_a_force_balance_to_rounding_and_nothing_more():
+    scene = replace(pendulum("path"), samples=(3.0,), most=6)
+    built = build(scene)
+    frame = built.curve(scene).frames[-1]
+    potential = Potential.of(scene, built.simulation)
+    assert abs(frame.force) < 1e-9
+    assert not fault(scene, frame, None, check(potential, frame, 0.0))
+    pulled = check(potential, replace(frame, force=frame.force + 1e-6), 0.0)
+    assert pulled.unstrained_work > THRESHOLDS.balanced
+
+
+def test_rounding_of_nodal_forces_grows_with_the_order_of_elements():
+    gains = []
+    for order in (1, 2):
+        scene = arch("plane-stress", order)
+        potential = Potential.of(scene, build(scene).simulation)
+        gains.append(potential.rounding(scene.links[1])[0] / np.sqrt(potential.mesh.nodes.size))
+    assert 1.2 * gains[0] < gains[1] < 2.0 * gains[0]
+
+
+def test_scenes_that_use_a_processor_for_too_long_hang():
+    worker = Worker(0.05)
+    try:
+        assert worker.judge(5).outcome == "wrong: hangs"
+    finally:
+        worker.close()
