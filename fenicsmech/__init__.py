@@ -88,7 +88,7 @@ from fenicsmech.errors import (
     MeshingError,
     OutOfMemoryError,
 )
-from fenicsmech.estimates import Choice
+from fenicsmech.estimates import Choice, DoubtOptions
 from fenicsmech.files import read_csv
 from fenicsmech.joints import JointKind, PlanarMarker, SpatialMarker
 from fenicsmech.laws import (

@@ -25,6 +25,7 @@ RECORDS = (
     fm.Correction,
     fm.Scatter,
     fm.MeshQuality,
+    fm.DoubtOptions,
     AccuracyOptions,
 )
 NUMBERS = [

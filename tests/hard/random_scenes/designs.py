@@ -98,9 +98,9 @@ def run(scene: DesignScene) -> tuple[str, str]:
         if _idle(scene, frame.displacement):
             return "true: DescriptionError, the links do not carry the force", str(error)
         raise
-    told = _misreported(scene, built, result)
-    if told is not None:
-        return told
+    misreport = _misreported(scene, built, result)
+    if misreport is not None:
+        return misreport
     if _met(result):
         return "designed: targets met", result.reason
     # an independent start, from shapes that differ by what the bounds allow
@@ -158,7 +158,7 @@ def _misreported(scene: DesignScene, built: Built, result: fm.DesignResult) -> t
         if result.verified:
             raise
         return "designed: not verified, and not reached from rest", str(error)
-    found, told = curve.frames[-1].displacement, float(result.targets[0].reached)
-    if abs(found - told) > THRESHOLDS.reached * scene.blueprint.length + THRESHOLDS.energy * abs(found):
-        return "wrong: displacement of a design", f"{told:.9g} reported, {found:.9g} on a curve from rest"
+    found, reported = curve.frames[-1].displacement, float(result.targets[0].reached)
+    if abs(found - reported) > THRESHOLDS.reached * scene.blueprint.length + THRESHOLDS.energy * abs(found):
+        return "wrong: displacement of a design", f"{reported:.9g} reported, {found:.9g} on a curve from rest"
     return None

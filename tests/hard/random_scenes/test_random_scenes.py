@@ -147,7 +147,7 @@ def test_errors_are_not_excused_by_what_is_no_equilibrium(solved):
     assert true_reason(potential.blueprint, built, failure) is None
 
 
-def test_excuses_that_let_off_more_than_their_share_are_told():
+def test_excuses_that_let_off_more_than_their_share_are_reported():
     excuse, right = "true: EquilibriumError, at a limit point", "equilibrium"
     results = [SceneResult(seed, "four-bar", excuse if seed < 10 else right, "", 1.0) for seed in range(100)]
     assert len(excessive(results)) == 1
