@@ -38,7 +38,10 @@ class Thresholds:
         held: share of those in which joints and motors hold the point, which is exact.
         spare: scenes that each may let off besides, for small samples.
         effectivity: largest factor between an error estimate and the true difference.
-        effective: least share of estimates within it, of those whose difference is above resolution.
+        said: largest share of estimates that are not within it, and said to be in doubt, of those whose difference is
+            above resolution.
+        needless: largest share of estimates within it that are in doubt all the same.
+        left_out: largest share of scenes whose estimates are not compared.
         resolved: difference over the value below which it counts as rounding and tolerance.
         still: displacement over the mechanism's length below which differences count as rounding.
     """
@@ -70,7 +73,9 @@ class Thresholds:
     held: float = 0.1
     spare: int = 5
     effectivity: float = 2.0
-    effective: float = 0.95
+    said: float = 0.05
+    needless: float = 0.1
+    left_out: float = 0.2
     resolved: float = 1e-6
     still: float = 1e-13
 

@@ -5,37 +5,48 @@ from __future__ import annotations
 import io
 import logging
 import multiprocessing
+from collections.abc import Callable
 from contextlib import redirect_stderr
 from multiprocessing.connection import Connection
+from typing import Generic, TypeVar
 
-from .scene_result import SceneResult, judge
+T = TypeVar("T")
 
 
-class Worker:
+class Crashed(Exception):
+    """The process ended without a result."""
+
+
+class Worker(Generic[T]):
     """One process that judges scene after scene.
 
     Args:
+        judge: the result of a seed; a function of a module, which the process imports.
         limit: seconds after which a scene is taken to hang.
-        quick: whether scenes are simulated with larger elements and fewer loads.
     """
 
-    def __init__(self, limit: float, *, quick: bool = False) -> None:
-        self._limit, self._quick = limit, quick
+    def __init__(self, judge: Callable[[int], T], limit: float) -> None:
+        self._judge, self._limit = judge, limit
         self._process, self._pipe = None, None
 
-    def judge(self, seed: int) -> SceneResult:
-        """The outcome of a scene; a hang or a crash is one too."""
+    def __call__(self, seed: int) -> T:
+        """The result of a scene.
+
+        Raises:
+            TimeoutError: it hangs.
+            Crashed: the process died, or an exception escaped.
+        """
         if self._process is None:
             self._start()
         self._pipe.send(seed)
         try:
             if self._pipe.poll(self._limit):
                 return self._pipe.recv()
-            end = "wrong: hangs"
         except (EOFError, ConnectionError):
-            end = "wrong: crashes"
+            self.close()
+            raise Crashed from None
         self.close()
-        return SceneResult(seed, "", end, f"limit {self._limit:g} s", self._limit)
+        raise TimeoutError(f"limit {self._limit:g} s")
 
     def close(self) -> None:
         """Ends the process."""
@@ -48,12 +59,12 @@ class Worker:
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
-        self._process = context.Process(target=_serve, args=(theirs, self._quick), daemon=True)
+        self._process = context.Process(target=_serve, args=(theirs, self._judge), daemon=True)
         self._process.start()
         theirs.close()
 
 
-def _serve(pipe: Connection, quick: bool) -> None:
+def _serve(pipe: Connection, judge: Callable[[int], T]) -> None:
     logging.getLogger("fenicsmech").setLevel(logging.ERROR)
     while True:
         try:
@@ -61,4 +72,4 @@ def _serve(pipe: Connection, quick: bool) -> None:
         except EOFError:
             return
         with redirect_stderr(io.StringIO()):  # progress of curves
-            pipe.send(judge(seed, quick=quick))
+            pipe.send(judge(seed))
