@@ -11,6 +11,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from unittest.mock import patch
 
+import numpy as np
+
 import fenicsmech as fm
 from fenicsmech import model
 from fenicsmech.design import Infeasible, SampleEquilibria, whole_state
@@ -122,21 +124,24 @@ def most_unknowns(scene: Blueprint) -> float:
 
 def _continued(scene: Blueprint, curve: fm.Curve, built: Built) -> Finer | None:
     """The value at the equilibrium near the last one of ``curve``; None where that is not found."""
-    if len(scene.ratios) > 1:
-        return None  # samples prescribe no common displacement
-    load, frame = built.forces[scene.forces[0].name], curve.frames[-1]
-    displaced = curve.unknown is fm.Unknown.FORCE
-    loads = {built.forces[plan.name]: plan.magnitude for plan in scene.forces[1:]}
-    loads[load] = fm.at(float(frame.displacement)) if displaced else float(frame.force)
-    sample = fm.Sample(loads, built.configuration)
-    quantity = fm.ForceMagnitude(load) if displaced else fm.Displacement(load)
-    guess = whole_state(curve.discretisation.model, frame.state)
-    equilibria = SampleEquilibria(built.simulation, [fm.Target(quantity, sample, least=True)])
+    frame, displaced, led = curve.frames[-1], curve.unknown is fm.Unknown.FORCE, len(scene.ratios)
+    if displaced and led > 1:
+        return None  # samples prescribe the displacement of one force
+    parts, ratios = [built.forces[plan.name] for plan in scene.forces], np.array(scene.ratios)
+    loads = dict(zip(parts[led:], (plan.magnitude for plan in scene.forces[led:]), strict=True))
+    if displaced:
+        loads[parts[0]] = fm.at(float(frame.displacement))
+        quantities = [fm.ForceMagnitude(parts[0])]
+    else:
+        loads |= dict(zip(parts, map(float, ratios * frame.force), strict=False))
+        quantities = [fm.Displacement(part) for part in parts[:led]]
+    sample, guess = fm.Sample(loads, built.configuration), whole_state(curve.discretisation.model, frame.state)
+    equilibria = SampleEquilibria(built.simulation, [fm.Target(own, sample, least=True) for own in quantities])
     try:
         found = equilibria.from_other({sample: guess}, estimated=True)
     except (Infeasible, fm.EquilibriumError):
         return None
-    return Finer(float(equilibria.values(found)[0]), float(equilibria.errors(found)[0]))
+    return Finer(*(float(ratios @ values) for values in (equilibria.values(found), equilibria.errors(found))))
 
 
 def _built(scene: Blueprint, shapes: Shapes | None) -> Built:
