@@ -195,10 +195,9 @@ class LoadStepper(Stepper):
             self._accept_at(point)
             if arrives:
                 return point
-            # a step twice as long as one that is reached after a failure has just failed
-            if point.iterations <= steps.iterations and not failed:
-                step *= 2.0
             failed = 0
+            if point.iterations <= steps.iterations:
+                step *= 2.0
 
     @property
     def _last(self) -> EquilibriumPoint | None:

@@ -72,7 +72,7 @@ def test_smaller_shifts_come_before_half_the_step():
 def test_a_path_on_which_only_steps_of_one_length_succeed_is_walked_to_its_end(part):
     path = Stubborn(0.1 * part)
     assert stepper(path).advance(LoadControl(0.1)).state.force == 0.1
-    # steps that follow a failure are not doubled at once: at most every other one fails
+    # steps double after each success, and halve: at most every other one fails
     assert path.failed <= 0.5 * len(path.tried) + math.log2(1.0 / part)
 
 

@@ -172,7 +172,11 @@ def overstrained(blueprint: Blueprint, built: Built, last: fm.Frame) -> Excuse |
 
 
 def turned_back(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError) -> Excuse | None:
-    """A path followed from rest through equilibria that pass the checks turns back before what is asked for."""
+    """A path followed from rest through equilibria that pass the checks turns back before what is asked for.
+
+    The first turn counts, and only if the last equilibrium lies before it: what the path may reach after a snap is not
+    what loads that grow lead to, and the error names the turn.
+    """
     if blueprint.control == "path" or failure.last.state.load_factor < 1.0 or built.configuration is not fm.DRAWN:
         return None
     asked = blueprint.samples[len(failure.frames)]
@@ -183,12 +187,12 @@ def turned_back(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError
     except fm.EquilibriumError as error:
         frames = error.frames
     shares = [getattr(frame, name) / asked for frame in frames]
-    top = int(np.argmax(shares)) if shares else 0
-    if top == 0 or top == len(frames) - 1 or shares[top] >= 1.0:
+    top = next((k for k in range(len(shares) - 1) if shares[k] > shares[k + 1]), 0)
+    if top == 0 or not getattr(failure.last, name) / asked <= shares[top] < 1.0 or "turns back" not in str(failure):
         return None
     if not all(_proven(blueprint, built, frame) for frame in frames[top - 1 : top + 2]):
         return None
-    return Excuse("a path of equilibria turns back", f"largest {name} over that asked for {shares[top]:.1e}")
+    return Excuse("a path of equilibria turns back", f"{name} there over that asked for {shares[top]:.1e}")
 
 
 _BY_GEOMETRY: tuple[Callable[[Blueprint, Built, fm.Frame | None], Excuse | None], ...] = (immobile, adrift, drowned)
