@@ -75,8 +75,11 @@ def finer(scene: Blueprint, curve: fm.Curve, levels: int, shapes: Shapes | None 
     with refined(levels):
         try:
             built = _built(scene, shapes)
-            if (found := _continued(scene, curve, built)) is not None:
-                return found
+        except fm.FenicsmechError as failure:
+            raise Unsolved(f"{type(failure).__name__} in finer elements") from failure
+        if (found := _continued(scene, curve, built)) is not None:
+            return found
+        try:
             whole = built.curve(scene)
         except fm.FenicsmechError as failure:
             raise Unsolved(f"{type(failure).__name__} in finer elements") from failure
@@ -123,7 +126,11 @@ def most_unknowns(scene: Blueprint) -> float:
 
 
 def _continued(scene: Blueprint, curve: fm.Curve, built: Built) -> Finer | None:
-    """The value at the equilibrium near the last one of ``curve``; None where that is not found."""
+    """The value at the equilibrium near the last one of ``curve``; None where that is not found.
+
+    Raises:
+        FenicsmechError: the error of its elements cannot be estimated.
+    """
     frame, displaced, led = curve.frames[-1], curve.unknown is fm.Unknown.FORCE, len(scene.ratios)
     if displaced and led > 1:
         return None  # samples prescribe the displacement of one force
@@ -136,10 +143,10 @@ def _continued(scene: Blueprint, curve: fm.Curve, built: Built) -> Finer | None:
         loads |= dict(zip(parts, map(float, ratios * frame.force), strict=False))
         quantities = [fm.Displacement(part) for part in parts[:led]]
     sample, guess = fm.Sample(loads, built.configuration), whole_state(curve.discretisation.model, frame.state)
-    equilibria = SampleEquilibria(built.simulation, [fm.Target(own, sample, least=True) for own in quantities])
     try:
-        found = equilibria.from_other({sample: guess}, estimated=True)
-    except (Infeasible, fm.EquilibriumError):
+        equilibria = SampleEquilibria(built.simulation, [fm.Target(own, sample, least=True) for own in quantities])
+        found = equilibria.from_other({sample: guess})
+    except (Infeasible, fm.FenicsmechError):
         return None
     return Finer(*(float(ratios @ values) for values in (equilibria.values(found), equilibria.errors(found))))
 
