@@ -88,7 +88,7 @@ from fenicsmech.errors import (
     MeshingError,
     OutOfMemoryError,
 )
-from fenicsmech.estimates import Choice
+from fenicsmech.estimates import Choice, DoubtOptions
 from fenicsmech.files import read_csv
 from fenicsmech.joints import JointKind, PlanarMarker, SpatialMarker
 from fenicsmech.laws import (
@@ -210,7 +210,7 @@ __all__ = [
     "BodyPoint", "in_dimension",
     # simulation, its curves and their results
     "Simulation", "SPACES", "Fidelity", "Quadrature", "Choice", "Predictor", "HermitePredictor", "TangentPredictor",
-    "ConstantPredictor",
+    "ConstantPredictor", "DoubtOptions",
     "RestShape", "Curve", "Frame", "Axis", "Unknown", "Freedom", "Reaction", "Explanation", "Hint", "PinFriction",
     "write_report", "Report", "plot_curve", "CurveSeries", "CurveMark", "CurveTarget", "Trace", "read_csv",
     "print_once", "configure_logging", "mpi_abort_on_error",

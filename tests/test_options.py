@@ -26,6 +26,7 @@ RECORDS = (
     fm.Correction,
     fm.Scatter,
     fm.MeshQuality,
+    fm.DoubtOptions,
     AccuracyOptions,
     RestSearch,
 )

@@ -65,7 +65,7 @@ class Pressure(Effect):
         return (Faces(self.link, self.where),)
 
     @property
-    def across_depth(self):
+    def pressure_across_depth(self):
         return {self.link: self.pressure} if self.where is None else {}
 
     def link_energy(self, fields):

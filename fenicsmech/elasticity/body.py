@@ -92,21 +92,26 @@ class ElasticBody(BodyFields):
     def contraction_energy(self, a, v, p, q, pressures: Sequence[float], *, degree: int) -> ufl.Form:
         """Energy of links in plane stress that contract by a instead of h = F₃₃ − 1 and curl across their depth by v.
 
-        ½ ∫ E ((a − p)² − 2 q h) + μ b²/12 |∇a − Fᵀv|² + b⁴/720 E/(1 − ν²) ((1 − ν) G : G + ν (tr G)²) + 2 P a det F dV
+        ½ ∫ E ((a − p)² − 2 q h) / g² + μ b²/12 |s|² + b⁴/720 E/(1 − ν²) ((1 − ν) G : G + ν (tr G)²) + 2 P a det F dV
 
-        with G = sym Fᵀ∇v and p the projection of h, whose derivatives are those of the term in q, that of a − p. P is
-        the load factor times the ``pressures`` on the faces of each link across its depth. dV is of the strain-free
-        state, but in the term of P of the rest shape, from which F and a count.
+        with s = F_p⁻ᵀ (∇a − Fᵀv / g), G = F_p⁻ᵀ sym(Fᵀ∇v) F_p⁻¹ and p the projection of h, whose derivatives are those
+        of the term in q, that of a − p. F_p is the growth, g that of the depth. P is the load factor times the
+        ``pressures`` on the faces of each link across its depth. dV is of the strain-free state, but in the term of P
+        of the rest shape, from which F and a count.
         """
         assert isinstance(self.model, PlaneStress), "links contract freely in plane stress alone"
         H, b, terms = self.gradient(self.u), self.depth, []
         F = ufl.Identity(self.model.dim) + H
         squeezing = self.load_factor * self.cellwise(pressures) * a * ufl.det(F)
-        grown = 1 if self.growth is None else self.growth.depth
-        shear, G = self.gradient(a) - ufl.dot(F.T, v), ufl.sym(ufl.dot(F.T, self.gradient(v)))
+        grown, shear = 1, self.gradient(a) - ufl.dot(F.T, v)
+        G = ufl.sym(ufl.dot(F.T, self.gradient(v)))
+        if self.growth is not None:
+            grown, inverse = self.growth.depth, self.growth.inverse
+            shear = ufl.dot(inverse.T, self.gradient(a) - ufl.dot(F.T, v) / grown)
+            G = ufl.dot(inverse.T, ufl.dot(G, inverse))
         for term in self.terms:
             E, nu, h = term.law.E, term.law.nu, grown * (1 + self.model.contraction(term.law, self._elastic(H))) - 1
-            contraction = E * ((a - p) ** 2 - 2 * q * h)
+            contraction = E * ((a - p) ** 2 - 2 * q * h) / grown**2
             curling = b**2 / 12 * E / (2 * (1 + nu)) * ufl.inner(shear, shear)
             membrane = b**4 / 720 * E / (1 - nu**2) * ((1 - nu) * ufl.inner(G, G) + nu * ufl.tr(G) ** 2)
             density = 0.5 * (contraction + curling + membrane) * self._volume + squeezing * self._rest_volume

@@ -92,9 +92,18 @@ class Growth:
 
     def elastic(self, H):
         """H_e in UFL."""
+        return H + self._inverse_excess + ufl.dot(H, self._inverse_excess)
+
+    @property
+    def inverse(self):
+        """F_p⁻¹ in UFL."""
+        return ufl.Identity(self._tensor.ufl_shape[0]) + self._inverse_excess
+
+    @property
+    def _inverse_excess(self):
+        """F_p⁻¹ − I in UFL."""
         grown = self.load_factor * self._excess
-        inverse = -grown / (1 + grown) * self._tensor
-        return H + inverse + ufl.dot(H, inverse)
+        return -grown / (1 + grown) * self._tensor
 
     @property
     def volume(self):

@@ -15,7 +15,7 @@ from fenicsmech.estimates.accuracy_control import (
     Trial,
     fidelity_levels,
 )
-from fenicsmech.estimates.doubts import DoubtOptions, near_limit_point
+from fenicsmech.estimates.doubts import DoubtOptions, Origin, examined
 from fenicsmech.estimates.estimates import (
     Calibration,
     Equilibrium,

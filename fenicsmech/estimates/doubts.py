@@ -3,10 +3,16 @@
 Estimates η are of first order, sums over cells, and of quantities that converge. Each of these may fail:
 
 - η is above a tenth of the largest value of its curve.
-- The compliance c = du/df of the controlled force changes much over the error itself: with its derivative c′ by the
-  displacement u along the path, |η c′ / c| > 0.4. Where a limit point is at the distance d in u, c ~ 1/d, and the
-  error is d − √(d² − 2 d η): twice η at η = d/2, and beyond it finer elements have no equilibrium near. c′ is a
+- The path turns back near, in the prescribed value v: a limit point of forces, or a turning point of displacements.
+  Finer elements shift the path in the plane of v and the unknown Q. Measured in units in which the largest values of
+  the curve are one, it crosses the given v elsewhere by η and, to second order, by half of η R more,
+
+      R = |q′ / q| (1 + s²/q²)⁻² |η| > 0.4,      q = dQ/dv,     s = max |Q| / max |v|,
+
+  with the derivative q′ of q by Q along the path. Where a limit point is at the distance d in u, q ~ 1/d, and the
+  error is d − √(d² − 2 d η): twice η at η = d/2, and beyond it finer elements have no equilibrium near. q′ is a
   difference over a small part of η along the tangent.
+- There is no such difference: the KKT matrix is singular that near, or an iterative solver stalls.
 - Contributions of cells cancel: |η| < ½ Σ |η_K|, those of the unloaded configuration, from which displacements count,
   included. Then errors of a quarter in those of either sign make one of a half in η.
 - The force acts at a point of a flexible link, whose displacement has no limit (``point_forces``).
@@ -14,12 +20,15 @@ Estimates η are of first order, sums over cells, and of quantities that converg
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
-from fenicsmech.equilibrium import Adjoint, EquilibriumSolver, LoadControl, NotConverged, Unknown
-from fenicsmech.errors import set_options
-from fenicsmech.estimates.estimates import Equilibrium, adjoint_at
-from fenicsmech.model import MechanismModel
+from fenicsmech.equilibrium import EquilibriumSolver, State, Unknown
+from fenicsmech.errors import EquilibriumError, set_options
+from fenicsmech.estimates.estimates import Equilibrium, ErrorKind, Estimates, adjoint_at
+
+TURNS = {Unknown.DISPLACEMENT: "limit point near", Unknown.FORCE: "turning point of the displacement near"}
+_NO_TANGENT = "tangent not defined"
 
 
 @dataclass(frozen=True)
@@ -27,8 +36,8 @@ class DoubtOptions:
     """When estimates are in doubt.
 
     Attributes:
-        compliance: largest change of the compliance over the error, relative, to first order.
-        step: displacement over the estimate for differences of the compliance.
+        turn: largest R, second-order part of an error over half of its first-order one.
+        step: change of the unknown over the estimate for differences of its derivative, at most.
         cancelled: least estimate over the sum of the absolute contributions of cells.
         growth: largest growth with each halving of the elements, by forces at points, over the estimate.
 
@@ -36,7 +45,7 @@ class DoubtOptions:
         DescriptionError: a number is not positive.
     """
 
-    compliance: float = 0.4
+    turn: float = 0.4
     step: float = 0.05
     cancelled: float = 0.5
     growth: float = 0.2
@@ -45,30 +54,78 @@ class DoubtOptions:
         set_options(self, "doubts of estimates")
 
 
-def near_limit_point(
-    model: MechanismModel, solver: EquilibriumSolver, equilibrium: Equilibrium, error: float, options: DoubtOptions
-) -> bool:
-    """Whether the compliance of the controlled force changes much where its displacement differs by ``error``.
+@dataclass(frozen=True)
+class Origin:
+    """The place of the unloaded configuration, from which displacements count.
 
-    Forces at prescribed displacements are not examined.
+    Attributes:
+        error: the estimate of its error.
+        spread: Σ |η_K| of that.
+    """
+
+    error: float = 0.0
+    spread: float = 0.0
+
+    @staticmethod
+    def at(estimates: Estimates, solver: EquilibriumSolver, unloaded: Equilibrium, kind: ErrorKind) -> Origin:
+        """Of the unloaded equilibrium, with its displacement as the unknown; raises as ``Estimates.at``."""
+        with estimates.shaped(unloaded.design):
+            return Origin(*estimates.sums(adjoint_at(solver, unloaded), kind))
+
+
+def examined(
+    estimates: Estimates,
+    solver: EquilibriumSolver,
+    equilibrium: Equilibrium,
+    kind: ErrorKind,
+    origin: Origin,
+    scale: float,
+    options: DoubtOptions,
+) -> tuple[float, tuple[str, ...]]:
+    """The estimate at an equilibrium, and reasons against it that it has alone, from a factor there and one near.
+
+    Args:
+        estimates: of the model.
+        solver: of the equilibrium.
+        equilibrium: that is examined.
+        kind: of the error.
+        origin: from which displacements count.
+        scale: s.
+        options: when it is in doubt.
 
     Raises:
+        DescriptionError: plane stress is the ``kind`` and the model is another one.
         EquilibriumError: the KKT matrix of the equilibrium is singular.
     """
-    if equilibrium.unknown is Unknown.FORCE or error == 0.0:
-        return False
-    state, system = equilibrium.state, solver.system
-    with model.shaped(equilibrium.design):
-        try:
-            here = adjoint_at(solver, equilibrium)
-            compliance = here.by_control()
-            if compliance == 0.0:
-                return False
-            there = system.moved(state, here.at.tangent().scaled(options.step * error / compliance))
-            beyond = solver.linearise(there, LoadControl(there.force))
-            ratio = Adjoint.of(beyond, beyond.travel_gradient(system.controlled)).by_control() / compliance
-        except NotConverged:  # singular within the error
-            return True
-        finally:
-            system.load(state)
-    return not abs(ratio - 1.0) < options.step * options.compliance
+    force = equilibrium.unknown is Unknown.FORCE
+    with estimates.shaped(equilibrium.design):
+        adjoint = adjoint_at(solver, equilibrium)
+        own, spread = estimates.sums(adjoint, kind)
+        slope = adjoint.by_control()
+        error = own + slope * origin.error if force else own - origin.error
+        spread += abs(slope) * origin.spread if force else origin.spread
+        # the adjoint of the conjugate of a control is the rate along the path, but for its sign
+        at = adjoint.at
+        tangent = at.control.tangent(at.step(adjoint.x).scaled(-1.0 if force else 1.0))
+        # of v, along the path: bounded where q vanishes, or grows without limit
+        size = slope**2 + scale**2
+        step = options.step * error * slope / size if 0.0 < size < math.inf else 0.0
+        reasons = []
+        if step != 0.0:
+            there = _slope_at(solver, equilibrium, solver.system.moved(equilibrium.state, tangent.scaled(step)))
+            solver.system.load(equilibrium.state)
+            if not math.isfinite(there):
+                reasons.append(_NO_TANGENT)
+            elif abs((there - slope) * slope) > options.step * options.turn * size:
+                reasons.append(TURNS[equilibrium.unknown])
+    if kind is ErrorKind.ELEMENTS and abs(error) < options.cancelled * spread:
+        reasons.append("contributions of elements cancel")
+    return error, tuple(reasons)
+
+
+def _slope_at(solver: EquilibriumSolver, equilibrium: Equilibrium, state: State) -> float:
+    """q at a ``state`` near the equilibrium; NaN where it has none."""
+    try:
+        return adjoint_at(solver, Equilibrium(state, equilibrium.design, equilibrium.unknown)).by_control()
+    except EquilibriumError:
+        return math.nan

@@ -40,8 +40,9 @@ the energy that 3D adds. It changes a quantity, to first order with its adjoint 
     Q(space) − Q(plane stress) ≈ −∂V/∂u · z     at these a and v.
 
 Where all contraction is blocked V = ½ ∫ E h² dV, to first order the difference between plane strain and plane stress.
-h includes what prestrain in all directions adds to the depth; pressure P on the whole boundary of a link also acts on
-the faces across its depth, and adds ∫ P a det F dV to V.
+h includes what prestrain in all directions adds to the depth, and V counts the elastic parts of a, v and gradients
+(``ElasticBody.contraction_energy``). Pressure P on the whole boundary of a link also acts on the faces across its
+depth, and adds ∫ P a det F dV of the rest shape to V.
 A strip of thickness t bent from curvature κ₀ to κ stores, far from its ends and per length,
 
     V = ½ ν² E I (κ − κ₀)² β² / (60 + β²),     β = b² κ / t,
@@ -69,7 +70,8 @@ Nickola, "Anticlastic action of flat sheets in bending" (Experimental Mechanics 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
@@ -173,7 +175,7 @@ class Estimates:
             DescriptionError: ``kinds`` hold the error of plane stress and the model is another one.
             EquilibriumError: the KKT matrix is singular.
         """
-        with self._model.clock.phase("estimate"), self._model.shaped(equilibrium.design):
+        with self.shaped(equilibrium.design):
             adjoint = adjoint_at(solver, equilibrium, output)
             slope = adjoint.by_control() if origin and equilibrium.unknown is Unknown.FORCE else 0.0
             found = self.of(adjoint, kinds)
@@ -188,15 +190,21 @@ class Estimates:
         errors = [self._element_error if kind is ErrorKind.ELEMENTS else self._plane_stress_error for kind in kinds]
         return [error.of(adjoint) for error in errors]
 
-    def spread(self, solver: EquilibriumSolver, equilibrium: Equilibrium, *, origin: float = 0.0) -> float:
-        """Sum of the absolute contributions of all cells to the estimated error of elements; raises as ``at``.
+    def sums(self, adjoint: Adjoint, kind: ErrorKind) -> tuple[float, float]:
+        """The correction of a quantity from its adjoint, and Σ |η| of the contributions η of all cells to it.
 
-        ``origin`` is that of the place that a prescribed displacement counts from.
+        That of plane stress has no contributions of cells: its absolute value. Raises as ``of``.
         """
-        with self._model.shaped(equilibrium.design):
-            adjoint = adjoint_at(solver, equilibrium)
-            slope = adjoint.by_control() if origin and equilibrium.unknown is Unknown.FORCE else 1.0
-            return self._element_error.spread(adjoint) + abs(slope) * origin
+        if kind is ErrorKind.ELEMENTS:
+            return self._element_error.sums(adjoint)
+        (error,) = self.of(adjoint, [kind])
+        return error, abs(error)
+
+    @contextmanager
+    def shaped(self, design: Design) -> Iterator[None]:
+        """The model has the shape of ``design`` within, and the time counts as that of estimates."""
+        with self._model.clock.phase("estimate"), self._model.shaped(design):
+            yield
 
     @cached_property
     def _element_error(self) -> ElementError:
@@ -261,11 +269,13 @@ class ElementError:
 
     def of(self, adjoint: Adjoint) -> float:
         """Q(u) − Q(u_h), from the adjoint of Q."""
-        return float(self._comm.allreduce(self._cellwise(adjoint).sum()))
+        return self.sums(adjoint)[0]
 
-    def spread(self, adjoint: Adjoint) -> float:
-        """Σ |η| of the contributions η of all cells to Q(u) − Q(u_h), from the adjoint of Q."""
-        return float(self._comm.allreduce(np.abs(self._cellwise(adjoint)).sum()))
+    def sums(self, adjoint: Adjoint) -> tuple[float, float]:
+        """Q(u) − Q(u_h), from the adjoint of Q, and Σ |η| of the contributions η of all cells to it."""
+        own = self._cellwise(adjoint)
+        error, spread = self._comm.allreduce(np.array([own.sum(), np.abs(own).sum()]))
+        return float(error), float(spread)
 
     def _cellwise(self, adjoint: Adjoint) -> np.ndarray:
         """The contributions of this rank's cells; a view."""
@@ -416,7 +426,7 @@ class PlaneStressError:
         p, q = (fem.Function(smooth, name=name) for name in ("free_contraction", "blocked_contraction"))
         self._fields, self._projected = (a, v), (p, q)
         pressures = [
-            sum(effect.across_depth.get(link, 0.0) for effect in model.effects)
+            sum(effect.pressure_across_depth.get(link, 0.0) for effect in model.effects)
             for link in model.mechanism.flexible_links
         ]
         energy = elastic.contraction_energy(a, v, p, q, pressures, degree=2 * elastic.order)

@@ -72,7 +72,7 @@ class Effect(ABC):
         return {}
 
     @property
-    def across_depth(self):
+    def pressure_across_depth(self):
         """The pressure on the faces of each link at the ends of its depth, which only space has."""
         return {}
 

@@ -19,9 +19,10 @@ from fenicsmech.estimates import (
     DoubtOptions,
     Equilibrium,
     ErrorKind,
+    Origin,
     cause_of_growth,
+    examined,
     growth_by_halving,
-    near_limit_point,
 )
 from fenicsmech.files import write_csv
 from fenicsmech.log import logger
@@ -185,30 +186,39 @@ class Curve:
         elements, plane_stress = self._estimated(list(ErrorKind), None)
         return elements.copy(), plane_stress.copy()
 
-    def doubts(self, *, modelling: bool = False) -> tuple[tuple[str, ...], ...]:
+    def doubts(self, options: DoubtOptions | None = None, *, modelling: bool = False) -> tuple[tuple[str, ...], ...]:
         """Why ``error_estimates``, or ``modelling_errors``, may be off by more than a factor of two, for every frame.
+
+        Two factorisations a frame; estimates that are not known yet come with them.
+
+        Args:
+            options: when estimates are in doubt.
+            modelling: those of ``modelling_errors``.
 
         Raises as ``error_estimates``, or ``modelling_errors``.
         """
-        errors = self.modelling_errors() if modelling else self.error_estimates()
-        options, left_out = DoubtOptions(), AccuracyOptions().corrections(errors, self.values) != errors
+        self._need_force()
+        options = options or DoubtOptions()
+        kind = ErrorKind.PLANE_STRESS if modelling else ErrorKind.ELEMENTS
+        estimates, solver, origin = self.discretisation.estimates, self._solver, Origin()
+        if (unloaded := self._moved_origin) is not None:
+            origin = Origin.at(estimates, solver, unloaded, kind)
+        prescribed = self.displacements if self.unknown is Unknown.FORCE else self.forces
+        given, found = np.abs(prescribed).max(), np.abs(self.values).max()
+        scale = found / given if given else np.inf
+        own = [examined(estimates, solver, self.equilibrium(at), kind, origin, scale, options) for at in self.frames]
+        errors = np.array([error for error, _ in own])
+        if (kind, None) not in self._errors:
+            self._keep(kind, None, errors)
         growth = np.abs(self._growth(SPATIAL) if modelling else self.growth_by_halving)
-        estimates, model, spread, found = self.discretisation.estimates, self.discretisation.model, 0.0, []
-        if not modelling and self.unloaded.has_reactions:
-            unloaded = Equilibrium(self.unloaded, self.frames[0].design, Unknown.DISPLACEMENT)
-            spread = estimates.spread(self._solver, unloaded)
-        for frame, error, large, grown in zip(self.frames, errors, left_out, growth, strict=True):
-            at = self.equilibrium(frame)
-            reasons = {
-                "estimate above a tenth of the largest value": large,
-                "limit point near": near_limit_point(model, self._solver, at, error, options),
-                "force at a point of a flexible link": grown > options.growth * abs(error),
-            }
-            if not modelling:
-                whole = estimates.spread(self._solver, at, origin=spread)
-                reasons["contributions of elements cancel"] = abs(error) < options.cancelled * whole
-            found.append(tuple(reason for reason, holds in reasons.items() if holds))
-        return tuple(found)
+        of_curve = {
+            "estimate above a tenth of the largest value": AccuracyOptions().corrections(errors, self.values) != errors,
+            "force at a point of a flexible link": growth > options.growth * np.abs(errors),
+        }
+        return tuple(
+            tuple(reason for reason, holds in of_curve.items() if holds[k]) + reasons
+            for k, (_, reasons) in enumerate(own)
+        )
 
     @cached_property
     def corrections(self) -> np.ndarray:
@@ -473,19 +483,29 @@ class Curve:
             at = map(self.equilibrium, self.frames)
             rows = [estimates.at(self._solver, own, missing, point, origin=origin) for own in at]
             for kind, column, less in zip(missing, np.array(rows).T, zero, strict=True):
-                self._errors[kind, output] = column - less
-            growth, largest = np.abs(self.growth_by_halving).max(), np.abs(self.values).max()
-            if output is None and growth > ExplanationOptions().tolerance * largest:
-                _log.warning("%s (each halving adds %.2g of it)", cause_of_growth(self.part), growth / largest)
+                self._keep(kind, output, column - less)
         return [self._errors[kind, output] for kind in kinds]
+
+    def _keep(self, kind: ErrorKind, output: Output | None, errors: np.ndarray) -> None:
+        """Keeps estimates, (frames,), and warns of values that have no limit."""
+        self._errors[kind, output] = errors
+        growth, largest = np.abs(self.growth_by_halving).max(), np.abs(self.values).max()
+        if kind is ErrorKind.ELEMENTS and output is None and growth > ExplanationOptions().tolerance * largest:
+            _log.warning("%s (each halving adds %.2g of it)", cause_of_growth(self.part), growth / largest)
+
+    @property
+    def _moved_origin(self) -> Equilibrium | None:
+        """The unloaded equilibrium, from which displacements count; None in a rigid assembly."""
+        if not self.unloaded.has_reactions:
+            return None
+        return Equilibrium(self.unloaded, self.frames[0].design, Unknown.DISPLACEMENT)
 
     def _unloaded_errors(self, kinds: Sequence[ErrorKind], output: PointLoad | None) -> tuple[list[float], list[float]]:
         """Estimated errors of each kind in the unloaded configuration: of the force's displacement, and of the quantity
         in question where it counts from there; 0 in a rigid assembly."""
         estimates, nothing = self.discretisation.estimates, [0.0] * len(kinds)
-        if not self.unloaded.has_reactions:
+        if (at := self._moved_origin) is None:
             return nothing, nothing
-        at = Equilibrium(self.unloaded, self.frames[0].design, Unknown.DISPLACEMENT)
         origin = estimates.at(self._solver, at, kinds)
         if output is not None:
             return origin, estimates.at(self._solver, at, kinds, output)

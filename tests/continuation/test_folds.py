@@ -17,8 +17,8 @@ def test_curve_that_ends_where_the_displacement_turns_back_says_where_and_names_
     values = [*np.linspace(0.0, fold, 30)[1:-1], 1.05 * fold]
     with pytest.raises(fm.EquilibriumError, match=r"Use follow\(\), which goes round the turn") as caught:
         simulation.load_displacement(push, displacements=values)
-    (told,) = re.findall("the path turns back near ([0-9.]+);", str(caught.value))
-    assert float(told) == pytest.approx(fold, rel=1e-3)
+    (found,) = re.findall("the path turns back near ([0-9.]+);", str(caught.value))
+    assert float(found) == pytest.approx(fold, rel=1e-3)
 
 
 def test_path_beside_an_imperfect_bifurcation_turns_into_the_next_mode_as_a_beam_does():

@@ -7,6 +7,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
+from fenicsmech.equilibrium import EquilibriumSolver
 
 from ..simulation.refined import cantilever
 
@@ -31,6 +32,82 @@ def test_limit_points_near_are_doubts():
     far, near = below.doubts()
     assert far == ()
     assert "limit point near" in near
+
+
+def arch_behind_a_spring() -> tuple[fm.Scene, fm.Force]:
+    """The shallow arch, pushed through a spring softer than the arch is after its limit load, which is negative."""
+    scene, _ = shallow_arch()
+    rig = scene.mechanism
+    crown = next(link for link in rig.links if link.name == "crown")
+    handle = rig.rigid("handle")
+    slide = rig.prismatic(crown, handle, at=(0, 6), axis=(0, 1, 0))
+    return fm.Scene(rig, effects=[fm.JointSpring(slide, 20.0)]), rig.force(on=handle, at=(0, 6), direction=(0, -1))
+
+
+def test_forces_are_doubted_where_the_displacement_turns_back_and_not_at_limit_loads():
+    scene, push = arch_behind_a_spring()
+    simulation = fm.Simulation(scene, space="plane-stress", size=2.0, comm=MPI.COMM_SELF)
+    path = simulation.follow(push, until=fm.Until(displacement=10.0, frames=26))
+    farthest, strongest = path.displacements.argmax(), path.forces.argmax()
+    assert 0 < strongest < farthest < len(path.frames) - 1
+    doubted = ["turning point of the displacement near" in reasons for reasons in path.doubts()]
+    assert doubted[farthest]
+    assert not any(doubted[: strongest + 2])
+
+
+def strained_by_a_motor() -> tuple[fm.Scene, fm.Configuration, fm.Force]:
+    """A link that a motor bends while its other end slides, and a force on the slide."""
+    rig = fm.Mechanism("motor")
+    ground, crank, slide = rig.rigid("ground", fixed=True), rig.rigid("crank"), rig.rigid("slide")
+    link = rig.flexible("link", fm.strip([(0, 0), (60, 0)], thickness=3.0, depth=5.0), fm.ONYX)
+    motor = rig.motor(rig.revolute(ground, crank, at=(0, 0)))
+    rig.weld(crank, link, at=(1.5, 0), region=fm.Rectangle(3, 5))
+    rig.revolute(link, slide, at=(58, 0), interface_radius=1.4)
+    rig.prismatic(ground, slide, at=(58, 0), axis=(1, 0, 0))
+    push = rig.force(on=slide, at=(58, 0), direction=(-1, 0))
+    scene = fm.Scene(rig)
+    return scene, scene.configuration("bent", {motor: 0.4}), push
+
+
+def test_the_unloaded_configuration_counts_alike_in_displacements_and_forces():
+    """The contributions to both errors differ by the stiffness, those of links that a motor strains included."""
+    scene, bent, push = strained_by_a_motor()
+    simulation = fm.Simulation(scene, space="plane-stress", size=3.0, comm=MPI.COMM_SELF)
+    free = simulation.load_displacement(push, forces=[1.0], configuration=bent)
+    held = simulation.load_displacement(push, displacements=list(free.displacements), configuration=bent)
+    doubted = []
+    for least in np.geomspace(1e-3, 1.0, 25):
+        options = fm.DoubtOptions(cancelled=least)
+        both = [curve.doubts(options)[0] for curve in (free, held)]
+        doubted.append(["contributions of elements cancel" in reasons for reasons in both])
+    assert {True, False} == {of_free for of_free, _ in doubted}
+    assert all(of_free == of_held for of_free, of_held in doubted)
+
+
+def test_solvers_that_stall_near_an_equilibrium_are_a_reason_of_their_own(monkeypatch):
+    scene, push, load = cantilever()
+    simulation = fm.Simulation(scene, space="plane-stress", size=3.0)
+    curve, linearise = simulation.load_displacement(push, forces=[load]), EquilibriumSolver.linearise
+
+    def stalled(self, state, *arguments, **options):
+        if state is not curve.frames[0].state:
+            raise fm.NotConverged("the linear solver stalled")
+        return linearise(self, state, *arguments, **options)
+
+    monkeypatch.setattr(EquilibriumSolver, "linearise", stalled)
+    assert curve.doubts() == (("tangent not defined",),)
+
+
+def test_doubts_make_two_factorisations_a_frame_and_keep_the_estimates():
+    scene, push, load = cantilever()
+    simulation = fm.Simulation(scene, space="plane-stress", size=3.0)
+    curve = simulation.load_displacement(push, forces=[0.5 * load, load])
+    solver = curve.discretisation.solver(push, [])
+    before = solver.factorisations
+    curve.doubts()
+    assert solver.factorisations - before == 2 * len(curve.frames)
+    curve.error_estimates()
+    assert solver.factorisations - before == 2 * len(curve.frames)
 
 
 def test_plain_bending_is_not_doubted():

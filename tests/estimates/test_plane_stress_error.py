@@ -74,7 +74,7 @@ def bent_by_a_couple(radius: float, opening: float, depth: float, poisson: float
     return fm.Scene(rig), fm.ForceGroup("couple", pair)
 
 
-def told_over_true(flat: fm.Simulation, deep: fm.Simulation, push, forces) -> np.ndarray:
+def estimate_over_true(flat: fm.Simulation, deep: fm.Simulation, push, forces) -> np.ndarray:
     """Estimates over what space adds, at each force."""
     curve, there = (simulation.load_displacement(push, forces=forces) for simulation in (flat, deep))
     added = there.displacements + there.error_estimates() - curve.displacements - curve.error_estimates()
@@ -89,7 +89,7 @@ def test_estimate_finds_how_much_stiffer_wide_thin_strips_are_in_space(depth, le
     scene, push, load = strip(depth, length, turn)
     flat = fm.Simulation(scene, space="plane-stress", size=2.0)
     deep = fm.Simulation(scene, space="3d-symmetric", size=2.0, layers=2)
-    found = told_over_true(flat, deep, push, [0.05 * load, load])
+    found = estimate_over_true(flat, deep, push, [0.05 * load, load])
     assert np.all((found > 0.5) & (found < 2.0))
 
 
@@ -105,7 +105,7 @@ def test_estimate_finds_how_much_stiffer_strips_of_all_depths_are_in_space(depth
     loads = [factor * load for factor in ((0.05, 1.5) if "pinned" in options else (0.05, 3.0))]
     flat = fm.Simulation(scene, space="plane-stress", order=3, size=1.5)
     deep = fm.Simulation(scene, space="3d-symmetric", order=3, size=2.0, layers=2)
-    found = told_over_true(flat, deep, push, loads)
+    found = estimate_over_true(flat, deep, push, loads)
     assert np.all((found > 0.5) & (found < 2.0))
 
 
@@ -124,8 +124,47 @@ def test_estimate_finds_how_far_effects_across_the_depth_push_in_space(effect):
     scene = fm.Scene(rig, effects=[effect(link)])
     flat = fm.Simulation(scene, space="plane-stress", size=0.7)
     deep = fm.Simulation(scene, space="3d-symmetric", size=0.7, layers=2)
-    found = told_over_true(flat, deep, push, [1e-6])
+    found = estimate_over_true(flat, deep, push, [1e-6])
     assert np.all((found > 0.8) & (found < 1.25)), found
+
+
+def swollen_strip(pressure: float, stretch: float, length: float):
+    """A strip of thickness and depth 1 between clamps, E = 1000, ν = 0.4, and a force that pulls it."""
+    rig = fm.Mechanism("strip")
+    wall, hand = rig.rigid("wall", fixed=True), rig.rigid("hand")
+    shape = fm.strip([(0, 0), (length, 0)], thickness=1.0, depth=1.0)
+    link = rig.flexible("link", shape, fm.Material("plastic", 1e3, 0.4))
+    rig.clamp(wall, link, end="start", length=1.0)
+    rig.clamp(hand, link, end="end", length=1.0)
+    pull = rig.force(on=hand, at=(length, 0), direction=(1, 0))
+    effects = [fm.Prestrain(link, stretch), *([fm.Pressure(link, pressure)] if pressure else [])]
+    return fm.Scene(rig, effects=effects), pull
+
+
+def test_pressure_on_faces_of_a_swollen_link_lengthens_it_by_what_its_volume_at_rest_does():
+    """Of a slender strip that swells by λ, by P L/E (λ ν − (1 − ν) (λ − 1)).
+
+    Under pressure on all faces it shortens by λ (1 − 2 ν) P L/E, on those of the drawn depth alone by (1 − ν) P L/E.
+    """
+    pressure, stretch, poisson, errors = 1.0, 1.3, 0.4, []
+    for load in (0.0, pressure):
+        for length in (22.0, 42.0):
+            scene, pull = swollen_strip(load, stretch, length)
+            flat = fm.Simulation(scene, space="plane-stress", size=0.7)
+            errors.append(flat.load_displacement(pull, forces=[1e-6]).modelling_errors()[0])
+    # ends add the same to either length
+    found = (errors[3] - errors[2]) - (errors[1] - errors[0])
+    lengthened = pressure * 20.0 / 1e3 * (stretch * poisson - (1.0 - poisson) * (stretch - 1.0))
+    assert found == pytest.approx(lengthened, rel=0.02)
+
+
+@pytest.mark.parametrize("stretch", [0.7, 1.4])
+def test_estimate_of_a_link_that_swells_much_counts_its_elastic_strain(stretch):
+    scene, pull = swollen_strip(0.0, stretch, 12.0)
+    flat = fm.Simulation(scene, space="plane-stress", size=0.35)
+    deep = fm.Simulation(scene, space="3d-symmetric", size=0.35, layers=2)
+    found = estimate_over_true(flat, deep, pull, [1e-6])
+    assert np.all((found > 0.5) & (found < 2.0))
 
 
 @pytest.mark.thorough
@@ -135,7 +174,7 @@ def test_estimate_finds_how_much_stiffer_the_designed_claw_is_in_space():
     flat = fm.Simulation(scene, space="plane-stress", size=script.QUICK)
     result = fm.DesignProblem(flat, **script.wanted(scene, grasp, configurations)).optimise()
     deep = fm.Simulation(scene, space="3d-symmetric", order=3, size=script.QUICK, layers=1)
-    found = told_over_true(flat.with_design(result), deep.with_design(result), grasp, [4.0, 10.0])
+    found = estimate_over_true(flat.with_design(result), deep.with_design(result), grasp, [4.0, 10.0])
     assert np.all((found > 0.5) & (found < 2.0))
 
 
@@ -151,7 +190,7 @@ def test_estimate_finds_how_much_stiffer_the_designed_truss_is_in_space_even_pul
     part = {diagonal: fm.step_file(tmp_path / "diagonal.step", depth=20.0)}
     flat = fm.Simulation(scene, space="plane-stress", order=3, size=script.QUICK).with_shapes(part)
     deep = fm.Simulation(scene, space="3d-symmetric", order=3, size=script.QUICK, layers=1).with_shapes(part)
-    found = told_over_true(flat, deep, push, [0.1, 0.3, 0.4])
+    found = estimate_over_true(flat, deep, push, [0.1, 0.3, 0.4])
     assert np.all((found > 0.8) & (found < 1.25)), found
 
 

@@ -1,4 +1,4 @@
-"""Elements that are too long to bend with a thin link are told, where measured errors say so."""
+"""Elements that are too long to bend with a thin link are named, where measured errors say so."""
 
 from __future__ import annotations
 
@@ -66,19 +66,19 @@ def test_links_that_are_thinner_than_their_elements_are_warned_of_once(kind, cap
     with caplog.at_level(logging.WARNING, "fenicsmech"):
         sim = fm.Simulation(scene, space="plane-stress", size=4.0)
         curve = sim.load_displacement(push, forces=[0.1])
-    told = warnings_of(caplog)
-    assert len(told) == 1
-    assert "'leaf' is drawn 1 mm thick at its thinnest, its elements 4 mm long" in told[0] and "size=3 " in told[0]
+    warned = warnings_of(caplog)
+    assert len(warned) == 1
+    assert "'leaf' is drawn 1 mm thick at its thinnest, its elements 4 mm long" in warned[0] and "size=3 " in warned[0]
     hints = {hint.what: hint for hint in curve.explain().left_out}
-    assert hints["length of elements"].text == told[0] and hints["length of elements"].matters
+    assert hints["length of elements"].text == warned[0] and hints["length of elements"].matters
 
 
 def test_the_size_that_a_warning_advises_gives_none(caplog):
     scene, _ = leaf("straight", thick=1.25)
     with caplog.at_level(logging.WARNING, "fenicsmech"):
         fm.Simulation(scene, space="plane-stress", size=4.0)
-        (told,) = warnings_of(caplog)
-        size = float(told.split("size=")[1].split()[0])
+        (warned,) = warnings_of(caplog)
+        size = float(warned.split("size=")[1].split()[0])
         assert 3.5 < size <= 3.0 * 1.25
         fm.Simulation(scene, space="plane-stress", size=size)
     assert len(warnings_of(caplog)) == 1
@@ -100,8 +100,8 @@ def test_thin_shapes_given_later_are_warned_of(caplog):
         sim.with_shapes({})
         assert not warnings_of(caplog)
         sim.with_shapes({link: other.shape})
-    (told,) = warnings_of(caplog)
-    assert "drawn 1 mm thick" in told
+    (warned,) = warnings_of(caplog)
+    assert "drawn 1 mm thick" in warned
 
 
 def test_links_with_elements_short_enough_give_no_warning(caplog):

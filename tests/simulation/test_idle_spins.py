@@ -73,12 +73,12 @@ def idle_hint(simulation, push) -> str:
 
 @pytest.mark.parametrize("kind", ["output", "force"])
 def test_points_away_from_the_line_of_an_idle_spin_are_named_by_explanations(kind):
-    for at, told in (((50, 0, 0), False), ((50, 1.0, 0), True)):
+    for at, named in (((50, 0, 0), False), ((50, 1.0, 0), True)):
         simulation, push, _ = rssr()
         mechanism = simulation.scene.mechanism
         (coupler,) = mechanism.flexible_links
         getattr(mechanism, kind)(on=coupler, at=at, direction=(0, 1, 0), name="side")
-        assert ("'side'" in idle_hint(simulation, push)) is told
+        assert ("'side'" in idle_hint(simulation, push)) is named
 
 
 def test_points_on_the_line_between_joints_of_a_design_are_not_named():

@@ -8,14 +8,16 @@ from __future__ import annotations
 
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 from benchmarks.table import ROOT, command, publish
 from fenicsmech.files import atomic_write
 
 from .record import append, read
+from .scene_result import SceneResult, judge
 from .summary import excessive, raw_table, table
-from .worker import Worker
+from .worker import Crashed, Worker
 
 _RAW = ROOT / "docs" / "tables" / "random-scenes.csv"
 
@@ -34,11 +36,15 @@ def main() -> int:
     seeds = range(options.seed, options.seed + options.count)
     path = options.out / f"{'quick' if options.quick else 'seed'}-{options.seed}.jsonl"
     results = {seed: result for seed, result in read(path).items() if seed in seeds}
-    worker, start, before = Worker(options.limit, quick=options.quick), time.monotonic(), len(results)
+    worker, start, before = Worker(partial(judge, quick=options.quick), options.limit), time.monotonic(), len(results)
     for seed in seeds:
         if seed in results:
             continue
-        results[seed] = worker.judge(seed)
+        try:
+            results[seed] = worker(seed)
+        except (TimeoutError, Crashed) as failure:
+            end = "hangs" if isinstance(failure, TimeoutError) else "crashes"
+            results[seed] = SceneResult(seed, "", f"wrong: {end}", str(failure), options.limit)
         append(path, results[seed])
         done, wrong = len(results), sum(result.wrong for result in results.values())
         left = (time.monotonic() - start) / (done - before) * (options.count - done)

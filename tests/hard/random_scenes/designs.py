@@ -107,9 +107,9 @@ def run(scene: DesignScene) -> tuple[str, str]:
         if _idle(scene, frame.displacement):
             return "true: DescriptionError, the links do not carry the force", str(error)
         raise
-    told = _misreported(scene, built, result, frame.displacement)
-    if told is not None:
-        return told
+    misreport = _misreported(scene, built, result, frame.displacement)
+    if misreport is not None:
+        return misreport
     if _met(result):
         return "designed: targets met", result.reason
     # an independent start, from shapes that differ by what the bounds allow
@@ -182,8 +182,8 @@ def _misreported(
         if result.verified:
             raise
         return "designed: not verified, and not reached from rest", str(error)
-    found, told = _reached(scene, curve.frames[-1]), float(result.targets[0].reached)
+    found, reported = _reached(scene, curve.frames[-1]), float(result.targets[0].reached)
     grain = THRESHOLDS.reached * scene.blueprint.length if scene.goal == "displacement" else 0.0
-    if abs(found - told) > grain + THRESHOLDS.energy * abs(found):
-        return f"wrong: {scene.goal} of a design", f"{told:.9g} reported, {found:.9g} on a curve from rest"
+    if abs(found - reported) > grain + THRESHOLDS.energy * abs(found):
+        return f"wrong: {scene.goal} of a design", f"{reported:.9g} reported, {found:.9g} on a curve from rest"
     return None

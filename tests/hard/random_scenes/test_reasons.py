@@ -20,7 +20,6 @@ from .stability_check import stiffness_left
 from .summary import excessive
 from .test_checks import arch
 from .thresholds import THRESHOLDS
-from .worker import Worker
 
 
 def slider(*effects, angle: float = 0.0, control: str = "forces") -> Blueprint:
@@ -260,11 +259,3 @@ def test_rounding_of_nodal_forces_grows_with_the_order_of_elements():
         potential = Potential.of(scene, build(scene).simulation)
         gains.append(potential.rounding(scene.links[1])[0] / np.sqrt(potential.mesh.nodes.size))
     assert 1.2 * gains[0] < gains[1] < 2.0 * gains[0]
-
-
-def test_scenes_that_use_a_processor_for_too_long_hang():
-    worker = Worker(0.05)
-    try:
-        assert worker.judge(5).outcome == "wrong: hangs"
-    finally:
-        worker.close()

@@ -48,7 +48,10 @@ class Thresholds:
         unchecked: shares of scenes in which a check is left out.
         spare: scenes that each may let off besides, for small samples.
         effectivity: largest factor between an error estimate and the true difference.
-        effective: least share of estimates within it, of those whose difference is above resolution.
+        said: largest share of estimates that are not within it, and said to be in doubt, of those whose difference is
+            above resolution.
+        needless: largest share of estimates within it that are in doubt all the same.
+        left_out: largest share of scenes whose estimates are not compared.
         resolved: difference over the value below which it counts as rounding and tolerance.
         still: displacement over the mechanism's length below which differences count as rounding.
     """
@@ -89,7 +92,9 @@ class Thresholds:
     unchecked: Mapping[str, float] = field(default_factory=lambda: {"displacement": 0.6, "stability": 0.3})
     spare: int = 5
     effectivity: float = 2.0
-    effective: float = 0.95
+    said: float = 0.05
+    needless: float = 0.1
+    left_out: float = 0.2
     resolved: float = 1e-6
     still: float = 1e-13
 

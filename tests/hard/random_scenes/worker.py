@@ -10,44 +10,53 @@ import io
 import logging
 import multiprocessing
 import signal
-import time
+from collections.abc import Callable
 from contextlib import redirect_stderr
 from multiprocessing.connection import Connection
+from typing import Generic, TypeVar
 
-from .scene_result import SceneResult, judge
+T = TypeVar("T")
 
 _WAITING = 3600.0  # seconds by the clock, also for what uses no processor
 
 
-class Worker:
+class Crashed(Exception):
+    """The process ended without a result."""
+
+
+class Worker(Generic[T]):
     """One process that judges scene after scene.
 
     Args:
+        judge: the result of a seed; a function of a module, which the process imports.
         limit: seconds of a processor after which a scene is taken to hang; compilers are not counted.
-        quick: whether scenes are simulated with larger elements and fewer loads.
     """
 
-    def __init__(self, limit: float, *, quick: bool = False) -> None:
-        self._limit, self._quick = limit, quick
+    def __init__(self, judge: Callable[[int], T], limit: float) -> None:
+        self._judge, self._limit = judge, limit
         self._process, self._pipe = None, None
 
-    def judge(self, seed: int) -> SceneResult:
-        """The outcome of a scene; a hang or a crash is one too."""
+    def __call__(self, seed: int) -> T:
+        """The result of a scene.
+
+        Raises:
+            TimeoutError: it hangs.
+            Crashed: the process died, or an exception escaped.
+        """
         if self._process is None:
             self._start()
-        start = time.perf_counter()
         self._pipe.send(seed)
         try:
             if self._pipe.poll(_WAITING):
                 return self._pipe.recv()
-            end = "wrong: waits"
         except (EOFError, ConnectionError):
             self._process.join()
-            end = "wrong: hangs" if self._process.exitcode == -signal.SIGPROF else "wrong: crashes"
+            hangs = self._process.exitcode == -signal.SIGPROF
+            self.close()
+            if not hangs:
+                raise Crashed from None
         self.close()
-        return SceneResult(
-            seed, "", end, f"limit {self._limit:g} s of a processor, {_WAITING:g} s in all", time.perf_counter() - start
-        )
+        raise TimeoutError(f"limit {self._limit:g} s of a processor, {_WAITING:g} s by the clock")
 
     def close(self) -> None:
         """Ends the process."""
@@ -60,12 +69,12 @@ class Worker:
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
-        self._process = context.Process(target=_serve, args=(theirs, self._limit, self._quick), daemon=True)
+        self._process = context.Process(target=_serve, args=(theirs, self._judge, self._limit), daemon=True)
         self._process.start()
         theirs.close()
 
 
-def _serve(pipe: Connection, limit: float, quick: bool) -> None:
+def _serve(pipe: Connection, judge: Callable[[int], T], limit: float) -> None:
     logging.getLogger("fenicsmech").setLevel(logging.ERROR)
     while True:
         try:
@@ -74,6 +83,6 @@ def _serve(pipe: Connection, limit: float, quick: bool) -> None:
             return
         signal.setitimer(signal.ITIMER_PROF, limit)
         with redirect_stderr(io.StringIO()):  # progress of curves
-            result = judge(seed, quick=quick)
+            result = judge(seed)
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         pipe.send(result)
