@@ -309,9 +309,7 @@ def main() -> int:
     parser = command(__doc__)
     parser.add_argument("--count", type=int, default=COUNT, help="number of scenes")
     parser.add_argument("--seed", type=int, default=FIRST, help="the first scene")
-    parser.add_argument(
-        "--limit", type=float, default=300.0, help="seconds of a processor after which a scene is left out"
-    )
+    parser.add_argument("--limit", type=float, default=300.0, help="seconds of a processor for each scene")
     parser.add_argument("--processes", type=int, default=os.cpu_count(), help="scenes judged side by side")
     parser.add_argument("--out", type=Path, default=Path("results/effectivity"), metavar="DIR")
     options = parser.parse_args()
