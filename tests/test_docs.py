@@ -33,6 +33,7 @@ def getting_started(names: Names, folder: Path) -> None:
 
 def describe(names: Names, folder: Path) -> None:
     assert {link.name for link in names["scene"].mechanism.links} == {"ground", "crank", "coupler", "follower"}
+    assert names["in_metres"].law.E == pytest.approx(1e6 * names["pom"].law.E)
 
 
 def simulate(names: Names, folder: Path) -> None:
