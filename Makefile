@@ -29,7 +29,7 @@ MPIRUN = OPENBLAS_NUM_THREADS=1 mpirun -n $(RANKS)
 heading = @printf '\n--- %s\n' '$(1)'
 
 .PHONY: help demo test check install install-test install-docs lint test-serial test-parallel test-thorough test-slow \
-    test-debian13 test-newest demos-quick hard-cases random-scenes random-scenes-check docs bench clean
+    test-debian13 test-newest demos-quick hard-cases random-scenes random-scenes-check effectivity docs bench clean
 
 help: ## list the targets
 	@sed -nE 's/^([a-z0-9-]+):.*## (.*)/\1\t\2/p' Makefile | expand -t 16
@@ -88,6 +88,7 @@ test-slow: install-test ## the tests marked `slow`
 # Results are kept: the same command continues after an interruption.
 N := 1000
 SEED := 0
+COMPARED := 300
 
 random-scenes: install-test ## N random scenes from SEED on (1000, 0), each checked independently; tables in docs/tables/
 	$(call heading,random scenes)
@@ -96,6 +97,10 @@ random-scenes: install-test ## N random scenes from SEED on (1000, 0), each chec
 random-scenes-check: install-test ## a hundred of them, afresh, from a block that nothing was built on
 	$(call heading,a hundred random scenes)
 	OPENBLAS_NUM_THREADS=1 $(PYTHON) -m tests.hard.random_scenes --count 100 --seed 10000 --out "$$(mktemp -d)"
+
+effectivity: install-test ## error estimates of COMPARED random scenes (300) from SEED on, against finer elements and space
+	$(call heading,effectivity of error estimates)
+	OPENBLAS_NUM_THREADS=1 $(PYTHON) -m tests.hard.random_scenes.effectivity --count $(COMPARED) --seed $(SEED) --write
 
 # What can differ between versions of dolfinx, PETSc, gmsh and Python; FULL=yes runs everything that is fast.
 FULL :=

@@ -1,4 +1,9 @@
-"""Work of one process for all, and errors raised on all processes: none waits for a process that has failed."""
+"""Work of one process for all, and errors raised on all processes: none waits for a process that has failed.
+
+Numbers that each process computes from copies of the same arrays may differ in their last digits: other kernels of
+linear algebra round otherwise. Where a decision depends on them, all take those of the first process (``agreed``);
+results of reductions are the same on all.
+"""
 
 from __future__ import annotations
 
@@ -24,6 +29,11 @@ def on_one(comm: MPI.Comm, work: Callable[[], T]) -> T | None:
 def from_one(comm: MPI.Comm, work: Callable[[], T]) -> T:
     """As ``on_one``; all processes get the result."""
     return pickle.loads(comm.bcast(on_one(comm, lambda: pickle.dumps(work())), root=0))
+
+
+def agreed(comm: MPI.Comm, value: T) -> T:
+    """The ``value`` of the first process, on all."""
+    return comm.bcast(value, root=0)
 
 
 def on_all(comm: MPI.Comm, work: Callable[[], T]) -> T:

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import resource
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from numbers import Integral, Real
 from pathlib import Path
 from statistics import median
@@ -116,7 +116,7 @@ def write_report(
     def write() -> None:
         label = f"von Mises stress [{units.stress}]"
         draw_configurations(folder / "mechanism.png", panels, title=name, colour_label=label, unit=units.length)
-        _plot(folder / "curve.png", name, curves, optimisation)
+        _plot(folder / "curve.png", name, curves, errors, optimisation)
         write_json(folder / "summary.json", summary)
 
     on_one(comm, write)
@@ -220,15 +220,26 @@ def _errors(curve: Curve) -> np.ndarray | None:
         return None
 
 
-def _plot(path: Path, name: str, curves: Sequence[Curve], optimisation: Optimisation | None) -> None:
+def _plot(
+    path: Path,
+    name: str,
+    curves: Sequence[Curve],
+    errors: Sequence[np.ndarray | None],
+    optimisation: Optimisation | None,
+) -> None:
     """The curves, with those of the drawn design and the targets if there was an optimisation."""
     before, targets = (optimisation.before, optimisation.problem.targets) if optimisation else ((), ())
     configurations = dict.fromkeys(curve.configuration for curve in (*curves, *before))
     colours = dict(zip(configurations, PALETTE * len(configurations), strict=False))
     series = [curve.series("initial design", colour=colours[curve.configuration], faint=True) for curve in before]
-    for curve in curves:
+    for curve, known in zip(curves, errors, strict=True):
         label = "optimised" if optimisation is not None and len(curves) == 1 else curve.configuration.name
-        series.append(curve.series(label, colour=colours[curve.configuration]))
+        own = curve.series(label, colour=colours[curve.configuration])
+        if known is not None:
+            added = (0.0, known) if curve.unknown is Unknown.FORCE else (known, 0.0)
+            corrected = np.column_stack([curve.displacements + added[0], curve.forces + added[1]])
+            own = replace(own, corrected=corrected)
+        series.append(own)
     points, parts = [point for target in targets if (point := target.on_curve)], [curve.part for curve in curves]
     wanted = [CurveTarget(u, magnitude, colours.get(place)) for force, magnitude, u, place in points if force in parts]
     across, up = curves[0].axes

@@ -39,6 +39,7 @@ INNER = {
     "OneSided",
     "Panel",
     "ParametricShape",
+    "Plane",
     "PointLoad",
     "Quadratic",
     "Residual",

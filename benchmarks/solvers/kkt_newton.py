@@ -66,7 +66,7 @@ class KKTNewtonSolver(EquilibriumSolver):
             x = self.try_solve(residual.vector, self.step_accuracy(residual))
             if x is None:
                 raise NotConverged("the linear solver stalled", iteration)
-            step, before = self.newton_step(x, state, control, residual), residual.norm
+            step, before = self.newton_step(x, self.plane(state, control, residual)), residual.norm
             try:
                 state, residual = self._advance(state, control, step, residual, iteration)
             except NotConverged as failure:

@@ -1,7 +1,8 @@
 """Arc-length continuation: steps along a path that may turn back in load and in displacement.
 
 An equilibrium is predicted along the tangent y′ and its curvature, corrected in the plane ⟨y₁′, y₂ − y⟩ = 0 through the
-prediction y, and accepted if the path turns little enough; steps are as long as its curvature allows.
+prediction y, and accepted if the path turns little enough; steps are as long as its curvature allows. The only fallback
+is half the step, as long as that is not the shortest one: with the default lengths, seventeen solves at most.
 
 Sources: Riks (doi:10.1016/0020-7683(79)90081-7), Crisfield (doi:10.1016/0045-7949(81)90108-5).
 """
@@ -12,6 +13,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+from fenicsmech.collective import agreed
 from fenicsmech.continuation.stepper import ParabolaPredictor, Stepper, on_cubic
 from fenicsmech.equilibrium import (
     ArcLengthControl,
@@ -43,8 +45,9 @@ class ArcSteps:
         tolerance: of the location of limit points and bifurcations, over the step they lie in.
         turn: angle between the tangents at both ends of a step that step sizes aim at, rad.
         largest_turn: angle above which a step is repeated with a smaller length: it jumps to another branch, or cuts
-            off a bend.
+            off a bend. Where other points touch an obstacle at its end, paths have corners, up to a right angle.
         iterations: number per step that step sizes aim at; the last one only determines the stability.
+        contact_iterations: the same where other points touch at the end of a step: it hardly depends on its length.
 
     Raises:
         DescriptionError: a number is not positive, the tolerance not below 1, or the number of iterations not whole.
@@ -58,9 +61,10 @@ class ArcSteps:
     turn: float = 0.25
     largest_turn: float = 0.9
     iterations: int = 5
+    contact_iterations: int = 7
 
     def __post_init__(self) -> None:
-        set_options(self, "arc-length steps", below_one=("tolerance",), iterations=1)
+        set_options(self, "arc-length steps", below_one=("tolerance",), iterations=1, contact_iterations=1)
 
 
 @dataclass(frozen=True)
@@ -127,8 +131,8 @@ class ArcLengthStepper(Stepper):
     # -- points ------------------------------------------------------------------------------------------------
 
     def value(self, point: EquilibriumPoint) -> float:
-        """The followed value."""
-        return self.followed.value(self.system, point.state)
+        """The followed value, the same on all processes."""
+        return agreed(self.system.comm, self.followed.value(self.system, point.state))
 
     def value_rate(self, point: EquilibriumPoint) -> float:
         """Rate of the followed value along the path."""
@@ -191,8 +195,10 @@ class ArcLengthStepper(Stepper):
                 found = self.correct(self._predict(self.length), point.tangent, point)
                 turn = self._turn(point, found)
                 _log.debug("arc %.2e: turn %.2f, %d iterations", self.length, turn, found.iterations)
-                if turn <= steps.largest_turn:
-                    growth = min(steps.turn / max(turn, 1e-12), math.sqrt(steps.iterations / found.iterations))
+                touched = self._other_points_touch(point.state, found.state)
+                if turn <= steps.largest_turn or (touched and turn < 0.5 * math.pi):
+                    iterations = steps.contact_iterations if touched else steps.iterations
+                    growth = min(steps.turn / max(turn, 1e-12), math.sqrt(iterations / found.iterations))
                     self.length *= min(max(growth, 0.5), 2.0)
                     self._accept(found, self.metric.norm(self.chord(point, found)))
                     return found

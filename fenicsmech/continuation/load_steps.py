@@ -7,6 +7,22 @@ towards a limit load p*, and the last equilibrium, at p* − 2 p* / 1024 or near
 moves a coordinate outside the range of the tangents at its ends may have snapped over a fold, where the path turns
 back: it is halved too, and if that does not help the snap is accepted and counted.
 
+Where an equilibrium is not found at once, fallbacks follow in this order. All of them are bounded by counts, which are
+the same on all processes and machines, and not by time:
+
+    fallback                                                   ends after
+    1. the tangent's prediction, then the last equilibrium,    one each; where other points touch, the latter at once
+       where a prediction moves too far
+    2. shifts of the KKT matrix until steps descend            ``PrimalDualNewton.shifts`` an iteration
+    3. shorter steps where elements are inverted               its ``halvings_inverted`` an iteration
+    4. line search, from the best state so far                 its ``iterations`` and ``factorisations``, with 2 and 3
+    5. other least shifts of zero-energy modes                 ``LoadSteps.shift_factors``, a solve each
+    6. half the step                                           ``LoadSteps.smallest``, or ``failures`` such steps
+    7. of motors: links that strain beyond a dead centre       ten halvings; then load steps once more
+
+Then the last equilibrium and the values without one are reported. The control stays the one that was asked for: under
+a dead load the equilibria past a limit point are not those that the mechanism would take.
+
 Motors may go beyond a dead centre, where the slack of the joints ends and links must strain. Towards it a
 coordinate x moves ever faster while the links are free of strain: close by, in units of x,
 
@@ -25,10 +41,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
+from fenicsmech.collective import agreed
 from fenicsmech.continuation.stepper import Predictor, Stepper, TangentPredictor
-from fenicsmech.equilibrium import ActiveSet, Control, EquilibriumPoint, EquilibriumSolver, NotConverged, State, Step
+from fenicsmech.equilibrium import Control, EquilibriumPoint, EquilibriumSolver, NotConverged, State, Step
 from fenicsmech.errors import not_negative, set_fields, set_options
 from fenicsmech.log import logger
 
@@ -42,6 +57,8 @@ class LoadSteps:
     Attributes:
         smallest: smallest step, over the distance to the end, or the distance covered if that is less.
         motion: largest motion of a step along the tangent (measured).
+        failures: steps without equilibrium on the way to one prescribed value after which stepping fails. Locating a
+            limit load takes ten to twelve, equilibria that are found take three at most (measured).
         smallest_limited: smallest step that ``motion`` may impose, over the distance to the end; smaller ones arise
             in singular positions, where the tangent is ignored.
         largest_prediction: motion above which a prediction is discarded.
@@ -64,6 +81,7 @@ class LoadSteps:
 
     smallest: float = 1.0 / 1024.0
     motion: float = 0.2
+    failures: int = 20
     smallest_limited: float = 1e-6
     largest_prediction: float = 1.0
     contact_residual: float = 10.0
@@ -76,7 +94,7 @@ class LoadSteps:
     shift_factors: tuple[float, ...] = (1.0, 1e-3, 0.0)
 
     def __post_init__(self) -> None:
-        set_options(self, "load steps", iterations=1)
+        set_options(self, "load steps", failures=1, iterations=1)
         factors = tuple(not_negative("shift factor of load steps", factor) for factor in self.shift_factors)
         set_fields(self, shift_factors=factors)
 
@@ -104,15 +122,20 @@ class LoadStepper(Stepper):
         start: first guess of the equilibrium at which steps begin; the control's value there is the first one.
         control: whose prescribed value changes.
         predictor: of the next equilibrium.
+        held: whether the prescribed value itself holds all zero-energy modes, as soon as it is not zero: matrices need
+            a least shift at the start only, and later ones would hide how stable equilibria are.
 
     Attributes:
         iterations: KKT systems factored and solved so far.
         snaps: number of times the path turned back and an equilibrium on another one was reached.
     """
 
-    def __init__(self, solver: EquilibriumSolver, start: State, control: Control, *, predictor: Predictor) -> None:
+    def __init__(
+        self, solver: EquilibriumSolver, start: State, control: Control, *, predictor: Predictor, held: bool = False
+    ) -> None:
         super().__init__(solver, predictor, start)
-        self._steps, self._value = LoadSteps(), control.value(solver.system, start)
+        self._held, self._steps = held, LoadSteps()
+        self._value = agreed(solver.system.comm, control.value(solver.system, start))
         self._origin, self._covered = self._value, 0.0  # farthest from there so far
         factors = self._steps.shift_factors if start.minimum_shift else (0.0,)
         self._shifts = tuple(factor * start.minimum_shift for factor in factors)
@@ -123,11 +146,13 @@ class LoadStepper(Stepper):
         """The equilibrium at ``control``'s prescribed value, reached in as many steps as needed.
 
         Raises:
-            LoadStepsFailed: the smallest step failed.
+            LoadStepsFailed: the smallest step failed, or too many.
             EquilibriumError: a potential does not hold for a step.
         """
         if not self._points:
             self._settle(control.at(self._value))
+            if self._held:
+                self._shifts = self._shifts[::-1]
         steps, distance = self._steps, control.prescribed - self._value
         step, tried = distance, []
         while True:
@@ -140,7 +165,7 @@ class LoadStepper(Stepper):
             except NotConverged as failure:
                 tried.append(value)
                 step = 0.5 * (value - self._value)
-                if abs(step) <= steps.smallest * self._scale(distance):
+                if abs(step) <= steps.smallest * self._scale(distance) or len(tried) == steps.failures:
                     raise LoadStepsFailed(self._last, self._value, failure.reason, tuple(tried)) from failure
                 continue
             if self._snapped(point):
@@ -170,7 +195,7 @@ class LoadStepper(Stepper):
             pass
 
     def _correct(self, guess: State, control: Control) -> EquilibriumPoint:
-        """The equilibrium near ``guess``, with the largest shift for zero-energy modes that leads there."""
+        """The equilibrium near ``guess``, with the first shift for zero-energy modes that leads there."""
         for place, shift in enumerate(self._shifts):
             try:
                 point = self.solver.solve(replace(guess, minimum_shift=shift), control)
@@ -186,11 +211,10 @@ class LoadStepper(Stepper):
     def _guess(self, control: Control) -> State:
         """The prediction; the last equilibrium where the prediction runs into obstacles, or comes off them."""
         guess = self._predict(control.prescribed - self._value)
-        contact = self.system.contact
-        if contact is None or not self._points:
+        if not self._points:
             return guess
         last = self._points[-1].state
-        return last if self._leaves_contact(contact, last, guess, control) else guess
+        return last if self._leaves_contact(last, guess, control) else guess
 
     def _predict(self, ahead: float) -> State:
         """The prediction; where it moves too far that of the tangent, then the last equilibrium."""
@@ -203,19 +227,19 @@ class LoadStepper(Stepper):
                 return guess
         return last
 
-    def _leaves_contact(self, contact: ActiveSet, last: State, guess: State, control: Control) -> bool:
+    def _leaves_contact(self, last: State, guess: State, control: Control) -> bool:
         """Whether other points touch in ``guess`` than in ``last``, and its residual under ``control`` is far larger.
 
         The tangent holds as long as the same points touch. Elsewhere the first step from the last equilibrium, with
         gaps linearised, is the prediction that keeps links outside obstacles.
         """
-        system, norms, touching = self.system, [], []
+        if not self._other_points_touch(last, guess):
+            return False
+        norms = []
         for state in (control.prepare(last), control.prepare(guess)):
-            system.load(state)
-            norms.append(system.residual(state, control).norm)
-            touching.append(contact.touching())
-        changed = system.comm.allreduce(int(np.any(touching[0] != touching[1]))) > 0
-        return changed and not norms[1] <= self._steps.contact_residual * norms[0]  # NaN where elements are inverted
+            self.system.load(state)
+            norms.append(self.system.residual(state, control).norm)
+        return not norms[1] <= self._steps.contact_residual * norms[0]  # NaN where elements are inverted
 
     def _limited(self, step: float, distance: float) -> float:
         """``step``, shortened to the largest ``motion`` unless that would leave too little of the ``distance``."""

@@ -16,6 +16,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from fenicsmech.equilibrium import ArcMetric, EquilibriumPoint, EquilibriumSolver, EquilibriumSystem, State, Step
 from fenicsmech.errors import set_options
 
@@ -114,6 +116,16 @@ class Stepper:
     def _predict(self, ahead: float) -> State:
         """The guess ``ahead`` of the last point."""
         return self.predictor.predict(self.system, self._points, self._width, ahead)
+
+    def _other_points_touch(self, a: State, b: State) -> bool:
+        """Whether other points touch obstacles in ``b`` than in ``a``; loads ``b`` where links may touch any."""
+        system, touching = self.system, []
+        if system.contact is None:
+            return False
+        for state in (a, b):
+            system.load(state)
+            touching.append(system.contact.touching())
+        return system.comm.allreduce(int(np.any(touching[0] != touching[1]))) > 0
 
     def _accept(self, point: EquilibriumPoint, width: float) -> None:
         """Keeps ``point``, ``width`` ahead of the last one, and that one unless they are in the same place.

@@ -259,6 +259,7 @@ class OneSided:
         else:
             stiffness = _RELATIVE_STIFFNESS * link.material.law.E / self._heights()
         self.compliances = np.repeat(1.0 / stiffness, len(self._points))
+        self._rest, self._u = (np.zeros(0), np.zeros(0)), np.zeros(0)  # shape and depth, u of the last update
 
     @cached_property
     def _gap(self) -> SmoothFunction:
@@ -274,20 +275,32 @@ class OneSided:
         return volume / area
 
     def update(self) -> None:
-        """Takes the rest shape and the displacements that the fields hold. Local."""
+        """Takes the rest shape and the displacements that the fields hold, where they changed. Local."""
+        body = self._body
+        shape, depth, u = body.shape.x.array, body.depth.x.array, body.u.x.array
+        same_rest = np.array_equal(shape, self._rest[0]) and np.array_equal(depth, self._rest[1])
+        if same_rest and np.array_equal(u, self._u):
+            return
+        if not same_rest:
+            self._take_rest()
+            self._rest = shape.copy(), depth.copy()
+        self._u = u.copy()
+        self._places = self._unloaded + self._nodes @ u.reshape(-1, body.model.dim)
+        numbers = np.array([self._obstacle.numbers])
+        self.gaps = self._gap.value(self._places, numbers)[:, 0]
+        self._normals = self._gap.gradient(self._places, numbers)[:, 0]
+
+    def _take_rest(self) -> None:
+        """Places and weights of the points in the rest shape."""
         places, dim = self._boundary.places, self._body.model.dim
         shape = self._body.shape.x.array.reshape(-1, dim)
-        rest = (self._points @ places).reshape(-1, dim) + self._shape @ shape
+        self._unloaded = (self._points @ places).reshape(-1, dim) + self._shape @ shape
         edges = [np.repeat(places[:, k] - places[:, 0], len(self._points), axis=0) for k in range(1, dim)]
         edges = [edge + along @ shape for edge, along in zip(edges, self._along, strict=True)]
         area = edges[0] if dim == 2 else np.cross(edges[0], edges[1])
         depth = self._body.model.multiplier(self._body.depth.x.array[self._boundary.cells])
         weights = np.outer(depth * np.ones(len(places)), self._weights).ravel()
         self.weights = weights * np.linalg.norm(area, axis=1)
-        self._places = rest + self._nodes @ self._body.u.x.array.reshape(-1, dim)
-        numbers = np.array([self._obstacle.numbers])
-        self.gaps = self._gap.value(self._places, numbers)[:, 0]
-        self._normals = self._gap.gradient(self._places, numbers)[:, 0]
 
     def rates(self, motion: np.ndarray) -> np.ndarray:
         """∇g · δu at the points, (n,), from δu of this rank's owned nodes, flat."""

@@ -15,7 +15,7 @@ import ufl
 
 from fenicsmech.errors import DescriptionError, expect, in_plane, point, positive, set_fields
 from fenicsmech.mechanism import Effect, RigidLink, in_dimension
-from fenicsmech.multibody import BodyPoint, PosePotential
+from fenicsmech.multibody import DeadForce
 
 
 @dataclass(frozen=True)
@@ -81,20 +81,4 @@ class Gravity(Effect):
 
     def pose_potentials(self, linkage):
         g = np.array(in_dimension(self.acceleration, linkage.dim))
-        return [_Weight(linkage.point(link, mass.at), mass.mass * g) for link, mass in self.masses.items()]
-
-
-class _Weight(PosePotential):
-    """−m g · u of a rigid link's centre of mass."""
-
-    def __init__(self, point: BodyPoint, weight: np.ndarray) -> None:
-        self.bodies, self._point, self._weight = (point.body,), point, weight
-
-    def value(self, poses):
-        return -float(self._weight @ self._point.displacement(None, poses))
-
-    def gradient(self, poses):
-        return -self._weight @ self._point.gradient(poses)
-
-    def hessian(self, poses):
-        return -self._point.hessian(poses, self._weight)
+        return [DeadForce(linkage.point(link, mass.at), mass.mass * g) for link, mass in self.masses.items()]

@@ -64,6 +64,10 @@ class Pressure(Effect):
     def faces(self):
         return (Faces(self.link, self.where),)
 
+    @property
+    def across_depth(self):
+        return {self.link: self.pressure} if self.where is None else {}
+
     def link_energy(self, fields):
         (faces,) = self.faces
         if self.about is None and not fields.boundaries[faces].is_closed(fields.mesh.comm):

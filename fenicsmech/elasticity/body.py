@@ -22,6 +22,7 @@ Newton method in geometrically non-linear structural problem discretized via dis
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -84,23 +85,26 @@ class ElasticBody(BodyFields):
             found.append((density * self._volume, term.dx))
         return found
 
-    def contraction_energy(self, a, v, p, q, *, degree: int) -> ufl.Form:
+    def contraction_energy(self, a, v, p, q, pressures: Sequence[float], *, degree: int) -> ufl.Form:
         """Energy of links in plane stress that contract by a instead of h = F₃₃ − 1 and curl across their depth by v.
 
-        ½ ∫ E ((a − p)² − 2 q h) + μ b²/12 |∇a − Fᵀv|² + b⁴/720 E/(1 − ν²) ((1 − ν) G : G + ν (tr G)²) dV
+        ½ ∫ E ((a − p)² − 2 q h) + μ b²/12 |∇a − Fᵀv|² + b⁴/720 E/(1 − ν²) ((1 − ν) G : G + ν (tr G)²) + 2 P a det F dV
 
-        with G = sym Fᵀ∇v and p the projection of h, whose derivatives are those of the term in q, that of a − p.
+        with G = sym Fᵀ∇v and p the projection of h, whose derivatives are those of the term in q, that of a − p. P is
+        the load factor times the ``pressures`` on the faces of each link across its depth.
         """
         assert isinstance(self.model, PlaneStress), "links contract freely in plane stress alone"
         H, b, terms = self.gradient(self.u), self.depth, []
         F = ufl.Identity(self.model.dim) + H
+        squeezing = self.load_factor * self.cellwise(pressures) * a * ufl.det(F)
+        grown = 1 if self.growth is None else self.growth.depth
         shear, G = self.gradient(a) - ufl.dot(F.T, v), ufl.sym(ufl.dot(F.T, self.gradient(v)))
         for term in self.terms:
-            E, nu, h = term.law.E, term.law.nu, self.model.contraction(term.law, self._elastic(H))
+            E, nu, h = term.law.E, term.law.nu, grown * (1 + self.model.contraction(term.law, self._elastic(H))) - 1
             contraction = E * ((a - p) ** 2 - 2 * q * h)
             curling = b**2 / 12 * E / (2 * (1 + nu)) * ufl.inner(shear, shear)
             membrane = b**4 / 720 * E / (1 - nu**2) * ((1 - nu) * ufl.inner(G, G) + nu * ufl.tr(G) ** 2)
-            density = 0.5 * (contraction + curling + membrane) * self._volume
+            density = (0.5 * (contraction + curling + membrane) + squeezing) * self._volume
             terms.append(density * term.dx(metadata={"quadrature_degree": degree}))
         return _sum(terms)
 

@@ -101,6 +101,11 @@ class Growth:
         """det F_p in UFL, the growth of depth included."""
         return (1 + self.load_factor * self._excess) ** self._power
 
+    @property
+    def depth(self):
+        """Strain-free depth over the drawn one, in the plane, in UFL."""
+        return (1 + self.load_factor * self._excess) ** ((self._power - 1) / 2)
+
 
 @dataclass(frozen=True)
 class Term:

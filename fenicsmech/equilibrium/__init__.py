@@ -23,6 +23,7 @@ from fenicsmech.equilibrium.control import (
     LoadControl,
     LoadFactorControl,
     MotorControl,
+    Plane,
     Stability,
 )
 from fenicsmech.equilibrium.kkt import EntryCopy, KktMatrix

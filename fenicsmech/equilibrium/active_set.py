@@ -16,6 +16,10 @@ the forces p = f(γ) ≥ 0 at these points are the least of ½ p · (S₀ + 1/d)
 problem if contact at others keeps the links stable; S₀ and γ₀₀ are S and γ₀ without the springs d. If it does not, the
 step stays that of K.
 
+Steps into a plane across a path (see ``control``) add τ x₁, so that gaps also change by τ b · x₁; forces a that lead
+out of the plane change τ by t · a. Least squares are then solved for given τ, and the τ that leads into the plane is
+found by Brent's method.
+
 Iterations thus depend on how far from linear links and gaps are, not on how many points touch or come and go. The next
 matrix takes the points and pressures of the linearised gaps, not those of the state, whose gaps are of second order.
 
@@ -32,10 +36,11 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
-from scipy.optimize import nnls
+from scipy.optimize import brentq, nnls
 
 from fenicsmech.collective import from_one
 from fenicsmech.effects import OneSided
+from fenicsmech.equilibrium.control import Plane
 from fenicsmech.equilibrium.unknowns import ScaledUnknowns
 from fenicsmech.errors import set_options
 
@@ -82,8 +87,8 @@ class ActiveSet:
         # A and the pressures in K, and those expected after the step; None: those of the state
         self._active = np.zeros(0, bool)
         self._expected: tuple[np.ndarray, np.ndarray] | None = None
-        # numbers of the points corrected with the present factor, and b · K⁻¹ b of each at this rank's points
-        self._corrected, self._columns = np.zeros(0, int), np.zeros((0, 0))
+        # of the points corrected with the present factor: numbers, b · K⁻¹ b at this rank's points, and t
+        self._corrected, self._columns, self._along = np.zeros(0, int), np.zeros((0, 0)), np.zeros(0)
 
     def start(self, load_factor: float) -> None:
         """Expects the points that touch at the state that is next linearised; ``load_factor`` is that of the energy."""
@@ -105,22 +110,29 @@ class ActiveSet:
         touching = self.touching()
         present = np.maximum(-self._gaps, 0.0) / self._compliances
         self._active, pressures = (touching, present) if self._expected is None else self._expected
-        self._corrected, self._columns = np.zeros(0, int), np.zeros((len(touching), 0))
+        self._corrected, self._columns, self._along = np.zeros(0, int), np.zeros((len(touching), 0)), np.zeros(0)
         stiffness = self._load_factor * (self._active * 1.0 - touching) / self._compliances
         pairs = zip(self._each(stiffness), self._each(self._load_factor * (pressures - present)), strict=True)
         for (surface, own), (_, pressure) in pairs:
             surface.add_stiffness(matrix, self._unknowns.numbering.rows_of, own, pressure)
 
     def corrected(
-        self, x: PETSc.Vec, residual: PETSc.Vec, solve: Callable[[PETSc.Vec], PETSc.Vec | None]
+        self,
+        x: PETSc.Vec,
+        residual: PETSc.Vec,
+        solve: Callable[[PETSc.Vec], PETSc.Vec | None],
+        plane: Plane | None = None,
     ) -> PETSc.Vec | None:
         """The solution ``x`` of K x = ``residual`` with contact linearised; None if a solve fails.
 
-        ``solve`` solves with the last factor of the matrix with ``add_stiffness``.
+        ``solve`` solves with the last factor of the matrix with ``add_stiffness``; steps lead into ``plane``, if any.
         """
         self._update()
         stiffness = self._load_factor * self._joined(lambda surface: surface.weights) / self._compliances
-        fixed = gaps = self._gaps - self._rates(x)
+        fixed, ahead, forward = self._gaps - self._rates(x), 0.0, np.zeros(len(self._gaps))
+        if plane is not None:
+            ahead, forward = plane.missing - plane.along(x), self._rates(plane.x)
+        gaps = fixed + ahead * forward
         a, solved = np.zeros(len(self._corrected)), False
         while len(new := self._missed(gaps, stiffness)) or (len(self._corrected) and not solved):
             if len(self._corrected) + len(new) > self._options.most:
@@ -132,14 +144,15 @@ class ActiveSet:
                 if z is None:
                     return None
                 self._columns = np.column_stack([self._columns, self._rates(z)])
+                self._along = np.append(self._along, plane.along(z) if plane is not None else 0.0)
                 z.destroy()
                 self._corrected = np.append(self._corrected, number)
-            found = self._settled(fixed, stiffness)
+            found = self._settled(fixed, stiffness, forward, ahead)
             if found is None:
                 self._expected = None
                 return x
             a, solved = found, True
-            gaps = fixed + self._columns @ a
+            gaps = fixed + self._columns @ a + (ahead + self._along @ a) * forward
         self._expected = gaps < 0.0, np.maximum(-gaps, 0.0) / self._compliances
         if not solved:
             return x
@@ -179,20 +192,22 @@ class ActiveSet:
         order = np.argsort(-sizes[others], kind="stable")
         return numbers[others][order][: max(self._options.first, len(self._corrected))]
 
-    def _settled(self, fixed: np.ndarray, stiffness: np.ndarray) -> np.ndarray | None:
+    def _settled(
+        self, fixed: np.ndarray, stiffness: np.ndarray, forward: np.ndarray, ahead: float
+    ) -> np.ndarray | None:
         """a of the points corrected, None if it is not found."""
         points = self._corrected
         own = np.flatnonzero((points >= self._first) & (points < self._first + len(fixed)))
         rows = points[own] - self._first
-        values = np.column_stack([fixed[rows], self._gaps[rows], stiffness[rows], self._active[rows]])
+        values = np.column_stack([fixed[rows], self._gaps[rows], stiffness[rows], self._active[rows], forward[rows]])
         parts = self._comm.allgather((own, self._columns[rows], values))
 
         def solution() -> np.ndarray | None:
             places, columns, known = (np.concatenate(part) for part in zip(*parts, strict=True))
             order = np.argsort(places)
-            compliance, (gaps, present, d, active) = columns[order], known[order].T
-            S = 0.5 * (compliance + compliance.T)
-            return _forces(S, gaps, present, d, active > 0.0, self._options.iterations)
+            compliance, (gaps, present, d, active, rates) = columns[order], known[order].T
+            S, iterations = 0.5 * (compliance + compliance.T), self._options.iterations
+            return _Equation(S, gaps, present, d, active > 0.0, rates, self._along, ahead, iterations).solution()
 
         # of one process: which points touch is a decision that depends on rounding
         return from_one(self._comm, solution)
@@ -209,46 +224,84 @@ def _missing(gaps: np.ndarray, present: np.ndarray, d: np.ndarray, active: np.nd
     return d * (np.maximum(-gaps, 0.0) - np.maximum(-present, 0.0) + active * (gaps - present))
 
 
-def _forces(
-    S: np.ndarray, fixed: np.ndarray, present: np.ndarray, d: np.ndarray, active: np.ndarray, iterations: int
-) -> np.ndarray | None:
-    """a with γ = γ₀ + S a, γ₀ the ``fixed`` gaps; None if it is not found."""
-    try:
-        found = _by_newton(S, fixed, present, d, active, np.zeros(len(d)), iterations)
-        if found is None:
-            start = _by_least_squares(S, fixed, present, d, active)
-            found = _by_newton(S, fixed, present, d, active, start, iterations)
-    except (np.linalg.LinAlgError, RuntimeError):  # not convex; too many iterations of nnls
-        return None
-    return found
+@dataclass(frozen=True, eq=False)
+class _Equation:
+    """a = f(γ) − f(g) + [A] d (γ − g) of n points, with γ = γ₀ + S a + h γ′ and h = h₀ + t · a.
 
-
-def _by_newton(S, fixed, present, d, active, a, iterations):
-    """From the points that touch with ``a``.
-
-    With σ = 1 in A, −1 elsewhere, a = d (⟨σ γ⟩ − ⟨σ g⟩), linear where σ γ > 0 and constant elsewhere.
+    Attributes:
+        S: compliance, (n, n).
+        fixed: γ₀, (n,).
+        present: g, (n,).
+        d: stiffness, (n,).
+        active: whether a point is in A, (n,).
+        forward: γ′, rate of the gaps along a path, (n,); zero under other controls.
+        along: t, (n,); zero under other controls.
+        ahead: h₀.
+        iterations: after which an iteration is taken for one that does not settle.
     """
-    sign = np.where(active, 1.0, -1.0)
-    before = np.maximum(sign * present, 0.0)
-    on = sign * (fixed + S @ a) > 0.0
-    for _ in range(iterations):
-        a = -d * before
-        right = fixed[on] - sign[on] * before[on] + S[np.ix_(on, ~on)] @ a[~on]
-        a[on] = np.linalg.solve(np.diag(sign[on] / d[on]) - S[np.ix_(on, on)], right)
-        last, on = on, sign * (fixed + S @ a) > 0.0
-        if np.array_equal(last, on):
-            return a
-    return None
 
+    S: np.ndarray
+    fixed: np.ndarray
+    present: np.ndarray
+    d: np.ndarray
+    active: np.ndarray
+    forward: np.ndarray
+    along: np.ndarray
+    ahead: float
+    iterations: int
 
-def _by_least_squares(S, fixed, present, d, active):
-    """From the forces p, with the springs of A among these points removed."""
-    force, springs = d * np.maximum(-present, 0.0), d * active
-    known = np.column_stack([S, fixed - S @ (force + springs * present)])
-    known = np.linalg.solve(np.eye(len(d)) - S * springs, known)
-    M, free = known[:, :-1] + np.diag(1.0 / d), known[:, -1]
-    unit = 1.0 / np.sqrt(np.abs(np.diag(M)))
-    L = np.linalg.cholesky(0.5 * (M + M.T) * unit[:, None] * unit)
-    p = unit * nnls(L.T, np.linalg.solve(L, -unit * free), maxiter=10 * len(d))[0]
-    gaps = free + M @ p - p / d
-    return p - force + springs * (gaps - present)
+    def solution(self) -> np.ndarray | None:
+        """a; None if it is not found."""
+        try:
+            found = self._by_newton(np.zeros(len(self.d)))
+            return self._by_newton(self._start()) if found is None else found
+        except (np.linalg.LinAlgError, RuntimeError):  # not convex; too many iterations of nnls; no plane reached
+            return None
+
+    def _by_newton(self, a: np.ndarray) -> np.ndarray | None:
+        """From the points that touch with ``a``.
+
+        With σ = 1 in A, −1 elsewhere, a = d (⟨σ γ⟩ − ⟨σ g⟩), linear where σ γ > 0 and constant elsewhere.
+        """
+        sign, d = np.where(self.active, 1.0, -1.0), self.d
+        S, fixed = self.S + np.outer(self.forward, self.along), self.fixed + self.ahead * self.forward
+        before = np.maximum(sign * self.present, 0.0)
+        on = sign * (fixed + S @ a) > 0.0
+        for _ in range(self.iterations):
+            a = -d * before
+            right = fixed[on] - sign[on] * before[on] + S[np.ix_(on, ~on)] @ a[~on]
+            a[on] = np.linalg.solve(np.diag(sign[on] / d[on]) - S[np.ix_(on, on)], right)
+            last, on = on, sign * (fixed + S @ a) > 0.0
+            if np.array_equal(last, on):
+                return a
+        return None
+
+    def _start(self) -> np.ndarray:
+        """a by least squares; in a plane across a path at the h that leads there."""
+
+        def missed(h: float) -> float:
+            return h - self.ahead - float(self.along @ self._by_least_squares(h))
+
+        far = near = self.ahead
+        if (first := missed(near)) != 0.0:
+            for doubling in range(self.iterations):
+                far = near - 2.0**doubling * first
+                if missed(far) * first <= 0.0:
+                    break
+            else:
+                raise RuntimeError("contact keeps the path from reaching the plane")
+            far = brentq(missed, near, far, rtol=1e-6)
+        return self._by_least_squares(far)
+
+    def _by_least_squares(self, h: float) -> np.ndarray:
+        """a at a given h from the forces p, with the springs of A among these points removed."""
+        S, d, fixed = self.S, self.d, self.fixed + h * self.forward
+        force, springs = d * np.maximum(-self.present, 0.0), d * self.active
+        known = np.column_stack([S, fixed - S @ (force + springs * self.present)])
+        known = np.linalg.solve(np.eye(len(d)) - S * springs, known)
+        M, free = known[:, :-1] + np.diag(1.0 / d), known[:, -1]
+        unit = 1.0 / np.sqrt(np.abs(np.diag(M)))
+        L = np.linalg.cholesky(0.5 * (M + M.T) * unit[:, None] * unit)
+        p = unit * nnls(L.T, np.linalg.solve(L, -unit * free), maxiter=10 * len(d))[0]
+        gaps = free + M @ p - p / d
+        return p - force + springs * (gaps - self.present)

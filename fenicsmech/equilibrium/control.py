@@ -20,7 +20,7 @@ in place of the equation that prescribes v. It needs no row of the matrix: solve
 (Rheinboldt & Burkardt, doi:10.1145/357456.357460), which leaves K regular at limit points of the other, and the Newton
 step is moved into the plane by bordering, with r the right-hand side of the control that is held,
 
-    K x₀ = −R,    K x₁ = r,    x = x₀ + τ x₁,    τ such that y + x lies in the plane.
+    K x₀ = −R,    K x₁ = r,    x = x₀ + τ x₁,    τ such that y + x lies in the plane (``Plane``).
 
 Sources: Riks (doi:10.1016/0020-7683(79)90081-7), Crisfield (doi:10.1016/0045-7949(81)90108-5).
 """
@@ -324,10 +324,34 @@ class ArcLengthControl(Control):
         held_rate = tangent.force * conjugate_rate  # of the same sign
         return self.held.stability(excess, tangent, held_rate)
 
-    def into_plane(self, system, state: State, correction: Step, x: PETSc.Vec) -> Step:
-        """``correction`` + τ x₁, which leads from ``state`` into the plane; ``x`` solves K x = r."""
-        rate = self.held.tangent(system.unknowns.step(x))
-        # the value that the correction itself changes is left to the next iteration
-        off = system.difference(state, self.origin) + replace(correction, force=0.0)
-        gap = self.metric.dot(self.normal, off) - self.prescribed
-        return correction + rate.scaled(-gap / self.metric.dot(self.normal, rate))
+
+class Plane:
+    """The plane of an ``ArcLengthControl``, into which steps from one state are moved along x₁.
+
+    Args:
+        control: of the plane.
+        system: of the state.
+        state: from which steps lead.
+        x: x₁, which solves K x = r.
+    """
+
+    def __init__(self, control: ArcLengthControl, system, state: State, x: PETSc.Vec) -> None:
+        self._control, self._system, self.x = control, system, x
+        self._rate = control.held.tangent(system.unknowns.step(x))
+        self._slope = control.metric.dot(control.normal, self._rate)
+        self._gap = control.value(system, state) - control.prescribed
+
+    @property
+    def missing(self) -> float:
+        """τ of no step: the state itself need not lie in the plane."""
+        return -self._gap / self._slope
+
+    def along(self, x: PETSc.Vec) -> float:
+        """τ that keeps a change of state by ``x`` parallel to the plane."""
+        # the value that it changes itself is left to the next iteration
+        step = replace(self._system.unknowns.step(x), force=0.0)
+        return -self._control.metric.dot(self._control.normal, step) / self._slope
+
+    def reached(self, x: PETSc.Vec) -> Step:
+        """The step by ``x`` + τ x₁ into the plane."""
+        return self._system.unknowns.step(x) + self._rate.scaled(self.missing + self.along(x))

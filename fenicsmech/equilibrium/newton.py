@@ -30,7 +30,6 @@ Where links may touch obstacles a step linearises the gaps and finds the points 
 
 Across a path (see ``control``) equilibria of any stability are wanted and a good guess is near: steps are taken in
 full, moved into the plane by bordering; where they diverge, a shorter step along the path is tried instead of descent.
-There the points that touch are those of the state, and paths go in short steps where points come and go.
 
 Sources: Nocedal & Wright, Numerical Optimization (doi:10.1007/978-0-387-40065-5), chapters 17–19; Chamberlain et al. on
 the watchdog (Mathematical Programming Studies 16, 1982); Deuflhard on the simplified Newton method
@@ -45,13 +44,14 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
+from fenicsmech.collective import agreed
 from fenicsmech.equilibrium.active_set import ActiveSet
-from fenicsmech.equilibrium.control import Control
+from fenicsmech.equilibrium.control import Control, Plane
 from fenicsmech.equilibrium.linearisation import EquilibriumPoint, NotConverged
 from fenicsmech.equilibrium.solver import EquilibriumMethod, EquilibriumSolver
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
-from fenicsmech.errors import not_negative, set_options
+from fenicsmech.errors import not_negative
 from fenicsmech.log import logger
 
 _log = logger(__name__)
@@ -66,6 +66,10 @@ class PrimalDualNewton(EquilibriumMethod):
         near: residual over the forces below which any equilibrium, unstable ones too, is converged to; farther
             off, steps descend.
         iterations: maximum number of iterations.
+        factorisations: after as many no iteration begins: thirty times those of an ordinary solve, which has five.
+        shifts: δ of one iteration that may be tried.
+        halvings: of a step along which the line search looks for descent.
+        halvings_inverted: of a whole step that inverts elements.
         watchdog: iterations in a row that may fail to improve on the best residual.
         predicted_stress: whether K_uu, as long as the residual is large, holds the stress that the last step solved
             for instead of the one it led to.
@@ -82,6 +86,10 @@ class PrimalDualNewton(EquilibriumMethod):
 
     near: float = 1e-2
     iterations: int = 25
+    factorisations: int = 150
+    shifts: int = 20
+    halvings: int = 20
+    halvings_inverted: int = 12
     watchdog: int = 12
     predicted_stress: bool = True
     largest_turn: float = 0.5
@@ -90,8 +98,16 @@ class PrimalDualNewton(EquilibriumMethod):
     divergence: float = 1e3
 
     def __post_init__(self) -> None:
-        super().__post_init__()
-        set_options(self, "Newton's method", free=("reuse_factor",), iterations=1, watchdog=0, path_iterations=1)
+        super().__post_init__(
+            free=("reuse_factor",),
+            iterations=1,
+            factorisations=1,
+            shifts=1,
+            halvings=1,
+            halvings_inverted=1,
+            watchdog=0,
+            path_iterations=1,
+        )
         not_negative("reuse_factor of Newton's method", self.reuse_factor)
 
     def solver(self, system: EquilibriumSystem) -> NewtonSolver:
@@ -110,7 +126,8 @@ class NewtonSolver(EquilibriumSolver):
         best, not_better, line_search, diverged = (state, residual), 0, False, None
         last: tuple[State, np.ndarray] | None = None  # where the last step began, and its motion of the nodes
         residuals, shift, any_stability, predicted, norm = [], least, True, False, math.inf
-        contact = None if path else system.contact
+        most = self.factorisations + options.factorisations
+        contact = system.contact
         if contact is not None:
             contact.start(start.load_factor)
         for iteration in range(limit + 1):
@@ -123,17 +140,18 @@ class NewtonSolver(EquilibriumSolver):
                 if not current or options.reuse_factor == 0.0:  # stability is of the true matrix
                     self.linearise(state, control, residual, iterations=iteration)
                 return self.accept(state, control, residual, residuals, iteration)
-            if iteration == limit:
+            if iteration == limit or self.factorisations >= most:
                 break
             near = path or (any_stability and residuals[-1] < options.near)
             predicted = last is not None and not near
             system.linearise(state, control, residual, last if predicted else None, contact)
             x, shift = self._direction(residual, least, last=shift, any_stability=near)
+            plane = self.plane(state, control, residual)
             if contact is not None:
-                x = self._with_contact(contact, x, residual)
+                x = self._with_contact(contact, x, residual, plane)
             if x is None:
                 raise NotConverged("the linear solver stalled", iteration + 1)
-            step = self.newton_step(x, state, control, residual)
+            step = self.newton_step(x, plane)
             _log.debug("iteration %d: residual %.2e, shift %.1e", iteration, residuals[-1], shift)
             if path:
                 norm = residual.norm
@@ -163,12 +181,14 @@ class NewtonSolver(EquilibriumSolver):
             if not_better > options.watchdog and not line_search:
                 state, line_search, last = best[0], True, None
                 residual = self._again(state, control)
-        return self.accept_best(*best, control, residuals, self.exhausted(residuals, limit))
+        return self.accept_best(*best, control, residuals, self.exhausted(residuals, iteration))
 
-    def _with_contact(self, contact: ActiveSet, x: PETSc.Vec, residual: Residual) -> PETSc.Vec | None:
+    def _with_contact(
+        self, contact: ActiveSet, x: PETSc.Vec, residual: Residual, plane: Plane | None = None
+    ) -> PETSc.Vec | None:
         """The solution ``x`` with gaps linearised in place of the points that touch; None if a solve fails."""
         accuracy = self.step_accuracy(residual)
-        return contact.corrected(x, residual.vector, lambda right: self.try_solve(right, accuracy))
+        return contact.corrected(x, residual.vector, lambda right: self.try_solve(right, accuracy), plane)
 
     def _again(self, state: State, control: Control) -> Residual:
         """The residual at an earlier ``state``, from which iterations go on."""
@@ -186,7 +206,7 @@ class NewtonSolver(EquilibriumSolver):
         δ = ``least`` is tried first; then a third of the ``last`` successful one, and eight times that, …
         """
         shift, following = least, max(_LEAST_SHIFT, last / 3.0)
-        for _ in range(20):
+        for _ in range(self.options.shifts):
             x = self.try_solve(residual.vector, self.step_accuracy(residual)) if self.factor(shift) else None
             if x is not None and (any_stability or self.descends()):
                 break
@@ -225,7 +245,7 @@ class NewtonSolver(EquilibriumSolver):
                 x = self._with_contact(system.contact, x, residual)
             if x is None:
                 break
-            correction = self.newton_step(x, state, control, residual)
+            correction = self.newton_step(x, None)
             length = system.size(correction)
             if not length <= self.options.reuse_factor * size:
                 break
@@ -243,7 +263,7 @@ class NewtonSolver(EquilibriumSolver):
         """The whole step, shortened only where it turns too far or inverts elements."""
         system = self.system
         length = min(1.0, self.options.largest_turn / max(system.size(step), 1e-300))
-        for _ in range(12):
+        for _ in range(self.options.halvings_inverted):
             trial = system.moved(state, step.scaled(length))
             if math.isfinite(system.elastic_energy()):
                 return trial, system.residual(trial, control), length
@@ -260,7 +280,7 @@ class NewtonSolver(EquilibriumSolver):
         towards = (state.multipliers + step.multipliers, state.force + step.force)
         before = self._merit(state, control, *towards)
         length = min(1.0, self.options.largest_turn / max(system.size(step), 1e-300))
-        for _ in range(20):
+        for _ in range(self.options.halvings):
             trial = system.moved(state, step.scaled(length))
             after = self._merit(trial, control, *towards)
             if math.isfinite(after):
@@ -279,4 +299,4 @@ class NewtonSolver(EquilibriumSolver):
         if control.constrained:
             gap = control.gap(system, state) / system.joints.length
             value += force * control.prescribed + 0.5 * stiffness * gap**2
-        return value
+        return agreed(system.comm, value)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 from petsc4py import PETSc
 
-from fenicsmech.equilibrium.control import ArcLengthControl, Control
+from fenicsmech.equilibrium.control import ArcLengthControl, Control, Plane
 from fenicsmech.equilibrium.linearisation import (
     EquilibriumPoint,
     Linearisation,
@@ -21,7 +21,7 @@ from fenicsmech.equilibrium.linearisation import (
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 from fenicsmech.equilibrium.two_level import BySize
-from fenicsmech.errors import counted, expect, positive, set_fields
+from fenicsmech.errors import counted, expect, set_options
 
 _STEP = 1e-6  # relative error that iterative solvers may leave in steps and tangents: the next iteration corrects it
 
@@ -44,9 +44,9 @@ class EquilibriumMethod(ABC):
     roundoff: float = 1e-14
     linear: LinearMethod = field(default_factory=BySize)
 
-    def __post_init__(self) -> None:
-        for name in ("tolerance", "roundoff"):
-            set_fields(self, **{name: positive(f"{name} of Newton's method", getattr(self, name))})
+    def __post_init__(self, *, free: Collection[str] = (), **least: int) -> None:
+        """Checks all numbers; subclasses give those that may be any, and the least of whole ones (``set_options``)."""
+        set_options(self, "Newton's method", free=free, below_one=(), **least)
         expect("linear systems", self.linear, LinearMethod, "a method", "Give BySize(…), Direct() or TwoLevel(…)")
 
     @abstractmethod
@@ -62,10 +62,11 @@ class EquilibriumSolver(ABC):
     Attributes:
         system: the equations.
         options: of the method.
+        factorisations: of KKT matrices so far.
     """
 
     def __init__(self, system: EquilibriumSystem, options: EquilibriumMethod) -> None:
-        self.system, self.options = system, options
+        self.system, self.options, self.factorisations = system, options, 0
 
     @cached_property
     def linear(self) -> LinearSolver:
@@ -118,6 +119,7 @@ class EquilibriumSolver(ABC):
 
     def factor(self, shift: float) -> bool:
         """Factors the KKT matrix last linearised with a ``shift``; whether that could be done."""
+        self.factorisations += 1
         with self.system.clock.phase("factor"):
             self.system.kkt.shift(shift)
             return self.linear.refactor()
@@ -128,15 +130,18 @@ class EquilibriumSolver(ABC):
             x = right.duplicate()
             return x if self.linear.solve(right, x, tolerance) else None
 
-    def newton_step(self, x: PETSc.Vec, state: State, control: Control, residual: Residual) -> Step:
-        """The step −``x`` with K x the residual; across a path it is moved into the plane."""
-        step = self.system.unknowns.step(x).scaled(-1.0)
+    def plane(self, state: State, control: Control, residual: Residual) -> Plane | None:
+        """The plane across a path, for steps with the matrix last factored; None for other controls."""
         if not isinstance(control, ArcLengthControl):
-            return step
+            return None
         rate = self.try_solve(control.rate(self.system, state), self.step_accuracy(residual))
         if rate is None:
             raise NotConverged("the linear solver stalled")
-        return control.into_plane(self.system, state, step, rate)
+        return Plane(control, self.system, state, rate)
+
+    def newton_step(self, x: PETSc.Vec, plane: Plane | None) -> Step:
+        """The step −``x`` with K x the residual, moved into the ``plane`` across a path."""
+        return self.system.unknowns.step(x).scaled(-1.0) if plane is None else plane.reached(-x)
 
     def descends(self) -> bool:
         """Whether the inertia known from the last solve guarantees that its solution is a descent direction."""

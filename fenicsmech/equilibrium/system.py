@@ -10,6 +10,7 @@ terms of L are those of ``border``, the blocks of the equations those of ``unkno
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -176,17 +177,22 @@ class EquilibriumSystem:
 
     def size(self, step: Step) -> float:
         """Largest displacement over the mechanism's length, or rotation, in ``step``."""
+        return max(self.comm.allgather(self._size(step)))
+
+    def _size(self, step: Step) -> float:
+        """``size`` of the bodies and this rank's nodes. Local."""
         displacements = step.u[self.numbering.rows.nodes.local]
         nodes = float(np.max(np.abs(displacements), initial=0.0)) / self.joints.length
         bodies = float(np.max(np.abs(step.z / self.joints.pose_scale), initial=0.0))
-        return max(self.comm.allgather(max(nodes, bodies)))
+        return max(nodes, bodies)
 
     def mean_product(self, a: Step, b: Step) -> float:
         """Mean product of two motions of free nodes and bodies, displacements over the mechanism's length."""
         free, joints = self.numbering.free[self.blocks.nodes.local], self.joints
-        own = np.array([float(a.u[free] @ b.u[free]) / joints.length**2, float(len(free))])
-        nodes, count = self.comm.allreduce(own)
-        bodies = float(np.sum(a.z * b.z / joints.pose_scale**2))
+        # of bodies, whose motions all know, the product of one process: decisions depend on it
+        bodies = float(np.sum(a.z * b.z / joints.pose_scale**2)) if self.comm.rank == 0 else 0.0
+        own = np.array([float(a.u[free] @ b.u[free]) / joints.length**2, float(len(free)), bodies])
+        nodes, count, bodies = self.comm.allreduce(own)
         return nodes / max(count, 1.0) + bodies / max(len(a.z), 1)
 
     # -- values at the loaded state ------------------------------------------------------------------------
@@ -247,15 +253,21 @@ class EquilibriumSystem:
                 load[:] = -control.gap(self, state)
             vector = self.unknowns.apply_transpose(r, border)
 
-            forces = np.linalg.norm(rigid_loads * scale) ** 2
-            forces += np.linalg.norm(reactions * self.blocks.restrict_border(scale).poses) ** 2
-            forces += self.comm.allreduce(float(np.linalg.norm(loads * self.unknowns.unit_u) ** 2))
+            border_forces = np.linalg.norm(rigid_loads * scale) ** 2
+            border_forces += np.linalg.norm(reactions * self.blocks.restrict_border(scale).poses) ** 2
+            link_forces = float(np.linalg.norm(loads * self.unknowns.unit_u) ** 2)
             gap = float(np.max(np.abs(joints.row_scale * violation), initial=0.0))
             z = joints.unknowns(state.poses) - joints.unknowns(joints.drawn)
-            motion = self.size(Step(state.u, z, state.multipliers, state.force))
+            motion = self._size(Step(state.u, z, state.multipliers, state.force))
+            # of the border, which all know, those of one process: decisions depend on them
+            links, motions, borders = zip(
+                *self.comm.allgather((link_forces, motion, (float(border_forces), gap))), strict=True
+            )
+            border_forces, gap = borders[0]
+            forces = math.sqrt(border_forces + sum(links))
             nodal = r[self.numbering.rows.nodes.local]
             moments = self._moments(nodal)
-            return Residual(vector, vector.norm(), float(np.sqrt(forces)), gap, motion, moments, nodal, poses.copy())
+            return Residual(vector, vector.norm(), forces, gap, max(motions), moments, nodal, poses.copy())
 
     # -- derivatives at the loaded state -------------------------------------------------------------------
 

@@ -2,6 +2,7 @@
 
 - ``estimates``: goal-oriented error estimates at equilibria, of elements and of plane stress
 - ``accuracy_control``: the cheapest fidelity whose estimated error is small enough
+- ``doubts``: reasons why an estimate may be off by more than a factor of two
 - ``point_forces``: forces at points, whose displacement has no limit as elements shrink
 """
 
@@ -14,6 +15,7 @@ from fenicsmech.estimates.accuracy_control import (
     Trial,
     fidelity_levels,
 )
+from fenicsmech.estimates.doubts import DoubtOptions, near_limit_point
 from fenicsmech.estimates.estimates import (
     Calibration,
     Equilibrium,

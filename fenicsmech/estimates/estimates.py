@@ -40,6 +40,8 @@ the energy that 3D adds. It changes a quantity, to first order with its adjoint 
     Q(space) − Q(plane stress) ≈ −∂V/∂u · z     at these a and v.
 
 Where all contraction is blocked V = ½ ∫ E h² dV, to first order the difference between plane strain and plane stress.
+h includes what prestrain in all directions adds to the depth; pressure P on the whole boundary of a link also acts on
+the faces across its depth, and adds ∫ P a det F dV to V.
 A strip of thickness t bent from curvature κ₀ to κ stores, far from its ends and per length,
 
     V = ½ ν² E I (κ − κ₀)² β² / (60 + β²),     β = b² κ / t,
@@ -84,6 +86,7 @@ from fenicsmech.compat import (
     assemble_matrix,
     assemble_vector,
     cell_dofs,
+    cellwise_space,
     compile_expression,
     compile_form,
     create_block_matrix,
@@ -185,6 +188,11 @@ class Estimates:
         errors = [self._element_error if kind is ErrorKind.ELEMENTS else self._plane_stress_error for kind in kinds]
         return [error.of(adjoint) for error in errors]
 
+    def spread(self, solver: EquilibriumSolver, equilibrium: Equilibrium) -> float:
+        """Sum of the absolute contributions of all cells to the estimated error of elements; raises as ``at``."""
+        with self._model.shaped(equilibrium.design):
+            return self._element_error.spread(adjoint_at(solver, equilibrium))
+
     @cached_property
     def _element_error(self) -> ElementError:
         return ElementError(self._model, self._calibration)
@@ -242,10 +250,20 @@ class ElementError:
         test = ufl.TestFunction(tensors)
         volume, measure = self._recovery.volume, elastic.free(2 * degree)
         self._right_hand_sides = [compile_form(ufl.inner(H, test) * volume * measure) for H in gradients]
-        self._error = compile_form(self._second_derivatives(gradients, 2 * degree))
+        self._contributions = fem.Function(cellwise_space(elastic.mesh))
+        cell = ufl.TestFunction(self._contributions.function_space)
+        self._error = compile_form(self._second_derivatives(gradients, 2 * degree, cell))
 
     def of(self, adjoint: Adjoint) -> float:
         """Q(u) − Q(u_h), from the adjoint of Q."""
+        return float(self._comm.allreduce(self._cellwise(adjoint).sum()))
+
+    def spread(self, adjoint: Adjoint) -> float:
+        """Σ |η| of the contributions η of all cells to Q(u) − Q(u_h), from the adjoint of Q."""
+        return float(self._comm.allreduce(np.abs(self._cellwise(adjoint)).sum()))
+
+    def _cellwise(self, adjoint: Adjoint) -> np.ndarray:
+        """The contributions of this rank's cells; a view."""
         elastic, dim = self._elastic, self._elastic.model.dim
         for part, values in zip(self._adjoint, elastic.split(adjoint.nodal), strict=True):
             owned_values(part)[:] = values
@@ -256,18 +274,19 @@ class ElementError:
             self._recovery.project(form, recovered, self._sums, odd)
         for pressure in self._pressures:
             pressure.update()
-        error = float(elastic.mesh.comm.allreduce(fem.assemble_scalar(self._error)))
         destroy_garbage(self._comm)
-        return error
+        return assemble_vector(self._error, self._contributions)
 
-    def _second_derivatives(self, gradients: Sequence, degree: int) -> ufl.Form:
-        """The sum of all second derivatives of the energy, in the directions of the errors."""
+    def _second_derivatives(self, gradients: Sequence, degree: int, cell) -> ufl.Form:
+        """The sum of all second derivatives of the energy, in the directions of the errors times ``cell``."""
         elastic = self._elastic
         A, B = (self._scale * (field - H) for field, H in zip(self._recovered, gradients, strict=True))
+        A = cell * A
         form = elastic.curvature(A, B, degree=degree)
         if elastic.pressure is None:
             return form
         p, (e_p, e_q) = elastic.pressure.p, (self._scale * pressure.error for pressure in self._pressures)
+        e_p = cell * e_p
         H = ufl.variable(elastic.gradient(elastic.u))
         for work, measure in elastic.densities(H):
             dx, stress = measure(metadata={"quadrature_degree": degree}), ufl.diff(work, H)
@@ -391,7 +410,11 @@ class PlaneStressError:
         a, v = fem.Function(V, name="contraction"), fem.Function(elastic.u.function_space, name="curling")
         p, q = (fem.Function(smooth, name=name) for name in ("free_contraction", "blocked_contraction"))
         self._fields, self._projected = (a, v), (p, q)
-        energy = elastic.contraction_energy(a, v, p, q, degree=2 * elastic.order)
+        pressures = [
+            sum(effect.across_depth.get(link, 0.0) for effect in model.effects)
+            for link in model.mechanism.flexible_links
+        ]
+        energy = elastic.contraction_energy(a, v, p, q, pressures, degree=2 * elastic.order)
         by_a, by_v, by_p, by_q, by_u = (ufl.derivative(energy, part) for part in (a, v, p, q, elastic.u))
         self._by_a, self._by_p, self._by_q, self._force = (compile_form(row) for row in (by_a, by_p, by_q, by_u))
         self._mass = compile_form(ufl.derivative(by_p, p))

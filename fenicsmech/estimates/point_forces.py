@@ -10,8 +10,8 @@ halving of h adds
 
     2 ln 2 F / (π E′ b)  in the plane,     about F / (E h)  in space.
 
-At points inside a link it is less than half of this in the plane. Source: Johnson, Contact Mechanics (1985), sections
-2.2 and 3.2.
+At points inside a link it is less than half of this in the plane, and nothing in interfaces, which are rigid. Source:
+Johnson, Contact Mechanics (1985), sections 2.2 and 3.2.
 """
 
 from __future__ import annotations
@@ -19,18 +19,25 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
-from fenicsmech.elasticity import PLANE_STRAIN
+import numpy as np
+
+from fenicsmech.elasticity import PLANE_STRAIN, ElasticModel
 from fenicsmech.mechanism import FlexibleLink, Force, ForceGroup, PrescribedPart
-from fenicsmech.model import MechanismModel
+from fenicsmech.model import MechanismModel, plan_sites
 
 
-def growth_by_halving(part: PrescribedPart, model: MechanismModel, sizes: Mapping[FlexibleLink, float]) -> float:
+def growth_by_halving(
+    part: PrescribedPart, model: MechanismModel, sizes: Mapping[FlexibleLink, float], kind: ElasticModel | None = None
+) -> float:
     """Largest growth of the displacement of ``part`` per force when all elements of some ``sizes`` are halved.
 
-    0 if no force acts at a point of a flexible link.
+    0 if no force acts at a point of a flexible link outside its interfaces. ``kind`` is that of the model by default.
     """
-    kind, total = model.elastic.model, 0.0
-    for _, link, ratio in _at_points(part):
+    kind, total = kind or model.elastic.model, 0.0
+    for force, link, ratio in _at_points(part):
+        at = np.array([force.at[:2]])
+        if any(site.contains(at, 0.0)[0] for site in plan_sites(model.linkage, link)):
+            continue
         index = model.mechanism.flexible_links.index(link)
         law = model.materials[index].law
         if kind.dim == 3:

@@ -72,6 +72,11 @@ class Effect(ABC):
         """Compliances c ≥ 0 by row of ``linkage.joints``, whose equation becomes C + c λ = 0; those of effects add."""
         return {}
 
+    @property
+    def across_depth(self):
+        """The pressure on the faces of each link at the ends of its depth, which only space has."""
+        return {}
+
     def growth(self, model):
         """The ``Stretch`` of each flexible link whose strain-free length differs from the drawn one.
 

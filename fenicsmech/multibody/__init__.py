@@ -3,9 +3,10 @@
 - ``points``: interface nodes of the mesh as functions of body poses, the design field at nodes, material points
 - ``places``: the places of joints in the drawn configuration, which designs change
 - ``linkage``: bodies and the constraints between them
-- ``potentials``: potentials of poses, and the free coordinate of a joint
+- ``potentials``: potentials of poses, those of dead forces too, and the free coordinate of a joint
 - ``spins``: idle spins, turns of bodies about the line through two ball joints, which nothing resists
 - ``assembly``: the rigid assembly of a configuration, and the motions that joints, motors and springs leave
+- ``rest_pose``: the pose that loads prefer where nothing else holds the mechanism
 """
 
 from fenicsmech.multibody.assembly import (
@@ -30,5 +31,6 @@ from fenicsmech.multibody.points import (
     link_point,
     shape_functions,
 )
-from fenicsmech.multibody.potentials import JointCoordinate, PosePotential, spring_potentials
+from fenicsmech.multibody.potentials import DeadForce, JointCoordinate, PosePotential, TravelSpring, spring_potentials
+from fenicsmech.multibody.rest_pose import RestSearch
 from fenicsmech.multibody.spins import IdleSpin, idle_spins

@@ -81,9 +81,9 @@ def assemble(linkage: Linkage, configuration: Configuration, springs: Sequence[P
 
 
 def _assembled(linkage: Linkage, configuration: Configuration, springs: Sequence[PosePotential]) -> Assembly:
-    poses, fraction, _ = _Assembler(linkage.rigid, springs).move(configuration)
+    poses, fraction, _ = Assembler(linkage.rigid, springs).move(configuration)
     if fraction < 1.0:
-        _, closing, worst = _Assembler(linkage.joints).move(configuration)
+        _, closing, worst = Assembler(linkage.joints).move(configuration)
         if closing < 1.0:
             raise AssemblyError(
                 f"configuration {configuration.name!r}",
@@ -106,12 +106,12 @@ def assemble_before_strain(
     if assembly.fraction == 1.0:
         return assembly
     fraction = 0.98 * assembly.fraction
-    poses, _, _ = _Assembler(linkage.rigid, springs).move(configuration, fraction)
+    poses, _, _ = Assembler(linkage.rigid, springs).move(configuration, fraction)
     return Assembly(poses, fraction)
 
 
 @dataclass(frozen=True)
-class _Assembler:
+class Assembler:
     """Motion of the motors of one set of constraints; lengths are in that of the mechanism, angles in rad.
 
     Attributes:
@@ -141,8 +141,8 @@ class _Assembler:
         start, target = (system.on_the_way(configuration.position, part) for part in (0.0, limit))
         travel = system.travel(target - start)
         largest = 1.0 if travel <= self.largest_step else self.largest_step / travel
-        poses, residual = self._close(system.drawn, start)
-        if not self._is_closed(residual):
+        poses, residual = self.close(system.drawn, start)
+        if not self.is_closed(residual):
             return poses, 0.0, int(np.argmax(np.abs(residual)))
         before, fraction, step, last_step, worst = system.drawn, 0.0, largest, 0.0, 0
         while travel > 0.0 and fraction < 1.0:
@@ -150,12 +150,12 @@ class _Assembler:
             here = system.unknowns(poses)
             guess = here + (here - system.unknowns(before)) * (step / last_step if last_step > 0.0 else 0.0)
             motors = start + (fraction + step) * (target - start)
-            trial, residual = self._relax(*self._close(system.with_unknowns(poses, guess), motors), motors)
+            trial, residual = self.relax(*self.close(system.with_unknowns(poses, guess), motors), motors)
             there = system.unknowns(trial)
             missed = np.linalg.norm((there - guess) / system.pose_scale)
             moved = np.linalg.norm((there - here) / system.pose_scale)
             shortest = step < self.smallest_step * largest
-            if not self._is_closed(residual):
+            if not self.is_closed(residual):
                 worst = int(np.argmax(np.abs(residual)))
                 if shortest:
                     return poses, fraction, worst
@@ -170,10 +170,11 @@ class _Assembler:
                 step = min(largest, 2.0 * step)
         return poses, 1.0, worst
 
-    def _is_closed(self, residual: np.ndarray) -> bool:
+    def is_closed(self, residual: np.ndarray) -> bool:
+        """Whether joints are closed, from their scaled residual."""
         return np.max(np.abs(residual), initial=0.0) <= self.closed
 
-    def _close(self, poses: np.ndarray, motors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def close(self, poses: np.ndarray, motors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Gauss–Newton from ``poses``; returns the best poses and their scaled residual."""
         system = self.system
         residual = system.row_scale * system.value(poses, motors)
@@ -184,16 +185,16 @@ class _Assembler:
             step = system.pose_scale * np.linalg.lstsq(scaled, -residual, rcond=1e-10)[0]
             trial = system.with_unknowns(poses, system.unknowns(poses) + step)
             new = system.row_scale * system.value(trial, motors)
-            if np.linalg.norm(new) >= np.linalg.norm(residual) and self._is_closed(residual):
+            if np.linalg.norm(new) >= np.linalg.norm(residual) and self.is_closed(residual):
                 break
             poses, residual = trial, new
         return poses, residual
 
-    def _relax(self, poses: np.ndarray, residual: np.ndarray, motors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def relax(self, poses: np.ndarray, residual: np.ndarray, motors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The closed assembly near ``poses`` where the energy of springs is least, and its residual."""
         system = self.system
         for _ in range(30 if self.springs else 0):
-            if not self._is_closed(residual):
+            if not self.is_closed(residual):
                 break
             free = free_motions(system, poses, motors, self.springs)
             stiffness, modes = np.linalg.eigh(free.curvature)
@@ -204,8 +205,8 @@ class _Assembler:
             if size <= self.relaxed:
                 break
             moved = system.unknowns(poses) + system.pose_scale * step * min(1.0, self.largest_turn / size)
-            trial, missed = self._close(system.with_unknowns(poses, moved), motors)
-            if not self._is_closed(missed):
+            trial, missed = self.close(system.with_unknowns(poses, moved), motors)
+            if not self.is_closed(missed):
                 break
             poses, residual = trial, missed
         return poses, residual

@@ -17,6 +17,7 @@ from fenicsmech.joints import coordinate_rate, free_coordinate
 from fenicsmech.mechanism import Effect, Joint
 from fenicsmech.multibody.linkage import Linkage
 from fenicsmech.multibody.places import JointChange
+from fenicsmech.multibody.points import BodyPoint
 
 
 class PosePotential(ABC):
@@ -77,6 +78,58 @@ class PosePotential(ABC):
 def spring_potentials(effects: Sequence[Effect], linkage: Linkage) -> tuple[PosePotential, ...]:
     """The potentials of ``effects`` that act in full from the start."""
     return tuple(found for effect in effects for found in effect.pose_potentials(linkage) if found.holds)
+
+
+class DeadForce(PosePotential):
+    """−F · u of a point that moves with a body."""
+
+    def __init__(self, point: BodyPoint, force: np.ndarray) -> None:
+        self.bodies, self._point, self._force = (point.body,), point, force
+
+    def value(self, poses):
+        return -float(self._force @ self._point.displacement(None, poses))
+
+    def gradient(self, poses):
+        return -self._force @ self._point.gradient(poses)
+
+    def hessian(self, poses):
+        return -self._point.hessian(poses, self._force)
+
+
+class TravelSpring(PosePotential):
+    """½ (w − d)², w = −V the work of dead forces of magnitude one: least where w is nearest to d."""
+
+    def __init__(self, forces: Sequence[DeadForce], travel: float) -> None:
+        self.bodies = tuple(sorted({body for force in forces for body in force.bodies}))
+        self._forces, self._travel = forces, travel
+
+    def value(self, poses):
+        return 0.5 * self._short(poses) ** 2
+
+    def gradient(self, poses):
+        return self._short(poses) * sum(self._spread(force, force.gradient(poses)) for force in self._forces)
+
+    def hessian(self, poses):
+        slope = sum(self._spread(force, force.gradient(poses)) for force in self._forces)
+        curvature = np.zeros((len(slope), len(slope)))
+        for force in self._forces:
+            own = self._own(force, poses)
+            curvature[own, own] += force.hessian(poses)
+        return np.outer(slope, slope) + self._short(poses) * curvature
+
+    def _short(self, poses: np.ndarray) -> float:
+        """d − w."""
+        return self._travel + sum(force.value(poses) for force in self._forces)
+
+    def _spread(self, force: DeadForce, slope: np.ndarray) -> np.ndarray:
+        """A slope by the pose of one force's body, among those of all ``bodies``."""
+        spread = np.zeros((len(self.bodies), len(slope)))
+        spread[self.bodies.index(force.bodies[0])] = slope
+        return spread.ravel()
+
+    def _own(self, force: DeadForce, poses: np.ndarray) -> slice:
+        first = poses.shape[1] * self.bodies.index(force.bodies[0])
+        return slice(first, first + poses.shape[1])
 
 
 class JointCoordinate:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.lines import Line2D
 from mpi4py import MPI
@@ -49,6 +50,7 @@ class CurveSeries:
         colour: a matplotlib colour; None takes the next of the palette.
         faint: draw it thin and light behind the others, for a curve before a change.
         marks: points with a marker.
+        corrected: (n, 2) displacement and force of each point in finer elements, as estimated; empty: not known.
 
     Raises:
         DescriptionError: the arrays differ in length or are not finite.
@@ -63,12 +65,15 @@ class CurveSeries:
     faint: bool = False
     marks: tuple[CurveMark, ...] = ()
     snapped_through: NDArray[np.bool_] = field(default_factory=_no_flags)
+    corrected: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
 
     def __post_init__(self) -> None:
         part = f"curve '{self.label}'"
         displacement = real_array(f"displacements of {part}", self.displacement, None)
         force = real_array(f"forces of {part}", self.force, len(displacement))
-        set_fields(self, displacement=displacement, force=force)
+        count = len(force) if np.size(self.corrected) else 0
+        corrected = real_array(f"corrected values of {part}", self.corrected, count, 2)
+        set_fields(self, displacement=displacement, force=force, corrected=corrected)
         for name, what, absent in (("stable", "stability", True), ("snapped_through", "snaps", False)):
             given = np.array(getattr(self, name), dtype=bool)
             flags = given if given.size else np.full(len(force), absent)
@@ -102,9 +107,10 @@ def plot_curve(
 ) -> None:
     """Draws load–displacement curves, displacement across and force up, as a PNG.
 
-    Stable parts are solid, unstable parts dashed, snap-throughs dotted arrows, points dots, targets open diamonds. For
-    curves before and after a change, give both the same colour and make the first faint; curves with the same label
-    appear once in the legend, in grey if their colours differ.
+    Stable parts are solid, unstable parts dashed, snap-throughs dotted arrows, points dots, targets open diamonds; bars
+    lead from points to where finer elements put them. For curves before and after a change, give
+    both the same colour and make the first faint; curves with the same label appear once in the legend, in grey if
+    their colours differ.
 
     Args:
         path: the PNG file.
@@ -168,6 +174,12 @@ def _draw_series(axes: Axes, curve: CurveSeries, colour: str) -> None:
     size = size if len(points) <= 40 else 0.55 * size
     for part, face in ((stable, colour), (~stable, "white")):
         axes.plot(*points[part].T, "o", ms=size, mfc=face, mec=colour, mew=1.0, zorder=4 - 1.5 * behind)
+    if len(curve.corrected):
+        off = np.any(curve.corrected != points, axis=1)
+        bars, across = np.stack([points, curve.corrected], axis=1)[off], curve.corrected[:, 0] != curve.displacement
+        axes.add_collection(LineCollection(bars, colors=colour, lw=0.7 * width, zorder=4.5 - behind))
+        look = {"ms": 1.6 * size, "mec": colour, "mew": 0.7 * width, "zorder": 4.5 - behind}
+        axes.plot(*bars[:, 1].T, "|" if across.any() else "_", **look)
 
 
 def _draw_targets(axes: Axes, targets: Sequence[CurveTarget]) -> None:
@@ -206,6 +218,10 @@ def _draw_legend(
     if any(curve.joined and curve.snapped_through.any() for curve in series):
         look = {"ls": _DOTS, "lw": 1.4, "marker": ">", "markevery": (1, 1), "ms": 5}
         handles.append(Line2D([], [], color=MUTED, label="snap-through", **look))
+    if any(len(curve.corrected) for curve in series):
+        handles.append(
+            Line2D([], [], color=MUTED, lw=1.4, marker="|", markevery=(1, 1), ms=7, label="in finer elements")
+        )
     for kind, marker in _markers(series).items():
         handles.append(Line2D([], [], lw=0, marker=marker, ms=8, mfc="white", mec=INK, mew=1.5, label=kind))
     if targets:

@@ -11,13 +11,21 @@ import numpy as np
 
 from fenicsmech.collective import on_one
 from fenicsmech.continuation import Mode, critical_changes, softest_modes
-from fenicsmech.elasticity import PLANE_STRESS
+from fenicsmech.elasticity import PLANE_STRESS, SPATIAL, ElasticModel
 from fenicsmech.equilibrium import EquilibriumSolver, LoadControl, MotorControl, NotConverged, PointLoad, State, Unknown
 from fenicsmech.errors import DescriptionError, EquilibriumError, counted
-from fenicsmech.estimates import AccuracyOptions, Equilibrium, ErrorKind, cause_of_growth, growth_by_halving
+from fenicsmech.estimates import (
+    AccuracyOptions,
+    DoubtOptions,
+    Equilibrium,
+    ErrorKind,
+    cause_of_growth,
+    growth_by_halving,
+    near_limit_point,
+)
 from fenicsmech.files import write_csv
 from fenicsmech.log import logger
-from fenicsmech.mechanism import Configuration, Force, ForceGroup, Joint, Output, PrescribedPart, Units
+from fenicsmech.mechanism import DRAWN, Configuration, Force, ForceGroup, Joint, Output, PrescribedPart, Units
 from fenicsmech.multibody import Freedom
 from fenicsmech.plot import Arrow, CurveSeries, Panel, Trace, draw_configurations, plot_curve
 from fenicsmech.simulation.discretisation import Discretisation
@@ -177,6 +185,31 @@ class Curve:
         elements, plane_stress = self._estimated(list(ErrorKind), None)
         return elements.copy(), plane_stress.copy()
 
+    def doubts(self, *, modelling: bool = False) -> tuple[tuple[str, ...], ...]:
+        """Why ``error_estimates``, or ``modelling_errors``, may be off by more than a factor of two, for every frame.
+
+        Raises as ``error_estimates``, or ``modelling_errors``.
+        """
+        errors = self.modelling_errors() if modelling else self.error_estimates()
+        options, left_out = DoubtOptions(), AccuracyOptions().corrections(errors, self.values) != errors
+        growth = np.abs(self._growth(SPATIAL) if modelling else self.growth_by_halving)
+        estimates, model, spread, found = self.discretisation.estimates, self.discretisation.model, 0.0, []
+        if not modelling and self.unloaded.has_reactions:
+            unloaded = Equilibrium(self.unloaded, self.frames[0].design, Unknown.DISPLACEMENT)
+            spread = estimates.spread(self._solver, unloaded)
+        for frame, error, large, grown in zip(self.frames, errors, left_out, growth, strict=True):
+            at = self.equilibrium(frame)
+            reasons = {
+                "estimate above a tenth of the largest value": large,
+                "limit point near": near_limit_point(model, self._solver, at, error, options),
+                "force at a point of a flexible link": grown > options.growth * abs(error),
+            }
+            if not modelling:
+                whole = spread + estimates.spread(self._solver, at)
+                reasons["contributions of elements cancel"] = abs(error) < options.cancelled * whole
+            found.append(tuple(reason for reason, holds in reasons.items() if holds))
+        return tuple(found)
+
     @cached_property
     def corrections(self) -> np.ndarray:
         """Sums of the estimated errors, to be added to ``values``, (frames,); 0 and a warning where they are too large.
@@ -209,12 +242,7 @@ class Curve:
 
         They grow without limit if the force is at a point of a flexible link; 0 if it does not, and where motors move.
         """
-        found = self.discretisation
-        growth = growth_by_halving(self.part, found.model, found.fidelity.sizes) * self.forces
-        if self.unknown is Unknown.DISPLACEMENT:
-            return growth
-        # at a given displacement the force is smaller in proportion as its displacement would be larger
-        return -growth * np.divide(self.forces, self.displacements, out=0.0 * growth, where=self.displacements != 0.0)
+        return self._growth(self.discretisation.fidelity.model)
 
     # -- stability, friction, assumptions ------------------------------------------------------------------------
 
@@ -331,6 +359,8 @@ class Curve:
         first, last = (gather(model, self.frames[k]) for k in (0, -1))
         forces = self.part.ratios if isinstance(self.part, Force | ForceGroup) else ()
         places = [position(model, force, end)[:2] for force, _ in forces]
+        # an optimised design in the drawn configuration is not the drawn design
+        name = "" if self.configuration == DRAWN else f"{self.configuration.name}: "
 
         def draw() -> Panel:
             assert first is not None and last is not None  # on rank 0
@@ -343,7 +373,7 @@ class Curve:
                 (plotter.shape(last, stress=stress),),
                 tuple(arrows),
                 tuple(traces),
-                f"{self.configuration.name}: {up(end.force)}, {across(end.displacement)}",
+                f"{name}{up(end.force)}, {across(end.displacement)}",
             )
 
         return on_one(self.discretisation.comm, draw)
@@ -392,6 +422,15 @@ class Curve:
     @property
     def _solver(self) -> EquilibriumSolver:
         return self.discretisation.solver(self.part, [other for other, _ in self.others])
+
+    def _growth(self, kind: ElasticModel) -> np.ndarray:
+        """``growth_by_halving`` in an elastic model."""
+        found = self.discretisation
+        growth = growth_by_halving(self.part, found.model, found.fidelity.sizes, kind) * self.forces
+        if self.unknown is Unknown.DISPLACEMENT:
+            return growth
+        # at a given displacement the force is smaller in proportion as its displacement would be larger
+        return -growth * np.divide(self.forces, self.displacements, out=0.0 * growth, where=self.displacements != 0.0)
 
     def _need_force(self) -> None:
         if not isinstance(self.part, Force | ForceGroup):

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
 
+from fenicsmech.collective import agreed
 from fenicsmech.continuation import (
     ArcLengthStepper,
     ArcSteps,
@@ -17,7 +19,7 @@ from fenicsmech.continuation import (
     locate,
     null_space,
 )
-from fenicsmech.equilibrium import EquilibriumPoint, LoadControl, NotConverged, State, Unknown
+from fenicsmech.equilibrium import DisplacementControl, EquilibriumPoint, LoadControl, NotConverged, State, Unknown
 from fenicsmech.errors import DescriptionError, EquilibriumError, finite, set_fields, whole
 from fenicsmech.mechanism import Configuration, Drive, Force, ForceGroup, Mechanism, Motor, PrescribedPart
 from fenicsmech.plot import CurveMark, CurveSeries
@@ -202,6 +204,10 @@ def branches(
 class CurveFollower:
     """The path of one request, until an end."""
 
+    _HELD = (
+        1e-3  # force at which a path starts if nothing else holds the mechanism, over that of a linear one at its end
+    )
+
     def __init__(self, discretisation: Discretisation, request: CurveRequest, until: Until, steps: ArcSteps) -> None:
         self._stepper, self._until, self._steps = CurveStepper(discretisation, request), until, steps
         self._followed, self._system = self._stepper.followed, self._stepper.solver.system
@@ -211,7 +217,14 @@ class CurveFollower:
         """The curve from the configuration without the controlled force; ``watch`` gets the number of frames so far."""
         self._frames.append(self._stepper.frame(LoadControl(0.0)))
         try:
-            path = self._path(self._frames[0].state)
+            state = self._frames[0].state
+            if self._drifts:
+                state = self._stepper.start_from_rest(LoadControl(self._sense()))
+                if free := self._within(self._conjugate(state)):
+                    return self._moved_freely(free, watch)
+                self._frames.append(self._held(state))
+                state = self._frames[-1].state
+            path = self._path(state)
         except NotConverged as failure:
             raise self._ended(failure) from failure
         start, finishes = path.start, self._finishes(path)
@@ -221,11 +234,38 @@ class CurveFollower:
             start = start.scaled(-1.0)
         return self._follow(path, start, watch)
 
+    @property
+    def _drifts(self) -> bool:
+        """Whether nothing but loads holds the mechanism, and a force is followed."""
+        return self._stepper.adrift and not self._followed.displaces
+
+    def _sense(self) -> float:
+        """Sign of the force towards the first displacement that is wanted, or else the first force."""
+        return next((end for end in (*self._until.displacements, *self._until.forces) if end), 1.0)
+
+    def _within(self, travel: float) -> tuple[float, ...]:
+        """The wanted displacements that the point reaches without a force, which moves freely as far as ``travel``."""
+        return tuple(end for end in self._until.displacements if end * travel > 0.0 and abs(end) < abs(travel))
+
+    def _moved_freely(self, ends: Sequence[float], watch: Callable[[int], None]) -> FollowedCurve:
+        """The curve on which nothing resists, until the first of ``ends``."""
+        stepper = self._stepper
+        controls = (DisplacementControl(0.0), DisplacementControl(min(ends, key=abs)))
+        moved = CurveStepper(stepper.discretisation, replace(stepper.request, controls=controls))
+        return self._curve(moved.curve(watch).frames)
+
+    def _held(self, state: State) -> Frame:
+        """An equilibrium near ``state``, at rest without the force, that a small part of the force holds."""
+        small = math.copysign(self._HELD * self._path(state).metric.value, self._sense())
+        return self._stepper.frame(LoadControl(small))
+
     def from_bifurcation(self, event: PathEvent, mode: ModeShape, sense: Sense) -> FollowedCurve:
         """The curve that crosses another one at ``event`` along ``mode``."""
         rest = self._stepper.frame(LoadControl(0.0))  # the tangent at the bifurcation has no scale
         self._frames.append(event.frame)
         try:
+            if self._drifts:
+                rest = self._held(self._stepper.start_from_rest(LoadControl(self._sense())))
             path = self._path(rest.state)
             first = crossing(path, event.critical, mode.step, sense)
         except NotConverged as failure:
@@ -234,8 +274,7 @@ class CurveFollower:
         return self._follow(path, first, lambda done: None)
 
     def _follow(self, path: ArcLengthStepper, start: EquilibriumPoint, watch: Callable[[int], None]) -> FollowedCurve:
-        stepper, request = self._stepper, self._stepper.request
-        clock = stepper.discretisation.clock
+        stepper, clock = self._stepper, self._stepper.discretisation.clock
         steps = path.follow(start, self._finishes(path), most=self._until.frames - len(self._frames))
         while True:
             began, seconds = perf_counter(), dict(clock.seconds)
@@ -250,11 +289,16 @@ class CurveFollower:
             frame = stepper.record(ends[1])
             self._frames.append(replace(frame, seconds=perf_counter() - began, phases=clock.since(seconds)))
             watch(min(len(self._frames), self._until.frames))  # critical points are additional frames
+        return self._curve(self._frames)
+
+    def _curve(self, frames: Sequence[Frame]) -> FollowedCurve:
+        """The curve of ``frames``, with the events so far."""
+        stepper, request = self._stepper, self._stepper.request
         return FollowedCurve(
             request.part,
             request.configuration,
             stepper.freedom,
-            tuple(self._frames),
+            tuple(frames),
             stepper.discretisation,
             stepper.unloaded,
             others=request.others,
@@ -276,7 +320,8 @@ class CurveFollower:
 
     def _path(self, state: State) -> ArcLengthStepper:
         """The path through ``state``, in units of its ends."""
-        until, value, conjugate = self._until, self._followed.value(self._system, state), self._conjugate(state)
+        until, conjugate = self._until, self._conjugate(state)
+        value = agreed(self._system.comm, self._followed.value(self._system, state))
         values, conjugates = until.displacements, until.forces
         if not self._followed.displaces:
             values, conjugates = conjugates, values
@@ -301,10 +346,11 @@ class CurveFollower:
         ]
 
     def _conjugate(self, state: State) -> float:
-        """The conjugate of the followed value; displacements count from the unloaded configuration."""
+        """The conjugate of the followed value, the same on all processes; displacements count from the unloaded
+        configuration."""
         self._system.load(state)
         origin = 0.0 if self._followed.displaces else self._stepper.origin
-        return self._followed.conjugate(self._system, state) - origin
+        return agreed(self._system.comm, self._followed.conjugate(self._system, state) - origin)
 
     def _ended(self, failure: NotConverged) -> EquilibriumError:
         stepper, last = self._stepper, self._frames[-1]

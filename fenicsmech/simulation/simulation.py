@@ -358,8 +358,8 @@ class Simulation:
             placed: points of these links that are elsewhere than drawn, likewise.
 
         Raises:
-            DescriptionError: these are not shapes of links of the mechanism, or it does not fit the fidelity; or none
-                was chosen for an accuracy yet.
+            DescriptionError: these are not shapes of flexible links of the mechanism, or points of them; or it does not
+                fit the fidelity, or none was chosen for an accuracy yet.
             MeshingError: a file cannot be read, or a joint is not on its link.
         """
         for link, shape in shapes.items():
@@ -368,6 +368,15 @@ class Simulation:
                     f"shapes of links of {self.scene.mechanism.name!r}",
                     f"{shape!r} is given as the shape of {link!r}",
                     "Give {link: shape, …} of flexible links of the mechanism",
+                )
+        for material, place in (placed or {}).items():
+            of_link = isinstance(material, tuple) and len(material) == 3
+            of_link = of_link and material[0] in self.scene.mechanism.flexible_links
+            if not of_link or not isinstance(place, PlacedPoint):
+                raise DescriptionError(
+                    f"placed points of {self.scene.mechanism.name!r}",
+                    f"{place!r} is given as the place of {material!r}",
+                    "Give {force.material: PlacedPoint(…), …} of points of flexible links of the mechanism",
                 )
         other = self._derived()
         other.clock, other.choice, other._design = Clock(), None, None

@@ -19,7 +19,7 @@ from time import perf_counter
 import numpy as np
 from mpi4py import MPI
 
-from fenicsmech.collective import from_one
+from fenicsmech.collective import agreed, from_one
 from fenicsmech.continuation import LoadStepper, LoadSteps, LoadStepsFailed, MotorStepper
 from fenicsmech.equilibrium import (
     Control,
@@ -49,6 +49,7 @@ from fenicsmech.multibody import (
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.frame import Frame
+from fenicsmech.simulation.rest_start import RestStart, rest_start
 
 
 @dataclass(frozen=True)
@@ -141,6 +142,7 @@ class CurveStepper:
         unloaded: the equilibrium without forces, effects at load factor 0.
         followed: the control whose value changes along the curve.
         origin: zero of displacements: that of the force's point in the unloaded configuration.
+        adrift: whether nothing but loads holds the mechanism, which has turned freely at most until now.
     """
 
     def __init__(self, discretisation: Discretisation, request: CurveRequest) -> None:
@@ -158,25 +160,51 @@ class CurveStepper:
         self.followed = discretisation.followed_control(request.part)
         self.origin, self._origins = 0.0, dict.fromkeys(model.mechanism.outputs, 0.0)
         self._snaps = 0  # so far, which no frame reports yet
-        self._poses = assembly.poses
+        self._poses, self._rigid_motors = assembly.poses, motors
         state = self.unloaded = self._unloaded(assembly)
+        # obstacles may keep the mechanism from turning as loads prefer
+        self.adrift = bool(self.freedom.zero_energy) and not state.has_reactions and self._system.contact is None
         self._system.load(state)
         if not self.followed.displaces:  # motors count from where they were drawn
-            self.origin = self.followed.conjugate(self._system, state)
+            self.origin = agreed(comm, self.followed.conjugate(self._system, state))
         self._origins = {output: model.travel(output, state) for output in model.mechanism.outputs}
 
     @cached_property
     def _state(self) -> State:
-        """The configuration under constant loads, where load steps start."""
-        if not (self.request.others or self._model.effects):
-            return self.unloaded
-        return self._under_constant_loads(self.unloaded)
+        """The configuration under constant loads, where load steps start as long as no force is prescribed."""
+        return self._under_constant_loads(self._at_rest(LoadControl(0.0)).state)
 
     @cached_property
     def _stepper(self) -> LoadStepper:
-        self._system.load(self._state)
+        return self._steps_from(self._state, held=False)
+
+    def _steps_from(self, state: State, *, held: bool) -> LoadStepper:
+        self._system.load(state)
         control = DisplacementControl() if any(c.constrained for c in self.request.controls) else LoadControl()
-        return LoadStepper(self.solver, self._state, control, predictor=self.discretisation.predictor)
+        return LoadStepper(self.solver, state, control, predictor=self.discretisation.predictor, held=held)
+
+    def start_from_rest(self, control: Control) -> State:
+        """Takes load steps, which stand at no force yet, to where ``control`` begins to resist, and gives the state.
+
+        That is the pose that a force of this sign prefers; a displacement may be reached before, without force.
+        """
+        rest = self._at_rest(control)
+        state = self._state = self._under_constant_loads(rest.state)
+        self._system.load(state)
+        short = agreed(self.discretisation.comm, control.gap(self._system, state))
+        self.adrift = control.constrained and abs(short) <= 1e-9 * self._joints.length
+        self._stepper = self._steps_from(state, held=rest.held and not self.adrift)
+        return state
+
+    def _at_rest(self, control: Control) -> RestStart:
+        """The unloaded configuration, in the pose that loads prefer where nothing else holds the mechanism."""
+        state, part = self.unloaded, self.request.part
+        if not self.adrift:
+            return RestStart(state, held=False)
+        self._system.load(state)
+        ratios = dict(part.ratios) if isinstance(part, Force | ForceGroup) else {}
+        others, idle = self.request.others, self._system.idle
+        return rest_start(self._model, state, self._rigid_motors, others, ratios, control, idle)
 
     def curve(self, watch: Callable[[int], None]) -> Curve:
         """The frames of all prescribed values; ``watch`` is called with the number of frames so far."""
@@ -197,10 +225,12 @@ class CurveStepper:
 
     def frame(self, control: Control) -> Frame:
         """The equilibrium under ``control``."""
-        clock, stepper = self._model.clock, self._stepper
-        start, seconds, iterations, snaps = perf_counter(), dict(clock.seconds), stepper.iterations, stepper.snaps
         if control.constrained:
             control = control.at(control.prescribed + self.origin)
+        if self.adrift and (control.constrained or control.prescribed):
+            self.start_from_rest(control)
+        clock, stepper = self._model.clock, self._stepper
+        start, seconds, iterations, snaps = perf_counter(), dict(clock.seconds), stepper.iterations, stepper.snaps
         try:
             with self.keeping_frames():
                 point = stepper.advance(control)
@@ -234,6 +264,9 @@ class CurveStepper:
         with model.clock.phase("measure"):
             stress = float(model.elastic.von_mises().max(initial=0.0))
             value, conjugate = followed.value(self._system, state), followed.conjugate(self._system, state)
+            travels = [model.travel(output, state) for output in self._origins]
+            value, conjugate, *travels = agreed(self.discretisation.comm, [value, conjugate, *travels])
+            outputs = {output: end - zero for (output, zero), end in zip(self._origins.items(), travels, strict=True)}
             displacement, force = (value, conjugate) if followed.displaces else (conjugate, value)
             return Frame(
                 force=force,
@@ -243,7 +276,7 @@ class CurveStepper:
                 stable_under_control=point.unstable_under_control == 0,
                 strain_energy=model.elastic.strain_energy(),
                 max_stress=model.mesh.mesh.comm.allreduce(stress, op=MPI.MAX),
-                outputs={output: model.travel(output, state) - zero for output, zero in self._origins.items()},
+                outputs=outputs,
                 reactions=joint_reactions(self._joints, state),
                 motors=motor_torques(self._joints, state),
                 iterations=point.iterations,
@@ -291,6 +324,8 @@ class CurveStepper:
 
     def _under_constant_loads(self, state: State) -> State:
         """The configuration under the request's constant forces and the scene's effects, which grow together."""
+        if not (self.request.others or self._model.effects):
+            return state
         control = LoadFactorControl()
         stepper = LoadStepper(self.solver, control.prepare(state), control, predictor=self.discretisation.predictor)
         try:
@@ -311,7 +346,7 @@ class CurveStepper:
 
     def _unreached(self, control: Control, failure: LoadStepsFailed) -> EquilibriumError:
         last, where = self._last(failure), self.request.where
-        if control.constrained and self._is_held():
+        if control.constrained and from_one(self.discretisation.comm, self._is_held):
             return EquilibriumError(
                 where,
                 f"no equilibrium at displacement {control.prescribed - self.origin:g}: joints and motors hold its "
@@ -386,7 +421,7 @@ class CurveStepper:
         for motion in from_one(comm, lambda: stiff_motions(model.linkage, state.poses, state.motors)):
             rounding = 1e-12 * float(reactions @ np.abs(motion.z))
             worst = max(worst, (self._work(residual, state, motion) - rounding) / motion.fastest(model.linkage.length))
-        return worst / loads if loads > 0.0 else 0.0
+        return agreed(comm, worst / loads if loads > 0.0 else 0.0)
 
     def _work(self, residual: Residual, state: State, motion: Motion) -> float:
         """|r · u̇ + ∂L/∂z · ż| of a motion."""

@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 import fenicsmech as fm
 from fenicsmech.continuation import HermitePredictor, LoadStepper, LoadStepsFailed
@@ -22,7 +23,7 @@ RESOLUTION = 2.0 / 1024.0  # of it
 class OneFreedom:
     """A path with a limit load of one, p = 1 − (1 − y)², in closed form, as ``LoadStepper`` sees it."""
 
-    potentials, contact = (), None
+    potentials, contact, comm = (), None, MPI.COMM_SELF
 
     def __init__(self) -> None:
         self.system, self.solved, self.softest = self, 0, 1.0

@@ -1,5 +1,7 @@
 """Best handle positions: better meshes, an exact implicit derivative, kinks of the spline, ranks."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -140,6 +142,24 @@ def test_handles_near_by_are_found_in_few_iterations():
     assert near.iterations <= 2
     fresh = HandleOptimum(both.shape, both.quality).solve(both.design(0.201), placed)
     assert near.theta == pytest.approx(fresh.theta, abs=1e-7)
+
+
+def test_a_placement_without_a_gradient_leads_to_those_near_by_all_the_same():
+    both = bench(2)
+    p = both.design(0.2, seed=6)
+    best, nearby = both.optimum.solve(p), both.optimum.solve(1.001 * p)
+    refused = 0
+    for shift in 0.2 * np.eye(len(best.theta)):
+        off = replace(best, theta=best.theta + shift)
+        both.shape.apply(p, off.theta)
+        if not np.isfinite(both.quality.value()):
+            continue
+        try:
+            both.optimum.total_gradient(off, np.zeros(len(p)), np.ones(len(shift)))
+        except ShapeError:
+            refused += 1
+            assert both.optimum.solve(1.001 * p, off).quality == pytest.approx(nearby.quality, rel=1e-6)
+    assert refused > 0
 
 
 def one_handle_at_a_control_point() -> tuple[LinkHandles, np.ndarray, np.ndarray]:

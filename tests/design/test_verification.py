@@ -157,6 +157,18 @@ def test_points_placed_elsewhere_are_where_paths_and_curves_have_them():
     assert found.displacements == pytest.approx(wanted.displacements, rel=1e-9)
 
 
+def test_places_of_what_is_no_point_of_a_flexible_link_are_refused_by_name():
+    case = bow(10.0)
+    (push,), sim = case.scene.mechanism.forces, case.simulate()
+    base = next(link for link in case.scene.mechanism.links if not isinstance(link, fm.FlexibleLink))
+    place = fm.PlacedPoint(np.array([(40.0, 12.0)]), np.ones(1))
+    for wrong in ({push: place}, {(base, (0.0, 0.0), None): place}, {push.material: (40.0, 12.0)}):
+        with pytest.raises(fm.DescriptionError, match="Give {force.material: PlacedPoint") as caught:
+            sim.with_shapes({}, placed=wrong)
+        (key, value), said = next(iter(wrong.items())), str(caught.value)
+        assert repr(key) in said and repr(value) in said
+
+
 def thorough(region: fm.Region | fm.Face):
     return pytest.param(region, marks=pytest.mark.thorough)
 

@@ -7,13 +7,14 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.effects import Contact, Cylinder, HalfPlane
-from fenicsmech.equilibrium import ActiveSet, LoadControl, NewtonSolver
+from fenicsmech.effects import Contact, Cylinder, HalfPlane, OneSided
+from fenicsmech.equilibrium import ActiveSet, Direct, EquilibriumSystem, LoadControl, NewtonSolver, TwoLevel
 from fenicsmech.quantities import Sensitivity
 
 from ..design.in_plane import design_field
 from ..design.refusal import refused
-from .touching import block, cantilever, finger, wrapped, wrapped_tip, wrapping_force
+from ..oracles.wrapped import wrap
+from .touching import block, cantilever, finger, touching_beside_another, wrapped, wrapped_tip, wrapping_force
 
 PULLS = [0.05, 0.1, 0.2, 0.4]
 
@@ -84,6 +85,8 @@ def test_an_obstacle_out_of_reach_changes_nothing(space):
 def test_a_cantilever_wraps_round_a_cylinder_in_few_iterations(load):
     case = wrapped()
     (frame,) = case.simulation.load_displacement(case.force, forces=[wrapping_force(load)]).frames
+    centreline = 50.0 + 0.5 * 0.005  # radius of it, over the length
+    assert frame.displacement == pytest.approx(100.0 * wrap(load, centreline).deflection, rel=1e-3)
     assert frame.displacement == pytest.approx(wrapped_tip(load), rel=1e-3)
     assert frame.iterations <= 30
     assert frame.stable
@@ -113,6 +116,39 @@ def test_wrapping_is_equal_on_all_ranks():
     assert found[0] == pytest.approx(found[1], rel=1e-8)
 
 
+@pytest.mark.thorough
+@pytest.mark.parallel
+def test_ranks_without_points_that_may_touch_take_part():
+    # the link that may touch is a tenth of all: on several ranks some hold none of it
+    found = []
+    for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
+        case = touching_beside_another(comm)
+        (frame,) = case.simulation.load_displacement(case.force, forces=[0.3]).frames
+        path = case.simulation.follow(case.force, until=fm.Until(force=0.3)).frames[-1]
+        assert path.displacement == pytest.approx(frame.displacement, rel=1e-8)
+        points = len(case.simulation.solver(case.force).system.contact.touching())
+        found.append(frame.displacement)
+        assert case.measure(frame)[0][1] > 0.01
+        assert comm.size == 1 or 0 in comm.allgather(points)
+    assert found[0] == pytest.approx(found[1], rel=1e-8)
+
+
+@pytest.mark.parametrize("space", ["plane-stress", pytest.param("3d", marks=pytest.mark.thorough)])
+def test_iterative_solves_find_the_points_that_touch(space):
+    found = []
+    for linear in (Direct(), TwoLevel()):
+        case = finger(space, size=4.0, solver=fm.PrimalDualNewton(linear=linear))
+        frame = case.simulation.load_displacement(case.force, forces=PULLS).frames[-1]
+        path = case.simulation.follow(case.force, until=fm.Until(force=PULLS[-1])).frames
+        assert len(path) <= 40
+        assert path[-1].displacement == pytest.approx(frame.displacement, rel=1e-7)
+        assert frame.stable and path[-1].stable
+        assert case.measure(frame)[0][0] > 0.5
+        found.append((frame.displacement, frame.iterations))
+    assert found[1][0] == pytest.approx(found[0][0], rel=1e-7)
+    assert found[1][1] <= found[0][1] + 2
+
+
 def test_solves_for_points_that_touch_leave_no_vectors_behind(monkeypatch):
     vectors, try_solve = [], NewtonSolver.try_solve
 
@@ -136,10 +172,10 @@ def test_corrections_that_stall_with_the_factor_at_hand_are_left_to_the_next_one
         fresh.append(True)
         add_stiffness(self, matrix)
 
-    def correct(self, x, residual, solve):
+    def correct(self, x, residual, solve, plane=None):
         if fresh:
             fresh.clear()
-            return corrected(self, x, residual, solve)
+            return corrected(self, x, residual, solve, plane)
         stalled.append(True)
         return None
 
@@ -189,8 +225,29 @@ def test_a_wrapped_cantilever_is_differentiated_by_the_design_field():
     assert gradient.design @ direction[: len(gradient.design)] == pytest.approx(slope, rel=1e-4)
 
 
+def test_gaps_are_computed_once_for_each_state(monkeypatch):
+    computed, states, value, load = [], [], OneSided.update, EquilibriumSystem.load
+
+    def update(self):
+        before = getattr(self, "gaps", None)
+        value(self)
+        computed.append(self.gaps is not before)
+
+    def count(self, state):
+        states.append(state)
+        load(self, state)
+
+    monkeypatch.setattr(OneSided, "update", update)
+    monkeypatch.setattr(EquilibriumSystem, "load", count)
+    case = finger("plane-stress")
+    case.simulation.load_displacement(case.force, forces=PULLS)
+    assert 0 < sum(computed) <= len(states)
+    assert sum(computed) < 0.5 * len(computed)
+
+
 def test_without_contact_no_boundary_is_looked_for():
     case = finger("plane-stress", active=False)
+    assert case.simulation.solver(case.force).system.contact is None
     assert case.simulation.model.fields.boundaries == {}
     kinds = {integral.integral_type() for integral in case.simulation.model.elastic.energy_ufl.integrals()}
     assert kinds == {"cell"}

@@ -72,6 +72,19 @@ def cantilever(
     return Touching(_simulation(mechanism, [contact], space, 2.0 * thickness), push, contact)
 
 
+def touching_beside_another(comm: MPI.Comm) -> Touching:
+    """The cantilever above a plane, and far from it a far larger block, which touches nothing."""
+    mechanism = fm.Mechanism("cantilever beside a block")
+    base, nylon = mechanism.rigid("base", fixed=True), fm.Material("nylon", 2000.0, 0.0)
+    beam = mechanism.flexible("beam", fm.strip([(-2, 0), (100, 0)], thickness=2.0, depth=3.0), nylon)
+    mechanism.weld(base, beam, at=(-1, 0), region=fm.Rectangle(2.0, 3.0))
+    other = mechanism.flexible("block", fm.polygon([(300, 0), (400, 0), (400, 90), (300, 90)], depth=3.0), nylon)
+    mechanism.weld(base, other, at=(302, 45), region=fm.Rectangle(4.0, 92.0))
+    push = mechanism.force(on=beam, at=(50, 0), direction=(0, -1))
+    contact = Contact(beam, HalfPlane((0, -2), (0, 1)))
+    return Touching(_simulation(mechanism, [contact], "plane-stress", 4.0, comm), push, contact)
+
+
 def finger(
     space: str,
     *,
@@ -80,6 +93,7 @@ def finger(
     centre: tuple[float, float] = (-10.0, 38.0),
     active: bool = True,
     comm: MPI.Comm = MPI.COMM_SELF,
+    solver: fm.PrimalDualNewton | None = None,
 ) -> Touching:
     """A soft upright finger, clamped at its root, whose tip is pulled to the left over a cylinder at ``centre``.
 
@@ -92,7 +106,7 @@ def finger(
     mechanism.weld(base, link, at=(0, 0), interface_radius=3.0)
     pull = mechanism.force(on=link, at=(0, 60), direction=(-1, 0))
     contact = Contact(link, Cylinder(centre, 6.0), stiffness)
-    return Touching(_simulation(mechanism, [contact] if active else [], space, size, comm), pull, contact)
+    return Touching(_simulation(mechanism, [contact] if active else [], space, size, comm, solver), pull, contact)
 
 
 def wrapped(*, gap: float = 0.0, unit: float = 1.0, stress: float = 1.0, comm: MPI.Comm = MPI.COMM_SELF) -> Touching:
@@ -130,6 +144,33 @@ def wrapping_force(load: float, *, unit: float = 1.0, stress: float = 1.0) -> fl
     return load * 2000.0 * stress * 10.0 * unit * (0.5 * unit) ** 3 / 12.0 / (100.0 * unit) ** 2
 
 
+def channel() -> Touching:
+    """A nearly straight strip, pressed along its axis by a slide, between walls 3 above and 2 below its ends."""
+    mechanism = fm.Mechanism("channel")
+    base, slide = mechanism.rigid("base", fixed=True), mechanism.rigid("slide")
+    shape = fm.strip([(0, 0), (50, 0.6), (100, 0)], thickness=1.5, depth=5.0)
+    strip = mechanism.flexible("strip", shape, fm.Material("nylon", 2000.0, 0.35))
+    mechanism.weld(base, strip, at=(0, 0), interface_radius=0.7)
+    mechanism.weld(strip, slide, at=(100, 0), interface_radius=0.7)
+    mechanism.prismatic(base, slide, at=(100, 0), axis=(1, 0))
+    push = mechanism.force(on=slide, at=(100, 0), direction=(-1, 0))
+    above, below = Contact(strip, HalfPlane((0, 3), (0, -1))), Contact(strip, HalfPlane((0, -2), (0, 1)))
+    return Touching(_simulation(mechanism, [above, below], "plane-stress", 2.0), push, above)
+
+
+def arch_over_floor() -> Touching:
+    """A shallow arch, pushed down beside its crown, that snaps through onto a plane 3 below its ends."""
+    mechanism = fm.Mechanism("arch over a floor")
+    base = mechanism.rigid("base", fixed=True)
+    shape = fm.strip([(-40, 0), (-20, 3), (0, 4), (20, 3), (40, 0)], thickness=1.0, depth=5.0)
+    arch = mechanism.flexible("arch", shape, fm.Material("nylon", 2000.0, 0.35))
+    for end in (-40, 40):
+        mechanism.weld(base, arch, at=(end, 0), interface_radius=0.45)
+    push = mechanism.force(on=arch, at=(1, 4), direction=(0, -1))
+    floor = Contact(arch, HalfPlane((0, -3), (0, 1)))
+    return Touching(_simulation(mechanism, [floor], "plane-stress", 1.5), push, floor)
+
+
 def block(space: str, stiffness: float) -> Touching:
     """A block of 10 × 8 × 5 on a plane, pressed by a rigid plate on a slider."""
     mechanism = fm.Mechanism("block")
@@ -143,5 +184,5 @@ def block(space: str, stiffness: float) -> Touching:
     return Touching(_simulation(mechanism, [contact], space, 4.0), push, contact)
 
 
-def _simulation(mechanism, effects, space: str, size: float, comm: MPI.Comm = MPI.COMM_SELF) -> fm.Simulation:
-    return fm.Simulation(fm.Scene(mechanism, effects=effects), space=space, size=size, comm=comm)
+def _simulation(mechanism, effects, space: str, size: float, comm=MPI.COMM_SELF, solver=None) -> fm.Simulation:
+    return fm.Simulation(fm.Scene(mechanism, effects=effects), space=space, size=size, comm=comm, solver=solver)

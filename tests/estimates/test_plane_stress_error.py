@@ -109,6 +109,25 @@ def test_estimate_finds_how_much_stiffer_strips_of_all_depths_are_in_space(depth
     assert np.all((found > 0.5) & (found < 2.0))
 
 
+@pytest.mark.parametrize(
+    "effect",
+    [lambda link: fm.Pressure(link, 5.0), lambda link: fm.Prestrain(link, 1.01)],
+    ids=["pressure", "prestrain"],
+)
+def test_estimate_finds_how_far_effects_across_the_depth_push_in_space(effect):
+    rig = fm.Mechanism("strip")
+    wall, hand = rig.rigid("wall", fixed=True), rig.rigid("hand")
+    link = rig.flexible("link", fm.strip([(0, 0), (10, 0)], thickness=1.0, depth=3.0), fm.Material("plastic", 1e3, 0.4))
+    rig.clamp(wall, link, end="start", length=1.0)
+    rig.clamp(hand, link, end="end", length=1.0)
+    push = rig.force(on=hand, at=(10, 0), direction=(1, 0))
+    scene = fm.Scene(rig, effects=[effect(link)])
+    flat = fm.Simulation(scene, space="plane-stress", size=0.7)
+    deep = fm.Simulation(scene, space="3d-symmetric", size=0.7, layers=2)
+    found = told_over_true(flat, deep, push, [1e-6])
+    assert np.all((found > 0.8) & (found < 1.25)), found
+
+
 @pytest.mark.thorough
 def test_estimate_finds_how_much_stiffer_the_designed_claw_is_in_space():
     script = demo("claw")

@@ -122,6 +122,19 @@ def test_a_snap_through_is_a_dotted_arrow_with_an_entry_of_its_own(tmp_path, dra
     assert [np.isnan(x).sum() for x in solid] == [0, 1]  # one piece, or two
 
 
+def test_bars_lead_from_points_to_where_finer_elements_put_them(tmp_path, drawn):
+    added = 0.05 * X
+    for corrected, end in (((X + added, X), "|"), ((X, X + added), "_")):
+        plot_curve(tmp_path / "a.png", [CurveSeries(X, X, "pushed", corrected=np.column_stack(corrected))])
+        axes = drawn[-1].axes[0]
+        (bars,) = axes.collections
+        moved = added != 0.0
+        expected = np.stack([np.column_stack([X, X]), np.column_stack(corrected)], axis=1)[moved]
+        assert np.array_equal(bars.get_segments(), expected)
+        assert end in [line.get_marker() for line in axes.get_lines()]
+        assert list(legend(drawn[-1])) == ["pushed", "in finer elements"]
+
+
 def test_a_faint_curve_is_thinner_lighter_and_behind_the_others(tmp_path):
     blue, faint = (33, 102, 172), (155, 186, 218)
     orders = {"strong": ["strong"], "faint": ["faint"], "both": ["faint", "strong"], "turned": ["strong", "faint"]}

@@ -133,6 +133,7 @@ class HandleOptimum:
             try:
                 total -= cho_solve(link.factor, slope[..., link.motion.free].T).T @ (link.cross @ own.matrix)
             except np.linalg.LinAlgError:
+                self._known = None, []  # nor do they lead to the positions of a nearby design
                 raise ShapeError(
                     f"shape of link {shape.own.name!r}",
                     "its mesh does not determine the positions of all handles",

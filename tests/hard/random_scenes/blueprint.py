@@ -217,7 +217,7 @@ class Blueprint:
         """In a few words."""
         effects = {type(plan).__name__.removesuffix("Plan").lower() for plan in self.effects}
         words = [self.topology, self.space, f"P{self.order}", *(["u–p"] if any(map(self.mixed, self.flexible)) else [])]
-        words += [self.control, *sorted(effects)]
+        words += [*(["idle spin"] if self.idle_spins else []), self.control, *sorted(effects)]
         return ", ".join([*words, f"{len(self.forces)} forces"] if len(self.forces) > 1 else words)
 
     def coarsened(self) -> Blueprint:

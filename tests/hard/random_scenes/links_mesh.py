@@ -143,19 +143,20 @@ class LinksMesh:
 
     def locate(self, cells: np.ndarray, at: np.ndarray) -> tuple[int, np.ndarray]:
         """The one of ``cells`` that holds a point (or comes nearest), and its barycentric coordinates there."""
-        found = np.array([self._inside(cell, at) for cell in cells])
-        best = int(np.argmax(found.min(axis=1)))
-        return int(cells[best]), found[best]
+        inside = self._inside(cells, at)
+        best = int(np.argmax(inside.min(axis=1)))
+        return int(cells[best]), inside[best]
 
-    def _inside(self, cell: int, at: np.ndarray) -> np.ndarray:
-        """Barycentric coordinates of a point in a cell, by Newton's method from its middle."""
-        inside = np.full(self.dim + 1, 1.0 / (self.dim + 1))
-        one = LinksMesh(self.elements, self.nodes, self.cells[[cell]], self.link[[cell]], self.body[[cell]])
+    def _inside(self, cells: np.ndarray, at: np.ndarray) -> np.ndarray:
+        """Barycentric coordinates of a point in each of ``cells``, by Newton's method from its middle, (m, dim + 1)."""
+        inside, nodes = np.full((len(cells), self.dim + 1), 1.0 / (self.dim + 1)), self.nodes[self.cells[cells]]
         for _ in range(_CORRECTIONS):
-            gap = at - self.elements.values(inside[None])[0] @ self.nodes[self.cells[cell]]
-            change = np.linalg.solve(one.edges(inside[None])[0, 0].T, gap)
-            change = change / max(1.0, np.abs(change).max())
-            inside = inside + np.append(-change.sum(), change)
+            slopes = self.elements.slopes(inside).astype(float)
+            edges = np.einsum("mka,mki->mai", slopes[:, :, 1:] - slopes[:, :, :1], nodes)
+            gap = at - np.einsum("mk,mki->mi", self.elements.values(inside), nodes)
+            change = np.linalg.solve(np.swapaxes(edges, 1, 2), gap[..., None])[..., 0]
+            change /= np.maximum(1.0, np.abs(change).max(axis=1, keepdims=True))
+            inside += np.column_stack([-change.sum(axis=1), change])
         return inside
 
 

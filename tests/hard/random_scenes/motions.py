@@ -8,6 +8,7 @@ import numpy as np
 
 from .closure import Place
 from .potential import Potential
+from .thresholds import THRESHOLDS
 
 STEP = 1e-30  # along the imaginary axis
 
@@ -38,7 +39,7 @@ def null_motions(
             columns.append(rates.astype(float))
     jacobian = np.array(columns).T.reshape(-1, len(columns))
     _, values, right = np.linalg.svd(jacobian, full_matrices=True)
-    null = right[int(np.sum(values > 1e-9 * max(values.max(initial=0.0), 1.0))) :]
+    null = right[int(np.sum(values > THRESHOLDS.rank * max(values.max(initial=0.0), 1.0))) :]
     modes = np.zeros((len(null), count, size))
     modes[:, names] = null.reshape(len(null), len(names), size) * scale
     return modes

@@ -197,6 +197,14 @@ class Potential:
         """Of all effects but prestrain, which changes the strain energy."""
         return self.link_energy(u) + self.body_energy(places)
 
+    def largest_stretch(self, u: np.ndarray) -> float:
+        """Largest principal stretch or inverse of one at the quadrature points of a state's ``u``, flat."""
+        stretches = [
+            np.linalg.svd(self._gradient(self.fields(u)[0], cells).astype(float), compute_uv=False)
+            for _, cells in self._groups
+        ]
+        return float(max(np.maximum(found, 1.0 / found).max() for found in stretches))
+
     def link_energy(self, u: np.ndarray) -> complex:
         """Of effects on flexible links: weight, contact, pressure."""
         value = 0.0
@@ -259,6 +267,17 @@ class Potential:
         """Σ ratio d · u(P) of the forces that change."""
         led = zip(self.blueprint.ratios, self.blueprint.forces, strict=False)
         return sum(ratio * self.travel(force, u, places) for ratio, force in led)
+
+    def led_slope(self) -> np.ndarray:
+        """∂(Σ ratio d · u(P))/∂u at the nodes of links, (n, dim)."""
+        slope = np.zeros(self.mesh.nodes.shape)
+        for ratio, force in zip(self.blueprint.ratios, self.blueprint.forces, strict=False):
+            if force.on in self.rows:
+                cell, inside = self._located[force.name]
+                direction = np.array((*force.direction, 0.0)[: self.mesh.dim])
+                shares = self.mesh.elements.values(inside[None])[0]
+                slope[self.mesh.cells[cell]] += ratio * np.outer(shares, direction / np.linalg.norm(direction))
+        return slope
 
     def acting(self, magnitude: float) -> list[tuple[ForcePlan, float]]:
         """All forces with their sizes."""

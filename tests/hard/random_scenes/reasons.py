@@ -1,85 +1,204 @@
-"""Whether an error about a scene that makes sense is true, judged without the solver."""
+"""Whether an error about a scene that makes sense is true, judged without the solver.
+
+Each excuse is proven by a number of its own, which the table of scenes gives, and all but the geometric ones start from
+the last equilibrium, which must be one.
+"""
 
 from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 import fenicsmech as fm
 
-from .blueprint import Blueprint, Built, SpringPlan
-from .draw import bending_force
-from .motions import body_modes, moved
+from .blueprint import Blueprint, Built, CompliancePlan, GravityPlan, SpringPlan
+from .closure import Place
+from .motions import STEP, body_modes, moved
 from .potential import Potential
-from .stability_check import eigenvalues
+from .residual_check import check, fault
+from .stability_check import eigenvalues, led_stiffness
 from .thresholds import THRESHOLDS
-
-_STEP = 1e-30
-
-
-def true_reason(blueprint: Blueprint, built: Built | None, failure: fm.FenicsmechError) -> str:
-    """The reason why the error is right, empty if it is not."""
-    if not isinstance(failure, fm.EquilibriumError):
-        return ""
-    displaced = blueprint.control in ("displacements", "path")
-    if displaced and failure.last is not None and immobile(blueprint, built, failure.last):
-        return "the point cannot move that way"
-    if displaced and failure.last is not None:
-        if abs(failure.last.force) > THRESHOLDS.unreached * min(map(bending_force, blueprint.flexible)):
-            return "links stretched straight: a thousand times and more what bends the softest"
-    if drowned(blueprint):
-        return "springs softer than the rounding of stiff links"
-    if adrift(blueprint):
-        return "nothing but the force holds the mechanism"
-    if blueprint.control == "forces" and max(map(abs, blueprint.samples)) > THRESHOLDS.huge * min(
-        map(bending_force, blueprint.flexible)
-    ):
-        return "a load ten times and more what bends the softest link"
-    if failure.last is not None and at_limit(blueprint, built, failure.last):
-        return "at a limit point"
-    return ""
+from .unstrained_check import unstrained_motions
 
 
-def adrift(blueprint: Blueprint) -> bool:
-    """Whether a mechanism of mobility one has neither motor, clamp nor spring."""
-    if blueprint.topology == "two-link arch" or blueprint.motors:
-        return False
-    held = any(joint.kind == "weld" for joint in blueprint.joints)
-    return not held and not any(isinstance(plan, SpringPlan) for plan in blueprint.effects)
+@dataclass(frozen=True)
+class Excuse:
+    """Why an error is true.
 
-
-def drowned(blueprint: Blueprint) -> bool:
-    """Whether a spring is softer than the rounding of what the stiffest link does to its joint.
-
-    A link of width b and modulus E, in elements about as long as thick, has nodal stiffnesses of E b, each rounded to
-    1e-16 of itself; a joint feels those of some thousand nodes at arms of the mechanism's length ℓ: k < 1e-14 E b ℓ².
+    Attributes:
+        reason: in words, one of ``REASONS``.
+        proof: the number that shows it.
     """
-    stiffest = max(link.young * link.depth for link in blueprint.flexible)
-    for plan in blueprint.effects:
-        if isinstance(plan, SpringPlan):
-            arm = 1.0 if blueprint.joint(plan.joint).kind == "prismatic" else blueprint.length
-            if plan.stiffness < THRESHOLDS.drowned * stiffest * arm**2:
-                return True
-    return False
+
+    reason: str
+    proof: str
 
 
-def immobile(blueprint: Blueprint, built: Built, frame: fm.Frame) -> bool:
-    """Whether no admissible motion takes the force's point along its direction, by the geometry of joints alone."""
+def true_reason(blueprint: Blueprint, built: Built | None, failure: fm.FenicsmechError) -> Excuse | None:
+    """Why the error is right; None if it is not."""
+    if not isinstance(failure, fm.EquilibriumError):
+        return None
+    last = failure.last
+    if last is not None and not _proven(blueprint, built, last):
+        return None
+    return next((excuse for excuse in (reason(blueprint, built, last) for reason in REASONS) if excuse), None)
+
+
+def _proven(blueprint: Blueprint, built: Built, last: fm.Frame) -> bool:
+    """Whether the last equilibrium is one, with the share of constant loads that it has."""
+    potential = Potential.of(blueprint, built.simulation, last.state.load_factor)
+    return not fault(blueprint, last, None, check(potential, last, math.nan))
+
+
+def immobile(blueprint: Blueprint, built: Built, last: fm.Frame | None) -> Excuse | None:
+    """No admissible motion takes the force's point along its direction, by the geometry of joints alone."""
+    if blueprint.control == "forces" or last is None:
+        return None
     potential = Potential.of(blueprint, built.simulation)
-    places = potential.places(frame.state.poses)
-    u = potential.nodal(potential.fields(frame.state.u)[0], places)
-    if abs(potential.led_travel(u + 1j * _STEP * potential.free, places).imag) > 0.0:
-        return False
+    places = potential.places(last.state.poses)
+    u = potential.nodal(potential.fields(last.state.u)[0], places)
+    if abs(potential.led_travel(u + 1j * STEP * potential.free, places).imag) > 0.0:
+        return None
     rates = [
-        potential.led_travel(potential.nodal(u, there), there).imag / _STEP
-        for there in (moved(places, 1j * _STEP * mode) for mode in body_modes(potential, places))
+        potential.led_travel(potential.nodal(u, there), there).imag / STEP
+        for there in (moved(places, 1j * STEP * mode) for mode in body_modes(potential, places))
     ]
-    return float(np.linalg.norm(rates)) < THRESHOLDS.immobile
+    rate = float(np.linalg.norm(rates))
+    return _excuse("the point cannot move that way", "travel per motion of bodies", rate, below=THRESHOLDS.immobile)
 
 
-def at_limit(blueprint: Blueprint, built: Built, frame: fm.Frame) -> bool:
-    """Whether the last equilibrium has all but lost the stiffness of its softest mode, that of the unloaded scene."""
-    loaded = Potential.of(blueprint, built.simulation, frame.state.load_factor)
+def at_limit(blueprint: Blueprint, built: Built, last: fm.Frame | None) -> Excuse | None:
+    """The last equilibrium has all but lost the stiffness of its softest mode, that of the unloaded scene.
+
+    Modes are those at the prescribed force or displacement; constant loads are raised before either. Paths go on past
+    limit points.
+    """
+    if last is None:
+        return None
+    constant = last.state.load_factor < 1.0
+    if blueprint.control == "path" and not constant:
+        return None
+    led = blueprint.control == "displacements" and not constant
+    loaded = Potential.of(blueprint, built.simulation, last.state.load_factor)
     unloaded = Potential.of(blueprint, built.simulation, 0.0)
     drawn = built.simulation.linkage.joints.drawn
-    before = eigenvalues(unloaded, np.zeros(unloaded.mesh.nodes.size), drawn, 0.0)[0]
-    return eigenvalues(loaded, frame.state.u, frame.state.poses, frame.force)[0] < THRESHOLDS.soft * before
+    before = eigenvalues(unloaded, np.zeros(unloaded.mesh.nodes.size), drawn, 0.0, led=led)[0]
+    now = eigenvalues(loaded, last.state.u, last.state.poses, last.force, led=led)[0]
+    return _excuse("at a limit point", "stiffness left", now / abs(before), below=THRESHOLDS.soft)
+
+
+def adrift(blueprint: Blueprint, built: Built, last: fm.Frame | None) -> Excuse | None:
+    """Loads work along a motion of the drawn mechanism that deforms neither links nor springs and is not prescribed.
+
+    Then no equilibrium is near the drawn configuration, however small the load.
+    """
+    potential = Potential.of(blueprint, built.simulation)
+    motions = _drawn_motions(potential)
+    sample = blueprint.samples[-1] if blueprint.control == "forces" else 0.0
+    rates, _ = _resistance(potential, motions)
+    if blueprint.control != "forces":
+        rates = np.vstack([rates, [potential.led_travel(du, there).imag / STEP for du, there in motions]])
+    free, _ = _split(rates)
+    work = np.zeros(len(motions))
+    for k, (du, there) in enumerate(motions):
+        done = sum(size * potential.travel(force, du, there) for force, size in potential.acting(sample))
+        for plan in blueprint.effects:
+            if isinstance(plan, GravityPlan):
+                done = done - potential.alone(plan).effect_energy(du, there)
+        work[k] = np.imag(done) / STEP
+    size = sum(abs(amount) for _, amount in potential.acting(sample)) + potential.weight
+    share = float(np.linalg.norm(free @ work)) / max(size, 1e-300)
+    reason = "nothing but the force holds the mechanism"
+    return _excuse(reason, "work of loads along a free motion", share, above=THRESHOLDS.adrift)
+
+
+def drowned(blueprint: Blueprint, built: Built, last: fm.Frame | None) -> Excuse | None:
+    """A motion of the drawn mechanism that deforms no link is resisted by springs softer than the rounding of links.
+
+    A link of width b and modulus E, in elements about as long as thick, has nodal stiffnesses of E b, each rounded to
+    1e-16 of itself; a motion feels those of some thousand nodes: k < 1e-14 E b, k per square of the velocity of what
+    moves fastest.
+    """
+    potential = Potential.of(blueprint, built.simulation)
+    rates, stiffnesses = _resistance(potential, _drawn_motions(potential))
+    _, resisted = _split(rates)
+    if not len(resisted):
+        return None
+    softest = float(np.linalg.eigvalsh(resisted @ (rates.T * stiffnesses) @ rates @ resisted.T)[0])
+    share = softest / max(link.young * link.depth for link in blueprint.flexible)
+    reason = "springs softer than the rounding of stiff links"
+    return _excuse(reason, "stiffness over the stiffest link's", share, below=THRESHOLDS.drowned)
+
+
+def out_of_reach(blueprint: Blueprint, built: Built, last: fm.Frame | None) -> Excuse | None:
+    """The displacement takes many times the force that would double the weakest link's length, E b t.
+
+    Links stretched straight stiffen: by the tangent of the last equilibrium it takes less than in truth.
+    """
+    if blueprint.control != "displacements" or last is None or last.state.load_factor < 1.0:
+        return None
+    potential = Potential.of(blueprint, built.simulation)
+    stiffness = led_stiffness(potential, last.state.u, last.state.poses, last.force)
+    needed = max(abs(last.force + stiffness * (sample - last.displacement)) for sample in blueprint.samples)
+    share = needed / min(link.young * link.depth * link.thickness for link in blueprint.flexible)
+    return _excuse("links stretched straight", "force needed over E b t", share, above=THRESHOLDS.unreached)
+
+
+def overstrained(blueprint: Blueprint, built: Built, last: fm.Frame | None) -> Excuse | None:
+    """Under a force the last equilibrium has elements at a multiple of their size, or a fraction of it."""
+    if blueprint.control != "forces" or last is None:
+        return None
+    stretch = Potential.of(blueprint, built.simulation, last.state.load_factor).largest_stretch(last.state.u)
+    return _excuse("elements strained out of shape", "stretch or its inverse", stretch, above=THRESHOLDS.strained)
+
+
+Reason = Callable[[Blueprint, Built, fm.Frame | None], Excuse | None]
+REASONS: tuple[Reason, ...] = (immobile, adrift, drowned, at_limit, out_of_reach, overstrained)
+
+
+def _excuse(
+    reason: str, name: str, number: float, *, below: float = -math.inf, above: float = math.inf
+) -> Excuse | None:
+    return Excuse(reason, f"{name} {number:.1e}") if number < below or number > above else None
+
+
+_Motion = tuple[np.ndarray, list[Place]]
+
+
+def _drawn_motions(potential: Potential) -> list[_Motion]:
+    """Steps along motions of the drawn mechanism that deform no link."""
+    poses = np.zeros((len(potential.centres), 3 if potential.blueprint.dim == 2 else 7))
+    if potential.blueprint.dim == 3:
+        poses[:, 3] = 1.0
+    still = np.zeros(potential.mesh.nodes.shape)
+    return [(du, there) for du, there, _ in unstrained_motions(potential, still, potential.places(poses))]
+
+
+def _resistance(potential: Potential, motions: list[_Motion]) -> tuple[np.ndarray, np.ndarray]:
+    """Rates of springs and joints that give way along motions, (rows, motions), and their stiffnesses, (rows,)."""
+    closure, rates, stiffnesses = potential.closure, [], []
+    for plan in potential.blueprint.effects:
+        match plan:
+            case SpringPlan(joint=name, stiffness=stiffness):
+                joint = potential.blueprint.joint(name)
+                rates.append([[closure.coordinate(joint, there).imag for _, there in motions]])
+                stiffnesses.append(stiffness)
+            case CompliancePlan(joint=name, compliance=compliance):
+                joint = potential.blueprint.joint(name)
+                gaps = [closure.gap(joint, there).imag for _, there in motions]
+                rates.append(np.reshape(gaps, (len(motions), potential.blueprint.dim)).T)
+                stiffnesses += [1.0 / compliance] * potential.blueprint.dim
+    rows = np.vstack([np.zeros((0, len(motions))), *rates]).astype(float) / STEP
+    return rows, np.array(stiffnesses)
+
+
+def _split(rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Orthonormal combinations of motions along which all rates vanish, and those along which they do not."""
+    if not rates.shape[1]:
+        return np.zeros((0, 0)), np.zeros((0, 0))
+    _, values, right = np.linalg.svd(rates, full_matrices=True)
+    rank = int(np.sum(values > THRESHOLDS.rank * max(values.max(initial=0.0), 1.0)))
+    return right[rank:], right[:rank]

@@ -7,21 +7,22 @@ the norm of the whole residual: the mean of (∇Π · v)² is |∇Π|².
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 import fenicsmech as fm
 
-from .blueprint import LinkPlan, PressurePlan, PrestrainPlan
+from .blueprint import Blueprint, LinkPlan, PressurePlan, PrestrainPlan
 from .closure import Place
 from .motions import body_modes, moved
 from .potential import Potential
 from .strain_energy import REAL
+from .thresholds import THRESHOLDS
 from .unstrained_check import unstrained_work
 
 _STEP = 1e-30
-_RANDOM = 8
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,10 @@ def check(potential: Potential, frame: fm.Frame, origin: float, seed: int = 0) -
         return float(np.imag(potential.value(potential.nodal(u + du, moved), moved, frame.force, p))) / _STEP
 
     rng = np.random.default_rng(seed)
-    squares = [slope(1j * _STEP * rng.standard_normal(u.shape) * potential.free, places) ** 2 for _ in range(_RANDOM)]
+    squares = [
+        slope(1j * _STEP * rng.standard_normal(u.shape) * potential.free, places) ** 2
+        for _ in range(THRESHOLDS.directions)
+    ]
     if len(potential.free_pressures):
         squares = [square + _volume_slope(potential, followed, p, rng) ** 2 for square in squares]
     along = [slope(np.zeros(u.shape), moved(places, 1j * _STEP * mode)) for mode in modes]
@@ -91,6 +95,26 @@ def check(potential: Potential, frame: fm.Frame, origin: float, seed: int = 0) -
         energy_error=abs(energy - frame.strain_energy) / max(abs(frame.strain_energy), _energy_digits(potential)),
         unstrained_work=unstrained_work(potential, frame.force, followed, places, floor=floor, reaction=scale),
     )
+
+
+def fault(blueprint: Blueprint, frame: fm.Frame, sample: float | None, found: Residual) -> str:
+    """The fault of a frame, empty if there is none; ``sample`` is what is prescribed."""
+    if sample is not None:
+        controlled = frame.force if blueprint.control == "forces" else frame.displacement
+        size = abs(sample) if blueprint.control == "forces" else blueprint.length
+        if abs(controlled - sample) > THRESHOLDS.reached * size:
+            return "control missed"
+    if found.gap > THRESHOLDS.closed:
+        return "joints apart"
+    if found.force > max(THRESHOLDS.residual * found.scale, THRESHOLDS.rounding * found.floor):
+        return "no equilibrium"
+    if found.unstrained_work > THRESHOLDS.balanced:
+        return "motions that deform no link are out of balance"
+    if not math.isnan(found.travel_error) and found.travel_error > THRESHOLDS.reached:
+        return "displacement"
+    if found.energy_error > THRESHOLDS.energy:
+        return "strain energy"
+    return ""
 
 
 def _volume_slope(potential: Potential, u: np.ndarray, p: np.ndarray, rng: np.random.Generator) -> float:
@@ -159,7 +183,7 @@ def _floor(potential: Potential, u: np.ndarray) -> float:
 
 
 def _energy_digits(potential: Potential) -> float:
-    """Cancellation error of textbook energies: 1e-16 of the modulus, times the volume; kept below a millionth."""
+    """Cancellation error of textbook energies: 1e-16 of the modulus, times the volume; all but the last ``digits``."""
     volume = sum(link.young / (1 - 2 * _poisson(potential, link)) for link in potential.blueprint.flexible)
     thickest = max(link.depth for link in potential.blueprint.flexible) if potential.mesh.dim == 2 else 1.0
-    return 1e-16 * volume * thickest * potential.volume * 1e6
+    return 1e-16 * volume * thickest * potential.volume * THRESHOLDS.digits

@@ -7,6 +7,7 @@ where the loop cannot close, no equilibrium where none can be expected. One that
 from __future__ import annotations
 
 import math
+import resource
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
@@ -21,13 +22,12 @@ from .generator import random_scene
 from .invalid import spoiled_scene
 from .potential import Potential
 from .reasons import true_reason
-from .residual_check import Residual, check
+from .residual_check import check, fault
 from .stability_check import checkable, unstable_directions
 from .thresholds import THRESHOLDS
 
 INVALID_SHARE = 3  # in ten
 DESIGNS = 40  # scenes for one design problem
-_CHECKED = 6  # frames of a path
 
 
 @dataclass(frozen=True)
@@ -40,10 +40,12 @@ class SceneResult:
         outcome: "equilibrium", "equilibrium to rounding", "designed: …", "refused", "true: …" or "wrong: …".
         detail: the error, or the figures.
         seconds: wall-clock time.
+        cpu: processor time, that of compilers included.
         frames: how many equilibria were checked.
         residual: the largest relative one.
         iterations: of Newton's method, on the way to all frames.
         unchecked: checks that are left out.
+        proof: the number by which an error is true.
     """
 
     seed: int
@@ -51,10 +53,12 @@ class SceneResult:
     outcome: str
     detail: str
     seconds: float
+    cpu: float = 0.0
     frames: int = 0
     residual: float = 0.0
     iterations: int = 0
     unchecked: str = ""
+    proof: str = ""
 
     @property
     def wrong(self) -> bool:
@@ -76,6 +80,7 @@ class _Verdict:
     residual: float = 0.0
     iterations: int = 0
     unchecked: str = ""
+    proof: str = ""
 
 
 def judge(seed: int, *, quick: bool = False) -> SceneResult:
@@ -83,7 +88,7 @@ def judge(seed: int, *, quick: bool = False) -> SceneResult:
 
     ``quick`` scenes have larger elements and fewer loads; design problems are what they are.
     """
-    start = time.perf_counter()
+    start, used = time.perf_counter(), _cpu()
     if seed % DESIGNS == DESIGNS - 1:
         scene, verdict = _judge_design(seed)
     elif seed % 10 < INVALID_SHARE:
@@ -91,7 +96,13 @@ def judge(seed: int, *, quick: bool = False) -> SceneResult:
     else:
         blueprint = random_scene(seed)
         scene, verdict = blueprint.summary, judge_sound(blueprint.coarsened() if quick else blueprint)
-    return SceneResult(seed, scene, seconds=time.perf_counter() - start, **asdict(verdict))
+    return SceneResult(seed, scene, seconds=time.perf_counter() - start, cpu=_cpu() - used, **asdict(verdict))
+
+
+def _cpu() -> float:
+    """Processor time of this process and of those that it has waited for, s."""
+    own, others = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return own.ru_utime + own.ru_stime + others.ru_utime + others.ru_stime
 
 
 def _judge_spoiled(seed: int) -> tuple[str, _Verdict]:
@@ -139,9 +150,11 @@ def judge_sound(blueprint: Blueprint) -> _Verdict:
     if frames or failure is None:
         verdict = judge_frames(blueprint, built, frames, ended=failure is None)
     if failure is not None and not verdict.outcome.startswith("wrong"):
-        unclear, reason = _unclear(failure), true_reason(blueprint, built, failure)
-        kind = type(failure).__name__
-        outcome = f"wrong: {unclear}" if unclear else f"true: {kind}, {reason}" if reason else f"wrong: {kind}"
+        unclear, excuse = _unclear(failure), true_reason(blueprint, built, failure)
+        outcome = f"wrong: {unclear or type(failure).__name__}"
+        if excuse is not None and not unclear:
+            outcome = f"true: {type(failure).__name__}, {excuse.reason}"
+            verdict = replace(verdict, proof=excuse.proof)
         verdict = replace(verdict, outcome=outcome, detail=str(failure))
     return verdict
 
@@ -157,7 +170,7 @@ def judge_frames(blueprint: Blueprint, built: Built, frames: Sequence[fm.Frame],
     origin, samples = unloaded_travel(potential, built), blueprint.samples
     chosen = [*frames]
     if blueprint.control == "path":
-        chosen = [frames[k] for k in np.unique(np.linspace(0, len(frames) - 1, _CHECKED).astype(int))]
+        chosen = [frames[k] for k in np.unique(np.linspace(0, len(frames) - 1, THRESHOLDS.frames).astype(int))]
         stopped = len(frames) >= blueprint.most
         samples = [None] * (len(chosen) - 1) + [samples[0] if ended and not stopped else None]
     count, iterations = len(chosen), sum(frame.iterations for frame in frames)
@@ -165,7 +178,7 @@ def judge_frames(blueprint: Blueprint, built: Built, frames: Sequence[fm.Frame],
         if not _finite(frame):
             return _Verdict("wrong: NaN", repr(frame), count, math.inf, iterations)
         found = check(potential, frame, origin)
-        error = _error(blueprint, frame, sample, found)
+        error = fault(blueprint, frame, sample, found)
         if worst is None or found.relative > worst.relative:
             worst = found
         if error:
@@ -185,26 +198,6 @@ def unloaded_travel(potential: Potential, built: Built) -> float:
     if built.configuration is fm.DRAWN or not potential.blueprint.motors:
         return 0.0
     return math.nan
-
-
-def _error(blueprint: Blueprint, frame: fm.Frame, sample: float | None, found: Residual) -> str:
-    """The fault of a frame, empty if there is none; ``sample`` is what is prescribed."""
-    if sample is not None:
-        controlled = frame.force if blueprint.control == "forces" else frame.displacement
-        size = abs(sample) if blueprint.control == "forces" else blueprint.length
-        if abs(controlled - sample) > THRESHOLDS.reached * size:
-            return "control missed"
-    if found.gap > THRESHOLDS.closed:
-        return "joints apart"
-    if found.force > max(THRESHOLDS.residual * found.scale, THRESHOLDS.rounding * found.floor):
-        return "no equilibrium"
-    if found.unstrained_work > THRESHOLDS.balanced:
-        return "motions that deform no link are out of balance"
-    if not math.isnan(found.travel_error) and found.travel_error > THRESHOLDS.reached:
-        return "displacement"
-    if found.energy_error > THRESHOLDS.energy:
-        return "strain energy"
-    return ""
 
 
 def _finite(frame: fm.Frame) -> bool:

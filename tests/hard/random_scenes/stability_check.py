@@ -8,6 +8,9 @@ has a negative eigenvalue for each. Congruence with a diagonal keeps the signs a
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
@@ -20,10 +23,8 @@ from .potential import Potential
 from .thresholds import THRESHOLDS
 
 _IMAGINARY, _REAL = 1e-30, 1e-5
-_DENSE = (
-    500  # unknowns up to which all eigenvalues are found; beyond, the four nearest to zero, unless some are negative
-)
-_MOST = 2500  # unknowns up to which they are
+# unknowns up to which all eigenvalues are found; beyond, the four nearest to zero, unless some are negative
+_DENSE = 500
 
 
 def unstable_directions(potential: Potential, frame: fm.Frame) -> int | None:
@@ -36,11 +37,11 @@ def unstable_directions(potential: Potential, frame: fm.Frame) -> int | None:
 
 def checkable(potential: Potential) -> bool:
     """Whether stability can be judged: pressures, at which potentials have saddles, are not eliminated here."""
-    return not len(potential.free_pressures) and int(potential.free.sum()) <= _MOST
+    return not len(potential.free_pressures) and int(potential.free.sum()) <= THRESHOLDS.unknowns
 
 
 def eigenvalues(
-    potential: Potential, u: np.ndarray, poses: np.ndarray, magnitude: float, *, every: bool = False
+    potential: Potential, u: np.ndarray, poses: np.ndarray, magnitude: float, *, every: bool = False, led: bool = False
 ) -> np.ndarray:
     """Of the scaled second derivative on admissible directions, ascending; of large scenes those nearest to zero,
     unless ``every`` one is wanted or some of these are negative.
@@ -54,7 +55,31 @@ def eigenvalues(
         poses: of the bodies.
         magnitude: of the force that changes.
         every: whether all are wanted.
+        led: whether directions that take the force's point along are left out, as where its displacement is prescribed.
     """
+    scaled, slope = _scaled(potential, u, poses, magnitude)
+    slope = slope if led else None
+    # a singular matrix has no inverse
+    values = None if every or scaled.shape[0] <= _DENSE or potential.blueprint.idle_spins else _nearest(scaled, slope)
+    if values is None or values.min() < 0.0:
+        values = np.linalg.eigvalsh(_restricted(scaled.toarray(), slope))
+    return np.sort(values[np.argsort(np.abs(values))[potential.blueprint.idle_spins :]])
+
+
+def led_stiffness(potential: Potential, u: np.ndarray, poses: np.ndarray, magnitude: float) -> float:
+    """Change of the force that leads by the travel of its point, in equilibrium, infinite if that is held; see
+    ``eigenvalues``."""
+    scaled, slope = _scaled(potential, u, poses, magnitude)
+    try:
+        return float(-_bordered(scaled, slope)(np.append(np.zeros(len(slope)), 1.0))[-1])
+    except RuntimeError:  # singular
+        return math.inf
+
+
+def _scaled(
+    potential: Potential, u: np.ndarray, poses: np.ndarray, magnitude: float
+) -> tuple[sparse.csc_matrix, np.ndarray]:
+    """Second derivative of L on admissible directions, and the slope of the travel that is led there, both scaled."""
     places = potential.places(poses)
     u = potential.nodal(potential.fields(u)[0], places)
     free = np.flatnonzero(potential.free)
@@ -66,20 +91,48 @@ def eigenvalues(
     hessian = sparse.bmat(
         [[stiff[:, free], stiff @ follow], [follow.T @ stiff.T, follow.T @ (stiffness @ follow) + curvature]]
     ).tocsc()
+    ways = np.tensordot(null.T, np.array(_motions(potential, bodies)), axes=1)
+    slope = np.concatenate([potential.led_slope().ravel()[free], _travel_rates(potential, u, places, ways)])
     diagonal = np.abs(hessian.diagonal())
-    scale = sparse.diags(1.0 / np.sqrt(np.maximum(diagonal, 1e-14 * diagonal.max())))
-    scaled = scale @ (0.5 * (hessian + hessian.T)) @ scale
-    # a singular matrix has no inverse
-    values = None if every or scaled.shape[0] <= _DENSE or potential.blueprint.idle_spins else _nearest_to_zero(scaled)
-    if values is None or values.min() < 0.0:
-        values = np.linalg.eigvalsh(scaled.toarray())
-    return np.sort(values[np.argsort(np.abs(values))[potential.blueprint.idle_spins :]])
+    scale = 1.0 / np.sqrt(np.maximum(diagonal, 1e-14 * diagonal.max()))
+    scaled = sparse.diags(scale) @ (0.5 * (hessian + hessian.T)) @ sparse.diags(scale)
+    return scaled.tocsc(), scale * slope
 
 
-def _nearest_to_zero(matrix: sparse.csc_matrix) -> np.ndarray:
-    """Four eigenvalues."""
-    solve = splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve
+def _travel_rates(potential: Potential, u: np.ndarray, places: list[Place], ways: np.ndarray) -> np.ndarray:
+    """Travel of the force's point along motions of bodies, (ways,)."""
+    there = [moved(places, 1j * _IMAGINARY * way) for way in ways]
+    return np.array([float(np.imag(potential.led_travel(potential.nodal(u, at), at))) for at in there]) / _IMAGINARY
+
+
+def _nearest(matrix: sparse.csc_matrix, slope: np.ndarray | None) -> np.ndarray:
+    """Four eigenvalues, those nearest to zero; ``slope`` as in ``_restricted``."""
+    if slope is None:
+        solve = splu(matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve
+    else:
+        bordered = _bordered(matrix, slope)
+
+        def solve(b: np.ndarray) -> np.ndarray:
+            return bordered(np.append(b, 0.0))[:-1]
+
     return eigsh(matrix, k=4, sigma=0.0, OPinv=LinearOperator(matrix.shape, matvec=solve), return_eigenvectors=False)
+
+
+def _bordered(matrix: sparse.csc_matrix, slope: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    """The inverse of [[A, s], [sᵀ, 0]]."""
+    column = sparse.csc_matrix(slope[:, None])
+    return splu(sparse.bmat([[matrix, column], [column.T, None]]).tocsc()).solve
+
+
+def _restricted(matrix: np.ndarray, slope: np.ndarray | None) -> np.ndarray:
+    """A matrix on the directions x with slope · x = 0, by a reflection; on all if there is no slope."""
+    if slope is None or not np.any(slope):
+        return matrix
+    mirror = slope / np.linalg.norm(slope)
+    mirror[0] += np.copysign(1.0, mirror[0])
+    mirror /= np.linalg.norm(mirror)
+    matrix = matrix - 2.0 * np.outer(mirror, mirror @ matrix)
+    return (matrix - 2.0 * np.outer(matrix @ mirror, mirror))[1:, 1:]
 
 
 def _motions(potential: Potential, bodies: list[int]) -> list[np.ndarray]:

@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
+import fenicsmech as fm
+
+from .__main__ import main
 from .blueprint import Blueprint, SpringPlan, build
 from .draw import bending_force
 from .generator import random_scene
@@ -21,9 +24,11 @@ from .known_scenes import (
 )
 from .motions import STEP
 from .potential import Potential
+from .reasons import overstrained, true_reason
 from .residual_check import check
-from .scene_result import judge, judge_frames, judge_sound
+from .scene_result import SceneResult, judge, judge_frames, judge_sound
 from .stability_check import unstable_directions
+from .summary import excessive
 from .thresholds import THRESHOLDS
 from .unstrained_check import unstrained_motions
 
@@ -73,7 +78,7 @@ def solved():
     scene = next(scene for scene in scenes if not scene.motors and _bent(scene) and scene.topology == "two-link arch")
     scene = replace(scene, samples=(scene.samples[-1],))
     built = build(scene)
-    return Potential.of(scene, built.simulation), built.curve(scene).frames[-1]
+    return Potential.of(scene, built.simulation), built.curve(scene).frames[-1], built
 
 
 def _bent(scene: Blueprint) -> bool:
@@ -81,7 +86,7 @@ def _bent(scene: Blueprint) -> bool:
 
 
 def test_the_check_accepts_an_equilibrium_and_nothing_near_it(solved):
-    potential, frame = solved
+    potential, frame, _ = solved
     assert check(potential, frame, 0.0).relative < THRESHOLDS.residual
     doubled = replace(frame, force=1.001 * frame.force)
     assert check(potential, doubled, 0.0).relative > 1e-4
@@ -90,14 +95,14 @@ def test_the_check_accepts_an_equilibrium_and_nothing_near_it(solved):
 
 
 def test_curves_that_leave_loads_out_are_wrong(solved):
-    potential, frame = solved
+    potential, frame, _ = solved
     more = replace(potential.blueprint, samples=(frame.force, 1.1 * frame.force))
     assert judge_frames(more, None, [frame], ended=True).outcome == "wrong: frames missing"
     assert judge_frames(replace(more, control="path"), None, [], ended=True).outcome == "wrong: frames missing"
 
 
 def test_imaginary_differences_of_the_potential_are_real_ones(solved):
-    potential, frame = solved
+    potential, frame, _ = solved
     mesh, places = potential.mesh, potential.places(frame.state.poses)
     rng, size = np.random.default_rng(1), 1e-2 * min(link.size for link in potential.blueprint.flexible)
     strained = frame.state.u.reshape(mesh.nodes.shape) + size * rng.standard_normal(mesh.nodes.shape) * potential.free
@@ -112,7 +117,7 @@ def test_imaginary_differences_of_the_potential_are_real_ones(solved):
 
 
 def test_order_of_links_and_joints_does_not_matter(solved):
-    potential, frame = solved
+    potential, frame, _ = solved
     scene = potential.blueprint
     other = scene.shuffled(3)
     again = build(other).curve(other).frames[-1]
@@ -122,8 +127,37 @@ def test_order_of_links_and_joints_does_not_matter(solved):
 
 
 def test_stability_agrees_with_second_differences(solved):
-    potential, frame = solved
+    potential, frame, _ = solved
     assert unstable_directions(potential, frame) == frame.unstable_modes
+
+
+def test_errors_at_a_sound_equilibrium_are_not_excused_however_large_the_load(solved):
+    potential, frame, built = solved
+    scene = replace(potential.blueprint, samples=(1e3 * frame.force,))
+    for control in ("forces", "displacements", "path"):
+        failure = fm.EquilibriumError("load", "not found", "Give up", last=frame)
+        assert true_reason(replace(scene, control=control), built, failure) is None
+
+
+def test_errors_are_not_excused_by_what_is_no_equilibrium(solved):
+    potential, frame, built = solved
+    torn = replace(frame, state=replace(frame.state, u=1e6 * frame.state.u))
+    assert overstrained(potential.blueprint, built, torn) is not None
+    failure = fm.EquilibriumError("load", "not found", "Give up", last=torn)
+    assert true_reason(potential.blueprint, built, failure) is None
+
+
+def test_excuses_that_let_off_more_than_their_share_are_told():
+    excuse, right = "true: EquilibriumError, at a limit point", "equilibrium"
+    results = [SceneResult(seed, "four-bar", excuse if seed < 10 else right, "", 1.0) for seed in range(100)]
+    assert len(excessive(results)) == 1
+    assert not excessive(results[3:])
+
+
+def test_quick_tables_are_not_published(monkeypatch):
+    monkeypatch.setattr("sys.argv", ["random_scenes", "--quick", "--write"])
+    with pytest.raises(SystemExit):
+        main()
 
 
 @pytest.fixture(scope="module")

@@ -15,10 +15,7 @@ from .blueprint import CompliancePlan, EffectPlan, GravityPlan, SpringPlan
 from .closure import Place
 from .motions import STEP, moved, null_motions
 from .potential import Potential
-
-_GRAIN = 1e-7  # rad or mechanism lengths: how closely springs must be relaxed, as soft as rounding of links or not
-
-_ROUNDED = 1e-14  # of velocities
+from .thresholds import THRESHOLDS
 
 
 def unstrained_motions(
@@ -76,7 +73,7 @@ def unstrained_work(
         speeds = [np.abs(du).max(), *(np.abs(body.shift.imag).max() for body in there)]
         speeds += [np.abs(body.turn.imag).max() * length for body in there]
         fastest = float(max(speeds)) / STEP
-        work, size, grain = 0.0, 0.0, reaction * (10.0 * opening + _ROUNDED * fastest)
+        work, size, grain = 0.0, 0.0, reaction * (THRESHOLDS.opening * opening + THRESHOLDS.rounded * fastest)
         for force, amount in potential.acting(magnitude):
             work -= amount * float(np.imag(potential.travel(force, u + du, there))) / STEP
             size += abs(amount) * fastest
@@ -99,8 +96,10 @@ def _grain(potential: Potential, plan: EffectPlan, places: list[Place], there: l
             joint = potential.blueprint.joint(name)
             unit = length if joint.kind == "prismatic" else 1.0
             turn = abs(potential.closure.coordinate(joint, places).real)
-            return float(stiffness * abs(potential.closure.coordinate(joint, there).imag) * _GRAIN * (unit + turn))
+            return float(
+                stiffness * abs(potential.closure.coordinate(joint, there).imag) * THRESHOLDS.grain * (unit + turn)
+            )
         case CompliancePlan(joint=name, compliance=compliance):
             rate = potential.closure.gap(potential.blueprint.joint(name), there).imag
-            return float(np.sqrt(np.sum(rate**2)) * _GRAIN * length / compliance)
+            return float(np.sqrt(np.sum(rate**2)) * THRESHOLDS.grain * length / compliance)
     return 0.0
