@@ -31,6 +31,7 @@ from fenicsmech.collective import on_one
 from fenicsmech.design import DesignProblem, DesignResult
 from fenicsmech.equilibrium import Unknown
 from fenicsmech.errors import DescriptionError, EquilibriumError, counted
+from fenicsmech.estimates import AccuracyOptions
 from fenicsmech.files import write_json
 from fenicsmech.log import logger, print_once
 from fenicsmech.mechanism import Force, ForceGroup, Mechanism
@@ -236,9 +237,7 @@ def _plot(
         label = "optimised" if optimisation is not None and len(curves) == 1 else curve.configuration.name
         own = curve.series(label, colour=colours[curve.configuration])
         if known is not None:
-            added = (0.0, known) if curve.unknown is Unknown.FORCE else (known, 0.0)
-            corrected = np.column_stack([curve.displacements + added[0], curve.forces + added[1]])
-            own = replace(own, corrected=corrected)
+            own = replace(own, corrected=_in_finer_elements(curve, known))
         series.append(own)
     points, parts = [point for target in targets if (point := target.on_curve)], [curve.part for curve in curves]
     wanted = [CurveTarget(u, magnitude, colours.get(place)) for force, magnitude, u, place in points if force in parts]
@@ -246,6 +245,13 @@ def _plot(
     title = name if optimisation else f"{name}: initial design"
     labels = {"xlabel": across.label, "ylabel": up.label, "title": title}
     plot_curve(path, series, targets=wanted, comm=MPI.COMM_SELF, **labels)
+
+
+def _in_finer_elements(curve: Curve, errors: np.ndarray) -> np.ndarray:
+    """Displacements and forces with those of their estimated ``errors`` added that are small enough, (frames, 2)."""
+    added, points = AccuracyOptions().corrections(errors, curve.values), [curve.displacements, curve.forces]
+    points[curve.unknown is Unknown.FORCE] = curve.values + added
+    return np.column_stack(points)
 
 
 # -- figures ---------------------------------------------------------------------------------------------------------

@@ -130,6 +130,21 @@ def test_targets_are_marked_on_curves_of_their_own_force(tmp_path, monkeypatch):
         assert [(own.displacement, own.force) for own in marked] == [expected]
 
 
+def test_points_are_shown_where_finer_elements_put_the_unknown_of_the_curve(tmp_path, monkeypatch):
+    case, shown = truss((0.1, WANTED)), []
+    simulation, (push,) = case.simulate(), case.scene.mechanism.forces
+    monkeypatch.setattr("fenicsmech.report.plot_curve", lambda _, series, **__: shown.extend(series))
+    for given, known in (({"forces": [0.05, 0.1]}, 1), ({"displacements": [1.0, 2.0]}, 0)):
+        shown.clear()
+        curve = simulation.load_displacement(push, **given)
+        fm.write_report(tmp_path, simulation, [curve])
+        (series,) = shown
+        points, moved = (series.displacement, series.force), series.corrected.T
+        assert moved[known] == pytest.approx(points[known], abs=0.0)
+        expected = curve.values + curve.error_estimates()
+        assert moved[1 - known] == pytest.approx(expected, rel=1e-12) and (moved[1 - known] != curve.values).all()
+
+
 @pytest.mark.parallel
 def test_reports_of_several_processes_are_those_of_one(shared_tmp_path):
     simulation = truss().simulate(comm=MPI.COMM_WORLD)

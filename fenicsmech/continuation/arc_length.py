@@ -46,6 +46,9 @@ class ArcSteps:
         turn: angle between the tangents at both ends of a step that step sizes aim at, rad.
         largest_turn: angle above which a step is repeated with a smaller length: it jumps to another branch, or cuts
             off a bend. Where other points touch an obstacle at its end, paths have corners, up to a right angle.
+        gap: between two paths that pass each other, over the step, from which the step is repeated with a smaller
+            length; closer ones count as one bifurcation.
+        bisections: of a step in which the stability changes and the path turns, to tell that gap.
         iterations: number per step that step sizes aim at; the last one only determines the stability.
         contact_iterations: the same where other points touch at the end of a step: it hardly depends on its length.
 
@@ -60,11 +63,15 @@ class ArcSteps:
     tolerance: float = 1e-4
     turn: float = 0.25
     largest_turn: float = 0.9
+    gap: float = 0.2
+    bisections: int = 5
     iterations: int = 5
     contact_iterations: int = 7
 
     def __post_init__(self) -> None:
-        set_options(self, "arc-length steps", below_one=("tolerance",), iterations=1, contact_iterations=1)
+        set_options(
+            self, "arc-length steps", below_one=("tolerance",), bisections=1, iterations=1, contact_iterations=1
+        )
 
 
 @dataclass(frozen=True)
@@ -196,7 +203,9 @@ class ArcLengthStepper(Stepper):
                 turn = self._turn(point, found)
                 _log.debug("arc %.2e: turn %.2f, %d iterations", self.length, turn, found.iterations)
                 touched = self._other_points_touch(point.state, found.state)
-                if turn <= steps.largest_turn or (touched and turn < 0.5 * math.pi):
+                # a straight path that goes on straight is the same one
+                jumps = turn > 0.1 * steps.gap and not touched and self._jumps(point, found)
+                if (turn <= steps.largest_turn and not jumps) or (touched and turn < 0.5 * math.pi):
                     iterations = steps.contact_iterations if touched else steps.iterations
                     growth = min(steps.turn / max(turn, 1e-12), math.sqrt(iterations / found.iterations))
                     self.length *= min(max(growth, 0.5), 2.0)
@@ -207,6 +216,29 @@ class ArcLengthStepper(Stepper):
             self.length *= 0.5
             if self.length < steps.smallest * min(longest / steps.largest, 1.0):
                 raise NotConverged(reason)
+
+    def _jumps(self, start: EquilibriumPoint, end: EquilibriumPoint) -> bool:
+        """Whether another path that comes near, as beside an imperfect bifurcation, is taken in the step.
+
+        The number of unstable modes differs then, and the part of the step in which it changes, bisected, remains as
+        long as the gap between the paths, far longer than its part of the tangent. Gaps far below the step are those of
+        a mesh that is not quite symmetric; such steps go on along the path that would be straight without them.
+        """
+        if start.unstable_modes == end.unstable_modes or self.followed.displaces:
+            return False
+        if self.value_rate(start) * self.value_rate(end) < 0.0:
+            return False  # a limit point
+        low, high = start, end
+        near, far = 0.0, self.along(start, end)
+        part = far * 0.5**self.steps.bisections
+        while far - near > 1.5 * part:
+            middle = 0.5 * (near + far)
+            found = self.between(start, end, middle)
+            if found.unstable_modes == start.unstable_modes:
+                low, near = found, middle
+            else:
+                high, far = found, middle
+        return self.metric.norm(self.chord(low, high)) > self.steps.gap * self.metric.norm(self.chord(start, end))
 
     def _longest(self, point: EquilibriumPoint) -> float:
         """The longest arc within the limits on the value, its conjugate and motions."""

@@ -17,7 +17,7 @@ the same on all processes and machines, and not by time:
     3. shorter steps where elements are inverted               its ``halvings_inverted`` an iteration
     4. line search, from the best state so far                 its ``iterations`` and ``factorisations``, with 2 and 3
     5. other least shifts of zero-energy modes                 ``LoadSteps.shift_factors``, a solve each
-    6. half the step                                           ``LoadSteps.smallest``, or ``failures`` such steps
+    6. half the step                                           ``LoadSteps.smallest``, or ``failures`` in a row
     7. of motors: links that strain beyond a dead centre       ten halvings; then load steps once more
 
 Then the last equilibrium and the values without one are reported. The control stays the one that was asked for: under
@@ -57,8 +57,8 @@ class LoadSteps:
     Attributes:
         smallest: smallest step, over the distance to the end, or the distance covered if that is less.
         motion: largest motion of a step along the tangent (measured).
-        failures: steps without equilibrium on the way to one prescribed value after which stepping fails. Locating a
-            limit load takes ten to twelve, equilibria that are found take three at most (measured).
+        failures: steps in a row without equilibrium after which stepping fails: halved as often, a step is 1e-12 of
+            itself. Those before an equilibrium that was reached do not count.
         smallest_limited: smallest step that ``motion`` may impose, over the distance to the end; smaller ones arise
             in singular positions, where the tangent is ignored.
         largest_prediction: motion above which a prediction is discarded.
@@ -70,6 +70,8 @@ class LoadSteps:
         branching_rate: largest rate of a step off a bifurcation, over the rate at its end.
         smallest_snap: smallest motion that counts as a snap; that at bifurcations is smaller.
         smallest_snap_step: smallest step, measured like ``smallest``, that is halved because of a snap.
+        fold_growth: growth of the tangent over the last step from which the path counts as turning back.
+        fold_ahead: largest distance ahead at which it does, over the last step that failed.
         minimum_shift: least shift of the KKT matrix, in units of the mean stiffness, where a mechanism has zero-energy
             modes, which would leave it singular.
         shift_factors: of ``minimum_shift``, tried in order: a shift slows Newton's method down where soft springs or
@@ -81,7 +83,7 @@ class LoadSteps:
 
     smallest: float = 1.0 / 1024.0
     motion: float = 0.2
-    failures: int = 20
+    failures: int = 40
     smallest_limited: float = 1e-6
     largest_prediction: float = 1.0
     contact_residual: float = 10.0
@@ -90,6 +92,8 @@ class LoadSteps:
     branching_rate: float = 2.2
     smallest_snap: float = 1e-4
     smallest_snap_step: float = 1.0 / 64.0
+    fold_growth: float = 1.1
+    fold_ahead: float = 4.0
     minimum_shift: float = 1e-10
     shift_factors: tuple[float, ...] = (1.0, 1e-3, 0.0)
 
@@ -107,11 +111,19 @@ class LoadStepsFailed(Exception):
         reached: its control value.
         reason: the solver's message.
         tried: control values without equilibrium.
+        fold: the control value at which the path turns back, None if it does not.
     """
 
-    def __init__(self, last: EquilibriumPoint | None, reached: float, reason: str, tried: tuple[float, ...]) -> None:
+    def __init__(
+        self,
+        last: EquilibriumPoint | None,
+        reached: float,
+        reason: str,
+        tried: tuple[float, ...],
+        fold: float | None = None,
+    ) -> None:
         super().__init__(reason)
-        self.last, self.reached, self.reason, self.tried = last, reached, reason, tried
+        self.last, self.reached, self.reason, self.tried, self.fold = last, reached, reason, tried, fold
 
 
 class LoadStepper(Stepper):
@@ -154,7 +166,7 @@ class LoadStepper(Stepper):
             if self._held:
                 self._shifts = self._shifts[::-1]
         steps, distance = self._steps, control.prescribed - self._value
-        step, tried = distance, []
+        step, tried, failed = distance, [], 0  # failed: steps since the last equilibrium
         while True:
             remaining = control.prescribed - self._value
             step = self._limited(step, distance)
@@ -164,9 +176,11 @@ class LoadStepper(Stepper):
                 point = self._correct(self._guess(control.at(value)), control.at(value))
             except NotConverged as failure:
                 tried.append(value)
+                failed += 1
                 step = 0.5 * (value - self._value)
-                if abs(step) <= steps.smallest * self._scale(distance) or len(tried) == steps.failures:
-                    raise LoadStepsFailed(self._last, self._value, failure.reason, tuple(tried)) from failure
+                if abs(step) <= steps.smallest * self._scale(distance) or failed == steps.failures:
+                    fold = self._fold(tried[-1])
+                    raise LoadStepsFailed(self._last, self._value, failure.reason, tuple(tried), fold) from failure
                 continue
             if self._snapped(point):
                 if abs(value - self._value) > steps.smallest_snap_step * self._scale(distance):
@@ -180,12 +194,32 @@ class LoadStepper(Stepper):
             self._accept_at(point)
             if arrives:
                 return point
+            failed = 0
             if point.iterations <= steps.iterations:
                 step *= 2.0
 
     @property
     def _last(self) -> EquilibriumPoint | None:
         return self._points[-1] if self._points else None
+
+    def _fold(self, tried: float) -> float | None:
+        """The value v* at which the path turns back, if it does before ``tried`` or about there.
+
+        Tangents grow towards a fold, |y′| ~ 1 / √(v* − v). From those at the last two points,
+
+            v* = v₁ + (v₁ − v₀) / (g² − 1),     g = |y₁′| / |y₀′|.
+
+        Where links stretch straight, motions grow so too, and the force far more: nothing turns back there.
+        """
+        if len(self._points) < 2:
+            return None
+        before, last = (self.system.size(point.tangent) for point in self._points)
+        growth, beyond = last / before if before else 1.0, tried - self._value
+        rates = agreed(self.system.comm, [abs(point.conjugate_rate) for point in self._points])
+        if not (growth > self._steps.fold_growth and rates[1] <= growth**2 * rates[0]):
+            return None
+        ahead = self._width / (growth**2 - 1.0)
+        return self._value + ahead if 0.0 < ahead / beyond <= self._steps.fold_ahead else None
 
     def _settle(self, control: Control) -> None:
         """The equilibrium at the start, whose tangent limits the first step."""

@@ -102,9 +102,7 @@ def carried(
         Infeasible: loading leads elsewhere.
     """
     try:
-        if solved is None:
-            return equilibria.from_other(surrogate(), estimated=True)
-        return equilibria.from_design(solved, estimated=True)
+        return equilibria.from_other(surrogate()) if solved is None else equilibria.from_design(solved)
     except Infeasible as failure:
         before = "the surrogate" if solved is None else "the last round"
         _log.info("equilibria of %s do not lead to those of this one: %s", before, failure)

@@ -31,6 +31,7 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
+from fenicsmech.collective import agreed
 from fenicsmech.design.optimisers.problem import Infeasible
 from fenicsmech.design.target import Target, sample_request
 from fenicsmech.design.transfer import WholeState, guess, whole_state
@@ -40,7 +41,6 @@ from fenicsmech.equilibrium import (
     DisplacementControl,
     EquilibriumPoint,
     EquilibriumSolver,
-    Linearisation,
     LoadControl,
     NotConverged,
     State,
@@ -113,17 +113,11 @@ class DesignEquilibria:
         design: that they belong to.
         samples: the equilibrium of each sample.
         raw: values of each target's observable, from the unloaded configuration where they count from there.
-        errors: estimated discretisation errors of the components, if they are known, (components,).
     """
 
     design: Design
     samples: dict[Sample, SampleState]
     raw: tuple[np.ndarray, ...]
-    errors: np.ndarray | None = None
-
-
-Values = Sequence[np.ndarray] | Mapping[int, np.ndarray]
-"""Values of observables by the places of their targets."""
 
 
 class _Path:
@@ -153,7 +147,8 @@ class _Path:
         if self.moved is None:
             return LoadControl(self.sample.magnitude)
         self._model.load(unloaded)
-        return DisplacementControl(self.sample.value + float(self.moved.values(unloaded)[0]))
+        origin = agreed(self._model.mesh.comm, float(self.moved.values(unloaded)[0]))
+        return DisplacementControl(self.sample.value + origin)
 
 
 class SampleEquilibria:
@@ -196,42 +191,34 @@ class SampleEquilibria:
             found.update(self._traced(samples))
         return self._at_design({sample: found[sample] for sample in self._paths})
 
-    def from_other(self, guesses: Mapping[Sample, WholeState], *, estimated: bool = False) -> DesignEquilibria:
+    def from_other(self, guesses: Mapping[Sample, WholeState]) -> DesignEquilibria:
         """The equilibria of all samples at the present design, from those of another simulation at the same design.
-
-        Args:
-            guesses: the equilibrium of each sample there.
-            estimated: whether discretisation errors are estimated, too, with the last factor of each equilibrium, which
-                changes them by less than a hundredth.
 
         Raises:
             Infeasible: an equilibrium is not found, is unstable or is not a continuation of the guess.
         """
-        samples, errors = dict[Sample, SampleState](), dict[int, list[float]]()
+        samples: dict[Sample, SampleState] = {}
         for first, *others in self._on_one_path():
             unloaded = self._unloaded(first)
             for sample in (first, *others):
-                path = self._paths[sample]
-                samples[sample], last = self._from_guess(path, guesses[sample], unloaded)
-                if estimated:
-                    errors |= self._errors_at(path, samples[sample], last)
-        return self._at_design({sample: samples[sample] for sample in self._paths}, errors if estimated else None)
+                samples[sample] = self._from_guess(self._paths[sample], guesses[sample], unloaded)
+        return self._at_design({sample: samples[sample] for sample in self._paths})
 
-    def from_design(self, solved: DesignEquilibria, *, estimated: bool = False) -> DesignEquilibria:
-        """The equilibria at the present design, from those of another one; ``estimated`` as in ``from_other``.
+    def from_design(self, solved: DesignEquilibria) -> DesignEquilibria:
+        """The equilibria at the present design, from those of another one.
 
         Raises:
             Infeasible: an equilibrium is not found or is unstable.
         """
-        design, samples, errors = self._model.design, dict[Sample, SampleState](), dict[int, list[float]]()
+        design = self._model.design
         try:
-            for sample, path in self._paths.items():
-                samples[sample], last = self._followed(path, solved.samples[sample], solved.design, design)
-                if estimated:
-                    errors |= self._errors_at(path, samples[sample], last)
+            samples = {
+                path.sample: self._followed(path, solved.samples[path.sample], solved.design, design)
+                for path in self._paths.values()
+            }
         finally:
             self._model.reshape(design)
-        return self._at_design(samples, errors if estimated else None)
+        return self._at_design(samples)
 
     def whole(self, solved: DesignEquilibria) -> dict[Sample, WholeState]:
         """Equilibria as ``from_other`` of another simulation takes them, on all processes of this one."""
@@ -249,24 +236,37 @@ class SampleEquilibria:
         """Derivatives of the components at the design that the model holds."""
         found = {k: [self._sensitivity.at_rest(own)] for k, own in self._at_rest.items()}
         for path in self._paths.values():
+            own = self._of(path.sample)
             at = solved.samples[path.sample]
-            places, partials = self._partials(solved.raw, path, at.state, self._of(path.sample))
+            places, partials = self._partials(solved, path, at.state, own)
             loaded = self._sensitivity.of(path.solver, at.state, at.control, partials)
             if path.moves(at.unloaded):
-                loaded = self._less_unloaded(solved.raw, path, at, places, loaded)
+                loaded = self._less_unloaded(solved, path, places, loaded)
             for k, gradient in zip(places, loaded, strict=True):
                 found.setdefault(k, []).append(gradient)
         return [gradient for k in range(len(self.targets)) for gradient in found[k]]
 
     def errors(self, solved: DesignEquilibria) -> np.ndarray:
         """Estimated discretisation errors of the components, to be added, (components,)."""
-        if solved.errors is not None:
-            return solved.errors
-        found = dict[int, list[float]]()
+        found = {k: [0.0] for k in self._at_rest}
         with self._model.shaped(solved.design):
-            for sample, path in self._paths.items():
-                found |= self._errors_at(path, solved.samples[sample])
-        return self._sorted(found)
+            for path in self._paths.values():
+                at = solved.samples[path.sample]
+                places, partials = self._partials(solved, path, at.state, self._of(path.sample))
+                adjoints = self._sensitivity.adjoints(path.solver, at.state, at.control, partials)
+                errors, slopes = self._estimated(adjoints), [own.by_control() if own else 0.0 for own in adjoints]
+                if path.moves(at.unloaded):
+                    from_there, counted, prescribed = self._unloaded_partials(solved, path, places)
+                    unloaded = self._estimated(
+                        self._sensitivity.adjoints(path.solver, at.unloaded, LoadControl(0.0), from_there)
+                    )
+                    for place, error in zip(counted, unloaded, strict=False):
+                        errors[place] -= error
+                    if prescribed:
+                        errors = [own + slope * unloaded[-1] for own, slope in zip(errors, slopes, strict=True)]
+                for k, error in zip(places, errors, strict=True):
+                    found.setdefault(k, []).append(error)
+        return np.array([error for k in range(len(self.targets)) for error in found[k]])
 
     # -- values and derivatives of one sample --------------------------------------------------------------------
 
@@ -275,58 +275,27 @@ class SampleEquilibria:
         pairs = enumerate(zip(self.targets, self._observables, strict=True))
         return [(observable, k) for k, (target, observable) in pairs if target.sample == sample]
 
-    def _at_design(
-        self, samples: dict[Sample, SampleState], errors: dict[int, list[float]] | None = None
-    ) -> DesignEquilibria:
+    def _at_design(self, samples: dict[Sample, SampleState]) -> DesignEquilibria:
         raw = {k: np.array([observable.value()]) for k, observable in self._at_rest.items()}
         for sample, at in samples.items():
-            raw |= self._raw(sample, at)
-        design, places = self._model.design, range(len(self.targets))
-        known = None if errors is None else self._sorted(errors)
-        return DesignEquilibria(design, samples, tuple(raw[k] for k in places), known)
-
-    def _raw(self, sample: Sample, at: SampleState) -> dict[int, np.ndarray]:
-        """Values of the observables of a sample, by the places of their targets."""
-        own, raw = self._of(sample), dict[int, np.ndarray]()
-        counted = [pair for pair in own if self.targets[pair[1]].quantity.from_unloaded]
-        for state, pairs, sign in ((at.unloaded, counted, -1.0), (at.state, own, 1.0)):
-            self._model.load(state)
-            for observable, k in pairs:
-                raw[k] = raw.get(k, 0.0) + sign * observable.values(state)
-        return raw
-
-    def _sorted(self, errors: dict[int, list[float]]) -> np.ndarray:
-        """Errors of the components, from those by the place of their target; none where links are at rest."""
-        known = dict.fromkeys(self._at_rest, [0.0]) | errors
-        return np.array([error for k in range(len(self.targets)) for error in known[k]])
-
-    def _errors_at(self, path: _Path, at: SampleState, last: Linearisation | None = None) -> dict[int, list[float]]:
-        """Errors of the components of one sample, by the place of their target, with the ``last`` factor if given."""
-        raw, adjoints = self._raw(path.sample, at), self._sensitivity.adjoints
-        places, partials = self._partials(raw, path, at.state, self._of(path.sample))
-        own = adjoints(path.solver, at.state, at.control, partials, last)
-        errors, slopes = self._estimated(own), [adjoint.by_control() if adjoint else 0.0 for adjoint in own]
-        if path.moves(at.unloaded):
-            from_there, counted, prescribed = self._unloaded_partials(raw, path, at, places)
-            unloaded = self._estimated(adjoints(path.solver, at.unloaded, LoadControl(0.0), from_there))
-            for place, error in zip(counted, unloaded, strict=False):
-                errors[place] -= error
-            if prescribed:
-                errors = [error + slope * unloaded[-1] for error, slope in zip(errors, slopes, strict=True)]
-        found = dict[int, list[float]]()
-        for k, error in zip(places, errors, strict=True):
-            found.setdefault(k, []).append(error)
-        return found
+            own = self._of(sample)
+            counted = [pair for pair in own if self.targets[pair[1]].quantity.from_unloaded]
+            for state, pairs, sign in ((at.unloaded, counted, -1.0), (at.state, own, 1.0)):
+                self._model.load(state)
+                for observable, k in pairs:
+                    raw[k] = raw.get(k, 0.0) + sign * observable.values(state)
+        design = self._model.design
+        return DesignEquilibria(design, samples, tuple(raw[k] for k in range(len(self.targets))))
 
     def _partials(
-        self, raw: Values, path: _Path, state: State, own: Sequence[tuple[Observable, int]]
+        self, solved: DesignEquilibria, path: _Path, state: State, own: Sequence[tuple[Observable, int]]
     ) -> tuple[list[int], list[Partial]]:
         """The partial derivatives of the wanted components at a state, each with the place of its target."""
         self._model.load(state)
         places, partials = [], []
         for observable, k in own:
             target = self.targets[k]
-            _, slopes = target.quantity.reduce(raw[k])
+            _, slopes = target.quantity.reduce(solved.raw[k])
             parts = observable.partials(path.solver.system, state)
             for row in slopes[: target.size]:
                 places.append(k)
@@ -335,25 +304,26 @@ class SampleEquilibria:
         return places, partials
 
     def _unloaded_partials(
-        self, raw: Values, path: _Path, at: SampleState, places: Sequence[int]
+        self, solved: DesignEquilibria, path: _Path, places: Sequence[int]
     ) -> tuple[list[Partial], list[int], bool]:
         """Partial derivatives in the unloaded configuration: of the components that count from there, then of the
         prescribed displacement; which components these are; and whether a displacement is prescribed.
         """
-        quantities = [self.targets[k].quantity for k in places]
+        unloaded, quantities = solved.samples[path.sample].unloaded, [self.targets[k].quantity for k in places]
         counted = [place for place, quantity in enumerate(quantities) if quantity.from_unloaded]
         own = [pair for pair in self._of(path.sample) if self.targets[pair[1]].quantity.from_unloaded]
-        _, partials = self._partials(raw, path, at.unloaded, own)
+        _, partials = self._partials(solved, path, unloaded, own)
         if path.moved is not None:
-            partials += path.moved.partials(path.solver.system, at.unloaded)
+            partials += path.moved.partials(path.solver.system, unloaded)
         return partials, counted, path.moved is not None
 
     def _less_unloaded(
-        self, raw: Values, path: _Path, at: SampleState, places: Sequence[int], loaded: Sequence[Gradient]
+        self, solved: DesignEquilibria, path: _Path, places: Sequence[int], loaded: Sequence[Gradient]
     ) -> list[Gradient]:
         """Derivatives of components less those in the unloaded configuration."""
-        partials, counted, prescribed = self._unloaded_partials(raw, path, at, places)
-        unloaded = self._sensitivity.of(path.solver, at.unloaded, LoadControl(0.0), partials)
+        partials, counted, prescribed = self._unloaded_partials(solved, path, places)
+        origin = solved.samples[path.sample].unloaded
+        unloaded = self._sensitivity.of(path.solver, origin, LoadControl(0.0), partials)
         found = list(loaded)
         for place, gradient in zip(counted, unloaded, strict=False):
             found[place] = found[place] + -1.0 * gradient
@@ -409,8 +379,8 @@ class SampleEquilibria:
         except (EquilibriumError, AssemblyError) as error:
             raise Infeasible(str(error)) from error
 
-    def _from_guess(self, path: _Path, other: WholeState, unloaded: State) -> tuple[SampleState, Linearisation]:
-        """The equilibrium near that in another simulation, whose residual is removed in one step; the last factor."""
+    def _from_guess(self, path: _Path, other: WholeState, unloaded: State) -> SampleState:
+        """The equilibrium near the one in another simulation, whose residual is removed in one step."""
         system, control = path.solver.system, path.control(unloaded)
         start = control.prepare(guess(self._model, other, unloaded))
         found = self._solved(path, start, control)
@@ -422,26 +392,20 @@ class SampleEquilibria:
         farthest = max(self._options.farthest_transfer * motion, self._options.rounding)
         if missed > self._options.largest_transfer_miss or distance > farthest:
             raise _Lost(_lost(path.sample, "a fold lies between this simulation and the other one"))
-        return SampleState(found.state, control, unloaded), found.linearisation
+        return SampleState(found.state, control, unloaded)
 
     # -- from one design to another ------------------------------------------------------------------------------
 
-    def _followed(
-        self, path: _Path, at: SampleState, before: Design, after: Design
-    ) -> tuple[SampleState, Linearisation]:
-        """The sample at design ``after``, from that at ``before``; the last factor. The model holds ``after``."""
+    def _followed(self, path: _Path, at: SampleState, before: Design, after: Design) -> SampleState:
         unloaded, halvings, nothing = at.unloaded, self._options.halvings, LoadControl(0.0)
         if path.moves(unloaded):
-            start, end = _Prescribed(before, nothing), _Prescribed(after, nothing)
-            unloaded = self._moved(path, unloaded, start, end, halvings).state
+            unloaded = self._moved(path, unloaded, _Prescribed(before, nothing), _Prescribed(after, nothing), halvings)
         self._model.reshape(after)
         control = path.control(unloaded)
-        found = self._moved(path, at.state, _Prescribed(before, at.control), _Prescribed(after, control), halvings)
-        return SampleState(found.state, control, unloaded), found.linearisation
+        state = self._moved(path, at.state, _Prescribed(before, at.control), _Prescribed(after, control), halvings)
+        return SampleState(state, control, unloaded)
 
-    def _moved(
-        self, path: _Path, state: State, before: _Prescribed, after: _Prescribed, halvings: int
-    ) -> EquilibriumPoint:
+    def _moved(self, path: _Path, state: State, before: _Prescribed, after: _Prescribed, halvings: int) -> State:
         """The equilibrium at design ``after``, from the one at ``before``, halfway first if need be."""
         try:
             return self._next(path, state, before, after)
@@ -449,10 +413,10 @@ class SampleEquilibria:
             if halvings == 0:
                 raise
         halfway = before.halfway(after)
-        state = self._moved(path, state, before, halfway, halvings - 1).state
+        state = self._moved(path, state, before, halfway, halvings - 1)
         return self._moved(path, state, halfway, after, halvings - 1)
 
-    def _next(self, path: _Path, start: State, before: _Prescribed, after: _Prescribed) -> EquilibriumPoint:
+    def _next(self, path: _Path, start: State, before: _Prescribed, after: _Prescribed) -> State:
         """The equilibrium at design ``after``, in one step."""
         model, system = self._model, path.solver.system
         model.reshape(before.design)
@@ -464,10 +428,9 @@ class SampleEquilibria:
         missing.scale(-1.0)
         missed = self._missed(path, found, start, back, missing)
         model.reshape(after.design)
-        system.unknowns.turn(found.state.poses)
         if missed > self._options.largest_miss:
             raise _Lost(_lost(path.sample, "a fold lies between this design and the last one"))
-        return found
+        return found.state
 
     def _solved(self, path: _Path, start: State, control: Control) -> EquilibriumPoint:
         """The stable equilibrium that Newton's method finds from ``start``, where all potentials hold."""

@@ -189,7 +189,7 @@ def _in_finer_elements(equilibria: SampleEquilibria, guesses: Mapping[Sample, Wh
     """Equilibria from those of coarser elements, or from zero load."""
     if guesses is not None:
         try:
-            return equilibria.from_other(guesses, estimated=True)
+            return equilibria.from_other(guesses)
         except Infeasible as failure:
             _log.info("equilibria in larger elements do not lead to those in smaller ones: %s", failure)
     return equilibria.from_zero()

@@ -259,7 +259,9 @@ class OneSided:
         else:
             stiffness = _RELATIVE_STIFFNESS * link.material.law.E / self._heights()
         self.compliances = np.repeat(1.0 / stiffness, len(self._points))
-        self._rest, self._u = (np.zeros(0), np.zeros(0)), np.zeros(0)  # shape and depth, u of the last update
+        # shape and depth, and u, of the last update; None before the first: arrays are empty on ranks without cells
+        self._rest: tuple[np.ndarray, np.ndarray] | None = None
+        self._u: np.ndarray | None = None
 
     @cached_property
     def _gap(self) -> SmoothFunction:
@@ -278,8 +280,9 @@ class OneSided:
         """Takes the rest shape and the displacements that the fields hold, where they changed. Local."""
         body = self._body
         shape, depth, u = body.shape.x.array, body.depth.x.array, body.u.x.array
-        same_rest = np.array_equal(shape, self._rest[0]) and np.array_equal(depth, self._rest[1])
-        if same_rest and np.array_equal(u, self._u):
+        rest = self._rest
+        same_rest = rest is not None and np.array_equal(shape, rest[0]) and np.array_equal(depth, rest[1])
+        if same_rest and self._u is not None and np.array_equal(u, self._u):
             return
         if not same_rest:
             self._take_rest()

@@ -91,7 +91,8 @@ class ElasticBody(BodyFields):
         ½ ∫ E ((a − p)² − 2 q h) + μ b²/12 |∇a − Fᵀv|² + b⁴/720 E/(1 − ν²) ((1 − ν) G : G + ν (tr G)²) + 2 P a det F dV
 
         with G = sym Fᵀ∇v and p the projection of h, whose derivatives are those of the term in q, that of a − p. P is
-        the load factor times the ``pressures`` on the faces of each link across its depth.
+        the load factor times the ``pressures`` on the faces of each link across its depth. dV is of the strain-free
+        state, but in the term of P of the rest shape, from which F and a count.
         """
         assert isinstance(self.model, PlaneStress), "links contract freely in plane stress alone"
         H, b, terms = self.gradient(self.u), self.depth, []
@@ -104,7 +105,7 @@ class ElasticBody(BodyFields):
             contraction = E * ((a - p) ** 2 - 2 * q * h)
             curling = b**2 / 12 * E / (2 * (1 + nu)) * ufl.inner(shear, shear)
             membrane = b**4 / 720 * E / (1 - nu**2) * ((1 - nu) * ufl.inner(G, G) + nu * ufl.tr(G) ** 2)
-            density = (0.5 * (contraction + curling + membrane) + squeezing) * self._volume
+            density = 0.5 * (contraction + curling + membrane) * self._volume + squeezing * self._rest_volume
             terms.append(density * term.dx(metadata={"quadrature_degree": degree}))
         return _sum(terms)
 
@@ -124,8 +125,12 @@ class ElasticBody(BodyFields):
     @property
     def _volume(self):
         """Strain-free volume per volume of the mesh."""
-        volume = ufl.det(self.rest_gradient) * self.model.multiplier(self.depth)
-        return volume if self.growth is None else volume * self.growth.volume
+        return self._rest_volume if self.growth is None else self._rest_volume * self.growth.volume
+
+    @property
+    def _rest_volume(self):
+        """Volume of the rest shape per volume of the mesh."""
+        return ufl.det(self.rest_gradient) * self.model.multiplier(self.depth)
 
     # -- compiled -----------------------------------------------------------------------------------------------
 

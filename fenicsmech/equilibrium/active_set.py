@@ -285,12 +285,12 @@ class _Equation:
         far = near = self.ahead
         if (first := missed(near)) != 0.0:
             for doubling in range(self.iterations):
-                far = near - 2.0**doubling * first
-                if missed(far) * first <= 0.0:
+                if missed(near - 2.0**doubling * first) * first <= 0.0:
                     break
             else:
                 raise RuntimeError("contact keeps the path from reaching the plane")
-            far = brentq(missed, near, far, rtol=1e-6)
+            # in units of the first miss: tolerances do not depend on those of the control
+            far = near - first * brentq(lambda t: missed(near - t * first) / first, 0.0, 2.0**doubling, rtol=1e-6)
         return self._by_least_squares(far)
 
     def _by_least_squares(self, h: float) -> np.ndarray:

@@ -17,7 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fenicsmech.equilibrium import Adjoint, EquilibriumSolver, LoadControl, NotConverged, Unknown
-from fenicsmech.errors import EquilibriumError, set_options
+from fenicsmech.errors import set_options
 from fenicsmech.estimates.estimates import Equilibrium, adjoint_at
 from fenicsmech.model import MechanismModel
 
@@ -48,7 +48,13 @@ class DoubtOptions:
 def near_limit_point(
     model: MechanismModel, solver: EquilibriumSolver, equilibrium: Equilibrium, error: float, options: DoubtOptions
 ) -> bool:
-    """Whether the compliance of the controlled force changes much where its displacement differs by ``error``."""
+    """Whether the compliance of the controlled force changes much where its displacement differs by ``error``.
+
+    Forces at prescribed displacements are not examined.
+
+    Raises:
+        EquilibriumError: the KKT matrix of the equilibrium is singular.
+    """
     if equilibrium.unknown is Unknown.FORCE or error == 0.0:
         return False
     state, system = equilibrium.state, solver.system
@@ -61,7 +67,7 @@ def near_limit_point(
             there = system.moved(state, here.at.tangent().scaled(options.step * error / compliance))
             beyond = solver.linearise(there, LoadControl(there.force))
             ratio = Adjoint.of(beyond, beyond.travel_gradient(system.controlled)).by_control() / compliance
-        except (EquilibriumError, NotConverged):
+        except NotConverged:  # singular within the error
             return True
         finally:
             system.load(state)

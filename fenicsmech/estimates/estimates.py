@@ -188,10 +188,15 @@ class Estimates:
         errors = [self._element_error if kind is ErrorKind.ELEMENTS else self._plane_stress_error for kind in kinds]
         return [error.of(adjoint) for error in errors]
 
-    def spread(self, solver: EquilibriumSolver, equilibrium: Equilibrium) -> float:
-        """Sum of the absolute contributions of all cells to the estimated error of elements; raises as ``at``."""
+    def spread(self, solver: EquilibriumSolver, equilibrium: Equilibrium, *, origin: float = 0.0) -> float:
+        """Sum of the absolute contributions of all cells to the estimated error of elements; raises as ``at``.
+
+        ``origin`` is that of the place that a prescribed displacement counts from.
+        """
         with self._model.shaped(equilibrium.design):
-            return self._element_error.spread(adjoint_at(solver, equilibrium))
+            adjoint = adjoint_at(solver, equilibrium)
+            slope = adjoint.by_control() if origin and equilibrium.unknown is Unknown.FORCE else 1.0
+            return self._element_error.spread(adjoint) + abs(slope) * origin
 
     @cached_property
     def _element_error(self) -> ElementError:

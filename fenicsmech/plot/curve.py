@@ -175,11 +175,11 @@ def _draw_series(axes: Axes, curve: CurveSeries, colour: str) -> None:
     for part, face in ((stable, colour), (~stable, "white")):
         axes.plot(*points[part].T, "o", ms=size, mfc=face, mec=colour, mew=1.0, zorder=4 - 1.5 * behind)
     if len(curve.corrected):
-        off = np.any(curve.corrected != points, axis=1)
-        bars, across = np.stack([points, curve.corrected], axis=1)[off], curve.corrected[:, 0] != curve.displacement
+        moved = curve.corrected != points
+        bars = np.stack([points, curve.corrected], axis=1)[moved.any(axis=1)]
         axes.add_collection(LineCollection(bars, colors=colour, lw=0.7 * width, zorder=4.5 - behind))
         look = {"ms": 1.6 * size, "mec": colour, "mew": 0.7 * width, "zorder": 4.5 - behind}
-        axes.plot(*bars[:, 1].T, "|" if across.any() else "_", **look)
+        axes.plot(*bars[:, 1].T, "|" if moved[:, 0].any() else "_", **look)
 
 
 def _draw_targets(axes: Axes, targets: Sequence[CurveTarget]) -> None:

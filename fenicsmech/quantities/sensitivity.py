@@ -33,7 +33,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from fenicsmech.compat import destroy_garbage, owned_values
-from fenicsmech.equilibrium import Adjoint, Control, EquilibriumSolver, Linearisation, State
+from fenicsmech.equilibrium import Adjoint, Control, EquilibriumSolver, State
 from fenicsmech.model import MechanismModel
 from fenicsmech.quantities.number import NumberKind, NumberTerms
 from fenicsmech.quantities.quantity import FormValue, Observable, Partial, RestObservable
@@ -103,20 +103,12 @@ class Sensitivity:
         return self._gradient(None, observable.slope())
 
     def adjoints(
-        self,
-        solver: EquilibriumSolver,
-        state: State,
-        control: Control,
-        partials: Sequence[Partial],
-        last: Linearisation | None = None,
+        self, solver: EquilibriumSolver, state: State, control: Control, partials: Sequence[Partial]
     ) -> list[Adjoint | None]:
-        """The adjoint of each component, from one factor; None where it does not depend on the state.
-
-        The ``last`` factor of the iteration that found the equilibrium, if given, has an error of its own.
-        """
+        """The adjoint of each component, from one factor; None where it does not depend on the state."""
         if not any(partial.of_state for partial in partials):
             return [None] * len(partials)
-        at, blocks = last or solver.linearise(state, control), solver.system.blocks
+        at, blocks = solver.linearise(state, control), solver.system.blocks
         nothing = np.zeros(len(state.u)), np.zeros(blocks.border.size)
         return [
             Adjoint.of(at, at.transpose(nothing[0] + own.links, nothing[1] + own.border)) if own.of_state else None

@@ -205,7 +205,7 @@ class Curve:
                 "force at a point of a flexible link": grown > options.growth * abs(error),
             }
             if not modelling:
-                whole = spread + estimates.spread(self._solver, at)
+                whole = estimates.spread(self._solver, at, origin=spread)
                 reasons["contributions of elements cancel"] = abs(error) < options.cancelled * whole
             found.append(tuple(reason for reason, holds in reasons.items() if holds))
         return tuple(found)

@@ -204,9 +204,8 @@ def branches(
 class CurveFollower:
     """The path of one request, until an end."""
 
-    _HELD = (
-        1e-3  # force at which a path starts if nothing else holds the mechanism, over that of a linear one at its end
-    )
+    # force at which a path starts if nothing else holds the mechanism, over that of a linear one at its end
+    _HELD = 1e-3
 
     def __init__(self, discretisation: Discretisation, request: CurveRequest, until: Until, steps: ArcSteps) -> None:
         self._stepper, self._until, self._steps = CurveStepper(discretisation, request), until, steps

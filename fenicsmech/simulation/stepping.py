@@ -357,11 +357,16 @@ class CurveStepper:
             )
         what, origin = ("displacement", self.origin) if control.constrained else ("force", 0.0)
         force = f" with a force of {last.force:g}" if control.constrained and last is not None else ""
+        tried, remedy = f"{failure.reason}; {len(failure.tried)} smaller steps were tried", {}
+        if failure.fold is not None:
+            tried = f"the path turns back near {failure.fold - origin:.6g}; {tried}"
+            other = "" if control.constrained else " or displacement control"
+            remedy = {"otherwise": f"Use follow(){other}, which goes round the turn, or values before it"}
         problem = (
             f"no equilibrium at {what} {control.prescribed - origin:g}; the last one is at {failure.reached - origin:g}"
-            f"{force} ({failure.reason}; {len(failure.tried)} smaller steps were tried)"
+            f"{force} ({tried})"
         )
-        return self.error(where, problem, last)
+        return self.error(where, problem, last, **remedy)
 
     def error(
         self,

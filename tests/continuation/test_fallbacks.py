@@ -68,15 +68,26 @@ def test_smaller_shifts_come_before_half_the_step():
     assert failure.value.tried == tuple(values) and failure.value.reached == 0.0
 
 
-def test_steps_that_fail_whenever_they_have_grown_again_end_after_a_bounded_number():
-    path = Stubborn(1.1 / 1024.0)  # of the distance: each success is followed by failures
+@pytest.mark.parametrize("part", [2.0 * LoadSteps().smallest, 1.1 / 64.0, 0.1])  # halves of these are not too small
+def test_a_path_on_which_only_steps_of_one_length_succeed_is_walked_to_its_end(part):
+    path = Stubborn(0.1 * part)
+    assert stepper(path).advance(LoadControl(0.1)).state.force == 0.1
+    # steps double after each success, and halve: at most every other one fails
+    assert path.failed <= 0.5 * len(path.tried) + math.log2(1.0 / part)
+
+
+@pytest.mark.parametrize("before", [1e-12, 1e-6, 1e-2])
+def test_steps_that_only_fail_end_after_a_bounded_number_with_the_last_equilibrium(before):
+    path = Stubborn(math.inf)
     walk = stepper(path)
+    walk.advance(LoadControl(before))
+    path.longest, solved = 0.0, len(path.tried)
     with pytest.raises(LoadStepsFailed, match="too far") as failure:
-        walk.advance(LoadControl(0.1))
         walk.advance(LoadControl(1.0))
-    assert path.failed <= 2 * LoadSteps().failures
-    assert len(path.tried) <= 200
-    assert failure.value.last.state.force == failure.value.reached == path.reached > 0.0
+    steps = LoadSteps()
+    halvings = math.ceil(math.log2(steps.motion / (before * steps.smallest)))  # motions limit the first step
+    assert len(path.tried) - solved == len(failure.value.tried) == min(halvings, steps.failures)
+    assert failure.value.last.state.force == failure.value.reached == before
 
 
 def test_a_path_that_needs_many_steps_without_failures_is_not_cut_short():

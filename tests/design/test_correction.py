@@ -127,11 +127,11 @@ def test_the_design_of_the_last_round_with_a_value_is_not_lost(loads, monkeypatc
     from_design, from_zero, failed = SampleEquilibria.from_design, SampleEquilibria.from_zero, set()
 
     def failing(name, found):
-        def once(equilibria: SampleEquilibria, *given, **options):
+        def once(equilibria: SampleEquilibria, *given):
             if equilibria._simulation.fidelity.model.name == "3d" and name not in failed:
                 failed.add(name)
                 raise Infeasible("it snaps")
-            return found(equilibria, *given, **options)
+            return found(equilibria, *given)
 
         return once
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -48,18 +46,6 @@ def test_following_a_design_ends_where_its_loading_from_zero_ends(name):
     assert_alike(followed, both.equilibria.from_zero())
     assert np.abs(displacements(followed) - displacements(known)).max() > 1e-3 * np.abs(displacements(known)).max()
     assert np.array_equal(followed.design.field, both.field())
-
-
-@each_case
-def test_errors_estimated_with_the_last_factor_are_those_with_the_factor_at_the_equilibrium(name):
-    both = made(name)
-    first = both.rest.place(both.design(0.03, seed=1), None)
-    known = both.equilibria.from_zero()
-    both.rest.place(both.design(0.08, seed=2), first)
-    found = both.equilibria.from_design(known, estimated=True)
-    exact = both.equilibria.errors(replace(found, errors=None))
-    assert np.abs(exact).min() > 0.0
-    assert both.equilibria.errors(found) == pytest.approx(exact, rel=1e-2)
 
 
 @pytest.mark.parallel

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
+from scipy.sparse import csr_matrix
 
 import fenicsmech as fm
 from fenicsmech.effects import Contact, Cylinder, HalfPlane, OneSided
@@ -243,6 +246,26 @@ def test_gaps_are_computed_once_for_each_state(monkeypatch):
     case.simulation.load_displacement(case.force, forces=PULLS)
     assert 0 < sum(computed) <= len(states)
     assert sum(computed) < 0.5 * len(computed)
+
+
+def test_a_rank_without_cells_has_no_points_but_their_arrays(monkeypatch):
+    case = finger("plane-stress")
+    fields, empty = case.simulation.model.fields, np.zeros(0)
+    (surface,) = case.contact.one_sided(fields)
+
+    class Body:  # of a rank without cells: its fields have no values
+        def __init__(self):
+            self.shape = self.depth = self.u = SimpleNamespace(x=SimpleNamespace(array=empty))
+            self.model = fields.body.model
+
+    dim = fields.dim
+    monkeypatch.setattr(surface, "_body", Body())
+    monkeypatch.setattr(surface, "_boundary", SimpleNamespace(places=np.zeros((0, dim, dim)), cells=np.zeros(0, int)))
+    for name in ("_nodes", "_shape"):
+        monkeypatch.setattr(surface, name, csr_matrix((0, 0)))
+    monkeypatch.setattr(surface, "_along", [csr_matrix((0, 0))])
+    surface.update()
+    assert surface.gaps.shape == surface.weights.shape == (0,)
 
 
 def test_without_contact_no_boundary_is_looked_for():

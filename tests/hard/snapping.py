@@ -10,7 +10,7 @@ from scipy.optimize import minimize_scalar
 
 import fenicsmech as fm
 
-from ..equilibrium import arch, bistable, toggle
+from ..equilibrium import arch, bistable, curved_beam, toggle
 from .case import BOTH, PLANE, Check, Fact, HardCase, deviation
 
 STIFF, SOFT = 200.0, 0.075  # MPa of the toggle's stilt: only the load turns back, or the displacement as well
@@ -73,10 +73,37 @@ def _four_bar(space: str, comm: MPI.Comm) -> Iterator[Check]:
     yield Fact("stable there", rest.frames[-1].stable)
 
 
+def _curved_beams(space: str, comm: MPI.Comm) -> Iterator[Check]:
+    end = fm.Until(displacement=2.0 * curved_beam.RISE)
+    for ratio in (3.0, 6.0, 10.0):
+        simulation, push = curved_beam.curved_beam(ratio, 1e-3, cells=1.0, comm=comm)
+        imperfect = simulation.follow(push, until=end)
+        yield Fact(f"2 limit points with an imperfection, h/t = {ratio:g}", _kinds(imperfect) == [LIMIT, LIMIT])
+        exact = curved_beam.beam_forces(ratio, 1e-3, imperfect.displacements[::4])
+        yield deviation("forces along that path", imperfect.forces[::4], exact, 1e-2)
+        simulation, push = curved_beam.curved_beam(ratio, cells=1.0, comm=comm)
+        perfect = simulation.follow(push, until=end)
+        loads = [event.value for event in perfect.bifurcations]
+        limits = [event.frame.force for event in imperfect.limit_points]
+        yield Fact(
+            "without it 2 limit points and 2 bifurcations, or more", min(len(loads), len(perfect.limit_points)) > 1
+        )
+        # the limit loads of a beam tend to the first and last of them as its imperfection vanishes
+        yield deviation("first and last bifurcation, at the limit loads", [loads[0], loads[-1]], limits, 0.05)
+        yield Fact("stable at both ends", bool(perfect.stable[0] and perfect.stable[-1]))
+
+
 CASES = (
     HardCase(
         "toggle", "snaps through, and back where a soft link stands in series; against the closed form", _toggle, BOTH
     ),
     HardCase("shallow arch", "load falls between two limit points, against the beam", _arch, BOTH),
+    HardCase(
+        "curved beams",
+        "of Qiu, Lang and Slocum, h/t = 3, 6 and 10, perfect, and with an imperfection of 1e-3 t, against the beam",
+        _curved_beams,
+        (PLANE,),
+        slow=True,
+    ),
     HardCase("bistable four-bar", "one flexible link, pushed through to its mirror image", _four_bar, BOTH),
 )

@@ -247,16 +247,24 @@ class Built:
 
     def curve(self, blueprint: Blueprint) -> fm.Curve:
         """The curve that the blueprint asks for."""
+        if blueprint.control == "path":
+            (end,) = blueprint.samples
+            return self.follow(blueprint, fm.Until(displacement=end, frames=blueprint.most))
+        part, shared = self._loads(blueprint)
+        return self.simulation.load_displacement(part, **{blueprint.control: blueprint.samples}, **shared)
+
+    def follow(self, blueprint: Blueprint, until: fm.Until) -> fm.Curve:
+        """A path of the blueprint's forces."""
+        part, shared = self._loads(blueprint)
+        return self.simulation.follow(part, until=until, **shared)
+
+    def _loads(self, blueprint: Blueprint) -> tuple[Force | fm.ForceGroup, dict]:
+        """The forces that change, and options of every curve."""
         led = len(blueprint.ratios)
         parts = [self.forces[plan.name] for plan in blueprint.forces[:led]]
         part = fm.ForceGroup("loads", dict(zip(parts, blueprint.ratios, strict=True))) if led > 1 else parts[0]
         others = {self.forces[plan.name]: plan.magnitude for plan in blueprint.forces[led:]}
-        shared = {"configuration": self.configuration, "others": others}
-        if blueprint.control == "path":
-            (end,) = blueprint.samples
-            until = fm.Until(displacement=end, frames=blueprint.most)
-            return self.simulation.follow(part, until=until, **shared)
-        return self.simulation.load_displacement(part, **{blueprint.control: blueprint.samples}, **shared)
+        return part, {"configuration": self.configuration, "others": others}
 
 
 def build(blueprint: Blueprint) -> Built:

@@ -1,7 +1,7 @@
 """Whether an error about a scene that makes sense is true, judged without the solver.
 
-Each excuse is proven by a number of its own, which the table of scenes gives, and all but the geometric ones start from
-the last equilibrium, which must be one.
+Each excuse is proven by a number of its own, which the table of scenes gives. Some follow from geometry and springs,
+the others from the last equilibrium, which must be one.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 
 import fenicsmech as fm
 
+from .assembly_check import smallest_gap
 from .blueprint import Blueprint, Built, CompliancePlan, GravityPlan, SpringPlan
 from .closure import Place
 from .motions import STEP, body_modes, moved
@@ -23,13 +24,15 @@ from .stability_check import eigenvalues, led_stiffness
 from .thresholds import THRESHOLDS
 from .unstrained_check import unstrained_motions
 
+HELD = "the point cannot move that way"
+
 
 @dataclass(frozen=True)
 class Excuse:
     """Why an error is true.
 
     Attributes:
-        reason: in words, one of ``REASONS``.
+        reason: in words.
         proof: the number that shows it.
     """
 
@@ -39,18 +42,33 @@ class Excuse:
 
 def true_reason(blueprint: Blueprint, built: Built | None, failure: fm.FenicsmechError) -> Excuse | None:
     """Why the error is right; None if it is not."""
+    if isinstance(failure, fm.AssemblyError):
+        return unassembled(blueprint)
     if not isinstance(failure, fm.EquilibriumError):
         return None
     last = failure.last
-    if last is not None and not _proven(blueprint, built, last):
+    for reason in _BY_GEOMETRY:
+        if excuse := reason(blueprint, built, last):
+            return excuse
+    if last is None or not _proven(blueprint, built, last):
         return None
-    return next((excuse for excuse in (reason(blueprint, built, last) for reason in REASONS) if excuse), None)
+    for reason in _BY_STATE:
+        if excuse := reason(blueprint, built, last):
+            return excuse
+    return turned_back(blueprint, built, failure)
 
 
 def _proven(blueprint: Blueprint, built: Built, last: fm.Frame) -> bool:
     """Whether the last equilibrium is one, with the share of constant loads that it has."""
     potential = Potential.of(blueprint, built.simulation, last.state.load_factor)
     return not fault(blueprint, last, None, check(potential, last, math.nan))
+
+
+def unassembled(blueprint: Blueprint) -> Excuse | None:
+    """Rigid links cannot be joined where motors are to take them, whatever shape the flexible ones have."""
+    if blueprint.idle_spins:
+        return None
+    return _excuse("rigid links cannot be joined", "gap over length", smallest_gap(blueprint), above=THRESHOLDS.joined)
 
 
 def immobile(blueprint: Blueprint, built: Built, last: fm.Frame | None) -> Excuse | None:
@@ -67,27 +85,7 @@ def immobile(blueprint: Blueprint, built: Built, last: fm.Frame | None) -> Excus
         for there in (moved(places, 1j * STEP * mode) for mode in body_modes(potential, places))
     ]
     rate = float(np.linalg.norm(rates))
-    return _excuse("the point cannot move that way", "travel per motion of bodies", rate, below=THRESHOLDS.immobile)
-
-
-def at_limit(blueprint: Blueprint, built: Built, last: fm.Frame | None) -> Excuse | None:
-    """The last equilibrium has all but lost the stiffness of its softest mode, that of the unloaded scene.
-
-    Modes are those at the prescribed force or displacement; constant loads are raised before either. Paths go on past
-    limit points.
-    """
-    if last is None:
-        return None
-    constant = last.state.load_factor < 1.0
-    if blueprint.control == "path" and not constant:
-        return None
-    led = blueprint.control == "displacements" and not constant
-    loaded = Potential.of(blueprint, built.simulation, last.state.load_factor)
-    unloaded = Potential.of(blueprint, built.simulation, 0.0)
-    drawn = built.simulation.linkage.joints.drawn
-    before = eigenvalues(unloaded, np.zeros(unloaded.mesh.nodes.size), drawn, 0.0, led=led)[0]
-    now = eigenvalues(loaded, last.state.u, last.state.poses, last.force, led=led)[0]
-    return _excuse("at a limit point", "stiffness left", now / abs(before), below=THRESHOLDS.soft)
+    return _excuse(HELD, "travel per motion of bodies", rate, below=THRESHOLDS.immobile)
 
 
 def adrift(blueprint: Blueprint, built: Built, last: fm.Frame | None) -> Excuse | None:
@@ -133,12 +131,30 @@ def drowned(blueprint: Blueprint, built: Built, last: fm.Frame | None) -> Excuse
     return _excuse(reason, "stiffness over the stiffest link's", share, below=THRESHOLDS.drowned)
 
 
-def out_of_reach(blueprint: Blueprint, built: Built, last: fm.Frame | None) -> Excuse | None:
+def at_limit(blueprint: Blueprint, built: Built, last: fm.Frame) -> Excuse | None:
+    """The last equilibrium has all but lost the stiffness of its softest mode, that of the unloaded scene.
+
+    Modes are those at the prescribed force or displacement; constant loads are raised before either. Paths go on past
+    limit points.
+    """
+    constant = last.state.load_factor < 1.0
+    if blueprint.control == "path" and not constant:
+        return None
+    led = blueprint.control == "displacements" and not constant
+    loaded = Potential.of(blueprint, built.simulation, last.state.load_factor)
+    unloaded = Potential.of(blueprint, built.simulation, 0.0)
+    drawn = built.simulation.linkage.joints.drawn
+    before = eigenvalues(unloaded, np.zeros(unloaded.mesh.nodes.size), drawn, 0.0, led=led)[0]
+    now = eigenvalues(loaded, last.state.u, last.state.poses, last.force, led=led)[0]
+    return _excuse("at a limit point", "stiffness left", now / abs(before), below=THRESHOLDS.soft)
+
+
+def out_of_reach(blueprint: Blueprint, built: Built, last: fm.Frame) -> Excuse | None:
     """The displacement takes many times the force that would double the weakest link's length, E b t.
 
     Links stretched straight stiffen: by the tangent of the last equilibrium it takes less than in truth.
     """
-    if blueprint.control != "displacements" or last is None or last.state.load_factor < 1.0:
+    if blueprint.control != "displacements" or last.state.load_factor < 1.0:
         return None
     potential = Potential.of(blueprint, built.simulation)
     stiffness = led_stiffness(potential, last.state.u, last.state.poses, last.force)
@@ -147,16 +163,40 @@ def out_of_reach(blueprint: Blueprint, built: Built, last: fm.Frame | None) -> E
     return _excuse("links stretched straight", "force needed over E b t", share, above=THRESHOLDS.unreached)
 
 
-def overstrained(blueprint: Blueprint, built: Built, last: fm.Frame | None) -> Excuse | None:
+def overstrained(blueprint: Blueprint, built: Built, last: fm.Frame) -> Excuse | None:
     """Under a force the last equilibrium has elements at a multiple of their size, or a fraction of it."""
-    if blueprint.control != "forces" or last is None:
+    if blueprint.control != "forces":
         return None
     stretch = Potential.of(blueprint, built.simulation, last.state.load_factor).largest_stretch(last.state.u)
     return _excuse("elements strained out of shape", "stretch or its inverse", stretch, above=THRESHOLDS.strained)
 
 
-Reason = Callable[[Blueprint, Built, fm.Frame | None], Excuse | None]
-REASONS: tuple[Reason, ...] = (immobile, adrift, drowned, at_limit, out_of_reach, overstrained)
+def turned_back(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError) -> Excuse | None:
+    """A path followed from rest through equilibria that pass the checks turns back before what is asked for.
+
+    The first turn counts, and only if the last equilibrium lies before it: what the path may reach after a snap is not
+    what loads that grow lead to, and the error names the turn.
+    """
+    if blueprint.control == "path" or failure.last.state.load_factor < 1.0 or built.configuration is not fm.DRAWN:
+        return None
+    asked = blueprint.samples[len(failure.frames)]
+    name = blueprint.control.removesuffix("s")
+    until = fm.Until(**{name: asked}, frames=THRESHOLDS.followed)
+    try:
+        frames = built.follow(blueprint, until).frames
+    except fm.EquilibriumError as error:
+        frames = error.frames
+    shares = [getattr(frame, name) / asked for frame in frames]
+    top = next((k for k in range(len(shares) - 1) if shares[k] > shares[k + 1]), 0)
+    if top == 0 or not getattr(failure.last, name) / asked <= shares[top] < 1.0 or "turns back" not in str(failure):
+        return None
+    if not all(_proven(blueprint, built, frame) for frame in frames[top - 1 : top + 2]):
+        return None
+    return Excuse("a path of equilibria turns back", f"{name} there over that asked for {shares[top]:.1e}")
+
+
+_BY_GEOMETRY: tuple[Callable[[Blueprint, Built, fm.Frame | None], Excuse | None], ...] = (immobile, adrift, drowned)
+_BY_STATE: tuple[Callable[[Blueprint, Built, fm.Frame], Excuse | None], ...] = (at_limit, out_of_reach, overstrained)
 
 
 def _excuse(
@@ -199,6 +239,6 @@ def _split(rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Orthonormal combinations of motions along which all rates vanish, and those along which they do not."""
     if not rates.shape[1]:
         return np.zeros((0, 0)), np.zeros((0, 0))
-    _, values, right = np.linalg.svd(rates, full_matrices=True)
+    _, values, right = np.linalg.svd(rates.astype(float), full_matrices=True)
     rank = int(np.sum(values > THRESHOLDS.rank * max(values.max(initial=0.0), 1.0)))
     return right[rank:], right[:rank]

@@ -7,6 +7,7 @@ import io
 from collections import Counter
 from collections.abc import Iterable
 
+from .reasons import HELD
 from .scene_result import INVALID_SHARE, SceneResult
 from .thresholds import THRESHOLDS
 
@@ -40,14 +41,14 @@ def table(results: Iterable[SceneResult]) -> str:
 
 def excessive(results: Iterable[SceneResult]) -> list[str]:
     """Excuses that let off more scenes than they may."""
-    results = list(results)
-    most = THRESHOLDS.spare + THRESHOLDS.excused * len(results)
+    results, found = list(results), []
     counts = Counter(result.outcome for result in results if result.outcome.startswith(_EXCUSED))
-    return [
-        f"{outcome!r} lets off {count} scenes, more than {most:.0f}"
-        for outcome, count in counts.items()
-        if count > most
-    ]
+    for outcome, count in counts.items():
+        share = THRESHOLDS.held if outcome.endswith(HELD) else THRESHOLDS.excused
+        most = THRESHOLDS.spare + share * len(results)
+        if count > most:
+            found.append(f"{outcome!r} lets off {count} scenes, more than {most:.0f}")
+    return found
 
 
 def _range(proofs: list[str]) -> str:
@@ -63,7 +64,7 @@ def _coverage(results: list[SceneResult]) -> list[str]:
     sound = [
         result for result in results if result.seed % 10 >= INVALID_SHARE and not result.scene.startswith("design")
     ]
-    counts = Counter(word for result in sound for word in set(result.scene.split(", ")))
+    counts = Counter(word for result in sound for word in set(result.scene.split(", ")) if word)
     kinds = sorted(counts.items(), key=lambda item: (-item[1], item[0]))
     designs = sum(result.scene.startswith("design") for result in results)
     return [

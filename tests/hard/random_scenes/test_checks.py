@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from .assembly_check import smallest_gap
 from .blueprint import (
     Blueprint,
     CompliancePlan,
@@ -14,6 +15,7 @@ from .blueprint import (
     GravityPlan,
     JointPlan,
     LinkPlan,
+    MotorPlan,
     PlanePlan,
     PressurePlan,
     PrestrainPlan,
@@ -97,3 +99,11 @@ def test_the_check_sees_a_hundredth_of_every_effect(space, order, effect, option
     assert check(Potential.of(other, built.simulation), frame, 0.0).relative > 10.0 * THRESHOLDS.residual
     if checkable(potential):
         assert unstable_directions(potential, frame) == frame.unstable_modes
+
+
+@pytest.mark.parametrize("turn, flexible, joined", [(0.0, False, True), (0.1, False, False), (0.1, True, True)])
+def test_motors_take_rigid_links_where_they_can_be_joined(turn, flexible, joined):
+    scene = arch("plane-stress", 2)
+    left, right = (link if flexible else LinkPlan(link.name) for link in scene.links[1:])
+    scene = replace(scene, links=(scene.links[0], left, right), motors=(MotorPlan("A", turn),))
+    assert (smallest_gap(scene) < THRESHOLDS.joined) == joined

@@ -25,17 +25,21 @@ class Thresholds:
         rank: singular value over the largest below which motions count as free.
         frames: of a path that are checked.
         directions: at random, along which the potential must be stationary.
+        joined: gap over the mechanism's length, rad, above which rigid links cannot be joined.
         immobile: travel of the force's point per unit motion of bodies at which it cannot be displaced.
         adrift: work of loads along a free motion, over loads times the velocity of what moves fastest, at which no
             equilibrium is near the drawn configuration.
         soft: stiffness of the softest mode over that of the unloaded scene at which a limit point is near.
         unreached: force that a displacement takes, over E b t of the weakest link, at which it is out of reach.
         strained: principal stretch, or its inverse, of elements out of shape.
+        followed: most frames of a path that is to turn back.
         drowned: stiffness of springs over that of the stiffest link at which rounding hides it.
         excused: share of all scenes that each excuse may let off.
+        held: share of those in which joints and motors hold the point, which is exact.
         spare: scenes that each may let off besides, for small samples.
         effectivity: largest factor between an error estimate and the true difference.
-        told: difference over the value below which it counts as rounding and tolerance.
+        effective: least share of estimates within it, of those whose difference is above resolution.
+        resolved: difference over the value below which it counts as rounding and tolerance.
         still: displacement over the mechanism's length below which differences count as rounding.
     """
 
@@ -54,16 +58,20 @@ class Thresholds:
     rank: float = 1e-9
     frames: int = 6
     directions: int = 8
+    joined: float = 1e-6
     immobile: float = 1e-9
     adrift: float = 1e-6
     soft: float = 0.1
     unreached: float = 10.0
     strained: float = 2.0
+    followed: int = 150
     drowned: float = 1e-14
     excused: float = 0.03
+    held: float = 0.1
     spare: int = 5
     effectivity: float = 2.0
-    told: float = 1e-6
+    effective: float = 0.95
+    resolved: float = 1e-6
     still: float = 1e-13
 
 
