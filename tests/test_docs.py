@@ -137,7 +137,7 @@ def test_every_path_command_and_target_named_exists():
     targets = {*re.findall(r"^([\w-]+):", makefile, flags=re.M), *(f"table-{name}" for name in tables)}
     for file in [*PAGES_OF_TEXT, *SOURCES]:
         text = file.read_text()
-        paths = re.findall(r"(?<![\w/])((?:fenicsmech|tests|benchmarks|demos|tools|docs)/[\w./-]*\w)", text)
+        paths = re.findall(r"(?<![\w/])(?<!\w\.)((?:fenicsmech|tests|benchmarks|demos|tools|docs)/[\w./-]*\w)", text)
         modules = [name.replace(".", "/") for name in re.findall(r"-m ((?:benchmarks|tests)(?:\.\w+)+)", text)]
         found = [path for path in paths if (ROOT / path).exists()]
         found += [path for path in modules if (ROOT / path).exists() or (ROOT / f"{path}.py").exists()]

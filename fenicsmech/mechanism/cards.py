@@ -125,13 +125,6 @@ class Figure:
         """Its value in Pa, kg/m³ or without a dimension."""
         return self.value * QUANTITIES[self.name][1][self.unit]
 
-    @property
-    def spread(self) -> float | None:
-        """The greatest distance from the value to the ends of its range, over the value; None without a range."""
-        if self.low is None or self.high is None:
-            return None
-        return max(self.high - self.value, self.value - self.low) / abs(self.value)
-
 
 @dataclass(frozen=True)
 class MaterialCard:
@@ -161,7 +154,7 @@ class MaterialCard:
         for name, value in (("E", young), ("nu", poisson)):
             if value is None:
                 reason = dict(self.missing).get(name, "no public figure found")
-                remedy = f"Give it: material({self.name!r}, nu=…)" if name == "nu" else "Make a Material(name, E, ν)"
+                remedy = "Give nu=…" if name == "nu" else "Make a Material(name, E, ν)"
                 raise DescriptionError(f"card {self.name!r}", f"it has no {QUANTITIES[name][0]} ({reason})", remedy)
         law = NeoHookean(units.stress_of(young), INCOMPRESSIBLE if poisson == 0.5 else poisson)  # type: ignore[arg-type]
         density = self._si("density")

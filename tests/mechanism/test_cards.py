@@ -2,7 +2,10 @@
 
 import pickle
 import runpy
+import tomllib
 from dataclasses import replace
+from fnmatch import fnmatch
+from importlib import resources
 from pathlib import Path
 
 import pytest
@@ -99,9 +102,25 @@ def test_units_of_sources_are_converted_as_defined():
 
 
 def test_figures_tell_how_sure_they_are():
-    assert figure("Onyx", "E").spread == pytest.approx((3.6 - 1.77) / 1.77)
-    assert figure("Onyx", "density").spread is None
-    assert figure("301", "yield_stress").spread is None  # a least value, no range
+    onyx, least = figure("Onyx", "E"), figure("301", "yield_stress")
+    assert (onyx.low, onyx.high) == (1.4, 3.6)
+    assert (least.low, least.high) == (965.0, None)
+
+
+def test_packages_hold_the_cards():
+    """``importlib.resources`` finds them, and each matches a pattern of the data that wheels hold."""
+    package = resources.files("fenicsmech")
+    cards = [each.name for each in (package / "mechanism" / "materials").iterdir()]
+    assert len(cards) == len(CARDS)
+    patterns = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["package-data"]["fenicsmech"]
+    assert all(any(fnmatch(f"mechanism/materials/{card}", pattern) for pattern in patterns) for card in cards)
+
+
+def test_lines_of_basquin_are_read_from_the_material():
+    small, large = (fm.material("SAE 4142", units=units).strength.fatigue for units in (MILLIMETRES, METRES))
+    assert small.coefficient == pytest.approx(1e-6 * large.coefficient, rel=1e-14)
+    assert small.exponent == large.exponent == figure("SAE 4142", "fatigue_exponent").value
+    assert fm.material("POM").strength.fatigue is None
 
 
 def test_cards_agree_with_the_materials_of_the_method():
@@ -159,7 +178,7 @@ def test_an_unknown_name_lists_those_known():
 
 
 def test_a_card_without_a_ratio_asks_for_it():
-    with pytest.raises(fm.DescriptionError, match=r"'PETG, printed': it has no Poisson's ratio.*nu=…"):
+    with pytest.raises(fm.DescriptionError, match=r"'PETG GN071-100': it has no Poisson's ratio.*nu=…"):
         fm.material("PETG")
     assert fm.material("PETG", nu=0.4).law.nu == 0.4
 
