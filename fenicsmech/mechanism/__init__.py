@@ -1,11 +1,14 @@
 """The description of a mechanism, as pure data.
 
 - ``shapes``: strips and their centrelines, outlines, STEP parts, meshes; interface regions, clamps
+- ``units``, ``strength``: units of a scene, strength of a material
+- ``cards``: materials from cards, plain data with its public sources
 - ``parts``: materials, links, joints, motors, forces, outputs, and their positions
 - ``mechanism``: the builder that collects parts
 - ``scene``: effects, configurations, names of units, and checks of the whole
 """
 
+from fenicsmech.mechanism.cards import Figure, MaterialCard, Source, material, material_card, material_names
 from fenicsmech.mechanism.mechanism import Mechanism
 from fenicsmech.mechanism.parts import (
     ONYX,
@@ -25,7 +28,7 @@ from fenicsmech.mechanism.parts import (
     in_dimension,
     same_place,
 )
-from fenicsmech.mechanism.scene import DRAWN, Configuration, Effect, Scene, Units, check_loads, validate
+from fenicsmech.mechanism.scene import DRAWN, Configuration, Effect, Scene, check_loads, validate
 from fenicsmech.mechanism.shapes import (
     Arc,
     Centreline,
@@ -45,3 +48,5 @@ from fenicsmech.mechanism.shapes import (
     step_file,
     strip,
 )
+from fenicsmech.mechanism.strength import Basquin, Strength
+from fenicsmech.mechanism.units import Units

@@ -11,6 +11,8 @@ from fenicsmech.errors import DescriptionError, expect, finite, point_text, posi
 from fenicsmech.joints import JointKind
 from fenicsmech.laws import Law, NeoHookean
 from fenicsmech.mechanism.shapes import Face, Point, Region, Shape
+from fenicsmech.mechanism.strength import Strength
+from fenicsmech.mechanism.units import Units
 
 Single = TypeVar("Single", "Motor", "Force")
 
@@ -24,15 +26,19 @@ class Material:
         E, nu: Young's modulus (force per area) and Poisson's ratio of the law ``NeoHookean(E, nu)``.
         law: any law, instead of E and nu.
         density: mass per volume, for its weight; with forces in N and lengths in mm in t/mm³ (water: 1e-9).
+        strength: what it bears, if known.
+        units: of its numbers, which a scene has to have; None for those of any scene.
 
     Raises:
         DescriptionError: E ≤ 0, ν outside (−1, 0.5), the density not positive, or not numbers; a law and numbers are
-            given, or neither.
+            given, or neither; the strength or the units are something else.
     """
 
     name: str
     law: Law
     density: float | None
+    strength: Strength | None
+    units: Units | None
 
     def __init__(
         self,
@@ -42,6 +48,8 @@ class Material:
         *,
         law: Law | None = None,
         density: float | None = None,
+        strength: Strength | None = None,
+        units: Units | None = None,
     ) -> None:
         part = f"material {name!r}"
         if law is None:
@@ -57,7 +65,9 @@ class Material:
             raise DescriptionError(part, f"its law is {law!r}", "Give a law with its numbers: NeoHookean(E, nu)")
         if density is not None:
             density = positive(f"density of {part}", density)
-        set_fields(self, name=name, law=law, density=density)
+        expect(part, strength, Strength | None, "a strength", "Give Strength(…)")
+        expect(part, units, Units | None, "a set of units", "Give Units(…)")
+        set_fields(self, name=name, law=law, density=density, strength=strength, units=units)
 
 
 ONYX = Material("Onyx", 1770.0, 0.42, density=1.2e-9)

@@ -19,6 +19,7 @@ from fenicsmech.errors import DescriptionError, expect, set_fields
 from fenicsmech.mechanism.mechanism import Mechanism
 from fenicsmech.mechanism.parts import FlexibleLink, Joint, Link, Motor, RigidLink, read_pairs, same_place
 from fenicsmech.mechanism.shapes import Region
+from fenicsmech.mechanism.units import MILLIMETRES, Units
 
 
 @dataclass(frozen=True)
@@ -86,15 +87,6 @@ class Effect(ABC):
 
 
 @dataclass(frozen=True)
-class Units:
-    """Names of a consistent set of units, stress in force over length squared; for labels only."""
-
-    length: str = "mm"
-    force: str = "N"
-    stress: str = "MPa"
-
-
-@dataclass(frozen=True)
 class Configuration:
     """Motor positions that stay fixed while loads are applied.
 
@@ -130,18 +122,25 @@ class Scene:
     """A mechanism and the ``effects`` that act on it; ``units`` name the units of plots and tables.
 
     Raises:
-        DescriptionError: ``mechanism`` is not a mechanism, or something listed under ``effects`` is not an effect.
+        DescriptionError: ``mechanism`` is not a mechanism, something listed under ``effects`` is not an effect, or the
+            material of a link is in other units.
     """
 
     mechanism: Mechanism
     effects: Sequence[Effect] = ()
-    units: Units = Units()
+    units: Units = MILLIMETRES
 
     def __post_init__(self) -> None:
         set_fields(self, effects=tuple(self.effects))
         expect("scene", self.mechanism, Mechanism, "a mechanism", "Pass a Mechanism")
         for effect in self.effects:
             expect("scene", effect, Effect, "an effect", "List effects only, such as Gravity(…)")
+        for link in self.mechanism.flexible_links:
+            own = link.material.units
+            if own not in (None, self.units):
+                problem = f"its material {link.material.name!r} is in {own}, the scene in {self.units}"
+                remedy = "Give units=… of the scene to material(…)"
+                raise DescriptionError(f"link {link.name!r}", problem, remedy)
 
     def __repr__(self) -> str:
         effects = "; ".join(effect.explain() for effect in self.effects)
