@@ -63,6 +63,7 @@ from fenicsmech.meshing import (
 from fenicsmech.multibody import (
     BodyPoint,
     DesignAtNodes,
+    IdleSpin,
     InterfaceMap,
     Linkage,
     LinkPoint,
@@ -321,11 +322,14 @@ class MechanismModel:
         boundaries = find_boundaries(mesh.mesh, links, mesh.link, faces, half=fidelity.model.half)
 
         self._effect_fields: list[tuple[Effect, LinkFields]] = []
+        self._on_links: list[Effect] = []  # effects with an energy of links
 
         def energy(effect: Effect, body: ElasticBody) -> ufl.Form | None:
             fields = LinkFields(tuple(links), body, boundaries)
             self._effect_fields.append((effect, fields))
-            return effect.link_energy(fields)
+            if (term := effect.link_energy(fields)) is not None:
+                self._on_links.append(effect)
+            return term
 
         self.elastic = ElasticBody(
             mesh.mesh,
@@ -574,16 +578,19 @@ class MechanismModel:
         if force not in self._point_loads:
             dim = self.elastic.model.dim if isinstance(force.on, FlexibleLink) else self.linkage.dim
             direction = np.array(in_dimension(force.direction, dim))
-            self._point_loads[force] = PointLoad(force.name, ((self.point(force), direction),), (force.on,))
+            spread = np.full(self.linkage.dim, np.inf)  # over a region: acts at no single place
+            at = self.rest_position(force)[: self.linkage.dim] if force.region is None else spread
+            self._point_loads[force] = PointLoad(force.name, ((self.point(force), direction),), ((force.on, at),))
         return self._point_loads[force]
 
-    def _acted_on(self, loads: Sequence[PointLoad]) -> set[int]:
-        """Bodies that loads, potentials, or effects on their links act on."""
-        links = {link for load in loads for link in load.links}
-        if self.elastic.effects_ufl is not None:
-            links.update(self.mechanism.flexible_links)
+    def _idle_spins(self, loads: Sequence[PointLoad]) -> tuple[IdleSpin, ...]:
+        """The spins that neither loads nor potentials nor effects resist; obstacles may."""
+        _ = self.elastic.effects_ufl  # names the effects on links
+        links = self.mechanism.flexible_links
         bodies = {body for potential in self.potentials for body in potential.bodies}
-        return bodies | {self.linkage.body_of(link) for link in links}
+        bodies |= {self.linkage.body_of(link) for own in self._on_links for link in links if not own.turns_with(link)}
+        forces = [(self.linkage.body_of(link), at) for load in loads for link, at in load.places]
+        return idle_spins(self.linkage, bodies, forces)
 
     def travel(self, part: Force | Output, state: State) -> float:
         """Travel of the point of a force or output in the loaded ``state``."""
@@ -600,7 +607,7 @@ class MechanismModel:
             potentials=self.potentials,
             compliances=self._compliances,
             one_sided=[constraint for effect in self.effects for constraint in effect.one_sided(self.fields)],
-            idle=idle_spins(self.linkage, self._acted_on([controlled, *loads])),
+            idle=self._idle_spins([controlled, *loads]),
             clock=self.clock,
             comm=self.mesh.comm,
         )

@@ -10,5 +10,5 @@
 from fenicsmech.continuation.arc_length import ArcLengthStepper, ArcSteps, Finish, equilibrium_at, linear_reach
 from fenicsmech.continuation.critical import Critical, CriticalPoint, Sense, crossing, locate, null_space
 from fenicsmech.continuation.eigen import Mode, critical_changes, softest_modes
-from fenicsmech.continuation.load_steps import LeastShifts, LoadStepper, LoadSteps, LoadStepsFailed, MotorStepper
+from fenicsmech.continuation.load_steps import DeadCentreStepper, LeastShifts, LoadStepper, LoadSteps, LoadStepsFailed
 from fenicsmech.continuation.stepper import ConstantPredictor, HermitePredictor, Predictor, TangentPredictor

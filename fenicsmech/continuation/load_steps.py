@@ -18,17 +18,19 @@ the same on all processes and machines, and not by time:
     4. line search, from the best state so far                 its ``iterations`` and ``factorisations``, with 2 and 3
     5. other least shifts of zero-energy modes                 ``LoadSteps.shift_factors``, a solve each
     6. half the step                                           ``LoadSteps.smallest``, or ``failures`` in a row
-    7. of motors: links that strain beyond a dead centre       ten halvings; then load steps once more
+    7. of motors and constant loads: links that strain         ten halvings; then load steps once more
+       beyond a dead centre
 
 Then the last equilibrium and the values without one are reported. The control stays the one that was asked for: under
 a dead load the equilibria past a limit point are not those that the mechanism would take.
 
-Motors may go beyond a dead centre, where the slack of the joints ends and links must strain. Towards it a
-coordinate x moves ever faster while the links are free of strain: close by, in units of x,
+Motors, and springs that constant loads wind up, may go beyond a dead centre, where the slack of the joints ends and
+links must strain. Towards it a coordinate x moves ever faster while the links are free of strain: close by, in units
+of x,
 
     C = b + ½ x² − e = 0,     E = ½ k e²,     λ = k e,     x λ = 0,
 
-e the strain and b how far the motors are beyond the dead centre. Before it (b < 0) joints close by x alone, x = √(−2b)
+e the strain and b how far these are beyond the dead centre. Before it (b < 0) joints close by x alone, x = √(−2b)
 and λ = 0; beyond it x = 0 and λ = k b. Newton's method does not get from one to the other: as long as λ = 0 the energy
 is not curved along x, every step closes the joints by x alone, x ← ½ x − b / x, and for b > 0 these oscillate without
 end. From a state in which links strain instead, it converges, with λ as the curvature. Such states lie along the rate
@@ -358,8 +360,8 @@ class LoadStepper(Stepper):
         self._covered = max(self._covered, abs(self._value - self._origin))
 
 
-class MotorStepper(LoadStepper):
-    """Load steps of motors, also past the dead centre of an unloaded mechanism."""
+class DeadCentreStepper(LoadStepper):
+    """Load steps of motors or constant loads, also past a dead centre that the mechanism reaches without strain."""
 
     def advance(self, control: Control) -> EquilibriumPoint:
         try:

@@ -201,6 +201,9 @@ class Contact(Effect):
     def one_sided(self, fields):
         return [OneSided(self, self.link, fields)] if isinstance(self.link, FlexibleLink) else []
 
+    def turns_with(self, link):
+        return True
+
     def link_energy(self, fields):
         if not isinstance(self.link, FlexibleLink):
             return None
@@ -239,6 +242,7 @@ class OneSided:
         fields: of the links.
 
     Attributes:
+        link: with the boundary.
         compliances: 1/κ, (n,).
         weights: areas that points stand for, of the links at rest, their depth included, (n,).
         gaps: g, (n,), as ``weights`` of the last ``update``.
@@ -246,7 +250,7 @@ class OneSided:
 
     def __init__(self, contact: Contact, link: FlexibleLink, fields: LinkFields) -> None:
         boundary, dim = fields.boundaries[Faces(link)], fields.dim
-        self._obstacle, self._body, self._boundary = contact.obstacle, fields.body, boundary
+        self.link, self._obstacle, self._body, self._boundary = link, contact.obstacle, fields.body, boundary
         points, self._weights = basix.make_quadrature(_FACETS[dim], 2 * fields.order)
         self._points = np.column_stack([1.0 - points.sum(axis=1), points])
         self._nodes = self._tabulated(fields.u, 0)[0]

@@ -68,6 +68,9 @@ class Pressure(Effect):
     def pressure_across_depth(self):
         return {self.link: self.pressure} if self.where is None else {}
 
+    def turns_with(self, link):
+        return link is not self.link or self.about is None  # the volume within a closed part
+
     def link_energy(self, fields):
         (faces,) = self.faces
         if self.about is None and not fields.boundaries[faces].is_closed(fields.mesh.comm):

@@ -43,6 +43,7 @@ from fenicsmech.effects import OneSided
 from fenicsmech.equilibrium.control import PathPlane
 from fenicsmech.equilibrium.unknowns import ScaledUnknowns
 from fenicsmech.errors import set_options
+from fenicsmech.mechanism import Link
 
 
 @dataclass(frozen=True)
@@ -103,6 +104,12 @@ class ActiveSet:
     def current(self) -> bool:
         """Whether the points in the matrix are those that touch at the loaded state."""
         return self._comm.allreduce(int(np.any(self.touching() != self._active))) == 0
+
+    def touched(self, *, expected: bool) -> frozenset[Link]:
+        """The links with points that touch at the loaded state, or in the matrix as ``expected`` there."""
+        points = self._active if expected else self.touching()
+        count = self._comm.allreduce(np.array([np.count_nonzero(own) for _, own in self._each(points)]))
+        return frozenset(surface.link for surface, some in zip(self._surfaces, count, strict=True) if some)
 
     def add_stiffness(self, matrix: PETSc.Mat) -> None:
         """Adds the stiffness with the points expected to touch, minus that with those that do at the loaded state, into

@@ -35,12 +35,13 @@ class PointLoad:
     Attributes:
         name: for messages.
         acting: points and directions, of as many coordinates as u(point), times the ratio of each force to f.
-        links: that carry the points.
+        places: links that carry the points, and where these are in the shapes at rest, (dim,); infinite for averages
+            over regions.
     """
 
     name: str
     acting: tuple[tuple[BodyPoint | LinkPoint, np.ndarray], ...]
-    links: tuple[Link, ...]
+    places: tuple[tuple[Link, np.ndarray], ...]
 
     def travel(self, u: fem.Function, poses: np.ndarray) -> float:
         """Σ direction · u(point)."""
@@ -60,12 +61,11 @@ class BorderTerms:
         *,
         potentials: Sequence[PosePotential],
         compliances: np.ndarray,
-        idle: Sequence[IdleSpin],
     ) -> None:
         self._elastic, self._joints, self._numbering = elastic, joints, numbering
         self._controlled, self._constant = controlled, tuple(constant)
         self._potentials = [(potential, self._places(potential)) for potential in potentials]
-        self._compliances, self._idle = compliances, tuple(idle)
+        self._compliances = compliances
 
     # -- values --------------------------------------------------------------------------------------------
 
@@ -133,13 +133,20 @@ class BorderTerms:
 
     # -- Hessian: entries of K̂ as (global rows, global columns, values) ------------------------------------------
 
-    def entries(self, state: State, control: Control, moments: Mapping[int, np.ndarray], scale: np.ndarray) -> Entries:
+    def entries(
+        self,
+        state: State,
+        control: Control,
+        moments: Mapping[int, np.ndarray],
+        scale: np.ndarray,
+        idle: Iterable[IdleSpin],
+    ) -> Entries:
         """All entries at ``state``.
 
             B = Σ_i r_i · ∂²u_i/∂z² − Σ f_k a_k · ∂²u_k/∂z² + ∂²V/∂z² − Σ λ_k ∂²C_k/∂z² + Σ e eᵀ
 
         ``moments`` are Σ r_i ⊗ (X_i − c) over the nodes on the interfaces of each body, ``scale`` are the units of the
-        border's unknowns, (border,), in which e, the gauge of an idle spin, has the size of one.
+        border's unknowns, (border,), in which e, the gauge of each of the ``idle`` spins, has the size of one.
         """
         joints, rows = self._joints, self._numbering.rows
         units = self._numbering.unknowns.restrict_border(scale)
@@ -157,7 +164,7 @@ class BorderTerms:
             for one, columns in places:
                 for other, other_columns in places:
                     yield z + columns, z + other_columns, curvature[one, other]
-        for spin in self._idle:
+        for spin in idle:
             body, gauge = spin.gauge(joints, state.poses)
             columns = joints.columns[body]
             gauge /= units.poses[columns]
@@ -177,7 +184,7 @@ class BorderTerms:
         else:  # f is given: its equation is f = f
             yield load, load, -1.0 / units.load[:, None] ** 2
 
-    def pattern(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    def pattern(self, idle: Sequence[IdleSpin]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Pattern of ``entries``, as (global rows, global columns). Local."""
         joints, dim = self._joints, self._joints.space.dim
         motors, constant = np.zeros(len(joints.connections)), np.zeros(len(self._constant))
@@ -185,7 +192,7 @@ class BorderTerms:
         moments = {body: np.zeros((dim, dim)) for body in joints.columns}
         scale = np.ones(self._numbering.unknowns.border.size)
         for control in (LoadControl(0.0), DisplacementControl(0.0)):
-            for rows, columns, _ in self.entries(drawn, control, moments, scale):
+            for rows, columns, _ in self.entries(drawn, control, moments, scale, idle):
                 yield rows, columns
 
     def _travel_rows(self, state: State) -> Iterator[tuple[np.ndarray, np.ndarray]]:

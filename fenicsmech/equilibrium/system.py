@@ -72,7 +72,7 @@ class EquilibriumSystem:
         loads: constant ones, whose magnitudes states hold.
         potentials: of body poses.
         compliances: c by constraint row; 0 where none is given.
-        idle: spins that nothing resists, whose gauge K fixes.
+        idle: spins that nothing but obstacles resists, whose gauge K fixes where their links touch none.
         one_sided: constraints on links, whose energy is in that of the links.
         clock: of the phases.
         comm: the processes that share the links.
@@ -108,21 +108,14 @@ class EquilibriumSystem:
         self.idle, self.potentials = tuple(idle), tuple(potentials)
         self.compliances = np.array([compliances.get(row, 0.0) for row in range(joints.rows)])
         self._border = BorderTerms(
-            elastic,
-            joints,
-            numbering,
-            controlled,
-            loads,
-            potentials=potentials,
-            compliances=self.compliances,
-            idle=idle,
+            elastic, joints, numbering, controlled, loads, potentials=potentials, compliances=self.compliances
         )
         with clock.phase("compile"):
             elastic.compile()
         with clock.phase("setup"):
             elastic.take(np.zeros(numbering.rows.links.count))
             elastic.update()
-            extended = create_extended_matrix(elastic, numbering, self._border.pattern())
+            extended = create_extended_matrix(elastic, numbering, self._border.pattern(self.idle))
             self.unknowns = ScaledUnknowns(elastic, numbering, interfaces, joints, extended.getDiagonal().array_r)
             self.kkt = KktMatrix(elastic, numbering, self.unknowns, extended, clock=clock)
             self.contact = ActiveSet(one_sided, self.unknowns, comm) if one_sided else None
@@ -289,7 +282,7 @@ class EquilibriumSystem:
         """Brings ``kkt`` to the loaded ``state``, with the stress predicted by the ``last`` step if that is given.
 
         It is the state before the step and δu of owned nodes, linear in it on interface nodes too, (owned dofs,).
-        Points touch obstacles as the state has it, or as ``contact`` expects.
+        Points touch obstacles as the state has it, or as ``contact`` expects; links with such points do not spin idly.
         """
         self.kkt.set_stiffness()
         moments = residual.moments
@@ -301,7 +294,11 @@ class EquilibriumSystem:
                 self._predicted_stress.take(last[0].u, last[1])
                 self._predicted_stress.add_stiffness(self.kkt.extended)
                 moments = _added(moments, self._moments(self._predicted_stress.forces()))
-        self.kkt.linearise(self._border.entries(state, control, moments, self.unknowns.scale))
+        idle = self.idle
+        if idle and self.contact is not None:
+            touched = self.contact.touched(expected=contact is not None)
+            idle = tuple(spin for spin in idle if spin.links.isdisjoint(touched))
+        self.kkt.linearise(self._border.entries(state, control, moments, self.unknowns.scale, idle))
 
     # -- right-hand sides whose KKT solutions are rates of x -----------------------------------------------------
 

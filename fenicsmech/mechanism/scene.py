@@ -61,6 +61,11 @@ class Effect(ABC):
         which points touch."""
         return ()
 
+    def turns_with(self, link) -> bool:
+        """Whether turns of a flexible link as a rigid body leave ``link_energy`` as it is, where no ``one_sided``
+        constraint acts: the link may spin idly between two ball joints."""
+        return False
+
     def pose_potentials(self, linkage):
         """A sequence of ``PosePotential``, potentials of the poses of bodies of the ``Linkage``.
 

@@ -12,19 +12,22 @@ Fixing the gauge,
     ∇²L + e eᵀ,     e · n ≠ 0,
 
 makes the matrix regular. Its solutions are those of ∇²L x = r with e · x = 0, and the spin counts as stable. The gauge
-e turns one body of the set about the line. No gauge is added where a force, a spring or an effect acts on a body of the
-set, or on its link: there the turn may change L.
+e turns one body of the set about the line. No gauge is added where the turn may change L: where a spring acts on a body
+of the set, a force away from the centres of the two joints, or an effect on a link, unless its energy turns with the
+link, as that of prestrain and of the pressure around it does. Obstacles resist the spin where the link touches them,
+and only there is its gauge left out (``EquilibriumSystem.linearise``).
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
+from fenicsmech.mechanism import Link
 from fenicsmech.multibody.linkage import JointSystem, Linkage
 
 
@@ -41,6 +44,11 @@ class IdleSpin:
     system: JointSystem
     bodies: tuple[int, ...]
     balls: tuple[tuple[int, int], tuple[int, int]]
+
+    @property
+    def links(self) -> frozenset[Link]:
+        """The links of the bodies."""
+        return frozenset(self.system.bodies[body].link for body in self.bodies)
 
     def line(self, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """A point on the line at ``poses`` (bodies, pose_size), and the unit vector along it, (3,) each."""
@@ -65,13 +73,17 @@ class IdleSpin:
         return z / np.linalg.norm(z)
 
 
-def idle_spins(linkage: Linkage, acted_on: Collection[int] = ()) -> tuple[IdleSpin, ...]:
+def idle_spins(
+    linkage: Linkage, acted_on: Collection[int] = (), forces: Sequence[tuple[int, np.ndarray]] = ()
+) -> tuple[IdleSpin, ...]:
     """The idle spins of a linkage in space.
 
     Args:
         linkage: the bodies and their joints.
-        acted_on: indices of bodies on which, or on whose link, forces, potentials or effects act; these do not spin
-            idly.
+        acted_on: indices of bodies on which, or on whose link, potentials or effects act that turns change; these do
+            not spin idly.
+        forces: on each of some bodies, or its link, a force acts at a place as drawn, (dim,); unless that is the centre
+            of one of the two ball joints the body does not spin idly.
     """
     system, found = linkage.rigid, []
     balls = {k: c for k, c in enumerate(system.connections) if system.is_ball(k)}
@@ -91,6 +103,8 @@ def idle_spins(linkage: Linkage, acted_on: Collection[int] = ()) -> tuple[IdleSp
         from_first = np.linalg.norm(places - places[0], axis=1)
         last = int(np.argmax(from_first))
         from_last, rounding = np.linalg.norm(places - places[last], axis=1), 1e-9 * linkage.length
-        if from_first[last] > rounding and np.all(np.minimum(from_first, from_last) <= rounding):
+        loaded = [at for body, at in forces if body in bodies]
+        off = [np.min(np.linalg.norm(places[[0, last]] - at, axis=1)) > rounding for at in loaded]
+        if from_first[last] > rounding and np.all(np.minimum(from_first, from_last) <= rounding) and not any(off):
             found.append(IdleSpin(system, bodies, (ends[0], ends[last])))
     return tuple(found)

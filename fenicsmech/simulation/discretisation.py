@@ -160,4 +160,4 @@ class Discretisation:
         forces = part.ratios if isinstance(part, Force | ForceGroup) else ()
         loads = [(self.model.point_load(force), ratio) for force, ratio in forces]
         acting = tuple((point, ratio * way) for load, ratio in loads for point, way in load.acting)
-        return PointLoad(part.name, acting, tuple(link for load, _ in loads for link in load.links))
+        return PointLoad(part.name, acting, tuple(place for load, _ in loads for place in load.places))

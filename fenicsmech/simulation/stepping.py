@@ -19,7 +19,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenicsmech.collective import agreed, from_one
-from fenicsmech.continuation import LoadStepper, LoadSteps, LoadStepsFailed, MotorStepper
+from fenicsmech.continuation import DeadCentreStepper, LoadStepper, LoadSteps, LoadStepsFailed
 from fenicsmech.equilibrium import (
     Control,
     DisplacementControl,
@@ -300,7 +300,7 @@ class CurveStepper:
         if fraction == 1.0 and not wound:
             return state, 0
         control = MotorControl(fraction, there - drawn, origin=drawn)
-        stepper = MotorStepper(self.solver, state, control, predictor=self.discretisation.predictor)
+        stepper = DeadCentreStepper(self.solver, state, control, predictor=self.discretisation.predictor)
         # a quarter of a radian, or of the mechanism's length: in space a motor's equation is periodic
         steps = max(int(np.ceil((1.0 - fraction) * self._joints.travel(there - drawn) / 0.25)), 1)
         try:
@@ -323,7 +323,8 @@ class CurveStepper:
         if not (self.request.others or self._model.effects):
             return state, None
         control = LoadFactorControl()
-        stepper = LoadStepper(self.solver, control.prepare(state), control, predictor=self.discretisation.predictor)
+        start, predictor = control.prepare(state), self.discretisation.predictor
+        stepper = DeadCentreStepper(self.solver, start, control, predictor=predictor)
         try:
             with self.keeping_frames():
                 return stepper.advance(control.at(1.0)).state, stepper

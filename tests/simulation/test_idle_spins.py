@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
+from fenicsmech.equilibrium import LoadControl
 
 # the rocker's arm at the force over that at the coupler, times Euler's load of the coupler between its balls
 BUCKLING = 40.0 / 30.0 * np.pi**2 * 1770.0 * 3.0**4 / 12.0 / 60.0**2
@@ -148,3 +149,52 @@ def test_load_steps_agree_with_a_path_that_is_followed_whatever_spins_idly(descr
     followed = simulation.follow(push, until=fm.Until(force=35.0), configuration=configuration)
     assert curve.frames[-1].displacement == pytest.approx(followed.frames[-1].displacement, rel=1e-8)
     assert followed.remarks == ()
+
+
+TURNING = {
+    "pressure and prestrain": lambda link: (fm.Pressure(link, 0.5), fm.Prestrain(link, 1.002)),
+    "distant obstacle": lambda link: (fm.Contact(link, fm.HalfPlane((0, -50, 0), (0, 1, 0))),),
+}
+
+
+@pytest.mark.parametrize("kind", TURNING)
+def test_links_spin_idly_under_effects_that_turn_with_them(kind):
+    mechanism, push, _ = two_couplers()
+    effects = TURNING[kind](mechanism.flexible_links[0])
+    simulation = fm.Simulation(fm.Scene(mechanism, effects=effects), space="3d", size=3.0)
+    curve = simulation.load_displacement(push, forces=[17.5, 35.0])
+    assert (curve.freedom.mobility, curve.freedom.zero_energy, curve.remarks) == (2, (), ())
+    assert all(frame.stable and not frame.snapped_through for frame in curve.frames)
+    followed = simulation.follow(push, until=fm.Until(force=35.0))
+    assert curve.frames[-1].displacement == pytest.approx(followed.frames[-1].displacement, rel=1e-8)
+
+
+def test_spins_are_not_idle_where_their_links_touch_obstacles():
+    simulation, push, _ = rssr()
+    mechanism = simulation.scene.mechanism
+    (coupler,) = mechanism.flexible_links
+    wall = fm.Contact(coupler, fm.HalfPlane((0, -1.4, 0), (0, 1, 0)))  # bends the coupler
+    touching = fm.Simulation(fm.Scene(mechanism, effects=[wall]), space="3d", size=3.0)
+    curve = touching.load_displacement(push, forces=[5.0, 10.0])
+    assert curve.freedom.zero_energy == ()
+    assert all(frame.stable and not frame.snapped_through for frame in curve.frames)
+    solver, frame = touching.solver(push), curve.frames[-1]
+    assert solver.system.touching(frame.state).any()
+    # without a gauge the rate is right: that of the secant
+    more = touching.load_displacement(push, forces=[10.0 - 1e-3, 10.0 + 1e-3])
+    secant = (more.frames[1].displacement - more.frames[0].displacement) / 2e-3
+    rate = solver.linearise(frame.state, LoadControl(frame.force)).point((), 0).conjugate_rate
+    assert rate == pytest.approx(secant, rel=1e-5)
+
+
+def test_forces_at_ball_joints_leave_their_links_idle():
+    simulation, _, _ = rssr()
+    mechanism = simulation.scene.mechanism
+    (coupler,), rocker = mechanism.flexible_links, mechanism.links[2]
+    travels = []
+    for link in (coupler, rocker):
+        push = mechanism.force(on=link, at=(80, 0, 0), direction=(-1, 0, 0), name=f"push on {link.name}")
+        curve = simulation.load_displacement(push, forces=[5.0, 20.0])
+        assert (curve.freedom.zero_energy, curve.remarks) == ((), ())
+        travels.append(curve.displacements)
+    assert travels[0] == pytest.approx(travels[1], rel=1e-8)

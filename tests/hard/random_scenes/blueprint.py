@@ -206,8 +206,9 @@ class Blueprint:
 
     @property
     def idle_spins(self) -> int:
-        """Number of links that turn idly between two ball joints: neither a force nor an effect acts on them."""
-        acted_on = {force.on for force in self.forces} | {getattr(plan, "link", None) for plan in self.effects}
+        """Number of links that turn idly between two ball joints: neither forces nor effects act on their turns."""
+        changed = [plan for plan in self.effects if not isinstance(plan, PressurePlan | PrestrainPlan)]
+        acted_on = {force.on for force in self.forces} | {getattr(plan, "link", None) for plan in changed}
         heavy = any(isinstance(plan, GravityPlan) for plan in self.effects)
         return sum(link.name not in acted_on and not (heavy and link.centreline) for link in self.spins)
 
