@@ -23,6 +23,7 @@ from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 from fenicsmech.equilibrium.two_level import BySize
 from fenicsmech.errors import counted, expect, set_options
 
+_ELEMENT = 5e-3  # size over the mechanism's length: F = I + ∇u is rounded as if links moved by as much
 _NO_MOTION = 1e-9  # over the mechanism's length, or rad, that counts as none
 _ROUNDING = 1e-4  # residual over the forces that may be rounding where the KKT matrix is nearly singular
 _STEP = 1e-6  # relative error that iterative solvers may leave in steps and tangents: the next iteration corrects it
@@ -212,8 +213,8 @@ class EquilibriumSolver(ABC):
         )
 
     def _rounding(self, residual: Residual) -> float:
-        """Rounding of displacements and rotations, which are counted from the drawn configuration.
+        """Rounding of displacements and rotations, which are counted from the drawn configuration, and of F.
 
-        Less than ``_NO_MOTION`` of the mechanism's length counts as no displacement.
+        That of F = I + ∇u is all where loads balance on each link, as pressure and prestrain do: no forces are left.
         """
-        return self.options.roundoff * self.system.unknowns.unit * max(residual.motion, _NO_MOTION)
+        return self.options.roundoff * self.system.unknowns.unit * max(residual.motion, _ELEMENT)
