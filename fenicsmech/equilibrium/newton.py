@@ -7,8 +7,10 @@ Each iteration solves
 the Newton step of the augmented Lagrangian, which tends to the KKT step for large ρ and stays regular for redundant
 constraints. If the matrix has more negative eigenvalues than there are multipliers, the step need not descend, and δ
 grows until it does (every pressure of near-incompressible links counts as a multiplier: E has a maximum there); close
-to an equilibrium δ stays zero, so that unstable equilibria on the path are found and reported as such. Merit of a step:
-the augmented Lagrangian
+to an equilibrium δ stays zero, so that unstable equilibria on the path are found and reported as such. There a step
+that turns stiff links by an angle φ strains them by φ², which may raise the residual of soft motions by orders of
+magnitude until the next step undoes it: these iterations converge as long as steps that raise it become shorter. From
+an unstable equilibrium descent would only lead away. Merit of a step: the augmented Lagrangian
 
     Φ(s) = E(s) − λᵀC + ½ ρ_m |C + cλ|²  at the new multipliers λ, with the compliance c of joints,
 
@@ -78,6 +80,8 @@ class PrimalDualNewton(EquilibriumMethod):
             stability and the tangent of the path; 0: never.
         path_iterations: maximum number of iterations of an arc-length step, after which a shorter one is tried.
         divergence: growth of the residual, over its least value or ``near``, at which a shorter step is tried too.
+        contraction: near an equilibrium, length of a step that raises the residual over that of the last one that did,
+            above which steps descend.
 
     Raises:
         DescriptionError: a limit is not a positive number, a number of iterations not a whole one, or ``reuse_factor``
@@ -96,6 +100,7 @@ class PrimalDualNewton(EquilibriumMethod):
     reuse_factor: float = 1e-3
     path_iterations: int = 10
     divergence: float = 1e3
+    contraction: float = 0.5
 
     def __post_init__(self) -> None:
         super().__post_init__(
@@ -123,7 +128,9 @@ class NewtonSolver(EquilibriumSolver):
         system, options, path = self.system, self.options, control.along_path
         limit, least = options.path_iterations if path else options.iterations, start.minimum_shift
         state, residual = start, system.residual(start, control)
-        best, not_better, line_search, diverged = (state, residual), 0, False, None
+        best, not_better, line_search = (state, residual), 0, False
+        diverged, raising = None, math.inf  # before the first step of any stability that raised the residual; length of
+        # the last such step
         last: tuple[State, np.ndarray] | None = None  # where the last step began, and its motion of the nodes
         residuals, shift, any_stability, predicted, norm, singular = [], least, True, False, math.inf, False
         most = self.factorisations + options.factorisations
@@ -142,7 +149,7 @@ class NewtonSolver(EquilibriumSolver):
                 return self.accept(state, control, residual, residuals, iteration)
             if iteration == limit or self.factorisations >= most:
                 break
-            near = path or (any_stability and residuals[-1] < options.near)
+            near = path or (any_stability and (diverged is not None or residuals[-1] < options.near))
             predicted = last is not None and not near
             system.linearise(state, control, residual, last if predicted else None, contact)
             x, shift, singular = self._direction(residual, least, last=shift, any_stability=near)
@@ -165,9 +172,10 @@ class NewtonSolver(EquilibriumSolver):
                 return self.accept_best(*best, control, residuals, _explained(failure, singular))
             # pressures of mixed elements are stresses that the step solves for already
             last = (before, -length * motion) if options.predicted_stress and not system.blocks.pressures.size else None
-            if near and residual.norm > norm and not self.converged(residual, norm):
-                if diverged is None and self.relative(residual) < options.near:
-                    diverged = before  # may happen once: just beyond a bifurcation small residuals hide large motions
+            closer = residual.norm <= norm and self.relative(residual) < options.near
+            if near and not closer and not self.converged(residual, norm):
+                if system.size(step) <= options.contraction * raising:
+                    diverged, raising = diverged or before, system.size(step)
                 else:
                     # no contraction: near a limit or bifurcation point, where only descent makes progress
                     state, any_stability, line_search, last = diverged or before, False, True, None

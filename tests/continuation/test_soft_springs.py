@@ -48,3 +48,34 @@ def test_last_equilibrium_before_a_limit_load_balances_a_spring_softer_than_the_
     last = caught.value.last
     assert last.force == pytest.approx(stiffness * force(last.displacement), rel=BALANCED)
     assert (1.0 - RESOLUTION) * limit < last.force < (1.0 + BALANCED) * limit
+
+
+def frame() -> tuple[fm.Simulation, fm.Force]:
+    """A symmetric frame of steel legs and rigid arms on soft springs; its ridge sways at a load of 0.02.
+
+    The load spreads the legs more the larger it is, before and beyond the bifurcation alike.
+    """
+    mechanism, steel = fm.Mechanism("frame"), fm.Material("steel", 2e5, 0.3)
+    base, ridge, arms, springs = mechanism.rigid("base", fixed=True), (0.0, 140.0), [], []
+    for name, x in (("left", -50.0), ("right", 50.0)):
+        leg = mechanism.flexible(name, fm.strip([(x, 0), (x, 100)], thickness=5.0, depth=1.0), steel)
+        arms.append(mechanism.rigid(f"{name} arm"))
+        springs.append(JointSpring(mechanism.revolute(base, leg, at=(x, 0), interface_radius=2.5), 1.0))
+        mechanism.revolute(leg, arms[-1], at=(x, 100), interface_radius=2.5)
+    springs.append(JointSpring(mechanism.revolute(*arms, at=ridge), 1.0))
+    load = mechanism.force(on=arms[0], at=ridge, direction=(0, -1))
+    scene = fm.Scene(mechanism, effects=springs)
+    return fm.Simulation(scene, space="plane-stress", order=1, size=10.0, comm=MPI.COMM_SELF), load
+
+
+def test_load_steps_of_stiff_links_beyond_a_bifurcation_end_where_the_followed_path_does():
+    simulation, load = frame()
+    path = simulation.follow(load, until=fm.Until(force=0.04, frames=300))
+    (bifurcation,) = path.bifurcations
+    assert bifurcation.frame.force == pytest.approx(0.02, rel=0.01)
+    stepped = simulation.load_displacement(load, forces=[0.03, 0.04])
+    assert stepped.forces[-1] == pytest.approx(path.forces[-1], rel=1e-9)
+    assert stepped.displacements[-1] == pytest.approx(path.displacements[-1], rel=1e-8)
+    assert [frame.unstable_modes for frame in stepped.frames] == [1, 1]
+    assert not stepped.snapped_through.any()
+    assert stepped.remarks == ("as drawn: 2 of 2 equilibria are unstable under dead loads",)

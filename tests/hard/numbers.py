@@ -58,6 +58,7 @@ def _fidelity(scene: fm.Scene, space: str, comm: MPI.Comm) -> dict[str, Callable
         "Newton's neighbourhood": lambda x: simulated(solver=PrimalDualNewton(near=x)),
         "Newton's largest turn": lambda x: simulated(solver=PrimalDualNewton(largest_turn=x)),
         "Newton's divergence": lambda x: simulated(solver=PrimalDualNewton(divergence=x)),
+        "Newton's contraction": lambda x: simulated(solver=PrimalDualNewton(contraction=x)),
         "Levenberg–Marquardt's tolerance": lambda x: fm.LevenbergMarquardt(tolerance=x),
         "Levenberg–Marquardt's damping": lambda x: fm.LevenbergMarquardt(damping=x),
         "BFGS's tolerance": lambda x: fm.BFGS(tolerance=x),
