@@ -93,7 +93,7 @@ random-scenes: install-test ## N random scenes from SEED on (1000, 0), each chec
 	$(call heading,random scenes)
 	OPENBLAS_NUM_THREADS=1 $(PYTHON) -m tests.hard.random_scenes --count $(N) --seed $(SEED) --write
 
-random-scenes-check: install-test ## a hundred of them, afresh, from a block that nothing was built on
+random-scenes-check: install-test ## a fixed block, the hundred seeds from 10000 on, afresh
 	$(call heading,a hundred random scenes)
 	OPENBLAS_NUM_THREADS=1 $(PYTHON) -m tests.hard.random_scenes --count 100 --seed 10000 --out "$$(mktemp -d)"
 

@@ -2,7 +2,8 @@
 
 An equilibrium is predicted along the tangent y′ and its curvature, corrected in the plane ⟨y₁′, y₂ − y⟩ = 0 through the
 prediction y, and accepted if the path turns little enough; steps are as long as its curvature allows. The only fallback
-is half the step, as long as that is not the shortest one: with the default lengths, seventeen solves at most.
+is half the step, as long as that is not the shortest one: with the default lengths, seventeen tries at most. A try is
+one solve, and one for each of the ``bisections`` if it may go round a corner or jump.
 
 Where other points come to touch an obstacle, the stiffness jumps and the path has a corner. What tells it from a bend
 and from a jump to another branch is the step bisected towards the larger turn: a bend turns less in each half, and the
@@ -32,7 +33,7 @@ from fenicsmech.equilibrium import (
     State,
     Step,
 )
-from fenicsmech.errors import set_options
+from fenicsmech.errors import DescriptionError, set_options
 from fenicsmech.log import logger
 
 _log = logger(__name__)
@@ -50,7 +51,7 @@ class ArcSteps:
         tolerance: of the location of limit points and bifurcations, over the step they lie in.
         turn: angle between the tangents at both ends of a step that step sizes aim at, rad.
         largest_turn: angle above which a step is repeated with a smaller length, unless that is the angle of a corner:
-            it jumps to another branch, or cuts off a bend.
+            it jumps to another branch, or cuts off a bend. At most π/2, across which steps cannot be bisected.
         largest_corner: angle, likewise, of a corner where other points come to touch an obstacle.
         gap: between two paths that pass each other, over the step, from which the step is repeated with a smaller
             length; closer ones count as one bifurcation. Between the ends of a corner, likewise.
@@ -62,7 +63,8 @@ class ArcSteps:
         contact_iterations: the same where other points touch at the end of a step: it hardly depends on its length.
 
     Raises:
-        DescriptionError: a number is not positive, the tolerance not below 1, or the number of iterations not whole.
+        DescriptionError: a number is not positive, the tolerance not below 1, the largest turn or corner above π/2, or
+            the number of iterations not whole.
     """
 
     first: float = 0.02
@@ -83,6 +85,9 @@ class ArcSteps:
         set_options(
             self, "arc-length steps", below_one=("tolerance",), bisections=1, iterations=1, contact_iterations=1
         )
+        for name in ("largest_turn", "largest_corner"):
+            if (angle := getattr(self, name)) > 0.5 * math.pi:
+                raise DescriptionError(f"{name} of arc-length steps", f"{angle:g} rad is above π/2", "Give π/2 or less")
 
 
 @dataclass(frozen=True)
@@ -245,7 +250,7 @@ class ArcLengthStepper(Stepper):
         """Whether the path through ``start`` leads to ``end``, with a ``turn`` that steps may have; ``touched`` is
         whether other points touch there."""
         steps = self.steps
-        if turn > steps.largest_turn:
+        if not turn <= steps.largest_turn:  # NaN where the tangent is lost
             return touched and turn < steps.largest_corner and self._is_corner(start, end)
         # a straight path that goes on straight is the same one
         return turn <= 0.1 * steps.gap or not self._jumps(start, end)

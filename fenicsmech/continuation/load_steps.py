@@ -295,10 +295,7 @@ class LoadStepper(Stepper):
         The tangent holds as long as the same points touch. Elsewhere the first step from the last equilibrium, with
         gaps linearised, is the prediction that keeps links outside obstacles.
         """
-        if self.system.contact is None:
-            return False
-        self.system.load(guess)
-        if not self._others_touch(last.touching, self.system.contact.touching()):
+        if not self._others_touch(last.touching, self.system.touching(guess)):
             return False
         norms = []
         for state in (control.prepare(last.state), control.prepare(guess)):

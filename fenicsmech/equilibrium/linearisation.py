@@ -280,10 +280,6 @@ class Linearisation:
         self._turn()
         return MotorControl(0.0, direction).rate(self._system, self.state)
 
-    def tangent(self) -> Step:
-        """The rate of the state with the control's value."""
-        return self.control.tangent(self.step(self.rate()))
-
     def point(self, residuals: Sequence[float], iterations: int, *, tolerance: float = _ACCURACY) -> EquilibriumPoint:
         """The equilibrium at this state, with its tangent and stability, from one solve; raises as ``solve``.
 

@@ -132,7 +132,8 @@ class NewtonSolver(EquilibriumSolver):
         diverged, raising = None, math.inf  # before the first step of any stability that raised the residual; length of
         # the last such step
         last: tuple[State, np.ndarray] | None = None  # where the last step began, and its motion of the nodes
-        residuals, shift, any_stability, predicted, norm, singular = [], least, True, False, math.inf, False
+        residuals, shift, any_stability, predicted, norm = [], least, True, False, math.inf
+        singular = 0  # of the last iterations, those with a null pivot
         most = self.factorisations + options.factorisations
         contact = system.contact
         if contact is not None:
@@ -152,7 +153,8 @@ class NewtonSolver(EquilibriumSolver):
             near = path or (any_stability and (diverged is not None or residuals[-1] < options.near))
             predicted = last is not None and not near
             system.linearise(state, control, residual, last if predicted else None, contact)
-            x, shift, singular = self._direction(residual, least, last=shift, any_stability=near)
+            x, shift, null = self._direction(residual, least, last=shift, any_stability=near)
+            singular = singular + 1 if null else 0
             plane = self.plane(state, control, residual)
             if contact is not None:
                 x = self._with_contact(contact, x, residual, plane)
@@ -212,21 +214,21 @@ class NewtonSolver(EquilibriumSolver):
     ) -> tuple[PETSc.Vec, float, bool]:
         """x with K x the residual, and δ, raised until the inertia guarantees descent unless ``any_stability`` will do.
 
-        Also returns whether K with the ``least`` δ has pivots that are zero but for rounding.
+        Also returns δ, and whether K with the ``least`` δ has pivots that are zero but for rounding.
 
         δ = ``least`` is tried first; then a third of the ``last`` successful one, and eight times that, …
         """
-        shift, following, singular = least, max(_LEAST_SHIFT, last / 3.0), False
+        shift, following, null = least, max(_LEAST_SHIFT, last / 3.0), False
         for _ in range(self.options.shifts):
             x = self.try_solve(residual.vector, self.step_accuracy(residual)) if self.factor(shift) else None
             if x is not None and shift == least:
-                singular = self.linear.known_inertia().zero > 0
+                null = self.linear.known_inertia().zero > 0
             if x is not None and (any_stability or self.descends()):
                 break
             shift, following = following, 8.0 * following
         else:
             raise NotConverged("no shift of the KKT matrix gives a direction of descent", 0)
-        return x, shift, singular
+        return x, shift, null
 
     def _path_step(self, state: State, control: Control, step: Step, residuals: list[float]) -> tuple[State, Residual]:
         """The whole step across a path, unless it is too large or diverges: then a shorter one along it is due."""
@@ -315,9 +317,13 @@ class NewtonSolver(EquilibriumSolver):
         return agreed(system.comm, value)
 
 
-def _explained(failure: NotConverged, singular: bool) -> NotConverged:
-    """The ``failure`` with its cause where the KKT matrix is ``singular`` but for rounding: steps lose their digits."""
-    if not singular:
+def _explained(failure: NotConverged, singular: int) -> NotConverged:
+    """The ``failure`` with a cause it may have where the last ``singular`` KKT matrices have null pivots, at least two.
+
+    Steps lose their digits then. One null pivot is that of a limit or bifurcation point as well.
+    """
+    if singular < 2:
         return failure
-    cause = "less than the rounding of the stiffest link resists some motion"
-    return NotConverged(f"{cause}; {failure.reason}", failure.iterations)
+    cause = "less than the rounding of the stiffest link may resist some motion"
+    remedy = "if so, stiffen the soft part or soften the stiff one"
+    return NotConverged(f"{failure.reason}; {cause}: {remedy}", failure.iterations)

@@ -13,6 +13,7 @@ import fenicsmech as fm
 from fenicsmech.continuation import ArcLengthStepper, Finish
 from fenicsmech.equilibrium import EquilibriumPoint, LoadControl, NotConverged, Stability, State, Step
 
+REFUSED = "bends too sharply, or another one is too near"
 SHARP = math.radians(75.0)  # more than steps along smooth paths may turn
 
 
@@ -22,11 +23,15 @@ class Plate:
 
     Args:
         paths: points of each, (n, 2), and whether something touches on the piece that begins at each of them.
-        first: the path that solves prefer up to the displacement ``until``; the other one beyond.
+        until: the displacement up to which solves end on the first path; beyond, on the other one.
+        modes: unstable ones of each path.
+        lost: the displacement beyond which tangents are not finite.
     """
 
     paths: list[tuple[np.ndarray, np.ndarray]]
     until: float = math.inf
+    modes: tuple[int, ...] = (0, 0)
+    lost: float = math.inf
     potentials, comm = (), MPI.COMM_SELF
 
     def __post_init__(self) -> None:
@@ -50,16 +55,16 @@ class Plate:
 
     # -- a solver in closed form ----------------------------------------------------------------------------------
 
-    def point(self, place: np.ndarray, way: np.ndarray, touches: bool, control) -> EquilibriumPoint:
+    def point(self, place: np.ndarray, way: np.ndarray, touches: bool, control, modes: int) -> EquilibriumPoint:
         tangent = Step(way[:1], np.zeros(0), np.zeros(0), float(way[1]))
         state = State(place[:1], np.zeros((0, 1)), np.zeros(0), float(place[1]), np.zeros(0))
-        rate = float(way[0])
-        return EquilibriumPoint(state, control, tangent, rate, Stability(0, 0), 1, (0.0,), None, np.array([touches]))
+        rate, stability = float(way[0]), Stability(modes, modes)
+        return EquilibriumPoint(state, control, tangent, rate, stability, 1, (0.0,), None, np.array([touches]))
 
     def linearise(self, state: State, control: LoadControl):
         places, touches = self.paths[0]
         way = (places[1] - places[0]) / (places[1] - places[0])[1]
-        found = self.point(places[0], way, bool(touches[0]), control)
+        found = self.point(places[0], way, bool(touches[0]), control, self.modes[0])
         return type("At", (), {"residual": None, "point": staticmethod(lambda residuals, iterations: found)})
 
     def relative(self, residual: None) -> float:
@@ -68,7 +73,8 @@ class Plate:
     def solve(self, guess: State, control) -> EquilibriumPoint:
         """Where the plane through the guess meets the path."""
         metric, normal = control.metric, control.normal
-        places, touches = self.paths[int(guess.u[0] > self.until)]
+        on = int(guess.u[0] > self.until)
+        places, touches = self.paths[on]
         scale = np.array([1.0 / metric.motion**2, 1.0 / metric.value**2])
         across = np.array([normal.u[0], normal.force]) * scale
         heights = (places - [guess.u[0], guess.force]) @ across
@@ -78,7 +84,8 @@ class Plate:
                 way = places[k + 1] - places[k]
                 way = way / math.sqrt(way**2 @ scale) * (1.0 if way @ across > 0.0 else -1.0)
                 place = places[k] + part * (places[k + 1] - places[k])
-                return self.point(place, way, bool(touches[k]), control)
+                way = way * (math.nan if place[0] > self.lost else 1.0)
+                return self.point(place, way, bool(touches[k]), control, self.modes[on])
         raise NotConverged("the plane meets no path", 1)
 
 
@@ -120,5 +127,21 @@ def test_no_step_takes_another_branch_on_which_something_touches():
     way = math.radians(45.0) + SHARP
     branch = turned([other, other + 5.0 * np.array([math.cos(way), math.sin(way)])], [True, True])
     path = stepper(Plate([straight, branch], until=0.32))
-    with pytest.raises(NotConverged):
+    with pytest.raises(NotConverged, match=REFUSED):
         walked(path, 1.0)
+
+
+def test_a_step_that_hardly_turns_does_not_take_a_less_stable_branch_on_which_something_touches():
+    # a parallel branch at a distance of half a step, which the stability tells from the path
+    straight = turned([(0.0, 0.0), (2.0, 2.0)], [False, False])
+    branch = turned([(0.06, 0.0), (2.06, 2.0)], [True, True])
+    with pytest.raises(NotConverged, match=REFUSED):
+        walked(stepper(Plate([straight, branch], until=0.32, modes=(0, 1))), 1.0)
+    # without another number of unstable modes it is the same path
+    assert walked(stepper(Plate([straight, branch], until=0.32)), 1.0)[-1][1] == pytest.approx(1.0)
+
+
+def test_a_step_to_a_point_without_a_tangent_is_not_taken():
+    straight = turned([(0.0, 0.0), (2.0, 2.0)], [False, False])
+    with pytest.raises(NotConverged, match=REFUSED):
+        walked(stepper(Plate([straight], lost=0.32)), 1.0)

@@ -92,7 +92,7 @@ def test_arc_length_is_corrected_like_other_controls_whatever_is_held(held):
     simulation, push = finger("plane-stress")
     solver = simulation.solver(push)
     system, state = solver.system, simulation.load_displacement(push, forces=[1.0]).frames[0].state
-    tangent = solver.linearise(state, LoadControl(1.0)).tangent()
+    tangent = solver.linearise(state, LoadControl(1.0)).point((), 0).tangent
     metric = ArcMetric(system, LoadControl(), system.size(tangent), 1.0, 1.0)
     control = ArcLengthControl(0.5, metric, state, metric.unit(tangent), held)
     point = solver.solve(state, control)

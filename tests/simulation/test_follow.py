@@ -1,5 +1,7 @@
 """Followed curves as users ask for them, draw them and go on from them."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -32,6 +34,13 @@ def test_invalid_ends_are_refused(given, message):
 def test_invalid_steps_are_refused(given):
     with pytest.raises(fm.DescriptionError):
         fm.ArcSteps(**given)
+
+
+@pytest.mark.parametrize("angle", ["largest_turn", "largest_corner"])
+def test_steps_that_turn_by_more_than_a_right_angle_are_refused(angle):
+    fm.ArcSteps(**{angle: 0.5 * math.pi})
+    with pytest.raises(fm.DescriptionError, match=f"{angle} of arc-length steps: 1.6 rad is above π/2"):
+        fm.ArcSteps(**{angle: 1.6})
 
 
 def test_an_until_without_an_end_is_refused():

@@ -107,16 +107,15 @@ def run(scene: DesignScene) -> tuple[str, str]:
         if _idle(scene, frame.displacement):
             return "true: DescriptionError, the links do not carry the force", str(error)
         raise
-    misreport = _misreported(scene, built, result, frame.displacement)
-    if misreport is not None:
+    if (misreport := _misreported(scene, built, result, frame.displacement)) is not None:
         return misreport
     if _met(result):
         return "designed: targets met", result.reason
     # an independent start, from shapes that differ by what the bounds allow
     rng, initial = np.random.default_rng(scene.start), problem.initial
     other = problem.optimise(start=initial + _spread(scene) * rng.uniform(-1.0, 1.0, initial.shape))
-    if (told := _misreported(scene, built, other, frame.displacement)) is not None:
-        return told
+    if (misreport := _misreported(scene, built, other, frame.displacement)) is not None:
+        return misreport
     if _met(other):
         return "wrong: a second start meets the targets", f"{result.reason}; {result.targets[0]}"
     return UNMET, f"{result.reason}; {', '.join(result.active)}; {result.targets[0]}"

@@ -1,4 +1,4 @@
-"""How far flexible links must be stretched at least for the force's point to get where it is prescribed to be.
+"""The least stretch of flexible links that is found for the force's point to get where it is prescribed to be.
 
 A link is replaced by strings between its joints and the point of the force, s the length of link between the ends of a
 string and d their distance: nothing resists while d < s. Rigid links, joints and motors are as they are; springs are
@@ -7,8 +7,9 @@ left out. Then the minimum over all poses, m strings,
     c = min Σ ⟨d / s − 1⟩² + w² (|gaps of joints|² + |travel − wanted|²)
 
 is zero or else at least one link is stretched by 1 + √(c / m), wherever the equilibrium is: where joints are closed and
-the travel is as wanted, the second term vanishes, and the first one is no less than c. It is found by least squares
-from a known pose on.
+the travel is as wanted, the second term vanishes, and the first one is no less than c. Least squares finds local
+minima: from a known pose on, and from some at random about it, always the same. The least of them bounds the stretch
+only if it is the global one, which nothing here proves.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 from scipy.spatial.transform import Rotation
 
 from .blueprint import LinkPlan
@@ -26,6 +27,9 @@ from .potential import Potential
 from .thresholds import THRESHOLDS
 
 _STEPS = 8  # from the travel that is known to the wanted one
+_STARTS, _APART = 6, np.pi  # poses at random, and by how many rad or lengths of the mechanism they are off at most
+_EVALUATIONS, _TOLERANCE = 100, 1e-6  # of a fit
+_CLOSE = 1e-3  # between the stretches of fits to the same minimum
 
 
 @dataclass(frozen=True)
@@ -37,7 +41,9 @@ class _String:
 
 
 def least_stretch(potential: Potential, u: np.ndarray, poses: np.ndarray, travel: float) -> float:
-    """The least stretch 1 + √(c / m) of the links that is found; one if they need none.
+    """The least stretch 1 + √(c / m) of the links that was found; one if they need none.
+
+    NaN if no fit converged to it.
 
     Args:
         potential: of the scene.
@@ -84,12 +90,18 @@ def least_stretch(potential: Potential, u: np.ndarray, poses: np.ndarray, travel
         held = np.append(potential.closure.residual(places).astype(float), (way - wanted) / length)
         return np.concatenate([np.maximum(slack, 0.0), THRESHOLDS.tied * held])
 
+    def fitted(unknowns: np.ndarray, wanted: float) -> OptimizeResult:
+        return least_squares(residual, unknowns, args=(wanted,), xtol=1e-12, ftol=_TOLERANCE, max_nfev=_EVALUATIONS)
+
     unknowns = np.zeros(len(free) * (dim + turns) + len(loose) * dim)
     for share in np.linspace(0.0, 1.0, _STEPS + 1)[1:]:
-        wanted = known + share * (travel - known)
-        unknowns = least_squares(residual, unknowns, args=(wanted,), xtol=1e-12, ftol=1e-12, max_nfev=100).x
-    cost = float(np.sum(residual(unknowns, travel) ** 2))
-    return 1.0 + float(np.sqrt(cost / max(len(strings), 1)))
+        fit = fitted(unknowns, known + share * (travel - known))
+        unknowns = fit.x
+    starts = np.random.default_rng(0).uniform(-_APART, _APART, (_STARTS, unknowns.size))
+    fits = [fit, *(fitted(start, travel) for start in starts)]
+    stretches = 1.0 + np.sqrt([2.0 * fit.cost / max(len(strings), 1) for fit in fits])
+    least, converged = float(stretches.min()), stretches[[fit.success for fit in fits]]
+    return least if converged.min(initial=np.inf) < least + _CLOSE else np.nan
 
 
 def _strings(potential: Potential) -> list[_String]:

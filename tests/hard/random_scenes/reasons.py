@@ -166,7 +166,7 @@ def at_limit(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError) -
 
 
 def out_of_reach(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError) -> Excuse | None:
-    """Rigid links and joints take the point where it is prescribed to be only if flexible links are drawn out of shape.
+    """No pose was found in which the point is where it is prescribed to be and flexible links keep their shape.
 
     Displacements count from the unloaded configuration, travels from the drawn one.
     """
@@ -178,7 +178,7 @@ def out_of_reach(blueprint: Blueprint, built: Built, failure: fm.EquilibriumErro
     travel = float(np.real(potential.led_travel(potential.nodal(potential.fields(last.state.u)[0], places), places)))
     wanted = travel + _asked(blueprint, failure) - last.displacement
     stretch = least_stretch(potential, last.state.u, last.state.poses, wanted)
-    return _excuse("out of reach", "stretch that links need", stretch, above=THRESHOLDS.unreached)
+    return _excuse("out of reach", "least stretch found", stretch, above=THRESHOLDS.unreached)
 
 
 def inverted(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError) -> Excuse | None:

@@ -8,7 +8,7 @@ import pytest
 
 import fenicsmech as fm
 
-from . import designs
+from . import designs, reach
 from .blueprint import Blueprint, ContactPlan, ForcePlan, JointPlan, LinkPlan, PlanePlan, SpringPlan, build
 from .designs import UNMET
 from .potential import Potential
@@ -105,6 +105,40 @@ def test_a_displacement_is_out_of_reach_where_links_must_be_twice_as_long(raised
     assert abs(stretch - THRESHOLDS.unreached) < 0.4 or displacement < 0.0 and stretch < 1.0 + 1e-6
     # of two samples the first failed
     assert out_of_reach(replace(led, samples=(0.0, displacement)), built, failed(frame)) is None
+
+
+def hung() -> Blueprint:
+    """A rigid crank from the origin to (0, 10), and a strip from there to the ground at (0, 30)."""
+    return replace(
+        slider(control="displacements"),
+        topology="hung",
+        links=(
+            LinkPlan("base", fixed=True),
+            LinkPlan("crank"),
+            LinkPlan("strip", False, ((0.0, 10.0), (0.0, 30.0)), 2.0, 3.0, 1770.0, 0.4, size=2.5),
+        ),
+        joints=(
+            JointPlan("A", "revolute", "base", "crank", (0.0, 0.0)),
+            JointPlan("B", "revolute", "crank", "strip", (0.0, 10.0), interface=1.4),
+            JointPlan("C", "revolute", "strip", "base", (0.0, 30.0), interface=1.4),
+        ),
+        forces=(ForcePlan("load", "crank", (0.0, 10.0), (1.0, 0.0)),),
+    )
+
+
+def test_reach_is_that_of_the_best_of_several_starts_and_of_none_that_did_not_converge(monkeypatch):
+    # the crank's end is 6 to the right in two poses: 8 above its pivot, and as far below, where it draws the strip
+    built = build(hung())
+    potential = Potential.of(hung(), built.simulation)
+    below, still = np.array(built.simulation.linkage.joints.drawn), np.zeros(potential.mesh.nodes.size)
+    crank, end = potential.closure.ends["B"]
+    below[crank] = [*(2.0 * (np.zeros(2) - potential.centres[crank][:2])), np.pi]
+    below[end] = [0.0, -20.0, 0.0]
+    assert least_stretch(potential, still, below, 6.0) == pytest.approx(1.0, abs=1e-3)
+    monkeypatch.setattr(reach, "_STARTS", 0)
+    assert least_stretch(potential, still, below, 6.0) > 1.3
+    monkeypatch.setattr(reach, "_EVALUATIONS", 1)
+    assert np.isnan(least_stretch(potential, still, below, 6.0))
 
 
 def test_stiffness_is_compared_at_stable_equilibria_that_second_differences_confirm(raised):
@@ -212,7 +246,7 @@ def results(outcomes: dict[str, int], total: int, unchecked: str = "") -> list[S
 
 
 @pytest.mark.parametrize(
-    "outcomes, told",
+    "outcomes, bounds",
     [
         ({"true: EquilibriumError, at a limit point": 35}, 0),
         ({"true: EquilibriumError, at a limit point": 36}, 1),
@@ -220,22 +254,22 @@ def results(outcomes: dict[str, int], total: int, unchecked: str = "") -> list[S
         ({"true: a": 22, "true: b": 22, "true: c": 22}, 1),
         ({"true: EquilibriumError, the point cannot move that way": 125}, 0),
         ({"true: EquilibriumError, the point cannot move that way": 126}, 1),
-        ({ROUNDED: 305}, 0),
-        ({ROUNDED: 306}, 1),
+        ({ROUNDED: 215}, 0),
+        ({ROUNDED: 216}, 1),
     ],
 )
-def test_excuses_are_bounded_alone_and_together(outcomes, told):
-    assert len(excessive(results(outcomes, 1000))) == told
+def test_excuses_are_bounded_alone_and_together(outcomes, bounds):
+    assert len(excessive(results(outcomes, 1000))) == bounds
 
 
 def test_checks_left_out_and_designs_without_an_end_are_bounded():
     some = results({}, 100)
-    some[:35] = results({}, 35, unchecked="stability")
+    some[:30] = results({}, 30, unchecked="stability")
     assert not excessive(some)
-    some[:36] = results({}, 36, unchecked="displacement and stability")
+    some[:31] = results({}, 31, unchecked="displacement and stability")
     assert len(excessive(some)) == 1
     ends = [
-        SceneResult(40 * k + 39, "design", UNMET if k < 13 else "designed: targets met", "", 1.0) for k in range(20)
+        SceneResult(40 * k + 39, "design", UNMET if k < 12 else "designed: targets met", "", 1.0) for k in range(20)
     ]
     assert not excessive(ends)
     assert len(excessive([replace(end, outcome=UNMET) for end in ends])) == 1
